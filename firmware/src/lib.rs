@@ -1,0 +1,2 @@
+//! Controller firmware: board-independent library.
+#![no_std]

@@ -1,0 +1,2 @@
+//! The muscle model.
+#![no_std]
