@@ -1,1 +1,5 @@
 //! Host library.
+
+pub mod error;
+pub mod muscle_description;
+pub mod recording;

@@ -1,0 +1,332 @@
+//! What went wrong, said once for a person: the cause, where it is, what to do.
+//!
+//! Every failure of the library is an [`Error`]. Its [`Code`] is stable, so that scripts can test for it, and decides
+//! the exit status: 1 when the input or the device is at fault, 2 when the call is.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Shorthand for results of this crate.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Who is at fault, and so the exit status of the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fault {
+    /// The input or the device: exit status 1.
+    Input,
+    /// The way the program was called: exit status 2.
+    Call,
+}
+
+impl Fault {
+    /// The exit status of the program.
+    #[must_use]
+    pub fn exit_status(self) -> u8 {
+        match self {
+            Self::Input => 1,
+            Self::Call => 2,
+        }
+    }
+}
+
+macro_rules! codes {
+    ($($(#[$doc:meta])* $name:ident = $text:literal, $fault:ident;)*) => {
+        /// The stable name of a kind of failure.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[non_exhaustive]
+        pub enum Code { $($(#[$doc])* $name,)* }
+
+        impl Code {
+            /// Every code there is, for the manual and for tests.
+            pub const ALL: &'static [Self] = &[$(Self::$name,)*];
+
+            /// The name that scripts may rely on, such as `recording::missing-column`.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$name => $text,)* }
+            }
+
+            /// Who is at fault.
+            #[must_use]
+            pub fn fault(self) -> Fault {
+                match self { $(Self::$name => Fault::$fault,)* }
+            }
+        }
+    };
+}
+
+codes! {
+    /// A file does not exist, may not be read, or ends early.
+    FileUnreadable = "file::unreadable", Input;
+    /// A result could not be written; what stood there before is untouched.
+    FileUnwritable = "file::unwritable", Input;
+    /// A file holds nothing at all.
+    RecordingEmpty = "recording::empty", Input;
+    /// A file is binary, or text in an encoding other than UTF-8.
+    RecordingNotText = "recording::not-text", Input;
+    /// A required column is absent.
+    RecordingMissingColumn = "recording::missing-column", Input;
+    /// Two columns give the same quantity.
+    RecordingDuplicateColumn = "recording::duplicate-column", Input;
+    /// A column's name ends in a unit that its quantity does not have.
+    RecordingUnknownUnit = "recording::unknown-unit", Input;
+    /// A cell holds something that is not a number.
+    RecordingNotANumber = "recording::not-a-number", Input;
+    /// A cell holds NaN or an infinity.
+    RecordingNotFinite = "recording::not-finite", Input;
+    /// A line has too few or too many cells.
+    RecordingWrongWidth = "recording::wrong-width", Input;
+    /// Time stands still or goes backwards.
+    RecordingTimeOrder = "recording::time-order", Input;
+    /// A number is outside what is physically possible.
+    RecordingOutOfRange = "recording::out-of-range", Input;
+    /// Too few rows to be of use.
+    RecordingTooShort = "recording::too-short", Input;
+    /// The file's container (compression, MATLAB, Parquet) is damaged or not supported.
+    RecordingContainer = "recording::container", Input;
+    /// Lengths are given, but not the muscle's rest length that turns them into a stroke.
+    RecordingRestLength = "recording::rest-length", Call;
+    /// An import description is not valid, or does not fit the file.
+    ImportInvalid = "import::invalid", Input;
+    /// A muscle description is not valid.
+    MuscleInvalid = "muscle::invalid", Input;
+    /// The data do not allow the fit that was asked for.
+    FitUnderdetermined = "fit::underdetermined", Input;
+    /// A table file is damaged or from another version.
+    TableInvalid = "table::invalid", Input;
+    /// The device does not answer, or is not ours.
+    DeviceSilent = "device::silent", Input;
+    /// The device speaks another version, or refused what was asked.
+    DeviceRefused = "device::refused", Input;
+    /// Options that contradict each other or are out of range.
+    CallInvalid = "call::invalid", Call;
+}
+
+/// Where in the input a failure was found. Unknown parts stay empty.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Place {
+    /// The file.
+    pub file: Option<PathBuf>,
+    /// Line in the file, counted from 1.
+    pub line: Option<u64>,
+    /// Column: its name, or its number counted from 1.
+    pub column: Option<String>,
+    /// The offending text.
+    pub value: Option<String>,
+}
+
+impl Place {
+    fn is_empty(&self) -> bool {
+        self.file.is_none() && self.line.is_none() && self.column.is_none() && self.value.is_none()
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(file) = &self.file {
+            write!(f, "{}", file.display())?;
+        }
+        if let Some(line) = self.line {
+            // `file:line` is what editors and terminals turn into a link.
+            if self.file.is_some() { write!(f, ":{line}")? } else { write!(f, "line {line}")? }
+        }
+        if let Some(column) = &self.column {
+            let gap = if self.file.is_some() || self.line.is_some() { ", " } else { "" };
+            write!(f, "{gap}column {column}")?;
+        }
+        if let Some(value) = &self.value {
+            let gap =
+                if self.file.is_some() || self.line.is_some() || self.column.is_some() { ": " } else { "" };
+            write!(f, "{gap}{value}")?;
+        }
+        Ok(())
+    }
+}
+
+#[derive(Debug)]
+struct Inner {
+    code: Code,
+    cause: String,
+    place: Place,
+    help: Option<String>,
+}
+
+/// A failure as the user sees it.
+///
+/// ```
+/// use host::error::{Code, Error};
+/// let error = Error::new(Code::RecordingNotANumber, "not a number")
+///     .file("a.csv").line(7).column("force_N").value("12,5").help("write decimals with a point");
+/// assert_eq!(error.to_string(), "not a number (a.csv:7, column force_N: `12,5`)");
+/// assert_eq!(error.code().name(), "recording::not-a-number");
+/// assert_eq!(error.exit_status(), 1);
+/// ```
+#[derive(Debug, thiserror::Error)]
+#[error("{}", self.text())]
+pub struct Error(Box<Inner>);
+
+impl Error {
+    /// A failure of kind `code` with its `cause` in one clause, without a full stop.
+    pub fn new(code: Code, cause: impl Into<String>) -> Self {
+        Self(Box::new(Inner { code, cause: cause.into(), place: Place::default(), help: None }))
+    }
+
+    /// The file could not be read; the operating system's reason becomes part of the cause.
+    pub fn unreadable(file: impl AsRef<Path>, reason: &std::io::Error) -> Self {
+        Self::new(Code::FileUnreadable, format!("cannot be read: {reason}")).file(file)
+    }
+
+    /// The file could not be written; the operating system's reason becomes part of the cause.
+    pub fn unwritable(file: impl AsRef<Path>, reason: &std::io::Error) -> Self {
+        Self::new(Code::FileUnwritable, format!("cannot be written: {reason}")).file(file)
+    }
+
+    /// Names the file. A file already named stays: the innermost place is the exact one.
+    #[must_use]
+    pub fn file(mut self, file: impl AsRef<Path>) -> Self {
+        self.0.place.file.get_or_insert_with(|| file.as_ref().to_path_buf());
+        self
+    }
+
+    /// Names the line, counted from 1.
+    #[must_use]
+    pub fn line(mut self, line: u64) -> Self {
+        self.0.place.line.get_or_insert(line);
+        self
+    }
+
+    /// Names the column.
+    #[must_use]
+    pub fn column(mut self, column: impl Into<String>) -> Self {
+        self.0.place.column.get_or_insert_with(|| column.into());
+        self
+    }
+
+    /// Quotes the offending text, shortened and with control characters made visible.
+    #[must_use]
+    pub fn value(mut self, value: impl AsRef<str>) -> Self {
+        let text = value.as_ref();
+        let mut quoted: String = text.chars().take(40).flat_map(char::escape_debug).collect();
+        if text.chars().nth(40).is_some() {
+            quoted.push('…');
+        }
+        self.0.place.value.get_or_insert(format!("`{quoted}`"));
+        self
+    }
+
+    /// Says what to do about it.
+    #[must_use]
+    pub fn help(mut self, help: impl Into<String>) -> Self {
+        self.0.help = Some(help.into());
+        self
+    }
+
+    /// The stable kind of this failure.
+    #[must_use]
+    pub fn code(&self) -> Code {
+        self.0.code
+    }
+
+    /// What is wrong, without the place.
+    #[must_use]
+    pub fn cause(&self) -> &str {
+        &self.0.cause
+    }
+
+    /// Where it is wrong.
+    #[must_use]
+    pub fn place(&self) -> &Place {
+        &self.0.place
+    }
+
+    /// What to do, if there is advice.
+    #[must_use]
+    pub fn advice(&self) -> Option<&str> {
+        self.0.help.as_deref()
+    }
+
+    /// The exit status that this failure ends the program with.
+    #[must_use]
+    pub fn exit_status(&self) -> u8 {
+        self.0.code.fault().exit_status()
+    }
+
+    fn text(&self) -> String {
+        if self.0.place.is_empty() {
+            self.0.cause.clone()
+        } else {
+            format!("{} ({})", self.0.cause, self.0.place)
+        }
+    }
+}
+
+impl miette::Diagnostic for Error {
+    fn code<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        Some(Box::new(self.0.code.name()))
+    }
+
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.0.help.as_ref().map(|h| Box::new(h) as Box<dyn fmt::Display>)
+    }
+}
+
+/// The candidate nearest in spelling to `wanted`, if one is near enough to be worth offering.
+///
+/// ```
+/// assert_eq!(host::error::nearest("pressure_kpa", ["time_s", "pressure_kPa"]), Some("pressure_kPa"));
+/// assert_eq!(host::error::nearest("voltage", ["time_s", "pressure_kPa"]), None);
+/// ```
+pub fn nearest<'a>(wanted: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let wanted = wanted.to_lowercase();
+    candidates
+        .into_iter()
+        .map(|c| (edit_distance(&wanted, &c.to_lowercase()), c))
+        .filter(|(d, c)| *d <= 1 + wanted.chars().count().max(c.chars().count()) / 4)
+        .min_by_key(|(d, _)| *d)
+        .map(|(_, c)| c)
+}
+
+fn edit_distance(a: &str, b: &str) -> usize {
+    // Names are short; anything longer is no misspelling of one of ours.
+    let a: Vec<char> = a.chars().take(64).collect();
+    let b: Vec<char> = b.chars().take(64).collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, ca) in a.iter().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, cb) in b.iter().enumerate() {
+            let substitution = diagonal + usize::from(ca != cb);
+            diagonal = row[j + 1];
+            row[j + 1] = substitution.min(row[j] + 1).min(row[j + 1] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_are_distinct_and_lead_to_an_exit_status() {
+        let mut names: Vec<_> = Code::ALL.iter().map(|c| c.name()).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), Code::ALL.len());
+        assert!(Code::ALL.iter().all(|c| matches!(c.fault().exit_status(), 1 | 2)));
+    }
+
+    #[test]
+    fn the_innermost_place_wins() {
+        let error = Error::new(Code::MuscleInvalid, "x").line(3).file("inner").file("outer").line(9);
+        assert_eq!(error.to_string(), "x (inner:3)");
+    }
+
+    #[test]
+    fn quoted_values_are_short_and_printable() {
+        let error =
+            Error::new(Code::RecordingNotANumber, "x").value("a\u{1b}[31m".to_owned() + &"é".repeat(100));
+        let text = error.to_string();
+        assert!(text.chars().count() < 70 && !text.contains('\u{1b}'), "{text}");
+    }
+}
