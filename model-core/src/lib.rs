@@ -1,2 +1,4 @@
 //! The muscle model.
 #![no_std]
+
+pub mod link;

@@ -1,0 +1,249 @@
+//! ONE table of endpoints: number, name, request, response. Everything else about them is made from it.
+
+use super::messages::{
+    DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, PastFault, Reference,
+    ReferencePoints, Refusal, SetPoint, Start, Status, TableBegin, TableInfo, TablePiece, TableRead,
+    TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead,
+};
+use super::messages::{Event, Side, Telemetry};
+use super::settings::Settings;
+use postcard_schema::{Schema, key::hash::fnv1a64::hash_ty_path};
+
+/// A question and its answer.
+pub trait Endpoint {
+    /// What the host sends.
+    type Request: serde::Serialize + serde::de::DeserializeOwned + Schema;
+    /// What the device answers.
+    type Response: serde::Serialize + serde::de::DeserializeOwned + Schema;
+    /// Number in the frame's header.
+    const ID: u8;
+    /// Name, for people.
+    const NAME: &'static str;
+}
+
+/// One row of the table, for tools that list it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// Number.
+    pub id: u8,
+    /// Name.
+    pub name: &'static str,
+    /// Hash of number, name, request and response.
+    pub hash: u64,
+}
+
+const fn mix(hash: u64, bytes: [u8; 8]) -> u64 {
+    let mut hash = hash;
+    let mut at = 0;
+    while at < bytes.len() {
+        hash = (hash ^ bytes[at] as u64).wrapping_mul(0x0000_0100_0000_01b3);
+        at += 1;
+    }
+    hash
+}
+
+const FNV_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
+
+macro_rules! endpoints {
+    ($($(#[$doc:meta])* $id:literal $name:ident $marker:ident : $request:ty => $response:ty;)*) => {
+        $(
+            $(#[$doc])*
+            #[derive(Clone, Copy, Debug)]
+            pub struct $marker;
+
+            impl Endpoint for $marker {
+                type Request = $request;
+                type Response = $response;
+                const ID: u8 = $id;
+                const NAME: &'static str = stringify!($name);
+            }
+        )*
+
+        /// The table, in the order of its numbers.
+        pub const TABLE: &[Row] = &[$(Row {
+            id: $id,
+            name: stringify!($name),
+            hash: mix(
+                mix(mix(FNV_BASIS, [$id, 0, 0, 0, 0, 0, 0, 0]), hash_ty_path::<$request>(stringify!($name))),
+                hash_ty_path::<$response>(stringify!($name)),
+            ),
+        }),*];
+
+        /// A request that has been read.
+        #[derive(Clone, Debug, PartialEq)]
+        #[allow(clippy::large_enum_variant, reason = "one exists at a time, on the stack of the link task")]
+        pub enum Call {
+            $($(#[$doc])* $marker($request),)*
+        }
+
+        impl Call {
+            /// Reads the request of an endpoint.
+            pub fn read(id: u8, body: &[u8]) -> Result<Self, Refusal> {
+                match id {
+                    $($id => postcard::from_bytes(body).map(Self::$marker).map_err(|_| Refusal::Malformed),)*
+                    _ => Err(Refusal::UnknownEndpoint),
+                }
+            }
+
+            /// Name of the endpoint.
+            pub const fn name(&self) -> &'static str {
+                match self {
+                    $(Self::$marker(_) => stringify!($name),)*
+                }
+            }
+        }
+
+        /// What a device must be able to answer: one function for each endpoint.
+        pub trait Service {
+            $(
+                $(#[$doc])*
+                fn $name(&mut self, request: $request) -> Result<$response, Refusal>;
+            )*
+        }
+
+        /// Answers one request with a service; gives the length of the postcard body in `out`.
+        pub fn answer<S: Service + ?Sized>(service: &mut S, id: u8, body: &[u8], out: &mut [u8]) -> Result<usize, Refusal> {
+            match Call::read(id, body)? {
+                $(Call::$marker(request) => {
+                    let response = service.$name(request)?;
+                    postcard::to_slice(&response, out).map(|used| used.len()).map_err(|_| Refusal::Range)
+                })*
+            }
+        }
+    };
+}
+
+endpoints! {
+    /// Identity, limits, tables in use.
+    1 info GetInfo: () => DeviceInfo;
+    /// What the device is doing.
+    2 status GetStatus: () => Status;
+    /// `Disarmed` → `Armed`.
+    3 arm Arm: () => Status;
+    /// `Armed` → `Running`, or another mode while running. The first set-point is what is measured.
+    4 start StartMode: Start => Status;
+    /// Vents and goes to `Armed`; allowed always except in `Fault`, where it vents and stays.
+    5 stop Stop: () => Status;
+    /// Vents and goes to `Disarmed`; in `Fault` it vents and stays.
+    6 disarm Disarm: () => Status;
+    /// What is wanted from now on; ends a reference.
+    7 set_point SetTo: SetPoint => Status;
+    /// Starts a reference generator.
+    8 reference SetReference: Reference => Status;
+    /// Points for the reference table.
+    9 reference_points SetReferencePoints: ReferencePoints => u16;
+    /// Sets the stream of telemetry; the answer is the rate in force.
+    10 telemetry SetTelemetry: TelemetryRate => TelemetryRate;
+    /// Faults since the start.
+    11 faults GetFaults: () => Faults;
+    /// One fault of the past, kept over power cycles.
+    12 past_fault GetPastFault: PastFault => Option<FaultReport>;
+    /// Forgets the latched fault: `Fault` → `Disarmed`, unless its condition still holds.
+    13 clear_fault ClearFault: () => Status;
+    /// The settings in force.
+    14 settings GetSettings: () => Settings;
+    /// Checks, keeps and uses settings; only while disarmed or armed.
+    15 set_settings SetSettings: Settings => Settings;
+    /// Begins the upload of a table.
+    16 table_begin BeginTable: TableBegin => ();
+    /// The next piece; the answer is how many bytes are there.
+    17 table_piece SendTablePiece: TablePiece => u32;
+    /// Checks the whole table, keeps it, uses it; only while disarmed or armed.
+    18 table_commit CommitTable: () => TableInfo;
+    /// A piece of the kept table; empty behind its end.
+    19 table_read ReadTable: TableRead => TablePiece;
+    /// Goes back to the table before; only while disarmed or armed.
+    20 table_rollback RollBackTable: Side => TableInfo;
+    /// What the table says at some points.
+    21 evaluate EvaluateTable: Evaluate => Evaluated;
+    /// Arms a trace.
+    22 trace_arm ArmTrace: TraceArm => TraceInfo;
+    /// The trace as it stands.
+    23 trace_info GetTrace: () => TraceInfo;
+    /// Values of the trace.
+    24 trace_read ReadTrace: TraceRead => TracePiece;
+    /// Forgets a muscle's remembered history.
+    25 forget_memory Forget: ForgetMemory => ();
+    /// Restarts the device after this answer; only while disarmed.
+    26 restart Restart: () => ();
+}
+
+/// Topic of [`Telemetry`].
+pub const TELEMETRY: u8 = 128;
+/// Topic of [`Event`].
+pub const EVENT: u8 = 129;
+
+/// Hash of the whole table, its messages and the topics: equal at both ends or they do not talk.
+pub const SCHEMA_HASH: u64 = {
+    let mut hash = FNV_BASIS;
+    let mut at = 0;
+    while at < TABLE.len() {
+        hash = mix(hash, TABLE[at].hash.to_le_bytes());
+        at += 1;
+    }
+    hash = mix(hash, hash_ty_path::<Telemetry>("telemetry"));
+    hash = mix(hash, hash_ty_path::<Event>("event"));
+    hash = mix(hash, hash_ty_path::<Refusal>("refusal"));
+    mix(hash, (super::LINK_VERSION as u64).to_le_bytes())
+};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::frame::MAX_BODY;
+    use crate::link::messages::{Mode, PIECE, POINTS, SideSample, State, TRACE_PIECE, Value};
+
+    #[test]
+    fn numbers_rise_and_names_differ() {
+        for pair in TABLE.windows(2) {
+            assert!(pair[0].id < pair[1].id, "{} and {}", pair[0].name, pair[1].name);
+        }
+        for (at, row) in TABLE.iter().enumerate() {
+            assert!(row.id > 0 && row.id < TELEMETRY, "0 is hello, from 128 on are topics");
+            assert!(TABLE[..at].iter().all(|other| other.name != row.name && other.hash != row.hash));
+        }
+    }
+
+    /// If this test breaks, a message or endpoint was changed on purpose: raise `LINK_VERSION` when its meaning moved,
+    /// and write the new hash here.
+    #[test]
+    fn the_schema_changes_only_on_purpose() {
+        assert_eq!(SCHEMA_HASH, 0x8d10_ea45_f35e_6c71, "{SCHEMA_HASH:#018x}");
+    }
+
+    #[test]
+    fn the_largest_messages_fit_a_frame() {
+        let mut out = [0u8; MAX_BODY];
+        let fits = |length: Result<&mut [u8], postcard::Error>| length.map(|used| used.len());
+        assert!(fits(postcard::to_slice(&Settings::default(), &mut out)).is_ok_and(|n| n < 400));
+        let piece =
+            TablePiece { offset: u32::MAX, bytes: heapless::Vec::from_slice(&[255; PIECE]).expect("fits") };
+        assert!(fits(postcard::to_slice(&piece, &mut out)).is_ok());
+        let piece = TracePiece { values: heapless::Vec::from_slice(&[f32::MAX; TRACE_PIECE]).expect("fits") };
+        assert!(fits(postcard::to_slice(&piece, &mut out)).is_ok());
+        let values = Evaluated {
+            values: heapless::Vec::from_slice(&[Value { force_n: 1.0, pressure_pa: 1.0 }; POINTS])
+                .expect("fits"),
+        };
+        assert!(fits(postcard::to_slice(&values, &mut out)).is_ok());
+        let sample = SideSample::default();
+        let telemetry = Telemetry {
+            time_us: u64::MAX / 2,
+            tick: u64::MAX / 1000,
+            state: State::Running,
+            mode: Mode::Pair,
+            asked: 1.0,
+            asked_second: 1.0,
+            sides: heapless::Vec::from_slice(&[sample; 2]).expect("fits"),
+        };
+        // A byte takes ten bits at 1 Mbaud: 100 bytes a millisecond, frame included, keep 1 kHz without loss.
+        assert!(fits(postcard::to_slice(&telemetry, &mut out)).is_ok_and(|n| n + 10 < 100));
+    }
+
+    #[test]
+    fn unknown_numbers_and_foreign_bodies_are_refused() {
+        assert_eq!(Call::read(127, &[]), Err(Refusal::UnknownEndpoint));
+        assert_eq!(Call::read(SetTo::ID, &[9]), Err(Refusal::Malformed));
+        assert_eq!(Call::read(GetInfo::ID, &[]), Ok(Call::GetInfo(())));
+    }
+}

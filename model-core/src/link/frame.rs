@@ -1,0 +1,344 @@
+//! Frames on the wire: COBS(header ‖ body ‖ CRC-32) 0x00, one encoder and one decoder for both ends.
+//!
+//! | bytes | field | |
+//! | --- | --- | --- |
+//! | 0 | kind | [`Kind`] |
+//! | 1 | id | number of the endpoint or topic |
+//! | 2..4 | sequence | little-endian; an answer repeats its request's, a topic counts its own |
+//! | 4..n−4 | body | at most [`MAX_BODY`] bytes |
+//! | n−4..n | check | CRC-32 (ISO-HDLC: polynomial 0x04C11DB7 reflected, as in Ethernet and zip) of all before it, little-endian |
+//!
+//! Consistent overhead byte stuffing (Cheshire and Baker, 1999, doi:10.1109/90.769765) leaves no zero byte inside, so
+//! a receiver that lost its place waits for the next zero and is in step again, whatever came before.
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+
+/// Largest body that a frame carries.
+pub const MAX_BODY: usize = 512;
+/// Bytes of the header.
+pub const HEADER: usize = 4;
+/// Bytes of the check sum.
+pub const CHECK: usize = 4;
+/// Largest frame before stuffing.
+pub const MAX_RAW: usize = HEADER + MAX_BODY + CHECK;
+/// Largest frame on the wire, its closing zero included: COBS adds one byte for each 254 begun.
+pub const MAX_WIRE: usize = MAX_RAW + MAX_RAW.div_ceil(254) + 1;
+
+/// The CRC of frames and of table uploads, with a look-up table of 1 KiB: telemetry needs it a thousand times a second.
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// CRC-32 (ISO-HDLC) of some bytes, as used in frames and for whole tables.
+///
+/// ```
+/// // The check value of the catalogue of parametrised CRC algorithms.
+/// assert_eq!(model_core::link::frame::crc32(b"123456789"), 0xCBF4_3926);
+/// ```
+pub fn crc32(bytes: &[u8]) -> u32 {
+    CRC.checksum(bytes)
+}
+
+/// What a frame is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Kind {
+    /// The host asks.
+    Request = 0,
+    /// The device answers.
+    Response = 1,
+    /// The device refuses; the body is a [`Refusal`](super::messages::Refusal).
+    Refusal = 2,
+    /// The device speaks by itself: telemetry and events.
+    Topic = 3,
+}
+
+impl Kind {
+    /// The kind of a number, if it is one.
+    pub const fn from_code(code: u8) -> Option<Self> {
+        match code {
+            0 => Some(Self::Request),
+            1 => Some(Self::Response),
+            2 => Some(Self::Refusal),
+            3 => Some(Self::Topic),
+            _ => None,
+        }
+    }
+}
+
+/// The head of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header {
+    /// What the frame is.
+    pub kind: Kind,
+    /// Endpoint or topic, see [`endpoints`](super::endpoints).
+    pub id: u8,
+    /// Sequence number: repeated by the answer, counted by each topic, wrapping.
+    pub sequence: u16,
+}
+
+/// A decoded frame; its body is borrowed from the accumulator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frame<'a> {
+    /// The head.
+    pub header: Header,
+    /// The postcard body.
+    pub body: &'a [u8],
+}
+
+/// Why bytes are not a frame, or a message does not fit one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameError {
+    /// More bytes than the longest frame came without a zero.
+    TooLong,
+    /// Fewer bytes than a header and a check sum.
+    TooShort,
+    /// The stuffing is broken.
+    Stuffing,
+    /// The check sum differs.
+    Check,
+    /// The kind is none of [`Kind`].
+    Kind,
+    /// The message does not fit the body or the buffer.
+    Space,
+}
+
+impl core::fmt::Display for FrameError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::TooLong => "more bytes than the longest frame came without an end",
+            Self::TooShort => "the frame is shorter than a header and a check sum",
+            Self::Stuffing => "the byte stuffing is broken",
+            Self::Check => "the check sum is wrong",
+            Self::Kind => "the kind of frame is unknown",
+            Self::Space => "the message does not fit a frame",
+        })
+    }
+}
+
+impl core::error::Error for FrameError {}
+
+/// Writes a frame around a message and returns its length in `out`, the closing zero included.
+///
+/// `out` of [`MAX_WIRE`] bytes always suffices. Fails with [`FrameError::Space`] when the message is longer than
+/// [`MAX_BODY`] or `out` is too short for it.
+pub fn encode<M: serde::Serialize + ?Sized>(
+    header: Header,
+    message: &M,
+    out: &mut [u8],
+) -> Result<usize, FrameError> {
+    let mut raw = [0u8; MAX_RAW];
+    let body = postcard::to_slice(message, &mut raw[HEADER..HEADER + MAX_BODY])
+        .map_err(|_| FrameError::Space)?
+        .len();
+    seal(header, &mut raw, body, out)
+}
+
+/// As [`encode`], for a body that is already bytes.
+pub fn encode_bytes(header: Header, body: &[u8], out: &mut [u8]) -> Result<usize, FrameError> {
+    let mut raw = [0u8; MAX_RAW];
+    raw.get_mut(HEADER..HEADER + MAX_BODY)
+        .and_then(|space| space.get_mut(..body.len()))
+        .ok_or(FrameError::Space)?
+        .copy_from_slice(body);
+    seal(header, &mut raw, body.len(), out)
+}
+
+fn seal(header: Header, raw: &mut [u8; MAX_RAW], body: usize, out: &mut [u8]) -> Result<usize, FrameError> {
+    raw[0] = header.kind as u8;
+    raw[1] = header.id;
+    raw[2..4].copy_from_slice(&header.sequence.to_le_bytes());
+    let end = HEADER + body;
+    let check = crc32(&raw[..end]);
+    raw[end..end + CHECK].copy_from_slice(&check.to_le_bytes());
+    let raw = &raw[..end + CHECK];
+    if out.len() <= cobs::max_encoding_length(raw.len()) {
+        return Err(FrameError::Space);
+    }
+    let length = cobs::encode(raw, out);
+    out[length] = 0;
+    Ok(length + 1)
+}
+
+/// Decodes one frame in place: the stuffed bytes, without the closing zero.
+pub fn decode(stuffed: &mut [u8]) -> Result<Frame<'_>, FrameError> {
+    let length = cobs::decode_in_place(stuffed).map_err(|_| FrameError::Stuffing)?;
+    let raw = &stuffed[..length];
+    if raw.len() < HEADER + CHECK {
+        return Err(FrameError::TooShort);
+    }
+    let (checked, check) = raw.split_at(raw.len() - CHECK);
+    if check != crc32(checked).to_le_bytes() {
+        return Err(FrameError::Check);
+    }
+    let kind = Kind::from_code(checked[0]).ok_or(FrameError::Kind)?;
+    let sequence = u16::from_le_bytes([checked[2], checked[3]]);
+    Ok(Frame { header: Header { kind, id: checked[1], sequence }, body: &checked[HEADER..] })
+}
+
+/// Counts of what an [`Accumulator`] has seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Whole frames.
+    pub good: u32,
+    /// Frames that were refused.
+    pub bad: u32,
+}
+
+/// Gathers bytes into frames and finds the way back after anything that is not one.
+///
+/// ```
+/// use model_core::link::frame::{Accumulator, Header, Kind, MAX_WIRE, encode};
+/// let mut wire = [0u8; MAX_WIRE];
+/// let header = Header { kind: Kind::Request, id: 3, sequence: 7 };
+/// let n = encode(header, &(1.5f32, 2u8), &mut wire)?;
+/// let mut accumulator = Accumulator::new();
+/// for &byte in b"noise\0" {
+///     if let Some(frame) = accumulator.push(byte) {
+///         assert!(frame.is_err());
+///     }
+/// }
+/// let mut seen = None;
+/// for &byte in &wire[..n] {
+///     if let Some(Ok(frame)) = accumulator.push(byte) {
+///         seen = Some(frame.header);
+///     }
+/// }
+/// assert_eq!(seen, Some(header));
+/// # Ok::<(), model_core::link::FrameError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Accumulator {
+    buffer: [u8; MAX_WIRE],
+    length: usize,
+    overrun: bool,
+    counts: Counts,
+}
+
+impl Default for Accumulator {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Accumulator {
+    /// An empty one.
+    pub const fn new() -> Self {
+        Self { buffer: [0; MAX_WIRE], length: 0, overrun: false, counts: Counts { good: 0, bad: 0 } }
+    }
+
+    /// Takes one byte; at the end of a frame gives the frame, or why it is none.
+    ///
+    /// Zeros in a row are no frames and no errors: a sender may flush the line with them.
+    pub fn push(&mut self, byte: u8) -> Option<Result<Frame<'_>, FrameError>> {
+        if byte != 0 {
+            if self.length < self.buffer.len() {
+                self.buffer[self.length] = byte;
+                self.length += 1;
+            } else {
+                self.overrun = true;
+            }
+            return None;
+        }
+        let length = core::mem::take(&mut self.length);
+        if core::mem::take(&mut self.overrun) {
+            self.counts.bad = self.counts.bad.wrapping_add(1);
+            return Some(Err(FrameError::TooLong));
+        }
+        if length == 0 {
+            return None;
+        }
+        let frame = decode(&mut self.buffer[..length]);
+        match frame {
+            Ok(_) => self.counts.good = self.counts.good.wrapping_add(1),
+            Err(_) => self.counts.bad = self.counts.bad.wrapping_add(1),
+        }
+        Some(frame)
+    }
+
+    /// What has been seen since the beginning.
+    pub const fn counts(&self) -> Counts {
+        self.counts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frames(accumulator: &mut Accumulator, bytes: &[u8]) -> (usize, usize) {
+        let before = accumulator.counts();
+        for &byte in bytes {
+            let _ = accumulator.push(byte);
+        }
+        let after = accumulator.counts();
+        ((after.good - before.good) as usize, (after.bad - before.bad) as usize)
+    }
+
+    #[test]
+    fn the_longest_body_fits_and_one_byte_more_does_not() {
+        let header = Header { kind: Kind::Topic, id: 1, sequence: 65535 };
+        let mut wire = [0u8; MAX_WIRE];
+        for fill in [0u8, 1, 255] {
+            let body = [fill; MAX_BODY];
+            let n = encode_bytes(header, &body, &mut wire).expect("the longest body fits");
+            let mut accumulator = Accumulator::new();
+            let mut seen = 0;
+            for &byte in &wire[..n] {
+                if let Some(frame) = accumulator.push(byte) {
+                    let frame = frame.expect("a whole frame");
+                    assert_eq!(frame.header, header);
+                    assert_eq!(frame.body, body);
+                    seen += 1;
+                }
+            }
+            assert_eq!(seen, 1);
+        }
+        assert_eq!(encode_bytes(header, &[1; MAX_BODY + 1], &mut wire), Err(FrameError::Space));
+        assert_eq!(encode_bytes(header, &[1; 100], &mut [0; 60]), Err(FrameError::Space));
+    }
+
+    #[test]
+    fn any_single_flipped_bit_is_noticed_and_the_next_frame_is_read() {
+        let header = Header { kind: Kind::Request, id: 9, sequence: 300 };
+        let mut wire = [0u8; MAX_WIRE];
+        let n = encode(header, &[7u8, 0, 0, 200, 13], &mut wire).expect("fits");
+        for bit in 0..(n - 1) * 8 {
+            let mut broken = wire;
+            broken[bit / 8] ^= 1 << (bit % 8);
+            let mut accumulator = Accumulator::new();
+            let (good, bad) = frames(&mut accumulator, &broken[..n]);
+            assert_eq!(good, 0, "bit {bit} passed unseen");
+            assert!(bad >= 1);
+            assert_eq!(frames(&mut accumulator, &wire[..n]), (1, 0), "after bit {bit}");
+        }
+    }
+
+    #[test]
+    fn finds_its_way_back_after_an_overlong_run_and_after_half_a_frame() {
+        let header = Header { kind: Kind::Response, id: 2, sequence: 1 };
+        let mut wire = [0u8; MAX_WIRE];
+        let n = encode(header, &[1u8; 40][..], &mut wire).expect("fits");
+        let mut accumulator = Accumulator::new();
+        for _ in 0..5 * MAX_WIRE {
+            assert!(accumulator.push(0x55).is_none());
+        }
+        assert_eq!(accumulator.push(0), Some(Err(FrameError::TooLong)));
+        assert_eq!(frames(&mut accumulator, &wire[..n]), (1, 0));
+        // Half a frame and then a whole one: the first zero ends the mixture, the frame after it is whole.
+        assert_eq!(frames(&mut accumulator, &wire[..n / 2]), (0, 0));
+        assert_eq!(frames(&mut accumulator, &wire[..n]), (0, 1));
+        assert_eq!(frames(&mut accumulator, &wire[..n]), (1, 0));
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn bytes_of_any_kind_never_stop_the_next_frame(noise in proptest::collection::vec(0u8.., 0..2000)) {
+            let header = Header { kind: Kind::Response, id: 2, sequence: 1 };
+            let mut wire = [0u8; MAX_WIRE];
+            let n = encode(header, &[1u8; 40][..], &mut wire).expect("fits");
+            let mut accumulator = Accumulator::new();
+            frames(&mut accumulator, &noise);
+            let _ = accumulator.push(0);
+            proptest::prop_assert_eq!(frames(&mut accumulator, &wire[..n]), (1, 0));
+        }
+    }
+}

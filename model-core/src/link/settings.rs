@@ -1,0 +1,238 @@
+//! Settings of a controller: everything a user may choose, in one message that the store keeps.
+
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+/// Where the pressure for a wanted force comes from before any trim.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum FeedForward {
+    /// The inverse of the muscle's table.
+    Table,
+    /// The ideal braid alone, `P = F · 4πN² / (3L² − B²)`: no bladder, no deadband, no friction.
+    Gaylord,
+    /// None: feedback does everything.
+    Off,
+}
+
+/// What a fault does to the regulator. Either way the fault is latched and the state is `Fault`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Reaction {
+    /// Command zero pressure at once.
+    Vent,
+    /// Keep the last command, for loads that must not fall; over-pressure never allows it.
+    Hold,
+}
+
+/// Trim of force on a load cell, added to the feed-forward pressure:
+/// `trim = K_p e + K_i ∫ e dt`, `e = F_wanted − F_measured`, the integral stopped where the command saturates.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct ForceLoop {
+    /// Proportional gain, Pa/N.
+    pub proportional_pa_per_n: f32,
+    /// Integral gain, Pa/(N·s).
+    pub integral_pa_per_n_s: f32,
+    /// Largest trim to either side, Pa; zero switches the trim off.
+    pub trim_limit_pa: f32,
+}
+
+/// Stroke loop around the force feed-forward:
+/// `F = F_load + K_p e + K_i ∫ e dt − K_d v`, `e = x_wanted − x`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct StrokeLoop {
+    /// Proportional gain, N/m.
+    pub proportional_n_per_m: f32,
+    /// Integral gain, N/(m·s).
+    pub integral_n_per_m_s: f32,
+    /// Damping, N·s/m.
+    pub damping_n_s_per_m: f32,
+    /// Load that the muscle is known to carry, N.
+    pub load_n: f32,
+    /// Stiffness of the load, N/m: force grows by it with the wanted stroke.
+    pub load_stiffness_n_per_m: f32,
+    /// Largest force that the loop may ask for, N.
+    pub force_limit_n: f32,
+}
+
+/// Two muscles on one pulley: strokes are `x_rest ± r θ`, the torque is `r (F_agonist − F_antagonist)`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Joint {
+    /// Radius of the pulley, m.
+    pub radius_m: f32,
+    /// Stroke of both muscles at angle zero, m.
+    pub rest_stroke_m: f32,
+    /// Proportional gain, N·m/rad.
+    pub proportional_nm_per_rad: f32,
+    /// Integral gain, N·m/(rad·s).
+    pub integral_nm_per_rad_s: f32,
+    /// Damping, N·m·s/rad.
+    pub damping_nm_s_per_rad: f32,
+    /// Largest torque that the loop may ask for, N·m.
+    pub torque_limit_nm: f32,
+}
+
+/// Model of the pressure regulator, found by the host: `gain · (command + offset)` behind a first-order lag, a rate limit
+/// and a deadband. The controller inverts the parts that can be inverted.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Regulator {
+    /// Pressure reached for each pascal commanded.
+    pub gain: f32,
+    /// Added to the command before the gain, Pa.
+    pub offset_pa: f32,
+    /// Time constant of the lag, s.
+    pub lag_s: f32,
+    /// Largest rate of pressure, Pa/s.
+    pub rate_pa_per_s: f32,
+    /// Half width of the band within which the regulator does not answer, Pa.
+    pub deadband_pa: f32,
+    /// Largest command, Pa.
+    pub command_max_pa: f32,
+    /// How much of the lag is inverted by lead: 0 none, 1 all.
+    pub lead: f32,
+}
+
+/// Limits of operation; crossing one is a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Limits {
+    /// Largest measured pressure, Pa.
+    pub pressure_pa: f32,
+    /// Least stroke, m (negative: stretched beyond rest).
+    pub stroke_min_m: f32,
+    /// Largest stroke, m.
+    pub stroke_max_m: f32,
+    /// Largest speed of stroke, m/s.
+    pub speed_m_per_s: f32,
+    /// Largest measured force, N.
+    pub force_n: f32,
+    /// Fastest change of the wanted pressure, Pa/s.
+    pub slew_pa_per_s: f32,
+}
+
+/// How one sensor is watched, in its own unit (Pa, m or N).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct SensorWatch {
+    /// Whether the sensor is there at all.
+    pub fitted: bool,
+    /// Readings below are impossible: a broken wire or a short.
+    pub low: f32,
+    /// Readings above are impossible.
+    pub high: f32,
+    /// Largest credible change from one tick to the next.
+    pub jump: f32,
+    /// Ticks of bit-equal readings, while the command moves, after which the sensor counts as stuck; 0 never.
+    pub stuck_ticks: u16,
+}
+
+/// The remaining watches.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Watch {
+    /// Readings out of range in a row before the fault, ticks.
+    pub debounce_ticks: u16,
+    /// Jumps within 256 ticks before a sensor counts as noisy.
+    pub noisy_jumps: u16,
+    /// Largest difference of measured and modelled force, N; 0 switches the comparison off.
+    pub disagree_n: f32,
+    /// How long force may disagree, ticks.
+    pub disagree_ticks: u16,
+    /// Largest difference between measured pressure and the regulator's model, Pa.
+    pub follow_pa: f32,
+    /// How long pressure may stay away, ticks.
+    pub follow_ticks: u16,
+    /// How long a streamed set-point stays good, ticks; 0 for ever. References of the device are not set-points.
+    pub silence_ticks: u32,
+    /// Ticks missed in a row before the fault.
+    pub overrun_ticks: u16,
+}
+
+/// Everything a user may choose. One for the device; both muscles of a pair share it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Settings {
+    /// Source of the feed-forward pressure.
+    pub feed_forward: FeedForward,
+    /// Trim of force.
+    pub force_loop: ForceLoop,
+    /// Stroke loop.
+    pub stroke_loop: StrokeLoop,
+    /// The joint of an antagonist pair.
+    pub joint: Joint,
+    /// The pressure regulator.
+    pub regulator: Regulator,
+    /// Limits of operation.
+    pub limits: Limits,
+    /// Watch of the pressure sensor, Pa.
+    pub pressure: SensorWatch,
+    /// Watch of the stroke sensor, m.
+    pub stroke: SensorWatch,
+    /// Watch of the load cell, N.
+    pub force: SensorWatch,
+    /// Remaining watches.
+    pub watch: Watch,
+    /// Bit n set: the fault of code n holds the last command instead of venting.
+    pub hold_on: u32,
+    /// Half a second's band of stroke within which a reversal is noise, m.
+    pub motion_band_m: f32,
+    /// Band of pressure within which a reversal at held length is noise, Pa.
+    pub pressure_band_pa: f32,
+}
+
+impl Default for Settings {
+    /// Sensible for the muscles of the thesis on a 0–10 bar regulator.
+    fn default() -> Self {
+        Self {
+            feed_forward: FeedForward::Table,
+            force_loop: ForceLoop {
+                proportional_pa_per_n: 0.0,
+                integral_pa_per_n_s: 0.0,
+                trim_limit_pa: 0.0,
+            },
+            stroke_loop: StrokeLoop {
+                proportional_n_per_m: 5_000.0,
+                integral_n_per_m_s: 20_000.0,
+                damping_n_s_per_m: 50.0,
+                load_n: 0.0,
+                load_stiffness_n_per_m: 0.0,
+                force_limit_n: 2_000.0,
+            },
+            joint: Joint {
+                radius_m: 0.02,
+                rest_stroke_m: 0.002,
+                proportional_nm_per_rad: 2.0,
+                integral_nm_per_rad_s: 10.0,
+                damping_nm_s_per_rad: 0.05,
+                torque_limit_nm: 20.0,
+            },
+            regulator: Regulator {
+                gain: 1.0,
+                offset_pa: 0.0,
+                lag_s: 0.02,
+                rate_pa_per_s: 20e6,
+                deadband_pa: 0.0,
+                command_max_pa: 650e3,
+                lead: 0.0,
+            },
+            limits: Limits {
+                pressure_pa: 700e3,
+                stroke_min_m: -0.01,
+                stroke_max_m: 0.08,
+                speed_m_per_s: 2.0,
+                force_n: 3_000.0,
+                slew_pa_per_s: 20e6,
+            },
+            pressure: SensorWatch { fitted: true, low: -50e3, high: 1_000e3, jump: 150e3, stuck_ticks: 200 },
+            stroke: SensorWatch { fitted: true, low: -0.02, high: 0.2, jump: 0.01, stuck_ticks: 0 },
+            force: SensorWatch { fitted: true, low: -500.0, high: 4_000.0, jump: 800.0, stuck_ticks: 200 },
+            watch: Watch {
+                debounce_ticks: 2,
+                noisy_jumps: 8,
+                disagree_n: 0.0,
+                disagree_ticks: 200,
+                follow_pa: 150e3,
+                follow_ticks: 200,
+                silence_ticks: 0,
+                overrun_ticks: 5,
+            },
+            hold_on: 0,
+            motion_band_m: 20e-6,
+            pressure_band_pa: 2e3,
+        }
+    }
+}
