@@ -1,4 +1,33 @@
-//! The muscle model.
-#![no_std]
+//! The quasi-static force model of a pneumatic artificial muscle, its tables and its inverse.
+//!
+//! One source serves the host (`f64`) and a microcontroller (`f32`): no standard library, no allocation, no clock, no
+//! input or output. State is a value that is handed in and out.
+//!
+//! | where is … | |
+//! | --- | --- |
+//! | length to radius, wall and strains | [`braid`] |
+//! | curves over pressure | [`spline`] |
+//! | what a fit finds and a file keeps | [`table`], [`image`] |
+//! | force and its slope | [`muscle`] |
+//! | pressure for a wanted force | [`inverse`] |
+//! | which way friction points | [`motion`] |
+//! | physics beyond the base model | [`effects`] |
+//! | what host and controller say to each other | [`link`] |
+//!
+//! Source of the model: E. G. Hocking, thesis on miniature and push-type pneumatic artificial muscles, University of
+//! Maryland (2012), chapters 2 and 3.
 
+#![cfg_attr(not(test), no_std)]
+#![deny(missing_docs)]
+
+pub mod braid;
+pub mod effects;
+pub mod image;
+pub mod inverse;
 pub mod link;
+pub mod motion;
+pub mod muscle;
+pub mod scalar;
+pub mod spline;
+pub mod table;
+pub mod units;

@@ -1,0 +1,329 @@
+//! Kinematics of the braided sleeve: from the muscle's length to its radius, wall and strains.
+//!
+//! Source: E. G. Hocking, thesis, University of Maryland (2012), chapter 2. Fibres of fixed length `B` wind `N` turns
+//! about a cylinder; the bladder's material keeps its volume `V_B`.
+
+use crate::scalar::Scalar;
+use crate::units::{Angle, Length};
+use core::f64::consts::PI;
+use serde::{Deserialize, Serialize};
+
+/// What one measures on a muscle at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Geometry<T = f64> {
+    /// `L0`: active length between the end fittings, unpressurised.
+    pub rest_length: Length<T>,
+    /// `α0`: angle of the fibres from the radial plane (77° is nearly axial).
+    pub braid_angle: Angle<T>,
+    /// `D0`: outer diameter of the bladder.
+    pub outer_diameter: Length<T>,
+    /// `t0`: wall thickness of the bladder.
+    pub wall: Length<T>,
+    /// Whether the load-bearing length is shortened by the rounded ends (`L′` in place of `L`).
+    pub tip_correction: bool,
+}
+
+/// Which dimension of a muscle cannot be right.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum GeometryError {
+    /// The rest length is not a positive number of metres.
+    RestLength,
+    /// The braid angle is not between 0° and 90° from the radial plane.
+    BraidAngle,
+    /// The outer diameter is not a positive number of metres.
+    OuterDiameter,
+    /// The wall is not positive or not thinner than the radius.
+    Wall,
+}
+
+impl core::fmt::Display for GeometryError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::RestLength => "the rest length must be a positive length",
+            Self::BraidAngle => "the braid angle must lie between 0° and 90°, measured from the radial plane",
+            Self::OuterDiameter => "the bladder's outer diameter must be a positive length",
+            Self::Wall => "the bladder's wall must be positive and thinner than its radius",
+        })
+    }
+}
+
+impl core::error::Error for GeometryError {}
+
+impl<T: Scalar> Geometry<T> {
+    /// The same dimensions in another number type.
+    pub fn cast<U: Scalar>(&self) -> Geometry<U> {
+        Geometry {
+            rest_length: self.rest_length.cast(),
+            braid_angle: self.braid_angle.cast(),
+            outer_diameter: self.outer_diameter.cast(),
+            wall: self.wall.cast(),
+            tip_correction: self.tip_correction,
+        }
+    }
+
+    /// The constants that the kinematics need at run time. They are computed in double precision whatever `T` is.
+    ///
+    /// # Errors
+    /// The dimension that cannot be right.
+    pub fn build(&self) -> Result<Braid<T>, GeometryError> {
+        let l0 = self.rest_length.si().to_f64();
+        let alpha = self.braid_angle.si().to_f64();
+        let d0 = self.outer_diameter.si().to_f64();
+        let t0 = self.wall.si().to_f64();
+        if !(l0.is_finite() && l0 > 0.0) {
+            return Err(GeometryError::RestLength);
+        }
+        if !(alpha > 0.0 && alpha < PI / 2.0) {
+            return Err(GeometryError::BraidAngle);
+        }
+        if !(d0.is_finite() && d0 > 0.0) {
+            return Err(GeometryError::OuterDiameter);
+        }
+        if !(t0 > 0.0 && t0 < d0 / 2.0) {
+            return Err(GeometryError::Wall);
+        }
+        let fibre = l0 / libm::sin(alpha);
+        let turns = fibre * libm::cos(alpha) / (PI * d0);
+        let inner = d0 - 2.0 * t0;
+        let volume = PI / 4.0 * l0 * (d0 * d0 - inner * inner);
+        let four_pi_n2 = 4.0 * PI * turns * turns;
+        let of = T::from_f64;
+        Ok(Braid {
+            rest_length: of(l0),
+            inv_rest_length: of(1.0 / l0),
+            inv_rest_radius: of(2.0 / d0),
+            rest_radius: of(d0 / 2.0),
+            fibre_squared: of(fibre * fibre),
+            inv_two_pi_turns: of(1.0 / (2.0 * PI * turns)),
+            inv_four_pi_turns_squared: of(1.0 / four_pi_n2),
+            inv_two_pi_turns_squared: of(2.0 / four_pi_n2),
+            bladder_volume: of(volume),
+            bladder_volume_over_pi: of(volume / PI),
+            tip: of(if self.tip_correction { 2.0 * (PI / 2.0 - 1.0) } else { 0.0 }),
+            fibre: of(fibre),
+            turns: of(turns),
+        })
+    }
+}
+
+/// The sleeve's constants, ready for use at any length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Braid<T> {
+    rest_length: T,
+    inv_rest_length: T,
+    rest_radius: T,
+    inv_rest_radius: T,
+    fibre_squared: T,
+    inv_two_pi_turns: T,
+    inv_four_pi_turns_squared: T,
+    inv_two_pi_turns_squared: T,
+    bladder_volume: T,
+    bladder_volume_over_pi: T,
+    tip: T,
+    fibre: T,
+    turns: T,
+}
+
+/// The muscle's shape at one length, and what it does to pressure and stress. All in SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Posture<T> {
+    /// `L`, m.
+    pub length: T,
+    /// `L` or, with the tip correction, `L′ = L − 2 (π/2 − 1)(R − R0)`, m.
+    pub load_length: T,
+    /// `R`, outer radius of the bladder, m.
+    pub radius: T,
+    /// `t`, wall of the bladder, m.
+    pub wall: T,
+    /// `ε_z = L/L0 − 1`, negative in contraction (with the tip correction, of `L′`).
+    pub axial_strain: T,
+    /// `ε_x = R/R0 − 1`.
+    pub radial_strain: T,
+    /// `g = ∂F_G/∂P′ = (3 L² − B²) / (4 π N²)`, m²: the muscle's effective area.
+    pub area: T,
+    /// `V_B / L`, m²: what an axial stress in the wall pulls with.
+    pub axial_area: T,
+    /// `t L² / (2 π N² R)`, m²: what a hoop stress in the wall pushes with.
+    pub hoop_area: T,
+}
+
+impl<T: Scalar> Braid<T> {
+    /// The shape at contraction stroke `ΔL = L0 − L`.
+    ///
+    /// ```text
+    /// R = sqrt(B² − L²) / (2 π N)      t = R − sqrt(R² − V_B/(π L))
+    /// ```
+    /// Beyond the fibre's length (`L ≥ B`, pulled straight) and where the bladder would fill the whole sleeve, the
+    /// roots' arguments are held at zero: the result stays finite there, but has no physical meaning.
+    #[inline]
+    pub fn posture(&self, stroke: Length<T>) -> Posture<T> {
+        let length = self.rest_length - stroke.si();
+        let radius = (self.fibre_squared - length * length).max(T::ZERO).sqrt() * self.inv_two_pi_turns;
+        let inv_length = T::ONE / length;
+        let bore_squared = (radius * radius - self.bladder_volume_over_pi * inv_length).max(T::ZERO);
+        let wall = radius - bore_squared.sqrt();
+        let load_length = length - self.tip * (radius - self.rest_radius);
+        let squared = load_length * load_length;
+        let axial_area = if self.tip == T::ZERO {
+            self.bladder_volume * inv_length
+        } else {
+            self.bladder_volume / load_length
+        };
+        // R > 0 wherever the sleeve has a bore; the floor keeps the quotient finite in the meaningless region.
+        let radius_floor = radius.max(self.rest_radius * T::from_f32(1.0e-3));
+        Posture {
+            length,
+            load_length,
+            radius,
+            wall,
+            axial_strain: load_length * self.inv_rest_length - T::ONE,
+            radial_strain: radius * self.inv_rest_radius - T::ONE,
+            area: (squared + squared + squared - self.fibre_squared) * self.inv_four_pi_turns_squared,
+            axial_area,
+            hoop_area: wall * squared * self.inv_two_pi_turns_squared / radius_floor,
+        }
+    }
+
+    /// The same sleeve in another number type.
+    pub fn cast<U: Scalar>(&self) -> Braid<U> {
+        let to = |x: T| U::from_f64(x.to_f64());
+        Braid {
+            rest_length: to(self.rest_length),
+            inv_rest_length: to(self.inv_rest_length),
+            rest_radius: to(self.rest_radius),
+            inv_rest_radius: to(self.inv_rest_radius),
+            fibre_squared: to(self.fibre_squared),
+            inv_two_pi_turns: to(self.inv_two_pi_turns),
+            inv_four_pi_turns_squared: to(self.inv_four_pi_turns_squared),
+            inv_two_pi_turns_squared: to(self.inv_two_pi_turns_squared),
+            bladder_volume: to(self.bladder_volume),
+            bladder_volume_over_pi: to(self.bladder_volume_over_pi),
+            tip: to(self.tip),
+            fibre: to(self.fibre),
+            turns: to(self.turns),
+        }
+    }
+
+    /// `L0`, m.
+    pub fn rest_length(&self) -> T {
+        self.rest_length
+    }
+    /// `R0`, m.
+    pub fn rest_radius(&self) -> T {
+        self.rest_radius
+    }
+    /// `B`, length of one fibre, m.
+    pub fn fibre_length(&self) -> T {
+        self.fibre
+    }
+    /// `N`, turns of a fibre about the bladder.
+    pub fn turns(&self) -> T {
+        self.turns
+    }
+    /// `V_B`, volume of the bladder's material, m³.
+    pub fn bladder_volume(&self) -> T {
+        self.bladder_volume
+    }
+    /// The contraction at which pressure no longer pulls: `1 − B / (√3 L0)`.
+    pub fn neutral_contraction(&self) -> T {
+        T::ONE - self.fibre / (T::from_f64(1.732_050_807_568_877_2) * self.rest_length)
+    }
+    /// The gas volume inside the bladder at a posture, m³: `π R² L − V_B`.
+    pub fn gas_volume(&self, posture: &Posture<T>) -> T {
+        T::from_f64(PI) * posture.radius * posture.radius * posture.length - self.bladder_volume
+    }
+}
+
+impl<T: Scalar> Posture<T> {
+    /// The coefficient of `E_k` in the elastic force, for `k = 1…M` (m²):
+    /// `c_k = (V_B/L) ε_z^k − t L² ε_x^k / (2 π N² R)`.
+    #[inline]
+    pub fn elastic_columns<const M: usize>(&self) -> [T; M] {
+        let mut axial = self.axial_area;
+        let mut hoop = self.hoop_area;
+        core::array::from_fn(|_| {
+            axial *= self.axial_strain;
+            hoop *= self.radial_strain;
+            axial - hoop
+        })
+    }
+}
+
+/// The thesis's miniature muscle, for examples and tests.
+pub fn miniature() -> Geometry {
+    Geometry {
+        rest_length: Length::from_millimetres(39.16),
+        braid_angle: Angle::from_degrees(77.4),
+        outer_diameter: Length::from_millimetres(3.0),
+        wall: Length::from_millimetres(0.5),
+        tip_correction: false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn at_rest_the_shape_is_the_measured_one_and_nothing_is_strained() {
+        let braid = miniature().build().expect("a valid geometry");
+        let p = braid.posture(Length::ZERO);
+        assert!((p.radius - 1.5e-3).abs() < 1e-12);
+        assert!((p.wall - 0.5e-3).abs() < 1e-12);
+        assert!(p.radial_strain.abs() < 1e-12 && p.axial_strain.abs() < 1e-12);
+        for c in p.elastic_columns::<4>() {
+            assert!(c.abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn the_effective_area_is_the_rate_of_volume_against_length() {
+        // Virtual work: F_G = −P dV/dL with the outer volume π R² L.
+        let braid = miniature().build().expect("a valid geometry");
+        let volume = |x: f64| {
+            let p = braid.posture(Length::from_metres(x));
+            PI * p.radius * p.radius * p.length
+        };
+        let h = 1e-6;
+        for x in [0.0, 0.5e-3, 1.5e-3, 3.0e-3] {
+            let dv_dx = (volume(x + h) - volume(x - h)) / (2.0 * h);
+            let area = braid.posture(Length::from_metres(x)).area;
+            assert!((dv_dx - area).abs() < 1e-6 * area, "at {x} m: {dv_dx} and {area}");
+        }
+    }
+
+    #[test]
+    fn blocked_force_of_the_thesis_muscle() {
+        // 552 kPa with P0 = 76.5 kPa gives 135.7 N in the thesis; its angle and diameters are rounded.
+        let braid = miniature().build().expect("a valid geometry");
+        let force = (552.0e3 - 76.5e3) * braid.posture(Length::ZERO).area;
+        assert!((force - 135.7).abs() < 0.05 * 135.7, "{force} N");
+    }
+
+    #[test]
+    fn impossible_dimensions_are_named() {
+        let good = miniature();
+        let with = |f: &dyn Fn(&mut Geometry)| {
+            let mut g = good;
+            f(&mut g);
+            g.build().map(|_| ())
+        };
+        assert_eq!(with(&|g| g.rest_length = Length::ZERO), Err(GeometryError::RestLength));
+        assert_eq!(with(&|g| g.rest_length = Length::from_metres(f64::NAN)), Err(GeometryError::RestLength));
+        assert_eq!(with(&|g| g.braid_angle = Angle::from_degrees(90.0)), Err(GeometryError::BraidAngle));
+        assert_eq!(with(&|g| g.wall = Length::from_millimetres(1.5)), Err(GeometryError::Wall));
+        assert_eq!(
+            with(&|g| g.outer_diameter = Length::from_metres(-1.0)),
+            Err(GeometryError::OuterDiameter)
+        );
+    }
+
+    #[test]
+    fn far_outside_the_working_range_everything_stays_finite() {
+        let braid = miniature().cast::<f32>().build().expect("a valid geometry");
+        for mm in [-5.0_f32, -1.0, 20.0, 35.0] {
+            let p = braid.posture(Length::from_millimetres(mm));
+            assert!(p.area.is_finite() && p.axial_area.is_finite() && p.hoop_area.is_finite());
+        }
+    }
+}

@@ -1,0 +1,320 @@
+//! Physics that the quasi-static model leaves out, one file per effect.
+//!
+//! Every effect adds a force to that of the base model, and that force is **linear in the effect's amplitudes**:
+//!
+//! ```text
+//! F = F_base(P, L, s) + Σ_effects Σ_i amplitude_i · term_i(context, shape, memory)
+//! ```
+//!
+//! Effects that act earlier in the chain (a shift of length, a lag of pressure, a softer bladder) enter by their first-order
+//! change of the force, with the sensitivities that the [`Context`] carries. So one source serves three uses: the host
+//! evaluates the terms as regressors to find out which effect a recording shows, the controller adds them to its
+//! feed-forward, and `predict` runs them over a recording.
+//!
+//! Adding an effect: write its file, and add one line to the list below.
+
+use crate::scalar::Scalar;
+use serde::{Deserialize, Serialize};
+
+mod coulomb_friction;
+mod stress_relaxation;
+mod viscous_damping;
+
+/// Where in the chain from the air to the reading an effect acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Link {
+    /// The pressure at the muscle.
+    Air,
+    /// The braid and the muscle's shape.
+    Braid,
+    /// The bladder's elastic stress.
+    Bladder,
+    /// The bladder's memory of the past.
+    Memory,
+    /// Friction.
+    Friction,
+    /// Masses and springs between the muscle and the load cell.
+    LoadPath,
+    /// The sensors.
+    Reading,
+}
+
+/// Whether a parameter scales the force or shapes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// The effect's force is proportional to it.
+    Amplitude,
+    /// The force depends on it in another way (a time constant, a length).
+    Shape,
+}
+
+/// One parameter of an effect, in SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// Its name, as in the effect's documentation.
+    pub name: &'static str,
+    /// Its SI unit, or an empty string.
+    pub unit: &'static str,
+    /// The smallest plausible value, in SI units.
+    pub low: f64,
+    /// The largest plausible value, in SI units.
+    pub high: f64,
+    /// What it does to the force.
+    pub role: Role,
+}
+
+impl Parameter {
+    /// A parameter that the force is proportional to.
+    pub const fn amplitude(name: &'static str, unit: &'static str, low: f64, high: f64) -> Self {
+        Self { name, unit, low, high, role: Role::Amplitude }
+    }
+    /// A parameter that shapes the force.
+    pub const fn shape(name: &'static str, unit: &'static str, low: f64, high: f64) -> Self {
+        Self { name, unit, low, high, role: Role::Shape }
+    }
+}
+
+/// What an effect is, for people and programs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Info {
+    /// The name in the catalogue, e.g. `viscous-damping`.
+    pub name: &'static str,
+    /// Where it acts.
+    pub link: Link,
+    /// Its parameters, in the order in which they are stored; amplitudes first.
+    pub parameters: &'static [Parameter],
+    /// Whether its force depends on the pressure of the moment (then the inverse has to iterate).
+    pub depends_on_pressure: bool,
+    /// Whether its memory has to survive a power cycle.
+    pub persistent: bool,
+    /// One sentence for someone who has never heard of it.
+    pub summary: &'static str,
+    /// Where the equation and the plausible ranges come from.
+    pub source: &'static str,
+}
+
+impl Info {
+    /// How many of the parameters are amplitudes (they come first).
+    pub fn amplitudes(&self) -> usize {
+        self.parameters.iter().take_while(|p| p.role == Role::Amplitude).count()
+    }
+}
+
+/// All that an effect may look at in one moment, in SI units. A plain value: whoever calls decides how speed and
+/// direction were found (causally on the controller, from both sides on the host).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Context<T> {
+    /// Time since the last step, s; zero on the first.
+    pub dt: T,
+    /// Time since the start of the campaign or since power-up, s.
+    pub time: T,
+    /// `P`, gauge, Pa.
+    pub pressure: T,
+    /// `dP/dt`, Pa/s.
+    pub pressure_rate: T,
+    /// `ΔL`, m.
+    pub stroke: T,
+    /// `ΔL/L0`.
+    pub contraction: T,
+    /// `v = d(ΔL)/dt`, m/s, positive while shortening.
+    pub speed: T,
+    /// `dv/dt`, m/s².
+    pub acceleration: T,
+    /// `s`: +1 shortening, −1 lengthening, 0 unknown.
+    pub direction: T,
+    /// Travel since the last turning point, m, ≥ 0.
+    pub travel: T,
+    /// Time since the last turning point, s.
+    pub since_reversal: T,
+    /// How long the muscle rested before its present motion, or has been resting, s.
+    pub hold_time: T,
+    /// Strokes back and forth so far, in full cycles.
+    pub cycles: T,
+    /// Absolute temperature, K, or 0 where it is not measured.
+    pub temperature: T,
+    /// `L0`, m.
+    pub rest_length: T,
+    /// `R`, m.
+    pub radius: T,
+    /// `R0`, m.
+    pub rest_radius: T,
+    /// `ε_x`, radial strain.
+    pub radial_strain: T,
+    /// `ε_z`, axial strain, negative in contraction.
+    pub axial_strain: T,
+    /// `V_B/L`, m²: what an axial stress in the wall pulls with.
+    pub axial_area: T,
+    /// `t L²/(2πN²R)`, m²: what a hoop stress in the wall pushes with.
+    pub hoop_area: T,
+    /// `g = ∂F_G/∂P`, m².
+    pub area: T,
+    /// `F_G(P′, L)`, N.
+    pub gaylord: T,
+    /// Elastic part of the base model, N (negative as the bladder resists contraction).
+    pub elastic: T,
+    /// Friction-free force of the base model, N.
+    pub quasi: T,
+    /// `∂F_quasi/∂(ΔL)`, N/m (negative: the muscle pulls less as it shortens).
+    pub stiffness: T,
+    /// `∂F_quasi/∂P`, N/Pa.
+    pub pressure_slope: T,
+}
+
+/// How many numbers an effect may remember.
+pub const MEMORY: usize = 8;
+/// How many parameters an effect may have.
+pub const MAX_PARAMETERS: usize = 6;
+/// How many effects a table may carry.
+pub const MAX_EFFECTS: usize = 4;
+
+/// An effect's memory; all zeros at the beginning of its life.
+pub type Memory<T> = [T; MEMORY];
+
+/// One effect's equations.
+pub trait Effect {
+    /// What it is.
+    const INFO: Info;
+    /// Lets time pass: `memory` goes from the last moment to this one.
+    fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
+        let _ = (parameters, context, memory);
+    }
+    /// The force it adds, N. Linear in the amplitudes.
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T;
+}
+
+macro_rules! effects {
+    ($($(#[$doc:meta])* $variant:ident = $module:ident;)+) => {
+        /// An effect of the muscle, by name. On the wire and in files it is its place in this list, so the order stays.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+        pub enum EffectName {
+            $($(#[$doc])* $variant,)+
+        }
+
+        impl EffectName {
+            /// Every effect of the muscle.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+
+            /// What it is.
+            pub const fn info(self) -> &'static Info {
+                match self {
+                    $(Self::$variant => &<$module::$variant as Effect>::INFO,)+
+                }
+            }
+
+            /// Lets time pass in its memory.
+            pub fn step<T: Scalar>(self, parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
+                match self {
+                    $(Self::$variant => $module::$variant::step(parameters, context, memory),)+
+                }
+            }
+
+            /// The force it adds, N.
+            pub fn force<T: Scalar>(self, parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
+                match self {
+                    $(Self::$variant => $module::$variant::force(parameters, context, memory),)+
+                }
+            }
+        }
+    };
+}
+
+effects! {
+    /// Friction of constant size.
+    CoulombFriction = coulomb_friction;
+    /// Friction proportional to speed.
+    ViscousDamping = viscous_damping;
+    /// The bladder's stress relaxes exponentially after each strain.
+    StressRelaxation = stress_relaxation;
+}
+
+impl EffectName {
+    /// The effect of this catalogue name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|e| e.info().name == name)
+    }
+}
+
+/// An effect with its parameters, as a table carries it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FittedEffect {
+    /// Which one.
+    pub effect: EffectName,
+    /// Its parameters in SI units, in the order of [`Info::parameters`].
+    pub parameters: heapless::Vec<f32, MAX_PARAMETERS>,
+}
+
+/// The effects of one muscle at work, with their memories.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chain<T> {
+    effects: heapless::Vec<Running<T>, MAX_EFFECTS>,
+    depends_on_pressure: bool,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Running<T> {
+    effect: EffectName,
+    parameters: heapless::Vec<T, MAX_PARAMETERS>,
+    memory: Memory<T>,
+}
+
+impl<T: Scalar> Chain<T> {
+    /// The effects of a table, with nothing remembered.
+    pub fn new(fitted: &[FittedEffect]) -> Self {
+        let mut effects = heapless::Vec::new();
+        for one in fitted.iter().take(MAX_EFFECTS) {
+            let parameters = one.parameters.iter().map(|p| T::from_f32(*p)).collect();
+            // The iterator is no longer than the vector.
+            let _ = effects.push(Running { effect: one.effect, parameters, memory: [T::ZERO; MEMORY] });
+        }
+        let depends_on_pressure = fitted.iter().any(|e| e.effect.info().depends_on_pressure);
+        Self { effects, depends_on_pressure }
+    }
+
+    /// Whether the table carries no effect.
+    pub fn is_empty(&self) -> bool {
+        self.effects.is_empty()
+    }
+
+    /// Whether any effect's force changes with the pressure of the moment.
+    pub fn depends_on_pressure(&self) -> bool {
+        self.depends_on_pressure
+    }
+
+    /// Lets time pass in every memory.
+    pub fn step(&mut self, context: &Context<T>) {
+        for e in &mut self.effects {
+            e.effect.step(&e.parameters, context, &mut e.memory);
+        }
+    }
+
+    /// The force that all effects together add, N.
+    pub fn force(&self, context: &Context<T>) -> T {
+        let mut sum = T::ZERO;
+        for e in &self.effects {
+            sum += e.effect.force(&e.parameters, context, &e.memory);
+        }
+        sum
+    }
+
+    /// The memories that must survive a power cycle, by position in the table.
+    pub fn memories(&self) -> impl Iterator<Item = (EffectName, &Memory<T>)> {
+        self.effects.iter().map(|e| (e.effect, &e.memory))
+    }
+
+    /// Puts a memory back; a position that the table does not have is ignored.
+    pub fn restore(&mut self, position: usize, memory: Memory<T>) {
+        if let Some(e) = self.effects.get_mut(position) {
+            e.memory = memory;
+        }
+    }
+}
+
+/// `e^(−dt/τ)`, remembered in two slots of a memory so that it is computed anew only when `dt` changes (on a controller:
+/// once).
+pub(crate) fn remembered_decay<T: Scalar>(dt: T, tau: T, memory: &mut Memory<T>, slot: usize) -> T {
+    if memory[slot] != dt || memory[slot + 1] == T::ZERO {
+        memory[slot] = dt;
+        memory[slot + 1] = (-(dt / tau)).exp();
+    }
+    memory[slot + 1]
+}

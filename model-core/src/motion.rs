@@ -1,0 +1,229 @@
+//! How the muscle is moving: direction, travel, rest. Causal, for the controller; small enough to run every tick.
+//!
+//! Which way friction points: while the muscle moves, the sign of its speed. While its length is held and the pressure
+//! changes, filling counts as shortening and emptying as lengthening. While neither changes, the last direction stays.
+//! Sensor noise and a regulator's ripple must not flip it: a turn counts only after a travel back that noise cannot make.
+
+use crate::scalar::Scalar;
+
+/// The motion at one moment, SI units.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Motion<T> {
+    /// Time since the last moment, s.
+    pub dt: T,
+    /// Time since the beginning, s.
+    pub time: T,
+    /// `ΔL`, m.
+    pub stroke: T,
+    /// m/s, positive while shortening.
+    pub speed: T,
+    /// m/s².
+    pub acceleration: T,
+    /// Pa/s.
+    pub pressure_rate: T,
+    /// +1 shortening, −1 lengthening, 0 unknown.
+    pub direction: T,
+    /// Travel since the last turn, m.
+    pub travel: T,
+    /// Time since the last turn, s.
+    pub since_reversal: T,
+    /// How long the muscle rested before its present motion, or has been resting, s.
+    pub hold_time: T,
+    /// Full cycles so far.
+    pub cycles: T,
+    /// Absolute temperature, K; 0 where unknown.
+    pub temperature: T,
+}
+
+/// What counts as a turn and how fast rates follow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionSettings<T> {
+    /// Travel back that counts as a turn, m; above the stroke sensor's noise.
+    pub stroke_threshold: T,
+    /// Change of pressure at held length that counts as filling or emptying, Pa; above ripple.
+    pub pressure_threshold: T,
+    /// Time constant of the filters behind speed and pressure rate, s.
+    pub rate_time: T,
+    /// A muscle slower than this, m/s, counts as resting.
+    pub rest_speed: T,
+}
+
+impl<T: Scalar> Default for MotionSettings<T> {
+    fn default() -> Self {
+        Self {
+            stroke_threshold: T::from_f32(1.0e-4),
+            pressure_threshold: T::from_f32(5.0e3),
+            rate_time: T::from_f32(0.02),
+            rest_speed: T::from_f32(1.0e-4),
+        }
+    }
+}
+
+/// Follows a motion from tick to tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionTracker<T> {
+    settings: MotionSettings<T>,
+    motion: Motion<T>,
+    started: bool,
+    last_stroke: T,
+    last_pressure: T,
+    /// The farthest point of the present stroke: a turn is measured from here.
+    extreme: T,
+    pressure_extreme: T,
+    turns: T,
+}
+
+impl<T: Scalar> MotionTracker<T> {
+    /// Nothing known yet.
+    pub fn new(settings: MotionSettings<T>) -> Self {
+        Self {
+            settings,
+            motion: Motion::default(),
+            started: false,
+            last_stroke: T::ZERO,
+            last_pressure: T::ZERO,
+            extreme: T::ZERO,
+            pressure_extreme: T::ZERO,
+            turns: T::ZERO,
+        }
+    }
+
+    /// The motion as last seen.
+    pub fn motion(&self) -> &Motion<T> {
+        &self.motion
+    }
+
+    /// Takes the next readings: seconds since the last ones, stroke (m), pressure (Pa).
+    pub fn step(&mut self, dt: T, stroke: T, pressure: T) -> &Motion<T> {
+        let m = &mut self.motion;
+        m.dt = dt;
+        m.stroke = stroke;
+        if !self.started {
+            self.started = true;
+            m.dt = T::ZERO;
+            self.last_stroke = stroke;
+            self.last_pressure = pressure;
+            self.extreme = stroke;
+            self.pressure_extreme = pressure;
+            return &self.motion;
+        }
+        if dt > T::ZERO {
+            m.time += dt;
+            m.since_reversal += dt;
+            let share = dt / (dt + self.settings.rate_time);
+            let speed = m.speed + share * ((stroke - self.last_stroke) / dt - m.speed);
+            m.acceleration += share * ((speed - m.speed) / dt - m.acceleration);
+            m.speed = speed;
+            m.pressure_rate += share * ((pressure - self.last_pressure) / dt - m.pressure_rate);
+            if speed.abs() < self.settings.rest_speed {
+                m.hold_time += dt;
+            } else if m.travel > self.settings.stroke_threshold * T::from_f32(4.0) {
+                m.hold_time = T::ZERO;
+            }
+        }
+        self.last_stroke = stroke;
+        self.last_pressure = pressure;
+        self.turn(stroke, pressure);
+        &self.motion
+    }
+
+    fn turn(&mut self, stroke: T, pressure: T) {
+        let m = &mut self.motion;
+        // Forward is where the present stroke goes; before the first motion both ways are open.
+        let forward = if m.direction == T::ZERO { (stroke - self.extreme).sign() } else { m.direction };
+        let gone = (stroke - self.extreme) * forward;
+        let resting = m.speed.abs() < self.settings.rest_speed;
+        if m.direction == T::ZERO {
+            if gone > self.settings.stroke_threshold {
+                self.begin(forward, stroke, pressure);
+                return;
+            }
+        } else if gone >= T::ZERO {
+            m.travel += gone;
+            self.extreme = stroke;
+            if gone > T::ZERO && !resting {
+                self.pressure_extreme = pressure;
+            }
+        } else if -gone > self.settings.stroke_threshold {
+            let back = -gone;
+            self.begin(-forward, stroke, pressure);
+            self.motion.travel = back;
+            return;
+        }
+        if resting {
+            // At held length the pressure says which way the braid creeps.
+            let rise = pressure - self.pressure_extreme;
+            let m = &self.motion;
+            if rise * m.direction >= T::ZERO && m.direction != T::ZERO {
+                self.pressure_extreme = pressure;
+            } else if rise.abs() > self.settings.pressure_threshold {
+                self.begin(rise.sign(), stroke, pressure);
+            }
+        }
+    }
+
+    fn begin(&mut self, direction: T, stroke: T, pressure: T) {
+        if direction != self.motion.direction {
+            self.turns += T::ONE;
+            self.motion.cycles = self.turns * T::from_f32(0.5);
+            self.motion.since_reversal = T::ZERO;
+            self.motion.travel = T::ZERO;
+        }
+        self.motion.direction = direction;
+        self.extreme = stroke;
+        self.pressure_extreme = pressure;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(readings: impl IntoIterator<Item = (f64, f64)>) -> (Motion<f64>, usize) {
+        let mut tracker = MotionTracker::new(MotionSettings::default());
+        let mut flips = 0;
+        let mut last = 0.0;
+        for (stroke, pressure) in readings {
+            let m = tracker.step(1e-3, stroke, pressure);
+            if m.direction != last {
+                flips += 1;
+                last = m.direction;
+            }
+        }
+        (*tracker.motion(), flips)
+    }
+
+    #[test]
+    fn before_anything_moved_the_direction_is_unknown() {
+        let (m, flips) = run((0..1000).map(|i| (1e-5 * f64::from(i % 3), 300e3)));
+        assert_eq!((m.direction, flips), (0.0, 0));
+    }
+
+    #[test]
+    fn noise_and_ripple_do_not_flip_it() {
+        let noisy = (0..4000_i32).map(|i| {
+            let noise = 3e-5 * f64::from((i * 7919) % 13 - 6) / 6.0;
+            (5e-6 * f64::from(i.min(2000)) + noise, 300e3 + 0.7e3 * f64::from((i * 31) % 7 - 3))
+        });
+        let (m, flips) = run(noisy);
+        assert_eq!((m.direction, flips), (1.0, 1));
+    }
+
+    #[test]
+    fn a_turn_is_seen_within_the_threshold_and_travel_counts_from_it() {
+        let up_and_down = (0..3000_i32).map(|i| (1e-5 * f64::from(1500 - (i - 1500).abs()), 300e3));
+        let (m, flips) = run(up_and_down);
+        assert_eq!((m.direction, flips), (-1.0, 2));
+        assert!((m.travel - 0.015).abs() < 2e-4, "{}", m.travel);
+        assert_eq!(m.cycles, 1.0);
+    }
+
+    #[test]
+    fn at_held_length_filling_counts_as_shortening() {
+        let fill = (0..2000).map(|i| (0.01, 100e3 + 100.0 * f64::from(i)));
+        let (m, flips) = run(fill);
+        assert_eq!((m.direction, flips), (1.0, 1));
+        let empty = (0..2000).map(|i| (0.01, 300e3 - 100.0 * f64::from(i)));
+        assert_eq!(run(empty).0.direction, -1.0);
+    }
+}

@@ -1,0 +1,240 @@
+//! The table of one muscle: what a fit finds, a file keeps and a controller is sent.
+//!
+//! It holds values at pressures (nodes), not run-time coefficients; [`crate::muscle::Muscle::build`] turns it into the form that is evaluated.
+//! Every number is an `f32`, so host and controller start from the same bits.
+
+use crate::braid::{self, Geometry, GeometryError};
+use crate::effects::{FittedEffect, MAX_EFFECTS};
+use crate::spline::MAX_NODES;
+use crate::units::{Force, Pressure};
+use serde::{Deserialize, Serialize};
+
+/// The largest order `M` of the elastic polynomial.
+pub const MAX_ORDER: usize = 6;
+
+/// Whether the muscle pulls, or its motion is reversed by a push-rod.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Kind {
+    /// It shortens and pulls.
+    Contractile,
+    /// It extends a rod and pushes; stroke and force count positive outward.
+    Push,
+}
+
+/// The range that the recordings behind a table covered. Beyond it the table is an extrapolation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tested {
+    /// Lowest pressure.
+    pub pressure_low: Pressure<f32>,
+    /// Highest pressure.
+    pub pressure_high: Pressure<f32>,
+    /// Smallest contraction `ΔL/L0`.
+    pub contraction_low: f32,
+    /// Largest contraction `ΔL/L0`.
+    pub contraction_high: f32,
+}
+
+/// A muscle's geometry, deadband, `E_k(P)`, `k_F(P)` and left-out effects.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MuscleTable {
+    /// Pulling or pushing.
+    pub kind: Kind,
+    /// The muscle at rest.
+    pub geometry: Geometry<f32>,
+    /// `P0`: the pressure at which contraction begins.
+    pub deadband: Pressure<f32>,
+    /// Whether the force stops at zero (a muscle that goes slack does not push).
+    pub goes_slack: bool,
+    /// The pressures that the curves are given at, increasing, Pa.
+    pub nodes: heapless::Vec<f32, MAX_NODES>,
+    /// `E_1…E_M` at the nodes, Pa; one curve after another.
+    pub elastic: heapless::Vec<heapless::Vec<f32, MAX_NODES>, MAX_ORDER>,
+    /// `k_F` at the nodes.
+    pub friction: heapless::Vec<f32, MAX_NODES>,
+    /// What the recordings covered.
+    pub tested: Tested,
+    /// The highest pressure that may be commanded.
+    pub max_pressure: Pressure<f32>,
+    /// Force at rest length and the highest tested pressure: the scale of this muscle's forces.
+    pub blocked_force: Force<f32>,
+    /// Physics beyond the base model.
+    pub effects: heapless::Vec<FittedEffect, MAX_EFFECTS>,
+}
+
+/// Why a table cannot be used. Every variant names the number at fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum TableError {
+    /// A dimension of the muscle.
+    Geometry(GeometryError),
+    /// The deadband is not a finite pressure between −100 kPa and 1 MPa.
+    Deadband,
+    /// There is no node.
+    NoNodes,
+    /// This node is not finite, or not above the one before.
+    Node(u8),
+    /// There is no elastic curve.
+    NoOrder,
+    /// Curve `k` (from 1) has not one finite value per node, below 10 TPa in size.
+    Elastic(u8),
+    /// The friction curve has not one value per node, each between −0.5 and 0.95.
+    Friction,
+    /// The tested range is not finite or is turned round.
+    Tested,
+    /// The greatest pressure is not finite and positive.
+    MaxPressure,
+    /// The blocked force is not a finite number.
+    BlockedForce,
+    /// The effect at this position has the wrong number of parameters, or one that is not finite.
+    Effect(u8),
+}
+
+impl core::fmt::Display for TableError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Geometry(e) => write!(f, "{e}"),
+            Self::Deadband => f.write_str("the deadband P0 is not a pressure between −100 kPa and 1 MPa"),
+            Self::NoNodes => f.write_str("the table has no pressure node"),
+            Self::Node(i) => write!(f, "pressure node {} is not finite or not above the one before", i + 1),
+            Self::NoOrder => f.write_str("the table has no elastic coefficient"),
+            Self::Elastic(k) => write!(f, "E_{k} does not have one finite value per pressure node"),
+            Self::Friction => {
+                f.write_str("k_F does not have one value between −0.5 and 0.95 per pressure node")
+            }
+            Self::Tested => f.write_str("the tested range is not finite or is turned round"),
+            Self::MaxPressure => f.write_str("the greatest pressure is not finite and positive"),
+            Self::BlockedForce => f.write_str("the blocked force is not a finite number"),
+            Self::Effect(i) => {
+                write!(f, "effect {} has a wrong number of parameters or one that is not finite", i + 1)
+            }
+        }
+    }
+}
+
+impl core::error::Error for TableError {}
+
+impl MuscleTable {
+    /// `M`, the order of the elastic polynomial.
+    pub fn order(&self) -> usize {
+        self.elastic.len()
+    }
+
+    /// Looks at every number. Nothing that passes can make the model's evaluation fail.
+    ///
+    /// # Errors
+    /// The first number at fault.
+    pub fn check(&self) -> Result<(), TableError> {
+        self.geometry.build().map_err(TableError::Geometry)?;
+        let deadband = self.deadband.pascals();
+        if !(-1.0e5..=1.0e6).contains(&deadband) {
+            return Err(TableError::Deadband);
+        }
+        if self.nodes.is_empty() {
+            return Err(TableError::NoNodes);
+        }
+        for (i, node) in self.nodes.iter().enumerate() {
+            if !node.is_finite() || (i > 0 && *node <= self.nodes[i - 1]) {
+                return Err(TableError::Node(i as u8));
+            }
+        }
+        if self.elastic.is_empty() {
+            return Err(TableError::NoOrder);
+        }
+        for (k, curve) in self.elastic.iter().enumerate() {
+            if curve.len() != self.nodes.len() || curve.iter().any(|e| !(e.abs() < 1.0e13)) {
+                return Err(TableError::Elastic(k as u8 + 1));
+            }
+        }
+        if self.friction.len() != self.nodes.len() || self.friction.iter().any(|k| !(-0.5..=0.95).contains(k))
+        {
+            return Err(TableError::Friction);
+        }
+        let t = &self.tested;
+        let ordered = |low: f32, high: f32| low.is_finite() && high.is_finite() && low <= high;
+        if !ordered(t.pressure_low.pascals(), t.pressure_high.pascals())
+            || !ordered(t.contraction_low, t.contraction_high)
+        {
+            return Err(TableError::Tested);
+        }
+        if !(self.max_pressure.is_finite() && self.max_pressure.pascals() > 0.0) {
+            return Err(TableError::MaxPressure);
+        }
+        if !self.blocked_force.is_finite() {
+            return Err(TableError::BlockedForce);
+        }
+        for (i, e) in self.effects.iter().enumerate() {
+            if e.parameters.len() != e.effect.info().parameters.len()
+                || e.parameters.iter().any(|p| !p.is_finite())
+            {
+                return Err(TableError::Effect(i as u8));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A table in the manner of the thesis's miniature muscle, for examples and tests: six pressures, `M = 4`.
+pub fn example() -> MuscleTable {
+    let nodes = [207.0e3_f32, 276.0e3, 345.0e3, 414.0e3, 483.0e3, 552.0e3];
+    let curve = |at_low: f32, at_high: f32| {
+        let per_pascal = (at_high - at_low) / (552.0e3 - 207.0e3);
+        nodes.iter().map(|p| at_low + per_pascal * (p - 207.0e3)).collect()
+    };
+    MuscleTable {
+        kind: Kind::Contractile,
+        geometry: braid::miniature().cast(),
+        deadband: Pressure::from_kilopascals(76.5),
+        goes_slack: false,
+        nodes: nodes.iter().copied().collect(),
+        elastic: [curve(2.1e6, 2.6e6), curve(-1.5e6, -2.2e6), curve(1.1e6, 1.6e6), curve(-0.2e6, -0.4e6)]
+            .into_iter()
+            .collect(),
+        friction: [0.14, 0.12, 0.10, 0.08, 0.06, 0.047].into_iter().collect(),
+        tested: Tested {
+            pressure_low: Pressure::from_kilopascals(207.0),
+            pressure_high: Pressure::from_kilopascals(552.0),
+            contraction_low: 0.0,
+            contraction_high: 0.077,
+        },
+        max_pressure: Pressure::from_kilopascals(600.0),
+        blocked_force: Force::from_newtons(135.7),
+        effects: heapless::Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::Length;
+
+    #[test]
+    fn every_wrong_number_is_named() {
+        let wrong = |f: &dyn Fn(&mut MuscleTable)| {
+            let mut t = example();
+            f(&mut t);
+            t.check()
+        };
+        assert_eq!(example().check(), Ok(()));
+        assert_eq!(
+            wrong(&|t| t.geometry.wall = Length::ZERO),
+            Err(TableError::Geometry(GeometryError::Wall))
+        );
+        assert_eq!(wrong(&|t| t.deadband = Pressure::from_pascals(f32::NAN)), Err(TableError::Deadband));
+        assert_eq!(wrong(&|t| t.nodes.clear()), Err(TableError::NoNodes));
+        assert_eq!(wrong(&|t| t.nodes[3] = t.nodes[2]), Err(TableError::Node(3)));
+        assert_eq!(wrong(&|t| t.elastic.clear()), Err(TableError::NoOrder));
+        assert_eq!(wrong(&|t| t.elastic[1][0] = f32::INFINITY), Err(TableError::Elastic(2)));
+        assert_eq!(wrong(&|t| t.friction[0] = 1.0), Err(TableError::Friction));
+        assert_eq!(wrong(&|t| t.tested.contraction_high = -1.0), Err(TableError::Tested));
+        assert_eq!(wrong(&|t| t.max_pressure = Pressure::ZERO), Err(TableError::MaxPressure));
+        assert_eq!(
+            wrong(&|t| t.blocked_force = Force::from_newtons(f32::NAN)),
+            Err(TableError::BlockedForce)
+        );
+        let short = FittedEffect {
+            effect: crate::effects::EffectName::CoulombFriction,
+            parameters: heapless::Vec::new(),
+        };
+        let with_effect = |t: &mut MuscleTable| t.effects = [short.clone()].into_iter().collect();
+        assert_eq!(wrong(&with_effect), Err(TableError::Effect(0)));
+    }
+}
