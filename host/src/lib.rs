@@ -1,5 +1,10 @@
-//! Host library.
+//! Recordings of muscles to tables: reading, fitting, checking, writing.
 
+pub mod cli;
+pub mod commands;
+pub mod console;
 pub mod error;
 pub mod muscle_description;
+pub mod output;
 pub mod recording;
+pub mod table_file;

@@ -1,0 +1,97 @@
+//! The command line: one sub-command per file of [`crate::commands`], options that all share, and the exit status.
+//!
+//! Exit status 0: done. 1: the input or the device is at fault. 2: the call is at fault.
+
+use std::process::ExitCode;
+
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+
+use crate::commands;
+use crate::console::{Colour, Console};
+use crate::error::Result;
+
+/// Recordings of pneumatic artificial muscles to tables, tables to controllers.
+#[derive(Debug, Parser)]
+#[command(name = "host", version, about, propagate_version = true, arg_required_else_help = true)]
+#[command(after_help = "Examples:\n  \
+    host fit --muscle mini.toml loops/*.csv -o mini.pam --report mini.html\n  \
+    host predict --table mini.pam new.csv -o predicted.csv\n  \
+    host table show mini.pam\n\n\
+    Exit status: 0 done, 1 the input or the device is at fault, 2 the call is at fault.")]
+pub struct Cli {
+    #[command(flatten)]
+    output: Output,
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// What every sub-command does with its messages.
+#[derive(Debug, Clone, Args)]
+pub struct Output {
+    /// Say nothing but results and errors.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Say more about what is done, and how long it took.
+    #[arg(short, long, global = true)]
+    verbose: bool,
+    /// Colours in messages.
+    #[arg(long, global = true, value_enum, default_value_t = Colours::Auto, value_name = "WHEN")]
+    color: Colours,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Colours {
+    /// On a terminal only, and not where `NO_COLOR` is set.
+    Auto,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+/// Every sub-command. A new one is one file in `commands/` and one line here and in [`Command::run`].
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Show, check or export a table.
+    Table(commands::table::Arguments),
+    /// Print a completion script for a shell.
+    Completions(commands::completions::Arguments),
+}
+
+impl Command {
+    fn run(self, console: &Console) -> Result<()> {
+        match self {
+            Self::Table(a) => a.run(console),
+            Self::Completions(a) => a.run(&mut Cli::command(), console),
+        }
+    }
+}
+
+/// Reads the command line, runs it, prints what went wrong, and gives the exit status.
+pub fn main() -> ExitCode {
+    // clap itself prints usage errors and ends with status 2.
+    let cli = Cli::parse();
+    let colour = match cli.output.color {
+        Colours::Auto => Colour::OnTerminal,
+        Colours::Always => Colour::Always,
+        Colours::Never => Colour::Never,
+    };
+    let console = Console::new(cli.output.quiet, cli.output.verbose, colour);
+    match cli.command.run(&console) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            console.error(&error);
+            ExitCode::from(error.exit_status())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+}

@@ -1,0 +1,28 @@
+//! `host completions`: a completion script for a shell.
+
+use clap::Args;
+use clap_complete::Shell;
+
+use crate::console::Console;
+use crate::error::Result;
+use crate::output::write_whole;
+
+/// Arguments of `host completions`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  host completions bash > ~/.local/share/bash-completion/completions/host")]
+pub struct Arguments {
+    /// The shell.
+    shell: Shell,
+}
+
+impl Arguments {
+    /// Prints the script.
+    ///
+    /// # Errors
+    /// None so far.
+    pub fn run(self, command: &mut clap::Command, _console: &Console) -> Result<()> {
+        let mut script = Vec::new();
+        clap_complete::generate(self.shell, command, "host", &mut script);
+        write_whole(std::path::Path::new("-"), &script)
+    }
+}

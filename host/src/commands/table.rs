@@ -1,0 +1,244 @@
+//! `host table`: look at a table, judge it.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use model_core::muscle::Muscle;
+use serde_json::{Value, json};
+
+use crate::console::Console;
+use crate::error::Result;
+use crate::table_file::TableFile;
+
+/// Arguments of `host table`.
+#[derive(Debug, Args)]
+#[command(arg_required_else_help = true)]
+pub struct Arguments {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Print a table.
+    #[command(
+        after_help = "Examples:\n  host table show mini.pam\n  host table show mini.pam --json | jq .pressures"
+    )]
+    Show(File),
+    /// Judge a table: every number, and what the model does with them.
+    #[command(
+        after_help = "Example:\n  host table check mini.pam && host flash mini.pam --port /dev/ttyACM0"
+    )]
+    Check(File),
+}
+
+#[derive(Debug, Args)]
+struct File {
+    /// The table file.
+    #[arg(value_name = "TABLE.pam")]
+    table: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Arguments {
+    /// Does what was asked.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is no valid table.
+    pub fn run(self, console: &Console) -> Result<()> {
+        match self.action {
+            Action::Show(file) => {
+                let table = TableFile::read(&file.table)?;
+                console.result(if file.json { pretty(&to_json(&table)) } else { to_text(&table) });
+            }
+            Action::Check(file) => {
+                let table = TableFile::read(&file.table)?;
+                let remarks = remarks(&table);
+                if file.json {
+                    console.result(pretty(&json!({ "valid": true, "remarks": remarks })));
+                } else {
+                    console.result(format!("{}: valid", file.table.display()));
+                    for remark in remarks {
+                        console.result(format!("  note: {remark}"));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn pretty(value: &Value) -> String {
+    format!("{value:#}")
+}
+
+/// What is odd about a valid table.
+fn remarks(file: &TableFile) -> Vec<String> {
+    let mut remarks = Vec::new();
+    let table = &file.table;
+    if table.nodes.len() == 1 {
+        remarks.push("only one pressure: nothing is known about others".to_owned());
+    }
+    if table.friction.iter().all(|k| *k == 0.0) {
+        remarks.push("no friction: the recordings showed no hysteresis, or only one direction".to_owned());
+    }
+    if table.friction.iter().any(|k| *k < 0.0) {
+        remarks.push("a negative k_F: friction that drives is not physical".to_owned());
+    }
+    if let Ok(muscle) = Muscle::<f64>::build(table) {
+        let (low, high) = (table.tested.contraction_low, table.tested.contraction_high);
+        let l0 = f64::from(table.geometry.rest_length.metres());
+        let mut falling = false;
+        for i in 0..=20 {
+            let contraction = f64::from(low) + f64::from(high - low) * f64::from(i) / 20.0;
+            let held = muscle.held(model_core::units::Length::from_metres(contraction * l0));
+            let (p0, p1) = (table.tested.pressure_low.pascals(), table.tested.pressure_high.pascals());
+            for j in 0..=20 {
+                let p = f64::from(p0) + f64::from(p1 - p0) * f64::from(j) / 20.0;
+                let parts = muscle.parts(&held, model_core::units::Pressure::from_pascals(p));
+                falling |= parts.quasi() > 0.0 && parts.pressure_slope < 0.0;
+            }
+        }
+        if falling {
+            remarks.push(
+                "inside the tested range the force falls with rising pressure somewhere: the inverse may not find a pressure there"
+                    .to_owned(),
+            );
+        }
+    }
+    remarks
+}
+
+fn to_json(file: &TableFile) -> Value {
+    let t = &file.table;
+    let kpa = |p: f32| f64::from(p) / 1e3;
+    let nodes: Vec<Value> = (0..t.nodes.len())
+        .map(|i| {
+            let e: Vec<f64> = t.elastic.iter().map(|c| f64::from(c[i]) / 1e6).collect();
+            json!({ "pressure_kPa": kpa(t.nodes[i]), "E_MPa": e, "k_F": t.friction[i] })
+        })
+        .collect();
+    let effects: Vec<Value> = t
+        .effects
+        .iter()
+        .map(|e| {
+            let info = e.effect.info();
+            let parameters: Vec<Value> = info
+                .parameters
+                .iter()
+                .zip(&e.parameters)
+                .map(|(p, v)| json!({ "name": p.name, "value": v, "unit": p.unit }))
+                .collect();
+            json!({ "effect": info.name, "parameters": parameters })
+        })
+        .collect();
+    let a = &file.about;
+    let corrections: Vec<Value> =
+        a.corrections.iter().map(|c| json!({ "effect": c.effect, "parameters": c.parameters })).collect();
+    let sources: Vec<Value> = a
+        .sources
+        .iter()
+        .map(|s| json!({ "path": s.path, "sha256": s.sha256, "samples": s.samples }))
+        .collect();
+    json!({
+        "schema": "pam-table/1",
+        "muscle": a.muscle,
+        "date": a.date,
+        "tool": a.tool,
+        "kind": match t.kind { model_core::table::Kind::Contractile => "contractile", model_core::table::Kind::Push => "push" },
+        "rest_length_mm": t.geometry.rest_length.millimetres(),
+        "braid_angle_deg": t.geometry.braid_angle.degrees(),
+        "bladder_outer_diameter_mm": t.geometry.outer_diameter.millimetres(),
+        "bladder_wall_mm": t.geometry.wall.millimetres(),
+        "tip_correction": t.geometry.tip_correction,
+        "order": t.order(),
+        "deadband_kPa": t.deadband.kilopascals(),
+        "goes_slack": t.goes_slack,
+        "blocked_force_N": t.blocked_force.newtons(),
+        "max_pressure_kPa": t.max_pressure.kilopascals(),
+        "tested": {
+            "pressure_kPa": [t.tested.pressure_low.kilopascals(), t.tested.pressure_high.kilopascals()],
+            "contraction": [t.tested.contraction_low, t.tested.contraction_high],
+        },
+        "pressures": nodes,
+        "effects": effects,
+        "corrections": corrections,
+        "fit": {
+            "samples": a.fit.samples,
+            "rms_N": a.fit.rms_newtons,
+            "mean_error_pct": a.fit.mean_error_percent,
+            "max_error_pct": a.fit.max_error_percent,
+            "left_out_pressure_mean_error_pct": a.fit.left_out_percent,
+            "warnings": a.fit.warnings,
+        },
+        "sources": sources,
+    })
+}
+
+fn to_text(file: &TableFile) -> String {
+    let (t, a) = (&file.table, &file.about);
+    let mut text = format!(
+        "{}  ({:?}, made {} by {})\n\
+         L0 {:.2} mm, braid {:.2}° from the radial plane, bladder {:.2} mm, wall {:.2} mm{}\n\
+         P0 {:.1} kPa, blocked force {:.1} N, at most {:.0} kPa\n\
+         tested {:.0} to {:.0} kPa, contraction {:.4} to {:.4}\n",
+        a.muscle,
+        t.kind,
+        a.date,
+        a.tool,
+        t.geometry.rest_length.millimetres(),
+        t.geometry.braid_angle.degrees(),
+        t.geometry.outer_diameter.millimetres(),
+        t.geometry.wall.millimetres(),
+        if t.geometry.tip_correction { ", tip correction" } else { "" },
+        t.deadband.kilopascals(),
+        t.blocked_force.newtons(),
+        t.max_pressure.kilopascals(),
+        t.tested.pressure_low.kilopascals(),
+        t.tested.pressure_high.kilopascals(),
+        t.tested.contraction_low,
+        t.tested.contraction_high,
+    );
+    text += "\n   P kPa";
+    for k in 1..=t.order() {
+        text += &format!("   E_{k} MPa");
+    }
+    text += "      k_F\n";
+    for i in 0..t.nodes.len() {
+        text += &format!("{:8.1}", t.nodes[i] / 1e3);
+        for curve in &t.elastic {
+            text += &format!("{:10.4}", curve[i] / 1e6);
+        }
+        text += &format!("{:9.4}\n", t.friction[i]);
+    }
+    for e in &t.effects {
+        let info = e.effect.info();
+        let parameters: Vec<String> = info
+            .parameters
+            .iter()
+            .zip(&e.parameters)
+            .map(|(p, v)| format!("{} = {v} {}", p.name, p.unit))
+            .collect();
+        text += &format!("effect {}: {}\n", info.name, parameters.join(", "));
+    }
+    for c in &a.corrections {
+        text += &format!("correction of the bench {}: {:?}\n", c.effect, c.parameters);
+    }
+    text += &format!(
+        "\n{} samples, rms {:.3} N, error {:.3} % mean, {:.3} % at most, of blocked force",
+        a.fit.samples, a.fit.rms_newtons, a.fit.mean_error_percent, a.fit.max_error_percent
+    );
+    if let Some(left_out) = a.fit.left_out_percent {
+        text += &format!("; {left_out:.3} % mean at pressures left out");
+    }
+    for s in &a.sources {
+        text +=
+            &format!("\nfrom {} ({} rows, sha256 {})", s.path, s.samples, s.sha256.get(..16).unwrap_or(""));
+    }
+    for w in &a.fit.warnings {
+        text += &format!("\nwarning: {w}");
+    }
+    text
+}
