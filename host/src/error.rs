@@ -94,10 +94,20 @@ codes! {
     FitUnderdetermined = "fit::underdetermined", Input;
     /// A table file is damaged or from another version.
     TableInvalid = "table::invalid", Input;
-    /// The device does not answer, or is not ours.
+    /// The port cannot be opened.
+    DevicePort = "device::port", Input;
+    /// The device does not answer, or stopped answering.
     DeviceSilent = "device::silent", Input;
-    /// The device speaks another version, or refused what was asked.
+    /// Something answers, and it is not a controller of ours.
+    DeviceForeign = "device::foreign", Input;
+    /// The device speaks another version.
+    DeviceVersion = "device::version", Input;
+    /// The device refused what was asked.
     DeviceRefused = "device::refused", Input;
+    /// What the device keeps is not what it was sent.
+    DeviceVerify = "device::verify", Input;
+    /// The device stopped because of a fault.
+    DeviceFault = "device::fault", Input;
     /// Options that contradict each other or are out of range.
     CallInvalid = "call::invalid", Call;
 }

@@ -3,6 +3,7 @@
 pub mod cli;
 pub mod commands;
 pub mod console;
+pub mod device;
 pub mod error;
 pub mod muscle_description;
 pub mod output;

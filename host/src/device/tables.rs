@@ -1,0 +1,90 @@
+//! Tables on a device: read, sent in pieces, read back, compared.
+
+use model_core::link::endpoints::{BeginTable, CommitTable, GetInfo, ReadTable, SendTablePiece};
+use model_core::link::frame::crc32;
+use model_core::link::messages::{
+    PIECE, Refusal, Side, TableBegin, TableFault, TableInfo, TablePiece, TableRead,
+};
+
+use super::{Client, words};
+use crate::error::{Code, Error, Result};
+
+/// The image that a device keeps for a muscle; `None` when it has none.
+///
+/// # Errors
+/// What the device refuses, silence, or [`Code::DeviceVerify`] when the bytes do not fit the device's own check sum.
+pub fn read(client: &mut Client, side: Side) -> Result<Option<Vec<u8>>> {
+    let info = client.call::<GetInfo>(&())?;
+    let Some(kept) = info.tables[side.index()] else { return Ok(None) };
+    let mut image = Vec::with_capacity(kept.length as usize);
+    while image.len() < kept.length as usize {
+        let offset = image.len() as u32;
+        let piece = client.call::<ReadTable>(&TableRead { side, offset })?;
+        if piece.offset != offset || piece.bytes.is_empty() {
+            break;
+        }
+        image.extend_from_slice(&piece.bytes);
+    }
+    image.truncate(kept.length as usize);
+    if image.len() != kept.length as usize || crc32(&image) != kept.crc {
+        return Err(Error::new(
+            Code::DeviceVerify,
+            format!(
+                "the device's table cannot be read back whole: {} of {} bytes, check sum {:08x} instead of {:08x}",
+                image.len(),
+                kept.length,
+                crc32(&image),
+                kept.crc
+            ),
+        )
+        .help("send the table again; if it comes back, the device's memory is failing"));
+    }
+    Ok(Some(image))
+}
+
+/// Sends an image, has it committed, reads it back and compares every byte. `progress` is told the bytes sent.
+///
+/// A piece whose answer was lost is not sent twice: the device says how much it has.
+///
+/// # Errors
+/// Refusals in words (the device keeps the table before), silence, or [`Code::DeviceVerify`].
+pub fn write(
+    client: &mut Client,
+    side: Side,
+    image: &[u8],
+    mut progress: impl FnMut(usize),
+) -> Result<TableInfo> {
+    let capacity = client.call::<GetInfo>(&())?.table_capacity;
+    let length = u32::try_from(image.len()).unwrap_or(u32::MAX);
+    if length > capacity {
+        return Err(words::refused("table_begin", Refusal::Table(TableFault::TooLong(capacity))));
+    }
+    let crc = crc32(image);
+    client.call::<BeginTable>(&TableBegin { side, length, crc })?;
+    let mut sent = 0;
+    while sent < image.len() {
+        let chunk = &image[sent..image.len().min(sent + PIECE)];
+        let bytes = heapless::Vec::from_slice(chunk)
+            .map_err(|_| Error::new(Code::CallInvalid, "a piece of the table does not fit its message"))?;
+        let there = match client.try_call::<SendTablePiece>(&TablePiece { offset: sent as u32, bytes })? {
+            Ok(there) | Err(Refusal::Table(TableFault::Gap(there))) => there as usize,
+            Err(refusal) => return Err(words::refused("table_piece", refusal)),
+        };
+        if there <= sent || there > image.len() {
+            return Err(words::refused("table_piece", Refusal::Table(TableFault::Gap(there as u32))));
+        }
+        sent = there;
+        progress(sent);
+    }
+    let kept = client.call_once::<CommitTable>(&())?;
+    let back = read(client, side)?.unwrap_or_default();
+    if back != image {
+        let at = back.iter().zip(image).position(|(a, b)| a != b).unwrap_or(back.len().min(image.len()));
+        return Err(Error::new(
+            Code::DeviceVerify,
+            format!("the table read back differs from the one sent, first at byte {at} of {}", image.len()),
+        )
+        .help("nothing was armed; send it again, and if it comes back the device's memory is failing"));
+    }
+    Ok(kept)
+}
