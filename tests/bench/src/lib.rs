@@ -1,4 +1,20 @@
 //! The virtual test bench: a pneumatic artificial muscle, its pneumatics, its load and its instruments, from other physics
 //! than the model that is proved against it. It imports nothing of `model-core`.
 
+pub mod bench;
+pub mod campaigns;
+pub mod friction;
 pub mod lockstep;
+pub mod material;
+pub mod muscle;
+pub mod physics;
+pub mod plant;
+pub mod pneumatics;
+pub mod presets;
+pub mod protocol;
+pub mod recording;
+pub mod rig;
+pub mod rng;
+pub mod sensors;
+pub mod surface;
+pub mod tube;

@@ -1,0 +1,405 @@
+//! The muscle as a plant for a control loop: pressure command in, sensor readings out, one control period a call.
+//!
+//! ```
+//! use virtual_bench::{bench::BenchSpec, plant::{Motion, Plant}, presets};
+//! let bench = BenchSpec::laboratory(presets::miniature(), 7);
+//! let mut plant = Plant::new(&bench, &Motion::Held { stroke_mm: 0.5 });
+//! let mut readings = plant.readings();
+//! for _ in 0..1000 {
+//!     readings = plant.step(1e-3, 400e3);
+//! }
+//! assert!((readings.pressure - 400e3).abs() < 5e3 && readings.force > 40.0);
+//! ```
+
+use crate::bench::BenchSpec;
+use crate::lockstep::{Answer, Station};
+use crate::muscle::Muscle;
+use crate::pneumatics::Air;
+use crate::rig::RigState;
+use crate::sensors::Channel;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// What moves the muscle's free end during a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Motion {
+    /// The length is held.
+    Held {
+        /// Contraction stroke, mm.
+        stroke_mm: f64,
+    },
+    /// The length swings: `mean + amplitude sin(2π f t)`.
+    Sine {
+        /// Mean stroke, mm.
+        mean_mm: f64,
+        /// Amplitude, mm.
+        amplitude_mm: f64,
+        /// Frequency f, Hz.
+        #[serde(rename = "frequency_Hz")]
+        frequency_hz: f64,
+    },
+    /// The length follows straight lines between points (time in s, stroke in mm); it stays at the last.
+    Path {
+        /// The points, times rising.
+        points: Vec<(f64, f64)>,
+    },
+    /// The muscle moves a mass against a spring: `m a = F − preload − k x − c v`, between stops.
+    Load {
+        /// Mass, kg.
+        #[serde(rename = "mass_kg")]
+        mass: f64,
+        /// Spring, N/mm.
+        #[serde(rename = "spring_N_mm", default)]
+        spring: f64,
+        /// Constant pull against the muscle, N.
+        #[serde(rename = "preload_N", default)]
+        preload: f64,
+        /// Damper, N s/mm.
+        #[serde(rename = "damper_N_s_mm", default)]
+        damper: f64,
+    },
+}
+
+/// The scripts of a plant file: `[[script]]` tables.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scripts {
+    /// In the order in which the board asks for them by number.
+    pub script: Vec<Motion>,
+}
+
+impl Scripts {
+    /// Read a TOML file of `[[script]]` tables; the error is the parser's, or says which number cannot be.
+    pub fn from_toml(text: &str) -> Result<Self, String> {
+        let scripts: Self = toml::from_str(text).map_err(|e| e.to_string())?;
+        for (i, s) in scripts.script.iter().enumerate() {
+            s.check().map_err(|what| format!("script {i}: {what}"))?;
+        }
+        Ok(scripts)
+    }
+}
+
+impl Motion {
+    /// Refuse numbers that cannot be.
+    pub fn check(&self) -> Result<(), &'static str> {
+        let finite = |x: &[f64]| x.iter().all(|v| v.is_finite());
+        let good = match self {
+            Self::Held { stroke_mm } => finite(&[*stroke_mm]),
+            Self::Sine { mean_mm, amplitude_mm, frequency_hz } => {
+                finite(&[*mean_mm, *amplitude_mm, *frequency_hz])
+            }
+            Self::Path { points } => {
+                if points.is_empty() || points.windows(2).any(|w| w[1].0 <= w[0].0) {
+                    return Err("a path needs points with rising times");
+                }
+                points.iter().all(|p| finite(&[p.0, p.1]))
+            }
+            Self::Load { mass, spring, preload, damper } => {
+                if *mass <= 0.0 {
+                    return Err("a load needs a mass above zero");
+                }
+                finite(&[*mass, *spring, *preload, *damper])
+            }
+        };
+        if good { Ok(()) } else { Err("numbers must be finite") }
+    }
+
+    /// Stroke (m) that is prescribed at a time (s), and whether the script is over.
+    fn stroke(&self, t: f64) -> (f64, bool) {
+        match self {
+            Self::Held { stroke_mm } => (stroke_mm * 1e-3, false),
+            Self::Sine { mean_mm, amplitude_mm, frequency_hz } => {
+                ((mean_mm + amplitude_mm * (TAU * frequency_hz * t).sin()) * 1e-3, false)
+            }
+            Self::Path { points } => {
+                let after = points.iter().position(|p| p.0 > t);
+                match after {
+                    Some(0) => (points[0].1 * 1e-3, false),
+                    Some(i) => {
+                        let (a, b) = (points[i - 1], points[i]);
+                        ((a.1 + (b.1 - a.1) * (t - a.0) / (b.0 - a.0)) * 1e-3, false)
+                    }
+                    None => (points.last().map_or(0.0, |p| p.1) * 1e-3, true),
+                }
+            }
+            Self::Load { .. } => (0.0, false),
+        }
+    }
+}
+
+/// What the controller's sensors read.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Readings {
+    /// Pa gauge.
+    pub pressure: f64,
+    /// Contraction stroke, m.
+    pub stroke: f64,
+    /// N.
+    pub force: f64,
+    /// Bladder temperature, °C.
+    pub temperature: f64,
+}
+
+/// Longest step of the physics, s.
+const LONGEST: f64 = 0.25e-3;
+
+/// A muscle with air, load and sensors under a controller.
+#[derive(Debug, Clone)]
+pub struct Plant {
+    motion: Motion,
+    muscle: Muscle,
+    air: Air,
+    rig: RigState,
+    channels: [Channel; 3],
+    time: f64,
+    stroke: f64,
+    speed: f64,
+    force: f64,
+    temperature: f64,
+    readings: Readings,
+    done: bool,
+}
+
+impl Plant {
+    /// A vented muscle at the start of a motion.
+    pub fn new(bench: &BenchSpec, motion: &Motion) -> Self {
+        Self::with_muscle(Muscle::new(bench.muscle.clone()), bench, motion)
+    }
+
+    /// The same with a muscle whose tables are built already.
+    pub fn with_muscle(mut muscle: Muscle, bench: &BenchSpec, motion: &Motion) -> Self {
+        muscle.reset();
+        let (stroke, done) = motion.stroke(0.0);
+        let i = &bench.instruments;
+        let mut plant = Self {
+            air: Air::new(bench.pneumatics, muscle.volume(0.0), bench.seed),
+            rig: RigState::new(bench.rig),
+            channels: [
+                Channel::new(i.pressure, bench.seed, "pressure"),
+                Channel::new(i.stroke, bench.seed, "stroke"),
+                Channel::new(i.force, bench.seed, "force"),
+            ],
+            muscle,
+            motion: motion.clone(),
+            time: 0.0,
+            stroke,
+            speed: 0.0,
+            force: 0.0,
+            temperature: 22.0,
+            readings: Readings::default(),
+            done,
+        };
+        plant.advance(LONGEST, 0.0);
+        plant.time = 0.0;
+        plant.sample(1e-3);
+        plant
+    }
+
+    /// Advance by one control period `dt` (s) under a pressure command (Pa); gives the readings at its end.
+    pub fn step(&mut self, dt: f64, command: f64) -> Readings {
+        let parts = (dt / LONGEST).ceil().clamp(1.0, 1e6) as u32;
+        let h = dt / f64::from(parts);
+        for _ in 0..parts {
+            self.advance(h, command);
+        }
+        self.sample(dt);
+        self.readings
+    }
+
+    fn advance(&mut self, h: f64, command: f64) {
+        self.time += h;
+        if let Motion::Load { mass, spring, preload, damper } = self.motion {
+            let limit = 0.45 * self.muscle.spec().geometry.rest_length;
+            let against = preload + spring * 1e3 * self.stroke;
+            // Semi-implicit in the damper; the stops take the speed away.
+            self.speed = (self.speed + h * (self.force - against) / mass) / (1.0 + h * damper * 1e3 / mass);
+            self.stroke += h * self.speed;
+            if self.stroke < 0.0 || self.stroke > limit {
+                self.stroke = self.stroke.clamp(0.0, limit);
+                self.speed = 0.0;
+            }
+        } else {
+            (self.stroke, self.done) = self.motion.stroke(self.time);
+        }
+        let stroke = self.rig.stroke(self.stroke, self.force, h);
+        let pressure = self.air.advance(h, command.max(0.0), self.muscle.volume(stroke));
+        let drive = self.muscle.advance(h, stroke, pressure, 22.0);
+        self.force = drive.force;
+        self.temperature = drive.temperature;
+        self.channels[0].follow(h, self.air.seen());
+        self.channels[1].follow(h, self.stroke);
+        let at_cell = self.rig.at_cell(drive.force, pressure, stroke, h);
+        self.channels[2].follow(h, at_cell);
+    }
+
+    fn sample(&mut self, dt: f64) {
+        let [pressure, stroke, force] = [0, 1, 2].map(|i| self.channels[i].sample(dt));
+        self.readings = Readings { pressure, stroke, force, temperature: self.temperature };
+    }
+
+    /// The last readings.
+    pub fn readings(&self) -> Readings {
+        self.readings
+    }
+
+    /// True pressure (Pa), stroke (m) and force (N), for the judge.
+    pub fn truth(&self) -> Readings {
+        Readings {
+            pressure: self.air.in_muscle(),
+            stroke: self.stroke,
+            force: self.force,
+            temperature: self.temperature,
+        }
+    }
+
+    /// Whether the motion script has ended.
+    pub fn done(&self) -> bool {
+        self.done
+    }
+
+    /// The muscle.
+    pub fn muscle(&self) -> &Muscle {
+        &self.muscle
+    }
+}
+
+/// A line of the bench's own log of a lock-step run.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LogRow {
+    /// Time in the run, s.
+    pub time: f64,
+    /// Number of the script.
+    pub script: u16,
+    /// What the board commanded, Pa.
+    pub command: f64,
+    /// What the board said it aims at, N.
+    pub setpoint: f64,
+    /// What was true.
+    pub truth: Readings,
+}
+
+/// A plant behind the lock-step wire.
+#[derive(Debug)]
+pub struct PlantStation {
+    bench: BenchSpec,
+    scripts: Vec<Motion>,
+    period: f64,
+    plant: Plant,
+    script: u16,
+    time: f64,
+    log: Vec<LogRow>,
+}
+
+impl PlantStation {
+    /// A bench with motion scripts and a control period (s). Without scripts the muscle is held at rest length.
+    pub fn new(bench: BenchSpec, scripts: Vec<Motion>, period: f64) -> Self {
+        let scripts = if scripts.is_empty() { vec![Motion::Held { stroke_mm: 0.0 }] } else { scripts };
+        let plant = Plant::new(&bench, &scripts[0]);
+        Self { bench, scripts, period, plant, script: 0, time: 0.0, log: Vec::new() }
+    }
+
+    /// What happened, one row per period.
+    pub fn log(&self) -> &[LogRow] {
+        &self.log
+    }
+
+    fn answer(&self) -> Answer {
+        let r = self.plant.readings();
+        let mut status = 0;
+        if self.plant.done() {
+            status |= Answer::SCRIPT_DONE;
+        }
+        if self.plant.truth().pressure > 1.25 * self.bench.muscle.max_pressure {
+            status |= Answer::BURST;
+        }
+        Answer {
+            status,
+            temperature_centi: (r.temperature * 100.0).round() as i16,
+            tick: 0,
+            pressure: r.pressure as f32,
+            stroke: r.stroke as f32,
+            force: r.force as f32,
+        }
+    }
+}
+
+impl Station for PlantStation {
+    fn reset(&mut self, script: u16) -> Answer {
+        let motion = self.scripts.get(usize::from(script)).unwrap_or(&self.scripts[0]);
+        self.plant = Plant::with_muscle(self.plant.muscle.clone(), &self.bench, motion);
+        self.script = script;
+        self.time = 0.0;
+        self.answer()
+    }
+
+    fn step(&mut self, pressure_command: f32, setpoint: f32) -> Answer {
+        self.plant.step(self.period, f64::from(pressure_command));
+        self.time += self.period;
+        self.log.push(LogRow {
+            time: self.time,
+            script: self.script,
+            command: f64::from(pressure_command),
+            setpoint: f64::from(setpoint),
+            truth: self.plant.truth(),
+        });
+        self.answer()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::presets;
+
+    #[test]
+    fn the_same_seed_gives_the_same_readings_bit_for_bit() {
+        let run = |seed| {
+            let bench = BenchSpec::laboratory(presets::miniature(), seed);
+            let motion = Motion::Sine { mean_mm: 1.0, amplitude_mm: 0.8, frequency_hz: 0.5 };
+            let mut plant = Plant::new(&bench, &motion);
+            (0..500)
+                .map(|i| plant.step(1e-3, 300e3 + 100.0 * f64::from(i)).force.to_bits())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(run(3), run(3));
+        assert_ne!(run(3), run(4));
+    }
+
+    #[test]
+    fn a_hanging_mass_comes_to_rest_where_the_forces_balance() {
+        let mut bench = BenchSpec::laboratory(presets::miniature(), 1);
+        bench.instruments = crate::sensors::Instruments::ideal();
+        let motion = Motion::Load { mass: 2.0, spring: 0.0, preload: 19.6, damper: 0.2 };
+        let mut plant = Plant::new(&bench, &motion);
+        for _ in 0..4000 {
+            plant.step(1e-3, 500e3);
+        }
+        let end = plant.truth();
+        assert!((end.force - 19.6).abs() < 1.0, "{end:?}");
+        assert!(end.stroke > 1e-3, "{end:?}");
+    }
+
+    #[test]
+    fn a_minute_at_a_kilohertz_is_quick() {
+        let bench = BenchSpec::laboratory(presets::contractile(), 1);
+        let motion = Motion::Sine { mean_mm: 10.0, amplitude_mm: 5.0, frequency_hz: 0.5 };
+        let mut plant = Plant::new(&bench, &motion);
+        let start = std::time::Instant::now();
+        for _ in 0..60_000 {
+            plant.step(1e-3, 400e3);
+        }
+        let spent = start.elapsed().as_secs_f64();
+        assert!(spent < 3.0, "{spent} s");
+    }
+
+    #[test]
+    fn scripts_come_from_a_file_and_bad_ones_are_refused() {
+        let good = "[[script]]\nkind = \"path\"\npoints = [[0.0, 0.0], [1.0, 2.0]]\n[[script]]\nkind = \"load\"\nmass_kg = 1.0\n";
+        let scripts = Scripts::from_toml(good).expect("good");
+        assert_eq!(scripts.script[0].stroke(0.5), (1e-3, false));
+        assert!(scripts.script[0].stroke(1.5).1);
+        assert!(Scripts::from_toml("[[script]]\nkind = \"path\"\npoints = []\n").is_err());
+        assert!(Scripts::from_toml("[[script]]\nkind = \"load\"\nmass_kg = 0.0\n").is_err());
+    }
+}
