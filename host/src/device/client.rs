@@ -331,7 +331,9 @@ impl Client {
                         self.topics.push_back(Topic::Event(event));
                     }
                 }
-                Kind::Topic | Kind::Request => {}
+                // A controller never asks: what arrives as a request is our own, sent back.
+                Kind::Request => heard.echoes += 1,
+                Kind::Topic => {}
             }
         }
         while self.topics.len() > BACKLOG {
@@ -347,6 +349,7 @@ impl Client {
 struct Heard {
     bytes: usize,
     frames: usize,
+    echoes: usize,
     first: Vec<u8>,
 }
 
@@ -362,6 +365,11 @@ impl Heard {
             return Error::new(Code::DeviceSilent, "nothing answers on this port")
                 .value(port.name())
                 .help("is the controller powered, flashed, and is this its port? `host device list` shows the ports here");
+        }
+        if self.echoes > 0 {
+            return Error::new(Code::DeviceForeign, "the line only sends back what it is sent")
+                .value(port.name())
+                .help("are transmit and receive joined, or is a terminal program on the other end?");
         }
         if self.frames > 0 {
             return Error::new(Code::DeviceSilent, "a controller is there, but it does not answer hello")
