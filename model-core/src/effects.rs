@@ -11,14 +11,98 @@
 //! evaluates the terms as regressors to find out which effect a recording shows, the controller adds them to its
 //! feed-forward, and `predict` runs them over a recording.
 //!
-//! Adding an effect: write its file, and add one line to the list below.
+//! Adding an effect: write its file, and and add it to the list below.
 
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
+mod fading;
+mod list;
+mod travel;
+
+mod braid_elasticity;
+mod breakaway_friction;
+mod contact_loss;
 mod coulomb_friction;
+mod cyclic_softening;
+mod end_slip;
+mod friction_asymmetry;
+mod higher_order_elasticity;
+mod leak;
+mod log_creep;
+mod minor_loop_memory;
+mod mullins_softening;
+mod permanent_set;
+mod presliding_hysteresis;
+mod pressure_friction;
+mod pressure_lag;
+mod rate_power;
+mod seal_friction;
+mod strand_jamming;
 mod stress_relaxation;
+mod stribeck_friction;
+mod thermal_softening;
+mod tip_effect;
 mod viscous_damping;
+
+pub use fading::{Fading, decay};
+pub use travel::BraidTravel;
+use travel::count_cycles;
+
+crate::effect_list! {
+    /// An effect of the muscle, by name. On the wire and in files it is its place in this list: the order stays, and new
+    /// ones go to the end.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+    EffectName:
+    /// Friction of constant size.
+    CoulombFriction = coulomb_friction;
+    /// Friction proportional to speed.
+    ViscousDamping = viscous_damping;
+    /// Part of the bladder's stress relaxes exponentially.
+    StressRelaxation = stress_relaxation;
+    /// The pressure at the muscle lags that at the sensor.
+    PressureLag = pressure_lag;
+    /// Air lost on the way costs pressure.
+    Leak = leak;
+    /// The ends are not cylinders.
+    TipEffect = tip_effect;
+    /// The braid's fibres stretch.
+    BraidElasticity = braid_elasticity;
+    /// The bladder does not touch the braid yet.
+    ContactLoss = contact_loss;
+    /// The braid's strands lock.
+    StrandJamming = strand_jamming;
+    /// An end slipped in its clamp.
+    EndSlip = end_slip;
+    /// The muscle stays a little longer with every cycle.
+    PermanentSet = permanent_set;
+    /// The bladder's elastic law has more terms than the table.
+    HigherOrderElasticity = higher_order_elasticity;
+    /// The first stretch breaks bonds in the rubber.
+    MullinsSoftening = mullins_softening;
+    /// The bladder softens with the number of cycles.
+    CyclicSoftening = cyclic_softening;
+    /// The bladder softens as it warms.
+    ThermalSoftening = thermal_softening;
+    /// Force creeps with the logarithm of time.
+    LogCreep = log_creep;
+    /// Friction proportional to pressure.
+    PressureFriction = pressure_friction;
+    /// Friction differs between shortening and lengthening.
+    FrictionAsymmetry = friction_asymmetry;
+    /// A rod's seal rubs.
+    SealFriction = seal_friction;
+    /// Friction is higher just after a rest.
+    BreakawayFriction = breakaway_friction;
+    /// Friction falls with speed.
+    StribeckFriction = stribeck_friction;
+    /// Friction builds up over a distance after a turn.
+    PreslidingHysteresis = presliding_hysteresis;
+    /// Small loops remember where the muscle turned.
+    MinorLoopMemory = minor_loop_memory;
+    /// Friction proportional to a power of speed.
+    RatePower = rate_power;
+}
 
 /// Where in the chain from the air to the reading an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -74,6 +158,20 @@ impl Parameter {
     }
 }
 
+/// What is known of an effect's memory when a recording begins. All zeros is the memory handed in first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// Nothing is remembered, or what is remembered begins known.
+    Known,
+    /// Zeros mean that the muscle has long been at rest in the state of the first reading. If it had not, an over-stress was
+    /// left, which fades by itself: the slots of [`Info::fading`] hold it, and its trace is linear in them.
+    Settled,
+    /// Zeros are a guess in the middle; the memory finds itself once the muscle has travelled far enough one way.
+    Branch,
+    /// Zeros mean a new specimen. One that has been worked before begins with a memory nobody recorded.
+    Virgin,
+}
+
 /// What an effect is, for people and programs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Info {
@@ -87,6 +185,17 @@ pub struct Info {
     pub depends_on_pressure: bool,
     /// Whether its memory has to survive a power cycle.
     pub persistent: bool,
+    /// Whether each amplitude is a law of its own (another drive, another scaling), so that they may be tried singly;
+    /// otherwise they are parts of one law.
+    pub alternatives: bool,
+    /// What is known of its memory when a recording begins.
+    pub start: Start,
+    /// The slots of its memory whose unknown beginning fades. The memory is linear in them: starting one at 1 instead of 0
+    /// adds a trace that can be fitted as one more column. Slots that would give the same trace are named once. Empty unless
+    /// [`Info::start`] is [`Start::Settled`].
+    pub fading: &'static [usize],
+    /// The force it adds, as an equation in the symbols of [`Context`].
+    pub equation: &'static str,
     /// One sentence for someone who has never heard of it.
     pub summary: &'static str,
     /// Where the equation and the plausible ranges come from.
@@ -105,17 +214,25 @@ impl Info {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Context<T> {
     /// Time since the last step, s; zero on the first.
+    ///
+    /// Over a pause between recordings it is the pause: any `dt ≥ 0` is stepped over exactly, half an hour or a month. A pause of
+    /// unknown length is the caller's to assume: zero ("nothing was forgotten") and infinity ("all that can fade has faded")
+    /// are both legal and bound what is possible.
     pub dt: T,
     /// Time since the start of the campaign or since power-up, s.
     pub time: T,
     /// `P`, gauge, Pa.
     pub pressure: T,
+    /// `P′ = P − P0`, Pa.
+    pub corrected_pressure: T,
     /// `dP/dt`, Pa/s.
     pub pressure_rate: T,
     /// `ΔL`, m.
     pub stroke: T,
     /// `ΔL/L0`.
     pub contraction: T,
+    /// `L`, m.
+    pub length: T,
     /// `v = d(ΔL)/dt`, m/s, positive while shortening.
     pub speed: T,
     /// `dv/dt`, m/s².
@@ -134,6 +251,10 @@ pub struct Context<T> {
     pub temperature: T,
     /// `L0`, m.
     pub rest_length: T,
+    /// `B`, length of one braid fibre, m.
+    pub fibre_length: T,
+    /// `N`, turns of a fibre about the bladder.
+    pub turns: T,
     /// `R`, m.
     pub radius: T,
     /// `R0`, m.
@@ -154,14 +275,32 @@ pub struct Context<T> {
     pub elastic: T,
     /// Friction-free force of the base model, N.
     pub quasi: T,
+    /// `k_F(P)`.
+    pub friction: T,
+    /// `M`, the order of the base model's elastic polynomial.
+    pub order: T,
     /// `∂F_quasi/∂(ΔL)`, N/m (negative: the muscle pulls less as it shortens).
     pub stiffness: T,
     /// `∂F_quasi/∂P`, N/Pa.
     pub pressure_slope: T,
 }
 
+impl<T: Scalar> Context<T> {
+    /// Force of the base model with its friction, N.
+    #[inline]
+    pub fn force(&self) -> T {
+        self.quasi * (T::ONE - self.friction * self.direction)
+    }
+
+    /// `c_1`, m²: the elastic force per pascal of a linear wall, `(V_B/L) ε_z − t L² ε_x/(2πN²R)`; negative in contraction.
+    #[inline]
+    pub fn unit_elastic(&self) -> T {
+        self.axial_area * self.axial_strain - self.hoop_area * self.radial_strain
+    }
+}
+
 /// How many numbers an effect may remember.
-pub const MEMORY: usize = 8;
+pub const MEMORY: usize = 24;
 /// How many parameters an effect may have.
 pub const MAX_PARAMETERS: usize = 6;
 /// How many effects a table may carry.
@@ -180,58 +319,6 @@ pub trait Effect {
     }
     /// The force it adds, N. Linear in the amplitudes.
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T;
-}
-
-macro_rules! effects {
-    ($($(#[$doc:meta])* $variant:ident = $module:ident;)+) => {
-        /// An effect of the muscle, by name. On the wire and in files it is its place in this list, so the order stays.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-        pub enum EffectName {
-            $($(#[$doc])* $variant,)+
-        }
-
-        impl EffectName {
-            /// Every effect of the muscle.
-            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
-
-            /// What it is.
-            pub const fn info(self) -> &'static Info {
-                match self {
-                    $(Self::$variant => &<$module::$variant as Effect>::INFO,)+
-                }
-            }
-
-            /// Lets time pass in its memory.
-            pub fn step<T: Scalar>(self, parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
-                match self {
-                    $(Self::$variant => $module::$variant::step(parameters, context, memory),)+
-                }
-            }
-
-            /// The force it adds, N.
-            pub fn force<T: Scalar>(self, parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
-                match self {
-                    $(Self::$variant => $module::$variant::force(parameters, context, memory),)+
-                }
-            }
-        }
-    };
-}
-
-effects! {
-    /// Friction of constant size.
-    CoulombFriction = coulomb_friction;
-    /// Friction proportional to speed.
-    ViscousDamping = viscous_damping;
-    /// The bladder's stress relaxes exponentially after each strain.
-    StressRelaxation = stress_relaxation;
-}
-
-impl EffectName {
-    /// The effect of this catalogue name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.iter().copied().find(|e| e.info().name == name)
-    }
 }
 
 /// An effect with its parameters, as a table carries it.
@@ -307,14 +394,4 @@ impl<T: Scalar> Chain<T> {
             e.memory = memory;
         }
     }
-}
-
-/// `e^(−dt/τ)`, remembered in two slots of a memory so that it is computed anew only when `dt` changes (on a controller:
-/// once).
-pub(crate) fn remembered_decay<T: Scalar>(dt: T, tau: T, memory: &mut Memory<T>, slot: usize) -> T {
-    if memory[slot] != dt || memory[slot + 1] == T::ZERO {
-        memory[slot] = dt;
-        memory[slot + 1] = (-(dt / tau)).exp();
-    }
-    memory[slot + 1]
 }

@@ -1,11 +1,12 @@
 //! Friction of constant size: `F_add = −s · F_c`.
 //!
-//! `s` is the direction of motion, `F_c` the friction force. It differs from the table's own friction, which is
+//! `s` is the direction of motion, `F_c` the friction force, N. It differs from the table's own friction, which is
 //! proportional to the muscle's force: it is still there where the force is zero, and shows in the tables as
-//! `k_F(P) ≈ a + b/P`. McKibben muscles have been reported with a hysteresis of 5–10 N that does not depend on speed
-//! (C.-P. Chou and B. Hannaford, IEEE Trans. Robotics and Automation 12 (1996) 90–102).
+//! `k_F(P) ≈ a + b/P`. McKibben muscles have been reported with a hysteresis of 5–10 N that does not depend on speed.
+//! Holds while the muscle slides; within the first tenths of a millimetre after a turn see `presliding-hysteresis`. Where the
+//! direction is unknown (`s = 0`) it adds nothing.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter};
+use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -18,8 +19,12 @@ impl Effect for CoulombFriction {
         parameters: &[Parameter::amplitude("friction_force", "N", 0.05, 20.0)],
         depends_on_pressure: false,
         persistent: false,
+        alternatives: false,
+        start: Start::Known,
+        fading: &[],
+        equation: "F = −s·F_c",
         summary: "A friction force of constant size opposes every motion, whatever the muscle pulls.",
-        source: "Chou and Hannaford 1996, doi 10.1109/70.481753",
+        source: "C.-P. Chou and B. Hannaford, IEEE Trans. Robotics and Automation 12 (1996) 90–102, doi 10.1109/70.481753",
     };
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {

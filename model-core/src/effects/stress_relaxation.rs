@@ -1,49 +1,57 @@
-//! A standard linear solid beside the bladder: part of every change of stress fades with time constant `τ`.
+//! A standard linear solid beside the muscle: part of every change of stress fades with time constant `τ`.
 //!
 //! ```text
-//! dq/dt = dF_el/dt − q/τ        F_add = g · q
+//! dq/dt = du/dt − q/τ        F_add = g · q
 //! ```
-//! `F_el` is the elastic part of the base model, N; `q` the over-stress, N; `g` the relaxing part (dimensionless). The step is
-//! exact for an elastic force that runs straight between two moments:
-//! `q ← q a + ΔF_el (1 − a) τ/dt`, `a = e^(−dt/τ)`.
+//! Three drives, three laws (their amplitudes may be tried singly):
+//!
+//! | amplitude | drive `u` | tells |
+//! | --- | --- | --- |
+//! | `relaxing_part` | `F_el`, elastic force of the base model, N | stress fades in proportion to the bladder's stress |
+//! | `strain_modulus`, Pa | `c_1 = (V_B/L) ε_z − t L² ε_x/(2πN²R)`, m² | stress fades in proportion to strain, whatever the pressure |
+//! | `settling_part` | `−F_G(P′, L)`, N | the pull follows the pressure late: braid and wall settle under load, also at constant length |
+//!
+//! `q` is the over-stress of a drive. For a spectrum over decades see `log-creep`. The memory begins settled: at rest for long in the
+//! state of the first reading; an over-stress left from before fades as `e^(−t/τ)`.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, remembered_decay};
+use super::{Context, Effect, Fading, Info, Link, Memory, Parameter, Start};
 use crate::scalar::Scalar;
+
+type Solid = Fading<1, 3>;
 
 /// See the [module](self).
 pub(super) struct StressRelaxation;
 
-// memory: [q, last F_el, seen, dt, decay]
 impl Effect for StressRelaxation {
+    // memory: see Fading, one time constant, three drives
     const INFO: Info = Info {
         name: "stress-relaxation",
         link: Link::Memory,
         parameters: &[
-            Parameter::amplitude("relaxing_part", "", 0.01, 0.5),
+            Parameter::amplitude("relaxing_part", "", 0.01, 0.6),
+            Parameter::amplitude("strain_modulus", "Pa", 1.0e4, 3.0e6),
+            Parameter::amplitude("settling_part", "", 0.003, 0.3),
             Parameter::shape("time_constant", "s", 0.3, 1000.0),
         ],
-        depends_on_pressure: false,
+        depends_on_pressure: true,
         persistent: false,
-        summary: "After each change of length the bladder's stress fades towards a lower value, as rubber does.",
-        source: "standard linear solid; W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
+        alternatives: true,
+        start: Start::Settled,
+        fading: &[Solid::slot(0, 0)],
+        equation: "F = g·q(F_el) + E_v·q(c_1) − g_P·q(F_G), dq/dt = du/dt − q/τ",
+        summary: "After each change of length or pressure the force fades towards its final value, as rubber does.",
+        source: "W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     };
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
-        let elastic = context.elastic;
-        if memory[2] == T::ZERO {
-            memory[1] = elastic;
-            memory[2] = T::ONE;
-            return;
-        }
-        if context.dt > T::ZERO {
-            let decay = remembered_decay(context.dt, parameters[1], memory, 3);
-            memory[0] =
-                memory[0] * decay + (elastic - memory[1]) * (T::ONE - decay) * parameters[1] / context.dt;
-            memory[1] = elastic;
-        }
+        let drives = [context.elastic, context.unit_elastic(), context.gaylord];
+        Solid::step(memory, context.dt, &[parameters[3]], &drives);
     }
 
-    fn force<T: Scalar>(parameters: &[T], _context: &Context<T>, memory: &Memory<T>) -> T {
-        parameters[0] * memory[0]
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
+        let times = [parameters[3]];
+        parameters[0] * Solid::value(memory, &times, 0, context.elastic)
+            + parameters[1] * Solid::value(memory, &times, 1, context.unit_elastic())
+            - parameters[2] * Solid::value(memory, &times, 2, context.gaylord)
     }
 }

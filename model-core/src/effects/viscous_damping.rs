@@ -1,9 +1,11 @@
-//! Friction proportional to speed: `F_add = −c · v`.
+//! Friction proportional to speed: `F_add = −(c + c_P P) · v`.
 //!
-//! `v` is the speed of shortening, m/s, `c` the damping, N·s/m. For large muscles inflation coefficients of 2.9 N·s/mm were
-//! measured (D. B. Reynolds et al., Annals of Biomedical Engineering 31 (2003) 310–317).
+//! `v` is the speed of shortening, m/s; `c` the damping, N·s/m; `c_P` a damping that grows with pressure, N·s/m per Pa. For a
+//! large muscle 2.9 N·s/mm were found on inflation, and on deflation 1.57 N·s/mm up to 372 kPa and 0.311 + 0.00338 P/kPa above.
+//! Holds at the speeds of one decade or two; rubber's own damping rises more slowly than speed (see `rate-power`). At rest it
+//! vanishes at once, unlike a lag of pressure.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter};
+use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -13,14 +15,21 @@ impl Effect for ViscousDamping {
     const INFO: Info = Info {
         name: "viscous-damping",
         link: Link::Friction,
-        parameters: &[Parameter::amplitude("damping", "N·s/m", 10.0, 3.0e3)],
-        depends_on_pressure: false,
+        parameters: &[
+            Parameter::amplitude("damping", "N·s/m", 10.0, 3.0e3),
+            Parameter::amplitude("damping_per_pressure", "N·s/m/Pa", 1.0e-5, 1.0e-2),
+        ],
+        depends_on_pressure: true,
         persistent: false,
+        alternatives: true,
+        start: Start::Known,
+        fading: &[],
+        equation: "F = −(c + c_P·P)·v",
         summary: "The faster the muscle moves, the more it resists: a force proportional to speed.",
-        source: "Reynolds et al. 2003, doi 10.1114/1.1554921",
+        source: "D. B. Reynolds et al., Annals of Biomedical Engineering 31 (2003) 310–317, doi 10.1114/1.1554921",
     };
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
-        -parameters[0] * context.speed
+        -(parameters[0] + parameters[1] * context.pressure) * context.speed
     }
 }

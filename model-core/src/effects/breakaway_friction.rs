@@ -1,0 +1,55 @@
+//! Static friction that has grown during a rest and is lost over the first tenths of a millimetre.
+//!
+//! ```text
+//! F_add = −s · ΔF_s · (1 − e^(−t_rest/τ_s)) · e^(−d/δ)
+//! ```
+//! `ΔF_s`, N, is the full excess; `t_rest` how long the muscle rested, s, and `τ_s` how fast the excess grows; `d` the travel since
+//! the rest, m, and `δ` the distance over which it is lost. The memory notes where the muscle rested and how long; a turn without
+//! rest counts as a rest of no length. While the muscle rests the force is not added: which part of a static friction acts
+//! then, nobody can say from outside.
+
+use super::{Context, Effect, Info, Link, Memory, Parameter, Start, decay};
+use crate::scalar::Scalar;
+
+/// See the [module](self).
+pub(super) struct BreakawayFriction;
+
+impl Effect for BreakawayFriction {
+    const INFO: Info = Info {
+        name: "breakaway-friction",
+        link: Link::Friction,
+        parameters: &[
+            Parameter::amplitude("excess_friction", "N", 0.1, 20.0),
+            Parameter::shape("loss_distance", "m", 3.0e-5, 1.0e-3),
+            Parameter::shape("growth_time", "s", 1.0, 100.0),
+        ],
+        depends_on_pressure: false,
+        persistent: false,
+        alternatives: false,
+        start: Start::Known,
+        fading: &[],
+        equation: "F = −s·ΔF_s·(1 − exp(−t_rest/τ_s))·exp(−d/δ)",
+        summary: "After a rest the muscle sticks: the first bit of motion needs an extra force that grows with the length of the rest.",
+        source: "B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083–1138, doi 10.1016/0005-1098(94)90209-7",
+    };
+
+    fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
+        // memory: [where it rested, for how long, last hold time, whether it moves, seen]
+        let resting = memory[4] == T::ZERO || context.hold_time > memory[2];
+        memory[4] = T::ONE;
+        memory[2] = context.hold_time;
+        if resting {
+            memory[0] = context.stroke;
+            memory[1] = context.hold_time;
+            memory[3] = T::ZERO;
+        } else {
+            memory[3] = T::ONE;
+        }
+    }
+
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
+        let gone = (context.stroke - memory[0]) / parameters[1].max(T::from_f32(1.0e-6));
+        let grown = T::ONE - decay(memory[1] / parameters[2].max(T::from_f32(1.0e-3)));
+        -context.direction * parameters[0] * memory[3] * grown * decay(gone)
+    }
+}

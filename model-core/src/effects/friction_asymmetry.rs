@@ -1,0 +1,32 @@
+//! A friction factor that differs between shortening and lengthening.
+//!
+//! With `k_F ± Δk/2` for the two directions the base model's `−s k_F F` gains an even part: `F_add = −(Δk/2) · F_quasi` while a
+//! direction is known. In a recording of full loops it cannot be told from a gain of the load cell or the gauge; a dwell
+//! approached from both sides can tell.
+
+use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use crate::scalar::Scalar;
+
+/// See the [module](self).
+pub(super) struct FrictionAsymmetry;
+
+impl Effect for FrictionAsymmetry {
+    const INFO: Info = Info {
+        name: "friction-asymmetry",
+        link: Link::Friction,
+        parameters: &[Parameter::amplitude("factor_difference", "", -0.2, 0.2)],
+        depends_on_pressure: true,
+        persistent: false,
+        alternatives: false,
+        start: Start::Known,
+        fading: &[],
+        equation: "F = −(Δk/2)·s²·F_quasi",
+        summary: "The muscle rubs more one way than the other.",
+        source: "M. Capace et al., Actuators 8(2) (2019) 49; D. B. Reynolds et al. 2003, doi 10.1114/1.1554921",
+    };
+
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
+        let known = context.direction * context.direction;
+        -known * parameters[0] * T::from_f32(0.5) * context.quasi
+    }
+}

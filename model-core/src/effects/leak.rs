@@ -1,0 +1,31 @@
+//! A leak at the muscle draws a steady flow, and the line drops pressure for it: `F_add = −∂F/∂P · λ · P`.
+//!
+//! `λ` (dimensionless) is the part of the gauge pressure lost between sensor and muscle. It holds for a laminar leak behind a
+//! laminar line at a regulated pressure; a closed muscle that leaks shows it in the measured pressure itself, and nothing is
+//! missing. From force alone it cannot be told from a wrong gain of the gauge: close the valve for a minute and watch.
+
+use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use crate::scalar::Scalar;
+
+/// See the [module](self).
+pub(super) struct Leak;
+
+impl Effect for Leak {
+    const INFO: Info = Info {
+        name: "leak",
+        link: Link::Air,
+        parameters: &[Parameter::amplitude("lost_part", "", 1.0e-3, 0.2)],
+        depends_on_pressure: true,
+        persistent: false,
+        alternatives: false,
+        start: Start::Known,
+        fading: &[],
+        equation: "F = −∂F/∂P·λ·P",
+        summary: "The muscle leaks, so a part of the pressure is lost on the way to it.",
+        source: "continuity of laminar flow through line and leak in series; leak-down recordings of Festo muscles lose 5 to 480 kPa in two minutes",
+    };
+
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
+        -context.pressure_slope * parameters[0] * context.pressure
+    }
+}

@@ -1,0 +1,53 @@
+//! Loops within loops that remember where the muscle turned: six play operators (Prandtl and Ishlinskii).
+//!
+//! ```text
+//! y_i = play of width r_i of the strands' travel ξ        r_i = r · (1, 1/2, … 1/32)
+//! F_add = −(A + A_P P) · (1/6) Σ (ξ − y_i)/r_i
+//! ```
+//! `r`, m, is the half-width of the widest play; `A`, N, and `A_P`, N/Pa, the force on a full loop, constant or growing with
+//! pressure. What is kept is `ξ − y_i`, which lies within `±r_i`; the rest of the play is a function of stroke alone and belongs
+//! to the base model. Independent of speed; an extremum is wiped out once the muscle goes beyond it. On loops wider than `2r` it is
+//! a dry friction. Before the first full travel the state is unknown; it begins in the middle.
+
+use super::{BraidTravel, Context, Effect, Info, Link, Memory, Parameter, Start};
+use crate::scalar::Scalar;
+
+/// See the [module](self).
+pub(super) struct MinorLoopMemory;
+
+impl Effect for MinorLoopMemory {
+    const INFO: Info = Info {
+        name: "minor-loop-memory",
+        link: Link::Friction,
+        parameters: &[
+            Parameter::amplitude("loop_force", "N", 0.1, 30.0),
+            Parameter::amplitude("loop_force_per_pressure", "N/Pa", 1.0e-7, 5.0e-5),
+            Parameter::shape("widest_play", "m", 2.0e-4, 3.0e-2),
+        ],
+        depends_on_pressure: true,
+        persistent: false,
+        alternatives: true,
+        start: Start::Branch,
+        fading: &[],
+        equation: "F = −(A + A_P·P)·mean_i[(ξ − y_i)/r_i], y_i = play of half-width r_i",
+        summary: "Inside a large loop the force depends on where the muscle turned before, whatever the speed.",
+        source: "P. Krejčí and K. Kuhnen, IEE Proc. Control Theory and Applications 148 (2001) 185–192, doi 10.1049/ip-cta:20010375; M. Van Damme et al. 2008 (Preisach model of a pleated muscle)",
+    };
+
+    fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
+        // memory: [(ξ − y_i)/r_i, i = 1…6; last stroke, last pressure, seen]
+        let mut by = BraidTravel::step(context, memory, 6) / parameters[2].max(T::from_f32(1.0e-6));
+        for stretch in &mut memory[..6] {
+            *stretch = (*stretch + by).clamp(-T::ONE, T::ONE);
+            by += by;
+        }
+    }
+
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
+        let mut sum = T::ZERO;
+        for stretch in &memory[..6] {
+            sum += *stretch;
+        }
+        -(parameters[0] + parameters[1] * context.pressure.max(T::ZERO)) * sum * T::from_f32(1.0 / 6.0)
+    }
+}

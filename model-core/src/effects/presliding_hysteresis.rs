@@ -1,0 +1,53 @@
+//! Friction that builds up over a distance after a turn: four Maxwell elements that stick, stretch and slip.
+//!
+//! ```text
+//! dz_i = dξ/d_i, held within ±1        d_i = (δ/2) · (1, 1/2, 1/4, 1/8)
+//! F_add = (share · k_F |F_quasi| + W) (s − ¼ Σ z_i)
+//! ```
+//! `ξ` is the strands' travel (the stroke, or at held length what the pressure would have moved), m; `δ` the travel after a turn
+//! until all slide, m; `share` the part of the table's own friction that builds up so, `W`, N, a dry friction that does. Once all
+//! slide nothing is added: the base model's jump at the turn is what is taken back. Memory is bounded by one per element, and
+//! it has the loops' own memory: return to a turning point closes its loop.
+//! Before the first full travel the elements' state is unknown; they begin in the middle.
+
+use super::{BraidTravel, Context, Effect, Info, Link, Memory, Parameter, Start};
+use crate::scalar::Scalar;
+
+/// See the [module](self).
+pub(super) struct PreslidingHysteresis;
+
+impl Effect for PreslidingHysteresis {
+    const INFO: Info = Info {
+        name: "presliding-hysteresis",
+        link: Link::Friction,
+        parameters: &[
+            Parameter::amplitude("share_of_friction", "", 0.1, 1.5),
+            Parameter::amplitude("dry_friction", "N", 0.1, 20.0),
+            Parameter::shape("sliding_travel", "m", 1.0e-4, 1.0e-2),
+        ],
+        depends_on_pressure: true,
+        persistent: false,
+        alternatives: true,
+        start: Start::Branch,
+        fading: &[],
+        equation: "F = (share·k_F·|F_quasi| + W)·(s − ¼·Σz_i), dz_i = dξ/d_i within ±1",
+        summary: "Just after a turn the strands stretch before they slide, so friction builds up over a distance instead of jumping.",
+        source: "F. Al-Bender, V. Lampaert, J. Swevers, IEEE Trans. Automatic Control 50 (2005) 1883–1887, doi 10.1109/TAC.2005.858676; T. Vo-Minh et al., Mechatronics (2010)",
+    };
+
+    fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
+        // memory: [z_1…z_4, last stroke, last pressure, seen]
+        let travel = BraidTravel::step(context, memory, 4);
+        let mut by = (travel + travel) / parameters[2].max(T::from_f32(1.0e-6));
+        for z in &mut memory[..4] {
+            *z = (*z + by).clamp(-T::ONE, T::ONE);
+            by += by;
+        }
+    }
+
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
+        let built = (memory[0] + memory[1] + memory[2] + memory[3]) * T::from_f32(0.25);
+        let friction = parameters[0] * context.friction * context.quasi.abs() + parameters[1];
+        friction * (context.direction - built)
+    }
+}

@@ -1,0 +1,36 @@
+//! Friction that falls as the muscle gets faster: `F_add = −s (ΔF + κ |F_quasi|) e^(−|v|/v_s)`.
+//!
+//! `ΔF`, N, and `κ` (dimensionless, for strands that the muscle's own force presses together) are the excess at rest over that at
+//! speed, `v_s`, m/s, the speed of the fall. Tondu and Lopez give the braid's friction this form. At one speed it cannot be told
+//! from dry friction; four speeds over two decades are needed, the slowest below 0.3 mm/s.
+
+use super::{Context, Effect, Info, Link, Memory, Parameter, Start, decay};
+use crate::scalar::Scalar;
+
+/// See the [module](self).
+pub(super) struct StribeckFriction;
+
+impl Effect for StribeckFriction {
+    const INFO: Info = Info {
+        name: "stribeck-friction",
+        link: Link::Friction,
+        parameters: &[
+            Parameter::amplitude("excess_friction", "N", 0.1, 20.0),
+            Parameter::amplitude("excess_factor", "", 0.002, 0.2),
+            Parameter::shape("falloff_speed", "m/s", 3.0e-4, 2.0e-2),
+        ],
+        depends_on_pressure: true,
+        persistent: false,
+        alternatives: true,
+        start: Start::Known,
+        fading: &[],
+        equation: "F = −s·(ΔF + κ·|F_quasi|)·exp(−|v|/v_s)",
+        summary: "Slow motion rubs more than fast motion.",
+        source: "B. Tondu and P. Lopez, IEEE Control Systems Magazine 20(2) (2000) 15–38, doi 10.1109/37.833638; Armstrong-Hélouvry et al. 1994, doi 10.1016/0005-1098(94)90209-7",
+    };
+
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
+        let slow = decay(context.speed / parameters[2].max(T::from_f32(1.0e-6)));
+        -context.direction * (parameters[0] + parameters[1] * context.quasi.abs()) * slow
+    }
+}
