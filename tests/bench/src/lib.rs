@@ -15,6 +15,8 @@ pub mod protocol;
 pub mod recording;
 pub mod rig;
 pub mod rng;
+pub mod rubber;
+pub mod rubbing;
 pub mod sensors;
 pub mod surface;
 pub mod tube;

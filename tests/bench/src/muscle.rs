@@ -2,7 +2,7 @@
 
 use crate::friction::{Braid, BraidFriction};
 use crate::material::Hyperelastic;
-use crate::physics::{Physics, PhysicsState};
+use crate::physics::{Moment, Physics, PhysicsState};
 use crate::surface::{Shape, Surface};
 use crate::tube::{Geometry, Tube};
 use serde::{Deserialize, Serialize};
@@ -293,17 +293,25 @@ impl Muscle {
         let (x0, p0) = self.last.unwrap_or((stroke, p));
         self.last = Some((stroke, p));
         let (dx, dp) = (stroke - x0, p - p0);
-        let worn = stroke - self.physics.rest_shift();
-        let (pressure_part, elastic) = self.quasi_parts(p, worn);
-        let stretch = self.surface.stretch(self.length(worn));
-        let core = pressure_part + self.physics.elastic(elastic, stretch, worn, dt);
-        let normal = self.physics.friction_level(&self.spec.friction, core, p, worn, dx, dt);
-        let rub = self.braid.slide(&self.spec.friction, normal, dx, dp, dt);
-        self.physics.after(rub * dx, core, dt, ambient, worn);
-        Drive {
-            force: core - rub - self.physics.drag(p, core, dx, dt),
-            core,
-            temperature: self.physics.temperature(),
-        }
+        // A muscle that has become longer is shortened by as much more at the same crosshead.
+        let worn = stroke + self.physics.rest_shift();
+        let ratio = self.spec.geometry.braid_radius(self.length(worn)) / self.spec.geometry.radius;
+        let (pressure_part, elastic) = self.quasi_parts(p - self.physics.uneven(ratio), worn);
+        let moment = Moment {
+            dt,
+            pressure: p,
+            stroke: worn,
+            dx,
+            stretch: self.surface.stretch(self.length(worn)),
+            area: ratio * self.length(worn) / self.spec.geometry.rest_length,
+            ambient,
+        };
+        let core = pressure_part + self.physics.elastic(elastic, &moment);
+        let core = self.physics.whole(core, &moment);
+        let level = self.physics.braid(self.spec.friction.factor(p) * core.abs(), &moment);
+        let rub = self.braid.slide(&self.spec.friction, level, dx, dp);
+        let drag = self.physics.drag(&moment);
+        self.physics.after((rub + drag) * dx, core, &moment);
+        Drive { force: core - rub - drag, core, temperature: self.physics.temperature() }
     }
 }

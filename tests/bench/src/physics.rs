@@ -1,7 +1,8 @@
 //! Physics beyond the quasi-static muscle, each of which can be switched on apart: [`Physics`] names what is on,
 //! [`PhysicsState`] carries the memory.
 
-use crate::friction::BraidFriction;
+pub use crate::rubber::{Branches, Heat, Mullins, Relaxation, Temperatures, Wear};
+pub use crate::rubbing::{Activated, Ageing, Relays, RubbingState, Seal, Slow, StrandContact, Viscous};
 use serde::{Deserialize, Serialize};
 
 /// What is switched on; everything off is the quasi-static muscle with bristle friction.
@@ -11,156 +12,271 @@ pub struct Physics {
     /// Viscous drag.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub viscous: Option<Viscous>,
-    /// Stress relaxation of the rubber.
+    /// A guide or a push-rod's seal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seal: Option<Seal>,
+    /// Strand friction by pressure and contact area.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub strands: Option<StrandContact>,
+    /// Contacts that age at rest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ageing: Option<Ageing>,
+    /// Friction that falls with speed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slow: Option<Slow>,
+    /// Friction that rises with speed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub activated: Option<Activated>,
+    /// Memory of turning points.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relays: Option<Relays>,
+    /// Relaxation of the elastic force.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relaxation: Option<Relaxation>,
+    /// Creep of the whole force under load.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub creep: Option<Relaxation>,
     /// Softening of rubber that was stretched before.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mullins: Option<Mullins>,
-    /// Friction of a push-rod's seal.
+    /// Softening by work.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub seal: Option<Seal>,
+    pub wear: Option<Wear>,
+    /// Heat.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub heat: Option<Heat>,
+    /// The bladder meets the braid unevenly as it widens: pressure lost is `p (1 − (R0/R)²)`, p in Pa.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uneven_contact: Option<f64>,
+    /// Strands lock towards a stroke.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub jam: Option<Jam>,
+    /// An end slips.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slip: Option<Slip>,
+    /// Rest length that yields under load.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub set: Option<Set>,
+    /// A linear spring beside the muscle (a stiff hose), N/m: outside the catalogue.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hose_spring: Option<f64>,
+    /// A fold of the bladder that snaps through: outside the catalogue.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fold: Option<Fold>,
 }
 
-/// Drag in proportion to speed: `c v`, N s/m.
+/// Strands that lock: the force falls by `F exp((x − x_j)/w)`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Viscous {
-    /// Drag per speed c, N s/m.
-    pub drag: f64,
-    /// Further drag per speed and pressure, N s/m/Pa.
-    #[serde(default)]
-    pub per_pressure: f64,
-}
-
-/// A spectrum of Maxwell branches whose strengths make a power law over decades of time: the elastic force's history
-/// `q_i' = F_el' − q_i/τ_i` adds `Σ g_i q_i`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Relaxation {
-    /// Strength of the fastest branch, per unit of elastic force.
-    pub strength: f64,
-    /// Time of the fastest branch, s.
-    pub fastest: f64,
-    /// Branches, a factor of √10 apart.
-    pub branches: usize,
-    /// Exponent of the power law: branch i has strength · (τ_i/τ_0)^−exponent.
-    pub exponent: f64,
-}
-
-/// Softening by the largest stretch so far, in the hyperbolic form of network damage (A. Dorfmann, R. W. Ogden, doi
-/// 10.1016/j.ijsolstr.2003.11.014): below the largest stretch J_m (J = I1 − 3) the elastic force is taken
-/// `1 − r tanh((J_m − J)/(m J_m))`-fold.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Mullins {
-    /// Largest loss r, 0..1.
-    pub loss: f64,
-    /// Width m.
+pub struct Jam {
+    /// Force at x_j, N.
+    pub force: f64,
+    /// Stroke x_j, m.
+    pub stroke: f64,
+    /// Width w, m.
     pub width: f64,
-    /// Largest I1 − 3 that the muscle has seen before the first recording.
-    #[serde(default)]
-    pub conditioned: f64,
 }
 
-/// A rod seal: friction `F0 + a P`, bristle travel δ.
+/// An end that slips once: the rest length grows by `travel` over a few hundredths of a second when the clock passes `time`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Seal {
-    /// Friction without pressure F0, N.
-    pub dry: f64,
-    /// Friction per pressure a, N/Pa.
-    pub per_pressure: f64,
-    /// Travel in which the lip gives, m.
+pub struct Slip {
+    /// Bench clock, s.
+    pub time: f64,
+    /// Travel, m.
     pub travel: f64,
+}
+
+/// Set: `s' = (s_max − s) |F|/(F_r τ)`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Set {
+    /// Final change of the rest length s_max, m.
+    pub travel: f64,
+    /// Reference force F_r, N.
+    pub force: f64,
+    /// Time at the reference force τ, s.
+    pub time: f64,
+}
+
+/// A fold: a bump `F exp(−((x − x_f)/w)²)` that is there on the way out only.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Fold {
+    /// Height, N.
+    pub force: f64,
+    /// Stroke, m.
+    pub stroke: f64,
+    /// Width, m.
+    pub width: f64,
+}
+
+/// What the muscle is doing in a step.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Moment {
+    /// Step, s.
+    pub dt: f64,
+    /// Pressure in the muscle, Pa.
+    pub pressure: f64,
+    /// Stroke from the worn rest length, m.
+    pub stroke: f64,
+    /// Change of the stroke, m.
+    pub dx: f64,
+    /// Mean I1 − 3 of the rubber.
+    pub stretch: f64,
+    /// Area of the cylinder against that at rest, (R/R0)(L/L0).
+    pub area: f64,
+    /// Temperature of the room, °C.
+    pub ambient: f64,
+}
+
+impl Moment {
+    fn speed(&self) -> f64 {
+        if self.dt > 0.0 { self.dx / self.dt } else { 0.0 }
+    }
 }
 
 /// Memory of everything in [`Physics`].
 #[derive(Debug, Clone)]
 pub struct PhysicsState {
     on: Physics,
-    maxwell: Vec<(f64, f64, f64)>,
-    last_elastic: Option<f64>,
+    relaxation: Branches,
+    creep: Branches,
+    rubbing: RubbingState,
     largest: f64,
-    seal: f64,
-    temperature: f64,
+    last_stretch: Option<f64>,
+    damage: f64,
+    warm: Temperatures,
+    ambient: f64,
+    clock: f64,
+    set: f64,
+    exchanged: f64,
 }
 
 impl PhysicsState {
     /// Fresh memory.
     pub fn new(on: &Physics) -> Self {
-        let maxwell = on.relaxation.map_or(Vec::new(), |r| {
-            (0..r.branches)
-                .map(|i| {
-                    let ratio = 10f64.powf(0.5 * i as f64);
-                    (r.strength * ratio.powf(-r.exponent), r.fastest * ratio, 0.0)
-                })
-                .collect()
-        });
         Self {
-            maxwell,
-            last_elastic: None,
+            relaxation: Branches::new(on.relaxation),
+            creep: Branches::new(on.creep),
+            rubbing: RubbingState::new(on.relays),
             largest: on.mullins.map_or(0.0, |m| m.conditioned),
-            seal: 0.0,
-            temperature: 22.0,
+            last_stretch: None,
+            damage: 0.0,
+            warm: Temperatures::default(),
+            ambient: 22.0,
+            clock: 0.0,
+            set: 0.0,
+            exchanged: 0.0,
             on: on.clone(),
         }
     }
 
-    /// The elastic force with its memory, N, from the hyperelastic one at stretch `j` (mean I1 − 3).
-    pub fn elastic(&mut self, hyperelastic: f64, j: f64, _stroke: f64, dt: f64) -> f64 {
+    /// The elastic force with its memory, N, from the hyperelastic one.
+    pub fn elastic(&mut self, hyperelastic: f64, m: &Moment) -> f64 {
         let mut force = hyperelastic;
-        if let Some(m) = self.on.mullins {
-            self.largest = self.largest.max(j);
+        if let Some(law) = self.on.mullins {
+            self.largest = self.largest.max(m.stretch);
             if self.largest > 0.0 {
-                force *= 1.0 - m.loss * ((self.largest - j) / (m.width * self.largest)).tanh();
+                force *= 1.0 - law.loss * ((self.largest - m.stretch) / (law.width * self.largest)).tanh();
             }
         }
-        let change = force - self.last_elastic.unwrap_or(force);
-        self.last_elastic = Some(force);
-        for (strength, tau, q) in &mut self.maxwell {
-            // Exact for an elastic force that moves straight during the step.
-            let decay = (-dt / *tau).exp();
-            let gain = if dt > 0.0 { (1.0 - decay) * *tau / dt } else { 1.0 };
-            *q = *q * decay + change * gain;
-            force += *strength * *q;
+        if let Some(law) = self.on.wear {
+            let path = (m.stretch - self.last_stretch.unwrap_or(m.stretch)).abs();
+            self.damage += path / law.path.max(1e-9) * (1.0 - self.damage).powi(3);
+            self.damage = self.damage.min(1.0);
+            force *= 1.0 - law.loss * self.damage;
+        }
+        self.last_stretch = Some(m.stretch);
+        if let Some(law) = self.on.heat {
+            self.exchanged = law.hysteresis * (force * m.dx).abs();
+            force *= 1.0 + law.stiffness * self.warm.bladder;
+        }
+        if self.on.relaxation.is_some() {
+            force += self.relaxation.add(force, m.dt);
         }
         force
     }
 
-    /// Level of the braid's friction, N.
-    pub fn friction_level(
-        &mut self,
-        f: &BraidFriction,
-        core: f64,
-        p: f64,
-        _x: f64,
-        _dx: f64,
-        _dt: f64,
-    ) -> f64 {
-        f.factor(p) * core.abs()
+    /// The force with creep and what stands beside the muscle, N.
+    pub fn whole(&mut self, force: f64, m: &Moment) -> f64 {
+        let mut whole = force;
+        if self.on.creep.is_some() {
+            whole -= self.creep.lose(force, m.dt);
+        }
+        if let Some(j) = self.on.jam {
+            whole -= j.force * ((m.stroke - j.stroke) / j.width.max(1e-9)).min(6.0).exp();
+        }
+        if let Some(k) = self.on.hose_spring {
+            whole -= k * m.stroke;
+        }
+        if let Some(f) = self.on.fold
+            && m.dx > 0.0
+        {
+            let u = (m.stroke - f.stroke) / f.width.max(1e-9);
+            whole -= f.force * (-u * u).exp();
+        }
+        whole
+    }
+
+    /// Level of the braid's friction, N, from its plain level.
+    pub fn braid(&mut self, plain: f64, m: &Moment) -> f64 {
+        let v = m.speed();
+        let mut level = plain;
+        if let Some(law) = self.on.strands {
+            level += law.area * m.area * m.pressure.max(0.0);
+        }
+        if let Some(law) = self.on.ageing {
+            level *= self.rubbing.aged(&law, v, m.dt);
+        }
+        if let Some(law) = self.on.slow {
+            let ratio = v / law.speed.max(1e-9);
+            level *= 1.0 + law.strength / (1.0 + ratio * ratio);
+        }
+        if let Some(law) = self.on.activated {
+            level *= 1.0 + law.strength * (v.abs() / law.speed.max(1e-12)).asinh();
+        }
+        if let Some(law) = self.on.heat {
+            level *= (1.0 + law.friction * self.warm.bladder).max(0.1);
+        }
+        level
     }
 
     /// Forces that oppose motion besides the braid's friction, N.
-    pub fn drag(&mut self, p: f64, _core: f64, dx: f64, dt: f64) -> f64 {
-        let v = if dt > 0.0 { dx / dt } else { 0.0 };
-        let mut drag = self.on.viscous.map_or(0.0, |c| (c.drag + c.per_pressure * p) * v);
-        if let Some(s) = self.on.seal {
-            let way = if dx > 0.0 { 1.0 } else { -1.0 };
-            self.seal = way + (self.seal - way) * (-dx.abs() / s.travel.max(1e-9)).exp();
-            drag += (s.dry + s.per_pressure * p.max(0.0)) * self.seal;
+    pub fn drag(&mut self, m: &Moment) -> f64 {
+        let v = m.speed();
+        let mut drag = self.on.viscous.map_or(0.0, |c| (c.drag + c.per_pressure * m.pressure) * v);
+        if let Some(law) = self.on.seal {
+            drag += self.rubbing.seal(&law, m.pressure, m.dx, v);
+        }
+        if let Some(law) = self.on.relays {
+            drag += self.rubbing.remembered(&law, m.pressure, m.stroke);
         }
         drag
     }
 
-    /// After the forces of a step are known: heat and wear.
-    pub fn after(&mut self, _heat: f64, _core: f64, _dt: f64, ambient: f64, _stroke: f64) {
-        self.temperature = ambient;
+    /// After the forces of a step are known: heat, set, the clock. `rubbed` is the work of friction in J.
+    pub fn after(&mut self, rubbed: f64, force: f64, m: &Moment) {
+        self.clock += m.dt;
+        self.ambient = m.ambient;
+        if let Some(law) = self.on.heat {
+            self.warm.advance(&law, rubbed.max(0.0) + self.exchanged, m.dt);
+        }
+        if let Some(law) = self.on.set {
+            let rate = force.abs() / (law.force * law.time).max(1e-12);
+            self.set += (law.travel - self.set) * (1.0 - (-rate * m.dt).exp());
+        }
     }
 
-    /// How much the rest length has changed, m of stroke.
+    /// How much longer the muscle has become, m.
     pub fn rest_shift(&self) -> f64 {
-        0.0
+        let slipped = self.on.slip.map_or(0.0, |s| s.travel * ((self.clock - s.time) / 0.05).clamp(0.0, 1.0));
+        slipped + self.set
+    }
+
+    /// Pressure that does not reach the braid because the bladder lies unevenly, Pa; `ratio` is R/R0.
+    pub fn uneven(&self, ratio: f64) -> f64 {
+        self.on.uneven_contact.map_or(0.0, |p| p * (1.0 - 1.0 / (ratio * ratio).max(0.25)))
     }
 
     /// Bladder temperature, °C.
     pub fn temperature(&self) -> f64 {
-        self.temperature
+        self.ambient + self.warm.bladder
     }
 }

@@ -222,7 +222,7 @@ impl Plant {
         } else {
             (self.stroke, self.done) = self.motion.stroke(self.time);
         }
-        let stroke = self.rig.stroke(self.stroke, self.force, h);
+        let stroke = self.rig.stroke(self.stroke, self.force);
         let pressure = self.air.advance(h, command.max(0.0), self.muscle.volume(stroke));
         let drive = self.muscle.advance(h, stroke, pressure, 22.0);
         self.force = drive.force;

@@ -42,7 +42,7 @@ impl Default for Pneumatics {
             deadband: 300.0,
             ripple: (250.0, 3.7),
             wander: (300.0, 8.0),
-            line: 0.01,
+            line: 0.004,
             leak: 0.0,
             sensor_at_regulator: false,
         }

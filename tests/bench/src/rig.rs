@@ -1,6 +1,7 @@
-//! The frame between crosshead, muscle and load cell.
+//! The frame between crosshead, muscle and load cell, and what the cell makes of it.
 
 use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
 
 /// What stands between the instruments and the muscle; everything off is a stiff, massless rig.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -9,12 +10,26 @@ pub struct Rig {
     /// Spring rate of frame and couplings, N/m; 0 for rigid. The muscle pulls its frame along and is shorter than the
     /// crosshead tells.
     pub stiffness: f64,
+    /// Play of a joint, m: the muscle's end follows the crosshead only at the play's edges, which are soft.
+    pub play: f64,
     /// Moving mass between muscle and cell, kg.
     pub mass: f64,
     /// Weight that hangs in the cell's reading, N.
     pub weight: f64,
     /// Force at the cell per pressure of the hose, N/Pa.
     pub hose: f64,
+    /// Angle between muscle and cell axis, rad: the cell sees the cosine, and a guide rubs with the sine.
+    pub misalignment: f64,
+    /// Friction coefficient of the guide that carries the side load.
+    pub guide: f64,
+    /// Zero of the cell as it warms up: amount, N, and time, s.
+    pub warm_up: (f64, f64),
+    /// A room that breathes: amplitude of the cell's zero, N, and period, s. Outside the catalogue.
+    pub room: (f64, f64),
+    /// Mounts that stick and jump: amplitude, N, and the travel between jumps, m. Outside the catalogue.
+    pub stick_slip: (f64, f64),
+    /// Mains hum seen through the sampling: amplitude, N, and the beat's frequency, Hz. Outside the catalogue.
+    pub hum: (f64, f64),
 }
 
 /// The rig's memory.
@@ -22,31 +37,97 @@ pub struct Rig {
 pub struct RigState {
     with: Rig,
     pull: f64,
+    played: Option<f64>,
     last: Option<(f64, f64)>,
+    guide: f64,
+    stuck: f64,
+    clock: f64,
 }
+
+/// Travel in which the guide's friction builds up, m.
+const GUIDE_TRAVEL: f64 = 20e-6;
 
 impl RigState {
     /// Unloaded.
     pub fn new(with: Rig) -> Self {
-        Self { with, pull: 0.0, last: None }
+        Self { with, pull: 0.0, played: None, last: None, guide: 0.0, stuck: 0.0, clock: 0.0 }
     }
 
     /// Stroke of the muscle (m) when the crosshead stands at `crosshead` (m) under the force of the last step (N).
-    pub fn stroke(&mut self, crosshead: f64, force: f64, _dt: f64) -> f64 {
-        if self.with.stiffness <= 0.0 {
-            return crosshead;
+    pub fn stroke(&mut self, crosshead: f64, force: f64) -> f64 {
+        let mut stroke = crosshead;
+        if self.with.stiffness > 0.0 {
+            // Half of each change is taken per step: the muscle's own stiffness must not make the two chase each other.
+            self.pull += 0.5 * (force - self.pull);
+            stroke += self.pull / self.with.stiffness;
         }
-        // Half of each change is taken per step: the muscle's own stiffness must not make the two chase each other.
-        self.pull += 0.5 * (force - self.pull);
-        crosshead + self.pull / self.with.stiffness
+        if self.with.play > 0.0 {
+            let at = self.played.unwrap_or(stroke);
+            let gap = stroke - at;
+            // Soft edges: the joint bears on a tenth of the play.
+            let edge = 0.5 * self.with.play;
+            let soft = 0.1 * self.with.play;
+            let beyond = (gap.abs() - edge + soft).max(0.0);
+            let push = if beyond < 2.0 * soft { beyond * beyond / (4.0 * soft) } else { beyond - soft };
+            self.played = Some(at + gap.signum() * push.min(gap.abs()));
+            stroke = self.played.unwrap_or(stroke);
+        }
+        stroke
     }
 
     /// Force at the cell, N.
     pub fn at_cell(&mut self, force: f64, pressure: f64, stroke: f64, dt: f64) -> f64 {
+        let w = &self.with;
+        self.clock += dt;
         let (x, v) = self.last.unwrap_or((stroke, 0.0));
-        let speed = if dt > 0.0 { (stroke - x) / dt } else { 0.0 };
+        let dx = stroke - x;
+        let speed = if dt > 0.0 { dx / dt } else { 0.0 };
         let acceleration = if dt > 0.0 { (speed - v) / dt } else { 0.0 };
         self.last = Some((stroke, speed));
-        force - self.with.mass * acceleration + self.with.weight + self.with.hose * pressure
+        let mut cell = force - w.mass * acceleration + w.weight + w.hose * pressure;
+        if w.misalignment != 0.0 {
+            let way = if dx > 0.0 { 1.0 } else { -1.0 };
+            self.guide = way + (self.guide - way) * (-dx.abs() / GUIDE_TRAVEL).exp();
+            let side = force.abs() * w.misalignment.sin().abs();
+            cell += force * (w.misalignment.cos() - 1.0) - w.guide * side * self.guide;
+        }
+        if w.warm_up.1 > 0.0 {
+            cell += w.warm_up.0 * (1.0 - (-self.clock / w.warm_up.1).exp());
+        }
+        if w.room.1 > 0.0 {
+            cell += w.room.0 * (TAU * self.clock / w.room.1).sin();
+        }
+        if w.stick_slip.1 > 0.0 {
+            self.stuck += dx;
+            if self.stuck.abs() > w.stick_slip.1 {
+                self.stuck = 0.0;
+            }
+            cell -= w.stick_slip.0 * self.stuck / w.stick_slip.1;
+        }
+        cell + w.hum.0 * (TAU * w.hum.1 * self.clock).sin()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_loose_joint_follows_only_at_its_edges() {
+        let mut r = RigState::new(Rig { play: 1e-4, ..Rig::default() });
+        let mut end = 0.0;
+        for i in 0..=1000 {
+            end = r.stroke(f64::from(i) * 1e-6, 0.0);
+        }
+        assert!((1e-3 - end - 0.5e-4).abs() < 1e-5, "lags by half the play: {end}");
+        let turned = r.stroke(1e-3 - 0.5e-4, 0.0);
+        assert!((turned - end).abs() < 1e-6, "and stays there on the way back: {turned} {end}");
+    }
+
+    #[test]
+    fn a_soft_frame_shortens_the_muscle_by_force_over_rate() {
+        let mut r = RigState::new(Rig { stiffness: 1e5, ..Rig::default() });
+        let end = (0..60).map(|_| r.stroke(1e-3, 50.0)).last().expect("steps");
+        assert!((end - 1.5e-3).abs() < 1e-9, "{end}");
     }
 }
