@@ -1,2 +1,34 @@
-//! Controller firmware: board-independent library.
-#![no_std]
+//! The controller without a board: what it does each millisecond, what it answers, what it keeps.
+//!
+//! | where is … | |
+//! | --- | --- |
+//! | the control step, one pure function | [`control`] |
+//! | pressure for force, stroke, a pair of muscles | [`modes`] |
+//! | states and faults, each in one table | [`safety`] |
+//! | how faults are noticed | [`watch`] |
+//! | sine, trapezoid, chirp, table | [`reference`] |
+//! | lag, limits and scaling of the pressure regulator | [`regulator`] |
+//! | the record of every loop variable | [`trace`] |
+//! | tables and settings in flash | [`store`] |
+//! | answers to the host | [`server`] |
+//! | the tasks that a board starts | [`tasks`] |
+//! | what a board must give | [`board`] |
+//! | all of it in a host's own process | `native` (feature of that name) |
+//!
+//! Nothing here knows a board, and nothing but `main` knows which board it is.
+
+#![cfg_attr(not(any(test, feature = "std")), no_std)]
+
+pub mod board;
+pub mod control;
+pub mod modes;
+#[cfg(feature = "native")]
+pub mod native;
+pub mod reference;
+pub mod regulator;
+pub mod safety;
+pub mod server;
+pub mod store;
+pub mod tasks;
+pub mod trace;
+pub mod watch;

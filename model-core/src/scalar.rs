@@ -145,24 +145,26 @@ macro_rules! scalar {
 scalar!(f32, sqrt_f32, expf, expm1f, logf, log1pf, powf, erff, tanhf);
 scalar!(f64, libm::sqrt, exp, expm1, log, log1p, pow, erf, tanh);
 
+#[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+core::arch::global_asm!(
+    ".syntax unified",
+    ".fpu fpv4-sp-d16",
+    ".section .text.pam_vsqrt_f32,\"ax\",%progbits",
+    ".global pam_vsqrt_f32",
+    ".type pam_vsqrt_f32,%function",
+    ".thumb_func",
+    "pam_vsqrt_f32:",
+    "vsqrt.f32 s0, s0",
+    "bx lr",
+    ".size pam_vsqrt_f32, . - pam_vsqrt_f32",
+    ".text",
+);
+
 /// The square root of the floating-point unit. Stable Rust has no name for that instruction without `std`, and refuses
 /// single-precision registers in inline assembly on this target; a two-instruction function is the way left.
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
 #[inline]
 fn sqrt_f32(value: f32) -> f32 {
-    core::arch::global_asm!(
-        ".syntax unified",
-        ".fpu fpv4-sp-d16",
-        ".section .text.pam_vsqrt_f32,\"ax\",%progbits",
-        ".global pam_vsqrt_f32",
-        ".type pam_vsqrt_f32,%function",
-        ".thumb_func",
-        "pam_vsqrt_f32:",
-        "vsqrt.f32 s0, s0",
-        "bx lr",
-        ".size pam_vsqrt_f32, . - pam_vsqrt_f32",
-        ".text",
-    );
     unsafe extern "C" {
         fn pam_vsqrt_f32(value: f32) -> f32;
     }

@@ -1,0 +1,65 @@
+//! What a board must give: readings, a regulator, a place to keep things, and its identity.
+
+use model_core::link::hello::Board;
+use model_core::link::messages::StartedBy;
+
+/// What the sensors of one muscle say.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Readings {
+    /// Gauge pressure at the muscle, Pa.
+    pub pressure_pa: f32,
+    /// Contraction stroke, m.
+    pub stroke_m: f32,
+    /// Load cell, N.
+    pub force_n: f32,
+}
+
+/// What one regulator is told.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Command {
+    /// Gauge pressure, Pa.
+    pub pressure_pa: f32,
+    /// Open the dump valve, whatever the pressure says.
+    pub vent: bool,
+}
+
+/// All that the control step is given each tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Inputs {
+    /// Readings of each muscle, `None` where none came in time.
+    pub sides: [Option<Readings>; 2],
+    /// Ticks that were missed since the last step.
+    pub missed_ticks: u16,
+    /// Whether the supply is below what the regulator needs.
+    pub supply_low: bool,
+    /// Time that the last step took, µs.
+    pub step_us: f32,
+}
+
+/// All that the control step decides.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Outputs {
+    /// Command to each regulator.
+    pub sides: [Command; 2],
+    /// What is asked for, for a plant that logs it.
+    pub asked: f32,
+}
+
+/// The sensors and regulators of a board, which also keep its time: one return is one control tick.
+pub trait Plant {
+    /// Gives the regulators their commands and returns the readings of the next tick.
+    fn exchange(&mut self, outputs: &Outputs) -> impl core::future::Future<Output = Inputs>;
+}
+
+/// Who a board is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Identity {
+    /// Which board.
+    pub board: Board,
+    /// Muscles that it can drive.
+    pub muscles: u8,
+    /// Serial number of its chip.
+    pub serial: [u8; 12],
+    /// Why it started.
+    pub started_by: StartedBy,
+}

@@ -1,0 +1,200 @@
+//! Arm MPS2 with the AN386 image (Cortex-M4 with floating point), as QEMU emulates it.
+//!
+//! | UART | what |
+//! | --- | --- |
+//! | 0 | link to the host |
+//! | 1, 2 | virtual benches of the first and second muscle, see [`bench`] |
+//!
+//! Logs, the store's file `pam-store.bin` and the end of the run go through semihosting. QEMU is started with
+//! `-M mps2-an386 -semihosting-config enable=on,target=native` and a `-serial` for each UART.
+
+mod bench;
+mod flash;
+mod register;
+mod semihosting;
+mod time;
+mod uart;
+
+use core::panic::PanicInfo;
+
+use cortex_m::peripheral::NVIC;
+use cortex_m_rt::{ExceptionFrame, entry, exception};
+use embassy_executor::{Executor, Spawner};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::mutex::Mutex;
+use embassy_time::Timer;
+use firmware::board::Identity;
+use firmware::server::Server;
+use firmware::tasks::{self, Shared};
+use model_core::link::hello::Board;
+use model_core::link::messages::StartedBy;
+use model_core::link::settings::Settings;
+use static_cell::StaticCell;
+
+use self::bench::{Bench, BenchUart, Benches};
+use self::flash::FileFlash;
+use self::uart::{Receiver, Sender, Uart};
+
+const LINK_RX: usize = 1024;
+const LINK_TX: usize = 512;
+type LinkUart = Uart<LINK_RX, LINK_TX>;
+
+static LINK: LinkUart = Uart::new(0x4000_4000);
+static BENCH: BenchUart = Uart::new(0x4000_5000);
+static SECOND_BENCH: BenchUart = Uart::new(0x4000_6000);
+
+type Port = Mutex<CriticalSectionRawMutex, Sender<LINK_RX, LINK_TX>>;
+
+/// One word of the vector table.
+#[repr(C)]
+pub union Vector {
+    handler: extern "C" fn(),
+    reserved: usize,
+}
+
+extern "C" fn link_received() {
+    LINK.on_receive();
+}
+extern "C" fn link_sent() {
+    LINK.on_transmit();
+}
+extern "C" fn bench_received() {
+    BENCH.on_receive();
+}
+extern "C" fn bench_sent() {
+    BENCH.on_transmit();
+}
+extern "C" fn second_received() {
+    SECOND_BENCH.on_receive();
+}
+extern "C" fn second_sent() {
+    SECOND_BENCH.on_transmit();
+}
+
+const RESERVED: Vector = Vector { reserved: 0 };
+
+/// The board's interrupts by their numbers: three UARTs (receive, transmit), two GPIO blocks, two timers.
+#[unsafe(link_section = ".vector_table.interrupts")]
+#[unsafe(no_mangle)]
+#[used]
+pub static __INTERRUPTS: [Vector; 10] = [
+    Vector { handler: link_received },
+    Vector { handler: link_sent },
+    Vector { handler: bench_received },
+    Vector { handler: bench_sent },
+    Vector { handler: second_received },
+    Vector { handler: second_sent },
+    RESERVED,
+    RESERVED,
+    Vector { handler: time::on_wrap },
+    Vector { handler: time::on_alarm },
+];
+
+/// An interrupt's number.
+#[derive(Clone, Copy)]
+struct Line(u16);
+
+// SAFETY: the numbers below are those of the table above.
+unsafe impl cortex_m::interrupt::InterruptNumber for Line {
+    fn number(self) -> u16 {
+        self.0
+    }
+}
+
+fn start_interrupts() {
+    for line in [0, 1, 2, 3, 4, 5, 8, 9] {
+        // SAFETY: every handler only touches its own registers and what critical sections guard.
+        unsafe { NVIC::unmask(Line(line)) };
+    }
+}
+
+#[embassy_executor::task]
+async fn control(shared: &'static Shared) {
+    let mut benches = Benches::new(Bench::new(&BENCH), Bench::new(&SECOND_BENCH));
+    tasks::control(&mut benches, shared).await
+}
+
+#[embassy_executor::task]
+async fn telemetry(port: &'static Port, shared: &'static Shared) {
+    tasks::telemetry(port, shared).await;
+}
+
+#[embassy_executor::task]
+async fn link(port: &'static Port, shared: &'static Shared, mut server: Server<FileFlash>) {
+    tasks::link(&mut Receiver(&LINK), port, &mut server, shared).await;
+    // The answer is on its way out of the pipe.
+    Timer::after_millis(20).await;
+    cortex_m::peripheral::SCB::sys_reset();
+}
+
+fn spawn(spawner: Spawner, shared: &'static Shared, port: &'static Port) -> Result<(), &'static str> {
+    let flash = FileFlash::open(c"pam-store.bin").ok_or("the file pam-store.bin cannot be opened")?;
+    let identity = Identity {
+        board: Board::Mps2An386,
+        muscles: 2,
+        serial: *b"emulated\0\0\0\0",
+        // The emulator does not tell a restart from power.
+        started_by: StartedBy::Power,
+    };
+    let server = Server::start(identity, flash, shared).map_err(|_| "the store cannot be opened")?;
+    let full = |_| "a task does not fit its place";
+    spawner.spawn(control(shared).map_err(full)?);
+    spawner.spawn(telemetry(port, shared).map_err(full)?);
+    spawner.spawn(link(port, shared, server).map_err(full)?);
+    super::log!("started");
+    Ok(())
+}
+
+#[entry]
+fn main() -> ! {
+    static SHARED: StaticCell<Shared> = StaticCell::new();
+    static PORT: StaticCell<Port> = StaticCell::new();
+    static EXECUTOR: StaticCell<Executor> = StaticCell::new();
+    time::start();
+    for uart in [&BENCH, &SECOND_BENCH] {
+        uart.start();
+    }
+    LINK.start();
+    start_interrupts();
+    let shared: &'static Shared = SHARED.init_with(|| Shared::new(Settings::default()));
+    let port: &'static Port = PORT.init_with(|| Mutex::new(Sender(&LINK)));
+    EXECUTOR.init_with(Executor::new).run(|spawner| {
+        if let Err(why) = spawn(spawner, shared, port) {
+            semihosting::print("firmware: ");
+            semihosting::print(why);
+            semihosting::print("\n");
+            semihosting::fail();
+        }
+    })
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    cortex_m::interrupt::disable();
+    semihosting::print("firmware: panic");
+    if let Some(place) = info.location() {
+        semihosting::print(" in ");
+        semihosting::print(place.file());
+        semihosting::print(", line ");
+        let mut digits = [0_u8; 10];
+        let mut rest = place.line();
+        let mut at = digits.len();
+        while at > 0 {
+            at -= 1;
+            digits[at] = b'0' + (rest % 10) as u8;
+            rest /= 10;
+            if rest == 0 {
+                break;
+            }
+        }
+        semihosting::print(core::str::from_utf8(&digits[at..]).unwrap_or("?"));
+    }
+    semihosting::print("\n");
+    semihosting::fail();
+}
+
+#[exception]
+unsafe fn HardFault(_frame: &ExceptionFrame) -> ! {
+    semihosting::print("firmware: hard fault\n");
+    semihosting::fail();
+}

@@ -1,0 +1,159 @@
+//! The sensors and the regulator of this board: a second UART to a virtual bench, one exchange a control tick, in
+//! lock-step. The bench's side and the meaning of each byte are described in `tests/bench/src/lockstep.rs`.
+//!
+//! The bench keeps the time: a tick is one answer. Without an answer the request is repeated, which advances nothing; after
+//! [`PATIENCE`] the tick goes by without readings, so that the device stays alive on a bench that is gone.
+
+use embassy_futures::select::{Either, select};
+use embassy_time::{Duration, Instant, Timer};
+use embedded_io_async::{Read, Write};
+use firmware::board::{Command, Inputs, Outputs, Plant, Readings};
+
+use super::uart::{Receiver, Sender, Uart};
+
+const REQUEST: usize = 18;
+const ANSWER: usize = 22;
+const REQUEST_SYNC: u8 = 0xA5;
+const ANSWER_SYNC: u8 = 0x5A;
+const RESET: u8 = 1;
+const VENT: u8 = 2;
+
+/// How long an answer may take before the tick goes by without one.
+const PATIENCE: Duration = Duration::from_millis(250);
+
+/// The pipes of a bench's UART.
+pub type BenchUart = Uart<64, 32>;
+
+/// CRC-16/IBM-3740.
+fn crc16(bytes: &[u8]) -> u16 {
+    let mut crc = 0xFFFF_u16;
+    for byte in bytes {
+        crc ^= u16::from(*byte) << 8;
+        for _ in 0..8 {
+            crc = if crc & 0x8000 == 0 { crc << 1 } else { (crc << 1) ^ 0x1021 };
+        }
+    }
+    crc
+}
+
+/// One muscle's bench.
+pub struct Bench {
+    uart: &'static BenchUart,
+    tick: u32,
+    /// Whether the bench has been told to start from its initial state.
+    started: bool,
+    buffer: [u8; ANSWER],
+    held: usize,
+}
+
+impl Bench {
+    /// The bench behind a UART.
+    pub const fn new(uart: &'static BenchUart) -> Self {
+        Self { uart, tick: 0, started: false, buffer: [0; ANSWER], held: 0 }
+    }
+
+    fn request(&self, command: &Command, asked: f32) -> [u8; REQUEST] {
+        let mut bytes = [0; REQUEST];
+        bytes[0] = REQUEST_SYNC;
+        bytes[1] = if self.started { 0 } else { RESET } | if command.vent { VENT } else { 0 };
+        bytes[4..8].copy_from_slice(&self.tick.to_le_bytes());
+        bytes[8..12].copy_from_slice(&command.pressure_pa.to_le_bytes());
+        bytes[12..16].copy_from_slice(&asked.to_le_bytes());
+        let crc = crc16(&bytes[..16]);
+        bytes[16..].copy_from_slice(&crc.to_le_bytes());
+        bytes
+    }
+
+    /// The whole answer to this tick, if it has come.
+    fn answer(&mut self) -> Option<Readings> {
+        let number = |at: usize| {
+            f32::from_le_bytes([
+                self.buffer[at],
+                self.buffer[at + 1],
+                self.buffer[at + 2],
+                self.buffer[at + 3],
+            ])
+        };
+        let crc = u16::from_le_bytes([self.buffer[20], self.buffer[21]]);
+        let good = self.buffer[0] == ANSWER_SYNC && crc16(&self.buffer[..20]) == crc;
+        let ours = self.buffer[4..8] == self.tick.to_le_bytes();
+        (good && ours).then(|| Readings { pressure_pa: number(8), stroke_m: number(12), force_n: number(16) })
+    }
+
+    /// Waits for the answer to this tick, passing over anything else.
+    async fn wait(&mut self) -> Readings {
+        loop {
+            while self.held < ANSWER {
+                let room = &mut self.buffer[self.held..];
+                let Ok(count) = Receiver(self.uart).read(room).await;
+                self.held += count;
+            }
+            let found = self.answer();
+            // A whole frame that is not ours is passed over; a broken one up to its next sync byte.
+            let whole = self.buffer[0] == ANSWER_SYNC
+                && crc16(&self.buffer[..20]) == u16::from_le_bytes([self.buffer[20], self.buffer[21]]);
+            let next = if whole {
+                ANSWER
+            } else {
+                self.buffer[1..].iter().position(|&b| b == ANSWER_SYNC).map_or(ANSWER, |at| at + 1)
+            };
+            self.buffer.copy_within(next.., 0);
+            self.held = ANSWER - next;
+            if let Some(readings) = found {
+                return readings;
+            }
+        }
+    }
+
+    /// One exchange.
+    async fn exchange(&mut self, command: &Command, asked: f32) -> Option<Readings> {
+        let request = self.request(command, asked);
+        let Ok(()) = Sender(self.uart).write_all(&request).await;
+        match select(self.wait(), Timer::after(PATIENCE)).await {
+            Either::First(readings) => {
+                self.started = true;
+                self.tick = self.tick.wrapping_add(1);
+                Some(readings)
+            }
+            Either::Second(()) => {
+                // The same tick is asked for again: if only the answer was lost, nothing advances twice.
+                self.uart.discard();
+                self.held = 0;
+                None
+            }
+        }
+    }
+}
+
+/// Up to two muscles. The second bench is asked only once it has answered, so that a board with one muscle does not wait
+/// for another.
+pub struct Benches {
+    first: Bench,
+    second: Bench,
+    looks_for_second: u8,
+    stepped_at: Instant,
+}
+
+impl Benches {
+    /// Benches behind two UARTs.
+    pub fn new(first: Bench, second: Bench) -> Self {
+        Self { first, second, looks_for_second: 1, stepped_at: Instant::now() }
+    }
+}
+
+impl Plant for Benches {
+    async fn exchange(&mut self, outputs: &Outputs) -> Inputs {
+        let step_us = self.stepped_at.elapsed().as_micros() as f32;
+        let first = self.first.exchange(&outputs.sides[0], outputs.asked).await;
+        let mut second = None;
+        if self.second.started || self.looks_for_second == 0 {
+            second = self.second.exchange(&outputs.sides[1], 0.0).await;
+            self.looks_for_second = 100;
+        } else if first.is_none() {
+            // Only a board that idles looks for another bench; a running one must not lose a tick to it.
+            self.looks_for_second -= 1;
+        }
+        self.stepped_at = Instant::now();
+        Inputs { sides: [first, second], missed_ticks: 0, supply_low: false, step_us }
+    }
+}

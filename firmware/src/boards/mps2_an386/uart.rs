@@ -1,0 +1,110 @@
+//! CMSDK UARTs as asynchronous byte streams: interrupts on both sides of two pipes.
+//!
+//! The hardware holds one byte each way. QEMU keeps further bytes back until the one is read, so nothing is lost as long
+//! as the receiving pipe has room.
+
+use core::convert::Infallible;
+
+use embassy_sync::{blocking_mutex::raw::CriticalSectionRawMutex, pipe::Pipe};
+use embedded_io_async::{ErrorType, Read, Write};
+
+use super::register::Register;
+
+const DATA: usize = 0x00;
+const STATE: usize = 0x04;
+const CTRL: usize = 0x08;
+const INTERRUPT: usize = 0x0C;
+const BAUD: usize = 0x10;
+
+const TX_FULL: u32 = 1 << 0;
+const RX_FULL: u32 = 1 << 1;
+const INTERRUPT_TX: u32 = 1 << 0;
+const INTERRUPT_RX: u32 = 1 << 1;
+/// Transmitter, receiver, and an interrupt for each.
+const ALL_ON: u32 = 0b1111;
+/// 25 MHz / 25 = 1 Mbaud.
+const DIVIDER: u32 = 25;
+
+/// One UART with pipes of `RX` and `TX` bytes.
+pub struct Uart<const RX: usize, const TX: usize> {
+    base: usize,
+    received: Pipe<CriticalSectionRawMutex, RX>,
+    sending: Pipe<CriticalSectionRawMutex, TX>,
+}
+
+impl<const RX: usize, const TX: usize> Uart<RX, TX> {
+    /// The UART at a base address.
+    pub const fn new(base: usize) -> Self {
+        Self { base, received: Pipe::new(), sending: Pipe::new() }
+    }
+
+    fn register(&self, offset: usize) -> Register {
+        Register::at(self.base + offset)
+    }
+
+    /// Switches it on.
+    pub fn start(&self) {
+        self.register(BAUD).write(DIVIDER);
+        self.register(CTRL).write(ALL_ON);
+    }
+
+    /// Its receive interrupt. A byte that finds the pipe full is lost, as on any UART; the frames' check sums tell.
+    pub fn on_receive(&self) {
+        self.register(INTERRUPT).write(INTERRUPT_RX);
+        while self.register(STATE).read() & RX_FULL != 0 {
+            let byte = self.register(DATA).read() as u8;
+            let _ = self.received.try_write(&[byte]);
+        }
+    }
+
+    /// Its transmit interrupt: sends what waits, as far as the hardware takes it.
+    pub fn on_transmit(&self) {
+        self.register(INTERRUPT).write(INTERRUPT_TX);
+        critical_section::with(|_| {
+            while self.register(STATE).read() & TX_FULL == 0 {
+                let mut byte = [0];
+                if self.sending.try_read(&mut byte).is_err() {
+                    break;
+                }
+                self.register(DATA).write(u32::from(byte[0]));
+            }
+        });
+    }
+
+    /// Forgets what has been received and not read.
+    pub fn discard(&self) {
+        self.received.clear();
+    }
+}
+
+/// The receiving half.
+pub struct Receiver<const RX: usize, const TX: usize>(pub &'static Uart<RX, TX>);
+
+/// The sending half.
+pub struct Sender<const RX: usize, const TX: usize>(pub &'static Uart<RX, TX>);
+
+impl<const RX: usize, const TX: usize> ErrorType for Receiver<RX, TX> {
+    type Error = Infallible;
+}
+
+impl<const RX: usize, const TX: usize> Read for Receiver<RX, TX> {
+    async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
+        Ok(self.0.received.read(buffer).await)
+    }
+}
+
+impl<const RX: usize, const TX: usize> ErrorType for Sender<RX, TX> {
+    type Error = Infallible;
+}
+
+impl<const RX: usize, const TX: usize> Write for Sender<RX, TX> {
+    async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+        let written = self.0.sending.write(bytes).await;
+        self.0.on_transmit();
+        Ok(written)
+    }
+
+    async fn flush(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}

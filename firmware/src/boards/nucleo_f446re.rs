@@ -1,0 +1,1 @@
+//! ST Nucleo-F446RE.

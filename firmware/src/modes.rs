@@ -1,0 +1,230 @@
+//! Which pressure a mode wants: the mathematics between a set-point and the regulator.
+
+use model_core::effects::{Chain, Context};
+use model_core::inverse::{Reach, Search};
+use model_core::link::settings::{FeedForward, ForceLoop, Joint, Settings, StrokeLoop};
+use model_core::motion::Motion;
+use model_core::muscle::{Held, Muscle};
+use model_core::table::{MuscleTable, TableError};
+use model_core::units::{Force, Length, Pressure};
+
+use crate::control::TICK_S;
+
+/// A muscle's table in use: the form that is evaluated, and its effects with what they remember.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Force and inverse.
+    pub muscle: Muscle<f32>,
+    /// Physics beyond the base model.
+    pub chain: Chain<f32>,
+}
+
+impl Model {
+    /// Builds it from a table.
+    ///
+    /// # Errors
+    /// The number of the table that cannot be used.
+    pub fn build(table: &MuscleTable) -> Result<Self, TableError> {
+        Ok(Self { muscle: Muscle::build(table)?, chain: Chain::new(&table.effects) })
+    }
+}
+
+/// One tick of one muscle: the shape at the measured stroke, computed once.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment {
+    /// The muscle at the measured stroke.
+    pub held: Held<f32>,
+    /// What effects look at; only where there are effects.
+    pub context: Option<Context<f32>>,
+    /// Direction of friction.
+    pub direction: f32,
+    /// Force by the table at the measured pressure, N.
+    pub model_n: f32,
+}
+
+impl Model {
+    /// Lets one tick pass: steps the effects and evaluates the force at the readings.
+    pub fn moment(&mut self, motion: &Motion<f32>, pressure_pa: f32) -> Moment {
+        let held = self.muscle.held(Length::from_metres(motion.stroke));
+        let pressure = Pressure::from_pascals(pressure_pa);
+        let parts = self.muscle.parts(&held, pressure);
+        let mut newtons = parts.force(motion.direction);
+        let mut context = None;
+        if !self.chain.is_empty() {
+            let now = self.muscle.context_held(&held, motion, pressure);
+            self.chain.step(&now);
+            newtons += self.chain.force(&now);
+            context = Some(now);
+        }
+        Moment { held, context, direction: motion.direction, model_n: self.muscle.pull(newtons).newtons() }
+    }
+
+    /// The pressure for a wanted force, and whether it can be had.
+    pub fn pressure_for(&self, force_n: f32, moment: &Moment, guess_pa: f32) -> (f32, bool) {
+        let search = Search { tolerance: Pressure::from_pascals(20.0), ..self.muscle.search() };
+        let force = Force::from_newtons(force_n);
+        let guess = Pressure::from_pascals(guess_pa);
+        let found = match &moment.context {
+            Some(context) => {
+                self.muscle.pressure_with(force, &moment.held, &self.chain, context, guess, &search)
+            }
+            None => self.muscle.pressure_for(force, &moment.held, moment.direction, guess, &search),
+        };
+        (found.pressure.pascals(), found.reach == Reach::Reached)
+    }
+
+    /// `P = F / g`, the ideal braid alone, `g = (3L² − B²)/(4πN²)`; the highest pressure past the neutral angle.
+    pub fn gaylord_pressure(&self, force_n: f32, moment: &Moment) -> (f32, bool) {
+        let high = self.muscle.max_pressure().pascals();
+        let area = moment.held.posture.area;
+        if area <= 0.0 {
+            return (high, false);
+        }
+        let free = force_n / area;
+        let limited = free.clamp(0.0, high);
+        (limited, limited == free)
+    }
+}
+
+/// The feed-forward pressure of a wanted force, Pa; without a table there is none.
+pub fn feed_forward(
+    settings: &Settings,
+    model: Option<(&Model, &Moment)>,
+    force_n: f32,
+    guess_pa: f32,
+) -> (f32, bool) {
+    match (settings.feed_forward, model) {
+        (FeedForward::Off, _) | (_, None) => (0.0, true),
+        (FeedForward::Table, Some((model, moment))) => model.pressure_for(force_n, moment, guess_pa),
+        (FeedForward::Gaylord, Some((model, moment))) => model.gaylord_pressure(force_n, moment),
+    }
+}
+
+/// An integrator that stops where going on would only push further against a limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Integral(f32);
+
+impl Integral {
+    /// Its value.
+    pub fn value(self) -> f32 {
+        self.0
+    }
+
+    /// Forgets.
+    pub fn reset(&mut self) {
+        self.0 = 0.0;
+    }
+
+    /// One tick of `rate`, unless `cut` (last tick's command was limited) and the error points the way of the limit
+    /// (`toward`: the sign of what was cut off).
+    fn step(&mut self, rate: f32, limit: f32, cut: f32) {
+        if cut * rate <= 0.0 {
+            self.0 = (self.0 + rate * TICK_S).clamp(-limit, limit);
+        }
+    }
+}
+
+/// Trim of force on the load cell, Pa. `cut` is the sign of what the last command's limits took away.
+///
+/// Its bandwidth beside the feed-forward: the muscle's slope `g = ∂F/∂P` makes the loop `L(s) = g (K_p + K_i/s)`, so it
+/// crosses over near `g K_i` rad/s; the regulator's lag asks for a good deal less than `1/lag`.
+pub fn trim(force_loop: &ForceLoop, integral: &mut Integral, error_n: f32, cut: f32) -> f32 {
+    let limit = force_loop.trim_limit_pa;
+    if limit <= 0.0 {
+        return 0.0;
+    }
+    integral.step(force_loop.integral_pa_per_n_s * error_n, limit, cut);
+    (force_loop.proportional_pa_per_n * error_n + integral.value()).clamp(-limit, limit)
+}
+
+/// Wanted force of the stroke loop, N.
+pub fn stroke_force(
+    stroke_loop: &StrokeLoop,
+    integral: &mut Integral,
+    wanted_m: f32,
+    stroke_m: f32,
+    speed_m_per_s: f32,
+    cut: f32,
+) -> f32 {
+    let error = wanted_m - stroke_m;
+    integral.step(stroke_loop.integral_n_per_m_s * error, stroke_loop.force_limit_n, cut);
+    let force = stroke_loop.load_n
+        + stroke_loop.load_stiffness_n_per_m * wanted_m
+        + stroke_loop.proportional_n_per_m * error
+        + integral.value()
+        - stroke_loop.damping_n_s_per_m * speed_m_per_s;
+    force.clamp(0.0, stroke_loop.force_limit_n)
+}
+
+/// What the pair's loop keeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PairState {
+    integral: Integral,
+    /// The common pressure that gives the wanted stiffness, Pa.
+    common_pa: f32,
+}
+
+/// What the joint is doing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Posed {
+    /// Wanted angle, rad.
+    pub angle_rad: f32,
+    /// Wanted stiffness, N·m/rad.
+    pub stiffness_nm_per_rad: f32,
+    /// Measured angle, rad.
+    pub measured_rad: f32,
+    /// Its rate, rad/s.
+    pub rate_rad_per_s: f32,
+}
+
+impl PairState {
+    /// Begins anew at a common pressure.
+    pub fn begin(&mut self, common_pa: f32) {
+        *self = Self { integral: Integral::default(), common_pa: common_pa.max(0.0) };
+    }
+
+    /// Wanted forces of both muscles, N.
+    ///
+    /// The joint's stiffness at held pressures is `r² Σ −∂F_i/∂x`; one Newton step a tick moves the common pressure to where
+    /// it is the wanted one. Around the forces that this pressure gives, the torque of the angle's loop is split evenly.
+    pub fn forces(
+        &mut self,
+        joint: &Joint,
+        posed: &Posed,
+        sides: [(&Model, &Moment, f32); 2],
+        cut: f32,
+    ) -> [f32; 2] {
+        let r = joint.radius_m;
+        let probe_pa = 10e3;
+        let mut stiffness = [0.0; 2];
+        let mut common_n = [0.0; 2];
+        for ((model, moment, stroke_m), common) in sides.into_iter().zip(&mut common_n) {
+            let h = model.muscle.braid().rest_length() * 1.0e-3;
+            let nearer = model.muscle.held(Length::from_metres(stroke_m - h));
+            let farther = model.muscle.held(Length::from_metres(stroke_m + h));
+            for (n, sum) in stiffness.iter_mut().enumerate() {
+                let p = Pressure::from_pascals(self.common_pa + n as f32 * probe_pa);
+                let fall = model.muscle.parts(&nearer, p).quasi() - model.muscle.parts(&farther, p).quasi();
+                *sum += r * r * fall / (2.0 * h);
+            }
+            *common = model
+                .muscle
+                .parts(&moment.held, Pressure::from_pascals(self.common_pa))
+                .force(moment.direction);
+        }
+        let high = sides[0].0.muscle.max_pressure().min(sides[1].0.muscle.max_pressure()).pascals();
+        let slope = (stiffness[1] - stiffness[0]) / probe_pa;
+        if slope > 0.0 {
+            // At most 1 kPa a tick, so that the forces never jump.
+            let step = ((posed.stiffness_nm_per_rad - stiffness[0]) / slope).clamp(-1e3, 1e3);
+            self.common_pa = (self.common_pa + step).clamp(0.0, high);
+        }
+        let error = posed.angle_rad - posed.measured_rad;
+        self.integral.step(joint.integral_nm_per_rad_s * error, joint.torque_limit_nm, cut);
+        let torque = (joint.proportional_nm_per_rad * error + self.integral.value()
+            - joint.damping_nm_s_per_rad * posed.rate_rad_per_s)
+            .clamp(-joint.torque_limit_nm, joint.torque_limit_nm);
+        let share = torque / (2.0 * r);
+        [(common_n[0] + share).max(0.0), (common_n[1] - share).max(0.0)]
+    }
+}

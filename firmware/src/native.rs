@@ -1,0 +1,1 @@
+//! The controller in the host's own process.

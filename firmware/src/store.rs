@@ -1,0 +1,287 @@
+//! What outlives a power cut: tables, settings, past faults, and what effects remember.
+//!
+//! # On flash
+//!
+//! A map of sequential-storage over whole erase pages (its items are written once and checked by their own CRC; a page is
+//! erased only after what is alive in it has been copied). Keys are one byte:
+//!
+//! | key | value |
+//! | --- | --- |
+//! | 0x10 + side | which slot holds the table in use: [`Selected`], postcard |
+//! | 0x20 + 2·side + slot | image of a table |
+//! | 0x30 | [`Settings`], postcard |
+//! | 0x40 + side | memories of effects that survive a power cycle, postcard |
+//! | 0x50 + n | past fault n of a ring, postcard; 0x5F its next place |
+//! | 0x60 | starts of the device, `u32` |
+//!
+//! A new table goes into the slot that is not in use, is read back and compared, and only then is the selection written: one
+//! item, so it is there whole or not at all. Whenever power fails, the old table or the new one is in use. [`FORMAT`] moves
+//! when this layout does.
+
+use embassy_futures::block_on;
+use embedded_storage_async::nor_flash::NorFlash;
+use heapless::Vec;
+use model_core::effects::{MAX_EFFECTS, Memory};
+use model_core::image;
+use model_core::link::frame::crc32;
+use model_core::link::messages::{FAULT_LOG, FaultReport, Side, StoreFault, TableInfo};
+use model_core::link::settings::Settings;
+use sequential_storage::Error;
+use sequential_storage::cache::{Cache, Uncached};
+use sequential_storage::map::{MapConfig, MapStorage};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+/// Version of the layout.
+pub const FORMAT: u16 = 1;
+/// Longest item with its key, rounded up to the largest word of flash.
+const BUFFER: usize = image::MAX_LEN + 64;
+
+/// Which slot holds the table in use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Selected {
+    /// 0 or 1.
+    pub slot: u8,
+    /// Table in that slot.
+    pub table: Described,
+    /// Table in the other slot, if it can be gone back to.
+    pub previous: Option<Described>,
+}
+
+/// A kept image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Described {
+    /// Length in bytes.
+    pub length: u16,
+    /// CRC-32 of all of it.
+    pub crc: u32,
+    /// Counts commits.
+    pub generation: u32,
+}
+
+impl Selected {
+    /// As the host is told.
+    pub fn info(&self) -> TableInfo {
+        TableInfo {
+            length: u32::from(self.table.length),
+            crc: self.table.crc,
+            generation: self.table.generation,
+            has_previous: self.previous.is_some(),
+        }
+    }
+}
+
+/// What effects remember of one muscle.
+pub type Memories = Vec<Memory<f32>, MAX_EFFECTS>;
+
+type NoCache = Cache<Uncached, Uncached, Uncached, u8>;
+
+const SELECTED: u8 = 0x10;
+const IMAGE: u8 = 0x20;
+const SETTINGS: u8 = 0x30;
+const MEMORIES: u8 = 0x40;
+const PAST_FAULT: u8 = 0x50;
+const PAST_FAULT_NEXT: u8 = 0x5F;
+const STARTS: u8 = 0x60;
+
+fn image_key(side: Side, slot: u8) -> u8 {
+    IMAGE + 2 * side.index() as u8 + (slot & 1)
+}
+
+fn fault_of<E>(error: Error<E>) -> StoreFault {
+    match error {
+        Error::FullStorage | Error::ItemTooBig | Error::BufferTooSmall(_) | Error::BufferTooBig => {
+            StoreFault::Full
+        }
+        _ => StoreFault::Medium,
+    }
+}
+
+/// The store over a flash. Its flash is one that answers at once (it blocks, or it is a file), so that no task waits on it.
+pub struct Store<F: NorFlash> {
+    map: MapStorage<u8, F, NoCache>,
+    buffer: [u8; BUFFER],
+}
+
+impl<F: NorFlash> Store<F> {
+    /// Opens the whole of a flash as a store; an erased one is an empty store.
+    ///
+    /// # Errors
+    /// [`StoreFault::Full`] when the flash has fewer than two pages or a page is too small.
+    pub fn open(flash: F) -> Result<Self, StoreFault> {
+        let end = u32::try_from(flash.capacity()).map_err(|_| StoreFault::Full)?;
+        let config = MapConfig::try_new(0..end).map_err(|_| StoreFault::Full)?;
+        Ok(Self { map: MapStorage::new(flash, config, Cache::new_uncached()), buffer: [0; BUFFER] })
+    }
+
+    /// Gives the flash back.
+    pub fn close(self) -> F {
+        self.map.destroy().0
+    }
+
+    /// Forgets everything, for a flash that holds something else.
+    ///
+    /// # Errors
+    /// [`StoreFault::Medium`].
+    pub fn erase(&mut self) -> Result<(), StoreFault> {
+        block_on(self.map.erase_all()).map_err(fault_of)
+    }
+
+    fn bytes(&mut self, key: u8) -> Result<Option<&[u8]>, StoreFault> {
+        block_on(self.map.fetch_item::<&[u8]>(&mut self.buffer, &key)).map_err(fault_of)
+    }
+
+    fn put_bytes(&mut self, key: u8, bytes: &[u8]) -> Result<(), StoreFault> {
+        block_on(self.map.store_item(&mut self.buffer, &key, &bytes)).map_err(fault_of)
+    }
+
+    /// A small value; one that cannot be read counts as absent.
+    fn value<V: DeserializeOwned>(&mut self, key: u8) -> Result<Option<V>, StoreFault> {
+        Ok(self.bytes(key)?.and_then(|bytes| postcard::from_bytes(bytes).ok()))
+    }
+
+    fn put_value<V: Serialize>(&mut self, key: u8, value: &V) -> Result<(), StoreFault> {
+        let mut bytes = [0; 512];
+        let used = postcard::to_slice(value, &mut bytes).map_err(|_| StoreFault::Full)?;
+        self.put_bytes(key, used)
+    }
+
+    /// Which table of a muscle is in use.
+    ///
+    /// # Errors
+    /// [`StoreFault::Medium`].
+    pub fn selected(&mut self, side: Side) -> Result<Option<Selected>, StoreFault> {
+        self.value(SELECTED + side.index() as u8)
+    }
+
+    /// The image of the table in use.
+    ///
+    /// # Errors
+    /// [`StoreFault::Verify`] when a table is selected and its bytes are not those that were kept.
+    pub fn table(&mut self, side: Side) -> Result<Option<&[u8]>, StoreFault> {
+        let Some(selected) = self.selected(side)? else { return Ok(None) };
+        let image = self.bytes(image_key(side, selected.slot))?;
+        match image {
+            Some(image) if fits(image, &selected.table) => Ok(Some(image)),
+            _ => Err(StoreFault::Verify),
+        }
+    }
+
+    /// Keeps a new table and selects it. The image must have been checked already.
+    ///
+    /// # Errors
+    /// As the medium fails; the table in use stays the old one then.
+    pub fn commit(&mut self, side: Side, image: &[u8]) -> Result<Selected, StoreFault> {
+        let old = self.selected(side)?;
+        let slot = old.map_or(0, |old| 1 - (old.slot & 1));
+        let table = Described {
+            length: u16::try_from(image.len()).map_err(|_| StoreFault::Full)?,
+            crc: crc32(image),
+            generation: old.map_or(1, |old| old.table.generation.wrapping_add(1)),
+        };
+        let key = image_key(side, slot);
+        self.put_bytes(key, image)?;
+        if self.bytes(key)? != Some(image) {
+            return Err(StoreFault::Verify);
+        }
+        let selected = Selected { slot, table, previous: old.map(|old| old.table) };
+        self.select(side, selected)
+    }
+
+    /// Goes back to the table before. Going back again returns.
+    ///
+    /// # Errors
+    /// [`StoreFault::NoPrevious`]; [`StoreFault::Verify`] when its bytes are damaged, and nothing changes then.
+    pub fn roll_back(&mut self, side: Side) -> Result<Selected, StoreFault> {
+        let now = self.selected(side)?.ok_or(StoreFault::NoPrevious)?;
+        let before = now.previous.ok_or(StoreFault::NoPrevious)?;
+        let slot = 1 - (now.slot & 1);
+        if !self.bytes(image_key(side, slot))?.is_some_and(|image| fits(image, &before)) {
+            return Err(StoreFault::Verify);
+        }
+        self.select(side, Selected { slot, table: before, previous: Some(now.table) })
+    }
+
+    fn select(&mut self, side: Side, selected: Selected) -> Result<Selected, StoreFault> {
+        self.put_value(SELECTED + side.index() as u8, &selected)?;
+        match self.selected(side)? {
+            Some(kept) if kept == selected => Ok(selected),
+            _ => Err(StoreFault::Verify),
+        }
+    }
+
+    /// The kept settings.
+    ///
+    /// # Errors
+    /// [`StoreFault::Medium`].
+    pub fn settings(&mut self) -> Result<Option<Settings>, StoreFault> {
+        self.value(SETTINGS)
+    }
+
+    /// Keeps settings.
+    ///
+    /// # Errors
+    /// As the medium fails.
+    pub fn put_settings(&mut self, settings: &Settings) -> Result<(), StoreFault> {
+        self.put_value(SETTINGS, settings)
+    }
+
+    /// What effects remembered of a muscle.
+    ///
+    /// # Errors
+    /// [`StoreFault::Medium`].
+    pub fn memories(&mut self, side: Side) -> Result<Option<Memories>, StoreFault> {
+        self.value(MEMORIES + side.index() as u8)
+    }
+
+    /// Keeps what effects remember, unless the same is kept already.
+    ///
+    /// # Errors
+    /// As the medium fails.
+    pub fn put_memories(&mut self, side: Side, memories: &Memories) -> Result<(), StoreFault> {
+        if self.memories(side)?.as_ref() == Some(memories) {
+            return Ok(());
+        }
+        self.put_value(MEMORIES + side.index() as u8, memories)
+    }
+
+    /// Adds a fault to the log.
+    ///
+    /// # Errors
+    /// As the medium fails.
+    pub fn put_fault(&mut self, report: &FaultReport) -> Result<(), StoreFault> {
+        let next = self.value::<u8>(PAST_FAULT_NEXT)?.unwrap_or(0) % FAULT_LOG as u8;
+        self.put_value(PAST_FAULT + next, report)?;
+        self.put_value(PAST_FAULT_NEXT, &((next + 1) % FAULT_LOG as u8))
+    }
+
+    /// A past fault, 0 the last.
+    ///
+    /// # Errors
+    /// [`StoreFault::Medium`].
+    pub fn past_fault(&mut self, back: u8) -> Result<Option<FaultReport>, StoreFault> {
+        let log = FAULT_LOG as u8;
+        if back >= log {
+            return Ok(None);
+        }
+        let next = self.value::<u8>(PAST_FAULT_NEXT)?.unwrap_or(0) % log;
+        self.value(PAST_FAULT + (next + log - 1 - back) % log)
+    }
+
+    /// Counts a start, and gives the count.
+    ///
+    /// # Errors
+    /// As the medium fails.
+    pub fn count_start(&mut self) -> Result<u32, StoreFault> {
+        let starts = self.value::<u32>(STARTS)?.unwrap_or(0).wrapping_add(1);
+        self.put_value(STARTS, &starts)?;
+        Ok(starts)
+    }
+}
+
+fn fits(image: &[u8], described: &Described) -> bool {
+    image.len() == usize::from(described.length) && crc32(image) == described.crc
+}
+
+#[cfg(test)]
+mod tests;

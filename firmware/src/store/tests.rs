@@ -1,0 +1,1 @@
+//! The store on a flash whose power is cut.

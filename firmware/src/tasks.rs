@@ -1,0 +1,139 @@
+//! What runs side by side: the control loop, the link, telemetry. A board wraps each in a task of its executor.
+
+use core::cell::RefCell;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::channel::Channel;
+use embassy_sync::mutex::Mutex as Gate;
+use embedded_io_async::{Read, Write};
+use embedded_storage_async::nor_flash::NorFlash;
+use model_core::link::endpoints::{EVENT, TELEMETRY};
+use model_core::link::frame::{self, Accumulator, Header, Kind, MAX_WIRE};
+use model_core::link::messages::{Event, Telemetry};
+use model_core::link::settings::Settings;
+
+use crate::board::{Outputs, Plant};
+use crate::control::{Controller, Stepped};
+use crate::server::Server;
+
+/// Samples that wait for the link.
+const WAITING: usize = 16;
+
+/// What the device says by itself.
+#[derive(Clone, Debug)]
+enum Spoken {
+    Sample(u16, Telemetry),
+    Event(Event),
+}
+
+/// What the tasks share: the controller, entered for short and never across an await, and what waits to be sent.
+pub struct Shared {
+    controller: Mutex<CriticalSectionRawMutex, RefCell<Controller>>,
+    spoken: Channel<CriticalSectionRawMutex, Spoken, WAITING>,
+    dropped: AtomicU32,
+}
+
+impl Shared {
+    /// A controller as after power-up.
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            controller: Mutex::new(RefCell::new(Controller::new(settings))),
+            spoken: Channel::new(),
+            dropped: AtomicU32::new(0),
+        }
+    }
+
+    /// Enters the controller.
+    pub fn with<R>(&self, act: impl FnOnce(&mut Controller) -> R) -> R {
+        self.controller.lock(|controller| act(&mut controller.borrow_mut()))
+    }
+
+    /// Samples that found no room, since the start.
+    pub fn telemetry_dropped(&self) -> u32 {
+        self.dropped.load(Ordering::Relaxed)
+    }
+
+    /// One control step; what it says is put where the telemetry task finds it. A sample without room is dropped and
+    /// counted: the loop never waits for the link.
+    pub fn step(&self, inputs: &crate::board::Inputs) -> Outputs {
+        let Stepped { outputs, telemetry, event } = self.with(|controller| controller.step(inputs));
+        let said =
+            [event.map(Spoken::Event), telemetry.map(|(number, sample)| Spoken::Sample(number, sample))];
+        for spoken in said.into_iter().flatten() {
+            if self.spoken.try_send(spoken).is_err() {
+                self.dropped.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+        outputs
+    }
+
+    /// Room for what the next step may say.
+    pub fn has_room(&self) -> bool {
+        self.spoken.free_capacity() >= 2
+    }
+
+    /// The next frame to send without being asked, if there is one.
+    pub fn next_spoken(&self, out: &mut [u8; MAX_WIRE]) -> Option<usize> {
+        self.spoken.try_receive().ok().map(|spoken| encode(&spoken, out))
+    }
+}
+
+fn encode(spoken: &Spoken, out: &mut [u8; MAX_WIRE]) -> usize {
+    let header = |id, sequence| Header { kind: Kind::Topic, id, sequence };
+    let written = match spoken {
+        Spoken::Sample(number, sample) => frame::encode(header(TELEMETRY, *number), sample, out),
+        Spoken::Event(event) => frame::encode(header(EVENT, 0), event, out),
+    };
+    // The largest of both fits, which `model_core::link::endpoints` tests.
+    written.unwrap_or(0)
+}
+
+/// The control loop, for ever, in the plant's time.
+pub async fn control(plant: &mut impl Plant, shared: &Shared) -> ! {
+    let mut outputs = Outputs::default();
+    for side in &mut outputs.sides {
+        side.vent = true;
+    }
+    loop {
+        let inputs = plant.exchange(&outputs).await;
+        outputs = shared.step(&inputs);
+    }
+}
+
+/// The link: reads requests, writes answers; returns when the host has asked for a restart and has been answered, or
+/// when the port is gone.
+pub async fn link<R: Read, W: Write, F: NorFlash>(
+    receiver: &mut R,
+    sender: &Gate<CriticalSectionRawMutex, W>,
+    server: &mut Server<F>,
+    shared: &Shared,
+) {
+    let mut accumulator = Accumulator::new();
+    let mut bytes = [0; 64];
+    let mut out = [0; MAX_WIRE];
+    loop {
+        let Ok(count) = receiver.read(&mut bytes).await else { return };
+        for &byte in &bytes[..count] {
+            server.note_counts(accumulator.counts());
+            let Some(Ok(request)) = accumulator.push(byte) else { continue };
+            let length = server.handle(&request, shared, &mut out);
+            if sender.lock().await.write_all(&out[..length]).await.is_err() || server.wants_restart() {
+                return;
+            }
+        }
+    }
+}
+
+/// Telemetry and events, for ever; returns when the port is gone.
+pub async fn telemetry<W: Write>(sender: &Gate<CriticalSectionRawMutex, W>, shared: &Shared) {
+    let mut out = [0; MAX_WIRE];
+    loop {
+        let spoken = shared.spoken.receive().await;
+        let length = encode(&spoken, &mut out);
+        if sender.lock().await.write_all(&out[..length]).await.is_err() {
+            return;
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! A record of loop variables, sampled inside the loop and read out afterwards.
+
+use heapless::Vec;
+use model_core::link::messages::{
+    Field, Refusal, TRACE_PIECE, TRACE_VARIABLES, TraceArm, TraceInfo, TracePiece, Trigger, Variable,
+};
+
+/// Values that a trace holds: 4 KiB.
+pub const CAPACITY: usize = 1024;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    Off,
+    Waiting,
+    Recording,
+    Complete,
+}
+
+/// One trace.
+#[derive(Clone, Debug)]
+pub struct Trace {
+    phase: Phase,
+    variables: Vec<Variable, TRACE_VARIABLES>,
+    every_ticks: u16,
+    trigger: Trigger,
+    countdown: u16,
+    values: [f32; CAPACITY],
+    /// Records that fit.
+    room: usize,
+    records: usize,
+    /// Where the next record goes; with `UntilFault` the oldest is there once it went round.
+    next: usize,
+    first_tick: u64,
+}
+
+impl Default for Trace {
+    fn default() -> Self {
+        Self {
+            phase: Phase::Off,
+            variables: Vec::new(),
+            every_ticks: 1,
+            trigger: Trigger::Now,
+            countdown: 0,
+            values: [0.0; CAPACITY],
+            room: 0,
+            records: 0,
+            next: 0,
+            first_tick: 0,
+        }
+    }
+}
+
+impl Trace {
+    /// Arms it.
+    ///
+    /// # Errors
+    /// [`Refusal::Value`] without variables or with a rate of 0.
+    pub fn arm(&mut self, request: &TraceArm) -> Result<(), Refusal> {
+        if request.variables.is_empty() || request.every_ticks == 0 {
+            return Err(Refusal::Value(Field::Rate));
+        }
+        self.variables = request.variables.clone();
+        self.every_ticks = request.every_ticks;
+        self.trigger = request.trigger;
+        self.room = CAPACITY / self.variables.len();
+        self.records = 0;
+        self.next = 0;
+        self.countdown = 0;
+        self.phase = match request.trigger {
+            Trigger::Start => Phase::Waiting,
+            Trigger::Now | Trigger::UntilFault => Phase::Recording,
+        };
+        Ok(())
+    }
+
+    /// A mode or reference starts.
+    pub fn on_start(&mut self) {
+        if self.phase == Phase::Waiting {
+            self.phase = Phase::Recording;
+        }
+    }
+
+    /// A fault stopped the device.
+    pub fn on_fault(&mut self) {
+        if self.phase == Phase::Recording && self.trigger == Trigger::UntilFault {
+            self.phase = Phase::Complete;
+        }
+    }
+
+    /// Takes one tick's variables; returns whether it just became full.
+    pub fn sample(&mut self, tick: u64, value: impl Fn(Variable) -> f32) -> bool {
+        if self.phase != Phase::Recording {
+            return false;
+        }
+        if self.countdown > 0 {
+            self.countdown -= 1;
+            return false;
+        }
+        self.countdown = self.every_ticks - 1;
+        let width = self.variables.len();
+        let place = self.next * width;
+        if let Some(record) = self.values.get_mut(place..place + width) {
+            for (to, variable) in record.iter_mut().zip(&self.variables) {
+                *to = value(*variable);
+            }
+        }
+        if self.records == 0 {
+            self.first_tick = tick;
+        }
+        if self.records < self.room {
+            self.records += 1;
+        } else {
+            self.first_tick += u64::from(self.every_ticks);
+        }
+        self.next += 1;
+        if self.next == self.room {
+            self.next = 0;
+            if self.trigger != Trigger::UntilFault {
+                self.phase = Phase::Complete;
+                return true;
+            }
+        }
+        false
+    }
+
+    /// The trace as it stands.
+    pub fn info(&self) -> TraceInfo {
+        TraceInfo {
+            complete: self.phase == Phase::Complete,
+            records: self.records as u32,
+            first_tick: self.first_tick,
+            every_ticks: self.every_ticks,
+            variables: self.variables.clone(),
+        }
+    }
+
+    /// As many whole records as fit a piece, from one on.
+    ///
+    /// # Errors
+    /// [`Refusal::Range`] behind the last record, and while it still records.
+    pub fn read(&self, record: u32) -> Result<TracePiece, Refusal> {
+        let from = record as usize;
+        if self.phase != Phase::Complete || from >= self.records {
+            return Err(Refusal::Range);
+        }
+        let width = self.variables.len();
+        let oldest = if self.records == self.room { self.next } else { 0 };
+        let mut values = Vec::new();
+        for at in from..self.records.min(from + TRACE_PIECE / width) {
+            let place = (oldest + at) % self.room * width;
+            let record = self.values.get(place..place + width).ok_or(Refusal::Range)?;
+            values.extend_from_slice(record).map_err(|_| Refusal::Range)?;
+        }
+        Ok(TracePiece { values })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn arm(trigger: Trigger, every_ticks: u16) -> Trace {
+        let mut trace = Trace::default();
+        let variables = [Variable::Pressure, Variable::Force, Variable::Stroke].into_iter().collect();
+        assert_eq!(trace.arm(&TraceArm { variables, every_ticks, trigger }), Ok(()));
+        trace
+    }
+
+    fn value(tick: u64) -> impl Fn(Variable) -> f32 {
+        move |variable| tick as f32 + if variable == Variable::Force { 0.5 } else { 0.0 }
+    }
+
+    fn read_all(trace: &Trace) -> std::vec::Vec<f32> {
+        let mut all = std::vec::Vec::new();
+        while let Ok(piece) = trace.read(all.len() as u32 / 3) {
+            all.extend_from_slice(&piece.values);
+        }
+        all
+    }
+
+    #[test]
+    fn it_fills_and_is_read_back_whole() {
+        let mut trace = arm(Trigger::Now, 2);
+        let full = (0..5000).filter(|tick| trace.sample(*tick, value(*tick))).count();
+        assert_eq!(full, 1);
+        let info = trace.info();
+        assert!(info.complete);
+        assert_eq!(info.records as usize, CAPACITY / 3);
+        let all = read_all(&trace);
+        assert_eq!(all.len(), CAPACITY / 3 * 3);
+        assert_eq!(all[..6], [0.0, 0.5, 0.0, 2.0, 2.5, 2.0]);
+    }
+
+    #[test]
+    fn until_a_fault_it_keeps_the_last_records_in_order() {
+        let mut trace = arm(Trigger::UntilFault, 1);
+        for tick in 0..1000 {
+            trace.sample(tick, value(tick));
+        }
+        trace.on_fault();
+        trace.sample(1000, value(1000));
+        let all = read_all(&trace);
+        let room = CAPACITY / 3;
+        assert_eq!(all.len(), room * 3);
+        assert_eq!(all[0], (1000 - room) as f32);
+        assert_eq!(trace.info().first_tick, (1000 - room) as u64);
+        assert_eq!(all[all.len() - 3], 999.0);
+    }
+
+    #[test]
+    fn it_waits_for_a_start() {
+        let mut trace = arm(Trigger::Start, 1);
+        trace.sample(0, value(0));
+        assert_eq!(trace.info().records, 0);
+        trace.on_start();
+        trace.sample(1, value(1));
+        assert_eq!((trace.info().records, trace.info().first_tick), (1, 1));
+        assert_eq!(trace.read(0), Err(Refusal::Range), "still recording");
+    }
+}

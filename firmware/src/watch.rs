@@ -1,0 +1,316 @@
+//! How faults are noticed, and how soon.
+//!
+//! | fault | noticed after |
+//! | --- | --- |
+//! | sensor out of range, no readings, over-pressure, over-stroke, over-force, over-speed | `debounce_ticks` in a row (default 2), so the command changes within 3 ms |
+//! | sensor stuck | `stuck_ticks` of bit-equal readings while the command moved by 20 kPa |
+//! | sensor noisy | `noisy_jumps` jumps within 256 ticks |
+//! | sensors disagree | `disagree_ticks` of table and load cell apart by `disagree_n` |
+//! | pressure not following | `follow_ticks` of pressure and regulator's model apart by `follow_pa` |
+//! | set-point silence | `silence_ticks` without one |
+//! | loop overrun | `overrun_ticks` missed in a row |
+//!
+//! Over-speed looks at the filtered speed (time constant 20 ms of the motion tracker).
+
+use model_core::link::messages::{Fault, Sensor};
+use model_core::link::settings::{SensorWatch, Settings};
+
+use crate::board::{Command, Readings};
+
+/// What a watch found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Finding {
+    /// The fault.
+    pub fault: Fault,
+    /// Its sensor.
+    pub sensor: Option<Sensor>,
+    /// The value judged.
+    pub value: f32,
+    /// The limit it crossed.
+    pub limit: f32,
+}
+
+/// A count of ticks in a row.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct InARow(u16);
+
+impl InARow {
+    /// Counts, or begins again; tells whether there have been enough.
+    fn count(&mut self, bad: bool, enough: u16) -> bool {
+        self.0 = if bad { self.0.saturating_add(1) } else { 0 };
+        bad && self.0 >= enough.max(1)
+    }
+}
+
+/// The change of command that a live sensor cannot ignore, Pa.
+const EXCITED_PA: f32 = 20e3;
+/// Ticks in which jumps are counted.
+const JUMP_WINDOW: u16 = 256;
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct OneSensor {
+    out: InARow,
+    last: Option<f32>,
+    same: u16,
+    command_at_change: f32,
+    jumps: u16,
+    window: u16,
+}
+
+impl OneSensor {
+    fn check(
+        &mut self,
+        sensor: Sensor,
+        watch: &SensorWatch,
+        settings: &Settings,
+        value: f32,
+        command_pa: f32,
+    ) -> Option<Finding> {
+        if !watch.fitted {
+            return None;
+        }
+        let found = |fault, value, limit| Some(Finding { fault, sensor: Some(sensor), value, limit });
+        // `!(…)` so that a reading that is no number counts as outside.
+        let outside = !(value >= watch.low && value <= watch.high);
+        if self.out.count(outside, settings.watch.debounce_ticks) {
+            return found(Fault::SensorRange, value, if value < watch.low { watch.low } else { watch.high });
+        }
+        let last = self.last.replace(value);
+        let Some(last) = last else {
+            self.command_at_change = command_pa;
+            return None;
+        };
+        self.window += 1;
+        if (value - last).abs() > watch.jump {
+            self.jumps += 1;
+            if self.jumps >= settings.watch.noisy_jumps.max(1) {
+                return found(Fault::SensorNoisy, value, watch.jump);
+            }
+        }
+        if self.window >= JUMP_WINDOW {
+            self.window = 0;
+            self.jumps = 0;
+        }
+        if value != last {
+            self.same = 0;
+            self.command_at_change = command_pa;
+        } else if (command_pa - self.command_at_change).abs() > EXCITED_PA {
+            self.same = self.same.saturating_add(1);
+            if watch.stuck_ticks > 0 && self.same >= watch.stuck_ticks {
+                return found(Fault::SensorStuck, value, f32::from(watch.stuck_ticks));
+            }
+        }
+        None
+    }
+}
+
+/// What the watches of one muscle remember.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SideWatch {
+    pressure: OneSensor,
+    stroke: OneSensor,
+    force: OneSensor,
+    silent: InARow,
+    over_pressure: InARow,
+    over_stroke: InARow,
+    over_speed: InARow,
+    over_force: InARow,
+    disagree: InARow,
+    low: InARow,
+    high: InARow,
+}
+
+/// What one muscle's watches look at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen {
+    /// Readings of this tick.
+    pub readings: Option<Readings>,
+    /// Filtered speed, m/s.
+    pub speed_m_per_s: f32,
+    /// Command of the last tick.
+    pub command: Command,
+    /// Pressure that the regulator should have brought about, Pa.
+    pub expected_pa: f32,
+    /// Force by the table, where there is one, N.
+    pub model_n: Option<f32>,
+}
+
+impl SideWatch {
+    /// Looks at one tick; gives the first finding, the gravest first.
+    pub fn check(&mut self, seen: &Seen, settings: &Settings) -> Option<Finding> {
+        let watch = &settings.watch;
+        let limits = &settings.limits;
+        let plain = |fault, value, limit| Some(Finding { fault, sensor: None, value, limit });
+        let silent = self.silent.count(seen.readings.is_none(), watch.debounce_ticks);
+        let Some(now) = seen.readings else {
+            return if silent {
+                plain(Fault::SensorsSilent, f32::from(self.silent.0), f32::from(watch.debounce_ticks))
+            } else {
+                None
+            };
+        };
+        let (fits_pressure, fits_stroke, fits_force) =
+            (settings.pressure.fitted, settings.stroke.fitted, settings.force.fitted);
+        let pressure = now.pressure_pa;
+        let command_pa = if seen.command.vent { 0.0 } else { seen.command.pressure_pa };
+
+        // Every count is kept up each tick, whatever another finds.
+        let over_pressure =
+            self.over_pressure.count(fits_pressure && pressure > limits.pressure_pa, watch.debounce_ticks);
+        let out_of_stroke = now.stroke_m < limits.stroke_min_m || now.stroke_m > limits.stroke_max_m;
+        let over_stroke = self.over_stroke.count(fits_stroke && out_of_stroke, watch.debounce_ticks);
+        let too_fast = seen.speed_m_per_s.abs() > limits.speed_m_per_s;
+        let over_speed = self.over_speed.count(fits_stroke && too_fast, watch.debounce_ticks);
+        let over_force =
+            self.over_force.count(fits_force && now.force_n > limits.force_n, watch.debounce_ticks);
+        let miss = seen.model_n.map_or(0.0, |model| (model - now.force_n).abs());
+        let apart = fits_force && watch.disagree_n > 0.0 && miss > watch.disagree_n;
+        let disagree = self.disagree.count(apart, watch.disagree_ticks);
+        let gap = pressure - seen.expected_pa;
+        let low = self.low.count(fits_pressure && gap < -watch.follow_pa, watch.follow_ticks);
+        let high = self.high.count(fits_pressure && gap > watch.follow_pa, watch.follow_ticks);
+        let sensors = [
+            self.pressure.check(Sensor::Pressure, &settings.pressure, settings, pressure, command_pa),
+            self.stroke.check(Sensor::Stroke, &settings.stroke, settings, now.stroke_m, command_pa),
+            self.force.check(Sensor::Force, &settings.force, settings, now.force_n, command_pa),
+        ];
+
+        if let Some(finding) = sensors.into_iter().flatten().next() {
+            return Some(finding);
+        }
+        if over_pressure {
+            return plain(Fault::OverPressure, pressure, limits.pressure_pa);
+        }
+        if over_force {
+            return plain(Fault::OverForce, now.force_n, limits.force_n);
+        }
+        if over_stroke {
+            let limit =
+                if now.stroke_m < limits.stroke_min_m { limits.stroke_min_m } else { limits.stroke_max_m };
+            return plain(Fault::OverStroke, now.stroke_m, limit);
+        }
+        if over_speed {
+            return plain(Fault::OverSpeed, seen.speed_m_per_s, limits.speed_m_per_s);
+        }
+        if high {
+            return plain(Fault::PressureNotFalling, pressure, seen.expected_pa + watch.follow_pa);
+        }
+        if low {
+            return plain(Fault::PressureNotRising, pressure, seen.expected_pa - watch.follow_pa);
+        }
+        if disagree {
+            return plain(Fault::SensorsDisagree, miss, watch.disagree_n);
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn good() -> Seen {
+        Seen {
+            readings: Some(Readings { pressure_pa: 200e3, stroke_m: 0.002, force_n: 40.0 }),
+            speed_m_per_s: 0.0,
+            command: Command { pressure_pa: 200e3, vent: false },
+            expected_pa: 200e3,
+            model_n: Some(41.0),
+        }
+    }
+
+    /// Ticks until the first finding of a stream of ticks.
+    fn first(ticks: impl IntoIterator<Item = Seen>, settings: &Settings) -> Option<(usize, Finding)> {
+        let mut watch = SideWatch::default();
+        ticks.into_iter().enumerate().find_map(|(at, seen)| watch.check(&seen, settings).map(|f| (at + 1, f)))
+    }
+
+    fn with(change: impl Fn(&mut Seen, &mut Readings, usize)) -> impl Iterator<Item = Seen> {
+        (0..5000).map(move |tick| {
+            let mut seen = good();
+            // A live sensor never reads the same twice.
+            let mut readings = seen.readings.unwrap_or_default();
+            let wiggle = (tick % 7) as f32 - 3.0;
+            readings.pressure_pa += wiggle;
+            readings.force_n += 1e-3 * wiggle;
+            seen.readings = Some(readings);
+            if tick >= 100 {
+                change(&mut seen, &mut readings, tick - 100);
+                if seen.readings.is_some() {
+                    seen.readings = Some(readings);
+                }
+            }
+            seen
+        })
+    }
+
+    #[test]
+    fn a_healthy_muscle_gives_no_finding() {
+        let mut settings = Settings::default();
+        settings.watch.disagree_n = 10.0;
+        assert_eq!(first(with(|_, _, _| ()), &settings), None);
+    }
+
+    #[test]
+    fn a_broken_load_cell_wire_is_noticed_within_two_ticks() {
+        let broken = with(|_, readings, _| readings.force_n = -1e6);
+        let (ticks, finding) = first(broken, &Settings::default()).expect("noticed");
+        assert!(ticks <= 102);
+        assert_eq!((finding.fault, finding.sensor), (Fault::SensorRange, Some(Sensor::Force)));
+        let nan = with(|_, readings, _| readings.stroke_m = f32::NAN);
+        assert_eq!(first(nan, &Settings::default()).map(|(_, f)| f.sensor), Some(Some(Sensor::Stroke)));
+    }
+
+    #[test]
+    fn each_limit_has_its_fault() {
+        type Change = fn(&mut Seen, &mut Readings, usize);
+        let cases: [(Fault, usize, Change); 9] = [
+            (Fault::OverPressure, 2, |_, r, _| r.pressure_pa = 710e3),
+            (Fault::OverStroke, 2, |_, r, _| r.stroke_m = 0.1),
+            (Fault::OverSpeed, 2, |s, _, _| s.speed_m_per_s = -3.0),
+            (Fault::OverForce, 2, |_, r, _| r.force_n = 3_500.0),
+            (Fault::SensorsSilent, 2, |s, _, _| s.readings = None),
+            (Fault::PressureNotRising, 200, |s, _, _| s.expected_pa = 400e3),
+            (Fault::PressureNotFalling, 200, |s, _, _| s.expected_pa = 20e3),
+            (Fault::SensorNoisy, 20, |_, r, t| r.pressure_pa = if t % 2 == 0 { 0.0 } else { 400e3 }),
+            (Fault::SensorStuck, 260, |s, r, t| {
+                r.pressure_pa = 200e3;
+                s.command.pressure_pa = 200e3 + 1e3 * t as f32;
+            }),
+        ];
+        for (fault, within, change) in cases {
+            let (ticks, finding) = first(with(change), &Settings::default()).expect("noticed");
+            assert_eq!(finding.fault, fault);
+            assert!(ticks <= 100 + within, "{fault:?} after {ticks}");
+        }
+    }
+
+    #[test]
+    fn table_and_load_cell_may_not_contradict_each_other_for_long() {
+        let mut settings = Settings::default();
+        settings.watch.disagree_n = 10.0;
+        let apart = with(|seen, _, _| seen.model_n = Some(70.0));
+        let (ticks, finding) = first(apart, &settings).expect("noticed");
+        assert_eq!(finding.fault, Fault::SensorsDisagree);
+        assert!((290..=301).contains(&ticks), "{ticks}");
+    }
+
+    #[test]
+    fn a_single_bad_tick_is_forgiven() {
+        let spike = with(|_, readings, tick| {
+            if tick % 50 == 0 {
+                readings.force_n = 5_000.0;
+            }
+        });
+        let mut settings = Settings::default();
+        settings.force.jump = 1e9;
+        assert_eq!(first(spike, &settings), None);
+    }
+
+    #[test]
+    fn a_sensor_that_is_not_fitted_is_not_watched() {
+        let mut settings = Settings::default();
+        settings.force.fitted = false;
+        assert_eq!(first(with(|_, readings, _| readings.force_n = f32::NAN), &settings), None);
+    }
+}
