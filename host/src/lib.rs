@@ -8,4 +8,5 @@ pub mod error;
 pub mod muscle_description;
 pub mod output;
 pub mod recording;
+pub mod report;
 pub mod table_file;

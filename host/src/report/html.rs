@@ -1,0 +1,162 @@
+//! A report as one HTML file: no other file, no network, readable without scripts.
+//!
+//! The only script saves a picture or its numbers to a file; both are already in the page.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::figure::Figure;
+use super::page::{Block, Page, Section, Table, Tone};
+use super::rich;
+use super::svg::{self, Layout};
+
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+
+/// The whole file.
+pub(crate) fn page(page: &Page) -> String {
+    let contents = page.sections.len() > 3;
+    let markup = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (rich::plain(&page.title)) " · " (rich::plain(&page.subtitle)) }
+                style id="figure-style" { (PreEscaped(svg::page_style())) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                header {
+                    h1 { (rich::html(&page.title)) }
+                    @if !page.subtitle.is_empty() { p.subtitle { (rich::html(&page.subtitle)) } }
+                    @if let Some((tone, verdict)) = &page.verdict {
+                        p class={ "verdict " (class(*tone)) } { (rich::html(verdict)) }
+                    }
+                    @if !page.facts.is_empty() {
+                        dl.facts {
+                            @for fact in &page.facts {
+                                div class=(class(fact.tone)) {
+                                    dt { (rich::html(&fact.label)) }
+                                    dd.value { (rich::html(&fact.value)) }
+                                    @if !fact.note.is_empty() { dd.note { (rich::html(&fact.note)) } }
+                                }
+                            }
+                        }
+                    }
+                    @if contents {
+                        nav aria-label="Contents" {
+                            @for (i, section) in page.sections.iter().enumerate() {
+                                a href={ "#part-" (i + 1) } { (rich::html(&section.title)) }
+                            }
+                        }
+                    }
+                }
+                main {
+                    @for (i, one) in page.sections.iter().enumerate() { (section(i + 1, one)) }
+                }
+                @if !page.origin.is_empty() {
+                    footer {
+                        h2 { "Where this comes from" }
+                        dl {
+                            @for (what, value) in &page.origin {
+                                dt { (rich::html(what)) }
+                                dd { (rich::html(value)) }
+                            }
+                        }
+                    }
+                }
+                script { (PreEscaped(SCRIPT)) }
+            }
+        }
+    };
+    markup.into_string()
+}
+
+fn class(tone: Tone) -> &'static str {
+    match tone {
+        Tone::Plain => "plain",
+        Tone::Good => "good",
+        Tone::Caution => "caution",
+        Tone::Bad => "bad",
+    }
+}
+
+fn section(number: usize, section: &Section) -> Markup {
+    html! {
+        section id={ "part-" (number) } {
+            h2 { (rich::html(&section.title)) }
+            @for block in &section.blocks {
+                @match block {
+                    Block::Text(text) => p { (rich::html(text)) },
+                    Block::Notice(tone, text) => p class={ "notice " (class(*tone)) } { (rich::html(text)) },
+                    Block::List(points) => ul { @for point in points { li { (rich::html(point)) } } },
+                    Block::Figure(one) => (figure(one)),
+                    Block::Table(one) => (table(one)),
+                    Block::Listing(text) => pre { code { (text) } },
+                }
+            }
+        }
+    }
+}
+
+fn figure(figure: &Figure) -> Markup {
+    // Inside a script element only its own end tag has a meaning, and numbers have none; names could.
+    let numbers = figure.csv().replace("</", "<\\/");
+    html! {
+        figure id=(figure.id) {
+            h3 { (rich::html(&figure.title)) }
+            div.wide { (PreEscaped(svg::inline(figure, Layout::Wide))) }
+            div.narrow { (PreEscaped(svg::inline(figure, Layout::Narrow))) }
+            figcaption {
+                (rich::html(&figure.reading))
+                span.save hidden {
+                    button type="button" data-save="svg" aria-label={ "Save the picture " (figure.id) " as SVG" } { "SVG" }
+                    button type="button" data-save="csv" aria-label={ "Save the numbers of " (figure.id) " as CSV" } { "CSV" }
+                }
+            }
+            script type="text/csv" { (PreEscaped(numbers)) }
+        }
+    }
+}
+
+/// Whether a cell is a number, which is set to the right.
+fn numeric(cell: &str) -> bool {
+    cell.chars().next().is_some_and(|c| c.is_ascii_digit() || matches!(c, '−' | '-' | '+' | '±' | '–' | '<'))
+}
+
+fn table(table: &Table) -> Markup {
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(rich::plain(&table.caption)) {
+            table {
+                @if !table.caption.is_empty() { caption { (rich::html(&table.caption)) } }
+                thead {
+                    tr {
+                        @for (i, head) in table.head.iter().enumerate() {
+                            th scope="col" class=[right(table, i)] { (rich::html(head)) }
+                        }
+                    }
+                }
+                tbody {
+                    @for row in &table.rows {
+                        tr {
+                            @for (i, cell) in row.iter().enumerate() {
+                                @if i == 0 {
+                                    th scope="row" class=[right(table, i)] { (rich::html(cell)) }
+                                } @else {
+                                    td class=[right(table, i)] { (rich::html(cell)) }
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Columns of numbers are set to the right, heads included.
+fn right(table: &Table, column: usize) -> Option<&'static str> {
+    let mut cells = table.rows.iter().filter_map(|r| r.get(column)).filter(|c| !c.is_empty()).peekable();
+    (cells.peek().is_some() && cells.all(|c| numeric(c))).then_some("number")
+}

@@ -1,0 +1,119 @@
+//! The legend: rows above the panels, as many as it takes.
+
+use std::fmt::Write as _;
+
+use super::axis::figures;
+use super::colour::Colour;
+use super::figure::{Figure, Layer, Look, Mark};
+use super::marks;
+use super::rich;
+use super::svg::{LETTER, px, text};
+
+const ROW: f64 = 20.0;
+const SWATCH: f64 = 22.0;
+
+/// The legend and the height it takes; empty where there is nothing to tell apart.
+pub(crate) fn draw(figure: &Figure, width: f64) -> (String, f64) {
+    let mut out = String::new();
+    let (mut x, mut y) = (0.0, 0.0);
+    let layers = figure.legend();
+    let heats = figure.panels.iter().flat_map(|p| &p.layers).filter_map(|l| match &l.mark {
+        Mark::Heat { values, label, .. } => Some((values, label)),
+        _ => None,
+    });
+    let heats: Vec<_> = heats.collect();
+    let shown: Vec<&&Layer> = layers.iter().filter(|l| !matches!(l.mark, Mark::Heat { .. })).collect();
+    let mut room = |needed: f64| {
+        if x > 0.0 && x + needed > width {
+            (x, y) = (0.0, y + ROW);
+        }
+        let at = (x, y);
+        x += needed + 16.0;
+        at
+    };
+    for layer in shown {
+        let (a, b) = room(SWATCH + 6.0 + rich::width(&layer.name) * LETTER);
+        swatch(&mut out, layer, a, b + 10.0);
+        text(&mut out, a + SWATCH + 6.0, b + 14.0, "start", Colour::Ink, "", &layer.name);
+    }
+    let mut named: Vec<&String> = Vec::new();
+    for (values, label) in heats {
+        if named.contains(&label) {
+            continue;
+        }
+        named.push(label);
+        let (largest, both) = marks::heat_range(values);
+        let low = if both { figures(-largest, 2) } else { "0".into() };
+        let high = figures(largest, 2);
+        let bar = 90.0;
+        let words = [label.as_str(), &low, &high].map(|t| rich::width(t) * LETTER);
+        let (a, b) = room(words[0] + 10.0 + words[1] + 6.0 + bar + 6.0 + words[2]);
+        text(&mut out, a, b + 14.0, "start", Colour::Ink, "", label);
+        let start = a + words[0] + 10.0;
+        text(&mut out, start, b + 14.0, "start", Colour::Ink, "", &low);
+        let left = start + words[1] + 6.0;
+        let cells = 9;
+        for i in 0..cells {
+            let place = f64::from(i) / f64::from(cells - 1);
+            let value = if both { 2.0 * place - 1.0 } else { place };
+            let colour = marks::heat_colour(value);
+            let _ = write!(
+                out,
+                "<rect class=\"F {}\" fill=\"{}\" fill-opacity=\"{:.2}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"11\"/>",
+                colour.class(),
+                colour.literal(),
+                0.06 + 0.9 * value.abs(),
+                px(left + bar * f64::from(i) / f64::from(cells)),
+                px(b + 4.5),
+                px(bar / f64::from(cells))
+            );
+        }
+        text(&mut out, left + bar + 6.0, b + 14.0, "start", Colour::Ink, "", &high);
+    }
+    if out.is_empty() { (out, 0.0) } else { (out, y + ROW + 8.0) }
+}
+
+fn swatch(out: &mut String, layer: &Layer, x: f64, y: f64) {
+    let (class, literal) = (layer.colour.class(), layer.colour.literal());
+    let middle = x + SWATCH / 2.0;
+    let stroke = |width: &str, extra: &str, d: String| {
+        format!("<path class=\"S {class}\" stroke=\"{literal}\" stroke-width=\"{width}\"{extra} d=\"{d}\"/>")
+    };
+    let across = format!("M{} {}h{SWATCH}", px(x), px(y));
+    let drawn = match &layer.mark {
+        Mark::Series { look, .. } => match look {
+            Look::Line | Look::Step => stroke("2.4", "", across),
+            Look::Hair => stroke("1.4", " stroke-opacity=\".8\"", across),
+            Look::Dashes => stroke("1.8", " stroke-dasharray=\"6 4\"", across),
+            Look::Points => stroke("6", " stroke-linecap=\"round\"", format!("M{} {}h0", px(middle), px(y))),
+            Look::Rings => format!(
+                "<circle class=\"S {class}\" stroke=\"{literal}\" stroke-width=\"1.6\" cx=\"{}\" cy=\"{}\" r=\"3.6\"/>",
+                px(middle),
+                px(y)
+            ),
+            Look::Crosses => {
+                stroke("1.6", "", format!("M{} {}l7 7m0 -7l-7 7", px(middle - 3.5), px(y - 3.5)))
+            }
+            Look::Bars => block(x, y, &class, &literal, ".85"),
+        },
+        Mark::Band { .. } => block(x, y, &class, &literal, ".22"),
+        Mark::Region { .. } => block(x, y, &class, &literal, ".22"),
+        Mark::Intervals { .. } => {
+            stroke("1.5", "", format!("M{} {}h8m-4 0v12m-4 0h8", px(middle - 4.0), px(y - 6.0)))
+        }
+        Mark::Level(_) => stroke("1.3", " stroke-dasharray=\"2 3\"", across),
+        Mark::Moment(_) => {
+            stroke("1.3", " stroke-dasharray=\"2 3\"", format!("M{} {}v14", px(middle), px(y - 7.0)))
+        }
+        Mark::Heat { .. } => String::new(),
+    };
+    out.push_str(&drawn);
+}
+
+fn block(x: f64, y: f64, class: &str, literal: &str, opacity: &str) -> String {
+    format!(
+        "<rect class=\"F {class}\" fill=\"{literal}\" fill-opacity=\"{opacity}\" x=\"{}\" y=\"{}\" width=\"{SWATCH}\" height=\"11\" rx=\"2\"/>",
+        px(x),
+        px(y - 5.5)
+    )
+}

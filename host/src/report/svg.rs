@@ -1,0 +1,334 @@
+//! Drawing a [`Figure`] as SVG: deterministic text, no fonts, no scripts, no outside resources.
+//!
+//! Every picture has two layouts, one for a page and one for a phone, since letters must not shrink with the screen.
+//! The legend stands above the panels, where no data can be.
+
+use std::fmt::Write as _;
+
+use super::axis::{Scale, Tick, linear_ticks, log_ticks};
+use super::colour::{self, Colour};
+use super::figure::{Figure, Panel};
+use super::legend;
+use super::marks;
+use super::rich;
+
+/// For what width a picture is laid out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Layout {
+    /// A page: 760 px.
+    Wide,
+    /// A phone: 360 px.
+    Narrow,
+}
+
+impl Layout {
+    pub(crate) fn width(self) -> f64 {
+        match self {
+            Self::Wide => 760.0,
+            Self::Narrow => 360.0,
+        }
+    }
+
+    fn columns(self, panels: usize) -> usize {
+        match (self, panels) {
+            (_, 0 | 1) | (Self::Narrow, _) => 1,
+            (Self::Wide, 2 | 4) => 2,
+            (Self::Wide, _) => 3,
+        }
+    }
+}
+
+/// Size of the letters on ticks and in legends, px.
+pub(crate) const LETTER: f64 = 12.0;
+
+/// A coordinate, to a tenth of a pixel.
+pub(crate) fn px(value: f64) -> String {
+    let tenths = (value * 10.0).round() as i64;
+    if tenths % 10 == 0 { format!("{}", tenths / 10) } else { format!("{:.1}", tenths as f64 / 10.0) }
+}
+
+/// Where a panel's numbers lie on the paper.
+#[derive(Debug, Clone)]
+pub(crate) struct Frame {
+    pub left: f64,
+    pub top: f64,
+    pub width: f64,
+    pub height: f64,
+    pub x_ends: (f64, f64),
+    pub y_ends: (f64, f64),
+    pub x_log: bool,
+    pub y_log: bool,
+    /// Names run from the top down, numbers from the bottom up.
+    pub y_down: bool,
+}
+
+fn fraction(value: f64, ends: (f64, f64), log: bool) -> f64 {
+    if log {
+        if value > 0.0 { (value / ends.0).ln() / (ends.1 / ends.0).ln() } else { f64::NAN }
+    } else {
+        (value - ends.0) / (ends.1 - ends.0)
+    }
+}
+
+impl Frame {
+    pub(crate) fn x(&self, value: f64) -> f64 {
+        self.left + self.width * fraction(value, self.x_ends, self.x_log)
+    }
+
+    pub(crate) fn y(&self, value: f64) -> f64 {
+        let up = fraction(value, self.y_ends, self.y_log);
+        self.top + self.height * if self.y_down { up } else { 1.0 - up }
+    }
+
+    /// The height of zero, or of the bottom where zero is not shown.
+    pub(crate) fn base(&self) -> f64 {
+        if self.y_log { self.top + self.height } else { self.y(0.0_f64.clamp(self.y_ends.0, self.y_ends.1)) }
+    }
+}
+
+/// The picture as a file of its own.
+pub(crate) fn standalone(figure: &Figure) -> String {
+    let style = format!("<style>{}{TEXT_STYLE}</style>", colour::style_sheet());
+    draw(figure, Layout::Wide, Some(&style))
+}
+
+/// The picture as part of a page that carries [`page_style`].
+pub(crate) fn inline(figure: &Figure, layout: Layout) -> String {
+    draw(figure, layout, None)
+}
+
+/// What a page needs once for all its pictures.
+pub(crate) fn page_style() -> String {
+    format!("{}{TEXT_STYLE}", colour::style_sheet())
+}
+
+const TEXT_STYLE: &str = "svg.fig text{font-family:system-ui,-apple-system,'Segoe UI',Roboto,'Helvetica Neue',Arial,\
+sans-serif}svg.fig text{font-variant-numeric:tabular-nums}.paper{fill:var(--paper)}.grid{stroke:var(--grid)}\
+.axis{stroke:var(--axis)}\n";
+
+fn ends(figure: &Figure, vertical: bool) -> Vec<(f64, f64)> {
+    let axis = |p: &Panel| if vertical { p.y.clone() } else { p.x.clone() };
+    let shared = if vertical { figure.share_y } else { figure.share_x };
+    if shared {
+        let all = figure
+            .panels
+            .iter()
+            .filter_map(|p| p.extent(vertical))
+            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        figure.panels.iter().map(|p| axis(p).ends(all)).collect()
+    } else {
+        figure.panels.iter().map(|p| axis(p).ends(p.extent(vertical))).collect()
+    }
+}
+
+fn ticks(axis: &super::axis::Axis, ends: (f64, f64), wanted: usize) -> Vec<Tick> {
+    match &axis.scale {
+        Scale::Linear => linear_ticks(ends.0, ends.1, wanted),
+        Scale::Log => log_ticks(ends.0, ends.1, wanted),
+        Scale::Names(names) => {
+            names.iter().enumerate().map(|(i, name)| Tick { at: i as f64, text: name.clone() }).collect()
+        }
+    }
+}
+
+fn draw(figure: &Figure, layout: Layout, style: Option<&str>) -> String {
+    let width = layout.width();
+    let columns = layout.columns(figure.panels.len());
+    let rows = figure.panels.len().div_ceil(columns);
+    let gap = 22.0;
+    let cell_width = (width - gap * (columns as f64 - 1.0)) / columns as f64;
+    let (legend, legend_height) = legend::draw(figure, width);
+    let suffix = if layout == Layout::Narrow { "n" } else { "w" };
+    let id = format!("{}-{suffix}", figure.id);
+    let (x_ends, y_ends) = (ends(figure, false), ends(figure, true));
+
+    let mut body = String::new();
+    let mut top = legend_height;
+    for row in 0..rows {
+        let range = row * columns..((row + 1) * columns).min(figure.panels.len());
+        let mut tallest: f64 = 0.0;
+        for i in range {
+            let left = (i % columns) as f64 * (cell_width + gap);
+            let clip = format!("{id}-{i}");
+            let place = (left, top, cell_width);
+            let height =
+                panel(&mut body, &figure.panels[i], place, (x_ends[i], y_ends[i]), &clip, columns > 1);
+            tallest = tallest.max(height);
+        }
+        top += tallest + if row + 1 < rows { 14.0 } else { 0.0 };
+    }
+    let height = top.ceil();
+    let mut out = String::with_capacity(body.len() + 2_048);
+    let _ = write!(
+        out,
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"fig\" viewBox=\"0 0 {} {}\" role=\"img\" \
+         aria-labelledby=\"{id}-t {id}-d\" font-family=\"sans-serif\" font-size=\"{LETTER}\" fill=\"none\"",
+        px(width),
+        px(height)
+    );
+    if style.is_some() {
+        let _ = write!(out, " width=\"{}\" height=\"{}\"", px(width), px(height));
+    }
+    let _ = write!(
+        out,
+        "><title id=\"{id}-t\">{}</title><desc id=\"{id}-d\">{}</desc>",
+        rich::escape(&rich::plain(&figure.title)),
+        rich::escape(&figure.description())
+    );
+    if let Some(style) = style {
+        let _ = write!(
+            out,
+            "{style}<rect class=\"paper\" width=\"{}\" height=\"{}\" fill=\"#ffffff\"/>",
+            px(width),
+            px(height)
+        );
+    }
+    out.push_str(&legend);
+    out.push_str(&body);
+    out.push_str("</svg>");
+    out
+}
+
+/// A text element. `anchor` is `start`, `middle` or `end`.
+pub(crate) fn text(out: &mut String, x: f64, y: f64, anchor: &str, colour: Colour, extra: &str, words: &str) {
+    let _ = write!(
+        out,
+        "<text x=\"{}\" y=\"{}\"{} class=\"F {}\" fill=\"{}\"{extra}>{}</text>",
+        px(x),
+        px(y),
+        if anchor == "start" { String::new() } else { format!(" text-anchor=\"{anchor}\"") },
+        colour.class(),
+        colour.literal(),
+        rich::svg(words)
+    );
+}
+
+/// Draws one panel at `place` (left, top, width) and returns its height.
+fn panel(
+    out: &mut String,
+    panel: &Panel,
+    place: (f64, f64, f64),
+    (x_ends, y_ends): ((f64, f64), (f64, f64)),
+    clip: &str,
+    small: bool,
+) -> f64 {
+    let (left, top, cell_width) = place;
+    let named_rows = if let Scale::Names(names) = &panel.y.scale { names.len() } else { 0 };
+    let height = match (named_rows, small, cell_width < 500.0) {
+        (1.., _, _) => 24.0 * named_rows as f64 + 8.0,
+        (_, true, _) => (cell_width * 0.68).max(150.0),
+        (_, _, true) => cell_width * 0.72,
+        _ => 330.0,
+    };
+    let y_ticks = ticks(&panel.y, y_ends, (height / 48.0) as usize);
+    let widest = y_ticks.iter().map(|t| rich::width(&t.text)).fold(0.0, f64::max) * LETTER;
+    let margin = (widest + 9.0).clamp(26.0, cell_width * 0.5);
+    let mut head = 0.0;
+    if !panel.title.is_empty() {
+        text(out, left, top + 14.0, "start", Colour::Ink, " font-weight=\"600\"", &panel.title);
+        head += 20.0;
+    }
+    if named_rows == 0 {
+        text(out, left, top + head + 13.0, "start", Colour::Ink, "", &panel.y.title());
+        head += 20.0;
+    }
+    let frame = Frame {
+        left: left + margin,
+        top: top + head + 2.0,
+        width: (cell_width - margin - 8.0).max(20.0),
+        height,
+        x_ends,
+        y_ends,
+        x_log: panel.x.scale == Scale::Log,
+        y_log: panel.y.scale == Scale::Log,
+        y_down: named_rows > 0,
+    };
+    let below = axes(out, panel, &frame, &y_ticks);
+    let _ = write!(
+        out,
+        "<clipPath id=\"{clip}\"><rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/></clipPath><g clip-path=\"url(#{clip})\">",
+        px(frame.left - 1.0),
+        px(frame.top - 4.0),
+        px(frame.width + 5.0),
+        px(frame.height + 5.0)
+    );
+    for stage in 0..3 {
+        panel
+            .layers
+            .iter()
+            .filter(|l| marks::stage(&l.mark) == stage)
+            .for_each(|l| marks::draw(out, l, &frame));
+    }
+    out.push_str("</g>");
+    frame.top + frame.height + below - top
+}
+
+/// Draws grid, ticks and axis titles; returns how much room they take below the frame.
+fn axes(out: &mut String, panel: &Panel, frame: &Frame, y_ticks: &[Tick]) -> f64 {
+    let (right, bottom) = (frame.left + frame.width, frame.top + frame.height);
+    let named = matches!(panel.x.scale, Scale::Names(_));
+    let x_ticks = ticks(&panel.x, frame.x_ends, ((frame.width / 72.0) as usize).max(2));
+    let mut grid = String::new();
+    for tick in y_ticks.iter().filter(|t| !t.text.is_empty() && !frame.y_down) {
+        let y = px(frame.y(tick.at));
+        let _ = write!(grid, "M{} {y}H{}", px(frame.left), px(right));
+    }
+    for tick in x_ticks.iter().filter(|t| !t.text.is_empty() && !named) {
+        let _ = write!(grid, "M{} {}V{}", px(frame.x(tick.at)), px(frame.top), px(bottom));
+    }
+    let _ = write!(out, "<path class=\"grid\" stroke=\"#e6e9ee\" d=\"{grid}\"/>");
+    let base = if frame.y_down { bottom } else { frame.base() };
+    let mut lines = format!("M{} {}H{}", px(frame.left), px(bottom), px(right));
+    if base < bottom - 0.5 {
+        let _ = write!(lines, "M{} {}H{}", px(frame.left), px(base), px(right));
+    }
+    if frame.y_down && frame.x_ends.0 <= 0.0 && !frame.x_log {
+        let zero = px(frame.x(0.0));
+        let _ = write!(lines, "M{zero} {}V{}", px(frame.top), px(bottom));
+    }
+    for tick in x_ticks.iter().filter(|_| !named) {
+        let length = if tick.text.is_empty() { 3.0 } else { 5.0 };
+        let _ = write!(lines, "M{} {}v{}", px(frame.x(tick.at)), px(bottom), px(length));
+    }
+    for tick in y_ticks.iter().filter(|t| t.text.is_empty()) {
+        let _ = write!(lines, "M{} {}h-3", px(frame.left), px(frame.y(tick.at)));
+    }
+    let _ = write!(out, "<path class=\"axis\" stroke=\"#9aa2b1\" d=\"{lines}\"/>");
+    for tick in y_ticks.iter().filter(|t| !t.text.is_empty()) {
+        let y = frame.y(tick.at) + 4.0;
+        text(out, frame.left - 7.0, y, "end", Colour::Ink, " opacity=\".82\"", &shortened(tick, frame.left));
+    }
+    let room = frame.width / x_ticks.len().max(1) as f64;
+    let widest = x_ticks.iter().map(|t| rich::width(&t.text)).fold(0.0, f64::max) * LETTER;
+    let slanted = named && widest > room - 6.0;
+    for tick in x_ticks.iter().filter(|t| !t.text.is_empty()) {
+        let x = frame.x(tick.at);
+        if slanted {
+            let y = bottom + 13.0;
+            let turn = format!(" transform=\"rotate(-35 {} {})\" opacity=\".82\"", px(x + 3.0), px(y));
+            text(out, x + 3.0, y, "end", Colour::Ink, &turn, &tick.text);
+        } else {
+            text(out, x, bottom + 18.0, "middle", Colour::Ink, " opacity=\".82\"", &tick.text);
+        }
+    }
+    let mut below = if slanted { 20.0 + 0.58 * widest } else { 24.0 };
+    let title = panel.x.title();
+    if !title.is_empty() {
+        text(out, frame.left + frame.width / 2.0, bottom + below + 13.0, "middle", Colour::Ink, "", &title);
+        below += 20.0;
+    }
+    below
+}
+
+/// A name that would run off the paper is cut; its whole form stands in the numbers.
+fn shortened(tick: &Tick, room: f64) -> String {
+    let fits = |text: &str| rich::width(text) * LETTER <= room.max(40.0) - 6.0;
+    if fits(&tick.text) {
+        return tick.text.clone();
+    }
+    let mut text = rich::plain(&tick.text);
+    while !text.is_empty() && !fits(&format!("{text}…")) {
+        text.pop();
+    }
+    format!("{text}…")
+}
