@@ -1,5 +1,6 @@
 //! Recordings of muscles to tables: reading, fitting, checking, writing.
 
+pub mod bench;
 pub mod cli;
 pub mod commands;
 pub mod console;

@@ -1,0 +1,46 @@
+//! Play between the stroke sensor and the muscle: after a turn the sensor moves and the muscle does not.
+//!
+//! ```text
+//! F_add = κ · ∂F/∂x · (play_{b/2}(x) − x)
+//! ```
+//! `b`, m, is the width of the play, `play` its output: it stands still until the stroke has gone back by `b`. `κ` (dimensionless) is 1 for a joint
+//! that is free over all of `b`, less if it is tight at times. A preloaded joint has none. The side on which the play begins is
+//! unknown until the first turn.
+
+use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use model_core::scalar::Scalar;
+
+/// See the [module](self).
+pub(super) struct Backlash;
+
+impl Effect for Backlash {
+    const INFO: Info = Info {
+        name: "backlash",
+        link: Link::LoadPath,
+        parameters: &[
+            Parameter::amplitude("free_part", "", 0.1, 1.2),
+            Parameter::shape("width", "m", 2.0e-5, 2.0e-3),
+        ],
+        depends_on_pressure: true,
+        persistent: false,
+        alternatives: false,
+        start: Start::Branch,
+        fading: &[],
+        equation: "F = κ·∂F/∂x·(play_b(x) − x)",
+        summary: "A loose joint lets the sensor move before the muscle does, after every turn.",
+        source: "play operator; sensitivity of the base model",
+    };
+
+    fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
+        // memory: [play(x) − x, last stroke, seen]
+        let half = (parameters[1] * T::from_f32(0.5)).max(T::ZERO);
+        let moved = if memory[2] == T::ZERO { T::ZERO } else { context.stroke - memory[1] };
+        memory[0] = (memory[0] - moved).clamp(-half, half);
+        memory[1] = context.stroke;
+        memory[2] = T::ONE;
+    }
+
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
+        parameters[0] * context.stiffness * memory[0]
+    }
+}

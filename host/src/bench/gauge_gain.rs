@@ -1,0 +1,33 @@
+//! The pressure gauge's scale is wrong: `F_add = g(L) · (γ P + γ_2 P²)`.
+//!
+//! `γ` (dimensionless) is the part by which it reads too low, `γ_2`, 1/Pa, a curvature. Of the same shape as a wrong force gain and a
+//! direction-dependent friction within a few per cent: compare with a reference gauge at three pressures.
+
+use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use model_core::scalar::Scalar;
+
+/// See the [module](self).
+pub(super) struct GaugeGain;
+
+impl Effect for GaugeGain {
+    const INFO: Info = Info {
+        name: "gauge-gain",
+        link: Link::Air,
+        parameters: &[
+            Parameter::amplitude("gain_missing", "", -0.05, 0.05),
+            Parameter::amplitude("curvature", "1/Pa", -1.0e-7, 1.0e-7),
+        ],
+        depends_on_pressure: true,
+        persistent: false,
+        alternatives: true,
+        start: Start::Known,
+        fading: &[],
+        equation: "F = g·(γ·P + γ_2·P²)",
+        summary: "The scale of the pressure gauge is off by some per cent.",
+        source: "usual gauge accuracy, 0.1 to 1 %; sensitivity of the base model",
+    };
+
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
+        context.area * context.pressure * (parameters[0] + parameters[1] * context.pressure)
+    }
+}

@@ -1,0 +1,30 @@
+//! The pressure gauge reads too low by `δ`: `F_add = g(L) · δ`.
+//!
+//! `g = ∂F_G/∂P`, m². Identical to a shift of the deadband `P0`, at every pressure and stroke: never named alone, reported as "`P0` includes the
+//! gauge's zero". Read the gauge with the muscle vented.
+
+use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use model_core::scalar::Scalar;
+
+/// See the [module](self).
+pub(super) struct GaugeOffset;
+
+impl Effect for GaugeOffset {
+    const INFO: Info = Info {
+        name: "gauge-offset",
+        link: Link::Air,
+        parameters: &[Parameter::amplitude("pressure_missing", "Pa", -1.0e4, 1.0e4)],
+        depends_on_pressure: false,
+        persistent: false,
+        alternatives: false,
+        start: Start::Known,
+        fading: &[],
+        equation: "F = g·δ",
+        summary: "The pressure gauge does not read zero when the muscle is vented.",
+        source: "usual gauge accuracy, 0.1 to 0.5 % of full scale; sensitivity of the base model",
+    };
+
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
+        parameters[0] * context.area
+    }
+}
