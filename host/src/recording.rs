@@ -3,8 +3,22 @@
 //! A file becomes one [`Recording`], or several when an import description splits it; the recordings of one call become a
 //! [`Campaign`] in chronological order. Nothing behind this door parses text or knows a unit other than SI.
 
+mod assemble;
+mod blocks;
 mod campaign;
+mod cells;
 mod columns;
+mod decimal;
+pub mod import;
+mod noise;
+mod plan;
+mod quantity;
+mod read;
+mod source;
 
 pub use campaign::{Campaign, Clock};
 pub use columns::Recording;
+pub use import::Import;
+pub use noise::white_noise;
+pub use quantity::{Named, Quantity, Unit, named};
+pub use read::Reader;

@@ -1,0 +1,44 @@
+//! Reads recordings and says what was in them and how long it took: `read_recordings [--import F] [--muscle M] FILE…`.
+
+use std::process::ExitCode;
+use std::time::Instant;
+
+use host::muscle_description::MuscleDescription;
+use host::recording::{Import, Reader};
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let status = error.exit_status();
+            eprintln!("{:?}", miette::Report::new(error));
+            ExitCode::from(status)
+        }
+    }
+}
+
+fn run() -> host::error::Result<()> {
+    let (mut import, mut muscle, mut files) = (None, None, Vec::new());
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--import" => import = Some(Import::read(arguments.next().unwrap_or_default())?),
+            "--muscle" => muscle = Some(MuscleDescription::read(arguments.next().unwrap_or_default())?),
+            _ => files.push(argument),
+        }
+    }
+    let reader = muscle.as_ref().map_or_else(Reader::new, Reader::of).import(import.as_ref());
+    let start = Instant::now();
+    let campaign = reader.campaign(&files)?;
+    let elapsed = start.elapsed().as_secs_f64();
+    for recording in campaign.recordings.iter().take(5) {
+        println!("{}: {} rows, {:.3} s", recording.name, recording.len(), recording.duration());
+    }
+    println!(
+        "{} recordings, {} rows, {:?} clock, read in {elapsed:.3} s",
+        campaign.recordings.len(),
+        campaign.samples(),
+        campaign.clock
+    );
+    Ok(())
+}

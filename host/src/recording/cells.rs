@@ -1,0 +1,381 @@
+//! Lines of text to numbers: one block of whole lines at a time.
+
+use std::collections::HashMap;
+
+use super::decimal;
+
+/// How a text file is cut into cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Dialect {
+    /// What stands between cells; a space means any run of blanks.
+    pub delimiter: u8,
+    /// Lines that begin with this are skipped.
+    pub comment: Option<u8>,
+    /// Decimals are written with a comma.
+    pub decimal_comma: bool,
+}
+
+/// What is wanted of one column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Want {
+    /// A number: SI value = number · scale + offset.
+    Number { scale: f64, offset: f64 },
+    /// The text itself, from a small vocabulary.
+    Text,
+}
+
+/// A column that is wanted. A plan's columns are in ascending order of `index`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Wanted {
+    pub index: usize,
+    pub want: Want,
+}
+
+/// What is wrong with a line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Fault {
+    Empty,
+    NotANumber,
+    NotFinite,
+    Width { found: usize, expected: usize },
+    OpenQuote,
+}
+
+/// Where a block went wrong.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct LineError {
+    /// Counted from 0 at the block's start.
+    pub line: u64,
+    /// Index of the cell.
+    pub cell: Option<usize>,
+    pub value: String,
+    pub fault: Fault,
+}
+
+/// Texts as numbers into a vocabulary.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Words {
+    pub codes: Vec<u32>,
+    pub words: Vec<String>,
+    index: HashMap<String, u32>,
+}
+
+impl Words {
+    pub fn push(&mut self, word: &str) {
+        let code = self.code(word);
+        self.codes.push(code);
+    }
+
+    fn code(&mut self, word: &str) -> u32 {
+        // Neighbouring rows mostly carry the same word.
+        if let Some(last) = self.codes.last()
+            && self.words[*last as usize] == word
+        {
+            return *last;
+        }
+        if let Some(code) = self.index.get(word) {
+            return *code;
+        }
+        let code = self.words.len() as u32;
+        self.words.push(word.to_owned());
+        self.index.insert(word.to_owned(), code);
+        code
+    }
+
+    pub fn append(&mut self, other: &Self) {
+        let map: Vec<u32> = other.words.iter().map(|w| self.code(w)).collect();
+        self.codes.extend(other.codes.iter().map(|c| map[*c as usize]));
+    }
+
+    pub fn get(&self, row: usize) -> &str {
+        self.codes.get(row).and_then(|c| self.words.get(*c as usize)).map_or("", String::as_str)
+    }
+}
+
+/// Which line of the file each row came from: (first row, its line), one entry wherever lines were skipped.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct LineMap(Vec<(usize, u64)>);
+
+impl LineMap {
+    pub fn note(&mut self, row: usize, line: u64) {
+        if self.0.last().is_none_or(|(r, l)| l + (row - r) as u64 != line) {
+            self.0.push((row, line));
+        }
+    }
+
+    pub fn append(&mut self, other: &Self, rows: usize, lines: u64) {
+        for (row, line) in &other.0 {
+            self.note(rows + row, lines + line);
+        }
+    }
+
+    pub fn line(&self, row: usize) -> u64 {
+        let at = self.0.partition_point(|(r, _)| *r <= row);
+        at.checked_sub(1).map_or(row as u64, |i| self.0[i].1 + (row - self.0[i].0) as u64)
+    }
+}
+
+/// The wanted cells of a block.
+#[derive(Debug, Default)]
+pub(super) struct Parsed {
+    /// One per wanted column; empty for texts.
+    pub numbers: Vec<Vec<f64>>,
+    /// One per wanted column; empty for numbers.
+    pub texts: Vec<Words>,
+    pub rows: usize,
+    pub lines: u64,
+    pub map: LineMap,
+}
+
+/// Parses a block of whole lines; `width` cells are expected in each.
+pub(super) fn parse(
+    block: &[u8],
+    dialect: Dialect,
+    wanted: &[Wanted],
+    width: usize,
+) -> Result<Parsed, Box<LineError>> {
+    let mut out = Parsed {
+        numbers: wanted.iter().map(|_| Vec::new()).collect(),
+        texts: wanted.iter().map(|_| Words::default()).collect(),
+        ..Parsed::default()
+    };
+    let mut rest = block;
+    while !rest.is_empty() {
+        let end = memchr::memchr(b'\n', rest).unwrap_or(rest.len());
+        let line = trim_end(&rest[..end]);
+        rest = rest.get(end + 1..).unwrap_or_default();
+        let skip =
+            line.first().is_none_or(|b| Some(*b) == dialect.comment) || line.iter().all(|b| is_blank(*b));
+        if !skip {
+            row(line, dialect, wanted, width, &mut out).map_err(|(cell, value, fault)| {
+                Box::new(LineError { line: out.lines, cell, value, fault })
+            })?;
+            out.map.note(out.rows, out.lines);
+            out.rows += 1;
+        }
+        out.lines += 1;
+    }
+    Ok(out)
+}
+
+type CellError = (Option<usize>, String, Fault);
+
+fn row(
+    line: &[u8],
+    dialect: Dialect,
+    wanted: &[Wanted],
+    width: usize,
+    out: &mut Parsed,
+) -> Result<(), CellError> {
+    let mut cells = Cells { line, at: Some(0), dialect };
+    let mut index = 0;
+    let mut next = 0;
+    while let Some(target) = wanted.get(next) {
+        // Cells before the wanted one are passed over without looking into them.
+        while index < target.index {
+            cells.skip().map_err(|()| open_quote(line))?;
+            index += 1;
+        }
+        let first_of_cell = next;
+        if cells.at.is_none() {
+            return Err(wrong_width(line, dialect, width));
+        }
+        let start = cells;
+        while wanted.get(next).is_some_and(|w| w.index == index) {
+            cells = start;
+            match wanted[next].want {
+                Want::Number { scale, offset } => match cells.number() {
+                    Some(value) => out.numbers[next].push(value * scale + offset),
+                    None => return Err(explain(start, width, index)),
+                },
+                Want::Text => {
+                    let cell = cells.text().map_err(|()| open_quote(line))?;
+                    out.texts[next].push(&cell);
+                }
+            }
+            next += 1;
+        }
+        debug_assert!(next > first_of_cell);
+        index += 1;
+    }
+    while cells.at.is_some() {
+        cells.skip().map_err(|()| open_quote(line))?;
+        index += 1;
+    }
+    if index == width { Ok(()) } else { Err(wrong_width(line, dialect, width)) }
+}
+
+fn open_quote(line: &[u8]) -> CellError {
+    (None, lossy(line), Fault::OpenQuote)
+}
+
+fn wrong_width(line: &[u8], dialect: Dialect, expected: usize) -> CellError {
+    let mut cells = Cells { line, at: Some(0), dialect };
+    let mut found = 0;
+    while cells.at.is_some() {
+        if cells.skip().is_err() {
+            return open_quote(line);
+        }
+        found += 1;
+    }
+    (None, lossy(line), Fault::Width { found, expected })
+}
+
+/// Says what is wrong with a cell that did not give a number.
+fn explain(mut cells: Cells<'_>, width: usize, index: usize) -> CellError {
+    let (line, dialect) = (cells.line, cells.dialect);
+    // A wrong number of cells shifts the columns, so it is the better explanation.
+    let width_error = wrong_width(line, dialect, width);
+    if !matches!(width_error.2, Fault::Width { found, .. } if found == width) {
+        return width_error;
+    }
+    let Ok(text) = cells.text() else { return open_quote(line) };
+    let bare = text.trim().trim_start_matches(['-', '+']).to_lowercase();
+    let fault = match bare.as_str() {
+        "" => Fault::Empty,
+        "nan" | "inf" | "infinity" | "na" | "n/a" | "null" | "none" | "1.#inf" | "1.#qnan" | "#n/a" => {
+            Fault::NotFinite
+        }
+        _ if decimal::prefix(bare.as_bytes()).is_some_and(|(v, n)| n == bare.len() && !v.is_finite()) => {
+            Fault::NotFinite
+        }
+        _ => Fault::NotANumber,
+    };
+    (Some(index), text.into_owned(), fault)
+}
+
+fn lossy(line: &[u8]) -> String {
+    String::from_utf8_lossy(&line[..line.len().min(200)]).into_owned()
+}
+
+fn is_blank(byte: u8) -> bool {
+    byte == b' ' || byte == b'\t'
+}
+
+/// A line without its carriage return.
+fn trim_end(line: &[u8]) -> &[u8] {
+    line.strip_suffix(b"\r").unwrap_or(line)
+}
+
+/// A place in a line, cell by cell; `at` is `None` behind the last cell.
+#[derive(Clone, Copy)]
+pub(super) struct Cells<'a> {
+    line: &'a [u8],
+    at: Option<usize>,
+    dialect: Dialect,
+}
+
+impl<'a> Cells<'a> {
+    /// All cells of a line as text; used for headers.
+    pub fn split(line: &'a [u8], dialect: Dialect) -> Result<Vec<String>, ()> {
+        let mut cells = Self { line: trim_end(line), at: Some(0), dialect };
+        let mut all = Vec::new();
+        while cells.at.is_some() {
+            all.push(cells.text()?.trim().to_owned());
+        }
+        Ok(all)
+    }
+
+    #[inline]
+    fn blanks(&self, mut at: usize) -> usize {
+        while let Some(b) = self.line.get(at)
+            && is_blank(*b)
+            && (*b != self.dialect.delimiter || self.dialect.delimiter == b' ')
+        {
+            at += 1;
+        }
+        at
+    }
+
+    /// Behind a cell that ends at `at`: the start of the next one, or `None` if something else stands there.
+    #[inline]
+    fn after(&self, at: usize) -> Option<Option<usize>> {
+        match self.line.get(at) {
+            None => Some(None),
+            Some(b) if *b == self.dialect.delimiter => Some(Some(at + 1)),
+            Some(_) => {
+                let end = self.blanks(at);
+                match self.line.get(end) {
+                    None => Some(None),
+                    Some(b) if *b == self.dialect.delimiter => Some(Some(end + 1)),
+                    Some(_) if self.dialect.delimiter == b' ' && end > at => Some(Some(end)),
+                    Some(_) => None,
+                }
+            }
+        }
+    }
+
+    #[inline]
+    fn number(&mut self) -> Option<f64> {
+        let start = self.blanks(self.at?);
+        if self.dialect.decimal_comma || self.line.get(start) == Some(&b'"') {
+            let text = self.text().ok()?;
+            let text = text.trim();
+            let (value, used) = if self.dialect.decimal_comma {
+                // A point would be a separator of thousands, whose meaning we do not guess.
+                if text.contains('.') {
+                    return None;
+                }
+                decimal::prefix(text.replace(',', ".").as_bytes())?
+            } else {
+                decimal::prefix(text.as_bytes())?
+            };
+            return (used == text.len() && value.is_finite()).then_some(value);
+        }
+        let (value, used) = decimal::prefix(&self.line[start..])?;
+        self.at = self.end_of_blank_run(self.after(start + used)?);
+        value.is_finite().then_some(value)
+    }
+
+    /// With blanks as delimiter, blanks at the end of a line do not open another cell.
+    #[inline]
+    fn end_of_blank_run(&self, at: Option<usize>) -> Option<usize> {
+        if self.dialect.delimiter != b' ' {
+            return at;
+        }
+        at.map(|a| self.blanks(a)).filter(|a| *a < self.line.len())
+    }
+
+    fn text(&mut self) -> Result<std::borrow::Cow<'a, str>, ()> {
+        let Some(at) = self.at else { return Ok("".into()) };
+        let start = self.blanks(at);
+        if self.line.get(start) == Some(&b'"') {
+            return self.quoted(start + 1);
+        }
+        let rest = &self.line[start.min(self.line.len())..];
+        let end = if self.dialect.delimiter == b' ' {
+            rest.iter().position(|b| is_blank(*b))
+        } else {
+            memchr::memchr(self.dialect.delimiter, rest)
+        };
+        let cell = &rest[..end.unwrap_or(rest.len())];
+        self.at = self.end_of_blank_run(end.map(|e| start + e + 1));
+        Ok(String::from_utf8_lossy(cell))
+    }
+
+    fn quoted(&mut self, start: usize) -> Result<std::borrow::Cow<'a, str>, ()> {
+        let mut text = Vec::new();
+        let mut at = start;
+        loop {
+            let end = at + memchr::memchr(b'"', &self.line[at..]).ok_or(())?;
+            text.extend_from_slice(&self.line[at..end]);
+            if self.line.get(end + 1) == Some(&b'"') {
+                text.push(b'"');
+                at = end + 2;
+                continue;
+            }
+            self.at = self.end_of_blank_run(self.after(end + 1).ok_or(())?);
+            return Ok(String::from_utf8_lossy(&text).into_owned().into());
+        }
+    }
+
+    #[inline]
+    fn skip(&mut self) -> Result<(), ()> {
+        let Some(at) = self.at else { return Ok(()) };
+        if self.dialect.delimiter == b' ' || self.line.get(self.blanks(at)) == Some(&b'"') {
+            return self.text().map(|_| ());
+        }
+        self.at = memchr::memchr(self.dialect.delimiter, &self.line[at..]).map(|n| at + n + 1);
+        Ok(())
+    }
+}

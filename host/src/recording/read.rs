@@ -1,0 +1,376 @@
+//! Files to recordings.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use super::assemble::{Job, LookupTable, assemble};
+use super::blocks::{BlockError, Blocks, Rows, RowsError, read_rows};
+use super::campaign::Campaign;
+use super::cells::{Cells, Dialect, Fault, LineError};
+use super::columns::Recording;
+use super::import::{Decimal, Import, Value};
+use super::plan::{Context, Plan, plan};
+use super::source;
+use crate::error::{Code, Error, Result};
+use crate::muscle_description::MuscleDescription;
+
+/// How to read recordings, and what is known of the muscle that made them.
+#[derive(Debug, Clone, Default)]
+pub struct Reader<'a> {
+    /// L0 in metres; needed when files give lengths or contractions instead of a stroke.
+    pub rest_length: Option<f64>,
+    /// The muscle's name, which an import description can select rows by.
+    pub muscle_name: Option<&'a str>,
+    /// For files that are not in our own form.
+    pub import: Option<&'a Import>,
+    /// Further row filters: column and the text or number that it must have.
+    pub filters: Vec<(String, String)>,
+    /// Files with fewer rows are refused.
+    pub min_rows: usize,
+}
+
+/// Fewer rows than this are no recording of a muscle, but a mistake.
+const MIN_ROWS: usize = 10;
+
+impl<'a> Reader<'a> {
+    /// For recordings of a muscle that is not known.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { min_rows: MIN_ROWS, ..Self::default() }
+    }
+
+    /// For recordings of the muscle that is described.
+    #[must_use]
+    pub fn of(muscle: &'a MuscleDescription) -> Self {
+        Self { rest_length: Some(muscle.rest_length()), muscle_name: Some(&muscle.name), ..Self::new() }
+    }
+
+    /// For recordings of a muscle of this rest length (m), as a table knows it.
+    #[must_use]
+    pub fn with_rest_length(rest_length: f64) -> Self {
+        Self { rest_length: Some(rest_length), ..Self::new() }
+    }
+
+    /// By an import description.
+    #[must_use]
+    pub fn import(mut self, import: Option<&'a Import>) -> Self {
+        self.import = import;
+        self
+    }
+
+    /// Reads files in chronological order.
+    ///
+    /// # Errors
+    /// As [`Reader::file`], for the first file that is not right.
+    pub fn campaign<P: AsRef<Path>>(&self, paths: impl IntoIterator<Item = P>) -> Result<Campaign> {
+        let mut recordings = Vec::new();
+        for path in paths {
+            recordings.extend(self.file(path.as_ref())?);
+        }
+        if recordings.is_empty() {
+            return Err(Error::new(Code::CallInvalid, "no recording was given"));
+        }
+        Ok(Campaign::new(recordings))
+    }
+
+    /// Reads one file: one recording, or several when the import description splits it.
+    ///
+    /// Text (CSV, tab-separated, or as described), also compressed by gzip or zstd.
+    ///
+    /// # Errors
+    /// Any `file::`, `recording::` or `import::` code, with file, line, column and value as far as they apply.
+    pub fn file(&self, path: &Path) -> Result<Vec<Recording>> {
+        self.open(path).map_err(|e| e.file(path))
+    }
+
+    fn open(&self, path: &Path) -> Result<Vec<Recording>> {
+        let source = source::open(path)?;
+        if source.magic.is_empty() {
+            return Err(Error::new(Code::RecordingEmpty, "the file is empty"));
+        }
+        self.text(path, source)
+    }
+
+    fn text(&self, path: &Path, source: source::Source) -> Result<Vec<Recording>> {
+        let description = self.description();
+        let mut blocks = Blocks::new(source.reader);
+        let mut first = Vec::new();
+        let start = match blocks.next(&mut first) {
+            Ok(_) => source::check_text(&first)?,
+            Err(BlockError::LongLine) => {
+                source::check_text(&first)?;
+                return Err(block_error(BlockError::LongLine));
+            }
+            Err(e) => return Err(block_error(e)),
+        };
+        let text = &first[start..];
+        if text.iter().all(u8::is_ascii_whitespace) {
+            return Err(Error::new(Code::RecordingEmpty, "the file holds nothing but blanks"));
+        }
+        let head = Head::read(text, &description)?;
+        let rest = &text[head.bytes..];
+        let average = head.average_line(rest);
+        blocks.put_back(rest);
+        let layout = self.layout(path, &head.names, &description)?;
+        let rows =
+            read_rows(blocks, head.dialect, &layout.plan.wanted, head.names.len(), source.size.or(average))
+                .map_err(|e| rows_error(e, &head, &description))?;
+        self.finish(path, &description, &head.names, &layout, head.lines + 1, rows)
+    }
+
+    pub(super) fn description(&self) -> Cow<'a, Import> {
+        self.import.map_or_else(|| Cow::Owned(Import::default()), Cow::Borrowed)
+    }
+
+    /// Decides what to read of columns with these names.
+    pub(super) fn layout(&self, path: &Path, names: &[String], import: &Import) -> Result<Layout> {
+        let from_name = from_file_name(path, import)?;
+        let lookup = import.lookup.as_ref().map(|l| read_lookup(path, &l.file)).transpose()?;
+        let mut filters: Vec<(String, Value)> =
+            import.filters.iter().map(|(k, v)| (k.clone(), v.clone())).collect();
+        for (name, text) in &self.filters {
+            // A filter of the call replaces that of the description.
+            filters.retain(|(n, _)| n != name);
+            filters.push((name.clone(), Value::Text(text.clone())));
+        }
+        let context = Context {
+            import,
+            foreign: self.import.is_some(),
+            from_name: from_name.constants,
+            filters: filters.iter().map(|(n, _)| n.clone()).collect(),
+            lookup: lookup.as_ref().map(|l| l.header.as_slice()),
+        };
+        Ok(Layout { plan: plan(names, &context)?, filters, lookup, labels: from_name.labels })
+    }
+
+    pub(super) fn finish(
+        &self,
+        path: &Path,
+        import: &Import,
+        names: &[String],
+        layout: &Layout,
+        first_line: u64,
+        rows: Rows,
+    ) -> Result<Vec<Recording>> {
+        let job = Job {
+            path,
+            reader: self,
+            import,
+            filters: &layout.filters,
+            plan: &layout.plan,
+            names,
+            lookup: layout.lookup.as_ref(),
+            first_line,
+            labels: layout.labels.clone(),
+        };
+        assemble(&job, rows)
+    }
+}
+
+/// What is read of one file.
+pub(super) struct Layout {
+    pub plan: Plan,
+    filters: Vec<(String, Value)>,
+    lookup: Option<LookupTable>,
+    labels: Vec<(String, String)>,
+}
+
+/// The beginning of a text file: how it is cut, and what its columns are called.
+struct Head {
+    dialect: Dialect,
+    names: Vec<String>,
+    /// Bytes and lines that the head takes.
+    bytes: usize,
+    lines: u64,
+}
+
+impl Head {
+    fn read(text: &[u8], import: &Import) -> Result<Self> {
+        let comment = import.comment.and_then(|c| u8::try_from(c).ok());
+        let mut bytes = 0;
+        let mut lines = 0;
+        let mut skipped = 0;
+        loop {
+            let rest = &text[bytes..];
+            if rest.is_empty() {
+                let cause = format!("the file ends within its first {lines} lines");
+                return Err(Error::new(Code::RecordingTooShort, cause)
+                    .help("see skip_lines in the import description"));
+            }
+            let end = memchr::memchr(b'\n', rest).map_or(rest.len(), |e| e + 1);
+            let line = rest[..end].trim_ascii_end();
+            let idle = line.is_empty() || line.first() == comment.as_ref();
+            if skipped < import.skip_lines || idle {
+                skipped += 1;
+                bytes += end;
+                lines += 1;
+                continue;
+            }
+            let dialect = Dialect {
+                delimiter: import.delimiter()?.unwrap_or_else(|| guess_delimiter(line, import)),
+                comment,
+                decimal_comma: import.decimal == Decimal::Comma,
+            };
+            let line = if line.contains(&b'\r') { Err(mac_lines()) } else { Ok(line) }?;
+            let cells = Cells::split(line, dialect).map_err(|()| {
+                Error::new(Code::RecordingWrongWidth, "a quotation mark is not closed").line(lines + 1)
+            })?;
+            if import.header == Some(false) {
+                let names = (1..=cells.len()).map(|n| n.to_string()).collect();
+                return Ok(Self { dialect, names, bytes, lines });
+            }
+            let numbers = cells.iter().filter(|c| c.parse::<f64>().is_ok()).count();
+            if numbers > 0 && numbers == cells.len() {
+                return Err(Error::new(Code::RecordingMissingColumn, "the file has no header line")
+                    .line(lines + 1)
+                    .value(String::from_utf8_lossy(&line[..line.len().min(100)]))
+                    .help(
+                        "put names with units above the numbers, such as `time_s,pressure_kPa,displacement_mm,force_N`, \
+                         or describe the columns by number in an import description (--import)",
+                    ));
+            }
+            return Ok(Self { dialect, names: cells, bytes: bytes + end, lines: lines + 1 });
+        }
+    }
+
+    /// For streams of unknown size: none; the estimate is only for reserving memory.
+    fn average_line(&self, rest: &[u8]) -> Option<u64> {
+        (rest.len() < 65_536).then_some(rest.len() as u64)
+    }
+}
+
+fn mac_lines() -> Error {
+    Error::new(Code::RecordingNotText, "lines end in carriage returns only")
+        .help("save the file with usual line ends")
+}
+
+/// A tab in the header decides, then a comma; with decimal commas, the semicolon that goes with them.
+fn guess_delimiter(line: &[u8], import: &Import) -> u8 {
+    if line.contains(&b'\t') {
+        b'\t'
+    } else if import.decimal == Decimal::Comma {
+        b';'
+    } else {
+        b','
+    }
+}
+
+fn block_error(error: BlockError) -> Error {
+    match error {
+        BlockError::LongLine => Error::new(Code::RecordingNotText, "the file has a line of more than 4 MiB")
+            .help("this is no table of text; give a CSV or tab-separated file with one header line"),
+        BlockError::Io(e) if e.kind() == std::io::ErrorKind::NotFound => Error::unreadable("", &e),
+        BlockError::Io(e) if matches!(e.kind(), std::io::ErrorKind::PermissionDenied) => {
+            Error::new(Code::FileUnreadable, format!("cannot be read: {e}"))
+        }
+        BlockError::Io(e) => Error::new(Code::RecordingContainer, format!("cannot be read to its end: {e}"))
+            .help("the file may be damaged or cut short; get it again from where it was recorded"),
+    }
+}
+
+fn rows_error(error: RowsError, head: &Head, import: &Import) -> Error {
+    let LineError { line, cell, value, fault } = match error {
+        RowsError::Block(e) => return block_error(e),
+        RowsError::Line(e) => *e,
+    };
+    let separator = match head.dialect.delimiter {
+        b'\t' => "tabs",
+        b';' => "semicolons",
+        b' ' => "blanks",
+        _ => "commas",
+    };
+    let error = match &fault {
+        Fault::Empty => Error::new(Code::RecordingNotANumber, "an empty cell")
+            .help("every row needs a number in every column that is used; leave incomplete rows out"),
+        Fault::NotFinite => Error::new(Code::RecordingNotFinite, "not a finite number")
+            .help("leave such rows out, or repair the sensor's channel; nothing is filled in silently"),
+        Fault::NotANumber => {
+            let comma =
+                value.contains(',') && value.chars().all(|c| c.is_ascii_digit() || ",.-+ ".contains(c));
+            let help = if comma && import.decimal == Decimal::Point {
+                "decimals are written with a point; for decimal commas use an import description with decimal = \"comma\""
+            } else if import.decimal == Decimal::Comma && value.contains('.') {
+                "the import description says that decimals are written with a comma"
+            } else {
+                "every cell of a column that is used must be a number"
+            };
+            Error::new(Code::RecordingNotANumber, "not a number").help(help)
+        }
+        Fault::Width { found, expected } => {
+            let cells = if *found == 1 { "1 cell".to_owned() } else { format!("{found} cells") };
+            let help = if *found == 2 * expected && separator == "commas" {
+                "this looks like decimal commas; write decimals with a point, or use an import description"
+                    .to_owned()
+            } else {
+                format!("cells are separated by {separator}; the line may be cut short or damaged")
+            };
+            Error::new(Code::RecordingWrongWidth, format!("{cells} where {expected} are expected")).help(help)
+        }
+        Fault::OpenQuote => {
+            Error::new(Code::RecordingWrongWidth, "a quotation mark is not closed on its line")
+                .help("cells that hold line breaks are not supported")
+        }
+    };
+    let error = error.line(head.lines + line + 1).value(value);
+    match cell.and_then(|c| head.names.get(c)) {
+        Some(name) => error.column(name.clone()),
+        None => error,
+    }
+}
+
+#[derive(Default)]
+struct FromName {
+    constants: Vec<(String, f64)>,
+    labels: Vec<(String, String)>,
+}
+
+/// What the file's name says, by the description's pattern.
+fn from_file_name(path: &Path, import: &Import) -> Result<FromName> {
+    let mut found = FromName::default();
+    let Some(pattern) = import.pattern()? else { return Ok(found) };
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let Some(captures) = pattern.captures(&name) else {
+        return Err(Error::new(Code::ImportInvalid, "the file's name is not as the import description says")
+            .value(name)
+            .help(format!("it must match {}", pattern.as_str())));
+    };
+    for group in pattern.capture_names().flatten() {
+        let Some(text) = captures.name(group).map(|m| m.as_str()) else { continue };
+        if super::import::constant(group).is_ok() {
+            let value = text.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
+                Error::new(Code::ImportInvalid, format!("the file's name gives no number for {group}"))
+                    .value(text)
+            })?;
+            found.constants.push((group.to_owned(), value));
+        } else {
+            found.labels.push((group.to_owned(), text.to_owned()));
+        }
+    }
+    Ok(found)
+}
+
+fn read_lookup(recording: &Path, file: &str) -> Result<LookupTable> {
+    let path = recording.parent().unwrap_or(Path::new("")).join(file);
+    let text = std::fs::read(&path).map_err(|e| {
+        Error::unreadable(&path, &e)
+            .help("the import description's lookup table stands in the recording's folder")
+    })?;
+    let text = &text[source::check_text(&text).map_err(|e| e.file(&path))?..];
+    let mut lines = text.split(|b| *b == b'\n').enumerate().filter(|(_, l)| !l.trim_ascii().is_empty());
+    let mut table = LookupTable::default();
+    let Some((_, header)) = lines.next() else {
+        return Err(Error::new(Code::RecordingEmpty, "the lookup table is empty").file(&path));
+    };
+    let delimiter = if header.contains(&b'\t') { b'\t' } else { b',' };
+    let dialect = Dialect { delimiter, comment: None, decimal_comma: false };
+    let open = |line: usize| {
+        Error::new(Code::RecordingWrongWidth, "a quotation mark is not closed")
+            .file(&path)
+            .line(line as u64 + 1)
+    };
+    table.header = Cells::split(header, dialect).map_err(|()| open(0))?;
+    for (n, line) in lines {
+        table.rows.push(Cells::split(line, dialect).map_err(|()| open(n))?);
+    }
+    Ok(table)
+}
