@@ -6,6 +6,7 @@ pub mod commands;
 pub mod console;
 pub mod device;
 pub mod error;
+pub mod fit;
 pub mod muscle_description;
 pub mod output;
 pub mod recording;

@@ -1,0 +1,139 @@
+//! What a user should know about a fit, in words: what was seen, what it means, what to do.
+
+use super::prepare::Prepared;
+use super::screen::Use;
+
+/// Everything worth saying. `left_out` is the error of each pressure predicted from the others, percent.
+#[must_use]
+pub fn warnings(prepared: &Prepared, left_out: &[Option<f64>]) -> Vec<String> {
+    let mut out = prepared.warnings.clone();
+    let design = &prepared.design;
+    let points = &prepared.points;
+    let rows = |wanted: Use| -> f64 {
+        points
+            .list
+            .iter()
+            .zip(&prepared.used)
+            .filter(|(_, u)| **u == wanted)
+            .map(|(p, _)| f64::from(p.rows))
+            .sum()
+    };
+    let fitted = rows(Use::Fitted);
+    let unknowns = design.layout().len();
+    if points.rows < 200 || fitted < 5.0 * unknowns as f64 {
+        out.push(format!(
+            "{fitted:.0} rows are fitted for {unknowns} unknowns: the penalty on bending decides much of the table; record more"
+        ));
+    }
+    match prepared.pressures.levels.len() {
+        1 => out.push(format!(
+            "only one pressure ({:.0} kPa) was tested: how anything changes with pressure is not known, and the table holds \
+             at this pressure only",
+            prepared.pressures.levels[0] / 1e3
+        )),
+        2 => out.push("only two pressures were tested: curves over pressure are straight lines between them".into()),
+        _ => {}
+    }
+    let l0 = prepared.braid.rest_length();
+    let (low, high) = (points.stroke.low / l0, points.stroke.high / l0);
+    if high - low < 0.01 {
+        out.push(format!(
+            "contraction covers only {low:.4} to {high:.4}: the elastic coefficients are hardly determined; record a longer stroke"
+        ));
+    }
+    if low > 0.01 {
+        out.push(format!(
+            "the recordings begin at a contraction of {low:.3}: P0 rests on elasticity continued to rest length; record the \
+             blocked force too"
+        ));
+    }
+    let order = design.orthonormal.order;
+    if design.orthonormal.rank < order {
+        out.push(format!(
+            "the strokes determine only {} of the {order} elastic coefficients (too few different lengths); higher ones are set \
+             to zero",
+            design.orthonormal.rank
+        ));
+    } else if design.orthonormal.condition > 1e5 {
+        out.push(format!(
+            "the elastic columns have a condition number of {:.0}: single E_k mean little by themselves, only their sum does; a \
+             lower order or a longer stroke would help",
+            design.orthonormal.condition
+        ));
+    }
+    if !design.friction {
+        let known = points.list.iter().any(|p| p.direction != 0.0);
+        out.push(if known {
+            "motion in one direction only: friction cannot be told from elasticity, k_F is set to zero and the table holds for \
+             that direction"
+                .into()
+        } else {
+            "no direction of motion was found: k_F is set to zero".into()
+        });
+    } else {
+        let levels = &prepared.pressures.levels;
+        let factors: Vec<f64> = levels.iter().map(|p| prepared.curves_at(*p).1).collect();
+        let scatter = prepared.scatter(&design.residuals(&prepared.parameters));
+        let noise = scatter.iter().copied().fold(0.0, f64::max);
+        let largest =
+            levels.iter().zip(&factors).map(|(p, k)| (k * prepared.blocked(*p)).abs()).fold(0.0, f64::max);
+        if largest < 0.5 * noise {
+            out.push("there is no hysteresis above the noise: k_F is zero within its error".into());
+        }
+        if let Some((p, k)) = levels.iter().zip(&factors).find(|(_, k)| **k < -0.01) {
+            out.push(format!(
+                "k_F is {k:.3} at {:.0} kPa: friction that drives is impossible; check the sign of the displacement, and \
+                 whether force and displacement are in step",
+                p / 1e3
+            ));
+        }
+    }
+    let p0 = prepared.deadband();
+    if p0 < 0.0 {
+        out.push(format!(
+            "the deadband comes out at {:.0} kPa, below zero: the nominal geometry (braid angle, diameter, rest length) does not \
+             fit the blocked force; try --fit-geometry",
+            p0 / 1e3
+        ));
+    } else if p0 > points.pressure.high {
+        out.push(format!("the deadband comes out at {:.0} kPa, above every tested pressure", p0 / 1e3));
+    }
+    let side = |name: &str, clip: &super::screen::Clip| {
+        format!(
+            "{} rows read exactly {:.2} N: the force sensor stands at the {name} end of its range there; they are not fitted",
+            clip.rows, clip.force
+        )
+    };
+    out.extend(prepared.clips.0.iter().map(|c| side("lower", c)));
+    out.extend(prepared.clips.1.iter().map(|c| side("upper", c)));
+    if prepared.goes_slack {
+        out.push(format!(
+            "the muscle is slack in {:.0} rows: the force stays near zero where the model would push; they are not fitted, and \
+             the table stops at zero force",
+            rows(Use::Slack)
+        ));
+    }
+    if !prepared.outliers.is_empty() {
+        out.push(format!(
+            "{} readings of the force jump out of the rest and are not fitted; they are listed under `outliers`",
+            prepared.outliers.len()
+        ));
+    }
+    let aside = rows(Use::NearTurn);
+    if aside > 0.3 * points.rows as f64 {
+        out.push(format!(
+            "{:.0} % of the rows lie just after a turn of motion and are not fitted: strokes are short against the way that \
+             friction needs to turn round",
+            100.0 * aside / points.rows as f64
+        ));
+    }
+    let errors: Vec<f64> = left_out.iter().copied().flatten().collect();
+    if let Some(worst) = errors.iter().copied().reduce(f64::max)
+        && worst > 5.0
+    {
+        out.push(format!(
+            "a pressure predicted from the others is off by {worst:.1} % of blocked force: test more pressures between"
+        ));
+    }
+    out
+}
