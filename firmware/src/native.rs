@@ -1,1 +1,346 @@
-//! The controller in the host's own process.
+//! The controller in a host's own process: the same control step, server and store as on a board, behind a TCP port, with a
+//! plant that is a function.
+//!
+//! ```
+//! use firmware::board::{Inputs, Outputs, Readings};
+//! use firmware::native::{Device, Options};
+//! use std::io::{Read, Write};
+//!
+//! // A plant that follows its command at once.
+//! let plant = |outputs: &Outputs| {
+//!     let pressure_pa = outputs.sides[0].pressure_pa;
+//!     let readings = Readings { pressure_pa, ..Readings::default() };
+//!     Inputs { sides: [Some(readings), None], ..Inputs::default() }
+//! };
+//! let device = Device::start("127.0.0.1:0", Options::default(), plant)?;
+//! let mut port = std::net::TcpStream::connect(device.address())?;
+//! // `hello`: COBS(request, endpoint 0, sequence 0, CRC-32) 0x00.
+//! let mut frame = [0; 32];
+//! let header = model_core::link::Header { kind: model_core::link::Kind::Request, id: 0, sequence: 0 };
+//! let length = model_core::link::frame::encode_bytes(header, &[], &mut frame).expect("it fits");
+//! port.write_all(&frame[..length])?;
+//! let mut answer = [0; 16];
+//! port.read_exact(&mut answer)?;
+//! assert!(answer.windows(4).any(|four| four == b"PAM!"));
+//! # Ok::<(), std::io::Error>(())
+//! ```
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use embedded_storage_async::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+};
+use model_core::link::frame::{Accumulator, MAX_WIRE};
+use model_core::link::hello::Board;
+use model_core::link::messages::StartedBy;
+use model_core::link::settings::Settings;
+
+use crate::board::{Identity, Inputs, Outputs};
+use crate::control::{Controller, TICKS_PER_S};
+use crate::server::Server;
+use crate::tasks::Shared;
+
+/// How a native device runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Device seconds in a second; infinite: as fast as the plant and the link go.
+    pub speed: f64,
+    /// File that the store is kept in; without one it is forgotten with the device.
+    pub store: Option<PathBuf>,
+    /// Muscles that the plant gives readings of.
+    pub muscles: u8,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { speed: 1.0, store: None, muscles: 1 }
+    }
+}
+
+const PAGE: usize = 4096;
+const PAGES: usize = 8;
+
+/// Flash in memory, written through to a file where one is given.
+#[derive(Debug)]
+pub struct MemoryFlash {
+    bytes: Vec<u8>,
+    file: Option<PathBuf>,
+}
+
+impl MemoryFlash {
+    /// Erased, or as the file left it.
+    ///
+    /// # Errors
+    /// The file is there and cannot be read.
+    pub fn open(file: Option<PathBuf>) -> io::Result<Self> {
+        let mut bytes = vec![0xFF; PAGE * PAGES];
+        if let Some(path) = &file {
+            match std::fs::read(path) {
+                Ok(kept) => {
+                    let length = kept.len().min(bytes.len());
+                    bytes[..length].copy_from_slice(&kept[..length]);
+                }
+                Err(error) if error.kind() == ErrorKind::NotFound => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(Self { bytes, file })
+    }
+
+    fn keep(&self) -> Result<(), MemoryError> {
+        match &self.file {
+            Some(path) => {
+                std::fs::write(path, &self.bytes).map_err(|_| MemoryError(NorFlashErrorKind::Other))
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn range(&mut self, offset: u32, length: usize) -> Result<&mut [u8], MemoryError> {
+        let offset = offset as usize;
+        offset
+            .checked_add(length)
+            .and_then(|end| self.bytes.get_mut(offset..end))
+            .ok_or(MemoryError(NorFlashErrorKind::OutOfBounds))
+    }
+}
+
+/// An access outside the flash, or a file that failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MemoryError(NorFlashErrorKind);
+
+impl NorFlashError for MemoryError {
+    fn kind(&self) -> NorFlashErrorKind {
+        self.0
+    }
+}
+
+impl ErrorType for MemoryFlash {
+    type Error = MemoryError;
+}
+
+impl ReadNorFlash for MemoryFlash {
+    const READ_SIZE: usize = 1;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), MemoryError> {
+        bytes.copy_from_slice(self.range(offset, bytes.len())?);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.bytes.len()
+    }
+}
+
+impl NorFlash for MemoryFlash {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = PAGE;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), MemoryError> {
+        let length = to.checked_sub(from).ok_or(MemoryError(NorFlashErrorKind::OutOfBounds))?;
+        self.range(from, length as usize)?.fill(0xFF);
+        self.keep()
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), MemoryError> {
+        self.range(offset, bytes.len())?.copy_from_slice(bytes);
+        self.keep()
+    }
+}
+
+/// A running device; it stops when this is dropped.
+#[derive(Debug)]
+pub struct Device {
+    address: SocketAddr,
+    stop: Arc<AtomicBool>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Device {
+    /// Starts a device that listens on an address (port 0: any) and drives a plant: commands in, readings of the next
+    /// tick out.
+    ///
+    /// # Errors
+    /// The address cannot be listened on, or the store's file cannot be read.
+    pub fn start(
+        address: impl ToSocketAddrs,
+        options: Options,
+        mut plant: impl FnMut(&Outputs) -> Inputs + Send + 'static,
+    ) -> io::Result<Self> {
+        let listener = TcpListener::bind(address)?;
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?;
+        let flash = MemoryFlash::open(options.store.clone())?;
+        let shared = Arc::new(Shared::new(Settings::default()));
+        let identity = Identity {
+            board: Board::Native,
+            muscles: options.muscles,
+            serial: *b"native\0\0\0\0\0\0",
+            started_by: StartedBy::Power,
+        };
+        let server = Server::start(identity, flash, &shared)
+            .map_err(|fault| io::Error::other(format!("the store cannot be opened: {fault:?}")))?;
+        let stop = Arc::new(AtomicBool::new(false));
+        let connected = Arc::new(AtomicBool::new(false));
+        let link = {
+            let (shared, stop, connected) = (shared.clone(), stop.clone(), connected.clone());
+            thread::Builder::new()
+                .name("link".into())
+                .spawn(move || serve(&listener, server, &shared, &stop, &connected))?
+        };
+        let control = {
+            let stop = stop.clone();
+            let pace = Pace::new(options.speed);
+            thread::Builder::new()
+                .name("control".into())
+                .spawn(move || run(&mut plant, &shared, &stop, &connected, pace))?
+        };
+        Ok(Self { address, stop, threads: vec![link, control] })
+    }
+
+    /// Where it listens.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        for thread in self.threads.drain(..) {
+            // A thread that panicked has said so itself.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Keeps device time in step with the clock on the wall.
+struct Pace {
+    tick: Option<Duration>,
+    next: Instant,
+}
+
+impl Pace {
+    fn new(speed: f64) -> Self {
+        let seconds = 1.0 / (f64::from(TICKS_PER_S) * speed);
+        let tick = Duration::try_from_secs_f64(seconds).ok().filter(|tick| !tick.is_zero());
+        Self { tick, next: Instant::now() }
+    }
+
+    /// Waits for the next tick. Sleeps are coarse, so ticks come in small bunches; after a pause of the whole machine
+    /// time goes on from now instead of catching up.
+    fn wait(&mut self) {
+        let Some(tick) = self.tick else { return };
+        self.next += tick;
+        let now = Instant::now();
+        if self.next > now + Duration::from_millis(1) {
+            thread::sleep(self.next - now);
+        } else if now > self.next + Duration::from_millis(100) {
+            self.next = now;
+        }
+    }
+}
+
+fn run(
+    plant: &mut impl FnMut(&Outputs) -> Inputs,
+    shared: &Shared,
+    stop: &AtomicBool,
+    connected: &AtomicBool,
+    mut pace: Pace,
+) {
+    let mut outputs = Outputs::default();
+    for side in &mut outputs.sides {
+        side.vent = true;
+    }
+    while !stop.load(Ordering::Relaxed) {
+        pace.wait();
+        // Nothing here runs in hard time, so the loop may wait for the link instead of dropping samples.
+        let waited = Instant::now();
+        while !shared.has_room() && connected.load(Ordering::Relaxed) && !stop.load(Ordering::Relaxed) {
+            if waited.elapsed() > Duration::from_millis(500) {
+                break;
+            }
+            thread::sleep(Duration::from_micros(50));
+        }
+        outputs = shared.step(&plant(&outputs));
+    }
+}
+
+fn serve(
+    listener: &TcpListener,
+    mut server: Server<MemoryFlash>,
+    shared: &Shared,
+    stop: &AtomicBool,
+    connected: &AtomicBool,
+) {
+    let mut spoken = [0; MAX_WIRE];
+    while !stop.load(Ordering::Relaxed) {
+        match listener.accept() {
+            Ok((stream, _)) => {
+                connected.store(true, Ordering::Relaxed);
+                // A connection that breaks is the peer's affair; the device goes on and waits for the next.
+                let _ = talk(stream, &mut server, shared, stop);
+                connected.store(false, Ordering::Relaxed);
+            }
+            Err(_) => {
+                while shared.next_spoken(&mut spoken).is_some() {}
+                thread::sleep(Duration::from_millis(2));
+            }
+        }
+        if server.wants_restart() {
+            shared.with(|controller| *controller = Controller::new(Settings::default()));
+            match server.restarted(shared) {
+                Ok(again) => server = again,
+                Err(_) => return,
+            }
+        }
+    }
+}
+
+fn talk(
+    mut stream: TcpStream,
+    server: &mut Server<MemoryFlash>,
+    shared: &Shared,
+    stop: &AtomicBool,
+) -> io::Result<()> {
+    stream.set_nonblocking(false)?;
+    stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(Duration::from_millis(1)))?;
+    stream.set_write_timeout(Some(Duration::from_secs(2)))?;
+    let mut accumulator = Accumulator::new();
+    let mut bytes = [0; 1024];
+    let mut out = [0; MAX_WIRE];
+    while !stop.load(Ordering::Relaxed) {
+        while let Some(length) = shared.next_spoken(&mut out) {
+            stream.write_all(&out[..length])?;
+        }
+        let count = match stream.read(&mut bytes) {
+            Ok(0) => return Ok(()),
+            Ok(count) => count,
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                if shared.has_changed() {
+                    server.keep(shared);
+                }
+                continue;
+            }
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            Err(error) => return Err(error),
+        };
+        for &byte in &bytes[..count] {
+            server.note_counts(accumulator.counts());
+            let Some(Ok(request)) = accumulator.push(byte) else { continue };
+            let length = server.handle(&request, shared, &mut out);
+            stream.write_all(&out[..length])?;
+            if server.wants_restart() {
+                return Ok(());
+            }
+        }
+    }
+    Ok(())
+}

@@ -139,6 +139,15 @@ impl<F: NorFlash> Server<F> {
         }
     }
 
+    /// Starts again on the same flash, as after a restart that was asked for.
+    ///
+    /// # Errors
+    /// As [`Server::start`].
+    pub fn restarted(self, shared: &Shared) -> Result<Self, StoreFault> {
+        let identity = Identity { started_by: StartedBy::Request, ..self.identity };
+        Self::start(identity, self.store.close(), shared)
+    }
+
     /// Whether the host asked for a restart, once the answer is out.
     pub fn wants_restart(&self) -> bool {
         self.restart

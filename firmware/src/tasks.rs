@@ -3,10 +3,12 @@
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_sync::mutex::Mutex as Gate;
+use embassy_sync::signal::Signal;
 use embedded_io_async::{Read, Write};
 use embedded_storage_async::nor_flash::NorFlash;
 use model_core::link::endpoints::{EVENT, TELEMETRY};
@@ -33,6 +35,8 @@ pub struct Shared {
     controller: Mutex<CriticalSectionRawMutex, RefCell<Controller>>,
     spoken: Channel<CriticalSectionRawMutex, Spoken, WAITING>,
     dropped: AtomicU32,
+    /// The state changed: there may be something to keep.
+    changed: Signal<CriticalSectionRawMutex, ()>,
 }
 
 impl Shared {
@@ -42,6 +46,7 @@ impl Shared {
             controller: Mutex::new(RefCell::new(Controller::new(settings))),
             spoken: Channel::new(),
             dropped: AtomicU32::new(0),
+            changed: Signal::new(),
         }
     }
 
@@ -67,6 +72,11 @@ impl Shared {
             }
         }
         outputs
+    }
+
+    /// Whether the state has changed since this was last asked.
+    pub fn has_changed(&self) -> bool {
+        self.changed.try_take().is_some()
     }
 
     /// Room for what the next step may say.
@@ -114,7 +124,14 @@ pub async fn link<R: Read, W: Write, F: NorFlash>(
     let mut bytes = [0; 64];
     let mut out = [0; MAX_WIRE];
     loop {
-        let Ok(count) = receiver.read(&mut bytes).await else { return };
+        let count = match select(receiver.read(&mut bytes), shared.changed.wait()).await {
+            Either::First(Ok(count)) => count,
+            Either::First(Err(_)) => return,
+            Either::Second(()) => {
+                server.keep(shared);
+                continue;
+            }
+        };
         for &byte in &bytes[..count] {
             server.note_counts(accumulator.counts());
             let Some(Ok(request)) = accumulator.push(byte) else { continue };

@@ -1,0 +1,33 @@
+//! The controller's image in QEMU: built by `firmware/build`, started with its link and its benches on TCP, ended with the
+//! value that holds it.
+//!
+//! Nothing is skipped in silence: without a compiler for the target or without QEMU every test fails with the sentence
+//! that says what to run, unless `PAM_SKIP_EMULATOR=1` is set.
+
+pub mod machine;
+pub mod stations;
+
+pub use machine::{Machine, Options, Skipped};
+pub use stations::Watched;
+
+use host::device::Client;
+use model_core::image;
+use model_core::link::messages::Side;
+use model_core::table::MuscleTable;
+
+/// The bytes of a table.
+///
+/// # Panics
+/// For a table that cannot be used: a mistake in a test.
+pub fn image_of(table: &MuscleTable) -> Vec<u8> {
+    let mut buffer = [0; image::MAX_LEN];
+    image::write(table, &mut buffer).expect("a valid table").to_vec()
+}
+
+/// Sends a table as `host flash` does: in pieces, committed, read back, compared.
+///
+/// # Panics
+/// When the device refuses it.
+pub fn upload(client: &mut Client, side: Side, table: &MuscleTable) {
+    host::device::tables::write(client, side, &image_of(table), |_| ()).expect("the table is taken");
+}

@@ -1,0 +1,283 @@
+//! One emulated board.
+
+use std::io::{self, Read};
+use std::net::{TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use host::device::{Client, Patience, Port};
+use virtual_bench::lockstep::{self, Station};
+
+/// The emulator was left out on request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Skipped;
+
+/// The project's top folder.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// Builds an image by the project's script, once a process, and gives its path.
+fn built(arguments: &'static [&'static str], file: &str, once: &OnceLock<Result<(), String>>) -> PathBuf {
+    let outcome = once.get_or_init(|| {
+        let run = Command::new(root().join("firmware/build")).args(arguments).output();
+        match run {
+            Ok(output) if output.status.success() => Ok(()),
+            Ok(output) => Err(String::from_utf8_lossy(&output.stderr).into_owned()),
+            Err(error) => Err(format!("firmware/build cannot be run: {error}")),
+        }
+    });
+    if let Err(why) = outcome {
+        panic!("the image cannot be built (set PAM_SKIP_EMULATOR=1 to leave the emulator out):\n{why}");
+    }
+    root().join("target/firmware").join(file)
+}
+
+/// Whether the emulator is to be left out; fails where it cannot be used and was not left out.
+///
+/// # Errors
+/// [`Skipped`] when `PAM_SKIP_EMULATOR=1` is set.
+///
+/// # Panics
+/// Without QEMU.
+fn available() -> Result<(), Skipped> {
+    if std::env::var_os("PAM_SKIP_EMULATOR").is_some_and(|value| value == "1") {
+        eprintln!("skipped: PAM_SKIP_EMULATOR=1 leaves the emulator out");
+        return Err(Skipped);
+    }
+    let found = Command::new("qemu-system-arm").arg("--version").stdout(Stdio::null()).status();
+    assert!(
+        found.is_ok_and(|status| status.success()),
+        "no emulator: run 'firmware/build --install', or install QEMU for ARM (Debian: apt-get install \
+         qemu-system-arm), or set PAM_SKIP_EMULATOR=1 to leave these tests out"
+    );
+    Ok(())
+}
+
+/// The controller's image.
+///
+/// # Errors
+/// [`Skipped`] when the emulator is left out.
+///
+/// # Panics
+/// With the reason when it cannot be built.
+pub fn image() -> Result<PathBuf, Skipped> {
+    static ONCE: OnceLock<Result<(), String>> = OnceLock::new();
+    available()?;
+    Ok(built(&["mps2-an386"], "mps2-an386.elf", &ONCE))
+}
+
+/// The image that counts instructions.
+///
+/// # Errors
+/// [`Skipped`] when the emulator is left out.
+///
+/// # Panics
+/// With the reason when it cannot be built.
+pub fn figures_image() -> Result<PathBuf, Skipped> {
+    static ONCE: OnceLock<Result<(), String>> = OnceLock::new();
+    available()?;
+    Ok(built(&["--figures", "mps2-an386"], "mps2-an386-figures.elf", &ONCE))
+}
+
+/// A folder of its own in the system's place for temporary files, removed with the value.
+#[derive(Debug)]
+pub struct Folder(PathBuf);
+
+impl Folder {
+    /// A new one.
+    ///
+    /// # Panics
+    /// When it cannot be made.
+    #[expect(clippy::new_without_default, reason = "it makes a folder on disk")]
+    pub fn new() -> Self {
+        static NUMBER: AtomicU32 = AtomicU32::new(0);
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let path = std::env::temp_dir().join(format!("pam-emulator-{}-{number}", std::process::id()));
+        std::fs::create_dir_all(&path).expect("a temporary folder");
+        Self(path)
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // What is left of a temporary folder does no harm.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// What to plug into a board.
+#[derive(Default)]
+pub struct Options {
+    /// The bench of the first muscle; none: its UART is silent.
+    pub first: Option<Box<dyn Station + Send>>,
+    /// The bench of the second.
+    pub second: Option<Box<dyn Station + Send>>,
+}
+
+/// A running board.
+#[derive(Debug)]
+pub struct Machine {
+    child: Child,
+    link: TcpStream,
+    benches: Vec<JoinHandle<()>>,
+}
+
+fn listener() -> (TcpListener, u16) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port of this machine");
+    let port = listener.local_addr().expect("its address").port();
+    (listener, port)
+}
+
+/// Waits for QEMU to connect, and notices when it has ended instead.
+fn accept(listener: &TcpListener, child: &mut Child) -> TcpStream {
+    listener.set_nonblocking(true).expect("a listener");
+    let deadline = Instant::now() + Duration::from_secs(20);
+    loop {
+        match listener.accept() {
+            Ok((stream, _)) => {
+                stream.set_nonblocking(false).expect("a stream");
+                stream.set_nodelay(true).expect("a stream");
+                return stream;
+            }
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+            Err(error) => panic!("cannot accept: {error}"),
+        }
+        if let Ok(Some(status)) = child.try_wait() {
+            let mut text = String::new();
+            if let Some(stderr) = child.stderr.as_mut() {
+                let _ = stderr.read_to_string(&mut text);
+            }
+            panic!("QEMU ended at once ({status}): {text}");
+        }
+        assert!(Instant::now() < deadline, "QEMU does not connect within 20 s");
+        thread::sleep(Duration::from_millis(2));
+    }
+}
+
+impl Machine {
+    /// Starts a board whose store is the file `pam-store.bin` in `folder`.
+    ///
+    /// # Errors
+    /// [`Skipped`] when the emulator is left out.
+    ///
+    /// # Panics
+    /// With the reason when the board cannot be started.
+    pub fn start(folder: &Path, options: Options) -> Result<Self, Skipped> {
+        let image = image()?;
+        let (link, link_port) = listener();
+        let mut command = Command::new("qemu-system-arm");
+        command
+            .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"])
+            .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+            .arg(image)
+            .args(["-chardev", &format!("socket,id=link,host=127.0.0.1,port={link_port}")])
+            .args(["-serial", "chardev:link"]);
+        let mut plugged = Vec::new();
+        for (number, station) in [options.first, options.second].into_iter().enumerate() {
+            match station {
+                Some(station) => {
+                    let (bench, port) = listener();
+                    command
+                        .args(["-chardev", &format!("socket,id=bench{number},host=127.0.0.1,port={port}")])
+                        .args(["-serial", &format!("chardev:bench{number}")]);
+                    plugged.push((bench, station));
+                }
+                None => {
+                    command.args(["-serial", "null"]);
+                }
+            }
+        }
+        let mut child = command
+            .current_dir(folder)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("QEMU starts");
+        let link = accept(&link, &mut child);
+        let benches = plugged
+            .into_iter()
+            .map(|(bench, mut station)| {
+                let mut stream = accept(&bench, &mut child);
+                thread::spawn(move || {
+                    // The emulator's end is the end of the bench; how it ended is the test's to judge.
+                    let _ = lockstep::serve(&mut stream, station.as_mut());
+                })
+            })
+            .collect();
+        Ok(Self { child, link, benches })
+    }
+
+    /// The raw link. Every value is the same line: one reads what another did not.
+    ///
+    /// # Panics
+    /// When the system gives no further handle.
+    pub fn link(&self) -> TcpStream {
+        self.link.try_clone().expect("a handle")
+    }
+
+    /// The host's own client on the link, and the error when the board does not say hello.
+    ///
+    /// # Errors
+    /// As [`Client::connect`].
+    pub fn try_client(&self) -> host::error::Result<Client> {
+        Client::connect(Port::from_tcp(self.link())?, Patience::default())
+    }
+
+    /// The host's own client on the link.
+    ///
+    /// # Panics
+    /// When the board does not say hello.
+    pub fn client(&self) -> Client {
+        self.try_client().expect("the board says hello")
+    }
+
+    /// Pulls the plug.
+    pub fn kill(mut self) {
+        self.end();
+    }
+
+    fn end(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        for bench in self.benches.drain(..) {
+            let _ = bench.join();
+        }
+    }
+
+    /// Whether the board is still there; a panic of the firmware ends QEMU.
+    pub fn is_running(&mut self) -> bool {
+        matches!(self.child.try_wait(), Ok(None))
+    }
+
+    /// Waits for QEMU to end by itself and gives its exit status.
+    ///
+    /// # Panics
+    /// When it does not within `patience`.
+    pub fn wait(&mut self, patience: Duration) -> Option<i32> {
+        let deadline = Instant::now() + patience;
+        loop {
+            if let Ok(Some(status)) = self.child.try_wait() {
+                return status.code();
+            }
+            assert!(Instant::now() < deadline, "QEMU does not end");
+            thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+impl Drop for Machine {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
