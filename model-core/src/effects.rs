@@ -297,6 +297,46 @@ impl<T: Scalar> Context<T> {
     pub fn unit_elastic(&self) -> T {
         self.axial_area * self.axial_strain - self.hoop_area * self.radial_strain
     }
+
+    /// The same moment in another number type.
+    pub fn cast<U: Scalar>(&self) -> Context<U> {
+        let to = |x: T| U::from_f64(x.to_f64());
+        Context {
+            dt: to(self.dt),
+            time: to(self.time),
+            pressure: to(self.pressure),
+            corrected_pressure: to(self.corrected_pressure),
+            pressure_rate: to(self.pressure_rate),
+            stroke: to(self.stroke),
+            contraction: to(self.contraction),
+            length: to(self.length),
+            speed: to(self.speed),
+            acceleration: to(self.acceleration),
+            direction: to(self.direction),
+            travel: to(self.travel),
+            since_reversal: to(self.since_reversal),
+            hold_time: to(self.hold_time),
+            cycles: to(self.cycles),
+            temperature: to(self.temperature),
+            rest_length: to(self.rest_length),
+            fibre_length: to(self.fibre_length),
+            turns: to(self.turns),
+            radius: to(self.radius),
+            rest_radius: to(self.rest_radius),
+            radial_strain: to(self.radial_strain),
+            axial_strain: to(self.axial_strain),
+            axial_area: to(self.axial_area),
+            hoop_area: to(self.hoop_area),
+            area: to(self.area),
+            gaylord: to(self.gaylord),
+            elastic: to(self.elastic),
+            quasi: to(self.quasi),
+            friction: to(self.friction),
+            order: to(self.order),
+            stiffness: to(self.stiffness),
+            pressure_slope: to(self.pressure_slope),
+        }
+    }
 }
 
 /// How many numbers an effect may remember.

@@ -71,6 +71,10 @@ pub struct MotionTracker<T> {
     extreme: T,
     pressure_extreme: T,
     turns: T,
+    /// Where the muscle has been, to within the threshold, for `quiet` seconds: noise does not end a rest.
+    anchor: T,
+    quiet: T,
+    moving_for: T,
 }
 
 impl<T: Scalar> MotionTracker<T> {
@@ -85,6 +89,9 @@ impl<T: Scalar> MotionTracker<T> {
             extreme: T::ZERO,
             pressure_extreme: T::ZERO,
             turns: T::ZERO,
+            anchor: T::ZERO,
+            quiet: T::ZERO,
+            moving_for: T::ZERO,
         }
     }
 
@@ -105,6 +112,7 @@ impl<T: Scalar> MotionTracker<T> {
             self.last_pressure = pressure;
             self.extreme = stroke;
             self.pressure_extreme = pressure;
+            self.anchor = stroke;
             return &self.motion;
         }
         if dt > T::ZERO {
@@ -115,10 +123,17 @@ impl<T: Scalar> MotionTracker<T> {
             m.acceleration += share * ((speed - m.speed) / dt - m.acceleration);
             m.speed = speed;
             m.pressure_rate += share * ((pressure - self.last_pressure) / dt - m.pressure_rate);
-            if speed.abs() < self.settings.rest_speed {
-                m.hold_time += dt;
-            } else if m.travel > self.settings.stroke_threshold * T::from_f32(4.0) {
-                m.hold_time = T::ZERO;
+            if (stroke - self.anchor).abs() > self.settings.stroke_threshold {
+                self.anchor = stroke;
+                self.quiet = T::ZERO;
+            } else {
+                self.quiet += dt;
+            }
+            if self.quiet >= self.rest_after() {
+                self.motion.hold_time = self.quiet;
+                self.moving_for = T::ZERO;
+            } else {
+                self.moving_for += dt;
             }
         }
         self.last_stroke = stroke;
@@ -127,12 +142,17 @@ impl<T: Scalar> MotionTracker<T> {
         &self.motion
     }
 
+    /// A muscle that stays within the threshold for so long, s, is slower than the rest speed.
+    fn rest_after(&self) -> T {
+        self.settings.stroke_threshold / self.settings.rest_speed
+    }
+
     fn turn(&mut self, stroke: T, pressure: T) {
+        let resting = self.motion.speed.abs() < self.settings.rest_speed || self.quiet >= self.rest_after();
         let m = &mut self.motion;
         // Forward is where the present stroke goes; before the first motion both ways are open.
         let forward = if m.direction == T::ZERO { (stroke - self.extreme).sign() } else { m.direction };
         let gone = (stroke - self.extreme) * forward;
-        let resting = m.speed.abs() < self.settings.rest_speed;
         if m.direction == T::ZERO {
             if gone > self.settings.stroke_threshold {
                 self.begin(forward, stroke, pressure);
@@ -167,6 +187,10 @@ impl<T: Scalar> MotionTracker<T> {
             self.turns += T::ONE;
             self.motion.cycles = self.turns * T::from_f32(0.5);
             self.motion.since_reversal = T::ZERO;
+            // A turn in the middle of a motion comes after no rest.
+            if self.moving_for > self.rest_after() {
+                self.motion.hold_time = T::ZERO;
+            }
             self.motion.travel = T::ZERO;
         }
         self.motion.direction = direction;
@@ -216,6 +240,23 @@ mod tests {
         assert_eq!((m.direction, flips), (-1.0, 2));
         assert!((m.travel - 0.015).abs() < 2e-4, "{}", m.travel);
         assert_eq!(m.cycles, 1.0);
+    }
+
+    #[test]
+    fn a_rest_is_timed_through_noise_and_remembered_by_the_motion_after_it() {
+        let noise = |i: i32| 2e-5 * f64::from((i * 7919) % 13 - 6) / 6.0;
+        let go = (0..2000_i32).map(|i| 5e-6 * f64::from(i));
+        let rest = (0..5000_i32).map(|_| 10e-3);
+        let back = (0..1500_i32).map(|i| 10e-3 - 5e-6 * f64::from(i));
+        let on = (0..1500_i32).map(|i| 2.5e-3 + 5e-6 * f64::from(i));
+        let with_noise = |strokes: Vec<f64>| {
+            run(strokes.into_iter().zip(0_i32..).map(|(x, i)| (x + noise(i), 300e3))).0.hold_time
+        };
+        let after: Vec<f64> = go.clone().chain(rest.clone()).chain(back.clone()).collect();
+        let timed = with_noise(after);
+        assert!((timed - 5.0).abs() < 0.1, "{timed} s");
+        // A turn without a rest, more than a second later, forgets it.
+        assert_eq!(with_noise(go.chain(rest).chain(back).chain(on).collect()), 0.0);
     }
 
     #[test]

@@ -1,0 +1,279 @@
+//! What every effect promises, tried on all of them: a force that is linear in the amplitudes, memories that stay finite over any
+//! motion and any pause, and the same answer in single precision as in double.
+
+use model_core::effects::{
+    Chain, Context, EffectName, FittedEffect, MAX_PARAMETERS, MEMORY, Memory, Role, Start,
+};
+use model_core::motion::{MotionSettings, MotionTracker};
+use model_core::muscle::Muscle;
+use model_core::table;
+use model_core::units::Pressure;
+use proptest::prelude::*;
+
+/// The catalogue's names of what belongs to the muscle.
+const CATALOGUE: [&str; 24] = [
+    "pressure-lag",
+    "leak",
+    "tip-effect",
+    "braid-elasticity",
+    "contact-loss",
+    "strand-jamming",
+    "end-slip",
+    "permanent-set",
+    "higher-order-elasticity",
+    "mullins-softening",
+    "cyclic-softening",
+    "thermal-softening",
+    "stress-relaxation",
+    "log-creep",
+    "coulomb-friction",
+    "pressure-friction",
+    "friction-asymmetry",
+    "seal-friction",
+    "breakaway-friction",
+    "stribeck-friction",
+    "presliding-hysteresis",
+    "minor-loop-memory",
+    "viscous-damping",
+    "rate-power",
+];
+
+fn muscle() -> Muscle<f64> {
+    Muscle::build(&table::example()).expect("a valid table")
+}
+
+/// One leg of a motion: where to, how fast, with how many readings.
+#[derive(Clone, Debug)]
+struct Leg {
+    stroke: f64,
+    pressure: f64,
+    dt: f64,
+    readings: usize,
+}
+
+fn leg() -> impl Strategy<Value = Leg> {
+    let dt = prop_oneof![4 => Just(1e-3), 4 => Just(1e-2), 2 => 1e-3..0.2_f64, 1 => Just(1800.0)];
+    (-0.5e-3..2.5e-3_f64, 0.0..560e3_f64, dt, 1..60_usize).prop_map(|(stroke, pressure, dt, readings)| Leg {
+        stroke,
+        pressure,
+        dt,
+        readings,
+    })
+}
+
+fn motion(legs: &[Leg]) -> Vec<Context<f64>> {
+    let muscle = muscle();
+    let mut tracker = MotionTracker::new(MotionSettings::default());
+    let (mut x, mut p) = (0.0, 100e3);
+    let mut contexts = Vec::new();
+    for leg in legs {
+        let (x0, p0) = (x, p);
+        for i in 1..=leg.readings {
+            let share = i as f64 / leg.readings as f64;
+            x = x0 + (leg.stroke - x0) * share;
+            p = p0 + (leg.pressure - p0) * share;
+            let mut m = *tracker.step(leg.dt, x, p);
+            m.temperature = 295.0 + 3.0 * share;
+            contexts.push(muscle.context(&m, Pressure::from_pascals(p)));
+        }
+    }
+    contexts
+}
+
+/// Parameters in the middle of their ranges, with the amplitudes scaled.
+fn middle(effect: EffectName, scale: f64) -> Vec<f64> {
+    let mid =
+        |low: f64, high: f64| if low > 0.0 { (low * high).sqrt() } else { 0.5 * (low + high) + 0.1 * high };
+    effect
+        .info()
+        .parameters
+        .iter()
+        .map(|p| if p.role == Role::Amplitude { scale * mid(p.low, p.high) } else { mid(p.low, p.high) })
+        .collect()
+}
+
+fn trace(effect: EffectName, parameters: &[f64], contexts: &[Context<f64>]) -> (Vec<f64>, Memory<f64>) {
+    let mut memory = [0.0; MEMORY];
+    let forces = contexts.iter().map(|c| {
+        effect.step(parameters, c, &mut memory);
+        effect.force(parameters, c, &memory)
+    });
+    (forces.collect(), memory)
+}
+
+#[test]
+fn the_whole_catalogue_is_there_under_its_names() {
+    for name in CATALOGUE {
+        assert!(EffectName::from_name(name).is_some(), "{name} is missing");
+    }
+    assert_eq!(EffectName::ALL.len(), CATALOGUE.len());
+}
+
+#[test]
+fn what_each_says_of_itself_holds_together() {
+    for effect in EffectName::ALL {
+        let info = effect.info();
+        let shapes = info.parameters.len() - info.amplitudes();
+        assert!(info.amplitudes() >= 1 && shapes <= 2, "{}", info.name);
+        assert!(info.parameters.len() <= MAX_PARAMETERS, "{}", info.name);
+        assert!(info.parameters[info.amplitudes()..].iter().all(|p| p.role == Role::Shape), "{}", info.name);
+        for p in info.parameters {
+            assert!(p.low < p.high && p.low.is_finite() && p.high.is_finite(), "{} of {}", p.name, info.name);
+        }
+        assert!(info.fading.iter().all(|s| *s < MEMORY), "{}", info.name);
+        assert!(info.fading.is_empty() || info.start == Start::Settled, "{}", info.name);
+        assert!(!info.persistent || info.start != Start::Settled, "{}", info.name);
+    }
+}
+
+/// Postcard writes an effect as its place in the list. If this fails an effect was inserted: tables that are out there would
+/// name another one. Move it to the end.
+#[test]
+fn the_order_on_the_wire_stays() {
+    let first: Vec<&str> = EffectName::ALL.iter().map(|e| e.info().name).take(6).collect();
+    let expected =
+        ["coulomb-friction", "viscous-damping", "stress-relaxation", "pressure-lag", "leak", "tip-effect"];
+    assert_eq!(first, expected);
+    assert_eq!(EffectName::ALL[23].info().name, "rate-power");
+    let mut buffer = [0; 8];
+    let bytes = postcard::to_slice(&EffectName::RatePower, &mut buffer).expect("one byte");
+    assert_eq!(bytes, [23]);
+}
+
+#[test]
+fn whether_the_force_depends_on_the_pressure_of_the_moment_is_told() {
+    let contexts = motion(&[
+        Leg { stroke: 2e-3, pressure: 400e3, dt: 1e-2, readings: 200 },
+        Leg { stroke: 0.5e-3, pressure: 450e3, dt: 1e-2, readings: 100 },
+    ]);
+    let last = contexts.last().expect("readings");
+    let mut moved = muscle().context(
+        &MotionTracker::new(MotionSettings::default()).step(0.0, last.stroke, 0.0).clone(),
+        Pressure::from_pascals(300e3),
+    );
+    moved = Context {
+        pressure: 300e3,
+        corrected_pressure: moved.corrected_pressure,
+        gaylord: moved.gaylord,
+        elastic: moved.elastic,
+        quasi: moved.quasi,
+        friction: moved.friction,
+        stiffness: moved.stiffness,
+        pressure_slope: moved.pressure_slope,
+        ..*last
+    };
+    for effect in EffectName::ALL {
+        let parameters = middle(*effect, 1.0);
+        let (_, memory) = trace(*effect, &parameters, &contexts);
+        let change = effect.force(&parameters, &moved, &memory) - effect.force(&parameters, last, &memory);
+        if change != 0.0 {
+            assert!(effect.info().depends_on_pressure, "{}", effect.info().name);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn the_force_is_linear_in_the_amplitudes(legs in prop::collection::vec(leg(), 1..8)) {
+        let contexts = motion(&legs);
+        for effect in EffectName::ALL {
+            let amplitudes = effect.info().amplitudes();
+            let whole = middle(*effect, 1.0);
+            let (force, memory) = trace(*effect, &whole, &contexts);
+            let mut sum = vec![0.0; force.len()];
+            for i in 0..amplitudes {
+                let mut one = whole.clone();
+                for (j, a) in one.iter_mut().take(amplitudes).enumerate() {
+                    *a = if i == j { 1.0 } else { 0.0 };
+                }
+                let (column, alone) = trace(*effect, &one, &contexts);
+                prop_assert_eq!(alone, memory, "the memory of {} depends on an amplitude", effect.info().name);
+                for (s, c) in sum.iter_mut().zip(column) {
+                    *s += whole[i] * c;
+                }
+            }
+            let size = force.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
+            for (a, b) in force.iter().zip(&sum) {
+                prop_assert!((a - b).abs() <= 1e-9 * size.max(1e-9), "{}: {} and {}", effect.info().name, a, b);
+            }
+        }
+    }
+
+    #[test]
+    fn memories_stay_finite_over_any_motion_and_pause(legs in prop::collection::vec(leg(), 1..12), endless in any::<bool>()) {
+        let mut contexts = motion(&legs);
+        if endless && let Some(c) = contexts.last_mut() {
+            c.dt = f64::INFINITY;
+        }
+        for effect in EffectName::ALL {
+            // The ends of the plausible range and beyond: zeros, as a careless table may hold them.
+            for parameters in [middle(*effect, 1.0), vec![0.0; effect.info().parameters.len()], vec![1e6; effect.info().parameters.len()]] {
+                let parameters32: Vec<f32> = parameters.iter().map(|p| *p as f32).collect();
+                let mut memory = [0.0_f32; MEMORY];
+                for c in &contexts {
+                    let c = c.cast::<f32>();
+                    effect.step(&parameters32, &c, &mut memory);
+                    let force = effect.force(&parameters32, &c, &memory);
+                    prop_assert!(force.is_finite(), "{} gives {} with {:?}", effect.info().name, force, parameters);
+                }
+                prop_assert!(memory.iter().all(|m| m.is_finite() && m.abs() < 1e12), "{}: {:?}", effect.info().name, memory);
+            }
+        }
+    }
+
+    #[test]
+    fn single_precision_gives_the_same_force(legs in prop::collection::vec(leg(), 2..8)) {
+        let contexts = motion(&legs);
+        for effect in EffectName::ALL {
+            let parameters = middle(*effect, 1.0);
+            let (exact, _) = trace(*effect, &parameters, &contexts);
+            let parameters32: Vec<f32> = parameters.iter().map(|p| *p as f32).collect();
+            let mut memory = [0.0_f32; MEMORY];
+            let size = exact.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
+            // Sums of the parts' sizes, as a small difference of large parts keeps only their digits.
+            let parts = contexts.iter().fold(0.0_f64, |m, c| m.max(c.quasi.abs()));
+            for (c, exact) in contexts.iter().zip(&exact) {
+                let c = c.cast::<f32>();
+                effect.step(&parameters32, &c, &mut memory);
+                let force = f64::from(effect.force(&parameters32, &c, &memory));
+                prop_assert!(
+                    (force - exact).abs() <= 3e-3 * size + 1e-6 * parts,
+                    "{}: {} and {} of {}", effect.info().name, force, exact, size
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_chain_adds_its_effects_and_gives_its_memories_back() {
+    let fitted = |effect: EffectName| FittedEffect {
+        effect,
+        parameters: middle(effect, 1.0).iter().map(|p| *p as f32).collect(),
+    };
+    let effects = [EffectName::MullinsSoftening, EffectName::StressRelaxation, EffectName::CoulombFriction];
+    let list: Vec<FittedEffect> = effects.iter().copied().map(fitted).collect();
+    let mut chain = Chain::<f64>::new(&list);
+    let contexts = motion(&[
+        Leg { stroke: 2e-3, pressure: 400e3, dt: 1e-2, readings: 50 },
+        Leg { stroke: 1e-3, pressure: 400e3, dt: 1e-2, readings: 50 },
+    ]);
+    let alone: Vec<Vec<f64>> = effects
+        .iter()
+        .zip(&list)
+        .map(|(e, f)| trace(*e, &f.parameters.iter().map(|p| f64::from(*p)).collect::<Vec<_>>(), &contexts).0)
+        .collect();
+    for (i, c) in contexts.iter().enumerate() {
+        chain.step(c);
+        let sum: f64 = alone.iter().map(|a| a[i]).sum();
+        assert!((chain.force(c) - sum).abs() < 1e-12 * sum.abs().max(1.0));
+    }
+    let mut woken = Chain::<f64>::new(&list);
+    let kept: Vec<Memory<f64>> = chain.memories().map(|(_, m)| *m).collect();
+    for (position, memory) in kept.into_iter().enumerate() {
+        woken.restore(position, memory);
+    }
+    assert_eq!(woken, chain);
+}
