@@ -54,6 +54,14 @@ enum Colours {
 enum Command {
     /// Show, check or export a table.
     Table(commands::table::Arguments),
+    /// Send a table to a controller, or program its chip.
+    Flash(commands::flash::Arguments),
+    /// Let a controller follow a course of force, pressure or stroke, and record it.
+    Run(commands::run::Arguments),
+    /// Vent the muscle and disarm the controller.
+    Vent(commands::run::VentArguments),
+    /// Ask a controller what it is, what it does and what went wrong; change its settings.
+    Device(commands::device::Arguments),
     /// Print a completion script for a shell.
     Completions(commands::completions::Arguments),
 }
@@ -62,6 +70,10 @@ impl Command {
     fn run(self, console: &Console) -> Result<()> {
         match self {
             Self::Table(a) => a.run(console),
+            Self::Flash(a) => a.run(console),
+            Self::Run(a) => a.run(console),
+            Self::Vent(a) => a.run(console),
+            Self::Device(a) => a.run(console),
             Self::Completions(a) => a.run(&mut Cli::command(), console),
         }
     }

@@ -1,4 +1,8 @@
 //! The sub-commands, one file each: arguments in, library calls, results out.
 
 pub mod completions;
+pub mod device;
+pub mod flash;
+pub mod port;
+pub mod run;
 pub mod table;

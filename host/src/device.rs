@@ -6,14 +6,23 @@
 //! | bytes with time-outs | [`Port`] |
 //! | hello, typed calls, topics, losses | [`Client`] |
 //! | tables: upload in pieces, read back | [`tables`] |
+//! | what is asked over time | [`course`] |
+//! | a run from start to vent | [`mod@run`] |
+//! | telemetry to a recording | [`recorder`] |
 //! | refusals and faults in words, with their remedy | [`words`] |
 
 mod address;
 mod client;
+pub mod course;
+pub mod difference;
 mod port;
+#[cfg(feature = "probe")]
+pub mod probe;
+pub mod recorder;
+pub mod run;
 pub mod tables;
 pub mod words;
 
 pub use address::Address;
 pub use client::{Client, Losses, Patience, Topic};
-pub use port::{Port, available};
+pub use port::{Port, available, plugged_in};

@@ -175,11 +175,21 @@ fn serial_error(name: &str, error: &serialport::Error) -> Error {
     Error::new(Code::DevicePort, format!("the port cannot be opened: {error}")).value(name).help(help)
 }
 
-/// Serial devices that are plugged in, USB ones first.
+fn is_usb(port: &serialport::SerialPortInfo) -> bool {
+    matches!(port.port_type, serialport::SerialPortType::UsbPort(_))
+}
+
+/// Serial devices, USB ones first.
 #[must_use]
 pub fn available() -> Vec<String> {
     let mut ports = serialport::available_ports().unwrap_or_default();
-    let usb = |p: &serialport::SerialPortInfo| matches!(p.port_type, serialport::SerialPortType::UsbPort(_));
-    ports.sort_by(|a, b| usb(b).cmp(&usb(a)).then_with(|| a.port_name.cmp(&b.port_name)));
+    ports.sort_by(|a, b| is_usb(b).cmp(&is_usb(a)).then_with(|| a.port_name.cmp(&b.port_name)));
     ports.into_iter().map(|p| p.port_name).collect()
+}
+
+/// Serial devices on USB: what a controller's board is. A computer's own serial line is nothing that was plugged in.
+#[must_use]
+pub fn plugged_in() -> Vec<String> {
+    let ports = serialport::available_ports().unwrap_or_default();
+    ports.into_iter().filter(is_usb).map(|p| p.port_name).collect()
 }

@@ -1,4 +1,5 @@
 //! A peer for tests of the link, byte by byte, that can misbehave in one way at a time.
+#![allow(clippy::unwrap_used, reason = "a helper of tests: a failure here is a failure of the test")]
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};

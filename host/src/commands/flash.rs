@@ -1,0 +1,208 @@
+//! `host flash`: a table to a controller, or the firmware to its chip.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use model_core::image;
+use model_core::link::endpoints::{GetInfo, Restart};
+use model_core::link::frame::crc32;
+use model_core::link::messages::Side;
+use serde_json::{Value, json};
+
+use super::port::{Muscle, PortOption};
+use crate::console::Console;
+use crate::device::{Client, difference, recorder, tables};
+use crate::error::{Code, Error, Result};
+use crate::table_file::{About, TableFile, now_utc};
+
+/// Arguments of `host flash`.
+#[derive(Debug, Args)]
+#[command(arg_required_else_help = true)]
+#[command(after_help = "Examples:\n  \
+    host flash mini.pam --port /dev/ttyACM0\n  \
+    host flash mini.pam --port tcp:127.0.0.1:4321 --dry-run\n  \
+    host flash --firmware target/firmware/nucleo-f446re.elf --chip STM32F446RETx\n\n\
+    The table that the device has is kept in a file beside the new one before anything is written.")]
+pub struct Arguments {
+    /// The table to send.
+    #[arg(value_name = "TABLE.pam", required_unless_present = "firmware", conflicts_with = "firmware")]
+    table: Option<PathBuf>,
+    #[command(flatten)]
+    port: PortOption,
+    #[command(flatten)]
+    muscle: Muscle,
+    /// Show the difference and write nothing.
+    #[arg(long, conflicts_with = "firmware")]
+    dry_run: bool,
+    /// Where to keep the table that the device has [default: beside TABLE.pam, named by its check sum].
+    #[arg(long, value_name = "FILE.pam", conflicts_with = "firmware")]
+    backup: Option<PathBuf>,
+    /// Restart the device at the end and compare once more.
+    #[arg(long, conflicts_with_all = ["firmware", "dry_run"])]
+    restart: bool,
+    /// Print what was done as JSON.
+    #[arg(long)]
+    json: bool,
+    /// Program the microcontroller itself, through a debug probe.
+    #[arg(long, value_name = "ELF", requires = "chip")]
+    firmware: Option<PathBuf>,
+    /// The microcontroller, as the probe's library names it.
+    #[arg(long, value_name = "CHIP", requires = "firmware")]
+    chip: Option<String>,
+}
+
+impl Arguments {
+    /// Does what was asked.
+    ///
+    /// # Errors
+    /// A bad file, a device that is silent, foreign or refuses, a table that does not come back as it was sent.
+    pub fn run(self, console: &Console) -> Result<()> {
+        match (&self.firmware, &self.chip, &self.table) {
+            (Some(firmware), Some(chip), _) => program(firmware, chip, console),
+            (_, _, Some(table)) => self.send(table, console),
+            _ => Err(Error::new(Code::CallInvalid, "neither a table nor a firmware is given")),
+        }
+    }
+
+    fn send(&self, path: &Path, console: &Console) -> Result<()> {
+        let file = TableFile::read(path)?;
+        let mut buffer = [0; image::MAX_LEN];
+        let image = image::write(&file.table, &mut buffer)
+            .map_err(|e| Error::new(Code::TableInvalid, e.to_string()).file(path))?;
+        if !file.about.corrections.is_empty() {
+            console.note("the table's corrections of the bench stay here; the controller is sent the muscle's part only");
+        }
+        let side = self.muscle.side();
+        let mut client = self.port.connect(console)?;
+        let before = tables::read(&mut client, side)?;
+        let mut done =
+            json!({ "schema": "pam-flash/1", "port": client.port(), "crc": format!("{:08x}", crc32(image)) });
+        let difference = self.compare(before.as_deref(), &file, console);
+        done["difference"] = difference;
+        if before.as_deref() == Some(image) {
+            console.note("the device already has this table");
+            done["written"] = Value::Bool(false);
+        } else if self.dry_run {
+            console.note("nothing was written");
+            done["written"] = Value::Bool(false);
+        } else {
+            if let Some(before) = &before {
+                done["backup"] = self.keep(path, before, &client, console)?;
+            }
+            let kept = tables::write(&mut client, side, image, |_| ())?;
+            console.note(format!(
+                "written and read back: {} bytes, check sum {:08x}, generation {}",
+                kept.length, kept.crc, kept.generation
+            ));
+            done["written"] = Value::Bool(true);
+            done["generation"] = json!(kept.generation);
+            if self.restart {
+                client = self.after_restart(client, side, image, console)?;
+                done["confirmed_after_restart"] = Value::Bool(true);
+            }
+        }
+        drop(client);
+        if self.json {
+            console.result(format!("{done:#}"));
+        } else if done["written"] == true {
+            console.result(format!(
+                "{} is in use on {}",
+                path.display(),
+                done["port"].as_str().unwrap_or_default()
+            ));
+        }
+        Ok(())
+    }
+
+    fn compare(&self, before: Option<&[u8]>, file: &TableFile, console: &Console) -> Value {
+        let Some(before) = before else {
+            console.note("the device has no table yet");
+            return Value::Null;
+        };
+        match image::read(before) {
+            Ok(table) => {
+                let difference = difference::between(&table, &file.table);
+                console.note(format!("device → {}:\n{}", file.about.muscle, difference.to_text()));
+                difference.to_json()
+            }
+            Err(e) => {
+                console.warning(format!("the device's table cannot be read by this version: {e}"));
+                Value::Null
+            }
+        }
+    }
+
+    /// Writes the device's table to a file; its name holds its check sum, so that it never replaces another.
+    fn keep(&self, path: &Path, before: &[u8], client: &Client, console: &Console) -> Result<Value> {
+        let table = match image::read(before) {
+            Ok(table) => table,
+            // What this version cannot read cannot become a table file; the bytes themselves are kept.
+            Err(_) => {
+                let to = self
+                    .backup
+                    .clone()
+                    .unwrap_or_else(|| path.with_extension(format!("{:08x}.image", crc32(before))));
+                crate::output::write_whole(&to, before)?;
+                return Ok(json!(to.display().to_string()));
+            }
+        };
+        let about = About {
+            muscle: "read from a device".to_owned(),
+            date: now_utc(),
+            tool: format!("host {}, from {}", env!("CARGO_PKG_VERSION"), recorder::serial(client.hello())),
+            ..About::default()
+        };
+        let to =
+            self.backup.clone().unwrap_or_else(|| path.with_extension(format!("{:08x}.pam", crc32(before))));
+        TableFile { table, about }.write(&to)?;
+        console.note(format!("the device's table is kept in {}", to.display()));
+        Ok(json!(to.display().to_string()))
+    }
+
+    fn after_restart(
+        &self,
+        mut client: Client,
+        side: Side,
+        image: &[u8],
+        console: &Console,
+    ) -> Result<Client> {
+        let starts = client.hello().starts;
+        client.call_once::<Restart>(&())?;
+        drop(client);
+        let mut last = None;
+        for _ in 0..20 {
+            std::thread::sleep(std::time::Duration::from_millis(250));
+            match self.port.connect(&Console::silent()) {
+                Ok(mut again) if again.hello().starts != starts => {
+                    let info = again.call::<GetInfo>(&())?;
+                    let crc = info.tables[side.index()].map(|t| t.crc);
+                    if crc != Some(crc32(image)) {
+                        return Err(Error::new(
+                            Code::DeviceVerify,
+                            "after its restart the device has another table",
+                        )
+                        .help("send it again; if it comes back, the device's memory is failing"));
+                    }
+                    console.note("confirmed after a restart");
+                    return Ok(again);
+                }
+                Ok(_) => {}
+                Err(e) => last = Some(e),
+            }
+        }
+        Err(last.unwrap_or_else(|| Error::new(Code::DeviceSilent, "the device did not restart")))
+    }
+}
+
+#[cfg(not(feature = "probe"))]
+fn program(firmware: &Path, _chip: &str, _console: &Console) -> Result<()> {
+    std::fs::metadata(firmware).map_err(|e| Error::unreadable(firmware, &e))?;
+    Err(Error::new(Code::CallInvalid, "this program was built without debug probes").help(
+        "build it with them: cargo build --release --package host --features probe; it takes a minute longer",
+    ))
+}
+
+#[cfg(feature = "probe")]
+fn program(firmware: &Path, chip: &str, console: &Console) -> Result<()> {
+    crate::device::probe::program(firmware, chip, console)
+}

@@ -1,0 +1,245 @@
+//! `host run` and `host vent`: let a controller follow a course and record it; make it safe.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::{Args, ValueEnum};
+use model_core::link::endpoints::{GetInfo, GetSettings, SetSettings};
+use model_core::link::settings::FeedForward;
+use serde_json::json;
+
+use super::port::PortOption;
+use crate::console::Console;
+use crate::device::course::{Course, Quantity};
+use crate::device::recorder::{Recorder, about_device, about_losses};
+use crate::device::run::{Ending, Plan, run, vent};
+use crate::device::{Client, words};
+use crate::error::{Code, Error, Result};
+use crate::table_file::now_utc;
+
+/// Arguments of `host run`.
+#[derive(Debug, Args)]
+#[command(arg_required_else_help = true)]
+#[command(after_help = "Examples:\n  \
+    host run --port /dev/ttyACM0 --force 'sine mean=60 amplitude=20 frequency=0.5' --seconds 10 -o run.csv\n  \
+    host run --port tcp:127.0.0.1:4321 --force 'steps 40 60 80 hold=2' --seconds 12 -o steps.csv\n  \
+    host run --port /dev/ttyACM0 --pressure 200 --seconds 5\n  \
+    host run --port /dev/ttyACM0 --stroke @course.csv --seconds 30 -o stroke.csv\n\n\
+    Courses: VALUE | sine mean= amplitude= frequency= | steps V V … hold= | trapezoid low= high= ramp= hold= |\n  \
+    chirp mean= amplitude= from= to= duration= | @FILE.csv (time in s, value); frequencies in Hz, times in s.\n\
+    The recording is read back by `host fit` and `host predict`. At the end, on any error and on Ctrl-C the muscle is vented.")]
+pub struct Arguments {
+    #[command(flatten)]
+    port: PortOption,
+    #[command(flatten)]
+    quantity: Asked,
+    /// How long, s of device time [default: until Ctrl-C].
+    #[arg(short, long, value_name = "S")]
+    seconds: Option<f64>,
+    /// The recording; a side file OUT.csv.json says how it was made.
+    #[arg(short, long, value_name = "OUT.csv")]
+    output: Option<PathBuf>,
+    /// Samples per second, at most the controller's own rate [default: its own rate].
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// Where the pressure for a force comes from; stays in force afterwards.
+    #[arg(long, value_enum, value_name = "SOURCE")]
+    feed_forward: Option<Source>,
+    /// Print how it went as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+struct Asked {
+    /// Force to follow, N.
+    #[arg(long, value_name = "COURSE", allow_hyphen_values = true)]
+    force: Option<String>,
+    /// Pressure to follow, kPa.
+    #[arg(long, value_name = "COURSE", allow_hyphen_values = true)]
+    pressure: Option<String>,
+    /// Stroke to follow, mm.
+    #[arg(long, value_name = "COURSE", allow_hyphen_values = true)]
+    stroke: Option<String>,
+}
+
+impl Asked {
+    fn parse(&self) -> Result<(Quantity, Course)> {
+        let (quantity, text) = match (&self.force, &self.pressure, &self.stroke) {
+            (Some(text), _, _) => (Quantity::Force, text),
+            (_, Some(text), _) => (Quantity::Pressure, text),
+            (_, _, Some(text)) => (Quantity::Stroke, text),
+            _ => return Err(Error::new(Code::CallInvalid, "nothing is asked for")),
+        };
+        Ok((quantity, Course::parse(text, quantity)?))
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Source {
+    /// The inverse of the muscle's table.
+    Table,
+    /// The ideal braid alone.
+    Gaylord,
+    /// None: feedback does everything.
+    Off,
+}
+
+impl Arguments {
+    /// Does what was asked.
+    ///
+    /// # Errors
+    /// A wrong course, a device that is silent or refuses, the fault that stopped it, a recording that cannot be written.
+    pub fn run(self, console: &Console) -> Result<()> {
+        let (quantity, course) = self.quantity.parse()?;
+        let wrong = |cause: &str| Err(Error::new(Code::CallInvalid, cause));
+        if self.seconds.is_some_and(|s| !(s > 0.0 && s.is_finite())) {
+            return wrong("--seconds must be above zero");
+        }
+        if self.rate.is_some_and(|r| !(r > 0.0 && r.is_finite())) {
+            return wrong("--rate must be above zero");
+        }
+        let interrupted = interrupts()?;
+        let mut client = self.port.connect(console)?;
+        if let Some(source) = self.feed_forward {
+            choose_feed_forward(&mut client, source)?;
+        }
+        let info = client.call::<GetInfo>(&())?;
+        let settings = client.call::<GetSettings>(&())?;
+        let ticks = f64::from(info.ticks_per_s);
+        let every_ticks = self.rate.map_or(1.0, |rate| (ticks / rate).round()).clamp(1.0, 60_000.0) as u16;
+        let mut recorder = self.output.as_deref().map(Recorder::create).transpose()?;
+        let plan = Plan { quantity, course, seconds: self.seconds, every_ticks };
+        let date = now_utc();
+        let mut errors = Errors::default();
+        let outcome = run(
+            &mut client,
+            &plan,
+            |sample| {
+                errors.add(quantity, sample);
+                match &mut recorder {
+                    Some(recorder) => recorder.push(sample),
+                    None => Ok(()),
+                }
+            },
+            || interrupted.load(Ordering::Relaxed),
+        );
+        let losses = client.losses();
+        let about = json!({
+            "schema": "pam-run/1",
+            "date": date,
+            "host": env!("CARGO_PKG_VERSION"),
+            "device": about_device(client.hello(), &info, &settings),
+            "mode": words::mode(quantity.mode()),
+            "course": self.quantity.force.as_deref().or(self.quantity.pressure.as_deref()).or(self.quantity.stroke.as_deref()),
+            "unit": quantity.unit(),
+            "samples": errors.samples,
+            "tracking_rms": errors.rms(quantity),
+            "losses": about_losses(losses),
+            "ended_by": match &outcome {
+                Ok(Ending::Done) => "time".to_owned(),
+                Ok(Ending::Stopped) => "interrupt".to_owned(),
+                Err(e) => e.to_string(),
+            },
+        });
+        let mut kept = None;
+        if let Some(recorder) = recorder {
+            if recorder.skipped() > 0 {
+                console.warning(format!("{} samples without numbers were left out", recorder.skipped()));
+            }
+            // What led to a fault is worth keeping: the recording is whole up to there.
+            kept = Some(recorder.finish(&about)?);
+        }
+        let ending = outcome?;
+        if losses.samples > 0 {
+            console
+                .warning(format!("{} samples were lost on the way, in {} gaps", losses.samples, losses.gaps));
+        }
+        if ending == Ending::Stopped {
+            console.note("interrupted; the muscle is vented");
+        }
+        if self.json {
+            console.result(format!("{about:#}"));
+        } else {
+            let name = kept.map(|p| format!(" in {}", p.display())).unwrap_or_default();
+            let rms = errors
+                .rms(quantity)
+                .map_or(String::new(), |r| format!(", tracking error {r:.3} {} rms", quantity.unit()));
+            console.result(format!("{} samples{name}{rms}; vented", errors.samples));
+        }
+        Ok(())
+    }
+}
+
+/// How far what was measured stayed from what was asked.
+#[derive(Debug, Default)]
+struct Errors {
+    samples: u64,
+    squares: f64,
+}
+
+impl Errors {
+    fn add(&mut self, quantity: Quantity, sample: &model_core::link::messages::Telemetry) {
+        let Some(side) = sample.sides.first() else { return };
+        let measured = match quantity {
+            Quantity::Force => side.force_n,
+            Quantity::Pressure => side.pressure_pa,
+            Quantity::Stroke => side.stroke_m,
+        };
+        let error = f64::from(measured - sample.asked);
+        if error.is_finite() {
+            self.samples += 1;
+            self.squares += error * error;
+        }
+    }
+
+    fn rms(&self, quantity: Quantity) -> Option<f64> {
+        (self.samples > 0).then(|| (self.squares / self.samples as f64).sqrt() / quantity.scale())
+    }
+}
+
+fn choose_feed_forward(client: &mut Client, source: Source) -> Result<()> {
+    let mut settings = client.call::<GetSettings>(&())?;
+    settings.feed_forward = match source {
+        Source::Table => FeedForward::Table,
+        Source::Gaylord => FeedForward::Gaylord,
+        Source::Off => FeedForward::Off,
+    };
+    let kept = client.call_once::<SetSettings>(&settings)?;
+    if kept != settings {
+        return Err(Error::new(Code::DeviceVerify, "the device keeps other settings than it was sent")
+            .help("see `host device settings`"));
+    }
+    Ok(())
+}
+
+/// A flag that Ctrl-C and a request to end set.
+fn interrupts() -> Result<Arc<AtomicBool>> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let seen = Arc::clone(&flag);
+    ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))
+        .map_err(|e| Error::new(Code::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
+    Ok(flag)
+}
+
+/// Arguments of `host vent`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  host vent --port /dev/ttyACM0")]
+pub struct VentArguments {
+    #[command(flatten)]
+    port: PortOption,
+}
+
+impl VentArguments {
+    /// Vents and disarms.
+    ///
+    /// # Errors
+    /// A device that does not answer; then it must be vented by hand.
+    pub fn run(self, console: &Console) -> Result<()> {
+        let status = vent(&mut self.port.connect(console)?)?;
+        console.result(format!("vented; the device is {}", words::state(status.state)));
+        Ok(())
+    }
+}
