@@ -52,6 +52,10 @@ enum Colours {
 /// Every sub-command. A new one is one file in `commands/` and one line here and in [`Command::run`].
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Fit a muscle's table to recordings.
+    Fit(commands::fit::Arguments),
+    /// Compute the force of a table on recordings, and score it.
+    Predict(commands::predict::Arguments),
     /// Show, check or export a table.
     Table(commands::table::Arguments),
     /// Send a table to a controller, or program its chip.
@@ -69,6 +73,8 @@ enum Command {
 impl Command {
     fn run(self, console: &Console) -> Result<()> {
         match self {
+            Self::Fit(a) => a.run(console),
+            Self::Predict(a) => a.run(console),
             Self::Table(a) => a.run(console),
             Self::Flash(a) => a.run(console),
             Self::Run(a) => a.run(console),

@@ -2,7 +2,10 @@
 
 pub mod completions;
 pub mod device;
+pub mod fit;
 pub mod flash;
 pub mod port;
+pub mod predict;
+pub mod recordings;
 pub mod run;
 pub mod table;

@@ -9,6 +9,7 @@ pub mod error;
 pub mod fit;
 pub mod muscle_description;
 pub mod output;
+pub mod predict;
 pub mod recording;
 pub mod report;
 pub mod table_file;

@@ -7,14 +7,16 @@
 //! controller is sent is byte for byte what the file holds. The rest stays with the host.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use model_core::image;
 use model_core::table::MuscleTable;
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use crate::error::{Code, Error, Result};
 use crate::output::write_whole;
+use crate::recording::Campaign;
 
 const MAGIC: [u8; 4] = *b"PAMF";
 /// The version that is written, and the only one read.
@@ -230,6 +232,32 @@ impl About {
         }
         Ok(())
     }
+}
+
+/// SHA-256 of a file's bytes, in hexadecimal.
+///
+/// # Errors
+/// [`Code::FileUnreadable`].
+pub fn sha256(path: impl AsRef<Path>) -> Result<String> {
+    let path = path.as_ref();
+    let mut file = fs::File::open(path).map_err(|e| Error::unreadable(path, &e))?;
+    let mut hash = Sha256::new();
+    std::io::copy(&mut file, &mut hash).map_err(|e| Error::unreadable(path, &e))?;
+    Ok(hash.finalize().iter().map(|b| format!("{b:02x}")).collect())
+}
+
+/// The recordings' files with their hashes, and how many rows each gave.
+#[must_use]
+pub fn sources(campaign: &Campaign, files: &[PathBuf], hashes: Vec<String>) -> Vec<Source> {
+    let rows = |file: &PathBuf| {
+        campaign.recordings.iter().filter(|r| r.source == *file).map(|r| r.len() as u64).sum()
+    };
+    let source = |(file, sha256): (&PathBuf, String)| Source {
+        path: file.display().to_string(),
+        sha256,
+        samples: rows(file),
+    };
+    files.iter().zip(hashes).map(source).collect()
 }
 
 /// The present time as ISO 8601 in UTC; `SOURCE_DATE_EPOCH` stands in for the clock where it is set, so that builds can be

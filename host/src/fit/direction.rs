@@ -1,5 +1,7 @@
 //! Which way friction points in every row of a campaign.
 
+use model_core::motion::{Motion, MotionSettings, MotionTracker};
+
 use crate::recording::{Campaign, Recording};
 
 /// +1 shortening or filling, −1 lengthening or emptying, 0 unknown; per recording, per row.
@@ -47,4 +49,24 @@ fn zigzag(values: &[f64]) -> Vec<i8> {
         directions[from..].fill(way);
     }
     directions
+}
+
+/// The motion in every row, for effects that depend on it: as a controller would follow it, but with the direction seen from
+/// both sides. `pause` is the time since the recording before, s.
+#[must_use]
+pub fn motions(recording: &Recording, directions: &[i8], pause: f64) -> Vec<Motion<f64>> {
+    let mut tracker = MotionTracker::new(MotionSettings::default());
+    (0..recording.len())
+        .map(|i| {
+            let dt = if i == 0 { 0.0 } else { recording.time[i] - recording.time[i - 1] };
+            let mut motion = *tracker.step(dt, recording.stroke[i], recording.pressure[i]);
+            motion.direction = f64::from(directions[i]);
+            if i == 0 {
+                motion.dt = pause;
+            }
+            motion.time = recording.time[i];
+            motion.temperature = recording.temperature.as_ref().map_or(0.0, |t| t[i]);
+            motion
+        })
+        .collect()
 }

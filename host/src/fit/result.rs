@@ -8,6 +8,7 @@ use serde::Serialize;
 use crate::error::{Code, Error, Result};
 use crate::muscle_description::{Kind, MuscleDescription};
 use crate::recording::Campaign;
+use crate::table_file::{FitQuality, Uncertainty};
 
 use super::Options;
 use super::errors::{ChunkError, Sample, by_chunk, errors};
@@ -170,6 +171,78 @@ impl Fit {
         let summary =
             summarise(&prepared, &table, campaign, muscle, &uncertain, &residuals, &chunks, &left_out);
         Ok(Self { table, prepared, uncertain, table_root, chunks, summary })
+    }
+}
+
+impl Fit {
+    /// The uncertainty as a table file keeps it: no more columns than numbers.
+    #[must_use]
+    pub fn stored_uncertainty(&self) -> Uncertainty {
+        let root = self.table_root.compact();
+        Uncertainty {
+            rows: root.rows as u32,
+            columns: root.columns as u32,
+            root: root.s,
+            residual_newtons: self.summary.rms_N,
+        }
+    }
+}
+
+impl Summary {
+    /// The figures of merit, as a table file keeps them.
+    #[must_use]
+    pub fn quality(&self) -> FitQuality {
+        FitQuality {
+            samples: self.samples as u64,
+            rms_newtons: self.rms_N,
+            mean_error_percent: self.mean_error_pct,
+            max_error_percent: self.max_error_pct,
+            left_out_percent: self.left_out_pressure_mean_error_pct,
+            warnings: self.warnings.clone(),
+        }
+    }
+}
+
+impl std::fmt::Display for Summary {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        writeln!(
+            f,
+            "{}: {} rows, P0 {:.1} ± {:.1} kPa, blocked force {:.1} N, rms {:.3} N",
+            self.muscle,
+            self.samples,
+            self.deadband_kPa,
+            1.96 * self.deadband_std_kPa,
+            self.blocked_force_N,
+            self.rms_N
+        )?;
+        write!(
+            f,
+            "error of blocked force: {:.3} % mean, {:.3} % at most",
+            self.mean_error_pct, self.max_error_pct
+        )?;
+        if let Some(left_out) = self.left_out_pressure_mean_error_pct {
+            write!(f, "; {left_out:.3} % mean at pressures left out")?;
+        }
+        write!(
+            f,
+            "\n{:>8} {:>8} {:>9} {:>7} {:>7} {:>7}  E_k MPa",
+            "P kPa", "k_F", "F_B N", "free", "mean %", "max %"
+        )?;
+        for p in &self.pressures {
+            let free = p.free_contraction.map_or("–".to_owned(), |c| format!("{c:.4}"));
+            let moduli: Vec<String> = p.E_MPa.iter().map(|e| format!("{e:.4}")).collect();
+            write!(
+                f,
+                "\n{:8.1} {:8.4} {:9.2} {free:>7} {:7.3} {:7.3}  {}",
+                p.pressure_kPa,
+                p.k_F,
+                p.blocked_force_N,
+                p.mean_error_pct,
+                p.max_error_pct,
+                moduli.join(" ")
+            )?;
+        }
+        Ok(())
     }
 }
 

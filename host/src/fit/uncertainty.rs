@@ -13,6 +13,8 @@
 
 use std::ops::Range;
 
+use nalgebra::DMatrix;
+
 use super::joint::{Design, Layout};
 use super::linear::{Symmetric, dot};
 use super::prepare::Prepared;
@@ -46,6 +48,26 @@ impl Root {
     pub fn std(&self, i: usize) -> f64 {
         let row = &self.s[i * self.columns..(i + 1) * self.columns];
         dot(row, row).sqrt()
+    }
+
+    /// The same covariance with at most as many columns as rows, from the eigenvectors of `C` with rows scaled to unit size.
+    #[must_use]
+    pub fn compact(&self) -> Self {
+        if self.columns <= self.rows {
+            return self.clone();
+        }
+        let scale: Vec<f64> =
+            (0..self.rows).map(|i| Some(self.std(i)).filter(|s| *s > 0.0).unwrap_or(1.0)).collect();
+        let row = |i: usize| &self.s[i * self.columns..(i + 1) * self.columns];
+        let c = DMatrix::from_fn(self.rows, self.rows, |i, j| dot(row(i), row(j)) / (scale[i] * scale[j]));
+        let eigen = c.symmetric_eigen();
+        let mut s = Vec::with_capacity(self.rows * self.rows);
+        for (i, scale) in scale.iter().enumerate() {
+            for k in 0..self.rows {
+                s.push(scale * eigen.eigenvectors[(i, k)] * eigen.eigenvalues[k].max(0.0).sqrt());
+            }
+        }
+        Self { rows: self.rows, columns: self.rows, s }
     }
 
     /// The root of `A C Aᵀ`, `A` given row after row.

@@ -1,0 +1,107 @@
+//! `host fit`: recordings to a table.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+
+use super::recordings::Recordings;
+use crate::console::Console;
+use crate::error::{Code, Error, Result};
+use crate::fit::{Options, fit};
+use crate::muscle_description::MuscleDescription;
+use crate::output::write_whole;
+use crate::recording::Reader;
+use crate::table_file::{self, TableFile};
+
+/// Arguments of `host fit`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    host fit --muscle mini.toml loops/*.csv -o mini.pam --json mini.json\n  \
+    host fit --muscle festo.toml --import bench.toml run*.csv -o festo.pam --order 3\n\n\
+    Recordings: CSV or tab-separated text, a header with units behind the last underscore (time_s, pressure_kPa,\n\
+    displacement_mm, force_N); anything else comes in by --import.")]
+pub struct Arguments {
+    /// The muscle's description.
+    #[arg(long, value_name = "MUSCLE.toml")]
+    muscle: PathBuf,
+    #[command(flatten)]
+    recordings: Recordings,
+    /// Where to write the table.
+    #[arg(short, long, value_name = "TABLE.pam")]
+    output: Option<PathBuf>,
+    /// Where to write the figures of the fit as JSON; `-` is standard output.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Order M of the elastic polynomial.
+    #[arg(long, default_value_t = 4, value_name = "M", value_parser = clap::value_parser!(u8).range(1..=6))]
+    order: u8,
+    /// Let the load-bearing length be shortened by the rounded ends (L′ in place of L).
+    #[arg(long)]
+    tip_correction: bool,
+    /// Weight of the penalty on curves over pressure that bend; chosen by leaving pressures out if not given.
+    #[arg(long, value_name = "WEIGHT")]
+    smoothing: Option<f64>,
+}
+
+impl Arguments {
+    /// Reads, fits, writes.
+    ///
+    /// # Errors
+    /// What is wrong with the input, or an output that cannot be written.
+    pub fn run(self, console: &Console) -> Result<()> {
+        if let Some(weight) = self.smoothing
+            && !(weight.is_finite() && weight >= 0.0)
+        {
+            return Err(Error::new(Code::CallInvalid, "a smoothing weight must be a number from 0 up")
+                .value(weight.to_string())
+                .help("1e-3 bends freely, 10 is nearly straight; leave the option out to have it chosen"));
+        }
+        let start = Instant::now();
+        let muscle = MuscleDescription::read(&self.muscle)?;
+        let campaign = self.recordings.read(Reader::of(&muscle))?;
+        console.detail(format!("read {} rows in {:.3} s", campaign.samples(), start.elapsed().as_secs_f64()));
+        let started = Instant::now();
+        let options = Options {
+            order: usize::from(self.order),
+            tip_correction: self.tip_correction,
+            smoothing: self.smoothing,
+        };
+        // Files are hashed while the fit runs.
+        let files = self.recordings.files.clone();
+        let (fitted, hashes) = std::thread::scope(|scope| {
+            let hashes = scope.spawn(|| files.iter().map(table_file::sha256).collect::<Result<Vec<_>>>());
+            let fitted = fit(&campaign, &muscle, &options);
+            (fitted, hashes.join())
+        });
+        let fitted = fitted?;
+        let hashes = hashes.map_err(|_| Error::new(Code::FileUnreadable, "a file could not be hashed"))??;
+        console.detail(format!("fitted in {:.3} s", started.elapsed().as_secs_f64()));
+        let about = table_file::About {
+            muscle: muscle.name.clone(),
+            date: table_file::now_utc(),
+            tool: format!("host {}", env!("CARGO_PKG_VERSION")),
+            sources: table_file::sources(&campaign, &files, hashes),
+            fit: fitted.summary.quality(),
+            uncertainty: Some(fitted.stored_uncertainty()),
+            corrections: Vec::new(),
+        };
+        let table = TableFile { table: fitted.table.clone(), about };
+        let json = serde_json::to_string_pretty(&fitted.summary)
+            .map_err(|e| Error::new(Code::FileUnwritable, e.to_string()))?;
+        if let Some(path) = &self.output {
+            table.write(path)?;
+        }
+        if let Some(path) = &self.json {
+            write_whole(path, format!("{json}\n").as_bytes())?;
+        }
+        for warning in &fitted.summary.warnings {
+            console.warning(warning);
+        }
+        if self.json.as_deref() != Some(std::path::Path::new("-")) {
+            console.note(fitted.summary.to_string());
+        }
+        console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));
+        Ok(())
+    }
+}

@@ -1,0 +1,80 @@
+//! `host predict`: a table's force on recordings.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use super::recordings::Recordings;
+use crate::console::Console;
+use crate::error::{Code, Error, Result};
+use crate::output::write_whole;
+use crate::predict::{predict, to_csv};
+use crate::recording::Reader;
+use crate::table_file::TableFile;
+
+/// Arguments of `host predict`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    host predict --table mini.pam new.csv -o predicted.csv\n  \
+    host predict --table mini.pam first.csv second.csv --json scores.json\n\n\
+    Several recordings are one history: effects with a memory run through them in order. The output is one table; with\n\
+    several recordings its first column is `file`.")]
+pub struct Arguments {
+    /// The table.
+    #[arg(long, value_name = "TABLE.pam")]
+    table: PathBuf,
+    #[command(flatten)]
+    recordings: Recordings,
+    /// Where to write the recordings with a column `force_model_N` added; `-` is standard output.
+    #[arg(short, long, value_name = "OUT.csv")]
+    output: Option<PathBuf>,
+    /// Where to write the scores as JSON; `-` is standard output.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+impl Arguments {
+    /// Reads, computes, writes.
+    ///
+    /// # Errors
+    /// What is wrong with the input, or an output that cannot be written.
+    pub fn run(self, console: &Console) -> Result<()> {
+        let table = TableFile::read(&self.table)?;
+        let rest_length = f64::from(table.table.geometry.rest_length.metres());
+        let mut reader = Reader::with_rest_length(rest_length);
+        reader.muscle_name = Some(&table.about.muscle);
+        let campaign = self.recordings.read(reader)?;
+        for warning in &campaign.warnings {
+            console.warning(warning);
+        }
+        let prediction = predict(&table, &campaign).map_err(|e| e.file(&self.table))?;
+        for warning in &prediction.warnings {
+            console.warning(warning);
+        }
+        if let Some(path) = &self.output {
+            write_whole(path, &to_csv(&campaign, &prediction, self.recordings.import.is_some()))?;
+        }
+        if let Some(path) = &self.json {
+            let recordings: Vec<_> = campaign
+                .recordings
+                .iter()
+                .zip(&prediction.recordings)
+                .map(|(r, p)| json!({ "file": r.name, "samples": r.len(), "rms_N": p.rms }))
+                .collect();
+            let json =
+                json!({ "schema": "pam-predict/1", "rms_N": prediction.rms, "recordings": recordings });
+            let text = serde_json::to_string_pretty(&json)
+                .map_err(|e| Error::new(Code::FileUnwritable, e.to_string()))?;
+            write_whole(path, format!("{text}\n").as_bytes())?;
+        }
+        for (recording, p) in campaign.recordings.iter().zip(&prediction.recordings) {
+            let rms = p.rms.map_or("no force to compare with".to_owned(), |r| format!("rms {r:.3} N"));
+            console.note(format!("{}: {} rows, {rms}", recording.name, recording.len()));
+        }
+        if self.output.is_none() && self.json.is_none() {
+            console.detail("nothing is written: give -o or --json");
+        }
+        Ok(())
+    }
+}

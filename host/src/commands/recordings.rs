@@ -1,0 +1,42 @@
+//! The recordings of a call, and how they are read: the same options wherever recordings are taken.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::error::{Code, Error, Result};
+use crate::recording::{Campaign, Import, Reader};
+
+/// Recordings on the command line.
+#[derive(Debug, Clone, Args)]
+pub struct Recordings {
+    /// Recordings of one muscle, in chronological order.
+    #[arg(required = true, value_name = "REC")]
+    pub files: Vec<PathBuf>,
+    /// How to read files that are not in the usual form: an import description.
+    #[arg(long, value_name = "IMPORT.toml")]
+    pub import: Option<PathBuf>,
+    /// Take only rows where a column has this value; may be given several times.
+    #[arg(long = "where", value_name = "COLUMN=VALUE")]
+    pub filters: Vec<String>,
+}
+
+impl Recordings {
+    /// Reads them all with a reader that knows the muscle.
+    ///
+    /// # Errors
+    /// What is wrong with a file, or with an option.
+    pub fn read(&self, reader: Reader<'_>) -> Result<Campaign> {
+        let import = self.import.as_ref().map(Import::read).transpose()?;
+        let mut reader = reader.import(import.as_ref());
+        for filter in &self.filters {
+            let (column, value) = filter.split_once('=').ok_or_else(|| {
+                Error::new(Code::CallInvalid, "a filter without `=`")
+                    .value(filter)
+                    .help("write --where column=value, such as --where run=8")
+            })?;
+            reader.filters.push((column.trim().to_owned(), value.trim().to_owned()));
+        }
+        reader.campaign(&self.files)
+    }
+}

@@ -1,0 +1,229 @@
+//! A table's force on recordings: the base model, the effects it carries, and the corrections of the bench.
+//!
+//! Effects have a memory, which runs through the recordings in their order: earlier files are the muscle's history. Over a pause
+//! of known length the memories fade as they do in time; over an unknown pause nothing is forgotten.
+
+use std::fmt::Write;
+use std::fs;
+
+use model_core::effects::{Chain, Memory};
+use model_core::muscle::Muscle;
+use model_core::units::{Force, Length, Pressure};
+
+use crate::bench::Candidate;
+use crate::error::{Code, Error, Result};
+use crate::fit::direction::directions;
+use crate::recording::{Campaign, Recording};
+use crate::table_file::TableFile;
+
+/// What a table says of a campaign.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// Per recording, in the campaign's order.
+    pub recordings: Vec<Predicted>,
+    /// Root mean square of `F − F_model` over all rows that have a force, N; `None` where none has.
+    pub rms: Option<f64>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// What a table says of one recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Predicted {
+    /// The force that the load cell would read, N, per row.
+    pub force: Vec<f64>,
+    /// Root mean square of `F − F_model`, N; `None` without a force column.
+    pub rms: Option<f64>,
+}
+
+/// Runs a table over a campaign.
+///
+/// # Errors
+/// [`Code::TableInvalid`] where the table cannot be evaluated, or names a correction that this program does not know.
+pub fn predict(file: &TableFile, campaign: &Campaign) -> Result<Prediction> {
+    let muscle =
+        Muscle::<f64>::build(&file.table).map_err(|e| Error::new(Code::TableInvalid, e.to_string()))?;
+    let mut chain = Chain::<f64>::new(&file.table.effects);
+    let mut corrections: Vec<(Candidate, &[f64], Memory<f64>)> = Vec::new();
+    for c in &file.about.corrections {
+        let candidate = Candidate::from_name(&c.effect)
+            .filter(|k| k.info().parameters.len() == c.parameters.len())
+            .ok_or_else(|| {
+                Error::new(Code::TableInvalid, format!("unknown correction `{}`", c.effect))
+                    .help("the table was written by a newer version of this program")
+            })?;
+        corrections.push((candidate, &c.parameters, Memory::<f64>::default()));
+    }
+    let plain = chain.is_empty() && corrections.is_empty();
+    let mut recordings = Vec::with_capacity(campaign.recordings.len());
+    let (mut square, mut rows) = (0.0, 0.0);
+    for (index, (recording, directions)) in campaign.recordings.iter().zip(directions(campaign)).enumerate() {
+        let force: Vec<f64> = if plain {
+            (0..recording.len())
+                .map(|i| {
+                    let p = Pressure::from_pascals(recording.pressure[i]);
+                    let x = Length::from_metres(recording.stroke[i]);
+                    muscle.force(p, x, f64::from(directions[i])).newtons()
+                })
+                .collect()
+        } else {
+            let pause = if index == 0 { 0.0 } else { campaign.pause_before(index).unwrap_or(0.0).max(0.0) };
+            let motions = crate::fit::direction::motions(recording, &directions, pause);
+            let mut forces = Vec::with_capacity(recording.len());
+            for (i, motion) in motions.iter().enumerate() {
+                let context = muscle.context(motion, Pressure::from_pascals(recording.pressure[i]));
+                chain.step(&context);
+                let mut force = muscle.force_with(&chain, &context);
+                for (candidate, parameters, memory) in &mut corrections {
+                    candidate.step(parameters, &context, memory);
+                    force += Force::from_newtons(candidate.force(parameters, &context, memory));
+                }
+                forces.push(force.newtons());
+            }
+            forces
+        };
+        let rms = recording.force.as_ref().map(|measured| {
+            let sum: f64 = measured.iter().zip(&force).map(|(f, m)| (f - m).powi(2)).sum();
+            square += sum;
+            rows += measured.len() as f64;
+            (sum / measured.len().max(1) as f64).sqrt()
+        });
+        recordings.push(Predicted { force, rms });
+    }
+    let rms = (rows > 0.0).then(|| (square / rows).sqrt());
+    Ok(Prediction { recordings, rms, warnings: beyond(file, campaign) })
+}
+
+/// Says where the recordings leave the range that the table was fitted to.
+fn beyond(file: &TableFile, campaign: &Campaign) -> Vec<String> {
+    let t = &file.table.tested;
+    let l0 = f64::from(file.table.geometry.rest_length.metres());
+    let mut warnings = Vec::new();
+    let mut say = |what: &str,
+                   unit: f64,
+                   name: &str,
+                   low: f32,
+                   high: f32,
+                   values: &dyn Fn(&Recording) -> Vec<f64>| {
+        let slack = 0.02 * f64::from(high - low).abs() + 1e-9;
+        let (low, high) = (f64::from(low) - slack, f64::from(high) + slack);
+        let all: Vec<f64> = campaign.recordings.iter().flat_map(values).collect();
+        let out = all.iter().filter(|v| **v < low || **v > high).count();
+        if out * 100 > all.len() {
+            warnings.push(format!(
+                "{} % of the rows lie outside the {what} that the table was fitted to ({:.4} to {:.4}{name}): an extrapolation there",
+                out * 100 / all.len(),
+                low / unit,
+                high / unit
+            ));
+        }
+    };
+    let (p_low, p_high) = (t.pressure_low.pascals(), t.pressure_high.pascals());
+    say("pressures", 1e3, " kPa", p_low, p_high, &|r| r.pressure.clone());
+    let scaled = |r: &Recording| r.stroke.iter().map(|x| x / l0).collect();
+    say("contractions", 1.0, "", t.contraction_low, t.contraction_high, &scaled);
+    warnings
+}
+
+/// The recordings with a column `force_model_N` added, as one CSV table; with several recordings the first column is
+/// `file`.
+///
+/// Where all files are plain text with one header their cells are kept as they are, other columns included. Recordings
+/// that came in by an import description, or from other containers, are written in the usual columns instead.
+#[must_use]
+pub fn to_csv(campaign: &Campaign, prediction: &Prediction, imported: bool) -> Vec<u8> {
+    let verbatim = if imported { None } else { verbatim(campaign, prediction) };
+    verbatim.unwrap_or_else(|| standard(campaign, prediction)).into_bytes()
+}
+
+fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
+    let several = campaign.recordings.len() > 1;
+    let mut out = String::new();
+    let mut header: Option<(String, char)> = None;
+    for (recording, predicted) in campaign.recordings.iter().zip(&prediction.recordings) {
+        if recording.rows.is_some() {
+            return None;
+        }
+        let text = fs::read(&recording.source).ok().and_then(|b| String::from_utf8(b).ok())?;
+        let mut lines = text.trim_start_matches('\u{feff}').lines().filter(|l| !l.trim().is_empty());
+        let first = lines.next()?;
+        let delimiter = ['\t', ';', ','].into_iter().find(|d| first.contains(*d))?;
+        match &header {
+            None => {
+                let file = if several { format!("file{delimiter}") } else { String::new() };
+                let _ = writeln!(out, "{file}{first}{delimiter}force_model_N");
+                header = Some((first.to_owned(), delimiter));
+            }
+            Some((known, _)) if known != first => return None,
+            Some(_) => {}
+        }
+        let rows: Vec<&str> = lines.collect();
+        if rows.len() != predicted.force.len() {
+            return None;
+        }
+        for (row, force) in rows.iter().zip(&predicted.force) {
+            if several {
+                let _ = write!(out, "{}{delimiter}", cell(&recording.name, delimiter));
+            }
+            let _ = writeln!(out, "{row}{delimiter}{force:.6}");
+        }
+    }
+    Some(out)
+}
+
+fn standard(campaign: &Campaign, prediction: &Prediction) -> String {
+    let several = campaign.recordings.len() > 1;
+    let all = |has: &dyn Fn(&Recording) -> bool| campaign.recordings.iter().all(has);
+    let force = all(&|r| r.force.is_some());
+    let temperature = all(&|r| r.temperature.is_some());
+    let command = all(&|r| r.pressure_command.is_some());
+    let cycle = all(&|r| r.cycle.is_some());
+    let mut out = String::new();
+    if several {
+        out += "file,";
+    }
+    out += "time_s,pressure_kPa,displacement_mm";
+    for (there, name) in [
+        (force, ",force_N"),
+        (temperature, ",temperature_K"),
+        (command, ",pressure_command_kPa"),
+        (cycle, ",cycle"),
+    ] {
+        if there {
+            out += name;
+        }
+    }
+    out += ",force_model_N\n";
+    for (r, predicted) in campaign.recordings.iter().zip(&prediction.recordings) {
+        let name = cell(&r.name, ',');
+        for i in 0..r.len() {
+            if several {
+                let _ = write!(out, "{name},");
+            }
+            let _ = write!(out, "{},{},{}", r.time[i], r.pressure[i] / 1e3, r.stroke[i] * 1e3);
+            for (there, column, scale) in [
+                (force, &r.force, 1.0),
+                (temperature, &r.temperature, 1.0),
+                (command, &r.pressure_command, 1e-3),
+            ] {
+                if let (true, Some(column)) = (there, column) {
+                    let _ = write!(out, ",{}", column[i] * scale);
+                }
+            }
+            if let (true, Some(cycles)) = (cycle, &r.cycle) {
+                let _ = write!(out, ",{}", cycles[i]);
+            }
+            let _ = writeln!(out, ",{:.6}", predicted.force[i]);
+        }
+    }
+    out
+}
+
+/// A name as one cell: quoted where it holds the delimiter or a quote.
+fn cell(name: &str, delimiter: char) -> String {
+    if name.contains([delimiter, '"', '\n']) {
+        format!("\"{}\"", name.replace('"', "\"\""))
+    } else {
+        name.to_owned()
+    }
+}
