@@ -245,6 +245,8 @@ pub struct Context<T> {
     pub since_reversal: T,
     /// How long the muscle rested before its present motion, or has been resting, s.
     pub hold_time: T,
+    /// 1 while the muscle rests, 0 while it moves. A caller that leaves it at 0 tells a rest by a growing hold time.
+    pub resting: T,
     /// Strokes back and forth so far, in full cycles.
     pub cycles: T,
     /// Absolute temperature, K, or 0 where it is not measured.
@@ -316,6 +318,7 @@ impl<T: Scalar> Context<T> {
             travel: to(self.travel),
             since_reversal: to(self.since_reversal),
             hold_time: to(self.hold_time),
+            resting: to(self.resting),
             cycles: to(self.cycles),
             temperature: to(self.temperature),
             rest_length: to(self.rest_length),

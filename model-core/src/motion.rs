@@ -29,6 +29,8 @@ pub struct Motion<T> {
     pub since_reversal: T,
     /// How long the muscle rested before its present motion, or has been resting, s.
     pub hold_time: T,
+    /// 1 while the muscle rests, 0 while it moves.
+    pub resting: T,
     /// Full cycles so far.
     pub cycles: T,
     /// Absolute temperature, K; 0 where unknown.
@@ -131,8 +133,10 @@ impl<T: Scalar> MotionTracker<T> {
             }
             if self.quiet >= self.rest_after() {
                 self.motion.hold_time = self.quiet;
+                self.motion.resting = T::ONE;
                 self.moving_for = T::ZERO;
             } else {
+                self.motion.resting = T::ZERO;
                 self.moving_for += dt;
             }
         }

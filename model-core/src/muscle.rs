@@ -216,6 +216,7 @@ impl<T: Scalar> Muscle<T> {
             travel: motion.travel,
             since_reversal: motion.since_reversal,
             hold_time: motion.hold_time,
+            resting: motion.resting,
             cycles: motion.cycles,
             temperature: motion.temperature,
             rest_length: self.braid.rest_length(),

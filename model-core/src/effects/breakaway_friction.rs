@@ -35,9 +35,7 @@ impl Effect for BreakawayFriction {
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [where it rested, for how long, last hold time, whether it moves, seen]
-        // A clock of single precision stands still after some hours of ticks; then the speed tells.
-        let for_hours = context.hold_time > T::from_f32(8192.0) && context.speed.abs() < T::from_f32(1.0e-4);
-        let resting = memory[4] == T::ZERO || context.hold_time > memory[2] || for_hours;
+        let resting = memory[4] == T::ZERO || context.resting != T::ZERO || context.hold_time > memory[2];
         memory[4] = T::ONE;
         memory[2] = context.hold_time;
         if resting {

@@ -8,10 +8,10 @@
 //! The step is exact for a drive that runs straight between two readings, whatever their distance:
 //! `q ← q − q (1−a) + Δu (1−a) τ/dt`, `1 − a = 1 − e^(−dt/τ)`.
 //!
-//! At 1 kHz and `τ` of minutes `1 − a` is so small that single precision would swallow it. The memory therefore lets time
-//! pend until a fiftieth of the shortest `τ` has gone by, and only then steps; in between the value is extrapolated to first
-//! order (error below 2·10⁻⁴ of `q`). The exponential is computed anew only where the pending time changes: on a controller
-//! with a steady tick, never.
+//! At 1 kHz and `τ` of minutes `1 − a` is so small that single precision would swallow it. Steps shorter than a fiftieth of the
+//! shortest `τ` therefore take in the drive's change at once and let the fading pend until a fiftieth is full; a change that
+//! comes in late is scaled up by what it must not fade. Both use the exponential's series, which at `dt/τ < 0.04` is exact to
+//! 10⁻⁶: a controller with a steady tick never computes an exponential.
 
 use super::{MEMORY, Memory};
 use crate::scalar::Scalar;
@@ -28,6 +28,12 @@ const SHARES: usize = 3;
 
 /// The shortest time constant that is stepped, s; guards against a table's zero.
 const SHORTEST: f32 = 1.0e-4;
+
+/// `1 − e^(−x)` for `0 ≤ x < 0.04`, to 10⁻⁷.
+#[inline]
+fn small_share<T: Scalar>(x: T) -> T {
+    x - x * x * (T::from_f32(0.5) - x * T::from_f64(1.0 / 6.0))
+}
 
 impl<const N: usize, const D: usize> Fading<N, D> {
     const LAST: usize = SHARES + N;
@@ -49,28 +55,65 @@ impl<const N: usize, const D: usize> Fading<N, D> {
             memory[Self::LAST..Self::FIRST].copy_from_slice(drives);
             return;
         }
-        let shortest = T::from_f32(SHORTEST);
-        let pending = memory[PENDING] + dt.max(T::ZERO);
-        if !(pending >= times[0].max(shortest) * T::from_f32(0.02)) {
-            memory[PENDING] = pending;
-            return;
+        let dt = dt.max(T::ZERO);
+        let full = times[0].max(T::from_f32(SHORTEST)) * T::from_f32(0.02);
+        if dt < full {
+            Self::step_short(memory, dt, full, times, drives);
+        } else {
+            Self::step_long(memory, dt, times, drives);
         }
-        memory[PENDING] = T::ZERO;
-        if memory[SHARES_FOR] != pending {
-            // An endless pause is not worth remembering, and would not be a finite number.
-            memory[SHARES_FOR] = if pending.is_finite() { pending } else { T::ZERO };
-            for (share, tau) in memory[SHARES..].iter_mut().zip(times) {
-                *share = -(-(pending / tau.max(shortest))).exp_m1();
+    }
+
+    fn step_short<T: Scalar>(memory: &mut Memory<T>, dt: T, full: T, times: &[T; N], drives: &[T; D]) {
+        let middle = memory[PENDING] + dt * T::from_f32(0.5);
+        let changes: [T; D] = core::array::from_fn(|d| drives[d] - memory[Self::LAST + d]);
+        memory[Self::LAST..Self::FIRST].copy_from_slice(drives);
+        for (i, tau) in times.iter().enumerate() {
+            let x = middle / tau.max(T::from_f32(SHORTEST));
+            let late = T::ONE + x + x * x * T::from_f32(0.5);
+            for (d, change) in changes.iter().enumerate() {
+                memory[Self::slot(d, i)] += *change * late;
             }
         }
-        let per_pending = T::ONE / pending;
+        memory[PENDING] += dt;
+        if memory[PENDING] >= full {
+            Self::settle(memory, times);
+        }
+    }
+
+    fn step_long<T: Scalar>(memory: &mut Memory<T>, dt: T, times: &[T; N], drives: &[T; D]) {
+        Self::settle(memory, times);
+        let shortest = T::from_f32(SHORTEST);
+        if memory[SHARES_FOR] != dt {
+            // An endless pause is not worth remembering, and would not be a finite number.
+            memory[SHARES_FOR] = if dt.is_finite() { dt } else { T::ZERO };
+            for (share, tau) in memory[SHARES..].iter_mut().zip(times) {
+                *share = -(-(dt / tau.max(shortest))).exp_m1();
+            }
+        }
         for (d, drive) in drives.iter().enumerate() {
             let change = *drive - memory[Self::LAST + d];
             memory[Self::LAST + d] = *drive;
             for (i, tau) in times.iter().enumerate() {
                 let share = memory[SHARES + i];
                 let q = &mut memory[Self::slot(d, i)];
-                *q = *q - *q * share + change * share * tau.max(shortest) * per_pending;
+                *q = *q - *q * share + change * (share * (tau.max(shortest) / dt));
+            }
+        }
+    }
+
+    /// Fades by the time that has been pending.
+    fn settle<T: Scalar>(memory: &mut Memory<T>, times: &[T; N]) {
+        let pending = memory[PENDING];
+        if pending == T::ZERO {
+            return;
+        }
+        memory[PENDING] = T::ZERO;
+        for (i, tau) in times.iter().enumerate() {
+            let share = small_share(pending / tau.max(T::from_f32(SHORTEST)));
+            for d in 0..D {
+                let q = &mut memory[Self::slot(d, i)];
+                *q = *q - *q * share;
             }
         }
     }
@@ -82,7 +125,7 @@ impl<const N: usize, const D: usize> Fading<N, D> {
         let mut sum = T::ZERO;
         for (i, tau) in times.iter().enumerate() {
             let q = memory[Self::slot(drive, i)];
-            sum += q - q * memory[PENDING] / tau.max(T::from_f32(SHORTEST)) + change;
+            sum += q - q * small_share(memory[PENDING] / tau.max(T::from_f32(SHORTEST))) + change;
         }
         sum
     }
@@ -93,8 +136,8 @@ impl<const N: usize, const D: usize> Fading<N, D> {
 #[inline]
 pub fn decay<T: Scalar>(x: T) -> T {
     let y = x.abs() * T::from_f32(0.25);
-    let horner = |inner: T, c: f32| inner * y + T::from_f32(c);
-    let p = horner(horner(horner(horner(T::from_f32(1.0 / 24.0), 1.0 / 6.0), 0.5), 1.0), 1.0);
+    let horner = |inner: T, c: f64| inner * y + T::from_f64(c);
+    let p = horner(horner(horner(horner(T::from_f64(1.0 / 24.0), 1.0 / 6.0), 0.5), 1.0), 1.0);
     let squared = p * p;
     T::ONE / (squared * squared)
 }

@@ -1,10 +1,12 @@
 //! Creep that goes on with the logarithm of time: four fading branches, one per decade.
 //!
 //! ```text
-//! dq_i/dt = du/dt − q_i/τ_i,  τ_i = t_0 · (1, 10, 100, 1000)        F_add = a · Σ q_i
+//! dq_i/dt = du/dt − q_i/τ_i,  τ_i = τ_0 · (1, 10, 100, 1000)        F_add = a · Σ q_i
 //! ```
-//! After a step of the drive the sum falls by `a` times the step per decade of time, from `t_0` to `1000 t_0`, as `−a log10(1 + t/t_0)` does,
-//! and then ends, as every real creep must. It remembers earlier runs: a load held for an hour still shows in the next run.
+//! After a step of the drive the sum falls by `a` times the step in each decade of time, as `−a log10(1 + 5 t/τ_0)` does to within 0.11 `a`
+//! up to `300 τ_0`, and then ends, as every real creep must. It remembers earlier runs: a load held for an hour
+//! still shows in the next run.
+//!
 //! Three drives, three laws (their amplitudes may be tried singly):
 //!
 //! | amplitude | drive `u` | tells |
@@ -43,7 +45,7 @@ impl Effect for LogCreep {
         alternatives: true,
         start: Start::Settled,
         fading: &[Spectrum::slot(0, 0), Spectrum::slot(0, 1), Spectrum::slot(0, 2), Spectrum::slot(0, 3)],
-        equation: "F = a·Σq_i(F_el) + E_c·Σq_i(c_1) − a_P·Σq_i(F_G), τ_i = t_0·(1, 10, 100, 1000)",
+        equation: "F = a·Σq_i(F_el) + E_c·Σq_i(c_1) − a_P·Σq_i(F_G), τ_i = τ_0·(1, 10, 100, 1000)",
         summary: "At constant length and pressure the force creeps, as much in each tenfold of time, and remembers earlier runs.",
         source: "S. M. Clarke, F. Elias, E. M. Terentjev, European Physical Journal E 2 (2000) 335–341; W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     };

@@ -48,6 +48,6 @@ impl Effect for MinorLoopMemory {
         for stretch in &memory[..6] {
             sum += *stretch;
         }
-        -(parameters[0] + parameters[1] * context.pressure.max(T::ZERO)) * sum * T::from_f32(1.0 / 6.0)
+        -(parameters[0] + parameters[1] * context.pressure.max(T::ZERO)) * sum * T::from_f64(1.0 / 6.0)
     }
 }
