@@ -115,6 +115,11 @@ impl Bench {
         self.clock
     }
 
+    /// The force without instruments at the last step, N.
+    pub fn true_force(&self) -> f64 {
+        self.force
+    }
+
     /// Carry out a protocol and give its files. The muscle keeps what happened to it: a second protocol goes on from there.
     pub fn run(&mut self, protocol: &Protocol) -> Result<Vec<Recording>, ProtocolError> {
         protocol.check()?;

@@ -269,6 +269,11 @@ impl Muscle {
         self.surface.volume(self.tube_volume, self.length(stroke))
     }
 
+    /// Mean I1 − 3 of the bladder's rubber at a stroke.
+    pub fn stretch(&self, stroke: f64) -> f64 {
+        self.surface.stretch(self.length(stroke))
+    }
+
     /// What is true of this muscle at these pressures (Pa).
     pub fn truth(&self, pressures: &[f64]) -> Truth {
         // The blocked core force is straight in the pressure once the bladder lies against the braid.

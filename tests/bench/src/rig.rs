@@ -12,6 +12,8 @@ pub struct Rig {
     pub stiffness: f64,
     /// Play of a joint, m: the muscle's end follows the crosshead only at the play's edges, which are soft.
     pub play: f64,
+    /// Zero error of the stroke, m: the muscle is shorter by this than the crosshead tells.
+    pub offset: f64,
     /// Moving mass between muscle and cell, kg.
     pub mass: f64,
     /// Weight that hangs in the cell's reading, N.
@@ -55,7 +57,7 @@ impl RigState {
 
     /// Stroke of the muscle (m) when the crosshead stands at `crosshead` (m) under the force of the last step (N).
     pub fn stroke(&mut self, crosshead: f64, force: f64) -> f64 {
-        let mut stroke = crosshead;
+        let mut stroke = crosshead + self.with.offset;
         if self.with.stiffness > 0.0 {
             // Half of each change is taken per step: the muscle's own stiffness must not make the two chase each other.
             self.pull += 0.5 * (force - self.pull);

@@ -1,0 +1,257 @@
+//! Making a trial: the campaign with its effects, its twin without, held-out recordings, and the sealed truth.
+
+use crate::inject::{Injection, Parameter, Scale};
+use crate::spec::{Spec, Stratum};
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+use virtual_bench::bench::{Bench, BenchSpec};
+use virtual_bench::campaigns;
+use virtual_bench::muscle::Muscle;
+use virtual_bench::pneumatics::Pneumatics;
+use virtual_bench::protocol::{Place, Protocol, Step};
+use virtual_bench::recording::{Recording, Row};
+use virtual_bench::rng::Rng;
+use virtual_bench::sensors::Sensor;
+
+/// One injected effect, as it stands in the sealed truth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TrueEffect {
+    /// Name in the catalogue, or of a mechanism outside it.
+    pub name: String,
+    /// Peak (99.5 % quantile) of the raw effect over the campaign, percent of the blocked force at the highest level.
+    pub amplitude_pct: f64,
+    /// What of it is left, rms in N, after a flexible base (polynomial and friction free per level) is refitted.
+    #[serde(rename = "left_flexible_N")]
+    pub left_flexible: f64,
+    /// The same after a stiff base (one polynomial for all levels).
+    #[serde(rename = "left_stiff_N")]
+    pub left_stiff: f64,
+    /// Its parameters, where one number says it.
+    pub parameters: Vec<Parameter>,
+}
+
+/// What is sealed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TrialTruth {
+    /// Number in the set.
+    pub id: usize,
+    /// What the trial is for.
+    pub stratum: Stratum,
+    /// Protocol of the campaign.
+    pub protocol: String,
+    /// What is hidden.
+    pub effects: Vec<TrueEffect>,
+    /// For a decoy, what it looks like.
+    pub looks_like: Option<String>,
+    /// Standard deviation of the force's noise, N, and its correlation time, s.
+    #[serde(rename = "noise_N")]
+    pub noise: f64,
+    /// Correlation time of the coloured part, s.
+    pub noise_time_s: f64,
+    /// Blocked force at the highest level, N.
+    #[serde(rename = "blocked_force_N")]
+    pub blocked_force: f64,
+    /// The muscle and its bench in full.
+    pub bench: BenchSpec,
+    /// Salt, so that the hash cannot be guessed from a likely truth.
+    pub salt: String,
+}
+
+/// A trial, made.
+#[derive(Debug, Clone)]
+pub struct Trial {
+    /// Muscle description as an engineer would measure it.
+    pub description: String,
+    /// The campaign.
+    pub recordings: Vec<Recording>,
+    /// Recordings that nobody sees before the answers are frozen; they follow the campaign.
+    pub held_out: Vec<Recording>,
+    /// Campaign and held-out recordings of the twin muscle without the effect.
+    pub twin: (Vec<Recording>, Vec<Recording>),
+    /// The sealed truth.
+    pub truth: TrialTruth,
+}
+
+/// Two levels that the campaign did not have, at another speed, after everything else.
+fn held_out_protocol(levels: &[f64], speed: f64) -> Protocol {
+    let between = |i: usize| 0.5 * (levels[i] + levels[i + 1]);
+    let mut step = Vec::new();
+    for (n, &p) in [between(3), between(1)].iter().enumerate() {
+        let loops = |count, speed_mm_s| Step::Cycles { to: Place::free(1.0), speed_mm_s, count };
+        step.push(Step::Pressure { to_kpa: p * 1e-3, rate_kpa_s: Some(50.0), settle_s: 2.0 });
+        step.push(Step::File { name: format!("held_out_{}", n + 1) });
+        step.extend([loops(1, speed), loops(2, 2.0 * speed), Step::EndFile]);
+    }
+    Protocol { name: "held-out".into(), sample_hz: 10.0, step }
+}
+
+fn duration(protocol: &Protocol, bench: &BenchSpec) -> f64 {
+    let mut quiet = bench.clone();
+    quiet.muscle.physics = Default::default();
+    let mut b = Bench::new(&quiet);
+    // A protocol that was built for the muscle passes its own check.
+    let _ = b.run(protocol);
+    b.clock()
+}
+
+/// The bench with instruments and regulator that add nothing of their own, so that two runs differ by the effect alone.
+fn silent(bench: &BenchSpec) -> BenchSpec {
+    let mut b = bench.clone();
+    let keep = |s: Sensor| Sensor { white: 0.0, coloured: (0.0, 1.0), outliers: (0.0, 0.0), ..s };
+    b.instruments.force = keep(b.instruments.force);
+    b.instruments.pressure = keep(b.instruments.pressure);
+    b.instruments.stroke = keep(b.instruments.stroke);
+    b.pneumatics = Pneumatics { ripple: (0.0, 1.0), wander: (0.0, 1.0), deadband: 0.0, ..b.pneumatics };
+    b
+}
+
+fn rows(bench: &BenchSpec, protocol: &Protocol) -> Vec<Vec<Row>> {
+    let run = Bench::new(bench).run(protocol).unwrap_or_default();
+    run.into_iter().map(|f| f.rows).collect()
+}
+
+/// What an effect does to the force at the same measured pressure and stroke, row by row.
+fn difference(with: &[Vec<Row>], without: &[Vec<Row>], g: &virtual_bench::tube::Geometry) -> Vec<f64> {
+    with.iter()
+        .flatten()
+        .zip(without.iter().flatten())
+        .map(|(a, b)| {
+            let area = g.pulling_area(g.rest_length - b.stroke);
+            (a.force - b.force) - area * (a.pressure - b.pressure)
+        })
+        .collect()
+}
+
+fn quantile(values: &[f64], q: f64) -> f64 {
+    let mut v: Vec<f64> = values.iter().map(|x| x.abs()).filter(|x| x.is_finite()).collect();
+    v.sort_by(f64::total_cmp);
+    v.get(((v.len() as f64 * q) as usize).min(v.len().saturating_sub(1))).copied().unwrap_or(0.0)
+}
+
+/// Rms of what is left of a difference after a base is refitted: per level (flexible) or over all levels (stiff).
+fn left(difference: &[f64], files: &[Vec<Row>], stroke: f64, force: f64, flexible: bool) -> f64 {
+    let mut blocks: Vec<(DMatrix<f64>, DVector<f64>)> = Vec::new();
+    let mut at = 0;
+    for file in files {
+        let n = file.len();
+        let step = (n / 400).max(1);
+        let top = file.iter().map(|r| r.pressure).fold(1.0, f64::max);
+        let mut data = Vec::new();
+        let mut rhs = Vec::new();
+        for i in (step..n.saturating_sub(step)).step_by(step) {
+            let r = &file[i];
+            let way = (file[i + step].stroke - file[i - step].stroke).signum();
+            let u = r.stroke / stroke;
+            let f = r.force / force;
+            if flexible {
+                data.extend([1.0, u, u * u, u.powi(3), u.powi(4), way * f]);
+            } else {
+                let p = r.pressure / 5e5;
+                data.extend([1.0, u, u * u, u.powi(3), u.powi(4), u.powi(5), way * f, way * f * p]);
+            }
+            rhs.push(difference[at + i]);
+        }
+        at += n;
+        let columns = if flexible { 6 } else { 8 };
+        if rhs.len() > columns && top > 20e3 {
+            blocks.push((DMatrix::from_row_slice(rhs.len(), columns, &data), DVector::from_vec(rhs)));
+        }
+    }
+    if !flexible && !blocks.is_empty() {
+        let columns = blocks[0].0.ncols();
+        let total: usize = blocks.iter().map(|b| b.0.nrows()).sum();
+        let data: Vec<f64> = blocks.iter().flat_map(|b| b.0.transpose().as_slice().to_vec()).collect();
+        let rhs: Vec<f64> = blocks.iter().flat_map(|b| b.1.as_slice().to_vec()).collect();
+        blocks = vec![(DMatrix::from_row_slice(total, columns, &data), DVector::from_vec(rhs))];
+    }
+    let (mut sum, mut n) = (0.0, 0usize);
+    for (a, y) in blocks {
+        let solved = a.clone().svd(true, true).solve(&y, 1e-10);
+        let rest = solved.map_or_else(|_| y.clone(), |x| &y - &a * x);
+        sum += rest.norm_squared();
+        n += rest.len();
+    }
+    (sum / n.max(1) as f64).sqrt()
+}
+
+/// Lose some rows: uneven sampling.
+fn thin(files: &mut [Recording], part: f64, seed: u64) {
+    if part <= 0.0 {
+        return;
+    }
+    let mut r = Rng::stream(seed, "lost rows");
+    for f in files {
+        f.rows.retain(|_| !r.chance(part));
+    }
+}
+
+/// Make one trial.
+pub fn make(spec: &Spec) -> Trial {
+    let muscle = Muscle::new(spec.bench.muscle.clone());
+    let levels = campaigns::levels(&muscle);
+    let speed = campaigns::slow(&muscle, &levels);
+    let protocol = campaigns::by_name(spec.protocol, &muscle, &levels, spec.seed)
+        .unwrap_or_else(|| campaigns::classic(&muscle, &levels));
+    let seconds = duration(&protocol, &spec.bench);
+    let scale = Scale::new(&muscle, &levels, speed * 1e-3, seconds);
+    let geometry = spec.bench.muscle.geometry;
+    let quiet = silent(&spec.bench);
+    let without = if spec.effects.is_empty() { Vec::new() } else { rows(&quiet, &protocol) };
+    let size = |injection: &Injection, s: f64| {
+        let mut b = quiet.clone();
+        injection.apply(&mut b, &scale, s);
+        let with = rows(&b, &protocol);
+        let d = difference(&with, &without, &geometry);
+        (quantile(&d, 0.995) / scale.force, d)
+    };
+    let mut bench = spec.bench.clone();
+    let mut effects = Vec::new();
+    for (injection, wanted) in &spec.effects {
+        let mut s = 1.0;
+        let (mut is, mut d) = size(injection, s);
+        for _ in 0..3 {
+            if is <= 0.0 || (is / wanted - 1.0).abs() < 0.1 {
+                break;
+            }
+            s = (s * (wanted / is).clamp(0.02, 50.0)).clamp(1e-3, injection.strongest());
+            (is, d) = size(injection, s);
+        }
+        let parameters = injection.apply(&mut bench, &scale, s);
+        effects.push(TrueEffect {
+            name: injection.name.into(),
+            amplitude_pct: 100.0 * is,
+            left_flexible: left(&d, &without, scale.stroke, scale.force, true),
+            left_stiff: left(&d, &without, scale.stroke, scale.force, false),
+            parameters,
+        });
+    }
+    let after = held_out_protocol(&levels, speed);
+    let campaign = |b: &BenchSpec| {
+        let mut at = Bench::new(b);
+        let mut first = at.run(&protocol).unwrap_or_default();
+        let mut second = at.run(&after).unwrap_or_default();
+        thin(&mut first, spec.lost_rows, spec.seed);
+        thin(&mut second, spec.lost_rows, spec.seed ^ 1);
+        (first, second)
+    };
+    let (recordings, held_out) = campaign(&bench);
+    let twin = if spec.effects.is_empty() { (Vec::new(), Vec::new()) } else { campaign(&spec.bench) };
+    let mut said = spec.bench.muscle.clone();
+    said.geometry.rest_length *= 1.0 + spec.measured.0;
+    said.geometry.braid_angle += spec.measured.1.to_radians();
+    let force = bench.instruments.force;
+    let mut salt = Rng::stream(spec.seed, "salt");
+    let truth = TrialTruth {
+        id: spec.id,
+        stratum: spec.stratum,
+        protocol: spec.protocol.into(),
+        effects,
+        looks_like: spec.looks_like.map(Into::into),
+        noise: force.white.hypot(force.coloured.0),
+        noise_time_s: force.coloured.1,
+        blocked_force: scale.force,
+        bench,
+        salt: format!("{:016x}{:016x}", salt.bits(), salt.bits()),
+    };
+    Trial { description: said.description(), recordings, held_out, twin, truth }
+}

@@ -1,0 +1,93 @@
+//! Files of a set: what the tool may see, what is sealed, and the ledger of hashes that is written first.
+
+use crate::generate::{Trial, make};
+use crate::spec::Spec;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::error::Error;
+use std::io::Read as _;
+use std::path::Path;
+use virtual_bench::recording::{Columns, Recording};
+
+/// The ledger of a set.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Ledger {
+    /// `dev` or `final`.
+    pub set: String,
+    /// The SHA-256 of the seed's decimal digits; the seed itself lies in sealed/seed.txt.
+    pub seed_sha256: String,
+    /// SHA-256 of each sealed truth file, in order of the trials.
+    pub truths: Vec<String>,
+    /// SHA-256 of each frozen answer, in order of the trials; empty before.
+    pub answers: Vec<String>,
+}
+
+/// SHA-256 in hexadecimal.
+pub fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// A seed from the operating system.
+pub fn secret_seed() -> Result<u64, Box<dyn Error>> {
+    let mut bytes = [0u8; 8];
+    std::fs::File::open("/dev/urandom")?.read_exact(&mut bytes)?;
+    Ok(u64::from_le_bytes(bytes))
+}
+
+/// Directory name of a trial.
+pub fn name(id: usize) -> String {
+    format!("{id:04}")
+}
+
+fn put(path: &Path, text: &str) -> Result<(), String> {
+    std::fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+fn directory(path: &Path) -> Result<(), String> {
+    std::fs::create_dir_all(path).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+fn put_recordings(dir: &Path, files: &[Recording]) -> Result<(), String> {
+    directory(dir)?;
+    for f in files {
+        put(&dir.join(format!("{}.csv", f.name)), &f.csv(Columns::default()))?;
+    }
+    Ok(())
+}
+
+fn put_trial(output: &Path, trial: &Trial) -> Result<String, String> {
+    let id = name(trial.truth.id);
+    let open = output.join("trials").join(&id);
+    put_recordings(&open, &trial.recordings)?;
+    put(&open.join("muscle.toml"), &trial.description)?;
+    let sealed = output.join("sealed").join(&id);
+    put_recordings(&sealed.join("held_out"), &trial.held_out)?;
+    if !trial.twin.0.is_empty() {
+        put_recordings(&sealed.join("twin"), &trial.twin.0)?;
+        put_recordings(&sealed.join("twin_held_out"), &trial.twin.1)?;
+    }
+    let truth = serde_json::to_string_pretty(&trial.truth).map_err(|e| e.to_string())?;
+    put(&sealed.join("truth.json"), &truth)?;
+    Ok(sha256(truth.as_bytes()))
+}
+
+/// Make and write a set; the ledger comes last, when every hash is known, and before any answer.
+pub fn write_set(output: &Path, set: &str, seed: u64, specs: &[Spec]) -> Result<(), Box<dyn Error>> {
+    if output.join("ledger.json").exists() {
+        return Err(
+            format!("{}: there is a set already; a set is never overwritten", output.display()).into()
+        );
+    }
+    directory(&output.join("sealed"))?;
+    put(&output.join("sealed").join("seed.txt"), &seed.to_string())?;
+    let truths: Result<Vec<String>, String> = specs.par_iter().map(|s| put_trial(output, &make(s))).collect();
+    let ledger = Ledger {
+        set: set.into(),
+        seed_sha256: sha256(seed.to_string().as_bytes()),
+        truths: truths?,
+        answers: Vec::new(),
+    };
+    put(&output.join("ledger.json"), &serde_json::to_string_pretty(&ledger)?)?;
+    Ok(())
+}

@@ -1,0 +1,254 @@
+//! What a trial is: stratum, protocol, muscle, effects, noise; drawn from a prior that is public, with a seed that is not.
+
+use crate::inject::Injection;
+use crate::names::{OUTSIDE, SINGLES, class};
+use serde::{Deserialize, Serialize};
+use virtual_bench::bench::BenchSpec;
+use virtual_bench::material::Hyperelastic;
+use virtual_bench::pneumatics::Pneumatics;
+use virtual_bench::presets;
+use virtual_bench::rng::Rng;
+
+/// What a trial is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stratum {
+    /// Nothing is left out.
+    NullClean,
+    /// Nothing is left out, but the data are bad.
+    NullNasty,
+    /// One effect.
+    Single,
+    /// Two effects.
+    Pair,
+    /// One effect in the shape of another.
+    Decoy,
+    /// Something that no name describes.
+    Outside,
+}
+
+/// One trial, drawn.
+#[derive(Debug, Clone)]
+pub struct Spec {
+    /// Its number in the set.
+    pub id: usize,
+    /// What it is for.
+    pub stratum: Stratum,
+    /// `A`, `D` or `C`.
+    pub protocol: &'static str,
+    /// What is hidden: the effect and its wanted size, in parts of the blocked force.
+    pub effects: Vec<(Injection, f64)>,
+    /// For a decoy, what it looks like.
+    pub looks_like: Option<&'static str>,
+    /// The bench without the effects.
+    pub bench: BenchSpec,
+    /// Seed of everything else in this trial.
+    pub seed: u64,
+    /// Part of the rows that is lost, for uneven sampling.
+    pub lost_rows: f64,
+    /// Errors of ruler and protractor: relative length, and angle in degrees.
+    pub measured: (f64, f64),
+}
+
+/// Numbers of trials per stratum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Composition {
+    /// Clean nulls.
+    pub clean: usize,
+    /// Nasty nulls.
+    pub nasty: usize,
+    /// Single effects.
+    pub single: usize,
+    /// Pairs.
+    pub pair: usize,
+    /// Decoys.
+    pub decoy: usize,
+    /// Outside the library.
+    pub outside: usize,
+}
+
+impl Composition {
+    /// The set of proof: 330 trials.
+    pub const FINAL: Self = Self { clean: 30, nasty: 30, single: 180, pair: 45, decoy: 15, outside: 30 };
+
+    /// The same mixture in `n` trials, every stratum at least once.
+    pub fn scaled(n: usize) -> Self {
+        let part = |of: usize| ((of * n) as f64 / 330.0).round().max(1.0) as usize;
+        let f = Self::FINAL;
+        let mut c = Self {
+            clean: part(f.clean),
+            nasty: part(f.nasty),
+            single: 0,
+            pair: part(f.pair),
+            decoy: part(f.decoy),
+            outside: part(f.outside),
+        };
+        c.single = n.saturating_sub(c.clean + c.nasty + c.pair + c.decoy + c.outside);
+        c
+    }
+
+    fn strata(&self) -> Vec<Stratum> {
+        [
+            (Stratum::NullClean, self.clean),
+            (Stratum::NullNasty, self.nasty),
+            (Stratum::Single, self.single),
+            (Stratum::Pair, self.pair),
+            (Stratum::Decoy, self.decoy),
+            (Stratum::Outside, self.outside),
+        ]
+        .iter()
+        .flat_map(|&(s, n)| std::iter::repeat_n(s, n))
+        .collect()
+    }
+}
+
+/// Effects that are made to look like others: (truth, looks like).
+const DECOYS: [(&str, &str); 5] = [
+    ("pressure-lag", "viscous-damping"),
+    ("sensor-delay", "viscous-damping"),
+    ("force-drift", "thermal-softening"),
+    ("backlash", "presliding-hysteresis"),
+    ("rig-compliance", "braid-elasticity"),
+];
+
+/// Draw a set of trials.
+pub fn draw(seed: u64, composition: Composition) -> Vec<Spec> {
+    let mut r = Rng::stream(seed, "set");
+    let mut singles: Vec<usize> = (0..SINGLES.len()).collect();
+    let mut strata = composition.strata();
+    // Singles go round the catalogue in shuffled order, so that every name comes as often as any other.
+    r.shuffle(&mut singles);
+    let mut single = 0;
+    let mut specs: Vec<Spec> = Vec::new();
+    let mut per_stratum = std::collections::HashMap::new();
+    for (id, stratum) in strata.drain(..).enumerate() {
+        let n: &mut usize = per_stratum.entry(stratum).or_insert(0);
+        // Three protocols equally within each stratum; for singles shifted on every round of the catalogue.
+        let protocol = ["A", "D", "C"][(*n + *n / SINGLES.len()) % 3];
+        let mut mine = Rng::stream(seed, &format!("trial {id}"));
+        let names: Vec<&'static str> = match stratum {
+            Stratum::NullClean | Stratum::NullNasty => Vec::new(),
+            Stratum::Single => {
+                single += 1;
+                vec![SINGLES[singles[(single - 1) % singles.len()]].0]
+            }
+            Stratum::Pair => pair(&mut mine, n.is_multiple_of(2)),
+            Stratum::Decoy => vec![DECOYS[*n % DECOYS.len()].0],
+            Stratum::Outside => vec![OUTSIDE[*n % OUTSIDE.len()]],
+        };
+        let looks_like = (stratum == Stratum::Decoy).then(|| DECOYS[*n % DECOYS.len()].1);
+        *n += 1;
+        specs.push(one(id, stratum, protocol, &names, looks_like, &mut mine));
+    }
+    specs
+}
+
+fn pair(r: &mut Rng, same_class: bool) -> Vec<&'static str> {
+    for _ in 0..1000 {
+        let (a, b) = (SINGLES[r.index(SINGLES.len())].0, SINGLES[r.index(SINGLES.len())].0);
+        if a != b && (class(a) == class(b)) == same_class {
+            return vec![a, b];
+        }
+    }
+    vec!["viscous-damping", "sensor-delay"]
+}
+
+fn one(
+    id: usize,
+    stratum: Stratum,
+    protocol: &'static str,
+    names: &[&'static str],
+    looks_like: Option<&'static str>,
+    r: &mut Rng,
+) -> Spec {
+    let seed = r.bits();
+    let mut muscle = presets::random(seed);
+    muscle.name = format!("trial-{id:04}");
+    // The contact's own give stays below what one sample sees, so that the plain law of friction is the truth of a null.
+    let travel = muscle.geometry.rest_length * r.log_range(2e-5, 1e-4);
+    muscle.friction.bristles = vec![(1.0, travel)];
+    let nasty = stratum == Stratum::NullNasty;
+    if nasty && r.chance(0.5) {
+        // A rubber that stiffens strongly: the elastic table is curved far more than a polynomial likes.
+        let c10 = 0.3e6;
+        let c30 = c10 * r.log_range(0.01, 0.03);
+        muscle.material = Hyperelastic::Yeoh { c10, c20: -0.02 * c10, c30 };
+        let top = 0.9 * muscle.max_pressure;
+        let (deadband, contraction) = (muscle.max_pressure * r.range(0.06, 0.12), r.range(0.1, 0.2));
+        muscle = muscle.with_deadband(deadband).with_free_contraction(top, contraction);
+    }
+    let mut bench = BenchSpec::laboratory(muscle, seed);
+    bench.pneumatics = Pneumatics {
+        lag: r.log_range(0.01, 0.1),
+        rate: r.log_range(3e5, 5e6),
+        deadband: r.range(0.0, 800.0),
+        ripple: (r.log_range(50.0, 600.0), r.range(0.5, 6.0)),
+        wander: (r.log_range(100.0, 800.0), r.log_range(2.0, 30.0)),
+        line: r.log_range(5e-4, 4e-3),
+        ..Pneumatics::default()
+    };
+    let i = &mut bench.instruments;
+    let louder = if nasty { r.range(1.5, 4.0) } else { 1.0 };
+    let range = i.force.coloured.0 / 3e-4;
+    i.force.white = louder * range * r.log_range(1e-4, 4e-4);
+    i.force.coloured = (louder * range * r.log_range(2e-4, 6e-4), r.log_range(1.0, 15.0));
+    if nasty {
+        i.force.outliers = (r.log_range(2e-4, 3e-3), r.range(8.0, 40.0));
+        i.pressure.outliers = (r.log_range(1e-4, 1e-3), r.range(5.0, 15.0));
+        i.stroke.white *= r.range(1.0, 4.0);
+    }
+    let measured = if nasty { (0.002 * r.normal(), 0.1 * r.normal()) } else { (0.0, 0.0) };
+    let lost_rows = if nasty && r.chance(0.6) { r.range(0.02, 0.3) } else { 0.0 };
+    let effects = names
+        .iter()
+        .map(|&name| {
+            let size = match stratum {
+                Stratum::Outside => r.log_range(0.01, 0.06),
+                Stratum::Decoy => r.log_range(0.01, 0.06),
+                Stratum::Pair => r.log_range(0.008, 0.06),
+                _ => r.log_range(0.003, 0.08),
+            };
+            (Injection::new(name, r.bits()), size)
+        })
+        .collect();
+    Spec { id, stratum, protocol, effects, looks_like, bench, seed, lost_rows, measured }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_final_set_is_composed_as_registered() {
+        let specs = draw(1, Composition::FINAL);
+        assert_eq!(specs.len(), 330);
+        for protocol in ["A", "C", "D"] {
+            let n = specs.iter().filter(|s| s.protocol == protocol).count();
+            assert!((108..=112).contains(&n), "{protocol}: {n}");
+        }
+        for (name, _) in SINGLES {
+            let n =
+                specs.iter().filter(|s| s.stratum == Stratum::Single && s.effects[0].0.name == name).count();
+            assert_eq!(n, 5, "{name}");
+        }
+        let same = specs.iter().filter(|s| {
+            s.stratum == Stratum::Pair && class(s.effects[0].0.name) == class(s.effects[1].0.name)
+        });
+        assert_eq!(same.count(), 23);
+    }
+
+    #[test]
+    fn a_name_meets_more_than_one_protocol() {
+        let specs = draw(2, Composition::FINAL);
+        for (name, _) in SINGLES {
+            let mut met: Vec<&str> = specs
+                .iter()
+                .filter(|s| s.stratum == Stratum::Single && s.effects[0].0.name == name)
+                .map(|s| s.protocol)
+                .collect();
+            met.sort_unstable();
+            met.dedup();
+            assert_eq!(met.len(), 3, "{name} {met:?}");
+        }
+    }
+}
