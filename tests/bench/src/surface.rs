@@ -64,7 +64,7 @@ impl Surface {
             (geometry.braid_radius(l0 * shortest.clamp(0.5, 0.97)) - first) / (LENGTH_NODES - 1) as f64;
         let at = |i: usize| geometry.length_at(first + pitch * i as f64);
         let cylinder = shape.ends <= 0.0 && shape.fibre_stiffness.is_none();
-        let nodes = if cylinder { 1 } else { PRESSURE_NODES };
+        let nodes = if shape.fibre_stiffness.is_none() { 1 } else { PRESSURE_NODES };
         let pressure_pitch = 1.1 * max_pressure / (PRESSURE_NODES - 1) as f64;
         let spline = |f: &dyn Fn(f64) -> f64| Spline::new((0..LENGTH_NODES).map(|i| f(at(i))).collect());
         let rows = (0..nodes)
@@ -158,10 +158,14 @@ fn cylinder_parts(g: &Geometry, tube: &Tube, l: f64) -> Parts {
 
 /// Slices of a tapering end, per half.
 const END_SLICES: usize = 12;
+/// Length of a taper per depth.
+pub const TAPER: f64 = 2.0;
 
 /// Stored energy and outer volume of the muscle with tapering ends; the middle radius follows from the fibre's length.
-fn tapered(g: &Geometry, tube: &Tube, ends: f64, w: f64, e: f64, l: f64) -> (f64, f64) {
+fn tapered(g: &Geometry, tube: &Tube, ends: f64, e: f64, l: f64) -> (f64, f64) {
     let b = g.fibre() * (1.0 + e);
+    let depth = (g.braid_radius(l) - g.radius).max(0.0) + 0.1 * g.radius;
+    let w = (2.0 * TAPER * depth / g.rest_length).min(0.95);
     let turns = g.turns();
     let slice = |middle: f64, q: f64| {
         let fitting = middle - ends * (middle - g.radius);
@@ -209,32 +213,24 @@ fn tapered(g: &Geometry, tube: &Tube, ends: f64, w: f64, e: f64, l: f64) -> (f64
 }
 
 fn relaxed_parts(g: &Geometry, tube: &Tube, shape: Shape, l: f64, p: f64) -> Parts {
-    let state = |w: f64, e: f64, l: f64| {
+    let state = |e: f64, l: f64| {
         if shape.ends > 0.0 {
-            tapered(g, tube, shape.ends, w, e, l)
+            tapered(g, tube, shape.ends.min(1.0), e, l)
         } else {
             let b = g.fibre() * (1.0 + e);
             let r = (b * b - l * l).max(0.0).sqrt() / (2.0 * PI * g.turns());
             (tube.stored(l, r).energy, PI * r * r * l)
         }
     };
-    let potential = |w: f64, e: f64| {
-        let (energy, volume) = state(w, e, l);
-        let fibres = shape.fibre_stiffness.map_or(0.0, |k| 0.5 * k * g.fibre() * e * e);
-        energy + fibres - p * volume
-    };
-    let widest = (3.0 * g.radius / g.rest_length).clamp(0.1, 0.9);
-    let (mut w, mut e) = (widest * 0.3, 0.0);
-    for _ in 0..if shape.ends > 0.0 && shape.fibre_stiffness.is_some() { 3 } else { 1 } {
-        if shape.ends > 0.0 {
-            w = least(&|w| potential(w, e), 0.02 * widest, widest);
-        }
-        if shape.fibre_stiffness.is_some() {
-            e = least(&|e| potential(w, e), -0.002, 0.1);
-        }
-    }
+    let stretch = shape.fibre_stiffness.map_or(0.0, |k| {
+        let potential = |e: f64| {
+            let (energy, volume) = state(e, l);
+            energy + 0.5 * k * g.fibre() * e * e - p * volume
+        };
+        least(&potential, -0.002, 0.1)
+    });
     let h = 2e-5 * g.rest_length;
-    let (up, down) = (state(w, e, l + h), state(w, e, l - h));
+    let (up, down) = (state(stretch, l + h), state(stretch, l - h));
     Parts { area: -(up.1 - down.1) / (2.0 * h), elastic: (up.0 - down.0) / (2.0 * h) }
 }
 
@@ -313,8 +309,7 @@ mod tests {
         let (g, tube) = mini();
         let (l, p) = (g.rest_length * 0.95, 400e3);
         let force = |ends: f64| {
-            let shape = Shape { ends, ..Shape::default() };
-            let a = relaxed_parts(&g, &tube, shape, l, p);
+            let a = relaxed_parts(&g, &tube, Shape { ends, ..Shape::default() }, l, p);
             p * a.area + a.elastic
         };
         let c = cylinder_parts(&g, &tube, l);
@@ -341,7 +336,7 @@ mod tests {
     #[test]
     fn the_table_reproduces_what_it_tabulates() {
         let (g, tube) = mini();
-        let shape = Shape { ends: 0.5, ..Shape::default() };
+        let shape = Shape { ends: 0.5, fibre_stiffness: Some(2e4) };
         let table = Surface::new(g, tube, shape, 552e3, 0.85);
         for (l, p) in [(0.9731, 333e3), (0.991, 151e3), (0.921, 537e3)] {
             let l = l * g.rest_length;

@@ -76,7 +76,9 @@ impl Injection {
     /// Largest strength that is still the effect and not nonsense.
     pub fn strongest(&self) -> f64 {
         match self.name {
-            "tip-effect" => 2.0,
+            "tip-effect" => 0.6,
+            "pressure-sensor-lag" => 5.0,
+            "misalignment" => 3.4,
             "presliding-hysteresis" => 1.0,
             "friction-asymmetry" => 6.0,
             "contact-loss" => 4.0,
@@ -216,7 +218,7 @@ impl Injection {
                 say("time", law.time, "s");
                 say("travel", law.travel, "m");
             }
-            "tip-effect" => bench.muscle.shape.ends = (0.5 * s).min(1.0),
+            "tip-effect" => bench.muscle.shape.ends = s.min(0.6),
             "braid-elasticity" => {
                 let stiffness = 60.0 * f / s.max(1e-3);
                 bench.muscle.shape.fibre_stiffness = Some(stiffness);
