@@ -249,6 +249,52 @@ impl<T: Scalar> Posture<T> {
     }
 }
 
+/// How the shape changes with contraction stroke `x`: derivatives by `x` of what [`Posture`] holds under the same names.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PostureSlopes<T> {
+    /// `dg/dx`, m.
+    pub area: T,
+    /// `d(V_B/L)/dx`, m.
+    pub axial_area: T,
+    /// `d(t L²/(2πN²R))/dx`, m.
+    pub hoop_area: T,
+    /// `dε_z/dx`, 1/m.
+    pub axial_strain: T,
+    /// `dε_x/dx`, 1/m.
+    pub radial_strain: T,
+}
+
+impl<T: Scalar> Braid<T> {
+    /// The derivatives by stroke at a posture, from those of [`Braid::posture`]'s equations:
+    ///
+    /// ```text
+    /// dR/dx = L/((2πN)² R)      dt/dx = dR/dx − (R dR/dx − V_B/(2π L²))/(R − t)
+    /// ```
+    /// Finite everywhere; without meaning where the posture has none.
+    #[inline]
+    pub fn slopes(&self, posture: &Posture<T>) -> PostureSlopes<T> {
+        let small = self.rest_radius * T::from_f32(1.0e-3);
+        let radius = posture.radius.max(small);
+        let inv_length = T::ONE / posture.length;
+        let widening = posture.length * self.inv_two_pi_turns * self.inv_two_pi_turns / radius;
+        let bore = posture.radius - posture.wall;
+        let squeezed = T::from_f32(0.5) * self.bladder_volume_over_pi * inv_length * inv_length;
+        // Where the bladder fills the sleeve the posture holds the bore at zero, and the wall is the radius.
+        let thinning = if bore > small { widening - (radius * widening - squeezed) / bore } else { widening };
+        let shortening = -T::ONE - self.tip * widening;
+        let per_length = shortening / posture.load_length;
+        let squared = self.inv_four_pi_turns_squared * posture.load_length * shortening;
+        let thin = thinning / posture.wall.max(small);
+        PostureSlopes {
+            area: (squared + squared + squared) * T::from_f32(2.0),
+            axial_area: -posture.axial_area * per_length,
+            hoop_area: posture.hoop_area * (thin + per_length + per_length - widening / radius),
+            axial_strain: shortening * self.inv_rest_length,
+            radial_strain: widening * self.inv_rest_radius,
+        }
+    }
+}
+
 /// The thesis's miniature muscle, for examples and tests.
 pub fn miniature() -> Geometry {
     Geometry {
@@ -289,6 +335,31 @@ mod tests {
             let dv_dx = (volume(x + h) - volume(x - h)) / (2.0 * h);
             let area = braid.posture(Length::from_metres(x)).area;
             assert!((dv_dx - area).abs() < 1e-6 * area, "at {x} m: {dv_dx} and {area}");
+        }
+    }
+
+    #[test]
+    fn slopes_agree_with_differences() {
+        for tip_correction in [false, true] {
+            let braid = Geometry { tip_correction, ..miniature() }.build().expect("a valid geometry");
+            let h = 1e-7;
+            for x in [-0.2e-3, 0.0, 1.0e-3, 3.0e-3] {
+                let at = |x: f64| braid.posture(Length::from_metres(x));
+                let slopes = braid.slopes(&at(x));
+                let (up, down) = (at(x + h), at(x - h));
+                let check = |name: &str, of: fn(&Posture<f64>) -> f64, slope: f64| {
+                    let difference = (of(&up) - of(&down)) / (2.0 * h);
+                    assert!(
+                        (slope - difference).abs() < 1e-6 * difference.abs(),
+                        "{name} at {x}: {slope} {difference}"
+                    );
+                };
+                check("area", |p| p.area, slopes.area);
+                check("axial area", |p| p.axial_area, slopes.axial_area);
+                check("hoop area", |p| p.hoop_area, slopes.hoop_area);
+                check("axial strain", |p| p.axial_strain, slopes.axial_strain);
+                check("radial strain", |p| p.radial_strain, slopes.radial_strain);
+            }
         }
     }
 

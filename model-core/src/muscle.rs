@@ -44,6 +44,15 @@ pub struct Held<T> {
     pub columns: [T; MAX_ORDER],
 }
 
+/// How a [`Held`] muscle's coefficients change with stroke `x`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeldSlopes<T> {
+    /// `dg/dx`, m.
+    pub area: T,
+    /// `dc_k/dx`, m.
+    pub columns: [T; MAX_ORDER],
+}
+
 /// The parts of the base model's force at one moment, N and N/Pa.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Parts<T> {
@@ -197,10 +206,7 @@ impl<T: Scalar> Muscle<T> {
     /// The same where the stroke's part is known already.
     pub fn context_held(&self, held: &Held<T>, motion: &Motion<T>, pressure: Pressure<T>) -> Context<T> {
         let parts = self.parts(held, pressure);
-        // A central difference over a thousandth of the rest length: the columns are smooth on that scale.
-        let h = self.braid.rest_length() * T::from_f32(1.0e-3);
-        let quasi_at = |x: T| self.parts(&self.held(Length::from_metres(x)), pressure).quasi();
-        let stiffness = (quasi_at(motion.stroke + h) - quasi_at(motion.stroke - h)) / (h + h);
+        let stiffness = self.stiffness_at(pressure.si(), &self.slopes(held));
         Context {
             dt: motion.dt,
             time: motion.time,
@@ -239,11 +245,65 @@ impl<T: Scalar> Muscle<T> {
         }
     }
 
+    /// How the coefficients of pressure and of the `E_k` change with stroke.
+    #[inline]
+    pub fn slopes(&self, held: &Held<T>) -> HeldSlopes<T> {
+        let posture = &held.posture;
+        let slopes = self.braid.slopes(posture);
+        let mut columns = [T::ZERO; MAX_ORDER];
+        // c_k = A ε_z^k − H ε_x^k, so c_k′ = (A′ ε_z + k A ε_z′) ε_z^(k−1) − (H′ ε_x + k H ε_x′) ε_x^(k−1).
+        let (mut axial_power, mut hoop_power) = (T::ONE, T::ONE);
+        let mut axial = slopes.axial_area * posture.axial_strain;
+        let mut hoop = slopes.hoop_area * posture.radial_strain;
+        for column in columns.iter_mut().take(self.order) {
+            axial += posture.axial_area * slopes.axial_strain;
+            hoop += posture.hoop_area * slopes.radial_strain;
+            *column = axial * axial_power - hoop * hoop_power;
+            axial_power *= posture.axial_strain;
+            hoop_power *= posture.radial_strain;
+        }
+        HeldSlopes { area: slopes.area, columns }
+    }
+
+    /// The moment with another pressure in place of the measured one: what the force there would be.
+    #[inline]
+    pub fn at_pressure(
+        &self,
+        context: &Context<T>,
+        held: &Held<T>,
+        slopes: &HeldSlopes<T>,
+        pressure: Pressure<T>,
+    ) -> (Context<T>, Parts<T>) {
+        let parts = self.parts(held, pressure);
+        let moved = Context {
+            pressure: pressure.si(),
+            corrected_pressure: pressure.si() - self.deadband,
+            gaylord: parts.gaylord,
+            elastic: parts.elastic,
+            quasi: parts.quasi(),
+            friction: parts.friction,
+            stiffness: self.stiffness_at(pressure.si(), slopes),
+            pressure_slope: parts.pressure_slope,
+            ..*context
+        };
+        (moved, parts)
+    }
+
+    /// `∂F_quasi/∂x` at a pressure, N/m.
+    #[inline]
+    fn stiffness_at(&self, pressure: T, slopes: &HeldSlopes<T>) -> T {
+        let place = self.nodes.place(pressure);
+        let segment = &self.segments[place.index];
+        let mut sum = (pressure - self.deadband) * slopes.area;
+        for (column, cubic) in slopes.columns.iter().zip(segment.iter()).take(self.order) {
+            sum += *column * spline::value(cubic, place.offset);
+        }
+        sum
+    }
+
     /// The force with the effects of `chain` at a moment that the chain has been stepped to.
     pub fn force_with(&self, chain: &Chain<T>, context: &Context<T>) -> Force<T> {
-        let place = self.nodes.place(context.pressure);
-        let friction = spline::value(&self.segments[place.index][FRICTION], place.offset);
-        self.pull(context.quasi * (T::ONE - friction * context.direction) + chain.force(context))
+        self.pull(context.force() + chain.force(context))
     }
 
     /// The sleeve's kinematics.

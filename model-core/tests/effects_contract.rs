@@ -4,10 +4,11 @@
 use model_core::effects::{
     Chain, Context, EffectName, FittedEffect, MAX_PARAMETERS, MEMORY, Memory, Role, Start,
 };
+use model_core::inverse::Reach;
 use model_core::motion::{MotionSettings, MotionTracker};
 use model_core::muscle::Muscle;
 use model_core::table;
-use model_core::units::Pressure;
+use model_core::units::{Force, Length, Pressure};
 use proptest::prelude::*;
 
 /// The catalogue's names of what belongs to the muscle.
@@ -276,4 +277,93 @@ fn a_chain_adds_its_effects_and_gives_its_memories_back() {
         woken.restore(position, memory);
     }
     assert_eq!(woken, chain);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// `force_with(pressure_with(F)) = F` with every effect, alone and all four places of a table taken, where the force rises.
+    #[test]
+    fn the_inverse_undoes_the_force_with_every_effect(
+        legs in prop::collection::vec(leg(), 1..5),
+        stroke in 0.0..2.0e-3_f64,
+        truth in 120e3..540e3_f64,
+        guess in 80e3..560e3_f64,
+        others in prop::array::uniform3(0..24_usize),
+        scale in 0.02..1.0_f64,
+    ) {
+        let muscle = muscle();
+        let mut legs = legs;
+        legs.push(Leg { stroke, pressure: 300e3, dt: 1e-3, readings: 20 });
+        let contexts = motion(&legs);
+        for effect in EffectName::ALL {
+            let names = [*effect, EffectName::ALL[others[0]], EffectName::ALL[others[1]], EffectName::ALL[others[2]]];
+            for count in [1, 4] {
+                let list: Vec<FittedEffect> = names[..count]
+                    .iter()
+                    .map(|e| FittedEffect {
+                        effect: *e,
+                        parameters: middle(*e, scale).iter().map(|p| *p as f32).collect(),
+                    })
+                    .collect();
+                let mut chain = Chain::<f64>::new(&list);
+                for c in &contexts {
+                    chain.step(c);
+                }
+                let now = contexts.last().expect("readings");
+                let held = muscle.held(Length::from_metres(now.stroke));
+                let slopes = muscle.slopes(&held);
+                let force_at = |p: f64| {
+                    let (moved, _) = muscle.at_pressure(now, &held, &slopes, Pressure::from_pascals(p));
+                    moved.force() + chain.force(&moved)
+                };
+                // Only a force that rises with pressure has one pressure that belongs to it.
+                let rises = (0..100).all(|i| force_at(6e3 * f64::from(i + 1)) > force_at(6e3 * f64::from(i)));
+                if !rises {
+                    continue;
+                }
+                let wanted = force_at(truth);
+                let found = muscle.pressure_with(
+                    Force::from_newtons(wanted), &held, &chain, now, Pressure::from_pascals(guess), &muscle.search(),
+                );
+                prop_assert_eq!(found.reach, Reach::Reached, "{:?}", names);
+                let again = force_at(found.pressure.pascals());
+                let near = (found.slope.abs() * 2.0).max(1e-9);
+                prop_assert!((again - wanted).abs() <= near, "{:?}: {} for {}", &names[..count], again, wanted);
+                prop_assert!(found.steps <= 12, "{:?}: {} steps", &names[..count], found.steps);
+            }
+        }
+    }
+
+    /// Whatever a table holds, in single precision and for a force out of reach: it ends within the limits and says so.
+    #[test]
+    fn the_inverse_ends_for_every_table(
+        stroke in -2.0e-3..20.0e-3_f64,
+        wanted in -1e3..1e3_f32,
+        names in prop::array::uniform4(0..24_usize),
+        scale in prop_oneof![Just(1.0), Just(1e3), Just(-30.0), Just(0.0)],
+    ) {
+        let muscle = Muscle::<f32>::build(&table::example()).expect("a valid table");
+        let list: Vec<FittedEffect> = names
+            .iter()
+            .map(|i| FittedEffect {
+                effect: EffectName::ALL[*i],
+                parameters: middle(EffectName::ALL[*i], scale).iter().map(|p| *p as f32).collect(),
+            })
+            .collect();
+        let mut chain = Chain::<f32>::new(&list);
+        let contexts = motion(&[Leg { stroke, pressure: 300e3, dt: 1e-2, readings: 10 }]);
+        for c in &contexts {
+            chain.step(&c.cast());
+        }
+        let now = contexts.last().expect("readings").cast::<f32>();
+        let held = muscle.held(Length::from_metres(now.stroke));
+        let found = muscle.pressure_with(
+            Force::from_newtons(wanted), &held, &chain, &now, Pressure::from_kilopascals(300.0), &muscle.search(),
+        );
+        prop_assert!(found.pressure.pascals() >= 0.0 && found.pressure <= muscle.max_pressure());
+        if found.reach == Reach::BeyondBlockedForce {
+            prop_assert_eq!(found.pressure, muscle.max_pressure());
+        }
+    }
 }
