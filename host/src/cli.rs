@@ -66,6 +66,8 @@ enum Command {
     Vent(commands::run::VentArguments),
     /// Ask a controller what it is, what it does and what went wrong; change its settings.
     Device(commands::device::Arguments),
+    /// Explain what the model leaves out, effect by effect.
+    Effects(commands::effects::Arguments),
     /// Print a completion script for a shell.
     Completions(commands::completions::Arguments),
 }
@@ -80,6 +82,7 @@ impl Command {
             Self::Run(a) => a.run(console),
             Self::Vent(a) => a.run(console),
             Self::Device(a) => a.run(console),
+            Self::Effects(a) => a.run(console),
             Self::Completions(a) => a.run(&mut Cli::command(), console),
         }
     }

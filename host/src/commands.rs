@@ -2,6 +2,7 @@
 
 pub mod completions;
 pub mod device;
+pub mod effects;
 pub mod fit;
 pub mod flash;
 pub mod port;

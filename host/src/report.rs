@@ -16,6 +16,8 @@
 //! assert!(figure.svg().contains("friction factor k"));
 //! ```
 
+pub mod effect_page;
+pub mod effect_trace;
 pub mod rich;
 
 mod axis;

@@ -121,7 +121,8 @@ pub(crate) fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
     }
     let raw = span / wanted.max(2) as f64;
     let power = 10f64.powf(raw.log10().floor());
-    let factor = [1.0, 2.0, 5.0, 10.0].into_iter().find(|f| f * power >= raw * 0.999).unwrap_or(10.0);
+    // The nearest round step, not the next larger one, or half the ticks would be lost.
+    let factor = [1.0, 2.0, 5.0, 10.0].into_iter().find(|f| f * power >= raw * 0.7).unwrap_or(10.0);
     let step = factor * power;
     let decimals = (-step.log10().floor()).max(0.0) as usize;
     let largest = low.abs().max(high.abs());
@@ -252,7 +253,7 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_tell_each_other_apart() {
-        assert_eq!(texts(&linear_ticks(-0.3, 10.2, 5)), ["0", "5", "10"]);
+        assert_eq!(texts(&linear_ticks(-0.3, 10.2, 5)), ["0", "2", "4", "6", "8", "10"]);
         assert_eq!(texts(&linear_ticks(0.0, 0.08, 5)), ["0.00", "0.02", "0.04", "0.06", "0.08"]);
         assert_eq!(texts(&linear_ticks(-1.0, 1.0, 4)), ["−1.0", "−0.5", "0.0", "0.5", "1.0"]);
         assert_eq!(texts(&linear_ticks(0.0, 3e6, 3)), ["0", "10^{6}", "2·10^{6}", "3·10^{6}"]);

@@ -102,22 +102,29 @@ fn on_paper(frame: &Frame, x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
 
 fn line(frame: &Frame, x: &[f64], y: &[f64]) -> String {
     let mut d = String::new();
-    let mut pen_down = false;
-    let mut last = String::new();
-    for (a, b) in on_paper(frame, x, y) {
-        if !(a.is_finite() && b.is_finite()) {
-            pen_down = false;
-            continue;
-        }
-        let here = format!("{} {}", px(a), px(b));
-        if pen_down && here == last {
-            continue;
-        }
-        d.push(if pen_down { 'L' } else { 'M' });
-        d.push_str(&here);
-        (pen_down, last) = (true, here);
+    let points = on_paper(frame, x, y);
+    let finite = |p: &(f64, f64)| p.0.is_finite() && p.1.is_finite();
+    for part in points.chunk_by(|a, b| finite(a) == finite(b)).filter(|p| finite(&p[0])) {
+        path(&mut d, &thin::needed(part, 0.12));
     }
     d
+}
+
+/// A path through points.
+fn path(d: &mut String, points: &[(f64, f64)]) {
+    let mut last = String::new();
+    for (i, (a, b)) in points.iter().enumerate() {
+        let here = format!("{} {}", px(*a), px(*b));
+        if i == 0 {
+            d.push('M');
+        } else if here == last {
+            continue;
+        } else {
+            d.push('L');
+        }
+        d.push_str(&here);
+        last = here;
+    }
 }
 
 fn steps(frame: &Frame, x: &[f64], y: &[f64]) -> String {
@@ -177,11 +184,9 @@ fn band(frame: &Frame, x: &[f64], low: &[f64], high: &[f64]) -> String {
     for part in rows.chunk_by(|a, b| finite(a) == finite(b)).filter(|p| finite(&p[0])) {
         let of = |v: &[f64]| part.iter().map(|i| v[*i]).collect::<Vec<f64>>();
         let (xs, lows, highs) = (of(x), of(low), of(high));
-        let mut edge = on_paper(frame, &xs, &highs);
-        edge.extend(on_paper(frame, &xs, &lows).into_iter().rev());
-        for (i, (a, b)) in edge.iter().enumerate() {
-            let _ = write!(d, "{}{} {}", if i == 0 { 'M' } else { 'L' }, px(*a), px(*b));
-        }
+        let mut edge = thin::needed(&on_paper(frame, &xs, &highs), 0.12);
+        edge.extend(thin::needed(&on_paper(frame, &xs, &lows), 0.12).into_iter().rev());
+        path(&mut d, &edge);
         d.push('Z');
     }
     d
@@ -248,7 +253,7 @@ fn region(
     }
     let _ = write!(
         out,
-        "<path class=\"S {class}\" stroke=\"{literal}\" stroke-width=\"1\" stroke-dasharray=\"4 3\" d=\"{edges}\"/>"
+        "<path class=\"S {class}\" stroke=\"{literal}\" stroke-width=\"1.4\" stroke-dasharray=\"5 3\" d=\"{edges}\"/>"
     );
 }
 

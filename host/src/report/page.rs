@@ -239,7 +239,7 @@ impl Page {
         let mut written = Vec::new();
         let mut write = |name: String, text: String| {
             let path = directory.join(name);
-            std::fs::write(&path, text).map_err(|e| Error::unwritable(&path, &e))?;
+            crate::output::write_whole(&path, text.as_bytes())?;
             written.push(path);
             Ok(())
         };

@@ -158,16 +158,20 @@ fn draw(figure: &Figure, layout: Layout, style: Option<&str>) -> String {
         top += tallest + if row + 1 < rows { 14.0 } else { 0.0 };
     }
     let height = top.ceil();
+    // A file of its own has a margin; on a page the page gives it.
+    let margin = if style.is_some() { 12.0 } else { 0.0 };
     let mut out = String::with_capacity(body.len() + 2_048);
     let _ = write!(
         out,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"fig\" viewBox=\"0 0 {} {}\" role=\"img\" \
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"fig\" viewBox=\"{0} {0} {1} {2}\" role=\"img\" \
          aria-labelledby=\"{id}-t {id}-d\" font-family=\"sans-serif\" font-size=\"{LETTER}\" fill=\"none\"",
-        px(width),
-        px(height)
+        px(-margin),
+        px(width + 2.0 * margin),
+        px(height + 2.0 * margin)
     );
     if style.is_some() {
-        let _ = write!(out, " width=\"{}\" height=\"{}\"", px(width), px(height));
+        let _ =
+            write!(out, " width=\"{}\" height=\"{}\"", px(width + 2.0 * margin), px(height + 2.0 * margin));
     }
     let _ = write!(
         out,
@@ -178,9 +182,10 @@ fn draw(figure: &Figure, layout: Layout, style: Option<&str>) -> String {
     if let Some(style) = style {
         let _ = write!(
             out,
-            "{style}<rect class=\"paper\" width=\"{}\" height=\"{}\" fill=\"#ffffff\"/>",
-            px(width),
-            px(height)
+            "{style}<rect class=\"paper\" x=\"{0}\" y=\"{0}\" width=\"{1}\" height=\"{2}\" fill=\"#ffffff\"/>",
+            px(-margin),
+            px(width + 2.0 * margin),
+            px(height + 2.0 * margin)
         );
     }
     out.push_str(&legend);
@@ -267,7 +272,19 @@ fn panel(
 fn axes(out: &mut String, panel: &Panel, frame: &Frame, y_ticks: &[Tick]) -> f64 {
     let (right, bottom) = (frame.left + frame.width, frame.top + frame.height);
     let named = matches!(panel.x.scale, Scale::Names(_));
-    let x_ticks = ticks(&panel.x, frame.x_ends, ((frame.width / 72.0) as usize).max(2));
+    let mut wanted = ((frame.width / 64.0) as usize).max(2);
+    let mut x_ticks = ticks(&panel.x, frame.x_ends, wanted);
+    let crowded = |ticks: &[Tick]| {
+        let written = || ticks.iter().filter(|t| !t.text.is_empty());
+        written().zip(written().skip(1)).any(|(a, b)| {
+            let room = frame.x(b.at) - frame.x(a.at);
+            0.5 * (rich::width(&a.text) + rich::width(&b.text)) * LETTER + 8.0 > room
+        })
+    };
+    while !named && wanted > 2 && crowded(&x_ticks) {
+        wanted -= 1;
+        x_ticks = ticks(&panel.x, frame.x_ends, wanted);
+    }
     let mut grid = String::new();
     for tick in y_ticks.iter().filter(|t| !t.text.is_empty() && !frame.y_down) {
         let y = px(frame.y(tick.at));

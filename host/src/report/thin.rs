@@ -122,6 +122,41 @@ pub fn cells(x: &[f64], y: &[f64], cell: f64, target: usize) -> Vec<usize> {
     }
 }
 
+/// The points of a line that are needed so that none is farther than `tolerance` from it (D. H. Douglas and T. K. Peucker,
+/// Cartographica 10 (1973) 112, doi:10.3138/FM57-6770-U75U-7727). All must be finite.
+#[must_use]
+pub fn needed(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64)> {
+    let n = points.len();
+    if n < 3 {
+        return points.to_vec();
+    }
+    let mut keep = vec![false; n];
+    (keep[0], keep[n - 1]) = (true, true);
+    let mut open = vec![(0, n - 1)];
+    while let Some((from, to)) = open.pop() {
+        let ((ax, ay), (bx, by)) = (points[from], points[to]);
+        let (dx, dy) = (bx - ax, by - ay);
+        let length = dx.hypot(dy);
+        let mut far = (tolerance, 0);
+        for (i, (x, y)) in points.iter().enumerate().take(to).skip(from + 1) {
+            // Where both ends are one point (a closed loop), the distance from that point.
+            let distance = if length > 1e-9 {
+                ((x - ax) * dy - (y - ay) * dx).abs() / length
+            } else {
+                (x - ax).hypot(y - ay)
+            };
+            if distance > far.0 {
+                far = (distance, i);
+            }
+        }
+        if far.1 > 0 {
+            keep[far.1] = true;
+            open.extend([(from, far.1), (far.1, to)]);
+        }
+    }
+    points.iter().zip(keep).filter_map(|(p, k)| k.then_some(*p)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -170,6 +205,16 @@ mod tests {
         let kept = cells(&x, &y, 1.0, 3_000);
         assert!(kept.len() <= 3_000);
         assert!(kept.contains(&200_000));
+    }
+
+    #[test]
+    fn straight_parts_need_only_their_ends() {
+        let mut points: Vec<(f64, f64)> = (0..=100).map(|i| (f64::from(i), 3.0 * f64::from(i))).collect();
+        points.extend((1..=100).map(|i| (100.0 + f64::from(i), 300.0)));
+        assert_eq!(needed(&points, 0.1), [(0.0, 0.0), (100.0, 300.0), (200.0, 300.0)]);
+        // There and back along one line: the far end must stay.
+        let back: Vec<(f64, f64)> = (0..=20).map(|i| (10.0 - f64::from((i - 10_i32).abs()), 0.0)).collect();
+        assert_eq!(needed(&back, 0.1), [(0.0, 0.0), (10.0, 0.0), (0.0, 0.0)]);
     }
 
     #[test]

@@ -1,0 +1,182 @@
+//! `host effects`: what a diagnosis can find, explained.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use crate::bench::Candidate;
+use crate::console::Console;
+use crate::error::{Code, Error, Result};
+use crate::output::write_whole;
+use crate::report::{effect_page, rich};
+
+/// Arguments of `host effects`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  host effects\n  host effects mullins-softening\n  host effects mullins-softening --report mullins.html"
+)]
+pub struct Arguments {
+    /// The effect to explain; all are listed where none is named.
+    #[arg(value_name = "EFFECT")]
+    effect: Option<String>,
+    /// Write a page with a picture of the effect's trace.
+    #[arg(long, value_name = "F.html", requires = "effect")]
+    report: Option<PathBuf>,
+    /// Write the book's chapters on all effects into a folder.
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["effect", "json"])]
+    book: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Arguments {
+    /// Does what was asked.
+    ///
+    /// # Errors
+    /// An effect that does not exist, or a file that cannot be written.
+    pub fn run(self, console: &Console) -> Result<()> {
+        if let Some(folder) = &self.book {
+            return book(folder, console);
+        }
+        let Some(name) = &self.effect else {
+            let mut all: Vec<Candidate> = Candidate::all().collect();
+            all.sort_by_key(|c| (c.info().link, c.is_bench()));
+            if self.json {
+                let all: Vec<_> = all.iter().map(|c| to_json(*c)).collect();
+                console.result(format!("{:#}", json!({ "schema": "pam-effects/1", "effects": all })));
+            } else {
+                console.result(list(&all));
+            }
+            return Ok(());
+        };
+        let candidate = Candidate::from_name(name).ok_or_else(|| unknown(name))?;
+        if self.json {
+            console.result(format!("{:#}", to_json(candidate)));
+        } else {
+            console.result(explain(candidate));
+        }
+        if let Some(path) = &self.report {
+            let all = catalogue()?;
+            if let Some((trace, figure)) = all.iter().find(|(t, _)| t.candidate == candidate) {
+                write_whole(path, effect_page::page(trace, figure, &all).html().as_bytes())?;
+                console.note(format!("wrote {}", path.display()));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn catalogue() -> Result<Vec<(crate::report::effect_trace::Trace, crate::report::Figure)>> {
+    effect_page::catalogue().map_err(|e| Error::new(Code::TableInvalid, e.to_string()))
+}
+
+fn unknown(name: &str) -> Error {
+    let near = Candidate::all().map(Candidate::name).min_by_key(|known| distance(known, name));
+    let help = near.map_or(String::new(), |n| format!("did you mean `{n}`? "));
+    Error::new(Code::CallInvalid, "there is no such effect")
+        .value(name)
+        .help(format!("{help}`host effects` lists all"))
+}
+
+/// Levenshtein's distance, to suggest the name that was meant.
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().enumerate() {
+        let mut before = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let substitute = before + usize::from(x != *y);
+            before = row[j + 1];
+            row[j + 1] = substitute.min(before + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+fn list(all: &[Candidate]) -> String {
+    let mut text = String::new();
+    let mut link = None;
+    for candidate in all {
+        let info = candidate.info();
+        if link != Some(info.link) {
+            text += &format!("{}{}\n", if link.is_some() { "\n" } else { "" }, effect_page::place(info.link));
+            link = Some(info.link);
+        }
+        let bench = if candidate.is_bench() { " (bench)" } else { "" };
+        text += &format!("  {}{bench}\n      {}\n", info.name, info.summary);
+    }
+    text.trim_end().to_owned()
+}
+
+fn explain(candidate: Candidate) -> String {
+    let info = candidate.info();
+    let whose = if candidate.is_bench() {
+        "of the bench: corrects the recording, never sent to a controller"
+    } else {
+        "of the muscle: goes into the table and to the controller"
+    };
+    let mut text = format!(
+        "{}\n  {}\n\n  acts on {}\n  {whose}\n  {}\n\n",
+        info.name,
+        info.summary,
+        effect_page::place(info.link),
+        rich::plain(info.equation)
+    );
+    for p in info.parameters {
+        text += format!("  {:24} {} to {} {}", p.name, p.low, p.high, p.unit).trim_end();
+        text.push('\n');
+    }
+    text + &format!("\n  source: {}", info.source)
+}
+
+fn to_json(candidate: Candidate) -> serde_json::Value {
+    let info = candidate.info();
+    let parameters: Vec<_> = info
+        .parameters
+        .iter()
+        .map(|p| {
+            json!({ "name": p.name, "unit": p.unit, "low": p.low, "high": p.high,
+            "amplitude": p.role == model_core::effects::Role::Amplitude })
+        })
+        .collect();
+    json!({
+        "effect": info.name,
+        "place": effect_page::place(info.link),
+        "bench": candidate.is_bench(),
+        "summary": info.summary,
+        "equation": info.equation,
+        "parameters": parameters,
+        "source": info.source,
+    })
+}
+
+fn book(folder: &std::path::Path, console: &Console) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::unwritable(folder, &e))?;
+    let all = catalogue()?;
+    write_whole(&folder.join("README.md"), effect_page::contents(&all).as_bytes())?;
+    for (trace, figure) in &all {
+        let name = trace.candidate.name();
+        let chapter = effect_page::chapter(trace, figure, &all);
+        write_whole(&folder.join(format!("{name}.md")), chapter.as_bytes())?;
+        if trace.force.iter().any(|f| *f != 0.0) {
+            write_whole(&folder.join(format!("{name}.svg")), figure.svg().as_bytes())?;
+        }
+    }
+    console.note(format!("wrote {} chapters to {}", all.len(), folder.display()));
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mistyped_name_is_answered_with_the_one_that_was_meant() {
+        let error = unknown("mulins-softning");
+        assert_eq!(error.exit_status(), 2);
+        assert!(error.advice().unwrap_or_default().contains("`mullins-softening`"));
+    }
+}
