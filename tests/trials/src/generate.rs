@@ -72,6 +72,25 @@ pub struct Trial {
     pub truth: TrialTruth,
 }
 
+/// The same protocol with every position in mm, taken from the muscle without effects: the crosshead's course must not
+/// depend on what is hidden.
+fn in_millimetres(mut protocol: Protocol, muscle: &Muscle) -> Protocol {
+    let mut pressure = 0.0;
+    for step in &mut protocol.step {
+        match step {
+            Step::Pressure { to_kpa, .. } => pressure = *to_kpa * 1e3,
+            Step::Tare { .. } | Step::Rest { .. } => pressure = 0.0,
+            Step::Move { to, .. } | Step::Cycles { to, .. } => {
+                if let Some(part) = to.free.take() {
+                    to.mm = Some(part * muscle.free_stroke(pressure) * 1e3);
+                }
+            }
+            _ => {}
+        }
+    }
+    protocol
+}
+
 /// Two levels that the campaign did not have, at another speed, after everything else.
 fn held_out_protocol(levels: &[f64], speed: f64) -> Protocol {
     let between = |i: usize| 0.5 * (levels[i] + levels[i + 1]);
@@ -192,6 +211,7 @@ pub fn make(spec: &Spec) -> Trial {
     let speed = campaigns::slow(&muscle, &levels);
     let protocol = campaigns::by_name(spec.protocol, &muscle, &levels, spec.seed)
         .unwrap_or_else(|| campaigns::classic(&muscle, &levels));
+    let protocol = in_millimetres(protocol, &muscle);
     let seconds = duration(&protocol, &spec.bench);
     let scale = Scale::new(&muscle, &levels, speed * 1e-3, seconds);
     let geometry = spec.bench.muscle.geometry;
@@ -238,7 +258,7 @@ pub fn make(spec: &Spec) -> Trial {
             parameters,
         });
     }
-    let after = held_out_protocol(&levels, speed);
+    let after = in_millimetres(held_out_protocol(&levels, speed), &muscle);
     let campaign = |b: &BenchSpec| {
         let mut at = Bench::new(b);
         let mut first = at.run(&protocol).unwrap_or_default();
