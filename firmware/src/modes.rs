@@ -25,7 +25,7 @@ impl Model {
     /// # Errors
     /// The number of the table that cannot be used.
     pub fn build(table: &MuscleTable) -> Result<Self, TableError> {
-        Ok(Self { muscle: Muscle::build(table)?, chain: Chain::new(&table.effects) })
+        Ok(Self { muscle: Muscle::build(table)?, chain: Chain::resumed(&table.effects) })
     }
 }
 

@@ -346,6 +346,8 @@ impl<T: Scalar> Context<T> {
 pub const MEMORY: usize = 24;
 /// How many parameters an effect may have.
 pub const MAX_PARAMETERS: usize = 6;
+/// How many numbers of a persistent memory a table may carry.
+pub const REMEMBERED: usize = 6;
 /// How many effects a table may carry.
 pub const MAX_EFFECTS: usize = 4;
 
@@ -371,6 +373,29 @@ pub struct FittedEffect {
     pub effect: EffectName,
     /// Its parameters in SI units, in the order of [`Info::parameters`].
     pub parameters: heapless::Vec<f32, MAX_PARAMETERS>,
+    /// What its memory held when the recordings behind the table ended, where that must outlive a power cycle
+    /// ([`Info::persistent`]): a controller takes over a muscle that has been worked, not a new one. Further slots are zero.
+    pub remembered: heapless::Vec<f32, REMEMBERED>,
+}
+
+impl FittedEffect {
+    /// An effect on a muscle that is as new. Parameters beyond [`MAX_PARAMETERS`] are dropped; a wrong number of them is found by
+    /// [`crate::table::MuscleTable::check`].
+    pub fn new(effect: EffectName, parameters: &[f64]) -> Self {
+        let parameters = parameters.iter().take(MAX_PARAMETERS).map(|p| *p as f32).collect();
+        Self { effect, parameters, remembered: heapless::Vec::new() }
+    }
+
+    /// The same on a muscle that the recordings left with this memory.
+    #[must_use]
+    pub fn left_with(mut self, memory: &Memory<f64>) -> Self {
+        self.remembered.clear();
+        if self.effect.info().persistent {
+            let used = memory.iter().rposition(|m| *m != 0.0).map_or(0, |last| last + 1);
+            self.remembered.extend(memory[..used.min(REMEMBERED)].iter().map(|m| *m as f32));
+        }
+        self
+    }
 }
 
 /// The effects of one muscle at work, with their memories.
@@ -388,7 +413,7 @@ struct Running<T> {
 }
 
 impl<T: Scalar> Chain<T> {
-    /// The effects of a table, with nothing remembered.
+    /// The effects of a table on a muscle as new and at rest: for running through recordings from their beginning.
     pub fn new(fitted: &[FittedEffect]) -> Self {
         let mut effects = heapless::Vec::new();
         for one in fitted.iter().take(MAX_EFFECTS) {
@@ -398,6 +423,17 @@ impl<T: Scalar> Chain<T> {
         }
         let depends_on_pressure = fitted.iter().any(|e| e.effect.info().depends_on_pressure);
         Self { effects, depends_on_pressure }
+    }
+
+    /// The effects of a table on the muscle as its recordings left it: for a controller.
+    pub fn resumed(fitted: &[FittedEffect]) -> Self {
+        let mut chain = Self::new(fitted);
+        for (running, one) in chain.effects.iter_mut().zip(fitted) {
+            for (to, from) in running.memory.iter_mut().zip(&one.remembered) {
+                *to = T::from_f32(*from);
+            }
+        }
+        chain
     }
 
     /// Whether the table carries no effect.
@@ -426,7 +462,7 @@ impl<T: Scalar> Chain<T> {
         sum
     }
 
-    /// The memories that must survive a power cycle, by position in the table.
+    /// All memories, by position in the table. Those of effects with [`Info::persistent`] must survive a power cycle.
     pub fn memories(&self) -> impl Iterator<Item = (EffectName, &Memory<T>)> {
         self.effects.iter().map(|e| (e.effect, &e.memory))
     }

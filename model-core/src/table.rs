@@ -84,7 +84,7 @@ pub enum TableError {
     MaxPressure,
     /// The blocked force is not a finite number.
     BlockedForce,
-    /// The effect at this position has the wrong number of parameters, or one that is not finite.
+    /// The effect at this position has the wrong number of parameters, or a parameter or memory that is not finite.
     Effect(u8),
 }
 
@@ -163,7 +163,7 @@ impl MuscleTable {
         }
         for (i, e) in self.effects.iter().enumerate() {
             if e.parameters.len() != e.effect.info().parameters.len()
-                || e.parameters.iter().any(|p| !p.is_finite())
+                || e.parameters.iter().chain(&e.remembered).any(|p| !p.is_finite())
             {
                 return Err(TableError::Effect(i as u8));
             }
@@ -230,10 +230,7 @@ mod tests {
             wrong(&|t| t.blocked_force = Force::from_newtons(f32::NAN)),
             Err(TableError::BlockedForce)
         );
-        let short = FittedEffect {
-            effect: crate::effects::EffectName::CoulombFriction,
-            parameters: heapless::Vec::new(),
-        };
+        let short = FittedEffect::new(crate::effects::EffectName::CoulombFriction, &[]);
         let with_effect = |t: &mut MuscleTable| t.effects = [short.clone()].into_iter().collect();
         assert_eq!(wrong(&with_effect), Err(TableError::Effect(0)));
     }

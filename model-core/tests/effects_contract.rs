@@ -250,10 +250,7 @@ proptest! {
 
 #[test]
 fn a_chain_adds_its_effects_and_gives_its_memories_back() {
-    let fitted = |effect: EffectName| FittedEffect {
-        effect,
-        parameters: middle(effect, 1.0).iter().map(|p| *p as f32).collect(),
-    };
+    let fitted = |effect: EffectName| FittedEffect::new(effect, &middle(effect, 1.0));
     let effects = [EffectName::MullinsSoftening, EffectName::StressRelaxation, EffectName::CoulombFriction];
     let list: Vec<FittedEffect> = effects.iter().copied().map(fitted).collect();
     let mut chain = Chain::<f64>::new(&list);
@@ -301,10 +298,7 @@ proptest! {
             for count in [1, 4] {
                 let list: Vec<FittedEffect> = names[..count]
                     .iter()
-                    .map(|e| FittedEffect {
-                        effect: *e,
-                        parameters: middle(*e, scale).iter().map(|p| *p as f32).collect(),
-                    })
+                    .map(|e| FittedEffect::new(*e, &middle(*e, scale)))
                     .collect();
                 let mut chain = Chain::<f64>::new(&list);
                 for c in &contexts {
@@ -346,10 +340,7 @@ proptest! {
         let muscle = Muscle::<f32>::build(&table::example()).expect("a valid table");
         let list: Vec<FittedEffect> = names
             .iter()
-            .map(|i| FittedEffect {
-                effect: EffectName::ALL[*i],
-                parameters: middle(EffectName::ALL[*i], scale).iter().map(|p| *p as f32).collect(),
-            })
+            .map(|i| FittedEffect::new(EffectName::ALL[*i], &middle(EffectName::ALL[*i], scale)))
             .collect();
         let mut chain = Chain::<f32>::new(&list);
         let contexts = motion(&[Leg { stroke, pressure: 300e3, dt: 1e-2, readings: 10 }]);
@@ -365,5 +356,38 @@ proptest! {
         if found.reach == Reach::BeyondBlockedForce {
             prop_assert_eq!(found.pressure, muscle.max_pressure());
         }
+    }
+}
+
+#[test]
+fn a_controller_takes_over_the_muscle_as_its_recordings_left_it() {
+    let contexts = motion(&[
+        Leg { stroke: 2e-3, pressure: 400e3, dt: 1e-2, readings: 100 },
+        Leg { stroke: 0.0, pressure: 400e3, dt: 1e-2, readings: 100 },
+        Leg { stroke: 1e-3, pressure: 400e3, dt: 1e-2, readings: 50 },
+    ]);
+    let last = contexts.last().expect("readings");
+    for effect in EffectName::ALL {
+        let mut parameters = middle(*effect, 0.5);
+        if *effect == EffectName::EndSlip {
+            parameters[1] = 0.5;
+        }
+        let (forces, memory) = trace(*effect, &parameters, &contexts);
+        let fitted = FittedEffect::new(*effect, &parameters).left_with(&memory);
+        assert_eq!(fitted.remembered.is_empty(), !effect.info().persistent, "{}", effect.info().name);
+        if !effect.info().persistent {
+            continue;
+        }
+        // The controller's clock and count begin again; the force is the one the recording ended with.
+        let mut chain = Chain::<f64>::resumed(&[fitted]);
+        let first = Context { dt: 0.0, time: 0.0, cycles: 0.0, ..*last };
+        chain.step(&first);
+        let end = forces.last().expect("readings");
+        assert!(
+            (chain.force(&first) - end).abs() <= 1e-5 * end.abs() + 1e-9,
+            "{}: {} after {end}",
+            effect.info().name,
+            chain.force(&first)
+        );
     }
 }
