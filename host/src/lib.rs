@@ -5,6 +5,7 @@ pub mod cli;
 pub mod commands;
 pub mod console;
 pub mod device;
+pub mod diagnose;
 pub mod error;
 pub mod fit;
 pub mod muscle_description;

@@ -1,0 +1,34 @@
+//! Left-out physics: where simulation and recordings differ, what is missing, how sure that is, what would tell.
+//!
+//! ```text
+//! recordings → rows → two baselines → noise → where → which effects → joint refit → what remains → answer
+//! ```
+//! | file | what |
+//! | --- | --- |
+//! | [`kinematics`], [`rows`] | block averages that keep turns, with the motion in each |
+//! | [`baselines`] | tables free over pressure, and one bladder for all pressures |
+//! | [`noise`] | what repeats tell; tests by whole blocks |
+//! | [`locate`] | where the misfit sits |
+//! | [`candidates`] | the library of effects as columns |
+//! | [`select`] | which effects, and when to abstain |
+//! | [`held_out`] | the improvement on rows that the fit had not seen |
+//! | [`verdict`] | the answer as values and JSON |
+//! | [`summary`] | the answer in words |
+//!
+//! Everything is computed in a fixed order with fixed seeds: the same recordings give the same answer on any number of threads.
+
+mod answer;
+mod baselines;
+mod candidates;
+mod held_out;
+mod kinematics;
+mod linear;
+mod locate;
+mod noise;
+mod rows;
+mod select;
+pub mod summary;
+pub mod verdict;
+
+pub use answer::{Options, diagnose};
+pub use verdict::Diagnosis;

@@ -1,0 +1,341 @@
+//! From a campaign to the answer.
+
+use model_core::braid::Geometry;
+
+use super::baselines::{self, Kind};
+use super::candidates::{self, library, place_in_words};
+use super::held_out::held_out;
+use super::linear::energy;
+use super::locate::locate;
+use super::noise;
+use super::rows::{self, Rows};
+use super::select::{self, Found, STATIC_INEXACTNESS, search};
+use super::verdict::{
+    Considered, Diagnosis, HeldOut, Missing, ParameterValue, PathStep, Trace, Unexplained, Verdict,
+};
+use crate::error::{Code, Error, Result};
+use crate::recording::Campaign;
+
+/// What the caller may choose.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// The muscle's name, for the answer.
+    pub muscle: String,
+}
+
+/// Fewest rows and half-strokes from which anything is judged.
+const FEWEST_ROWS: usize = 60;
+const FEWEST_BLOCKS: usize = 6;
+
+/// Finds out what the model leaves out of a campaign of recordings.
+///
+/// # Errors
+/// Recordings without force or without rows, or an impossible geometry.
+pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> Result<Diagnosis> {
+    let braid = geometry.build().map_err(|e| Error::new(Code::MuscleInvalid, e.to_string()))?;
+    if campaign.samples() == 0 {
+        return Err(Error::new(Code::RecordingEmpty, "the recordings hold no rows"));
+    }
+    let mut rows = rows::prepare(campaign, &braid)?;
+    let mut remarks = std::mem::take(&mut rows.remarks);
+    let blocked = blocked_force(&rows);
+    remarks.extend(what_can_be_judged(&rows));
+    if let Some(reason) = cannot_be_judged(&rows, blocked) {
+        return Ok(no_judgement(&rows, options, remarks, reason, blocked));
+    }
+    let step = rows::typical_step(&rows);
+    let first = baselines::fit(&rows, Kind::Stiff, &[]);
+    let slack = baselines::mask_slack(&mut rows, &first);
+    if slack * 100 > rows.len() {
+        remarks.push(format!(
+            "in {:.0} % of the rows the muscle hangs slack; they say nothing about its force and were left out",
+            100.0 * slack as f64 / rows.len() as f64
+        ));
+    }
+    if let Some(reason) = cannot_be_judged(&rows, blocked) {
+        return Ok(no_judgement(&rows, options, remarks, reason, blocked));
+    }
+    // The model as it was: four orders, tables free over pressure.
+    let production = baselines::fit(&rows, Kind::Flexible(4), &[]);
+    let misfit = production.rms(&rows);
+    let library = library();
+    let found = search(&mut rows, &library, blocked, step);
+    remarks.extend(found.remarks.iter().cloned());
+    let sigma = found.noise.sigma;
+
+    let missing = missing(&found, &library, &rows);
+    let explained: f64 = if found.above > 0.0 && !missing.is_empty() {
+        ((energy(&found.bare.residual) - energy(&found.full.residual)) / found.above).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    let weight = energy(&rows.root_weight).max(1e-12);
+    let left = (energy(&found.full.residual) / weight - sigma * sigma).max(0.0).sqrt();
+    let own = (select::OWN_INEXACTNESS * 2.0 * blocked).max(0.5 * sigma);
+    let verdict = if missing.is_empty() {
+        if left <= own.max(STATIC_INEXACTNESS * blocked) { Verdict::Consistent } else { Verdict::Unexplained }
+    } else if explained >= 0.8 || left <= own {
+        Verdict::Explained
+    } else if explained >= 0.25 {
+        Verdict::PartlyExplained
+    } else {
+        Verdict::Unexplained
+    };
+    let (regions, profiles) = locate(&rows, &found.bare.residual, &found.full.residual, sigma, 7);
+    let (left_regions, _) = locate(&rows, &found.full.residual, &found.full.residual, sigma, 8);
+    let share = if verdict == Verdict::Consistent { 0.0 } else { 1.0 - explained };
+    let pattern = match left_regions.first() {
+        Some(r) if left > own => r.words.clone(),
+        _ => "none".to_owned(),
+    };
+    let held = held_out(&rows, found.full.kind, &found.traces, sigma);
+    let considered = considered(&found, &library, &missing, sigma);
+    let path = found
+        .taken
+        .iter()
+        .map(|t| PathStep {
+            effect: library[t.trial.candidate].name().into(),
+            rms_N: t.rms,
+            p: t.p,
+            runners_up: t.rivals.iter().map(|r| (library[r.0].name().to_owned(), r.1)).collect(),
+        })
+        .collect();
+    Ok(Diagnosis {
+        schema: "pam-diagnose/1".into(),
+        muscle: options.muscle.clone(),
+        samples: rows.samples,
+        verdict,
+        noise_N: sigma,
+        misfit_rms_N: misfit,
+        r#where: if verdict == Verdict::Consistent { Vec::new() } else { regions },
+        missing,
+        unexplained: Unexplained { share, pattern },
+        held_out: held,
+        next_experiment: None,
+        considered,
+        path,
+        blocked_force_N: blocked,
+        noise_memory_s: found.noise.memory,
+        remarks,
+        profiles,
+        trace: trace(&rows, &found),
+    })
+}
+
+/// The scale of forces: what the highest pressure would give at rest length, or the largest force seen.
+fn blocked_force(rows: &Rows) -> f64 {
+    let strongest = rows.force.iter().copied().fold(0.0, f64::max);
+    let by_pressure = rows
+        .contexts
+        .iter()
+        .map(|c| c.pressure * c.area)
+        .fold(0.0, f64::max);
+    // An outlier must not set the scale.
+    if by_pressure > 0.0 { strongest.min(1.3 * by_pressure) } else { strongest }
+}
+
+fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<String> {
+    let effective = rows.effective();
+    if effective < FEWEST_ROWS {
+        return Some(format!(
+            "only {effective} rows can be used (direction known, muscle not slack); {FEWEST_ROWS} is the least"
+        ));
+    }
+    if rows.blocks < FEWEST_BLOCKS {
+        return Some(format!(
+            "only {} half-strokes: with fewer than {FEWEST_BLOCKS} chance and physics cannot be told apart",
+            rows.blocks
+        ));
+    }
+    let (lo, hi) = rows
+        .force
+        .iter()
+        .zip(&rows.root_weight)
+        .filter(|(_, w)| **w > 0.0)
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (f, _)| (l.min(*f), h.max(*f)));
+    if !(hi - lo > 1e-6 * blocked.abs().max(1e-9)) || !(blocked > 0.0) {
+        return Some("the force is constant or never pulls: there is nothing to explain".to_owned());
+    }
+    None
+}
+
+fn what_can_be_judged(rows: &Rows) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if rows.isometric {
+        remarks.push(
+            "the length was held throughout: speed, viscous friction, inertia and first strokes cannot be judged".to_owned(),
+        );
+    }
+    if rows.levels.len() < 2 {
+        remarks.push("one pressure only: what scales with pressure cannot be told from what does not".to_owned());
+    }
+    if !rows.has_temperature {
+        remarks.push("no temperature was recorded: warming shows only as a slow change".to_owned());
+    }
+    let moving = rows.contexts.iter().filter(|c| c.direction > 0.0).count();
+    let back = rows.contexts.iter().filter(|c| c.direction < 0.0).count();
+    if moving.min(back) * 50 < rows.len() {
+        remarks.push("the muscle moves one way only: friction cannot be judged".to_owned());
+    }
+    if !rows.vented.iter().any(|v| *v) {
+        remarks.push("no vented stretch: an offset of the load cell cannot be told from the model's own surface".to_owned());
+    }
+    remarks
+}
+
+fn no_judgement(rows: &Rows, options: &Options, mut remarks: Vec<String>, reason: String, blocked: f64) -> Diagnosis {
+    remarks.insert(0, format!("nothing can be judged: {reason}"));
+    let considered = library()
+        .iter()
+        .map(|c| Considered {
+            effect: c.name().into(),
+            gain: 0.0,
+            why_not: "these recordings cannot show it".into(),
+            hidden_up_to_N: None,
+            visible: 0.0,
+        })
+        .collect();
+    Diagnosis {
+        schema: "pam-diagnose/1".into(),
+        muscle: options.muscle.clone(),
+        samples: rows.samples,
+        verdict: Verdict::Consistent,
+        noise_N: 0.0,
+        misfit_rms_N: 0.0,
+        r#where: Vec::new(),
+        missing: Vec::new(),
+        unexplained: Unexplained { share: 0.0, pattern: "none".into() },
+        held_out: HeldOut {
+            split: "none: nothing was fitted".into(),
+            rms_before_N: 0.0,
+            rms_after_N: 0.0,
+            noise_N: 0.0,
+            with_turns_before_N: 0.0,
+            with_turns_after_N: 0.0,
+        },
+        next_experiment: None,
+        considered,
+        path: Vec::new(),
+        blocked_force_N: if blocked.is_finite() { blocked } else { 0.0 },
+        noise_memory_s: 0.0,
+        remarks,
+        profiles: Vec::new(),
+        trace: Trace { time: Vec::new(), before: Vec::new(), after: Vec::new(), effects: Vec::new() },
+    }
+}
+
+/// How sure a name may be, by how much of the misfit it explains: little explained means that something else may be at work.
+fn in_the_library(share: f64) -> f64 {
+    1.0 / (1.0 + (-(9.0 * (share - 0.45))).exp())
+}
+
+fn missing(found: &Found, library: &[candidates::Candidate], rows: &Rows) -> Vec<Missing> {
+    let deviations = select::deviations(found, library, rows);
+    let explained =
+        ((energy(&found.bare.residual) - energy(&found.full.residual)) / found.above).clamp(0.0, 1.0);
+    let total: f64 = found.taken.iter().map(|t| t.share.max(0.0)).sum::<f64>().max(1e-12);
+    found
+        .taken
+        .iter()
+        .zip(&deviations)
+        .map(|(t, d)| {
+            let candidate = &library[t.trial.candidate];
+            let info = candidate.info;
+            let values = t.trial.amplitudes.iter().chain(&t.trial.shapes);
+            let parameters = info
+                .parameters
+                .iter()
+                .zip(values)
+                .zip(d)
+                .map(|((p, v), std)| ParameterValue {
+                    name: p.name.into(),
+                    value: *v,
+                    std: *std,
+                    unit: p.unit.into(),
+                    outside_known_range: *v != 0.0 && (v.abs() > p.high.abs().max(p.low.abs()) || v.abs() < p.low.abs().min(p.high.abs()) && p.low * p.high > 0.0),
+                })
+                .collect();
+            let sum: f64 = 1.0 + t.rivals.iter().map(|r| r.1).sum::<f64>();
+            let confusable: Vec<String> = t
+                .rivals
+                .iter()
+                .filter(|r| r.1 > 0.05 || (r.2.abs() > 0.9 && r.1 > 0.02))
+                .map(|r| library[r.0].name().to_owned())
+                .collect();
+            let share = (explained * t.share / total).clamp(0.0, 1.0);
+            let why = format!(
+                "it takes {:.0} % of the misfit above noise with the base refitted; by chance over all {} effects and their \
+                 shapes this would happen with p = {:.4}",
+                share * 100.0,
+                library.len(),
+                t.p
+            );
+            Missing {
+                effect: info.name.into(),
+                probability: (in_the_library(explained) / sum).clamp(0.0, 1.0),
+                share_explained: share,
+                parameters,
+                confusable_with: confusable,
+                place: place_in_words(info.link).into(),
+                correction: candidate.of_the_bench(),
+                summary: info.summary.into(),
+                source: info.source.into(),
+                peak_N: t.trial.peak,
+                p: t.p,
+                why,
+            }
+        })
+        .collect()
+}
+
+fn considered(
+    found: &Found,
+    library: &[candidates::Candidate],
+    missing: &[Missing],
+    sigma: f64,
+) -> Vec<Considered> {
+    let named: Vec<&str> = missing.iter().map(|m| m.effect.as_str()).collect();
+    let confusable: Vec<&String> = missing.iter().flat_map(|m| &m.confusable_with).collect();
+    found
+        .first_look
+        .iter()
+        .zip(&found.first_p)
+        .filter(|(t, _)| !named.contains(&library[t.candidate].name()))
+        .map(|(t, p)| {
+            let name = library[t.candidate].name();
+            let gain = (t.gain / found.above).clamp(0.0, 1.0);
+            // The trace that three standard deviations of noise could hide, given how much of it the base leaves.
+            let hidden = (t.visible > candidates::INVISIBLE && t.size > 0.0).then(|| {
+                let detectable = 3.5 * sigma / (found.noise.independent.max(4.0)).sqrt() / t.visible.sqrt();
+                detectable * t.peak / t.size
+            });
+            let why_not = if t.visible < candidates::INVISIBLE {
+                "these recordings do not excite it, or the tables imitate it completely: it could be present unseen".to_owned()
+            } else if confusable.iter().any(|c| c.as_str() == name) {
+                "cannot be told from what is named".to_owned()
+            } else if *p > select::FAMILY_ALPHA {
+                format!("no more than chance gives over all effects looked at (p = {p:.2})")
+            } else if missing.is_empty() {
+                "takes too little of the misfit to be named".to_owned()
+            } else {
+                "explains less than what is named, and little besides it".to_owned()
+            };
+            Considered { effect: name.into(), gain, why_not, hidden_up_to_N: hidden.filter(|h| h.is_finite()), visible: t.visible }
+        })
+        .collect()
+}
+
+fn trace(rows: &Rows, found: &Found) -> Trace {
+    let stride = rows.len().div_ceil(1_500).max(1);
+    let pick: Vec<usize> = (0..rows.len()).step_by(stride).collect();
+    Trace {
+        time: pick.iter().map(|i| rows.contexts[*i].time).collect(),
+        before: pick.iter().map(|i| found.bare.residual[*i]).collect(),
+        after: pick.iter().map(|i| found.full.residual[*i]).collect(),
+        effects: pick.iter().map(|i| found.traces.iter().map(|t| t[*i]).sum()).collect(),
+    }
+}
+
+/// Keeps the noise module's name in reach of the documentation above.
+#[allow(unused_imports)]
+use noise as _;

@@ -1,0 +1,132 @@
+//! The improvement on rows that the fit had not seen: whole pressures, recordings, cycles or stretches of time, never random
+//! rows of the same stroke.
+
+use rayon::prelude::*;
+
+use super::baselines::{self, Kind};
+use super::rows::Rows;
+use super::verdict::HeldOut;
+
+/// Rows at most: held-out error needs no more.
+const ROWS: usize = 6_000;
+
+/// How rows are put into groups that are left out one at a time.
+struct Split {
+    words: &'static str,
+    group: Vec<u32>,
+    groups: Vec<u32>,
+}
+
+fn split(words: &'static str, rows: &Rows, key: &dyn Fn(usize) -> u32) -> Split {
+    let group: Vec<u32> = (0..rows.len()).map(key).collect();
+    let mut groups: Vec<u32> =
+        group.iter().zip(&rows.root_weight).filter(|(_, w)| **w > 0.0).map(|(g, _)| *g).collect();
+    groups.sort_unstable();
+    groups.dedup();
+    Split { words, group, groups }
+}
+
+/// Every n-th row, with the effects' traces.
+fn thin(rows: &Rows, traces: &[Vec<f64>]) -> (Rows, Vec<Vec<f64>>) {
+    let stride = rows.len().div_ceil(ROWS).max(1);
+    let keep: Vec<usize> = (0..rows.len()).step_by(stride).collect();
+    let pick = |v: &Vec<f64>| keep.iter().map(|i| v[*i]).collect::<Vec<f64>>();
+    let pick_u = |v: &Vec<u32>| keep.iter().map(|i| v[*i]).collect::<Vec<u32>>();
+    let thinned = Rows {
+        contexts: keep.iter().map(|i| rows.contexts[*i]).collect(),
+        shapes: keep.iter().map(|i| rows.shapes[*i]).collect(),
+        force: pick(&rows.force),
+        root_weight: pick(&rows.root_weight),
+        vented: keep.iter().map(|i| rows.vented[*i]).collect(),
+        recording: pick_u(&rows.recording),
+        block: pick_u(&rows.block),
+        cycle: pick_u(&rows.cycle),
+        level: pick_u(&rows.level),
+        levels: rows.levels.clone(),
+        largest: pick(&rows.largest),
+        local_time: pick(&rows.local_time),
+        blocks: rows.blocks,
+        ..Rows::default()
+    };
+    (thinned, traces.iter().map(pick).collect())
+}
+
+/// Sums of squares on rows that the fit did not see: on the sure rows, and with those about the turns.
+fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> [f64; 2] {
+    let parts: Vec<([f64; 2], [f64; 2])> = split
+        .groups
+        .par_iter()
+        .map(|g| {
+            let mut blind = rows.clone();
+            for (w, group) in blind.root_weight.iter_mut().zip(&split.group) {
+                if group == g {
+                    *w = 0.0;
+                }
+            }
+            let fitted = baselines::fit(&blind, kind, traces);
+            let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
+            for i in 0..rows.len() {
+                if split.group[i] == *g && rows.contexts[i].direction != 0.0 {
+                    let square = fitted.raw_residual[i].powi(2);
+                    if square.is_finite() {
+                        sums[1] += square;
+                        counts[1] += 1.0;
+                        if rows.root_weight[i] > 0.0 {
+                            sums[0] += square;
+                            counts[0] += 1.0;
+                        }
+                    }
+                }
+            }
+            (sums, counts)
+        })
+        .collect();
+    std::array::from_fn(|k| {
+        let sum: f64 = parts.iter().map(|p| p.0[k]).sum();
+        let count: f64 = parts.iter().map(|p| p.1[k]).sum();
+        (sum / f64::max(count, 1.0)).sqrt()
+    })
+}
+
+/// Held-out error with and without the effects, by the strictest split that the recordings allow.
+pub(crate) fn held_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], noise: f64) -> HeldOut {
+    let (thin, traces) = thin(rows, traces);
+    let by_pressure = split("each pressure predicted from the others", &thin, &|i| thin.level[i]);
+    let by_cycle = split("each cycle predicted from the others", &thin, &|i| thin.cycle[i]);
+    let by_recording = split("each recording predicted from the others", &thin, &|i| thin.recording[i]);
+    let quarter = thin.blocks.div_ceil(4).max(1) as u32;
+    let by_time = split("each quarter of the time predicted from the rest", &thin, &|i| thin.block[i] / quarter);
+    // A pressure left out needs a baseline that reaches over pressures.
+    let chosen = if matches!(kind, Kind::Stiff) && by_pressure.groups.len() >= 3 {
+        by_pressure
+    } else if (2..=10).contains(&by_cycle.groups.len()) {
+        by_cycle
+    } else if (2..=10).contains(&by_recording.groups.len()) && thin.levels.len() < 2 {
+        by_recording
+    } else {
+        by_time
+    };
+    if chosen.groups.len() < 2 {
+        let fitted = baselines::fit(&thin, kind, &traces);
+        let bare = baselines::fit(&thin, kind, &[]);
+        let (before, after) = (bare.rms(&thin), fitted.rms(&thin));
+        return HeldOut {
+            split: "none: there is nothing that could be left out, so these are errors on the rows fitted".into(),
+            rms_before_N: before,
+            rms_after_N: after,
+            noise_N: noise,
+            with_turns_before_N: before,
+            with_turns_after_N: after,
+        };
+    }
+    let before = left_out(&thin, kind, &[], &chosen);
+    let after = if traces.is_empty() { before } else { left_out(&thin, kind, &traces, &chosen) };
+    HeldOut {
+        split: chosen.words.into(),
+        rms_before_N: before[0],
+        rms_after_N: after[0],
+        noise_N: noise,
+        with_turns_before_N: before[1],
+        with_turns_after_N: after[1],
+    }
+}

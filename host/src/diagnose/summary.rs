@@ -1,0 +1,94 @@
+//! The answer for a person at a terminal who has never heard of the effect.
+
+use std::fmt::Write;
+
+use super::verdict::{Diagnosis, Verdict};
+
+/// The diagnosis in words.
+#[must_use]
+pub fn summary(d: &Diagnosis) -> String {
+    let mut s = String::new();
+    let _ = writeln!(
+        s,
+        "{}: {} rows, blocked force {:.1} N, noise {:.3} N, misfit of the plain model {:.3} N rms ({:.2} % of blocked force)",
+        d.muscle,
+        d.samples,
+        d.blocked_force_N,
+        d.noise_N,
+        d.misfit_rms_N,
+        100.0 * d.misfit_rms_N / d.blocked_force_N.max(1e-12)
+    );
+    let _ = writeln!(
+        s,
+        "\n{}",
+        match d.verdict {
+            Verdict::Consistent =>
+                "CONSISTENT: nothing stands above the noise and the model's own inexactness.",
+            Verdict::Explained => "EXPLAINED: what the model leaves out has a name.",
+            Verdict::PartlyExplained => "PARTLY EXPLAINED: a part of what the model leaves out has a name.",
+            Verdict::Unexplained =>
+                "UNEXPLAINED: the model leaves something out that no effect of the library describes well enough to be named.",
+        }
+    );
+    if !d.r#where.is_empty() {
+        let _ = writeln!(s, "\nWhere the misfit sits");
+        for r in d.r#where.iter().take(4) {
+            let _ = writeln!(s, "  {} (p = {:.3})", r.words, r.p);
+        }
+    }
+    for m in &d.missing {
+        let _ = writeln!(
+            s,
+            "\nMissing: {} (probability {:.0} %), acts on {}",
+            m.effect,
+            100.0 * m.probability,
+            m.place
+        );
+        let _ = writeln!(s, "  {}", m.summary);
+        let _ = writeln!(s, "  why: {}; up to {:.2} N", m.why, m.peak_N);
+        for p in &m.parameters {
+            let std = p.std.map_or_else(|| "not determined".to_owned(), |v| format!("± {v:.3e}"));
+            let odd = if p.outside_known_range { "   outside the range known from the literature" } else { "" };
+            let _ = writeln!(s, "  {} = {:.4e} {} {std}{odd}", p.name, p.value, p.unit);
+        }
+        if !m.confusable_with.is_empty() {
+            let _ = writeln!(s, "  could also be: {} (these recordings cannot tell)", m.confusable_with.join(", "));
+        }
+        if m.correction {
+            let _ = writeln!(s, "  this is the bench's, not the muscle's: it corrects the data and is not sent to the controller");
+        }
+    }
+    let h = &d.held_out;
+    if !d.missing.is_empty() {
+        let _ = writeln!(
+            s,
+            "\nOn unseen rows ({}): {:.3} N before, {:.3} N after; noise {:.3} N\n  with the samples about each turn: {:.3} N before, {:.3} N after",
+            h.split, h.rms_before_N, h.rms_after_N, h.noise_N, h.with_turns_before_N, h.with_turns_after_N
+        );
+    }
+    if d.verdict != Verdict::Consistent {
+        let _ = writeln!(s, "\nLeft: {:.0} % of the misfit above noise; {}", 100.0 * d.unexplained.share, d.unexplained.pattern);
+    }
+    if let Some(n) = &d.next_experiment {
+        let _ = writeln!(s, "\nRecord next: {} (expected difference {:.2} N)", n.words, n.expected_difference_N);
+    }
+    let hidden: Vec<String> = d
+        .considered
+        .iter()
+        .filter(|c| c.hidden_up_to_N.is_none_or(|h| h > 0.02 * d.blocked_force_N))
+        .map(|c| match c.hidden_up_to_N {
+            Some(h) => format!("{} up to {h:.1} N", c.effect),
+            None => format!("{} of any size", c.effect),
+        })
+        .collect();
+    if !hidden.is_empty() {
+        let _ = writeln!(s, "\nCould be hidden in these recordings: {}", hidden.join(", "));
+    }
+    if !d.remarks.is_empty() {
+        let _ = writeln!(s, "\nTo know");
+        for r in &d.remarks {
+            let _ = writeln!(s, "  {r}");
+        }
+    }
+    s
+}
