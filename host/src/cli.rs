@@ -56,6 +56,8 @@ enum Command {
     Fit(commands::fit::Arguments),
     /// Compute the force of a table on recordings, and score it.
     Predict(commands::predict::Arguments),
+    /// Say what the model leaves out of recordings: where, what, how sure, what to record next.
+    Diagnose(commands::diagnose::Arguments),
     /// Show, check or export a table.
     Table(commands::table::Arguments),
     /// Send a table to a controller, or program its chip.
@@ -77,6 +79,7 @@ impl Command {
         match self {
             Self::Fit(a) => a.run(console),
             Self::Predict(a) => a.run(console),
+            Self::Diagnose(a) => a.run(console),
             Self::Table(a) => a.run(console),
             Self::Flash(a) => a.run(console),
             Self::Run(a) => a.run(console),

@@ -9,4 +9,5 @@ pub mod port;
 pub mod predict;
 pub mod recordings;
 pub mod run;
+pub mod diagnose;
 pub mod table;

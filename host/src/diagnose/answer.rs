@@ -7,7 +7,6 @@ use super::candidates::{self, library, place_in_words};
 use super::held_out::held_out;
 use super::linear::energy;
 use super::locate::locate;
-use super::noise;
 use super::rows::{self, Rows};
 use super::select::{self, Found, STATIC_INEXACTNESS, search};
 use super::verdict::{
@@ -58,7 +57,7 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     // The model as it was: four orders, tables free over pressure.
     let production = baselines::fit(&rows, Kind::Flexible(4), &[]);
     let misfit = production.rms(&rows);
-    let library = library();
+    let library = library(&rows);
     let found = search(&mut rows, &library, blocked, step);
     remarks.extend(found.remarks.iter().cloned());
     let sigma = found.noise.sigma;
@@ -125,11 +124,7 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
 /// The scale of forces: what the highest pressure would give at rest length, or the largest force seen.
 fn blocked_force(rows: &Rows) -> f64 {
     let strongest = rows.force.iter().copied().fold(0.0, f64::max);
-    let by_pressure = rows
-        .contexts
-        .iter()
-        .map(|c| c.pressure * c.area)
-        .fold(0.0, f64::max);
+    let by_pressure = rows.contexts.iter().map(|c| c.pressure * c.area).fold(0.0, f64::max);
     // An outlier must not set the scale.
     if by_pressure > 0.0 { strongest.min(1.3 * by_pressure) } else { strongest }
 }
@@ -167,7 +162,9 @@ fn what_can_be_judged(rows: &Rows) -> Vec<String> {
         );
     }
     if rows.levels.len() < 2 {
-        remarks.push("one pressure only: what scales with pressure cannot be told from what does not".to_owned());
+        remarks.push(
+            "one pressure only: what scales with pressure cannot be told from what does not".to_owned(),
+        );
     }
     if !rows.has_temperature {
         remarks.push("no temperature was recorded: warming shows only as a slow change".to_owned());
@@ -178,14 +175,23 @@ fn what_can_be_judged(rows: &Rows) -> Vec<String> {
         remarks.push("the muscle moves one way only: friction cannot be judged".to_owned());
     }
     if !rows.vented.iter().any(|v| *v) {
-        remarks.push("no vented stretch: an offset of the load cell cannot be told from the model's own surface".to_owned());
+        remarks.push(
+            "no vented stretch: an offset of the load cell cannot be told from the model's own surface"
+                .to_owned(),
+        );
     }
     remarks
 }
 
-fn no_judgement(rows: &Rows, options: &Options, mut remarks: Vec<String>, reason: String, blocked: f64) -> Diagnosis {
+fn no_judgement(
+    rows: &Rows,
+    options: &Options,
+    mut remarks: Vec<String>,
+    reason: String,
+    blocked: f64,
+) -> Diagnosis {
     remarks.insert(0, format!("nothing can be judged: {reason}"));
-    let considered = library()
+    let considered = library(rows)
         .iter()
         .map(|c| Considered {
             effect: c.name().into(),
@@ -335,7 +341,3 @@ fn trace(rows: &Rows, found: &Found) -> Trace {
         effects: pick.iter().map(|i| found.traces.iter().map(|t| t[*i]).sum()).collect(),
     }
 }
-
-/// Keeps the noise module's name in reach of the documentation above.
-#[allow(unused_imports)]
-use noise as _;

@@ -104,10 +104,8 @@ fn over_pressure(rows: &Rows, kind: Kind) -> OverPressure {
             OverPressure { elastic: functions.clone(), friction: functions }
         }
         Kind::Stiff => {
-            let (lo, hi) = (
-                rows.levels.first().copied().unwrap_or(0.0),
-                rows.levels.last().copied().unwrap_or(1.0),
-            );
+            let (lo, hi) =
+                (rows.levels.first().copied().unwrap_or(0.0), rows.levels.last().copied().unwrap_or(1.0));
             let u = |p: f64| if hi > lo { (2.0 * (p - lo) / (hi - lo) - 1.0).clamp(-1.2, 1.2) } else { 0.0 };
             let degree = rows.levels.len().clamp(1, 3);
             let friction = (0..degree)
@@ -154,7 +152,8 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
         columns.extend(effects.iter().cloned());
         let y: Vec<f64> = (0..n)
             .map(|i| {
-                (rows.force[i] - factor[i] * rows.shapes[i].area * rows.contexts[i].pressure) * rows.root_weight[i]
+                (rows.force[i] - factor[i] * rows.shapes[i].area * rows.contexts[i].pressure)
+                    * rows.root_weight[i]
             })
             .collect();
         let basis = Basis::new(&columns, &rows.root_weight);
@@ -249,30 +248,6 @@ pub(crate) fn into_contexts(rows: &mut Rows, fitted: &Baseline) {
         c.stiffness = live * fitted.stiffness[i];
         c.pressure_slope = c.area;
     }
-}
-
-/// How much of the residual's energy is shared by two stays at the same place: the mean product of residuals at
-/// the same level, direction and contraction in different cycles, over the mean square. One means that it repeats.
-pub(crate) fn repeatability(rows: &Rows, residual: &[f64]) -> Option<f64> {
-    let mut cells: std::collections::BTreeMap<(u32, i8, i32, u32), (f64, f64)> = std::collections::BTreeMap::new();
-    for i in 0..rows.len() {
-        if rows.root_weight[i] > 0.0 && !rows.vented[i] {
-            let c = &rows.contexts[i];
-            let bin = (c.contraction * 250.0).round() as i32;
-            let cell = cells.entry((rows.level[i], c.direction as i8, bin, rows.cycle[i])).or_default();
-            cell.0 += residual[i];
-            cell.1 += 1.0;
-        }
-    }
-    let mut products = (0.0, 0.0);
-    let cells: Vec<_> = cells.into_iter().map(|(k, (s, n))| (k, s / n)).collect();
-    for (a, b) in cells.iter().zip(cells.iter().skip(1)) {
-        if (a.0.0, a.0.1, a.0.2) == (b.0.0, b.0.1, b.0.2) {
-            products.0 += a.1 * b.1;
-            products.1 += 0.5 * (a.1 * a.1 + b.1 * b.1);
-        }
-    }
-    (products.1 > 0.0).then(|| products.0 / products.1)
 }
 
 /// Cosine of two columns after weighting and projection.

@@ -1,17 +1,11 @@
 //! The library of effects as columns: each candidate evaluated over the rows, per amplitude, on a grid of its shapes.
 
-use model_core::effects::{Context, EffectName, Info, Link, MEMORY, Parameter, Role};
+use model_core::effects::{Info, Link, MEMORY, Parameter, Role};
 use rayon::prelude::*;
 
 use super::linear::{Basis, Sign, amplitudes, dot, energy, projected};
 use super::rows::Rows;
-
-/// A force law that may be missing.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Law {
-    /// An effect of the muscle: goes into the model and to the controller.
-    Muscle(EffectName),
-}
+use crate::bench::{Candidate as Law, Span};
 
 /// One member of the library.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +14,8 @@ pub(crate) struct Candidate {
     pub law: Law,
     /// What it is.
     pub info: &'static Info,
+    /// What the recordings can show of shapes on their own axes.
+    span: Span,
 }
 
 impl Candidate {
@@ -30,14 +26,19 @@ impl Candidate {
 
     /// Whether it belongs to the bench and corrects the data.
     pub(crate) fn of_the_bench(&self) -> bool {
-        match self.law {
-            Law::Muscle(_) => false,
-        }
+        self.law.is_bench()
     }
 
-    /// Its shape parameters.
-    fn shapes(&self) -> impl Iterator<Item = &'static Parameter> {
-        self.info.parameters.iter().filter(|p| p.role == Role::Shape)
+    /// Its shape parameters, with ranges that the recordings reach.
+    fn shapes(&self) -> impl Iterator<Item = Parameter> + '_ {
+        self.info.parameters.iter().filter(|p| p.role == Role::Shape).map(|p| {
+            let (low, high) = match p.name {
+                "slip_time" => self.span.time,
+                "jamming_contraction" => (self.span.contraction.0.max(0.0), self.span.contraction.1),
+                _ => (p.low, p.high),
+            };
+            Parameter { low, high, ..*p }
+        })
     }
 
     /// How many amplitudes it has.
@@ -70,7 +71,7 @@ impl Candidate {
 
     /// The grid of shapes that is looked at first.
     pub(crate) fn grid(&self) -> Vec<Vec<f64>> {
-        let shapes: Vec<&Parameter> = self.shapes().collect();
+        let shapes: Vec<Parameter> = self.shapes().collect();
         let points = match shapes.len() {
             0 | 1 => 9,
             2 => 5,
@@ -79,7 +80,7 @@ impl Candidate {
         };
         let mut grid = vec![Vec::new()];
         for p in shapes {
-            let axis: Vec<f64> = (0..points).map(|i| place(p, (i as f64 + 0.5) / points as f64)).collect();
+            let axis: Vec<f64> = (0..points).map(|i| place(&p, (i as f64 + 0.5) / points as f64)).collect();
             grid = grid
                 .into_iter()
                 .flat_map(|g: Vec<f64>| {
@@ -99,10 +100,10 @@ impl Candidate {
         let mut near = Vec::new();
         for (i, p) in self.shapes().enumerate() {
             for sign in [-1.0, 1.0] {
-                let u = unplace(p, center[i]) + sign * step;
+                let u = unplace(&p, center[i]) + sign * step;
                 if (-0.02..=1.02).contains(&u) {
                     let mut moved = center.to_vec();
-                    moved[i] = place(p, u.clamp(0.0, 1.0));
+                    moved[i] = place(&p, u.clamp(0.0, 1.0));
                     near.push(moved);
                 }
             }
@@ -112,27 +113,13 @@ impl Candidate {
 
     /// Its force per unit of each amplitude, N, over the rows in order.
     pub(crate) fn columns(&self, shapes: &[f64], rows: &Rows) -> Vec<Vec<f64>> {
-        let count = self.amplitudes().max(1);
-        let mut columns = vec![vec![0.0; rows.len()]; count];
-        let parameters = |unit: usize| -> Vec<f64> {
-            let mut p: Vec<f64> = (0..count).map(|i| if i == unit { 1.0 } else { 0.0 }).collect();
-            p.extend_from_slice(shapes);
-            p
-        };
-        let units: Vec<Vec<f64>> = (0..count).map(parameters).collect();
+        let mut memory = [0.0; MEMORY];
+        let mut columns = self.law.columns(&rows.contexts, shapes, &mut memory);
         let vented_too = self.seen_vented();
-        let mut memory = [0.0_f64; MEMORY];
-        for (i, context) in rows.contexts.iter().enumerate() {
-            match self.law {
-                Law::Muscle(effect) => {
-                    effect.step(&units[0], context, &mut memory);
-                    if rows.vented[i] && !vented_too {
-                        continue;
-                    }
-                    for (column, unit) in columns.iter_mut().zip(&units) {
-                        let f: f64 = effect.force(unit, context, &memory);
-                        column[i] = if f.is_finite() { f } else { 0.0 };
-                    }
+        for column in &mut columns {
+            for (value, vented) in column.iter_mut().zip(&rows.vented) {
+                if (*vented && !vented_too) || !value.is_finite() {
+                    *value = 0.0;
                 }
             }
         }
@@ -157,9 +144,14 @@ fn unplace(p: &Parameter, value: f64) -> f64 {
     }
 }
 
-/// All effects that are looked at, in the order of the library.
-pub(crate) fn library() -> Vec<Candidate> {
-    EffectName::ALL.iter().map(|e| Candidate { law: Law::Muscle(*e), info: e.info() }).collect()
+/// All effects that are looked at, in the order of the library. What cannot be told from a part of the base model in any
+/// recording stays out: the gauge's offset is the deadband, and a higher elastic order is offered by the baselines.
+pub(crate) fn library(rows: &Rows) -> Vec<Candidate> {
+    let span = Span::of(&rows.contexts).unwrap_or(Span { time: (0.0, 1.0), contraction: (0.0, 1.0) });
+    Law::all()
+        .filter(|law| !matches!(law.name(), "gauge-offset" | "higher-order-elasticity"))
+        .map(|law| Candidate { law, info: law.info(), span })
+        .collect()
 }
 
 /// A candidate tried beside a baseline at one set of shapes.
@@ -307,12 +299,7 @@ pub(crate) fn trace(trial: &Trial, library: &[Candidate], rows: &Rows) -> Vec<f6
 }
 
 /// The weighted trace of a trial (of its first column where it has no amplitude) freed of what the baseline expresses.
-pub(crate) fn projected_trace(
-    trial: &Trial,
-    library: &[Candidate],
-    rows: &Rows,
-    basis: &Basis,
-) -> Vec<f64> {
+pub(crate) fn projected_trace(trial: &Trial, library: &[Candidate], rows: &Rows, basis: &Basis) -> Vec<f64> {
     let column = trace(trial, library, rows);
     projected(&[column], &rows.root_weight, basis).swap_remove(0)
 }
@@ -329,6 +316,3 @@ pub(crate) fn place_in_words(link: Link) -> &'static str {
         Link::Reading => "the sensors' readings",
     }
 }
-
-/// The context type that effects read, for callers that build their own.
-pub(crate) type Moment = Context<f64>;

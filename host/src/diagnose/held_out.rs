@@ -95,7 +95,8 @@ pub(crate) fn held_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], noise: f64)
     let by_cycle = split("each cycle predicted from the others", &thin, &|i| thin.cycle[i]);
     let by_recording = split("each recording predicted from the others", &thin, &|i| thin.recording[i]);
     let quarter = thin.blocks.div_ceil(4).max(1) as u32;
-    let by_time = split("each quarter of the time predicted from the rest", &thin, &|i| thin.block[i] / quarter);
+    let by_time =
+        split("each quarter of the time predicted from the rest", &thin, &|i| thin.block[i] / quarter);
     // A pressure left out needs a baseline that reaches over pressures.
     let chosen = if matches!(kind, Kind::Stiff) && by_pressure.groups.len() >= 3 {
         by_pressure
@@ -111,7 +112,8 @@ pub(crate) fn held_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], noise: f64)
         let bare = baselines::fit(&thin, kind, &[]);
         let (before, after) = (bare.rms(&thin), fitted.rms(&thin));
         return HeldOut {
-            split: "none: there is nothing that could be left out, so these are errors on the rows fitted".into(),
+            split: "none: there is nothing that could be left out, so these are errors on the rows fitted"
+                .into(),
             rms_before_N: before,
             rms_after_N: after,
             noise_N: noise,

@@ -147,7 +147,8 @@ pub(crate) fn kinematics(
         let end = turning.get(k + 1).map_or(n, |t| t.0 + 1);
         let gone = |j: usize| (stroke[j] - stroke[*extreme]) * direction;
         let passed = (*extreme..end).find(|j| gone(*j) > thresholds.stroke).unwrap_or(end - 1);
-        let third = (*extreme..passed).rev().find(|j| gone(*j) <= thresholds.stroke / 3.0).unwrap_or(*extreme);
+        let third =
+            (*extreme..passed).rev().find(|j| gone(*j) <= thresholds.stroke / 3.0).unwrap_or(*extreme);
         let rate = (gone(passed) - gone(third)) / (time[passed] - time[third]).max(1e-12);
         let onset = if rate > 0.0 { time[passed] - gone(passed) / rate } else { time[*extreme] };
         let onset = onset.clamp(time[*extreme], time[passed]);
@@ -187,7 +188,9 @@ pub(crate) fn kinematics(
         }
         // A turn of a triangle is quiet for one window; a hold lasts longer and stays within the threshold.
         if quiet[i] && j - i > 2 * half + 2 {
-            let (lo, hi) = stroke[i..j].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(*s), h.max(*s)));
+            let (lo, hi) = stroke[i..j]
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(*s), h.max(*s)));
             let slow = (stroke[j - 1] - stroke[i]).abs() <= thresholds.stroke;
             if hi - lo <= 3.0 * thresholds.stroke && slow {
                 let (from, to) = (i.saturating_sub(half / 2), (j + half / 2).min(n));
@@ -348,8 +351,9 @@ mod tests {
     fn at_held_length_the_pressure_decides_and_before_it_moves_nothing_is_known() {
         let time: Vec<f64> = (0..900).map(|i| f64::from(i) * 0.1).collect();
         let stroke = vec![0.01; 900];
-        let pressure: Vec<f64> =
-            (0..900).map(|i| if i < 100 { 1e5 } else { 1e5 + 1e3 * (400.0 - (f64::from(i) - 500.0).abs()) }).collect();
+        let pressure: Vec<f64> = (0..900)
+            .map(|i| if i < 100 { 1e5 } else { 1e5 + 1e3 * (400.0 - (f64::from(i) - 500.0).abs()) })
+            .collect();
         let k = kinematics(&time, &stroke, &pressure, None, Thresholds { stroke: 1e-4, pressure: 5e3 });
         assert_eq!((k.direction[50], k.direction[300], k.direction[700]), (0.0, 1.0, -1.0));
         assert!(k.held.iter().all(|h| *h));

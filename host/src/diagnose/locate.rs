@@ -29,7 +29,9 @@ fn coordinates(rows: &Rows) -> Vec<Coordinate> {
         of("recording", "", true, &|i| f64::from(rows.recording[i]) + 1.0),
         of("time", "s", false, &|i| c[i].time),
         of("cycle", "", true, &|i| f64::from(rows.cycle[i])),
-        of("pressure", "Pa", rows.levels.len() > 1 && rows.levels.len() <= 12, &|i| rows.levels[rows.level[i] as usize]),
+        of("pressure", "Pa", rows.levels.len() > 1 && rows.levels.len() <= 12, &|i| {
+            rows.levels[rows.level[i] as usize]
+        }),
         of("contraction", "", false, &|i| c[i].contraction),
         of("direction", "", true, &|i| c[i].direction),
         of("speed", "m/s", false, &|i| c[i].speed.abs()),
@@ -279,15 +281,27 @@ fn words(name: &str, from: f64, to: f64, share: f64, part: f64) -> String {
         "cycle" => format!("in cycle {} at a pressure", range(1.0, "", 0)),
         "pressure" => format!("at {}", range(1e-3, " kPa", 0)),
         "contraction" => format!("at contractions of {}", range(100.0, " %", 2)),
-        "direction" => if from > 0.0 { "while shortening".to_owned() } else if to < 0.0 { "while lengthening".to_owned() } else { "in both directions".to_owned() },
+        "direction" => {
+            if from > 0.0 {
+                "while shortening".to_owned()
+            } else if to < 0.0 {
+                "while lengthening".to_owned()
+            } else {
+                "in both directions".to_owned()
+            }
+        }
         "speed" => format!("at speeds of {}", range(1e3, " mm/s", 2)),
         "acceleration" => format!("at accelerations of {}", range(1.0, " m/s²", 4)),
         "force" => format!("where the muscle pulls {}", range(1.0, " N", 1)),
         "pressure-rate" => format!("where the pressure changes by {}", range(1e-3, " kPa/s", 2)),
         "since-reversal" => format!("{} after a turn", range(1.0, " s", 2)),
         "hold-time" => format!("after a rest of {}", range(1.0, " s", 1)),
-        "largest-contraction-so-far" if to >= -1e-4 => "where the muscle is as short as never before".to_owned(),
-        "largest-contraction-so-far" => format!("{} short of the largest contraction so far", range(-100.0, " %", 2)),
+        "largest-contraction-so-far" if to >= -1e-4 => {
+            "where the muscle is as short as never before".to_owned()
+        }
+        "largest-contraction-so-far" => {
+            format!("{} short of the largest contraction so far", range(-100.0, " %", 2))
+        }
         "temperature" => format!("at {}", range(1.0, " K", 1)),
         _ => range(1.0, "", 3),
     };

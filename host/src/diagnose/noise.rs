@@ -32,7 +32,9 @@ fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
         .iter()
         .zip(&rows.root_weight)
         .filter(|(_, w)| **w > 0.0)
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (c, _)| (l.min(c.contraction), h.max(c.contraction)));
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (c, _)| {
+            (l.min(c.contraction), h.max(c.contraction))
+        });
     let width = ((range.1 - range.0) / 25.0).max(1e-6);
     let mut cells: BTreeMap<(u32, i8, i32, i32, u32), Cell> = BTreeMap::new();
     for i in 0..rows.len() {
@@ -41,7 +43,8 @@ fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
             // Repeats at another speed are no repeats.
             let speed = (c.speed.abs().ln() * 1.5).round() as i32;
             let bin = (c.contraction / width).round() as i32;
-            let cell = cells.entry((rows.level[i], c.direction as i8, bin, speed, rows.cycle[i])).or_default();
+            let cell =
+                cells.entry((rows.level[i], c.direction as i8, bin, speed, rows.cycle[i])).or_default();
             cell.sum += residual[i];
             cell.squares += residual[i] * residual[i];
             cell.count += 1.0;
@@ -130,7 +133,8 @@ pub(crate) fn family_p(scores: &[&[f64]], throws: usize, seed: u64) -> Vec<f64> 
             if scatter > 0.0 { 1.0 / scatter } else { 0.0 }
         })
         .collect();
-    let observed: Vec<f64> = scores.iter().zip(&inverse).map(|(s, i)| s.iter().sum::<f64>().abs() * i).collect();
+    let observed: Vec<f64> =
+        scores.iter().zip(&inverse).map(|(s, i)| s.iter().sum::<f64>().abs() * i).collect();
     let mut random = Random(seed);
     let mut largest = Vec::with_capacity(throws);
     let mut signs = vec![1.0; blocks];

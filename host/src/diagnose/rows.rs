@@ -121,9 +121,7 @@ fn yeoh(braid: &Braid<f64>, stroke: f64) -> [f64; YEOH] {
     let i = invariant(stroke);
     // d/dL = −d/d(ΔL).
     let slope = -(invariant(stroke + h) - invariant(stroke - h)) / (2.0 * h);
-    std::array::from_fn(|k| {
-        -braid.bladder_volume() * (k as f64 + 1.0) * i.max(0.0).powi(k as i32) * slope
-    })
+    std::array::from_fn(|k| -braid.bladder_volume() * (k as f64 + 1.0) * i.max(0.0).powi(k as i32) * slope)
 }
 
 /// Isolated spikes of a series: rows that stand out from the middle of their five neighbours by more than noise can.
@@ -158,7 +156,9 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
     let stroke_noise = campaign.recordings.iter().map(|r| white_noise(&r.stroke)).fold(0.0, f64::max);
     let pressure_noise = campaign.recordings.iter().map(|r| white_noise(&r.pressure)).fold(0.0, f64::max);
     let thresholds = Thresholds {
-        stroke: (8.0 * stroke_noise).max(0.004 * (strokes.1 - strokes.0)).max(1e-3 * braid.rest_length() * 0.05),
+        stroke: (8.0 * stroke_noise)
+            .max(0.004 * (strokes.1 - strokes.0))
+            .max(1e-3 * braid.rest_length() * 0.05),
         pressure: (8.0 * pressure_noise).max(0.02 * (pressures.1 - pressures.0)).max(2e3),
     };
     let total = campaign.samples();
@@ -227,7 +227,18 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
                 j += 1;
             }
             let mean = sums.map(|s| s / count);
-            let [time, pressure, stroke, speed, acceleration, pressure_rate, travel, since, hold, temperature] = mean;
+            let [
+                time,
+                pressure,
+                stroke,
+                speed,
+                acceleration,
+                pressure_rate,
+                travel,
+                since,
+                hold,
+                temperature,
+            ] = mean;
             let local = time - start;
             let dt = match previous_time {
                 Some(p) => time - p,

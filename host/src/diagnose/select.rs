@@ -223,13 +223,14 @@ pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step:
     let above = (energy(&bare.residual) - noise_energy).max(0.02 * energy(&bare.residual)).max(1e-12);
     let (first_look, first_p) = look(library, rows, &bare);
 
-    let (mut full, mut traces) = if chosen.is_empty() {
-        (bare.clone(), Vec::new())
-    } else {
-        refit(rows, kind, &mut chosen, library)
-    };
+    let (mut full, mut traces) =
+        if chosen.is_empty() { (bare.clone(), Vec::new()) } else { refit(rows, kind, &mut chosen, library) };
     while chosen.len() < MAX_NAMED {
-        let (best, p) = if chosen.is_empty() { (first_look.clone(), first_p.clone()) } else { look(library, rows, &full) };
+        let (best, p) = if chosen.is_empty() {
+            (first_look.clone(), first_p.clone())
+        } else {
+            look(library, rows, &full)
+        };
         let left = energy(&full.residual);
         let rest = (left - noise_energy).max(0.02 * left);
         let independent = noise.independent.max(rows.blocks as f64);
@@ -292,7 +293,14 @@ fn repair(
         .filter(|t| t.gain > 0.3 * deficit)
         .map(|t| {
             let t = refine(t, library, rows, &stiff.basis, &stiff.residual);
-            let same = attempt(t.candidate, &library[t.candidate], &t.shapes, rows, &flexible.basis, &flexible.residual);
+            let same = attempt(
+                t.candidate,
+                &library[t.candidate],
+                &t.shapes,
+                rows,
+                &flexible.basis,
+                &flexible.residual,
+            );
             let gap = deficit - t.gain + same.gain;
             (t, gap)
         })
@@ -356,11 +364,7 @@ fn exchange(
 
 /// Standard deviations of all parameters of the chosen effects by whole blocks: amplitudes exactly, shapes by their
 /// linearised traces.
-pub(crate) fn deviations(
-    found: &Found,
-    library: &[Candidate],
-    rows: &Rows,
-) -> Vec<Vec<Option<f64>>> {
+pub(crate) fn deviations(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<Vec<Option<f64>>> {
     // Tangents: one column per free number.
     let mut tangents: Vec<Vec<f64>> = Vec::new();
     let mut place: Vec<(usize, usize)> = Vec::new();
@@ -386,11 +390,8 @@ pub(crate) fn deviations(
             place.push((t, trial.amplitudes.len() + j));
         }
     }
-    let mut result: Vec<Vec<Option<f64>>> = found
-        .taken
-        .iter()
-        .map(|t| vec![None; t.trial.amplitudes.len() + t.trial.shapes.len()])
-        .collect();
+    let mut result: Vec<Vec<Option<f64>>> =
+        found.taken.iter().map(|t| vec![None; t.trial.amplitudes.len() + t.trial.shapes.len()]).collect();
     // The bare baseline's span, not the full one's, which holds the amplitudes themselves.
     let base = baselines::fit(rows, found.full.kind, &[]);
     let z: Vec<Vec<f64>> = super::linear::projected(&tangents, &rows.root_weight, &base.basis);

@@ -48,14 +48,22 @@ pub fn summary(d: &Diagnosis) -> String {
         let _ = writeln!(s, "  why: {}; up to {:.2} N", m.why, m.peak_N);
         for p in &m.parameters {
             let std = p.std.map_or_else(|| "not determined".to_owned(), |v| format!("± {v:.3e}"));
-            let odd = if p.outside_known_range { "   outside the range known from the literature" } else { "" };
+            let odd =
+                if p.outside_known_range { "   outside the range known from the literature" } else { "" };
             let _ = writeln!(s, "  {} = {:.4e} {} {std}{odd}", p.name, p.value, p.unit);
         }
         if !m.confusable_with.is_empty() {
-            let _ = writeln!(s, "  could also be: {} (these recordings cannot tell)", m.confusable_with.join(", "));
+            let _ = writeln!(
+                s,
+                "  could also be: {} (these recordings cannot tell)",
+                m.confusable_with.join(", ")
+            );
         }
         if m.correction {
-            let _ = writeln!(s, "  this is the bench's, not the muscle's: it corrects the data and is not sent to the controller");
+            let _ = writeln!(
+                s,
+                "  this is the bench's, not the muscle's: it corrects the data and is not sent to the controller"
+            );
         }
     }
     let h = &d.held_out;
@@ -67,10 +75,16 @@ pub fn summary(d: &Diagnosis) -> String {
         );
     }
     if d.verdict != Verdict::Consistent {
-        let _ = writeln!(s, "\nLeft: {:.0} % of the misfit above noise; {}", 100.0 * d.unexplained.share, d.unexplained.pattern);
+        let _ = writeln!(
+            s,
+            "\nLeft: {:.0} % of the misfit above noise; {}",
+            100.0 * d.unexplained.share,
+            d.unexplained.pattern
+        );
     }
     if let Some(n) = &d.next_experiment {
-        let _ = writeln!(s, "\nRecord next: {} (expected difference {:.2} N)", n.words, n.expected_difference_N);
+        let _ =
+            writeln!(s, "\nRecord next: {} (expected difference {:.2} N)", n.words, n.expected_difference_N);
     }
     let hidden: Vec<String> = d
         .considered
