@@ -2,6 +2,7 @@
 
 pub mod completions;
 pub mod device;
+pub mod diagnose;
 pub mod effects;
 pub mod fit;
 pub mod flash;
@@ -9,5 +10,4 @@ pub mod port;
 pub mod predict;
 pub mod recordings;
 pub mod run;
-pub mod diagnose;
 pub mod table;
