@@ -68,6 +68,8 @@ pub struct Trial {
     pub held_out: Vec<Recording>,
     /// Campaign and held-out recordings of the twin muscle without the effect.
     pub twin: (Vec<Recording>, Vec<Recording>),
+    /// Where what is hidden sits, as a table.
+    pub trace: String,
     /// The sealed truth.
     pub truth: TrialTruth,
 }
@@ -147,50 +149,70 @@ fn quantile(values: &[f64], q: f64) -> f64 {
     v.get(((v.len() as f64 * q) as usize).min(v.len().saturating_sub(1))).copied().unwrap_or(0.0)
 }
 
-/// Rms of what is left of a difference after a base is refitted: per level (flexible) or over all levels (stiff).
-fn left(difference: &[f64], files: &[Vec<Row>], stroke: f64, force: f64, flexible: bool) -> f64 {
-    let mut blocks: Vec<(DMatrix<f64>, DVector<f64>)> = Vec::new();
+/// Columns of a base at one row: the flexible base has its own set per file, the stiff one shares a larger set.
+fn base(r: &Row, way: f64, stroke: f64, force: f64, flexible: bool) -> Vec<f64> {
+    let (u, f) = (r.stroke / stroke, r.force / force);
+    if flexible {
+        vec![1.0, u, u * u, u.powi(3), u.powi(4), way * f]
+    } else {
+        vec![1.0, u, u * u, u.powi(3), u.powi(4), u.powi(5), way * f, way * f * r.pressure / 5e5]
+    }
+}
+
+/// What is left of a difference after a base is refitted, row by row and file by file; vented files are left out of the
+/// fit and have nothing left.
+fn left(difference: &[f64], files: &[Vec<Row>], stroke: f64, force: f64, flexible: bool) -> Vec<Vec<f64>> {
+    let columns = if flexible { 6 } else { 8 };
+    let way = |file: &[Row], i: usize| {
+        let (a, b) = (i.saturating_sub(1), (i + 1).min(file.len() - 1));
+        (file[b].stroke - file[a].stroke).signum()
+    };
+    let mut normal = DMatrix::<f64>::zeros(columns, columns);
+    let mut rhs = DVector::<f64>::zeros(columns);
     let mut at = 0;
+    let mut starts = Vec::new();
+    let mut solutions: Vec<Option<DVector<f64>>> = Vec::new();
+    let solve = |a: &DMatrix<f64>, y: &DVector<f64>| a.clone().svd(true, true).solve(y, 1e-12).ok();
     for file in files {
-        let n = file.len();
-        let step = (n / 400).max(1);
-        let top = file.iter().map(|r| r.pressure).fold(1.0, f64::max);
-        let mut data = Vec::new();
-        let mut rhs = Vec::new();
-        for i in (step..n.saturating_sub(step)).step_by(step) {
-            let r = &file[i];
-            let way = (file[i + step].stroke - file[i - step].stroke).signum();
-            let u = r.stroke / stroke;
-            let f = r.force / force;
-            if flexible {
-                data.extend([1.0, u, u * u, u.powi(3), u.powi(4), way * f]);
-            } else {
-                let p = r.pressure / 5e5;
-                data.extend([1.0, u, u * u, u.powi(3), u.powi(4), u.powi(5), way * f, way * f * p]);
+        starts.push(at);
+        if flexible {
+            normal.fill(0.0);
+            rhs.fill(0.0);
+        }
+        let pressed = file.iter().map(|r| r.pressure).fold(0.0, f64::max) > 20e3;
+        if pressed {
+            for i in (0..file.len()).step_by((file.len() / 600).max(1)) {
+                let b = DVector::from_vec(base(&file[i], way(file, i), stroke, force, flexible));
+                normal += &b * b.transpose();
+                rhs += b * difference[at + i];
             }
-            rhs.push(difference[at + i]);
         }
-        at += n;
-        let columns = if flexible { 6 } else { 8 };
-        if rhs.len() > columns && top > 20e3 {
-            blocks.push((DMatrix::from_row_slice(rhs.len(), columns, &data), DVector::from_vec(rhs)));
-        }
+        solutions.push(if flexible && pressed { solve(&normal, &rhs) } else { None });
+        at += file.len();
     }
-    if !flexible && !blocks.is_empty() {
-        let columns = blocks[0].0.ncols();
-        let total: usize = blocks.iter().map(|b| b.0.nrows()).sum();
-        let data: Vec<f64> = blocks.iter().flat_map(|b| b.0.transpose().as_slice().to_vec()).collect();
-        let rhs: Vec<f64> = blocks.iter().flat_map(|b| b.1.as_slice().to_vec()).collect();
-        blocks = vec![(DMatrix::from_row_slice(total, columns, &data), DVector::from_vec(rhs))];
-    }
-    let (mut sum, mut n) = (0.0, 0usize);
-    for (a, y) in blocks {
-        let solved = a.clone().svd(true, true).solve(&y, 1e-10);
-        let rest = solved.map_or_else(|_| y.clone(), |x| &y - &a * x);
-        sum += rest.norm_squared();
-        n += rest.len();
-    }
-    (sum / n.max(1) as f64).sqrt()
+    let shared = if flexible { None } else { solve(&normal, &rhs) };
+    files
+        .iter()
+        .zip(starts)
+        .zip(&solutions)
+        .map(|((file, at), own)| {
+            let pressed = file.iter().map(|r| r.pressure).fold(0.0, f64::max) > 20e3;
+            let Some(x) = own.as_ref().or(shared.as_ref()).filter(|_| pressed) else {
+                return vec![0.0; file.len()];
+            };
+            (0..file.len())
+                .map(|i| {
+                    let b = DVector::from_vec(base(&file[i], way(file, i), stroke, force, flexible));
+                    difference[at + i] - b.dot(x)
+                })
+                .collect()
+        })
+        .collect()
+}
+
+fn rms(rows: &[Vec<f64>]) -> f64 {
+    let n: usize = rows.iter().filter(|f| f.iter().any(|v| *v != 0.0)).map(Vec::len).sum();
+    (rows.iter().flatten().map(|v| v * v).sum::<f64>() / n.max(1) as f64).sqrt()
 }
 
 /// Lose some rows: uneven sampling.
@@ -228,6 +250,7 @@ pub fn make(spec: &Spec) -> Trial {
     };
     let mut bench = spec.bench.clone();
     let mut effects = Vec::new();
+    let mut together: Vec<Vec<f64>> = without.iter().map(|f| vec![0.0; f.len()]).collect();
     for (injection, wanted) in &spec.effects {
         let mut s = injection.strongest().min(1.0) * 0.5;
         let (mut is, mut d) = size(injection, s);
@@ -250,11 +273,15 @@ pub fn make(spec: &Spec) -> Trial {
             }
         }
         let parameters = injection.apply(&mut bench, &scale, s);
+        let rest = left(&d, &without, scale.stroke, scale.force, true);
+        for (sum, one) in together.iter_mut().flatten().zip(rest.iter().flatten()) {
+            *sum += one;
+        }
         effects.push(TrueEffect {
             name: injection.name.into(),
             amplitude_pct: 100.0 * is,
-            left_flexible: left(&d, &without, scale.stroke, scale.force, true),
-            left_stiff: left(&d, &without, scale.stroke, scale.force, false),
+            left_flexible: rms(&rest),
+            left_stiff: rms(&left(&d, &without, scale.stroke, scale.force, false)),
             parameters,
         });
     }
@@ -286,5 +313,6 @@ pub fn make(spec: &Spec) -> Trial {
         bench,
         salt: format!("{:016x}{:016x}", salt.bits(), salt.bits()),
     };
-    Trial { description: said.description(), recordings, held_out, twin, truth }
+    let trace = crate::locate::trace(&without, &together, geometry.rest_length);
+    Trial { description: said.description(), recordings, held_out, twin, trace, truth }
 }

@@ -1,6 +1,6 @@
 //! Files of a set: what the tool may see, what is sealed, and the ledger of hashes that is written first.
 
-use crate::generate::{Trial, make};
+use crate::generate::{Trial, TrialTruth, make};
 use crate::spec::Spec;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ use std::path::Path;
 use virtual_bench::recording::{Columns, Recording};
 
 /// The ledger of a set.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ledger {
     /// `dev` or `final`.
     pub set: String,
@@ -21,6 +21,35 @@ pub struct Ledger {
     pub truths: Vec<String>,
     /// SHA-256 of each frozen answer, in order of the trials; empty before.
     pub answers: Vec<String>,
+    /// Version and hash of the tool that answered.
+    #[serde(default)]
+    pub tool: String,
+    /// Time of each answer, s.
+    #[serde(default)]
+    pub seconds: Vec<f64>,
+}
+
+/// The ledger of a set.
+pub fn read_ledger(set: &Path) -> Result<Ledger, Box<dyn Error>> {
+    let path = set.join("ledger.json");
+    let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    Ok(serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?)
+}
+
+/// Write the ledger again.
+pub fn write_ledger(set: &Path, ledger: &Ledger) -> Result<(), Box<dyn Error>> {
+    put(&set.join("ledger.json"), &serde_json::to_string_pretty(ledger)?)?;
+    Ok(())
+}
+
+/// Open a seal: the truth of a trial, its hash checked.
+pub fn open(set: &Path, ledger: &Ledger, id: usize) -> Result<TrialTruth, Box<dyn Error>> {
+    let path = set.join("sealed").join(name(id)).join("truth.json");
+    let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    if ledger.truths.get(id) != Some(&sha256(text.as_bytes())) {
+        return Err(format!("{}: not the truth that was sealed", path.display()).into());
+    }
+    Ok(serde_json::from_str(&text)?)
 }
 
 /// SHA-256 in hexadecimal.
@@ -64,6 +93,7 @@ fn put_trial(output: &Path, trial: &Trial) -> Result<String, String> {
     let sealed = output.join("sealed").join(&id);
     put_recordings(&sealed.join("held_out"), &trial.held_out)?;
     if !trial.twin.0.is_empty() {
+        put(&sealed.join("trace.csv"), &trial.trace)?;
         put_recordings(&sealed.join("twin"), &trial.twin.0)?;
         put_recordings(&sealed.join("twin_held_out"), &trial.twin.1)?;
     }
@@ -87,6 +117,8 @@ pub fn write_set(output: &Path, set: &str, seed: u64, specs: &[Spec]) -> Result<
         seed_sha256: sha256(seed.to_string().as_bytes()),
         truths: truths?,
         answers: Vec::new(),
+        tool: String::new(),
+        seconds: Vec::new(),
     };
     put(&output.join("ledger.json"), &serde_json::to_string_pretty(&ledger)?)?;
     Ok(())

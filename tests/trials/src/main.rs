@@ -1,14 +1,22 @@
 //! `trials`: make sealed trials, have the tool answer them, open the seals and judge.
 
+mod answer;
+mod baselines;
+mod clopper;
+mod fitted;
 mod generate;
 mod inject;
 mod ledger;
+mod locate;
 mod names;
+mod report;
+mod score;
 mod spec;
 
 use clap::{Parser, Subcommand};
+use rayon::prelude::*;
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Sealed trials of the diagnosis.
@@ -36,11 +44,53 @@ enum Command {
         #[arg(short, long)]
         output: PathBuf,
     },
+    /// Ask `host diagnose` about every trial of a set, once, and freeze the answers.
+    Answer {
+        /// The set's directory.
+        set: PathBuf,
+        /// The tool.
+        #[arg(long, default_value = "target/release/host")]
+        host: PathBuf,
+    },
+    /// Open the seals of an answered set and write report.md and report.json.
+    Score {
+        /// The set's directory.
+        set: PathBuf,
+        /// The tool, for the errors on held-out recordings.
+        #[arg(long, default_value = "target/release/host")]
+        host: PathBuf,
+        /// Leave the held-out recordings alone (quicker).
+        #[arg(long)]
+        no_held_out: bool,
+    },
+    /// Generate, answer and score in one go.
+    Prove {
+        /// dev or final.
+        #[arg(long, default_value = "final")]
+        set: String,
+        /// How many trials.
+        #[arg(long, default_value_t = 330)]
+        n: usize,
+        /// Seed instead of the set's own.
+        #[arg(long)]
+        seed: Option<u64>,
+        /// Where to.
+        #[arg(short, long)]
+        output: PathBuf,
+        /// The tool.
+        #[arg(long, default_value = "target/release/host")]
+        host: PathBuf,
+    },
 }
 
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Generate { set, n, seed, output } => generate(&set, n, seed, &output),
+        Command::Answer { set, host } => answer::ask(&set, &host),
+        Command::Score { set, host, no_held_out } => score(&set, &host, !no_held_out),
+        Command::Prove { set, n, seed, output, host } => generate(&set, n, seed, &output)
+            .and_then(|()| answer::ask(&output, &host))
+            .and_then(|()| score(&output, &host, true)),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -54,7 +104,7 @@ fn main() -> ExitCode {
 /// The development set's seed is public.
 const DEVELOPMENT: u64 = 20_261_121;
 
-fn generate(set: &str, n: usize, seed: Option<u64>, output: &std::path::Path) -> Result<(), Box<dyn Error>> {
+fn generate(set: &str, n: usize, seed: Option<u64>, output: &Path) -> Result<(), Box<dyn Error>> {
     let seed = match (seed, set) {
         (Some(s), _) => s,
         (None, "dev") => DEVELOPMENT,
@@ -66,5 +116,54 @@ fn generate(set: &str, n: usize, seed: Option<u64>, output: &std::path::Path) ->
     let start = std::time::Instant::now();
     ledger::write_set(output, set, seed, &specs)?;
     println!("{} trials in {} ({:.1} s)", specs.len(), output.display(), start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+fn score(set: &Path, host: &Path, held_out: bool) -> Result<(), Box<dyn Error>> {
+    let ledger = ledger::read_ledger(set)?;
+    if ledger.answers.len() != ledger.truths.len() {
+        return Err("the set has not been answered: seals stay closed until the answers are frozen".into());
+    }
+    let mut scored: Vec<report::Scored> = Vec::new();
+    let mut truths = Vec::new();
+    for id in 0..ledger.truths.len() {
+        let answer = answer::frozen(set, &ledger, id)?;
+        let truth = ledger::open(set, &ledger, id)?;
+        let seconds = ledger.seconds.get(id).copied().unwrap_or(0.0);
+        let located = answer.as_ref().ok().and_then(|a| locate::hit(set, id, &a.regions));
+        scored.push((score::judge(&truth, &answer, seconds, located), None));
+        truths.push(truth);
+    }
+    if held_out {
+        let tables: Vec<Result<fitted::HeldOut, String>> =
+            truths.par_iter().map(|t| fitted::held_out(set, host, t)).collect();
+        for (s, t) in scored.iter_mut().zip(tables) {
+            match t {
+                Ok(h) => s.1 = Some(h),
+                Err(e) => eprintln!("trial {}: no held-out errors: {e}", s.0.id),
+            }
+        }
+    }
+    let baselines = baselines::all(set, &truths, &scored)?;
+    let title =
+        format!("Sealed trials: set \"{}\", {} trials, tool {}", ledger.set, truths.len(), ledger.tool);
+    let text = report::markdown(&title, &scored, &baselines);
+    std::fs::write(set.join("report.md"), &text)?;
+    let every: Vec<&report::Scored> = scored.iter().collect();
+    let per = |p: &str| report::Figures::of(&scored.iter().filter(|s| s.0.protocol == p).collect::<Vec<_>>());
+    let json = serde_json::json!({
+        "schema": "pam-trials/1",
+        "set": ledger.set,
+        "tool": ledger.tool,
+        "all": report::Figures::of(&every),
+        "A": per("A"),
+        "D": per("D"),
+        "C": per("C"),
+        "trials": scored.iter().map(|(o, h)| serde_json::json!({ "outcome": o, "held_out": h })).collect::<Vec<_>>(),
+    });
+    std::fs::write(set.join("report.json"), serde_json::to_string_pretty(&json)?)?;
+    let end = text.find("\n## Every failure").unwrap_or(text.len());
+    println!("{}", &text[..end]);
+    println!("Failures one by one: {}", set.join("report.md").display());
     Ok(())
 }
