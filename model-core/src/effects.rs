@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 mod fading;
 mod list;
 mod travel;
+mod work;
 
 mod braid_elasticity;
 mod breakaway_friction;
@@ -47,7 +48,6 @@ mod viscous_damping;
 
 pub use fading::{Fading, decay};
 pub use travel::BraidTravel;
-use travel::count_cycles;
 
 crate::effect_list! {
     /// An effect of the muscle, by name. On the wire and in files it is its place in this list: the order stays, and new
@@ -347,7 +347,7 @@ pub const MEMORY: usize = 24;
 /// How many parameters an effect may have.
 pub const MAX_PARAMETERS: usize = 6;
 /// How many numbers of a persistent memory a table may carry.
-pub const REMEMBERED: usize = 6;
+pub const REMEMBERED: usize = 10;
 /// How many effects a table may carry.
 pub const MAX_EFFECTS: usize = 4;
 

@@ -19,7 +19,7 @@ impl Effect for Backlash {
         link: Link::LoadPath,
         parameters: &[
             Parameter::amplitude("free_part", "", 0.1, 1.2),
-            Parameter::shape("width", "m", 2.0e-5, 2.0e-3),
+            Parameter::shape("width", "m", 5.0e-6, 2.0e-3),
         ],
         depends_on_pressure: true,
         persistent: false,

@@ -26,7 +26,7 @@ impl Effect for ForceDrift {
             Parameter::amplitude("warm_up", "N", -20.0, 20.0),
             Parameter::amplitude("creep_part", "", -0.01, 0.01),
             Parameter::amplitude("zero_per_kelvin", "N/K", -2.0, 2.0),
-            Parameter::shape("settling_time", "s", 30.0, 3000.0),
+            Parameter::shape("settling_time", "s", 30.0, 1.0e4),
         ],
         depends_on_pressure: true,
         persistent: false,

@@ -26,7 +26,7 @@ impl Effect for BraidElasticity {
         fading: &[],
         equation: "F = −c·P′²·L·B³/(4π²·N⁴)",
         summary: "The fibres of the braid stretch under load, so the muscle swells more and pulls less at high pressure.",
-        source: "J. Chambers and N. Wereley, Actuators 11(8) (2022) 219; the hoop balance is that of M. Gaylord, US patent 2,844,126",
+        source: "J. Chambers and N. Wereley, Actuators 11(8) (2022) 219, doi 10.3390/act11080219; the hoop balance is that of M. Gaylord, US patent 2,844,126",
     };
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {

@@ -1,12 +1,12 @@
 //! Static friction that has grown during a rest and is lost over the first tenths of a millimetre.
 //!
 //! ```text
-//! F_add = −s · ΔF_s · (1 − e^(−t_rest/τ_s)) · e^(−d/δ)
+//! F_add = −s · (ΔF_s + κ |F_quasi|) · (1 − e^(−t_rest/τ_s)) · e^(−d/δ)
 //! ```
-//! `ΔF_s`, N, is the full excess; `t_rest` how long the muscle rested, s, and `τ_s` how fast the excess grows; `d` the travel since
-//! the rest, m, and `δ` the distance over which it is lost. The memory notes where the muscle rested and how long; a turn without
-//! rest counts as a rest of no length. While the muscle rests the force is not added: which part of a static friction acts
-//! then, nobody can say from outside.
+//! `ΔF_s`, N, and `κ` (of the muscle's force, which presses the strands together) are the full excess: laws to choose from; `t_rest` how
+//! long the muscle rested, s, and `τ_s` how fast the excess grows; `d` the travel since the rest, m, and `δ` the distance over which it is
+//! lost. The memory notes where the muscle rested and how long; a turn without rest counts as a rest of no length. While the muscle
+//! rests the force is not added: which part of a static friction acts then, nobody can say from outside.
 
 use super::{Context, Effect, Info, Link, Memory, Parameter, Start, decay};
 use crate::scalar::Scalar;
@@ -19,16 +19,17 @@ impl Effect for BreakawayFriction {
         name: "breakaway-friction",
         link: Link::Friction,
         parameters: &[
-            Parameter::amplitude("excess_friction", "N", 0.1, 20.0),
-            Parameter::shape("loss_distance", "m", 3.0e-5, 1.0e-3),
-            Parameter::shape("growth_time", "s", 1.0, 100.0),
+            Parameter::amplitude("excess_friction", "N", 0.05, 20.0),
+            Parameter::amplitude("excess_factor", "", 0.002, 0.2),
+            Parameter::shape("loss_distance", "m", 5.0e-6, 1.0e-3),
+            Parameter::shape("growth_time", "s", 0.3, 100.0),
         ],
-        depends_on_pressure: false,
+        depends_on_pressure: true,
         persistent: false,
-        alternatives: false,
+        alternatives: true,
         start: Start::Known,
         fading: &[],
-        equation: "F = −s·ΔF_s·(1 − exp(−t_rest/τ_s))·exp(−d/δ)",
+        equation: "F = −s·(ΔF_s + κ·|F_quasi|)·(1 − exp(−t_rest/τ_s))·exp(−d/δ)",
         summary: "After a rest the muscle sticks: the first bit of motion needs an extra force that grows with the length of the rest.",
         source: "B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083–1138, doi 10.1016/0005-1098(94)90209-7",
     };
@@ -48,8 +49,9 @@ impl Effect for BreakawayFriction {
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
-        let gone = (context.stroke - memory[0]) / parameters[1].max(T::from_f32(1.0e-6));
-        let grown = T::ONE - decay(memory[1] / parameters[2].max(T::from_f32(1.0e-3)));
-        -context.direction * parameters[0] * memory[3] * grown * decay(gone)
+        let gone = (context.stroke - memory[0]) / parameters[2].max(T::from_f32(1.0e-6));
+        let grown = T::ONE - decay(memory[1] / parameters[3].max(T::from_f32(1.0e-3)));
+        let excess = parameters[0] + parameters[1] * context.quasi.abs();
+        -context.direction * excess * memory[3] * grown * decay(gone)
     }
 }

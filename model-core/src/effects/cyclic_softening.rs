@@ -1,45 +1,55 @@
-//! The bladder softens with the number of cycles: `F_add = −[b log10(1 + n) + b_∞ (1 − e^(−n/n_0))] F_el`.
+//! The bladder softens with the strain it has been worked through:
+//! `F_add = −[b log10(1 + s/s_0) + b_∞ (1 − e^(−s/s_0))] F_el`.
 //!
-//! `n` counts cycles since the muscle was new; `b` is the softening per tenfold of cycles, `b_∞` the final one of a law that ends after about
-//! `n_0` cycles. The two are laws to choose from. Unlike a warming bladder a worn one does not recover at rest. The logarithm is
-//! computed only where `n` changes.
+//! `s` is the path that the strands have slid since the muscle was new, in rest lengths: a full cycle of 15 % contraction is 0.3, a small one
+//! counts for less. `b` is the softening per tenfold of path beyond `s_0`, `b_∞` the final one of a law that ends. The two are laws to choose
+//! from. Unlike a warming bladder a worn one does not recover at rest. The logarithm is computed only where the path has grown by
+//! a thousandth.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start, count_cycles, decay};
+use super::{
+    Context, Effect, Info, Link, Memory, Parameter, Start, decay,
+    work::{PATH, WORK_SLOTS, work},
+};
 use crate::scalar::Scalar;
+
+const LOGARITHM: usize = WORK_SLOTS;
+const FOR_PATH: usize = WORK_SLOTS + 1;
 
 /// See the [module](self).
 pub(super) struct CyclicSoftening;
 
 impl Effect for CyclicSoftening {
+    // memory: see `work`, then log10(1 + s/s_0) and the path it belongs to
     const INFO: Info = Info {
         name: "cyclic-softening",
         link: Link::Bladder,
         parameters: &[
             Parameter::amplitude("loss_per_decade", "", 0.001, 0.1),
             Parameter::amplitude("final_loss", "", 0.003, 0.4),
-            Parameter::shape("cycles_to_settle", "", 0.5, 300.0),
+            Parameter::shape("path", "", 0.1, 300.0),
         ],
         depends_on_pressure: true,
         persistent: true,
         alternatives: true,
         start: Start::Virgin,
         fading: &[],
-        equation: "F = −[b·log10(1 + n) + b_∞·(1 − exp(−n/n_0))]·F_el",
+        equation: "F = −[b·log10(1 + s/s_0) + b_∞·(1 − exp(−s/s_0))]·F_el",
         summary: "Every cycle wears the bladder a little, so it resists less and less.",
-        source: "B. Woods, M. Gentry, C. Kothera, N. Wereley, J. Intelligent Material Systems and Structures 23 (2012): fatigue of swaged muscles",
+        source: "B. Woods, M. Gentry, C. Kothera, N. Wereley, J. Intelligent Material Systems and Structures 23 (2012) 327–343: fatigue of swaged muscles",
     };
 
-    fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
-        // memory: [cycles worked, cycles at the last reading, seen, log10(1 + n), the n it belongs to]
-        count_cycles(context, memory);
-        if memory[4] != memory[0] {
-            memory[4] = memory[0];
-            memory[3] = memory[0].ln_1p() * T::from_f64(core::f64::consts::LOG10_E);
+    fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
+        work(context, memory);
+        let scale = parameters[2].max(T::from_f32(1.0e-3));
+        let path = memory[PATH].max(T::ZERO);
+        if (path - memory[FOR_PATH]).abs() > (scale + path) * T::from_f32(1.0e-3) {
+            memory[FOR_PATH] = path;
+            memory[LOGARITHM] = (path / scale).ln_1p() * T::from_f64(core::f64::consts::LOG10_E);
         }
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
-        let settled = T::ONE - decay(memory[0] / parameters[2].max(T::from_f32(1.0e-3)));
-        -(parameters[0] * memory[3] + parameters[1] * settled) * context.elastic
+        let settled = T::ONE - decay(memory[PATH] / parameters[2].max(T::from_f32(1.0e-3)));
+        -(parameters[0] * memory[LOGARITHM] + parameters[1] * settled) * context.elastic
     }
 }

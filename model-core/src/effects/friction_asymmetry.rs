@@ -22,7 +22,7 @@ impl Effect for FrictionAsymmetry {
         fading: &[],
         equation: "F = −(Δk/2)·s²·F_quasi",
         summary: "The muscle rubs more one way than the other.",
-        source: "M. Capace et al., Actuators 8(2) (2019) 49; D. B. Reynolds et al. 2003, doi 10.1114/1.1554921",
+        source: "M. Capace et al., Actuators 8(2) (2019) 49, doi 10.3390/act8020049; D. B. Reynolds et al. 2003, doi 10.1114/1.1554921",
     };
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {

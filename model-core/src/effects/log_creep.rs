@@ -47,7 +47,7 @@ impl Effect for LogCreep {
         fading: &[Spectrum::slot(0, 0), Spectrum::slot(0, 1), Spectrum::slot(0, 2), Spectrum::slot(0, 3)],
         equation: "F = a·Σq_i(F_el) + E_c·Σq_i(c_1) − a_P·Σq_i(F_G), τ_i = τ_0·(1, 10, 100, 1000)",
         summary: "At constant length and pressure the force creeps, as much in each tenfold of time, and remembers earlier runs.",
-        source: "S. M. Clarke, F. Elias, E. M. Terentjev, European Physical Journal E 2 (2000) 335–341; W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
+        source: "S. M. Clarke, F. Elias, E. M. Terentjev, European Physical Journal E 2 (2000) 335–341, doi 10.1007/s101890050015; W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     };
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {

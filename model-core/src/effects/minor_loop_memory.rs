@@ -22,7 +22,7 @@ impl Effect for MinorLoopMemory {
         parameters: &[
             Parameter::amplitude("loop_force", "N", 0.1, 30.0),
             Parameter::amplitude("loop_force_per_pressure", "N/Pa", 1.0e-7, 5.0e-5),
-            Parameter::shape("widest_play", "m", 2.0e-4, 3.0e-2),
+            Parameter::shape("widest_play", "m", 5.0e-5, 3.0e-2),
         ],
         depends_on_pressure: true,
         persistent: false,
@@ -31,7 +31,7 @@ impl Effect for MinorLoopMemory {
         fading: &[],
         equation: "F = −(A + A_P·P)·mean_i[(ξ − y_i)/r_i], y_i = play of half-width r_i",
         summary: "Inside a large loop the force depends on where the muscle turned before, whatever the speed.",
-        source: "P. Krejčí and K. Kuhnen, IEE Proc. Control Theory and Applications 148 (2001) 185–192, doi 10.1049/ip-cta:20010375; M. Van Damme et al. 2008 (Preisach model of a pleated muscle)",
+        source: "Y. Liu et al., Strojniški vestnik 63 (2017) 56–64, doi 10.5545/sv-jme.2016.4027 (Prandtl–Ishlinskii operators for a pneumatic muscle); P. Krejčí and K. Kuhnen, IEE Proc. Control Theory and Applications 148 (2001) 185–192",
     };
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {

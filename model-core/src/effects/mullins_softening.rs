@@ -22,7 +22,7 @@ impl Effect for MullinsSoftening {
         parameters: &[
             Parameter::amplitude("largest_loss", "", 0.01, 0.7),
             Parameter::shape("onset", "", 1.0e-3, 1.0),
-            Parameter::shape("onset_growth", "", 0.0, 0.5),
+            Parameter::shape("onset_growth", "", 0.0, 1.0),
         ],
         depends_on_pressure: true,
         persistent: true,

@@ -1,39 +1,49 @@
-//! With the first cycles the muscle stays a little longer at rest: `F_add = ∂F/∂x · δ · (1 − e^(−n/n_0))`.
+//! Working stretches the muscle for good: its rest length grows by `δ` in the course of its life.
 //!
-//! `δ`, m, is the final set of the rest length; `n` the cycles since the muscle was new and `n_0` how many it takes. At the same active
-//! length a muscle with a longer rest length is contracted further and pulls less. First order in `δ`.
+//! ```text
+//! F_add = ∂F/∂x · [δ (1 − e^(−s/s_0)) + δ_l (1 − e^(−I/I_0))]
+//! ```
+//! `δ` and `δ_l`, m, are the final sets of two laws to choose from: driven by the path `s` that the strands have slid (in rest lengths; a
+//! full cycle of 15 % contraction is 0.3) over `s_0`, or by the load's impulse `I = ∫|F_quasi| dt`, N·s, over `I_0`. At the same active length a
+//! muscle with a longer rest length is contracted further and pulls less. First order in `δ`.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start, count_cycles, decay};
+use super::{
+    Context, Effect, Info, Link, Memory, Parameter, Start, decay,
+    work::{IMPULSE, PATH, work},
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
 pub(super) struct PermanentSet;
 
 impl Effect for PermanentSet {
+    // memory: see `work`
     const INFO: Info = Info {
         name: "permanent-set",
         link: Link::Braid,
         parameters: &[
-            Parameter::amplitude("set", "m", -2.0e-3, 2.0e-3),
-            Parameter::shape("cycles_to_settle", "", 0.5, 300.0),
+            Parameter::amplitude("set_by_work", "m", -2.0e-3, 2.0e-3),
+            Parameter::amplitude("set_by_load", "m", -2.0e-3, 2.0e-3),
+            Parameter::shape("path", "", 0.1, 300.0),
+            Parameter::shape("impulse", "N·s", 1.0e3, 1.0e6),
         ],
         depends_on_pressure: true,
         persistent: true,
-        alternatives: false,
+        alternatives: true,
         start: Start::Virgin,
         fading: &[],
-        equation: "F = ∂F/∂x·δ·(1 − exp(−n/n_0))",
+        equation: "F = ∂F/∂x·[δ·(1 − exp(−s/s_0)) + δ_l·(1 − exp(−I/I_0))]",
         summary: "Working stretches the muscle for good by a fraction of a per cent, mostly in its early life.",
-        source: "catalogue of this project, V7; sensitivity of the base model",
+        source: "change of rest length in early life, 0.1 to 1 %; E. G. Hocking, thesis, University of Maryland (2012): run-in over the first tests",
     };
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
-        // memory: [cycles worked, cycles at the last reading, seen]
-        count_cycles(context, memory);
+        work(context, memory);
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
-        let done = T::ONE - decay(memory[0] / parameters[1].max(T::from_f32(1.0e-3)));
-        context.stiffness * parameters[0] * done
+        let worked = T::ONE - decay(memory[PATH] / parameters[2].max(T::from_f32(1.0e-3)));
+        let loaded = T::ONE - decay(memory[IMPULSE] / parameters[3].max(T::from_f32(1.0e-3)));
+        context.stiffness * (parameters[0] * worked + parameters[1] * loaded)
     }
 }

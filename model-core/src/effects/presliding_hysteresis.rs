@@ -23,7 +23,7 @@ impl Effect for PreslidingHysteresis {
         parameters: &[
             Parameter::amplitude("share_of_friction", "", 0.1, 1.5),
             Parameter::amplitude("dry_friction", "N", 0.1, 20.0),
-            Parameter::shape("sliding_travel", "m", 1.0e-4, 1.0e-2),
+            Parameter::shape("sliding_travel", "m", 2.0e-5, 1.0e-2),
         ],
         depends_on_pressure: true,
         persistent: false,
@@ -32,7 +32,7 @@ impl Effect for PreslidingHysteresis {
         fading: &[],
         equation: "F = (share·k_F·|F_quasi| + W)·(s − ¼·Σz_i), dz_i = dξ/d_i within ±1",
         summary: "Just after a turn the strands stretch before they slide, so friction builds up over a distance instead of jumping.",
-        source: "F. Al-Bender, V. Lampaert, J. Swevers, IEEE Trans. Automatic Control 50 (2005) 1883–1887, doi 10.1109/TAC.2005.858676; T. Vo-Minh et al., Mechatronics (2010)",
+        source: "F. Al-Bender, V. Lampaert, J. Swevers, Chaos 14 (2004) 446–460, doi 10.1063/1.1741752 (generalized Maxwell slip); T. Vo-Minh et al., Mechatronics 20 (2010) 402–414 (for a pneumatic muscle)",
     };
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {

@@ -21,7 +21,7 @@ impl Effect for SealFriction {
             Parameter::amplitude("fit_friction", "N", 0.2, 20.0),
             Parameter::amplitude("rubbing_area", "m²", 5.0e-7, 1.0e-4),
             Parameter::shape("breakaway_ratio", "", 1.0, 3.0),
-            Parameter::shape("falloff_speed", "m/s", 5.0e-4, 1.0e-2),
+            Parameter::shape("falloff_speed", "m/s", 1.0e-4, 2.0e-2),
         ],
         depends_on_pressure: true,
         persistent: false,

@@ -30,7 +30,7 @@ impl Effect for StressRelaxation {
         parameters: &[
             Parameter::amplitude("relaxing_part", "", 0.01, 0.6),
             Parameter::amplitude("strain_modulus", "Pa", 1.0e4, 3.0e6),
-            Parameter::amplitude("settling_part", "", 0.003, 0.3),
+            Parameter::amplitude("settling_part", "", -0.3, 0.3),
             Parameter::shape("time_constant", "s", 0.3, 1000.0),
         ],
         depends_on_pressure: true,

@@ -17,7 +17,7 @@ impl Effect for StribeckFriction {
         parameters: &[
             Parameter::amplitude("excess_friction", "N", 0.1, 20.0),
             Parameter::amplitude("excess_factor", "", 0.002, 0.2),
-            Parameter::shape("falloff_speed", "m/s", 3.0e-4, 2.0e-2),
+            Parameter::shape("falloff_speed", "m/s", 5.0e-5, 2.0e-2),
         ],
         depends_on_pressure: true,
         persistent: false,

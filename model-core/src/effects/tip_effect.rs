@@ -23,7 +23,7 @@ impl Effect for TipEffect {
         fading: &[],
         equation: "F = −k_t·P′·π·R²·(R/L)·ε",
         summary: "The muscle narrows towards its ends, which do not pull like a cylinder.",
-        source: "J. Chambers and N. Wereley, Actuators 10(4) (2021) 72; E. G. Hocking, thesis, University of Maryland (2012), appendix on tip correction",
+        source: "J. Chambers and N. Wereley, Actuators 10(4) (2021) 72, doi 10.3390/act10040072; E. G. Hocking, thesis, University of Maryland (2012), appendix on tip correction",
     };
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {

@@ -33,13 +33,3 @@ impl BraidTravel {
         moved + filled * per_pascal
     }
 }
-
-/// Counts the cycles that a muscle has worked, over all recordings and power cycles, in three slots of a memory: worked, count
-/// at the last reading, seen. A count that begins again (a new power-up) adds up.
-pub(super) fn count_cycles<T: Scalar>(context: &Context<T>, memory: &mut Memory<T>) {
-    if memory[2] != T::ZERO {
-        memory[0] += (context.cycles - memory[1]).max(T::ZERO);
-    }
-    memory[1] = context.cycles;
-    memory[2] = T::ONE;
-}
