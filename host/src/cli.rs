@@ -60,6 +60,8 @@ enum Command {
     Diagnose(commands::diagnose::Arguments),
     /// Show, check or export a table.
     Table(commands::table::Arguments),
+    /// The whole story on this machine, no hardware: record, fit, flash, track.
+    Demo(commands::demo::Arguments),
     /// Send a table to a controller, or program its chip.
     Flash(commands::flash::Arguments),
     /// Let a controller follow a course of force, pressure or stroke, and record it.
@@ -81,6 +83,7 @@ impl Command {
             Self::Predict(a) => a.run(console),
             Self::Diagnose(a) => a.run(console),
             Self::Table(a) => a.run(console),
+            Self::Demo(a) => a.run(console),
             Self::Flash(a) => a.run(console),
             Self::Run(a) => a.run(console),
             Self::Vent(a) => a.run(console),

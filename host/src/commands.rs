@@ -1,6 +1,7 @@
 //! The sub-commands, one file each: arguments in, library calls, results out.
 
 pub mod completions;
+pub mod demo;
 pub mod device;
 pub mod diagnose;
 pub mod effects;

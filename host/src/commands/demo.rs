@@ -1,0 +1,349 @@
+//! `host demo`: the whole story on this machine, no hardware.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::Args;
+use model_core::image;
+use model_core::link::endpoints::GetSettings;
+use model_core::link::messages::Side;
+use serde_json::{Value, json};
+use virtual_bench::plant::Motion;
+
+use crate::console::Console;
+use crate::demo::campaign::{Made, record};
+use crate::demo::page::{Story, page, rms};
+use crate::demo::tracking::{Law, Task, Track, choose, track};
+use crate::device::recorder::{Recorder, about_device, about_losses};
+use crate::device::{Client, tables};
+use crate::emulated::{Emulated, Kind, Stand};
+use crate::error::{Code, Error, Result};
+use crate::fit::result::Fit;
+use crate::fit::{Options, fit};
+use crate::muscle_description::MuscleDescription;
+use crate::output::write_whole;
+use crate::predict::predict;
+use crate::recording::{Campaign, Reader};
+use crate::table_file::{self, About, TableFile};
+
+/// Arguments of `host demo`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  host demo\n  host demo --muscle contractile -o /tmp/demo --json\n\n\
+    A muscle is recorded on the virtual bench and fitted; its table goes over the link into the controller (in QEMU where that\n\
+    is installed, else in this process); the controller follows a force while the bench moves the muscle, with the fitted table,\n\
+    with the plain Gaylord formula and without feed-forward. Everything stays in the folder, the page with the pictures too.")]
+pub struct Arguments {
+    /// The muscle of the bench: mini, contractile, push or random:SEED.
+    #[arg(long, value_name = "MUSCLE", default_value = "mini")]
+    muscle: String,
+    /// Seed of the bench's noise.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// The folder for all files.
+    #[arg(short, long, value_name = "FOLDER", default_value = "pam-demo")]
+    output: PathBuf,
+    /// Run the firmware in this process, or insist on QEMU.
+    #[arg(long, value_name = "WHERE", value_parser = ["native", "qemu"])]
+    on: Option<String>,
+    /// Print the figures as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A line on a terminal that is written over, with the time that remains.
+struct Progress<'a> {
+    console: &'a Console,
+    began: Instant,
+    shown: f64,
+}
+
+impl<'a> Progress<'a> {
+    fn new(console: &'a Console) -> Self {
+        Self { console, began: Instant::now(), shown: -1.0 }
+    }
+
+    fn at(&mut self, what: &str, share: f64) {
+        if !self.console.live() || (share - self.shown).abs() < 0.02 {
+            return;
+        }
+        self.shown = share;
+        let left = self.began.elapsed().as_secs_f64() * (1.0 - share) / share.max(0.02);
+        let _ = write!(std::io::stderr(), "\r\u{1b}[2K  {what}: {:.0} %, {left:.0} s left", 100.0 * share);
+    }
+
+    fn done(&mut self) {
+        if self.console.live() && self.shown >= 0.0 {
+            let _ = write!(std::io::stderr(), "\r\u{1b}[2K");
+        }
+        self.shown = -1.0;
+    }
+}
+
+impl Arguments {
+    /// Tells the story.
+    ///
+    /// # Errors
+    /// What went wrong in any of its steps.
+    pub fn run(self, console: &Console) -> Result<()> {
+        let began = Instant::now();
+        let step = |number: u32, text: String| {
+            console.note(format!("[{number}/6 {:5.1} s] {text}", began.elapsed().as_secs_f64()))
+        };
+        let made = record(&self.muscle, self.seed, &self.output)?;
+        step(
+            1,
+            format!(
+                "recorded `{}` on the virtual bench: {} files, {} rows in {}",
+                made.bench.muscle.name,
+                made.recordings.len(),
+                made.rows,
+                self.output.display()
+            ),
+        );
+
+        let (muscle, campaign, fitted, table) = fit_campaign(&made, &self.output)?;
+        let summary = &fitted.summary;
+        let blocked = f64::from(table.table.blocked_force.newtons());
+        step(
+            2,
+            format!(
+                "fitted: P0 {:.1} kPa, blocked force {blocked:.1} N, mean error {:.2} % and at most {:.2} % of it; table in {}",
+                summary.deadband_kPa,
+                summary.mean_error_pct,
+                summary.max_error_pct,
+                self.output.join("muscle.pam").display()
+            ),
+        );
+
+        let motion = motion(&made);
+        let stand = Stand::new(made.bench.clone(), motion);
+        let only = match self.on.as_deref() {
+            Some("native") => Some(Kind::Native),
+            Some("qemu") => Some(Kind::Qemu),
+            _ => None,
+        };
+        let emulated = Emulated::start(stand, only, 4.0)?;
+        step(3, format!("controller started: {}", emulated.words()));
+        let told =
+            self.control(&emulated, &table, &made, step, console).map_err(|e| with_log(e, &emulated))?;
+        drop(emulated);
+
+        let (telemetry, refit) = read_back(&told, &table, &muscle, console)?;
+        step(
+            6,
+            format!(
+                "read back: the table's error on {} rows of telemetry is {:.2} N rms ({:.2} % of blocked force)",
+                telemetry.1,
+                telemetry.0,
+                100.0 * telemetry.0 / blocked
+            ),
+        );
+        let story = Story {
+            muscle: &made.bench.muscle.name,
+            campaign: &campaign,
+            fit: &fitted,
+            controller: &told.controller,
+            device: told.device.clone(),
+            tracks: &told.tracks,
+            blocked_force: blocked,
+            telemetry,
+            refit,
+            seconds: began.elapsed().as_secs_f64(),
+        };
+        let report = self.output.join("demo.html");
+        write_whole(&report, page(&story)?.html().as_bytes())?;
+        let figures = figures(&story);
+        write_whole(&self.output.join("demo.json"), format!("{figures:#}\n").as_bytes())?;
+        if self.json {
+            console.result(format!("{figures:#}"));
+        } else {
+            console.result(terminal_table(&story));
+            console.result(format!("page with pictures: {}", report.display()));
+        }
+        Ok(())
+    }
+
+    /// Sends the table, lets the controller track, and keeps its telemetry.
+    fn control(
+        &self,
+        emulated: &Emulated,
+        table: &TableFile,
+        made: &Made,
+        step: impl Fn(u32, String),
+        console: &Console,
+    ) -> Result<Told> {
+        let mut client = Client::open(emulated.address())?;
+        let mut buffer = [0; image::MAX_LEN];
+        let image = image::write(&table.table, &mut buffer)
+            .map_err(|e| Error::new(Code::TableInvalid, e.to_string()))?;
+        let kept = tables::write(&mut client, Side::Agonist, image, |_| ())?;
+        let (major, minor, patch) = client.hello().release;
+        let device =
+            format!("release {major}.{minor}.{patch}, table {:08x}, {} bytes", kept.crc, kept.length);
+        step(4, format!("flashed and read back: {} bytes, check sum {:08x}", kept.length, kept.crc));
+
+        // The middle of what the muscle can pull where the bench moves it.
+        let mean = 0.35 * made.blocked_force;
+        let span =
+            f64::from(table.table.tested.pressure_high.pascals()) - f64::from(table.table.deadband.pascals());
+        let gain = made.blocked_force / span.max(1.0);
+        let mut tracks = Vec::new();
+        let mut recordings = Vec::new();
+        let mut progress = Progress::new(console);
+        let total = (Law::ALL.len() * Task::ALL.len()) as f64;
+        for law in Law::ALL {
+            choose(&mut client, law, gain)?;
+            for task in Task::ALL {
+                let before = tracks.len() as f64;
+                let tracked = track(&mut client, law, task, mean, |share| {
+                    progress.at("tracking", (before + share) / total)
+                })?;
+                recordings.push(self.keep(&mut client, &tracked)?);
+                tracks.push(tracked);
+            }
+        }
+        progress.done();
+        let losses = client.losses();
+        step(
+            5,
+            format!(
+                "tracked a sine and steps under {} laws, {} samples, {} lost",
+                Law::ALL.len(),
+                tracks.iter().map(|t: &Track| t.samples.len()).sum::<usize>(),
+                losses.samples
+            ),
+        );
+        Ok(Told { controller: emulated.words(), device, tracks, recordings })
+    }
+
+    fn keep(&self, client: &mut Client, track: &Track) -> Result<PathBuf> {
+        let path = self.output.join(format!("run-{}-{}.csv", track.law.key(), track.task.name()));
+        let mut recorder = Recorder::create(&path)?;
+        for sample in &track.samples {
+            recorder.push(sample)?;
+        }
+        let info = client.call::<model_core::link::endpoints::GetInfo>(&())?;
+        let settings = client.call::<GetSettings>(&())?;
+        recorder.finish(&json!({
+            "schema": "pam-run/1",
+            "date": table_file::now_utc(),
+            "host": env!("CARGO_PKG_VERSION"),
+            "device": about_device(client.hello(), &info, &settings),
+            "losses": about_losses(client.losses()),
+        }))
+    }
+}
+
+/// What the controller did.
+struct Told {
+    controller: String,
+    device: String,
+    tracks: Vec<Track>,
+    recordings: Vec<PathBuf>,
+}
+
+fn with_log(error: Error, emulated: &Emulated) -> Error {
+    let log = emulated.log();
+    let said = log.trim();
+    if said.is_empty() {
+        error
+    } else {
+        Error::new(error.code(), format!("{}; the emulator said: {said}", error.cause()))
+    }
+}
+
+/// The muscle swings slowly around a quarter of its free stroke.
+fn motion(made: &Made) -> Motion {
+    let free_mm = made.free_stroke * 1e3;
+    Motion::Sine { mean_mm: 0.2 * free_mm, amplitude_mm: 0.1 * free_mm, frequency_hz: 0.4 }
+}
+
+fn fit_campaign(made: &Made, folder: &Path) -> Result<(MuscleDescription, Campaign, Fit, TableFile)> {
+    let muscle = MuscleDescription::read(&made.muscle)?;
+    let campaign = Reader::of(&muscle).campaign(&made.recordings)?;
+    let fitted = fit(&campaign, &muscle, &Options::default())?;
+    let hashes = made.recordings.iter().map(table_file::sha256).collect::<Result<Vec<_>>>()?;
+    let about = About {
+        muscle: muscle.name.clone(),
+        date: table_file::now_utc(),
+        tool: format!("host {} demo", env!("CARGO_PKG_VERSION")),
+        sources: table_file::sources(&campaign, &made.recordings, hashes),
+        fit: fitted.summary.quality(),
+        uncertainty: Some(fitted.stored_uncertainty()),
+        corrections: Vec::new(),
+    };
+    let table = TableFile { table: fitted.table.clone(), about };
+    table.write(folder.join("muscle.pam"))?;
+    Ok((muscle, campaign, fitted, table))
+}
+
+/// Reads the telemetry as recordings: the table's error on it, and the error of a fit to it alone.
+fn read_back(
+    told: &Told,
+    table: &TableFile,
+    muscle: &MuscleDescription,
+    console: &Console,
+) -> Result<((f64, usize), Option<f64>)> {
+    let campaign = Reader::of(muscle).campaign(&told.recordings)?;
+    let prediction = predict(table, &campaign)?;
+    let rms = prediction
+        .rms
+        .ok_or_else(|| Error::new(Code::RecordingMissingColumn, "the telemetry has no force"))?;
+    // A few seconds at working pressures need not determine a whole table; that is no failure of the story.
+    let refit = match fit(&campaign, muscle, &Options { order: 1, ..Options::default() }) {
+        Ok(fit) => Some(fit.summary.mean_error_pct),
+        Err(e) => {
+            console.detail(format!("a fit to the telemetry alone: {e}"));
+            None
+        }
+    };
+    Ok(((rms, campaign.samples()), refit))
+}
+
+fn figures(story: &Story<'_>) -> Value {
+    let percent = |newtons: f64| 100.0 * newtons / story.blocked_force;
+    let laws: Vec<Value> = Law::ALL
+        .iter()
+        .map(|law| {
+            let of = |task| rms(story.tracks, |t| t.law == *law && t.task == task);
+            json!({
+                "feed_forward": law.key(),
+                "sine_rms_N": of(Task::Sine), "sine_rms_pct": percent(of(Task::Sine)),
+                "steps_rms_N": of(Task::Steps), "steps_rms_pct": percent(of(Task::Steps)),
+                "rms_pct": percent(rms(story.tracks, |t| t.law == *law)),
+            })
+        })
+        .collect();
+    json!({
+        "schema": "pam-demo/1",
+        "muscle": story.muscle,
+        "controller": story.controller,
+        "fit_mean_error_pct": story.fit.summary.mean_error_pct,
+        "deadband_kPa": story.fit.summary.deadband_kPa,
+        "blocked_force_N": story.blocked_force,
+        "tracking": laws,
+        "telemetry_rows": story.telemetry.1,
+        "telemetry_rms_N": story.telemetry.0,
+        "telemetry_fit_mean_error_pct": story.refit,
+        "seconds": story.seconds,
+    })
+}
+
+fn terminal_table(story: &Story<'_>) -> String {
+    let percent = |newtons: f64| 100.0 * newtons / story.blocked_force;
+    let mut text = String::from("\nforce tracking, rms error in % of blocked force, muscle moving\n");
+    text += &format!("{:<24}{:>12}{:>10}{:>10}\n", "feed-forward", "sine 0.5 Hz", "steps", "both");
+    for law in Law::ALL {
+        let of = |task| rms(story.tracks, |t| t.law == law && t.task == task);
+        text += &format!(
+            "{:<24}{:>12.2}{:>10.2}{:>10.2}\n",
+            law.name(),
+            percent(of(Task::Sine)),
+            percent(of(Task::Steps)),
+            percent(rms(story.tracks, |t| t.law == law))
+        );
+    }
+    text += &format!("\n{:.1} s altogether; {}", story.seconds, story.controller);
+    text
+}

@@ -1,0 +1,345 @@
+//! A controller without hardware: the firmware in QEMU, or the same firmware in this process, on a muscle of the virtual bench.
+
+use std::io;
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use firmware::board::{Inputs, Outputs, Readings};
+use firmware::native::{Device, Options};
+use virtual_bench::bench::BenchSpec;
+use virtual_bench::lockstep::{self, Answer, Station};
+use virtual_bench::plant::{Motion, Plant};
+
+use crate::device::Address;
+use crate::error::{Code, Error, Result};
+
+/// Where the firmware runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Its image, on an emulated Cortex-M4.
+    Qemu,
+    /// Its library, in this process.
+    Native,
+}
+
+/// What goes wrong on the bench, for trying what a controller does then.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Mishap {
+    /// Nothing.
+    None = 0,
+    /// The load cell's wire breaks: its reading leaves its range.
+    LoadCell = 1,
+    /// The supply air is closed: no pressure follows.
+    Supply = 2,
+    /// The pressure sensor reads the same for ever.
+    StuckGauge = 3,
+}
+
+impl Mishap {
+    /// The mishap of a number; anything unknown is none.
+    #[must_use]
+    pub const fn from_code(code: u8) -> Self {
+        match code {
+            1 => Self::LoadCell,
+            2 => Self::Supply,
+            3 => Self::StuckGauge,
+            _ => Self::None,
+        }
+    }
+}
+
+/// A muscle on the virtual bench, what moves it, and what goes wrong there.
+#[derive(Debug, Clone)]
+pub struct Stand {
+    spec: BenchSpec,
+    motion: Motion,
+    plant: Plant,
+    mishap: Arc<AtomicU8>,
+    stuck: Option<f32>,
+}
+
+/// One control tick, s.
+const TICK: f64 = 1e-3;
+
+impl Stand {
+    /// A muscle that is moved as told.
+    #[must_use]
+    pub fn new(spec: BenchSpec, motion: Motion) -> Self {
+        let plant = Plant::new(&spec, &motion);
+        Self { spec, motion, plant, mishap: Arc::default(), stuck: None }
+    }
+
+    /// The switch for mishaps; a [`Mishap`] as a number.
+    #[must_use]
+    pub fn mishap(&self) -> Arc<AtomicU8> {
+        Arc::clone(&self.mishap)
+    }
+
+    fn answer(&mut self) -> Answer {
+        let r = self.plant.readings();
+        let (mut pressure, mut force) = (r.pressure as f32, r.force as f32);
+        match Mishap::from_code(self.mishap.load(Ordering::Relaxed)) {
+            Mishap::LoadCell => force = 1e5,
+            Mishap::StuckGauge => pressure = *self.stuck.get_or_insert(pressure),
+            Mishap::None | Mishap::Supply => self.stuck = None,
+        }
+        let status = if self.plant.truth().pressure > 1.25 * self.spec.muscle.max_pressure {
+            Answer::BURST
+        } else {
+            0
+        };
+        Answer {
+            status,
+            temperature_centi: (r.temperature * 100.0).round() as i16,
+            tick: 0,
+            pressure,
+            stroke: r.stroke as f32,
+            force,
+        }
+    }
+}
+
+impl Station for Stand {
+    fn reset(&mut self, _script: u16) -> Answer {
+        self.plant = Plant::with_muscle(self.plant.muscle().clone(), &self.spec, &self.motion);
+        self.answer()
+    }
+
+    fn step(&mut self, pressure_command: f32, _setpoint: f32) -> Answer {
+        let supply = Mishap::from_code(self.mishap.load(Ordering::Relaxed)) != Mishap::Supply;
+        self.plant.step(TICK, if supply { f64::from(pressure_command) } else { 0.0 });
+        self.answer()
+    }
+}
+
+/// A running controller; it ends when this is dropped.
+#[derive(Debug)]
+pub struct Emulated {
+    kind: Kind,
+    address: Address,
+    why_native: Option<String>,
+    _running: Running,
+}
+
+#[derive(Debug)]
+enum Running {
+    Qemu(Qemu),
+    Native { _device: Device },
+}
+
+impl Emulated {
+    /// Starts the firmware on a stand: in QEMU where emulator and image are there, else in this process.
+    ///
+    /// `only` insists on one of them. `speed` is device seconds in a second for the native one; QEMU takes its own.
+    ///
+    /// # Errors
+    /// [`Code::DevicePort`] when what was insisted on cannot be started.
+    pub fn start(stand: Stand, only: Option<Kind>, speed: f64) -> Result<Self> {
+        if only != Some(Kind::Native) {
+            match Qemu::start(stand.clone()) {
+                Ok((qemu, address)) => {
+                    return Ok(Self {
+                        kind: Kind::Qemu,
+                        address,
+                        why_native: None,
+                        _running: Running::Qemu(qemu),
+                    });
+                }
+                Err(why) if only == Some(Kind::Qemu) => {
+                    return Err(Error::new(
+                        Code::DevicePort,
+                        format!("the emulator cannot be started: {why}"),
+                    )
+                    .help("install what is missing with: firmware/build --install"));
+                }
+                Err(why) => return Self::native(stand, speed, Some(why)),
+            }
+        }
+        Self::native(stand, speed, None)
+    }
+
+    fn native(mut stand: Stand, speed: f64, why_native: Option<String>) -> Result<Self> {
+        stand.reset(0);
+        let plant = move |outputs: &Outputs| {
+            let side = &outputs.sides[0];
+            let readings = stand.step(if side.vent { 0.0 } else { side.pressure_pa }, outputs.asked);
+            let now = Readings {
+                pressure_pa: readings.pressure,
+                stroke_m: readings.stroke,
+                force_n: readings.force,
+            };
+            Inputs { sides: [Some(now), None], ..Inputs::default() }
+        };
+        let options = Options { speed, ..Options::default() };
+        let device = Device::start("127.0.0.1:0", options, plant).map_err(|e| {
+            Error::new(Code::DevicePort, format!("the controller cannot be started in this process: {e}"))
+        })?;
+        let at = device.address();
+        let address = Address::Tcp { host: at.ip().to_string(), port: at.port() };
+        Ok(Self { kind: Kind::Native, address, why_native, _running: Running::Native { _device: device } })
+    }
+
+    /// Where the firmware runs.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// Its link; any program may connect, one at a time.
+    #[must_use]
+    pub fn address(&self) -> &Address {
+        &self.address
+    }
+
+    /// Why it does not run in QEMU, where that was left open.
+    #[must_use]
+    pub fn why_native(&self) -> Option<&str> {
+        self.why_native.as_deref()
+    }
+
+    /// In words, for people.
+    #[must_use]
+    pub fn words(&self) -> String {
+        match (self.kind, &self.why_native) {
+            (Kind::Qemu, _) => "the firmware's image on an emulated Cortex-M4 (QEMU, mps2-an386)".to_owned(),
+            (Kind::Native, Some(why)) => format!("the firmware's library in this process, as {why}"),
+            (Kind::Native, None) => "the firmware's library in this process".to_owned(),
+        }
+    }
+
+    /// What QEMU said, for when something went wrong.
+    #[must_use]
+    pub fn log(&self) -> String {
+        match &self._running {
+            Running::Qemu(qemu) => std::fs::read_to_string(qemu.folder.join("qemu.log")).unwrap_or_default(),
+            Running::Native { .. } => String::new(),
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Qemu {
+    child: Child,
+    folder: PathBuf,
+    stop: Arc<AtomicBool>,
+}
+
+impl Drop for Qemu {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        // It may have ended by itself; there is nobody left to tell.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        let _ = std::fs::remove_dir_all(&self.folder);
+    }
+}
+
+impl Qemu {
+    /// The reason in words where it cannot be started.
+    fn start(stand: Stand) -> std::result::Result<(Self, Address), String> {
+        let image = image().ok_or("the firmware's image is not built (firmware/build)")?;
+        let bench = TcpListener::bind("127.0.0.1:0").map_err(|e| format!("no port can be opened ({e})"))?;
+        let bench_port = bench.local_addr().map_err(|e| e.to_string())?.port();
+        // QEMU opens the link's port itself; this one was free a moment ago.
+        let link_port =
+            TcpListener::bind("127.0.0.1:0").and_then(|l| l.local_addr()).map_err(|e| e.to_string())?.port();
+        let folder = std::env::temp_dir().join(format!("pam-emulated-{}-{link_port}", std::process::id()));
+        std::fs::create_dir_all(&folder).map_err(|e| format!("no temporary folder can be made ({e})"))?;
+        let started = std::fs::File::create(folder.join("qemu.log")).and_then(|log| {
+            Command::new("qemu-system-arm")
+                .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"])
+                .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+                .arg(&image)
+                .args(["-serial", &format!("tcp:127.0.0.1:{link_port},server=on,wait=off")])
+                .args(["-serial", &format!("tcp:127.0.0.1:{bench_port}"), "-serial", "null"])
+                // The store's file is made where the emulator runs.
+                .current_dir(&folder)
+                .stdin(Stdio::null())
+                .stdout(log.try_clone()?)
+                .stderr(log)
+                .spawn()
+        });
+        let child = started.map_err(|e| match e.kind() {
+            io::ErrorKind::NotFound => "QEMU is not installed".to_owned(),
+            _ => format!("QEMU cannot be run ({e})"),
+        })?;
+        let stop = Arc::new(AtomicBool::new(false));
+        let mut qemu = Self { child, folder, stop: Arc::clone(&stop) };
+        let stream = qemu.accept(&bench)?;
+        let mut stand = stand;
+        thread::spawn(move || {
+            let mut stream = stream;
+            // It ends with the emulator: then the stream closes.
+            let _ = lockstep::serve(&mut stream, &mut stand);
+        });
+        let address = Address::Tcp { host: "127.0.0.1".into(), port: link_port };
+        Ok((qemu, address))
+    }
+
+    fn accept(&mut self, listener: &TcpListener) -> std::result::Result<std::net::TcpStream, String> {
+        let broken = |e: io::Error| format!("QEMU cannot be reached ({e})");
+        listener.set_nonblocking(true).map_err(broken)?;
+        let deadline = Instant::now() + Duration::from_secs(15);
+        loop {
+            match listener.accept() {
+                Ok((stream, _)) => {
+                    stream.set_nonblocking(false).map_err(broken)?;
+                    stream.set_nodelay(true).map_err(broken)?;
+                    return Ok(stream);
+                }
+                Err(e) if e.kind() == io::ErrorKind::WouldBlock => {}
+                Err(e) => return Err(broken(e)),
+            }
+            if let Ok(Some(status)) = self.child.try_wait() {
+                let log = std::fs::read_to_string(self.folder.join("qemu.log")).unwrap_or_default();
+                return Err(format!("QEMU ended at once ({status}): {}", log.trim()));
+            }
+            if Instant::now() > deadline {
+                return Err("QEMU does not connect to the bench within 15 s".to_owned());
+            }
+            thread::sleep(Duration::from_millis(2));
+        }
+    }
+}
+
+/// The firmware's image: `PAM_FIRMWARE`, or where `firmware/build` puts it, seen from here or from this program.
+#[must_use]
+pub fn image() -> Option<PathBuf> {
+    if let Some(path) = std::env::var_os("PAM_FIRMWARE") {
+        return Some(PathBuf::from(path)).filter(|p| p.is_file());
+    }
+    let below = |top: &Path| Some(top.join("target/firmware/mps2-an386.elf")).filter(|p| p.is_file());
+    let from = |start: Option<PathBuf>| start.and_then(|s| s.ancestors().find_map(below));
+    from(std::env::current_dir().ok()).or_else(|| from(std::env::current_exe().ok()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use virtual_bench::presets;
+
+    #[test]
+    fn a_mishap_is_seen_in_the_readings_and_ends_with_it() {
+        let spec = BenchSpec::laboratory(presets::miniature(), 1);
+        let mut stand = Stand::new(spec, Motion::Held { stroke_mm: 0.5 });
+        let mishap = stand.mishap();
+        let settled = |stand: &mut Stand| (0..600).map(|_| stand.step(300e3, 0.0)).last().unwrap();
+        let well = settled(&mut stand);
+        assert!((well.pressure - 300e3).abs() < 5e3 && well.force > 20.0 && well.force < 200.0);
+        mishap.store(Mishap::LoadCell as u8, Ordering::Relaxed);
+        assert_eq!(stand.step(300e3, 0.0).force, 1e5);
+        mishap.store(Mishap::StuckGauge as u8, Ordering::Relaxed);
+        let stuck = stand.step(300e3, 0.0).pressure;
+        assert!((0..50).all(|_| stand.step(100e3, 0.0).pressure == stuck));
+        mishap.store(Mishap::Supply as u8, Ordering::Relaxed);
+        assert!(settled(&mut stand).pressure < 2e3);
+        mishap.store(Mishap::None as u8, Ordering::Relaxed);
+        assert!((settled(&mut stand).pressure - 300e3).abs() < 5e3);
+    }
+}
