@@ -14,6 +14,7 @@ mod noise;
 mod plan;
 mod quantity;
 mod read;
+pub mod segment;
 mod source;
 
 pub use campaign::{Campaign, Clock};

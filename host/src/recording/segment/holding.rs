@@ -1,0 +1,184 @@
+//! Where the length is held.
+
+use std::collections::VecDeque;
+
+use super::scale::Scale;
+use super::turning::Leg;
+
+/// A stretch of samples at held length, both ends included.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hold {
+    /// First sample at rest.
+    pub start: usize,
+    /// Last sample at rest.
+    pub end: usize,
+    /// The stroke it rests at, m.
+    pub stroke: f64,
+}
+
+/// The holds of a smoothed stroke, in order.
+///
+/// A hold is a stretch that stays within the threshold for much longer than the motion around it takes for that distance,
+/// and within which the stroke is flat and not the round top of a smooth turn.
+pub(super) fn holds(time: &[f64], smooth: &[f64], scale: &Scale, legs: &[Leg]) -> Vec<Hold> {
+    let n = smooth.len();
+    if n == 0 {
+        return Vec::new();
+    }
+    if legs.is_empty() {
+        return vec![Hold { start: 0, end: n - 1, stroke: median(smooth) }];
+    }
+    let mut holds: Vec<Hold> = Vec::new();
+    let (mut lows, mut highs) = (VecDeque::new(), VecDeque::new());
+    let mut start = 0;
+    let mut leg = 0;
+    for end in 0..=n {
+        // The window start..end is the longest one that ends here and stays within the threshold.
+        let mut broken = end == n;
+        if end < n {
+            while lows.back().is_some_and(|i: &usize| smooth[*i] >= smooth[end]) {
+                lows.pop_back();
+            }
+            while highs.back().is_some_and(|i: &usize| smooth[*i] <= smooth[end]) {
+                highs.pop_back();
+            }
+            lows.push_back(end);
+            highs.push_back(end);
+            let spread = |l: &VecDeque<usize>, h: &VecDeque<usize>| match (l.front(), h.front()) {
+                (Some(l), Some(h)) => smooth[*h] - smooth[*l],
+                _ => 0.0,
+            };
+            broken = spread(&lows, &highs) > scale.threshold;
+            if broken {
+                let behind = match longest(time, &mut holds, smooth, scale, legs, &mut leg, start, end) {
+                    Found::Hold => end,
+                    // Testing this stretch again sample by sample would take quadratic time.
+                    Found::Round => start + (end - start) / 4,
+                    Found::Short => start + 1,
+                };
+                while start < behind || spread(&lows, &highs) > scale.threshold {
+                    start += 1;
+                    while lows.front().is_some_and(|i| *i < start) {
+                        lows.pop_front();
+                    }
+                    while highs.front().is_some_and(|i| *i < start) {
+                        highs.pop_front();
+                    }
+                }
+                continue;
+            }
+        }
+        if broken {
+            longest(time, &mut holds, smooth, scale, legs, &mut leg, start, end);
+        }
+    }
+    joined(holds, smooth, scale)
+}
+
+/// What a stretch turned out to be.
+enum Found {
+    Hold,
+    /// Long enough, but a smooth turn.
+    Round,
+    Short,
+}
+
+/// Takes the samples from `start` up to `end` as a hold if they are one.
+#[allow(clippy::too_many_arguments)] // One step of `holds`, apart for being read.
+fn longest(
+    time: &[f64],
+    holds: &mut Vec<Hold>,
+    smooth: &[f64],
+    scale: &Scale,
+    legs: &[Leg],
+    leg: &mut usize,
+    start: usize,
+    end: usize,
+) -> Found {
+    if end < start + 6 {
+        return Found::Short;
+    }
+    while legs[*leg].end < start && *leg + 1 < legs.len() {
+        *leg += 1;
+    }
+    // The slower of the legs around it says how long the motion would take for this distance.
+    let slowest = legs[*leg..]
+        .iter()
+        .take_while(|l| l.start <= end)
+        .take(3)
+        .map(|l| l.amplitude() / (time[l.end] - time[l.start]).max(f64::MIN_POSITIVE))
+        .fold(f64::INFINITY, f64::min);
+    let duration = time[end - 1] - time[start];
+    let passing = scale.threshold / slowest;
+    if !(duration > 4.0 * passing) {
+        return Found::Short;
+    }
+    // What stays so much longer is at rest even if it creeps.
+    if duration < 60.0 * passing && !flat(&smooth[start..end], scale) {
+        return Found::Round;
+    }
+    let level = median(&smooth[start..end]);
+    let tolerance = (3.0 * scale.smoothed_noise).max(0.1 * scale.threshold);
+    let still = |i: &usize| (smooth[*i] - level).abs() <= tolerance;
+    let (Some(first), Some(last)) = ((start..end).find(still), (start..end).rev().find(still)) else {
+        return Found::Round;
+    };
+    holds.push(Hold { start: first, end: last, stroke: level });
+    Found::Hold
+}
+
+/// Whether a stretch is flat: the parabola through it rises and bends by no more than noise does. A smooth turn that fills
+/// the threshold bends by half of it, its flanks rise by as much.
+fn flat(smooth: &[f64], scale: &Scale) -> bool {
+    let cut = smooth.len() / 20;
+    let inner = &smooth[cut..smooth.len() - cut];
+    let n = inner.len() as f64;
+    // Orthogonal polynomials on -1..1: the coefficient of each alone tells rise and bend.
+    let place = |i: usize| 2.0 * i as f64 / (n - 1.0) - 1.0;
+    let mean_square = (0..inner.len()).map(|i| place(i).powi(2)).sum::<f64>() / n;
+    let (mut pp, mut px, mut qq, mut qx) = (0.0, 0.0, 0.0, 0.0);
+    for (i, x) in inner.iter().enumerate() {
+        let (p, x) = (place(i), x - inner[0]);
+        let q = p * p - mean_square;
+        pp += p * p;
+        px += p * x;
+        qq += q * q;
+        qx += q * x;
+    }
+    let size = |square: f64, product: f64| if square > 0.0 { (product / square).abs() } else { 0.0 };
+    let most = (2.5 * scale.smoothed_noise).max(0.15 * scale.threshold);
+    size(pp, px) <= most && size(qq, qx) <= most
+}
+
+/// Joins holds at one level that a single wild sample has parted.
+fn joined(holds: Vec<Hold>, smooth: &[f64], scale: &Scale) -> Vec<Hold> {
+    let mut joined: Vec<Hold> = Vec::with_capacity(holds.len());
+    for hold in holds {
+        match joined.last_mut() {
+            Some(last)
+                if (last.stroke - hold.stroke).abs() < 0.5 * scale.threshold
+                    && smooth[last.end..hold.start]
+                        .iter()
+                        .all(|x| (x - last.stroke).abs() < 1.5 * scale.threshold) =>
+            {
+                // The level of the longer one is the better known.
+                if hold.end - hold.start > last.end - last.start {
+                    last.stroke = hold.stroke;
+                }
+                last.end = hold.end;
+            }
+            _ => joined.push(hold),
+        }
+    }
+    joined
+}
+
+pub(super) fn median(column: &[f64]) -> f64 {
+    // Some thousands of samples tell a level as well as millions.
+    let mut some: Vec<f64> = column.iter().step_by(column.len() / 4096 + 1).copied().collect();
+    if some.is_empty() {
+        return 0.0;
+    }
+    let middle = some.len() / 2;
+    *some.select_nth_unstable_by(middle, f64::total_cmp).1
+}

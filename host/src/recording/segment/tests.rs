@@ -1,0 +1,342 @@
+//! Motions whose directions are known, with noise: what is found must be the truth but for samples that noise hides.
+
+use proptest::prelude::*;
+
+use super::*;
+
+/// One piece of a test's path.
+#[derive(Debug, Clone, Copy)]
+enum Piece {
+    /// To a stroke (m) at a speed (m/s).
+    Go(f64, f64),
+    /// Held for so long (s).
+    Rest(f64),
+    /// Held while the pressure goes somewhere (Pa) in some seconds.
+    Pressure(f64, f64),
+}
+
+struct Truth {
+    recording: Recording,
+    direction: Vec<i8>,
+    /// Speed at which the stroke passes each sample, m/s.
+    speed: Vec<f64>,
+}
+
+/// Pseudo-random numbers of a normal distribution: the sum of twelve uniform ones.
+struct Noise(u64);
+
+impl Noise {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// Carries out a path and samples it.
+fn carry_out(path: &[Piece], rate: f64, stroke_noise: f64, ripple: f64, seed: u64) -> Truth {
+    let (mut stroke, mut pressure) = (0.0, 300e3);
+    let mut noise = Noise(seed);
+    let mut truth = Truth { recording: Recording::default(), direction: Vec::new(), speed: Vec::new() };
+    let (mut clock, mut begun, mut last) = (0.0, 0.0, 0i8);
+    for piece in path {
+        let (to, duration, at) = match *piece {
+            Piece::Go(to, speed) => (to - stroke, ((to - stroke) / speed).abs(), pressure),
+            Piece::Rest(duration) => (0.0, duration, pressure),
+            Piece::Pressure(at, duration) => (0.0, duration, at),
+        };
+        let way = if to == 0.0 { at - pressure } else { to };
+        if way != 0.0 {
+            last = if way > 0.0 { 1 } else { -1 };
+        }
+        while clock <= begun + duration {
+            let share = if duration > 0.0 { (clock - begun) / duration } else { 1.0 };
+            truth.recording.time.push(clock);
+            truth.recording.stroke.push(stroke + share * to + stroke_noise * noise.normal());
+            let wave = ripple * (clock * 2.0 * std::f64::consts::PI * 3.7).sin();
+            truth
+                .recording
+                .pressure
+                .push(pressure + share * (at - pressure) + wave + 0.3 * ripple * noise.normal());
+            truth.direction.push(last);
+            truth.speed.push(if duration > 0.0 { to.abs() / duration } else { 0.0 });
+            clock += 1.0 / rate;
+        }
+        begun += duration;
+        stroke += to;
+        pressure = at;
+    }
+    truth
+}
+
+/// Samples whose direction is wrong.
+fn wrong(truth: &Truth, found: &Motion) -> Vec<usize> {
+    (0..truth.direction.len()).filter(|i| truth.direction[*i] != found.direction[*i]).collect()
+}
+
+fn turns(direction: &[i8]) -> usize {
+    direction.windows(2).filter(|w| w[0] != w[1]).count()
+}
+
+const MM: f64 = 1e-3;
+
+fn loops(count: usize, top: f64, speed: f64) -> Vec<Piece> {
+    (0..count).flat_map(|_| [Piece::Go(top, speed), Piece::Go(0.0, speed)]).collect()
+}
+
+#[test]
+fn triangles_turn_at_the_right_sample() {
+    // 10 Hz at 1 mm/s: a step is 0.1 mm, the noise 2 µm. Every sample is certain.
+    for seed in 1..20 {
+        let truth = carry_out(&loops(3, 27.03 * MM, 1.0 * MM), 10.0, 2e-6, 250.0, seed);
+        let found = Motion::of(&truth.recording);
+        assert_eq!(wrong(&truth, &found), Vec::<usize>::new(), "seed {seed}");
+        assert_eq!(found.turns.len(), 6);
+    }
+}
+
+#[test]
+fn without_any_noise_every_sample_is_right() {
+    for (rate, speed) in [(10.0, 1.0), (10.0, 0.3), (1000.0, 0.3), (100.0, 16.0), (30.0, 0.287)] {
+        let truth = carry_out(&loops(2, 10.007 * MM, speed * MM), rate, 0.0, 0.0, 1);
+        let found = Motion::of(&truth.recording);
+        assert_eq!(wrong(&truth, &found), Vec::<usize>::new(), "{rate} Hz, {speed} mm/s");
+    }
+}
+
+#[test]
+fn slow_motion_under_noise_turns_within_what_noise_hides() {
+    // 1 kHz at 0.3 mm/s: a step is 0.3 µm, the noise 10 µm. Lines through some hundred samples on either side meet within a
+    // few standard errors: 10 µm / √100 / 0.3 µm, some 3 to 10 samples.
+    for seed in 1..6 {
+        let truth = carry_out(&loops(2, 3.0 * MM, 0.3 * MM), 1000.0, 10e-6, 250.0, seed);
+        let found = Motion::of(&truth.recording);
+        assert_eq!(turns(&found.direction), 3, "seed {seed}");
+        assert!(wrong(&truth, &found).len() < 30, "seed {seed}: {} wrong", wrong(&truth, &found).len());
+    }
+}
+
+#[test]
+fn direction_is_kept_through_a_rest_and_changes_when_motion_goes_on() {
+    let path = [
+        Piece::Rest(3.0),
+        Piece::Go(5.0 * MM, 1.0 * MM),
+        Piece::Rest(10.0),
+        Piece::Go(9.0 * MM, 1.0 * MM),
+        Piece::Rest(20.0),
+        Piece::Go(2.0 * MM, 2.0 * MM),
+        Piece::Rest(5.0),
+    ];
+    for (rate, noise) in [(10.0, 2e-6), (100.0, 2e-6), (100.0, 20e-6), (1000.0, 5e-6)] {
+        let truth = carry_out(&path, rate, noise, 250.0, 3);
+        let found = Motion::of(&truth.recording);
+        assert_eq!(turns(&found.direction), 2, "{rate} Hz {noise} m: {:?} {:?}", found.turns, found.holds);
+        assert!(
+            wrong(&truth, &found).len() as f64 <= 2.0 + 0.03 * rate,
+            "{rate} Hz {noise} m: {:?}",
+            wrong(&truth, &found)
+        );
+        assert_eq!(found.direction[0], 0);
+        let rest =
+            found.holds.iter().filter(|h| truth.recording.time[h.end] - truth.recording.time[h.start] > 2.0);
+        assert_eq!(rest.count(), 4, "{rate} Hz {noise} m: {:?}", found.holds);
+        let columns = found.columns(&truth.recording);
+        let late = truth.recording.time.partition_point(|t| *t < 43.0);
+        assert!((columns.hold_time[late] - 20.0).abs() < 0.5, "{}", columns.hold_time[late]);
+    }
+}
+
+#[test]
+fn at_held_length_the_pressure_decides() {
+    let path = [
+        Piece::Rest(2.0),
+        Piece::Pressure(500e3, 4.0),
+        Piece::Rest(5.0),
+        Piece::Pressure(100e3, 8.0),
+        Piece::Rest(3.0),
+        Piece::Pressure(200e3, 2.0),
+    ];
+    for (rate, noise) in [(10.0, 0.0), (10.0, 2e-6), (106.0, 5e-6)] {
+        let truth = carry_out(&path, rate, noise, 250.0, 5);
+        let found = Motion::of(&truth.recording);
+        assert_eq!(turns(&found.direction), 3, "{:?}", found.turns);
+        let at: Vec<f64> = found.turns.iter().map(|t| truth.recording.time[t.index]).collect();
+        for (found, true_time) in at.iter().zip([2.0, 11.0, 22.0]) {
+            assert!((found - true_time).abs() < 0.25, "{at:?}");
+        }
+    }
+}
+
+#[test]
+fn a_rest_with_pressure_in_the_middle_of_a_stroke() {
+    let path = [
+        Piece::Go(5.0 * MM, 1.0 * MM),
+        Piece::Pressure(100e3, 2.0),
+        Piece::Rest(5.0),
+        Piece::Go(9.0 * MM, 1.0 * MM),
+        Piece::Go(0.0, 1.0 * MM),
+    ];
+    let truth = carry_out(&path, 50.0, 3e-6, 250.0, 8);
+    let found = Motion::of(&truth.recording);
+    assert_eq!(turns(&found.direction), 3, "{:?}", found.turns);
+    assert!(wrong(&truth, &found).len() <= 12, "{:?}", wrong(&truth, &found));
+}
+
+#[test]
+fn ripple_and_noise_at_rest_flip_nothing() {
+    let truth = carry_out(&[Piece::Rest(600.0)], 100.0, 20e-6, 1500.0, 2);
+    let found = Motion::of(&truth.recording);
+    assert!(found.direction.iter().all(|d| *d == 0), "{:?}", found.turns);
+}
+
+#[test]
+fn settled_points_of_a_staircase_turn_between_the_last_up_and_the_first_down() {
+    let up = (0..30).map(|i| 640e3 * (1.0 - (-f64::from(i) / 8.0).exp()));
+    let down = (1..28).map(|i| 625e3 * (-f64::from(i) / 9.0).exp());
+    let pressure: Vec<f64> =
+        up.chain(down).enumerate().map(|(i, p)| p + [300.0, -400.0, 100.0][i % 3]).collect();
+    let recording = Recording {
+        time: (0..57).map(|i| 0.415 + 0.5 * f64::from(i)).collect(),
+        stroke: vec![12e-3; 57],
+        pressure,
+        ..Recording::default()
+    };
+    let found = Motion::of(&recording);
+    let expected: Vec<i8> = (0..57).map(|i| if i < 30 { 1 } else { -1 }).collect();
+    let known: Vec<usize> = (0..57).filter(|i| found.direction[*i] != expected[*i]).collect();
+    assert!(known.iter().all(|i| *i < 2), "{known:?}");
+}
+
+#[test]
+fn what_the_file_says_stands() {
+    let mut truth = carry_out(&loops(1, 5.0 * MM, 1.0 * MM), 10.0, 0.0, 0.0, 1);
+    truth.recording.direction = Some(truth.direction.iter().map(|_| -1).collect());
+    let found = Motion::of(&truth.recording);
+    assert!(found.direction.iter().all(|d| *d == -1));
+}
+
+#[test]
+fn cycles_are_counted_and_minor_loops_are_not() {
+    let mut path = loops(2, 10.0 * MM, 1.0 * MM);
+    path.extend([
+        Piece::Go(10.0 * MM, 1.0 * MM),
+        Piece::Go(8.0 * MM, 1.0 * MM),
+        Piece::Go(9.0 * MM, 1.0 * MM),
+        Piece::Go(0.0, 1.0 * MM),
+        Piece::Go(10.0 * MM, 1.0 * MM),
+    ]);
+    let truth = carry_out(&path, 20.0, 2e-6, 100.0, 4);
+    let found = Motion::of(&truth.recording);
+    let cycle = found.columns(&truth.recording).cycle;
+    let at = |t: f64| cycle[truth.recording.time.partition_point(|x| *x < t)];
+    assert_eq!([at(1.0), at(15.0), at(25.0), at(45.0), at(51.5), at(55.0), at(65.0)], [1, 1, 2, 3, 3, 3, 4]);
+}
+
+#[test]
+fn rates_are_those_of_the_motion() {
+    let n = 4000;
+    let time: Vec<f64> = (0..n).map(|i| i as f64 * 0.01).collect();
+    let mut noise = Noise(9);
+    let stroke = time.iter().map(|t| 5.0 * MM * (1.0 - (0.8 * t).cos()) + 3e-6 * noise.normal()).collect();
+    let pressure = time.iter().map(|t| 300e3 + 100e3 * (0.5 * t).sin() + 100.0 * noise.normal()).collect();
+    let recording = Recording { time: time.clone(), stroke, pressure, ..Recording::default() };
+    let rates = Rates::of(&recording, &Motion::of(&recording));
+    for i in (50..n - 50).step_by(7) {
+        let t = time[i];
+        assert!((rates.speed[i] - 4.0 * MM * (0.8 * t).sin()).abs() < 0.3 * MM, "speed at {t}");
+        assert!((rates.pressure_rate[i] - 50e3 * (0.5 * t).cos()).abs() < 5e3, "pressure rate at {t}");
+    }
+    let rms = |f: &dyn Fn(usize) -> f64| ((0..n).map(|i| f(i).powi(2)).sum::<f64>() / n as f64).sqrt();
+    assert!(rms(&|i| rates.speed[i] - 4.0 * MM * (0.8 * time[i]).sin()) < 0.08 * MM);
+    assert!(rms(&|i| rates.acceleration[i] - 3.2 * MM * (0.8 * time[i]).cos()) < 1.6 * MM);
+}
+
+#[test]
+fn levels_are_found_and_ramps_are_not_levels() {
+    let at = |pressure: Vec<f64>| Recording {
+        time: (0..pressure.len()).map(|i| i as f64).collect(),
+        stroke: vec![0.0; pressure.len()],
+        pressure,
+        ..Recording::default()
+    };
+    let mut noise = Noise(3);
+    let files: Vec<Recording> = [207e3, 276e3, 345e3, 414e3]
+        .iter()
+        .map(|p| {
+            at((0..2000).map(|i| p + 300.0 * noise.normal() + 400.0 * (f64::from(i) / 90.0).sin()).collect())
+        })
+        .collect();
+    let PressureLevels::Constant(levels) = PressureLevels::of(&files) else { panic!("no levels") };
+    assert_eq!(levels.len(), 4);
+    assert!((levels[2].mean - 345e3).abs() < 200.0 && levels[2].samples > 1990);
+    let ramp = at((0..5000).map(|i| f64::from(i) * 120.0).collect());
+    assert!(matches!(PressureLevels::of([&ramp]), PressureLevels::Continuous { .. }));
+    let one = at(vec![300e3; 50]);
+    assert!(matches!(PressureLevels::of([&one]), PressureLevels::Constant(l) if l.len() == 1));
+}
+
+#[test]
+fn a_shared_clock_carries_the_direction_over() {
+    let mut truth = carry_out(&loops(1, 5.0 * MM, 1.0 * MM), 10.0, 0.0, 0.0, 1);
+    let first = truth.recording.clone();
+    let shift = truth.recording.duration() + 10.0;
+    truth.recording.time.iter_mut().for_each(|t| *t += shift);
+    truth.recording.stroke.fill(0.0);
+    let campaign = Campaign::new(vec![first, truth.recording]);
+    let motions = Motion::of_campaign(&campaign);
+    assert!(motions[1].direction.iter().all(|d| *d == -1));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn noisy_motion_gives_its_true_turns(
+        seed: u64,
+        points in prop::collection::vec((2.0..12.0f64, 0.3..4.0f64, 0.0..12.0f64), 2..7),
+        rate in 20.0..400.0f64,
+        noise in 0.5e-6..20e-6f64,
+    ) {
+        // Every move is at least 2 mm, a hundred times the noise; a rest is long enough to be one.
+        let mut path = vec![Piece::Rest(2.0)];
+        let mut at = 0.0;
+        for (i, (size, speed, rest)) in points.iter().enumerate() {
+            at += if i % 2 == 0 { size * MM } else { -size * MM };
+            path.push(Piece::Go(at, speed * MM));
+            if *rest > 4.0 {
+                path.push(Piece::Rest(*rest));
+            }
+        }
+        let truth = carry_out(&path, rate, noise, 250.0, seed);
+        let found = Motion::of(&truth.recording);
+        prop_assert_eq!(turns(&found.direction), turns(&truth.direction), "{:?}", found.turns);
+        // A turn is uncertain by the time in which the stroke moves by some standard deviations of the noise.
+        let slowest = points.iter().map(|p| p.1 * MM).fold(f64::INFINITY, f64::min);
+        let each = 2.0 + 4.0 * noise / slowest * rate;
+        let off = wrong(&truth, &found).len() as f64;
+        prop_assert!(off <= each * points.len() as f64, "{off} of {each} per turn");
+    }
+
+    #[test]
+    fn nothing_makes_it_panic(
+        values in prop::collection::vec((1e-3..1.0f64, -1e6..1e6f64, -1.0..1.0f64), 0..60),
+        constant in 0..3usize,
+    ) {
+        let mut clock = 0.0;
+        let time = values.iter().map(|v| { clock += v.0; clock }).collect();
+        let pressure = values.iter().map(|v| if constant == 1 { 3e5 } else { v.1 }).collect();
+        let stroke = values.iter().map(|v| if constant == 2 { 0.01 } else { v.2 }).collect();
+        let recording = Recording { time, pressure, stroke, ..Recording::default() };
+        let motion = Motion::of(&recording);
+        let columns = motion.columns(&recording);
+        let rates = Rates::of(&recording, &motion);
+        prop_assert_eq!(columns.travel.len(), recording.len());
+        prop_assert_eq!(columns.cycle.len(), recording.len());
+        prop_assert!(rates.speed.iter().chain(&rates.pressure_rate).all(|v| v.is_finite()));
+        prop_assert!(columns.travel.iter().all(|v| *v >= 0.0));
+        let _ = PressureLevels::of([&recording]);
+    }
+}
