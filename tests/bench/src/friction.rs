@@ -8,7 +8,9 @@
 //! so that in full sliding the friction is `W sgn v`. `W = k_F(P) |F_core|`: what presses the strands together is the braid's
 //! tension, and with it the muscle's force. The travel `dξ = dx + s dP` counts, besides the stroke, what the strands slip
 //! under the ends while the pressure changes at held length (fibres stretch and settle): filling acts like shortening. This
-//! makes the gap between filling and emptying that isometric recordings show.
+//! makes the gap between filling and emptying that isometric recordings show. Changes within the lock `±h` of the last
+//! pressure that moved the strands are carried by their static friction and move nothing: a regulator's ripple does not
+//! shake the friction loose.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,6 +24,9 @@ pub struct BraidFriction {
     pub bristles: Vec<(f64, f64)>,
     /// Slip of the strands per pressure at held length s, m/Pa.
     pub slip: f64,
+    /// Change of pressure that static friction carries, half-width h, Pa.
+    #[serde(default)]
+    pub lock: f64,
     /// How much the friction differs between the ways: shortening has `1 + asymmetry` times W, lengthening `1 − asymmetry`.
     #[serde(default)]
     pub asymmetry: f64,
@@ -48,12 +53,14 @@ impl BraidFriction {
 #[derive(Debug, Clone)]
 pub struct Braid {
     z: Vec<f64>,
+    /// Pressure since the strands last moved, Pa, within ±h.
+    carried: f64,
 }
 
 impl Braid {
     /// Bristles upright: nobody knows which way the muscle last moved.
     pub fn new(friction: &BraidFriction) -> Self {
-        Self { z: vec![0.0; friction.bristles.len()] }
+        Self { z: vec![0.0; friction.bristles.len()], carried: 0.0 }
     }
 
     /// Slide by `dx` (m, shortening positive) while the pressure changes by `dp` (Pa) under a friction level `w` (N);
@@ -61,7 +68,9 @@ impl Braid {
     ///
     /// The bristles' law is solved exactly over the step, so a step of any size is stable.
     pub fn slide(&mut self, friction: &BraidFriction, w: f64, dx: f64, dp: f64) -> f64 {
-        let travel = dx + friction.slip * dp;
+        let reached = self.carried + dp;
+        self.carried = reached.clamp(-friction.lock, friction.lock);
+        let travel = dx + friction.slip * (reached - self.carried);
         let way = if travel > 0.0 { 1.0 } else { -1.0 };
         let mut sum = 0.0;
         for (z, (share, delta)) in self.z.iter_mut().zip(&friction.bristles) {
@@ -81,6 +90,7 @@ mod tests {
             factor: vec![(200e3, 0.14), (600e3, 0.06)],
             bristles: vec![(0.7, 1e-5), (0.3, 5e-5)],
             slip: 4e-10,
+            lock: 0.0,
             asymmetry: 0.0,
         }
     }
@@ -118,6 +128,19 @@ mod tests {
         let f = friction();
         let mut b = Braid::new(&f);
         assert!(b.slide(&f, 5.0, 0.0, 400e3) > 4.0);
+        assert!(b.slide(&f, 5.0, 0.0, -400e3) < -4.0);
+    }
+
+    #[test]
+    fn ripple_within_the_lock_moves_nothing() {
+        let f = BraidFriction { lock: 3e3, ..friction() };
+        let mut b = Braid::new(&f);
+        let held = b.slide(&f, 5.0, 1e-3, 0.0);
+        let mut last = held;
+        for i in 0..1000 {
+            last = b.slide(&f, 5.0, 0.0, if i % 2 == 0 { 1e3 } else { -1e3 });
+        }
+        assert!((last - held).abs() < 1e-9, "{last} {held}");
         assert!(b.slide(&f, 5.0, 0.0, -400e3) < -4.0);
     }
 

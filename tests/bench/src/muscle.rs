@@ -175,6 +175,9 @@ pub struct TruthAt {
     pub free_contraction: f64,
 }
 
+/// Push at which a slack muscle buckles, part of the blocked force at the rated pressure.
+pub const BUCKLING: f64 = 0.004;
+
 /// A muscle at work: tables built once, and its state.
 #[derive(Debug, Clone)]
 pub struct Muscle {
@@ -182,6 +185,7 @@ pub struct Muscle {
     surface: Surface,
     tube_volume: f64,
     braid: Braid,
+    buckling: f64,
     physics: PhysicsState,
     last: Option<(f64, f64)>,
 }
@@ -205,7 +209,10 @@ impl Muscle {
         let surface = Surface::new(spec.geometry, tube, spec.shape, spec.max_pressure, shortest);
         let braid = Braid::new(&spec.friction);
         let physics = PhysicsState::new(&spec.physics);
-        Self { tube_volume: tube.volume(), surface, braid, physics, spec, last: None }
+        let mut muscle =
+            Self { tube_volume: tube.volume(), surface, braid, buckling: 0.0, physics, spec, last: None };
+        muscle.buckling = BUCKLING * muscle.straight_parts(muscle.spec.max_pressure, 0.0).0.max(0.0);
+        muscle
     }
 
     /// What it was built from.
@@ -234,8 +241,19 @@ impl Muscle {
     /// The same in its two parts: what the pressure gives and what the stored energy takes, N.
     ///
     /// Below contact the bladder stands alone and pushes its ends apart in proportion to the pressure; at contact the two
-    /// descriptions agree.
+    /// descriptions agree. A muscle that pushes buckles: it goes slack at a push of [`BUCKLING`] of its blocked force.
     pub fn quasi_parts(&self, p: f64, stroke: f64) -> (f64, f64) {
+        let (pressure, elastic) = self.straight_parts(p, stroke);
+        let force = pressure + elastic;
+        if force >= 0.0 || self.buckling <= 0.0 {
+            return (pressure, elastic);
+        }
+        let slack = -self.buckling * (1.0 - (force / self.buckling).exp());
+        (slack - elastic, elastic)
+    }
+
+    /// The two parts of a muscle that is kept from buckling.
+    fn straight_parts(&self, p: f64, stroke: f64) -> (f64, f64) {
         let l = self.length(stroke);
         let lost = self.spec.deadband.lost;
         let touch = self.surface.contact_pressure(l) + lost.max(0.0);
