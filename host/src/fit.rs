@@ -14,7 +14,9 @@
 //! | columns of the linear problem | [`basis`] |
 //! | the solution | [`joint`], [`linear`] |
 //! | how much curves may bend | [`smoothing`] |
-//! | errors as the thesis measures them | [`errors`] |
+//! | errors as the thesis measures them | [`errors`], [`midline`] |
+//! | the thesis's models side by side | [`models`] |
+//! | how uncertain it all is | [`uncertainty`] |
 //! | all of it in order | [`prepare`], [`result`] |
 
 pub mod basis;
@@ -22,6 +24,8 @@ pub mod direction;
 pub mod errors;
 pub mod joint;
 pub mod linear;
+pub mod midline;
+pub mod models;
 pub mod nodes;
 pub mod points;
 pub mod prepare;

@@ -193,6 +193,13 @@ impl Prepared {
         nearest.unwrap_or(0) as u32
     }
 
+    /// Where pressure moves, mid-lines are cut into hundredths of its range; levels are not.
+    #[must_use]
+    pub fn fine_pressure(&self, pressure: f64) -> u32 {
+        let range = self.points.pressure;
+        if self.pressures.held { 0 } else { ((pressure - range.low) / range.span().max(1.0) * 100.0) as u32 }
+    }
+
     /// Whether enough points move either way for friction to be told from elasticity.
     fn both_directions(&self) -> bool {
         let rows = |s: f64| {

@@ -12,6 +12,8 @@ use crate::table_file::{FitQuality, Uncertainty};
 
 use super::Options;
 use super::errors::{ChunkError, Sample, by_chunk, errors};
+use super::midline::{MidPoint, midline};
+use super::models::{self, Model};
 use super::prepare::Prepared;
 use super::screen::Use;
 use super::smoothing;
@@ -30,6 +32,10 @@ pub struct Fit {
     pub table_root: Root,
     /// Every chunk's error by eq. 24.
     pub chunks: Vec<ChunkError>,
+    /// F_AVG, chunk by chunk.
+    pub midline: Vec<MidPoint>,
+    /// Every model on the mid-lines.
+    pub models: Vec<Model>,
     /// The figures, as they are written to JSON.
     pub summary: Summary,
 }
@@ -168,9 +174,20 @@ impl Fit {
         let residuals = table_residuals(&prepared, &table)?;
         let chunks = chunks(&prepared, &residuals, |_| true);
         let left_out = left_out(&prepared, options);
-        let summary =
+        let midline = midline(&prepared);
+        let modulus = muscle.young_modulus_MPa.map(|e| e * 1e6);
+        let models = models::side_by_side(&prepared, &midline, modulus);
+        let mut summary =
             summarise(&prepared, &table, campaign, muscle, &uncertain, &residuals, &chunks, &left_out);
-        Ok(Self { table, prepared, uncertain, table_root, chunks, summary })
+        summary.models.splice(
+            0..0,
+            models.iter().map(|m| ModelError {
+                name: m.name.into(),
+                mean_error_pct: m.mean_error,
+                max_error_pct: m.max_error,
+            }),
+        );
+        Ok(Self { table, prepared, uncertain, table_root, chunks, midline, models, summary })
     }
 }
 
@@ -313,11 +330,7 @@ pub fn chunks(prepared: &Prepared, residuals: &[f64], take: impl Fn(u32) -> bool
         let group = prepared.design.bins[prepared.design.rows[i].bin as usize].group;
         (matches!(prepared.used[i], Use::Fitted) && take(group)).then(|| Sample {
             group,
-            fine: if prepared.pressures.held {
-                0
-            } else {
-                ((p.pressure - pressure.low) / pressure.span().max(1.0) * 100.0) as u32
-            },
+            fine: prepared.fine_pressure(p.pressure),
             contraction: p.stroke / l0,
             direction: p.direction,
             rows: f64::from(p.rows),
