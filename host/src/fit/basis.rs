@@ -99,8 +99,12 @@ impl Orthonormal {
         let scaled = DMatrix::from_fn(columns.len(), order, |i, k| {
             if scale[k] > 0.0 { columns[i].elastic[k] / scale[k] } else { 0.0 }
         });
-        let singular = scaled.clone().svd(false, false).singular_values;
-        let (largest, smallest) = (singular.max(), singular.min());
+        let (largest, smallest) = if columns.is_empty() {
+            (0.0, 0.0)
+        } else {
+            let singular = scaled.clone().svd(false, false).singular_values;
+            (singular.max(), singular.min())
+        };
         let condition = if smallest > 1e-12 * largest && columns.len() >= order {
             largest / smallest
         } else {
