@@ -14,6 +14,7 @@
 //! | columns of the linear problem | [`basis`] |
 //! | the solution | [`joint`], [`linear`] |
 //! | how much curves may bend | [`smoothing`] |
+//! | effective dimensions | [`geometry`] |
 //! | errors as the thesis measures them | [`errors`], [`midline`] |
 //! | the thesis's models side by side | [`models`] |
 //! | how uncertain it all is | [`uncertainty`] |
@@ -22,6 +23,7 @@
 pub mod basis;
 pub mod direction;
 pub mod errors;
+pub mod geometry;
 pub mod joint;
 pub mod linear;
 pub mod midline;
@@ -48,11 +50,15 @@ pub struct Options {
     pub tip_correction: bool,
     /// Weight of the penalty on bending curves; chosen by leaving pressures out where absent.
     pub smoothing: Option<f64>,
+    /// Whether effective dimensions are found too.
+    pub fit_geometry: bool,
+    /// Whether the length of each mounting may be corrected.
+    pub fit_lengths: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { order: 4, tip_correction: false, smoothing: None }
+        Self { order: 4, tip_correction: false, smoothing: None, fit_geometry: false, fit_lengths: false }
     }
 }
 

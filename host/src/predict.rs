@@ -3,6 +3,7 @@
 //! Effects have a memory, which runs through the recordings in their order: earlier files are the muscle's history. Over a pause
 //! of known length the memories fade as they do in time; over an unknown pause nothing is forgotten.
 
+use std::borrow::Cow;
 use std::fmt::Write;
 use std::fs;
 
@@ -57,7 +58,9 @@ pub fn predict(file: &TableFile, campaign: &Campaign) -> Result<Prediction> {
     let plain = chain.is_empty() && corrections.is_empty();
     let mut recordings = Vec::with_capacity(campaign.recordings.len());
     let (mut square, mut rows) = (0.0, 0.0);
-    for (index, (recording, directions)) in campaign.recordings.iter().zip(directions(campaign)).enumerate() {
+    let corrected: Vec<Cow<'_, Recording>> =
+        campaign.recordings.iter().map(|r| with_true_length(file, r)).collect();
+    for (index, (recording, directions)) in corrected.iter().zip(directions(campaign)).enumerate() {
         let force: Vec<f64> = if plain {
             (0..recording.len())
                 .map(|i| {
@@ -92,6 +95,18 @@ pub fn predict(file: &TableFile, campaign: &Campaign) -> Result<Prediction> {
     }
     let rms = (rows > 0.0).then(|| (square / rows).sqrt());
     Ok(Prediction { recordings, rms, warnings: beyond(file, campaign) })
+}
+
+/// The recording with the correction of its mounting, where the table knows the stroke that it was held at.
+fn with_true_length<'a>(file: &TableFile, recording: &'a Recording) -> Cow<'a, Recording> {
+    let known = |held: f64| file.about.mountings.iter().find(|(s, _)| (s - held).abs() <= 1e-4);
+    match recording.held_stroke().filter(|_| !file.about.mountings.is_empty()).and_then(known) {
+        None => Cow::Borrowed(recording),
+        Some((_, offset)) => {
+            let stroke = recording.stroke.iter().map(|x| x + offset).collect();
+            Cow::Owned(Recording { stroke, ..recording.clone() })
+        }
+    }
 }
 
 /// Says where the recordings leave the range that the table was fitted to.

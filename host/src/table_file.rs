@@ -52,6 +52,9 @@ pub struct About {
     pub uncertainty: Option<Uncertainty>,
     /// Corrections of the bench that the recordings were made on. `predict` applies them; a controller never sees them.
     pub corrections: Vec<Correction>,
+    /// Strokes that whole recordings were held at, and what is to be added to each, m. `predict` adds it to recordings
+    /// held at the same stroke.
+    pub mountings: Vec<(f64, f64)>,
 }
 
 /// One file that a table was fitted to.
@@ -220,6 +223,9 @@ impl About {
         }
         if self.corrections.iter().flat_map(|c| &c.parameters).any(|p| !p.is_finite()) {
             return wrong("a correction's parameter is not finite");
+        }
+        if self.mountings.iter().any(|(s, o)| !s.is_finite() || !o.is_finite()) {
+            return wrong("a mounting's length is not finite");
         }
         if let Some(u) = &self.uncertainty {
             let expected = (u.rows as usize).checked_mul(u.columns as usize);

@@ -42,6 +42,12 @@ pub struct Arguments {
     /// Weight of the penalty on curves over pressure that bend; chosen by leaving pressures out if not given.
     #[arg(long, value_name = "WEIGHT")]
     smoothing: Option<f64>,
+    /// Find effective dimensions (braid angle, bladder diameter, wall) too, within bounds.
+    #[arg(long)]
+    fit_geometry: bool,
+    /// Correct the length of every mounting (a stroke held through whole recordings) by up to 1 mm.
+    #[arg(long)]
+    fit_lengths: bool,
 }
 
 impl Arguments {
@@ -66,6 +72,8 @@ impl Arguments {
             order: usize::from(self.order),
             tip_correction: self.tip_correction,
             smoothing: self.smoothing,
+            fit_geometry: self.fit_geometry,
+            fit_lengths: self.fit_lengths,
         };
         // Files are hashed while the fit runs.
         let files = self.recordings.files.clone();
@@ -85,6 +93,7 @@ impl Arguments {
             fit: fitted.summary.quality(),
             uncertainty: Some(fitted.stored_uncertainty()),
             corrections: Vec::new(),
+            mountings: fitted.prepared.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
         };
         let table = TableFile { table: fitted.table.clone(), about };
         let json = serde_json::to_string_pretty(&fitted.summary)

@@ -65,6 +65,12 @@ pub struct Design {
     pub extra_prior: Vec<f64>,
     /// Whether both directions of motion are there, so that `k_F` can be found.
     pub friction: bool,
+    /// What `P0` counts from, Pa: the first unknown is `P0 − origin`.
+    pub origin: f64,
+    /// How strongly `P0` is held at its origin, N² per Pa² of the data's weight; zero where the points alone decide.
+    pub hold_deadband: f64,
+    /// Weight of a penalty on `E_k` that change with pressure at all; zero but where dimensions are fitted too.
+    pub level: f64,
 }
 
 /// Where each unknown stands in the vector of all.
@@ -192,7 +198,7 @@ impl Design {
         let row = &self.rows[i];
         let m = curves.order;
         let at = &curves.values[row.bin as usize * (m + 1)..][..=m];
-        let mut quasi = (row.pressure - parameters[Layout::DEADBAND]) * row.area;
+        let mut quasi = (row.pressure - self.origin - parameters[Layout::DEADBAND]) * row.area;
         for (e, c) in at[..m].iter().zip(&row.elastic) {
             quasi += e * c;
         }
@@ -203,6 +209,12 @@ impl Design {
             force += dot(&self.extra[i * self.extras..(i + 1) * self.extras], &parameters[from..]);
         }
         Evaluated { quasi, grip, force }
+    }
+
+    /// `ẽ_1 … ẽ_M` at a bin.
+    #[must_use]
+    pub fn reduced_at<'a>(&self, bin: u32, curves: &'a Curves) -> &'a [f64] {
+        &curves.values[bin as usize * (curves.order + 1)..][..curves.order]
     }
 
     /// `F − F_model` of every row, N.
@@ -384,7 +396,7 @@ impl Design {
     #[must_use]
     pub fn start(&self, deadband: f64) -> Vec<f64> {
         let mut parameters = vec![0.0; self.layout().len()];
-        parameters[Layout::DEADBAND] = deadband;
+        parameters[Layout::DEADBAND] = deadband - self.origin;
         parameters
     }
 
@@ -424,6 +436,11 @@ impl Design {
                 let row = [(place(j - 1), a), (place(j), -a - c), (place(j + 1), c)];
                 penalty.add_row(&row, weight * share);
             }
+            if k < layout.order && self.level > 0.0 {
+                for j in 1..nodes.len() {
+                    penalty.add_row(&[(place(j - 1), -1.0), (place(j), 1.0)], self.level * scale);
+                }
+            }
             if k == layout.order {
                 // Beyond the data friction tends to stay: a trend continued for long would pass zero or one.
                 for j in 1..nodes.len() {
@@ -431,6 +448,7 @@ impl Design {
                 }
             }
         }
+        penalty.add(Layout::DEADBAND, Layout::DEADBAND, self.hold_deadband);
         // Ten digits below the data: only what nothing else determines is held by it.
         let hold = 1e-10 * data.weight;
         for k in 0..layout.order {
@@ -535,6 +553,9 @@ pub(crate) mod tests {
             extras: 0,
             extra_prior: Vec::new(),
             friction: true,
+            origin: 0.0,
+            hold_deadband: 0.0,
+            level: 0.0,
         };
         let layout = design.layout();
         let mut truth = design.start(76.5e3);

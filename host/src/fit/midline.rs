@@ -52,13 +52,14 @@ pub fn midline(prepared: &Prepared) -> Vec<MidPoint> {
         }
         let group = prepared.design.bins[prepared.design.rows[i].bin as usize].group;
         let fine = prepared.fine_pressure(p.pressure);
-        let chunk = (p.stroke / l0 * CHUNKS).floor() as i64;
+        let x = p.stroke + prepared.shift[i];
+        let chunk = (x / l0 * CHUNKS).floor() as i64;
         let branches = chunks.entry((group, fine, chunk)).or_default();
         let b = &mut branches[if p.direction > 0.0 { 2 } else { usize::from(p.direction == 0.0) }];
         let n = f64::from(p.rows);
         b.rows += n;
         b.pressure += n * p.pressure;
-        b.stroke += n * p.stroke;
+        b.stroke += n * x;
         b.force += n * p.force;
     }
     chunks

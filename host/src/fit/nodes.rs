@@ -54,9 +54,14 @@ fn held_levels(points: &Points) -> Option<Vec<f64>> {
     let near: Vec<f64> = (0..BINS)
         .map(|i| rows[i.saturating_sub(half)..(i + half + 1).min(BINS)].iter().sum::<f64>())
         .collect();
-    // Spread evenly over the range, a window holds this much; a level holds several times more.
-    let even = total * (2 * half + 1) as f64 / BINS as f64;
-    let mut order: Vec<usize> = (0..BINS).filter(|i| near[*i] > 2.5 * even.min(total / 20.0)).collect();
+    // A level stands out of its surroundings, however few of all rows it holds: short strokes at low pressure are a level too.
+    let stands_out = |i: usize| {
+        let width = 2 * half + 1;
+        let around = [i.checked_sub(2 * width), i.checked_sub(width), Some(i + width), Some(i + 2 * width)];
+        let beside: f64 = around.into_iter().flatten().filter_map(|k| near.get(k)).sum::<f64>() / 4.0;
+        near[i] > 4.0 * beside && near[i] > (0.003 * total).max(8.0)
+    };
+    let mut order: Vec<usize> = (0..BINS).filter(|i| stands_out(*i)).collect();
     order.sort_by(|a, b| near[*b].total_cmp(&near[*a]).then(a.cmp(b)));
     let mut peaks: Vec<usize> = Vec::new();
     for i in order {

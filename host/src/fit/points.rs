@@ -29,8 +29,7 @@ pub struct Point {
     pub force: f64,
     /// The lowest and the highest force among its rows, N: spikes show here.
     pub force_range: (f64, f64),
-    /// Distance from the last turn, in shares of the ranges of stroke and pressure; infinite before the first turn of a
-    /// recording, where no turn is known to be near.
+    /// Distance from the last turn, or from the recording's beginning, in shares of the ranges of stroke and pressure.
     pub since_turn: f64,
 }
 
@@ -106,7 +105,8 @@ pub fn points(campaign: &Campaign, directions: &[Vec<i8>]) -> Points {
         let (Some(f), Some(directions)) = (&recording.force, directions.get(index)) else { continue };
         let (p, x, t) = (&recording.pressure, &recording.stroke, &recording.time);
         let n = recording.len().min(directions.len());
-        let mut turn: Option<usize> = None;
+        // What the muscle did before is not recorded: a beginning is as good as a turn, and may be one.
+        let mut turn = 0;
         let mut start = 0;
         while start < n {
             let direction = directions[start];
@@ -127,9 +127,8 @@ pub fn points(campaign: &Campaign, directions: &[Vec<i8>]) -> Points {
             }
             let count = (end - start) as f64;
             let [time, pressure, stroke, force] = sums.map(|s| s / count);
-            let since_turn = turn.map_or(f64::INFINITY, |r| {
-                (stroke - x[r]).abs() * per_stroke + (pressure - p[r]).abs() * per_pressure
-            });
+            let since_turn =
+                (stroke - x[turn]).abs() * per_stroke + (pressure - p[turn]).abs() * per_pressure;
             list.push(Point {
                 recording: index as u32,
                 first_row: start as u32,
@@ -145,7 +144,7 @@ pub fn points(campaign: &Campaign, directions: &[Vec<i8>]) -> Points {
             });
             if end < n && directions[end] != direction {
                 block += 1;
-                turn = Some(end.saturating_sub(1));
+                turn = end.saturating_sub(1);
             }
             start = end;
         }
@@ -216,7 +215,7 @@ mod tests {
         let (campaign, directions) = loops(6000);
         let points = points(&campaign, &directions);
         let first = points.list.iter().position(|p| p.direction < 0.0).expect("a way back");
-        assert!(points.list[first - 1].since_turn.is_infinite());
+        assert!((points.list[first - 1].since_turn - 1.0).abs() < 0.01);
         assert!(points.list[first].since_turn < 0.01);
         assert!(points.list[first + 100].since_turn > 0.15);
     }

@@ -10,6 +10,7 @@ use crate::recording::Campaign;
 
 use super::Options;
 use super::basis::{Columns, Orthonormal, PressureBasis, columns};
+use super::geometry::{Adjusted, Mounting};
 use super::joint::{Bin, Design, Layout, Row};
 use super::nodes::{Pressures, pressures};
 use super::points::{Points, median, points};
@@ -23,7 +24,9 @@ pub struct Prepared {
     pub points: Points,
     /// Tested pressures and nodes.
     pub pressures: Pressures,
-    /// The muscle at rest.
+    /// The muscle at rest, as described.
+    pub nominal: Geometry,
+    /// The muscle at rest, as fitted: the same, unless dimensions were left open.
     pub geometry: Geometry,
     /// Its kinematics.
     pub braid: Braid<f64>,
@@ -45,6 +48,14 @@ pub struct Prepared {
     pub clips: (Option<Clip>, Option<Clip>),
     /// Readings that do not belong.
     pub outliers: Vec<Outlier>,
+    /// Standard deviation of a `P0` that is held because a higher order found it, Pa.
+    pub deadband_std: Option<f64>,
+    /// Dimensions and lengths that were found too.
+    pub adjusted: Vec<Adjusted>,
+    /// Corrected mountings.
+    pub mountings: Vec<Mounting>,
+    /// What was added to each point's stroke, m.
+    pub shift: Vec<f64>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -109,8 +120,12 @@ impl Prepared {
                 extras: 0,
                 extra_prior: Vec::new(),
                 friction: false,
+                origin: 0.0,
+                hold_deadband: 0.0,
+                level: 0.0,
             },
             points,
+            nominal: geometry,
             geometry,
             braid,
             parameters: Vec::new(),
@@ -119,10 +134,15 @@ impl Prepared {
             goes_slack: false,
             clips,
             outliers,
+            deadband_std: None,
+            adjusted: Vec::new(),
+            mountings: Vec::new(),
+            shift: Vec::new(),
             warnings: campaign.warnings.clone(),
         };
         prepared.screen_by_itself();
-        prepared.design = prepared.build_design(options.order, &vec![0.0; prepared.points.list.len()]);
+        prepared.shift = vec![0.0; prepared.points.list.len()];
+        prepared.design = prepared.build_design(options.order);
         prepared.find(options);
         Ok(prepared)
     }
@@ -134,9 +154,9 @@ impl Prepared {
     }
 
     /// Builds the linear problem on the present nodes.
-    fn build_design(&self, order: usize, shift: &[f64]) -> Design {
+    fn build_design(&self, order: usize) -> Design {
         let basis = PressureBasis::new(&self.pressures.nodes);
-        let columns = self.columns(shift);
+        let columns = self.columns(&self.shift);
         let orthonormal = Orthonormal::over(&spread(&self.points, &columns, &self.used), order);
         let range = self.points.pressure;
         let per_bin = if range.span() > 0.0 { BINS as f64 / range.span() } else { 0.0 };
@@ -181,6 +201,9 @@ impl Prepared {
             extras: 0,
             extra_prior: Vec::new(),
             friction: directed,
+            origin: 0.0,
+            hold_deadband: 0.0,
+            level: 0.0,
         }
     }
 
@@ -232,7 +255,7 @@ impl Prepared {
 
     /// Weights from scratch: every chunk of stroke at every pressure and direction counts alike, as far as its rows carry it.
     fn weigh(&mut self) {
-        let deadband = self.parameters.first().copied().unwrap_or(0.0);
+        let deadband = self.design.origin + self.parameters.first().copied().unwrap_or(0.0);
         let stroke = self.points.stroke;
         let pressure = self.points.pressure;
         let chunk = |x: f64, range: super::points::Range, n: f64| {
@@ -274,7 +297,7 @@ impl Prepared {
             .collect();
     }
 
-    fn solve(&mut self, smoothing: Smoothing, steps: usize) {
+    pub(super) fn solve(&mut self, smoothing: Smoothing, steps: usize) {
         let data = self.design.normal(&self.parameters, &self.weights);
         let penalty = self.design.penalty(&data, smoothing.elastic, smoothing.friction);
         self.design.solve(&mut self.parameters, &self.weights, &penalty, steps);
@@ -293,9 +316,18 @@ impl Prepared {
             self.weigh();
             self.solve(Smoothing::START, 6);
         }
+        if options.fit_geometry || options.fit_lengths {
+            self.adjust(options);
+            // With the right dimensions slackness shows where it is.
+            self.find_slack();
+            self.mark_turns(self.turn_zone);
+            self.weigh();
+            self.adjust(options);
+        }
         self.find_outliers();
         self.weigh();
         self.solve(Smoothing::START, 4);
+        self.settle_deadband(options);
         self.smoothing = match options.smoothing {
             Some(weight) => Smoothing { elastic: weight, friction: weight },
             None => smoothing::choose(&self.design, &self.parameters, &self.weights).0,
@@ -303,6 +335,45 @@ impl Prepared {
         self.solve(self.smoothing, 12);
         self.soften();
         self.solve(self.smoothing, 8);
+    }
+
+    /// Finds `P0` by the highest order that the strokes determine, then holds it.
+    ///
+    /// At rest length no elastic term acts, so `P0` is the blocked force's intercept. Away from it `P0` and the `E_k` trade, and
+    /// what a low order cannot describe about the bladder would be put into `P0`: with M = 4 on a hyperelastic wall it
+    /// is off by up to 1 kPa, with M = 6 by a fifth of that.
+    fn settle_deadband(&mut self, options: &Options) {
+        let order = MAX_ORDER;
+        if options.order >= order
+            || options.fit_geometry
+            || options.fit_lengths
+            || self.pressures.levels.len() < 2
+        {
+            return;
+        }
+        let mut finer = self.clone();
+        finer.design = finer.build_design(order);
+        let reaches_rest = self.points.stroke.low <= 0.02 * self.points.stroke.high;
+        if finer.design.orthonormal.rank < order || !reaches_rest {
+            return;
+        }
+        finer.parameters = finer.design.start(self.deadband());
+        finer.solve(Smoothing::START, 8);
+        let smoothing = match options.smoothing {
+            Some(weight) => Smoothing { elastic: weight, friction: weight },
+            None => smoothing::choose(&finer.design, &finer.parameters, &finer.weights).0,
+        };
+        finer.solve(smoothing, 6);
+        let data = finer.design.normal(&finer.parameters, &finer.weights);
+        let penalty = finer.design.penalty(&data, smoothing.elastic, smoothing.friction);
+        self.deadband_std = Some(super::uncertainty::jackknife(&finer, &penalty).root.std(Layout::DEADBAND));
+        let found = finer.deadband();
+        self.parameters[Layout::DEADBAND] = 0.0;
+        self.design.origin = found;
+        // Stiffer than all the points together.
+        let own =
+            self.design.normal(&self.parameters, &self.weights).matrix.at(Layout::DEADBAND, Layout::DEADBAND);
+        self.design.hold_deadband = 1e4 * own;
     }
 
     fn mark_turns(&mut self, zone: f64) {
@@ -327,7 +398,7 @@ impl Prepared {
         let force = self.points.force.span();
         let shares = (0..self.points.list.len()).filter_map(|i| {
             let p = &self.points.list[i];
-            if !matches!(self.used[i], Use::Fitted | Use::NearTurn) || !p.since_turn.is_finite() {
+            if !matches!(self.used[i], Use::Fitted | Use::NearTurn) {
                 return None;
             }
             let e = self.design.evaluate(i, &self.parameters, &curves);
@@ -458,7 +529,7 @@ impl Prepared {
     /// `P0`, Pa.
     #[must_use]
     pub fn deadband(&self) -> f64 {
-        self.parameters[Layout::DEADBAND]
+        self.design.origin + self.parameters[Layout::DEADBAND]
     }
 
     /// `F_B` at a pressure: the friction-free force at rest length, N.

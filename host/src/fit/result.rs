@@ -12,6 +12,7 @@ use crate::table_file::{FitQuality, Uncertainty};
 
 use super::Options;
 use super::errors::{ChunkError, Sample, by_chunk, errors};
+use super::geometry::Adjusted;
 use super::midline::{MidPoint, midline};
 use super::models::{self, Model};
 use super::prepare::Prepared;
@@ -78,6 +79,8 @@ pub struct Summary {
     pub condition: Option<f64>,
     /// Readings that do not belong to the rest.
     pub outliers: Vec<OutlierRow>,
+    /// Dimensions and lengths that were found too.
+    pub adjusted: Vec<Adjusted>,
     /// In words.
     pub warnings: Vec<String>,
 }
@@ -259,6 +262,19 @@ impl std::fmt::Display for Summary {
                 moduli.join(" ")
             )?;
         }
+        for a in &self.adjusted {
+            write!(
+                f,
+                "\n{}: {:.3} ± {:.3} {} (described {:.3}; {:.0} % determined by the recordings{})",
+                a.name,
+                a.value,
+                1.96 * a.std,
+                a.unit,
+                a.nominal,
+                100.0 * a.determined,
+                if a.at_bound { ", at its bound" } else { "" }
+            )?;
+        }
         Ok(())
     }
 }
@@ -311,10 +327,11 @@ fn table_residuals(prepared: &Prepared, table: &MuscleTable) -> Result<Vec<f64>>
         .points
         .list
         .iter()
-        .map(|p| {
+        .zip(&prepared.shift)
+        .map(|(p, shift)| {
             let direction = if directed { p.direction } else { 0.0 };
-            let model =
-                muscle.force(Pressure::from_pascals(p.pressure), Length::from_metres(p.stroke), direction);
+            let stroke = Length::from_metres(p.stroke + shift);
+            let model = muscle.force(Pressure::from_pascals(p.pressure), stroke, direction);
             p.force - model.newtons()
         })
         .collect())
@@ -331,7 +348,7 @@ pub fn chunks(prepared: &Prepared, residuals: &[f64], take: impl Fn(u32) -> bool
         (matches!(prepared.used[i], Use::Fitted) && take(group)).then(|| Sample {
             group,
             fine: prepared.fine_pressure(p.pressure),
-            contraction: p.stroke / l0,
+            contraction: (p.stroke + prepared.shift[i]) / l0,
             direction: p.direction,
             rows: f64::from(p.rows),
             residual: residuals[i],
@@ -478,6 +495,7 @@ fn summarise(
         turn_zone: prepared.turn_zone,
         condition: Some(prepared.design.orthonormal.condition).filter(|c| c.is_finite()),
         outliers,
+        adjusted: prepared.adjusted.clone(),
         warnings: super::warnings::warnings(prepared, left_out),
     }
 }

@@ -50,6 +50,17 @@ impl Root {
         dot(row, row).sqrt()
     }
 
+    /// Adds one more column: an independent source of uncertainty.
+    fn append(&mut self, column: &[f64]) {
+        let mut s = Vec::with_capacity(self.rows * (self.columns + 1));
+        for (i, x) in column.iter().enumerate().take(self.rows) {
+            s.extend_from_slice(&self.s[i * self.columns..(i + 1) * self.columns]);
+            s.push(*x);
+        }
+        self.columns += 1;
+        self.s = s;
+    }
+
     /// The same covariance with at most as many columns as rows, from the eigenvectors of `C` with rows scaled to unit size.
     #[must_use]
     pub fn compact(&self) -> Self {
@@ -108,8 +119,21 @@ const MOST_BLOCKS: usize = 240;
 pub fn jackknife(prepared: &Prepared, penalty: &Symmetric) -> Uncertain {
     let correlation = correlation_time(prepared);
     let blocks = blocks(prepared, correlation);
-    let root = leave_out(&prepared.design, &prepared.parameters, &prepared.weights, penalty, &blocks);
+    let mut root = leave_out(&prepared.design, &prepared.parameters, &prepared.weights, penalty, &blocks);
+    if let Some(std) = prepared.deadband_std {
+        root.append(&follow_deadband(prepared, penalty, std));
+    }
     Uncertain { root, blocks: blocks.len(), correlation }
+}
+
+/// How all parameters follow when a held `P0` moves by `std`, Pa.
+fn follow_deadband(prepared: &Prepared, penalty: &Symmetric, std: f64) -> Vec<f64> {
+    let design = &prepared.design;
+    let mut matrix = design.normal(&prepared.parameters, &prepared.weights).matrix;
+    matrix.add_scaled(penalty, 1.0);
+    let mut right = vec![0.0; matrix.n];
+    right[Layout::DEADBAND] = design.hold_deadband * std;
+    matrix.factor().solve(&right)
 }
 
 fn leave_out(

@@ -119,6 +119,21 @@ pub fn warnings(prepared: &Prepared, left_out: &[Option<f64>]) -> Vec<String> {
             prepared.outliers.len()
         ));
     }
+    for a in prepared.adjusted.iter().filter(|a| a.at_bound) {
+        out.push(format!(
+            "{} stopped at its bound of {:.2} {}: either it was measured wrongly by more than is plausible, or it stands in for \
+             something else that the model lacks",
+            a.name, a.value, a.unit
+        ));
+    }
+    let undetermined: Vec<&str> =
+        prepared.adjusted.iter().filter(|a| a.determined < 0.5).map(|a| a.name.as_str()).collect();
+    if !undetermined.is_empty() {
+        out.push(format!(
+            "the recordings hardly determine {}: the value is mostly the described one",
+            undetermined.join(", ")
+        ));
+    }
     let aside = rows(Use::NearTurn);
     if aside > 0.3 * points.rows as f64 {
         out.push(format!(
