@@ -1,7 +1,7 @@
 //! A table's force on recordings: the base model, the effects it carries, and the corrections of the bench.
 //!
 //! Effects have a memory, which runs through the recordings in their order: earlier files are the muscle's history. Over a pause
-//! of known length the memories fade as they do in time; over an unknown pause nothing is forgotten.
+//! of known length the memories fade as they do in time; an unknown pause counts as a minute.
 
 use std::borrow::Cow;
 use std::fmt::Write;
@@ -13,7 +13,8 @@ use model_core::units::{Force, Length, Pressure};
 
 use crate::bench::Candidate;
 use crate::error::{Code, Error, Result};
-use crate::fit::direction::directions;
+use crate::fit::direction::Follower;
+use crate::recording::segment::Motion;
 use crate::recording::{Campaign, Recording};
 use crate::table_file::TableFile;
 
@@ -55,23 +56,25 @@ pub fn predict(file: &TableFile, campaign: &Campaign) -> Result<Prediction> {
             })?;
         corrections.push((candidate, &c.parameters, Memory::<f64>::default()));
     }
+    let mut follower = Follower::default();
     let plain = chain.is_empty() && corrections.is_empty();
     let mut recordings = Vec::with_capacity(campaign.recordings.len());
     let (mut square, mut rows) = (0.0, 0.0);
     let corrected: Vec<Cow<'_, Recording>> =
         campaign.recordings.iter().map(|r| with_true_length(file, r)).collect();
-    for (index, (recording, directions)) in corrected.iter().zip(directions(campaign)).enumerate() {
+    for (index, (recording, motion)) in
+        corrected.iter().map(Cow::as_ref).zip(Motion::of_campaign(campaign)).enumerate()
+    {
         let force: Vec<f64> = if plain {
             (0..recording.len())
                 .map(|i| {
                     let p = Pressure::from_pascals(recording.pressure[i]);
                     let x = Length::from_metres(recording.stroke[i]);
-                    muscle.force(p, x, f64::from(directions[i])).newtons()
+                    muscle.force(p, x, f64::from(motion.direction[i])).newtons()
                 })
                 .collect()
         } else {
-            let pause = if index == 0 { 0.0 } else { campaign.pause_before(index).unwrap_or(0.0).max(0.0) };
-            let motions = crate::fit::direction::motions(recording, &directions, pause);
+            let motions = follower.follow(recording, &motion, campaign.pause_before(index));
             let mut forces = Vec::with_capacity(recording.len());
             for (i, motion) in motions.iter().enumerate() {
                 let context = muscle.context(motion, Pressure::from_pascals(recording.pressure[i]));

@@ -272,6 +272,7 @@ fn fit_campaign(made: &Made, folder: &Path) -> Result<(MuscleDescription, Campai
         fit: fitted.summary.quality(),
         uncertainty: Some(fitted.stored_uncertainty()),
         corrections: Vec::new(),
+        ..About::default()
     };
     let table = TableFile { table: fitted.table.clone(), about };
     table.write(folder.join("muscle.pam"))?;
