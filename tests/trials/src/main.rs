@@ -11,6 +11,7 @@ mod locate;
 mod names;
 mod report;
 mod score;
+mod semi;
 mod spec;
 
 use clap::{Parser, Subcommand};
@@ -63,6 +64,18 @@ enum Command {
         #[arg(long)]
         no_held_out: bool,
     },
+    /// Put effects into the real recordings of the 10 mm fluidic muscle and ask what was put in.
+    Semi {
+        /// Directory that holds aarl-festo-10mm-2022.
+        #[arg(long, default_value = "../shared/data")]
+        data: PathBuf,
+        /// Where to.
+        #[arg(short, long)]
+        output: PathBuf,
+        /// The tool.
+        #[arg(long, default_value = "target/release/host")]
+        host: PathBuf,
+    },
     /// Generate, answer and score in one go.
     Prove {
         /// dev or final.
@@ -88,6 +101,7 @@ fn main() -> ExitCode {
         Command::Generate { set, n, seed, output } => generate(&set, n, seed, &output),
         Command::Answer { set, host } => answer::ask(&set, &host),
         Command::Score { set, host, no_held_out } => score(&set, &host, !no_held_out),
+        Command::Semi { data, output, host } => semi::run(&data, &output, &host),
         Command::Prove { set, n, seed, output, host } => generate(&set, n, seed, &output)
             .and_then(|()| answer::ask(&output, &host))
             .and_then(|()| score(&output, &host, true)),
