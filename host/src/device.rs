@@ -8,6 +8,7 @@
 //! | tables: upload in pieces, read back | [`tables`] |
 //! | what is asked over time | [`course`] |
 //! | a run from start to vent | [`mod@run`] |
+//! | the pressure regulator, found from steps | [`regulator`] |
 //! | telemetry to a recording | [`recorder`] |
 //! | refusals and faults in words, with their remedy | [`words`] |
 
@@ -19,6 +20,7 @@ mod port;
 #[cfg(feature = "probe")]
 pub mod probe;
 pub mod recorder;
+pub mod regulator;
 pub mod run;
 pub mod tables;
 pub mod words;

@@ -16,7 +16,7 @@ use crate::demo::campaign::{Made, record};
 use crate::demo::page::{Story, page, rms};
 use crate::demo::tracking::{Law, Task, Track, choose, track};
 use crate::device::recorder::{Recorder, about_device, about_losses};
-use crate::device::{Client, tables};
+use crate::device::{Client, regulator, tables};
 use crate::emulated::{Emulated, Kind, Stand};
 use crate::error::{Code, Error, Result};
 use crate::fit::result::Fit;
@@ -133,7 +133,7 @@ impl Arguments {
         step(
             6,
             format!(
-                "read back: the table's error on {} rows of telemetry is {:.2} N rms ({:.2} % of blocked force)",
+                "read back: on {} rows of telemetry inside its tested range the table is wrong by {:.2} N rms ({:.2} % of blocked force)",
                 telemetry.1,
                 telemetry.0,
                 100.0 * telemetry.0 / blocked
@@ -182,6 +182,23 @@ impl Arguments {
         let device =
             format!("release {major}.{minor}.{patch}, table {:08x}, {} bytes", kept.crc, kept.length);
         step(4, format!("flashed and read back: {} bytes, check sum {:08x}", kept.length, kept.crc));
+
+        let tested = &table.table.tested;
+        let found = regulator::identify(
+            &mut client,
+            f64::from(tested.pressure_low.pascals()),
+            f64::from(
+                tested.pressure_low.pascals()
+                    + 0.3 * (tested.pressure_high.pascals() - tested.pressure_low.pascals()),
+            ),
+        )?;
+        found.keep(&mut client)?;
+        console.note(format!(
+            "              found the regulator: gain {:.3}, lag {:.0} ms, at most {:.1} MPa/s; its lag is inverted from here on",
+            found.gain,
+            found.lag_s * 1e3,
+            found.rate_pa_per_s * 1e-6
+        ));
 
         // The middle of what the muscle can pull where the bench moves it.
         let mean = 0.35 * made.blocked_force;
@@ -288,9 +305,23 @@ fn read_back(
 ) -> Result<((f64, usize), Option<f64>)> {
     let campaign = Reader::of(muscle).campaign(&told.recordings)?;
     let prediction = predict(table, &campaign)?;
-    let rms = prediction
-        .rms
-        .ok_or_else(|| Error::new(Code::RecordingMissingColumn, "the telemetry has no force"))?;
+    let tested = &table.table.tested;
+    let inside = f64::from(tested.pressure_low.pascals())..=f64::from(tested.pressure_high.pascals());
+    let (mut squares, mut rows) = (0.0, 0_u32);
+    for (recording, predicted) in campaign.recordings.iter().zip(&prediction.recordings) {
+        let measured = recording.require_force()?;
+        for ((pressure, force), model) in recording.pressure.iter().zip(measured).zip(&predicted.force) {
+            // Where the muscle fills and where it goes slack the table was never fitted.
+            if inside.contains(pressure) {
+                squares += (force - model).powi(2);
+                rows += 1;
+            }
+        }
+    }
+    if rows == 0 {
+        return Err(Error::new(Code::RecordingTooShort, "no telemetry lies inside the table's tested range"));
+    }
+    let rms = (squares / f64::from(rows)).sqrt();
     // A few seconds at working pressures need not determine a whole table; that is no failure of the story.
     let refit = match fit(&campaign, muscle, &Options { order: 1, ..Options::default() }) {
         Ok(fit) => Some(fit.summary.mean_error_pct),
@@ -299,7 +330,7 @@ fn read_back(
             None
         }
     };
-    Ok(((rms, campaign.samples()), refit))
+    Ok(((rms, rows as usize), refit))
 }
 
 fn figures(story: &Story<'_>) -> Value {

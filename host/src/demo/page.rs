@@ -113,7 +113,7 @@ pub fn page(story: &Story<'_>) -> Result<Page> {
 
     let mut back = Section::new("And back");
     back.text(format!(
-        "The controller's telemetry is a recording like any other: on its {} rows, which no fit has seen, the table is wrong by \
+        "The controller's telemetry is a recording like any other: on its {} rows inside the tested range, which no fit has seen, the table is wrong by \
          {:.2} N rms ({:.2} % of blocked force).{}",
         story.telemetry.1,
         story.telemetry.0,

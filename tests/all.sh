@@ -1,0 +1,50 @@
+#!/usr/bin/env bash
+# Every test: both firmware images, all crates with their documentation, the firmware in QEMU, the page in a browser.
+#
+#     bash tests/all.sh            # everything
+#     bash tests/all.sh --lint     # and clippy, and documentation without a warning
+#
+# Missing tools for the firmware are installed (firmware/build --install). Tests on real recordings run where these are
+# beside the project (../shared/data), the test of the page where Chromium is; both say so when they are skipped.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+lint=no
+for argument in "$@"; do
+    case $argument in
+        --lint) lint=yes ;;
+        *) echo "tests/all.sh: '$argument' is no option; there is --lint" >&2; exit 2 ;;
+    esac
+done
+
+command -v cargo >/dev/null || { echo "tests/all.sh: no Rust compiler; install one from https://rustup.rs" >&2; exit 1; }
+[ -d ../shared/data ] || echo "tests/all.sh: tests on real recordings are skipped: ../shared/data is not there"
+command -v chromium >/dev/null || command -v google-chrome >/dev/null ||
+    echo "tests/all.sh: the test of the page is skipped: there is no Chromium"
+
+began=$SECONDS
+echo "== firmware images =="
+firmware/build --install mps2-an386
+firmware/build nucleo-f446re
+
+if command -v rustfmt >/dev/null && cargo fmt --version >/dev/null 2>&1; then
+    echo "== format =="
+    cargo fmt --all --check
+fi
+
+echo "== tests =="
+failed=0
+cargo test --workspace --locked --no-fail-fast || failed=$?
+
+if [ "$lint" = yes ]; then
+    echo "== lints =="
+    cargo clippy --workspace --all-targets --locked -- -D warnings || failed=$?
+    RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked || failed=$?
+fi
+
+if [ "$failed" = 0 ]; then
+    echo "tests/all.sh: everything passed in $((SECONDS - began)) s"
+else
+    echo "tests/all.sh: FAILED, see above ($((SECONDS - began)) s)" >&2
+fi
+exit "$failed"
