@@ -10,5 +10,6 @@ pub mod flash;
 pub mod port;
 pub mod predict;
 pub mod recordings;
+pub mod reports;
 pub mod run;
 pub mod table;

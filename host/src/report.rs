@@ -16,8 +16,10 @@
 //! assert!(figure.svg().contains("friction factor k"));
 //! ```
 
+pub mod diagnose_page;
 pub mod effect_page;
 pub mod effect_trace;
+pub mod fit_page;
 pub mod rich;
 
 mod axis;

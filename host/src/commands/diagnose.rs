@@ -6,18 +6,20 @@ use clap::Args;
 use model_core::braid::Geometry;
 use model_core::units::{Angle, Length};
 
+use super::reports::Reports;
 use crate::console::Console;
 use crate::diagnose::{self, Options, summary::summary};
 use crate::error::Result;
 use crate::muscle_description::MuscleDescription;
 use crate::output::write_whole;
 use crate::recording::{Import, Reader};
+use crate::report::diagnose_page;
 
 /// Arguments of `host diagnose`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     host diagnose --muscle mini.toml loops/*.csv\n  \
-    host diagnose --muscle mini.toml loops/*.csv --json answer.json")]
+    host diagnose --muscle mini.toml loops/*.csv --report answer.html")]
 pub struct Arguments {
     /// The muscle's description.
     #[arg(long, value_name = "M.toml")]
@@ -31,6 +33,8 @@ pub struct Arguments {
     /// Write the answer as JSON; `-` is standard output.
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    reports: Reports,
 }
 
 impl Arguments {
@@ -56,6 +60,7 @@ impl Arguments {
         if let Some(path) = &self.json {
             write_whole(path, (answer.to_json() + "\n").as_bytes())?;
         }
+        self.reports.write(console, || diagnose_page::page(&answer, &geometry))?;
         if self.json.as_deref() != Some(std::path::Path::new("-")) {
             console.result(summary(&answer).trim_end());
         }

@@ -6,18 +6,20 @@ use std::time::Instant;
 use clap::Args;
 
 use super::recordings::Recordings;
+use super::reports::Reports;
 use crate::console::Console;
 use crate::error::{Code, Error, Result};
 use crate::fit::{Options, fit};
 use crate::muscle_description::MuscleDescription;
 use crate::output::write_whole;
 use crate::recording::Reader;
+use crate::report::fit_page;
 use crate::table_file::{self, TableFile};
 
 /// Arguments of `host fit`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    host fit --muscle mini.toml loops/*.csv -o mini.pam --json mini.json\n  \
+    host fit --muscle mini.toml loops/*.csv -o mini.pam --report mini.html\n  \
     host fit --muscle festo.toml --import bench.toml run*.csv -o festo.pam --order 3\n\n\
     Recordings: CSV or tab-separated text, a header with units behind the last underscore (time_s, pressure_kPa,\n\
     displacement_mm, force_N); anything else comes in by --import.")]
@@ -33,6 +35,8 @@ pub struct Arguments {
     /// Where to write the figures of the fit as JSON; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    reports: Reports,
     /// Order M of the elastic polynomial.
     #[arg(long, default_value_t = 4, value_name = "M", value_parser = clap::value_parser!(u8).range(1..=6))]
     order: u8,
@@ -104,6 +108,7 @@ impl Arguments {
         if let Some(path) = &self.json {
             write_whole(path, format!("{json}\n").as_bytes())?;
         }
+        self.reports.write(console, || fit_page::page(&fitted, &campaign, &options))?;
         for warning in &fitted.summary.warnings {
             console.warning(warning);
         }

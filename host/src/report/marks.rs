@@ -148,7 +148,9 @@ fn steps(frame: &Frame, x: &[f64], y: &[f64]) -> String {
 fn points(frame: &Frame, x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
     let xs: Vec<f64> = x.iter().map(|v| frame.x(*v)).collect();
     let ys: Vec<f64> = y.iter().map(|v| frame.y(*v)).collect();
-    let kept = thin::cells(&xs, &ys, 1.0, 2_500);
+    // More dots than that make a cloud, not a picture.
+    let most = ((frame.width * frame.height / 70.0) as usize).clamp(300, 1_800);
+    let kept = thin::cells(&xs, &ys, 1.0, most);
     kept.into_iter().map(|i| (xs[i], ys[i])).filter(|(a, b)| a.abs() < 1e5 && b.abs() < 1e5).collect()
 }
 

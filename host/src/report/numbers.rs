@@ -7,7 +7,7 @@ use super::figure::{Figure, Mark, Panel};
 use super::{rich, thin};
 
 /// The most rows of one layer that are written; longer series are thinned as they are for drawing.
-const MOST_ROWS: usize = 4_000;
+const MOST_ROWS: usize = 1_500;
 
 /// One row a point: panel (where there are several), layer, abscissa, ordinate. See [`Figure::csv`].
 pub(crate) fn csv(figure: &Figure) -> String {

@@ -80,6 +80,22 @@ pub fn escape(text: &str) -> String {
     out
 }
 
+/// Numbers stay on one line with their unit, and both sides of an equation with its sign.
+fn kept_together(text: &str) -> String {
+    let mut out = text.replace(" = ", "\u{a0}=\u{a0}").replace("p &lt; ", "p\u{a0}&lt;\u{a0}");
+    for unit in ["%", "N", "kPa", "MPa", "mm", "s"] {
+        for digit in '0'..='9' {
+            for end in [" ", ",", ".", ";", ":", ")"] {
+                let loose = format!("{digit} {unit}{end}");
+                if out.contains(&loose) {
+                    out = out.replace(&loose, &format!("{digit}\u{a0}{unit}{end}"));
+                }
+            }
+        }
+    }
+    out
+}
+
 /// As HTML.
 ///
 /// ```
@@ -89,7 +105,7 @@ pub fn escape(text: &str) -> String {
 pub fn html(text: &str) -> Markup {
     let mut out = String::new();
     for (kind, inner) in parts(text) {
-        let inner = escape(inner);
+        let inner = if kind == Kind::Plain { kept_together(&escape(inner)) } else { escape(inner) };
         let tag = match kind {
             Kind::Plain => "",
             Kind::Sub => "sub",

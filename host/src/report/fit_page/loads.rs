@@ -1,0 +1,354 @@
+//! Load lines, loops, blocked force and free contraction, the deadband line, and the models side by side.
+
+use super::super::{Axis, Colour, Figure, Mark, Panel, Section, Table, figures, fixed};
+use super::view::View;
+use crate::fit::basis::columns;
+
+/// At most this many small panels: more cannot be compared by eye.
+const PANELS: usize = 9;
+
+fn contraction_axis() -> Axis {
+    Axis::new("contraction ΔL/L_{0}", "%")
+}
+
+pub(super) fn section(view: &View<'_>) -> Section {
+    let mut section = Section::new("Load lines");
+    section.figure(load_lines(view));
+    section.figure(loops(view));
+    section.figure(ends(view));
+    section.figure(deadband(view));
+    section
+}
+
+fn load_lines(view: &View<'_>) -> Figure {
+    let points = view.points();
+    let mut panel = Panel::new(contraction_axis(), Axis::new("force F", "N").from_zero());
+    for group in 0..view.levels.len() {
+        let (x, y): (Vec<f64>, Vec<f64>) = broken(points.iter().enumerate().map(|(i, p)| {
+            (view.group(i) == group).then(|| (view.contraction(p.stroke), p.force, p.recording))
+        }));
+        panel = if view.fit.prepared.pressures.held {
+            panel.hair(view.name(group), view.colour(group), &x, &y)
+        } else {
+            panel.points(view.name(group), view.colour(group), &x, &y)
+        };
+    }
+    for group in (0..view.levels.len()).filter(|_| view.fit.prepared.pressures.held) {
+        let mid = view.fit.midline.iter().filter(|m| m.group as usize == group);
+        let (x, y): (Vec<f64>, Vec<f64>) = mid.map(|m| (100.0 * m.contraction, m.force)).unzip();
+        panel = panel.dashes(if group == 0 { "mid-line F_{AVG}" } else { "" }, Colour::Ink, &x, &y);
+    }
+    Figure::new(
+        "load-lines",
+        "Load lines",
+        "Force against contraction as measured, one colour a pressure. The upper branch of a loop is lengthening, the lower one \
+         shortening; half their distance is friction, the dashed mid-line is what the elastic model has to meet.",
+        panel,
+    )
+}
+
+/// Points with a break wherever the course leaves the wanted ones, or goes over to another recording.
+fn broken(points: impl Iterator<Item = Option<(f64, f64, u32)>>) -> (Vec<f64>, Vec<f64>) {
+    let (mut x, mut y) = (Vec::new(), Vec::new());
+    let mut last = None;
+    for point in points {
+        match point {
+            Some((a, b, recording)) => {
+                if last.is_some_and(|l| l != Some(recording)) && !x.is_empty() {
+                    x.push(f64::NAN);
+                    y.push(f64::NAN);
+                }
+                x.push(a);
+                y.push(b);
+                last = Some(Some(recording));
+            }
+            None => last = Some(None),
+        }
+    }
+    (x, y)
+}
+
+fn loops(view: &View<'_>) -> Figure {
+    let friction = view.fit.prepared.design.friction;
+    let panels = view.some(PANELS).into_iter().map(|group| {
+        let mut of: Vec<usize> = (0..view.points().len()).filter(|i| view.group(*i) == group).collect();
+        // Few enough to stay dots, so that one sees them on both sides of the line.
+        let every = of.len().div_ceil(160).max(1);
+        of = of.into_iter().step_by(every).collect();
+        let xs: Vec<f64> = of.iter().map(|i| view.contraction(view.points()[*i].stroke)).collect();
+        let ys: Vec<f64> = of.iter().map(|i| view.points()[*i].force).collect();
+        let strokes = view.strokes(group, 80);
+        let at: Vec<f64> = strokes.iter().map(|x| view.contraction(*x)).collect();
+        let pressure = view.levels[group];
+        let branch = |s: f64| -> Vec<f64> { strokes.iter().map(|x| view.force(pressure, *x, s)).collect() };
+        let mut panel = Panel::new(contraction_axis(), Axis::new("force F", "N"))
+            .titled(view.name(group))
+            .points("measured", Colour::Muted, &xs, &ys);
+        if friction {
+            panel = panel.line("table, shortening", Colour::Series(0), &at, &branch(1.0)).line(
+                "table, lengthening",
+                Colour::Series(1),
+                &at,
+                &branch(-1.0),
+            );
+        } else {
+            panel = panel.line("table", Colour::Series(0), &at, &branch(0.0));
+        }
+        panel
+    });
+    let more = view.levels.len().saturating_sub(PANELS);
+    let left =
+        if more > 0 { format!(" {more} pressures between them are left out here.") } else { String::new() };
+    Figure::multiples(
+        "loops",
+        "The full model on the loops",
+        format!("Each line should run through the middle of its branch's dots.{left}"),
+        panels.collect(),
+    )
+}
+
+/// One loop: how far its mid-line lies from the table's at rest length and where the force ends.
+struct Repeat {
+    group: usize,
+    /// Counted within its pressure.
+    number: usize,
+    blocked: Option<f64>,
+    free: Option<f64>,
+}
+
+/// Pairs of successive half-strokes in opposite directions, at one pressure.
+fn repeats(view: &View<'_>) -> Vec<Repeat> {
+    let points = view.points();
+    let mut blocks: Vec<(usize, usize)> = Vec::new();
+    let mut start = 0;
+    for i in 1..=points.len() {
+        if i == points.len() || points[i].block != points[start].block || view.group(i) != view.group(start) {
+            blocks.push((start, i));
+            start = i;
+        }
+    }
+    blocks.retain(|(from, to)| (*from..*to).any(|i| view.fitted(i)));
+    let mut out: Vec<Repeat> = Vec::new();
+    let mut i = 0;
+    while i + 1 < blocks.len() {
+        let (a, b) = (blocks[i], blocks[i + 1]);
+        let (p, q) = (&points[a.0], &points[b.0]);
+        let group = view.group(a.0);
+        if p.recording != q.recording || group != view.group(b.0) || p.direction == q.direction {
+            i += 1;
+            continue;
+        }
+        let number = 1 + out.iter().filter(|r| r.group == group).count();
+        out.push(repeat(view, group, number, [a, b]));
+        i += 2;
+    }
+    out
+}
+
+fn repeat(view: &View<'_>, group: usize, number: usize, branches: [(usize, usize); 2]) -> Repeat {
+    let at = &view.fit.summary.pressures[group];
+    let pressure = view.levels[group];
+    // The mid-line's distance from the table's, N, over points that `take` accepts: both branches count alike.
+    let off = |take: &dyn Fn(f64) -> bool| -> Option<f64> {
+        let mut sum = 0.0;
+        for (from, to) in branches {
+            let near: Vec<f64> = (from..to)
+                .filter(|i| view.fitted(*i) && take(view.points()[*i].stroke / view.l0))
+                .map(|i| view.residual[i])
+                .collect();
+            if near.is_empty() {
+                return None;
+            }
+            sum += 0.5 * near.iter().sum::<f64>() / near.len() as f64;
+        }
+        Some(sum)
+    };
+    let reach = view.strokes(group, 2).last().copied().unwrap_or(0.0) / view.l0;
+    let blocked = off(&|c| c < 0.1 * reach.max(0.01)).map(|d| at.blocked_force_N + d);
+    let free = at.free_contraction.and_then(|free| {
+        let shift = off(&|c| (c - free).abs() < 0.12 * free.max(0.01))?;
+        let h = 1e-4;
+        let slope = (view.force(pressure, (free + h) * view.l0, 0.0)
+            - view.force(pressure, (free - h) * view.l0, 0.0))
+            / (2.0 * h);
+        (slope < 0.0).then(|| free - shift / slope)
+    });
+    Repeat { group, number, blocked, free }
+}
+
+fn ends(view: &View<'_>) -> Figure {
+    let all = repeats(view);
+    let most = all.iter().map(|r| r.number).max().unwrap_or(0).min(8);
+    let kpa: Vec<f64> = view.levels.iter().map(|p| p / 1e3).collect();
+    let s = &view.fit.summary.pressures;
+    let blocked: Vec<f64> = s.iter().map(|p| p.blocked_force_N).collect();
+    let free: Vec<f64> = s.iter().map(|p| p.free_contraction.map_or(f64::NAN, |c| 100.0 * c)).collect();
+    let pressure = || Axis::new("pressure P", "kPa");
+    let mut panels = [
+        Panel::new(pressure(), Axis::new("blocked force F_{B}", "N").from_zero())
+            .titled("Blocked force")
+            .line("table", Colour::Muted, &kpa, &blocked),
+        Panel::new(pressure(), Axis::new("free contraction", "%").from_zero())
+            .titled("Free contraction")
+            .line("table", Colour::Muted, &kpa, &free),
+    ];
+    for number in 1..=most {
+        let name =
+            if most == 8 && number == 8 { "loop 8 and later".into() } else { format!("loop {number}") };
+        let of = |value: &dyn Fn(&Repeat) -> Option<f64>| -> (Vec<f64>, Vec<f64>) {
+            all.iter()
+                .filter(|r| r.number.min(8) == number)
+                .filter_map(|r| Some((view.levels[r.group] / 1e3, value(r)?)))
+                .unzip()
+        };
+        let colour = Colour::ordered(number - 1, most);
+        let (x, y) = of(&|r| r.blocked);
+        let [first, second] = panels;
+        let first = first.rings(name.clone(), colour, &x, &y);
+        let (x, y) = of(&|r| r.free.map(|c| 100.0 * c));
+        panels = [first, second.rings(name, colour, &x, &y)];
+    }
+    Figure::multiples(
+        "blocked-free",
+        "Blocked force and free contraction against pressure, loop by loop",
+        "Rings of one pressure should lie on each other. Where they climb from loop to loop the muscle is still running in \
+         (Mullins softening); where they scatter, the test does not repeat.",
+        panels.to_vec(),
+    )
+}
+
+fn deadband(view: &View<'_>) -> Figure {
+    let s = &view.fit.summary;
+    let area = columns(&view.fit.prepared.braid, 0.0).area;
+    let (p0, half) = (s.deadband_kPa, 1.96 * s.deadband_std_kPa);
+    let top = view.levels.last().map_or(1.0, |p| p / 1e3);
+    let all = repeats(view);
+    let (x, y): (Vec<f64>, Vec<f64>) =
+        all.iter().filter_map(|r| Some((view.levels[r.group] / 1e3, r.blocked?))).unzip();
+    let line: Vec<f64> = [p0, top].iter().map(|p| 1e3 * (p - p0) * area).collect();
+    let ends = [p0 - half, top];
+    let low: Vec<f64> = ends.iter().map(|p| (1e3 * (p - p0 - half) * area).max(0.0)).collect();
+    let high: Vec<f64> = ends.iter().map(|p| (1e3 * (p - p0 + half) * area).max(0.0)).collect();
+    let panel = Panel::new(
+        Axis::new("pressure P", "kPa").from_zero(),
+        Axis::new("blocked force without friction", "N").from_zero(),
+    )
+    .band("95 % interval", Colour::Series(0), &ends, &low, &high)
+    .line("(P − P_{0}) g(L_{0})", Colour::Series(0), &[p0, top], &line)
+    .with(format!("P_{{0}} = {} kPa", fixed(p0, 1)), Colour::Ink, Mark::Moment(p0))
+    .points("each loop", Colour::Muted, &x, &y);
+    Figure::new(
+        "deadband",
+        "The deadband line",
+        "At rest length every elastic term vanishes, so the blocked force is a straight line whose foot is the deadband. Dots \
+         off the line mean another geometry than the one described, or a force or pressure zero that is off.",
+        panel,
+    )
+}
+
+/// The models of the thesis and the table, side by side.
+pub(super) fn models(view: &View<'_>) -> Section {
+    let mut section = Section::new("Models side by side").summarised();
+    let s = &view.fit.summary;
+    let mut table = Table::new(
+        "Error of the mid-line, percent of blocked force (thesis, eq. 24)",
+        &["model", "mean", "largest", "what is fitted"],
+    );
+    for model in &s.models {
+        let cells = [model.mean_error_pct, model.max_error_pct].map(|v| figures(v, 2));
+        table.row([
+            format!("`{}`", model.name),
+            cells[0].clone(),
+            cells[1].clone(),
+            what(&model.name).into(),
+        ]);
+    }
+    section.table(table);
+    section.figure(against_midline(view));
+    section.figure(error_lines(view));
+    section
+}
+
+fn what(model: &str) -> &'static str {
+    match model {
+        "gaylord" => "nothing: pressure and braid alone",
+        "gaylord-corrected" => "the deadband",
+        "linear" => "the deadband; E of the material",
+        "m1-linear-part" | "m2-linear-part" => "E_{k} per pressure, on the straight part of the load line",
+        "m2" | "m3" | "m4" => "E_{k} per pressure, on the whole load line",
+        "m4-tip" => "the same with rounded tips, L′",
+        "m4-friction" => "E_{k} and k_{F} per pressure, judged on both branches",
+        "yeoh" => "one hyperelastic wall for all pressures: P_{0} and three constants",
+        "material" => "the deadband; the wall from the material's modulus alone",
+        "table" => "everything at once, curves over pressure: this goes to the controller",
+        _ => "",
+    }
+}
+
+/// Models that are drawn, with their colours.
+const DRAWN: [(&str, usize); 5] = [("gaylord", 6), ("linear", 1), ("m2", 2), ("m4", 3), ("yeoh", 4)];
+
+fn against_midline(view: &View<'_>) -> Figure {
+    let panels = view.some(PANELS).into_iter().map(|group| {
+        let of: Vec<usize> =
+            (0..view.fit.midline.len()).filter(|i| view.fit.midline[*i].group as usize == group).collect();
+        let x: Vec<f64> = of.iter().map(|i| 100.0 * view.fit.midline[*i].contraction).collect();
+        let average: Vec<f64> = of.iter().map(|i| view.fit.midline[*i].force).collect();
+        let mut panel = Panel::new(contraction_axis(), Axis::new("force F", "N"))
+            .titled(view.name(group))
+            .points("F_{AVG}", Colour::Muted, &x, &average);
+        for (name, colour) in DRAWN {
+            if let Some(model) = view.fit.models.iter().find(|m| m.name == name) {
+                let y: Vec<f64> = of.iter().map(|i| model.force[*i]).collect();
+                panel = panel.dashes(name, Colour::Series(colour), &x, &y);
+            }
+        }
+        let strokes: Vec<f64> = of.iter().map(|i| view.fit.midline[*i].stroke).collect();
+        let pressure = view.levels[group];
+        let mid: Vec<f64> = strokes.iter().map(|s| view.force(pressure, *s, 0.0)).collect();
+        let std = view.force_std(pressure, &strokes);
+        let edge =
+            |sign: f64| -> Vec<f64> { mid.iter().zip(&std).map(|(f, s)| f + sign * 1.96 * s).collect() };
+        panel.band("table, 95 %", Colour::Series(0), &x, &edge(-1.0), &edge(1.0)).line(
+            "table",
+            Colour::Series(0),
+            &x,
+            &mid,
+        )
+    });
+    Figure::multiples(
+        "models",
+        "Each model against the mid-line",
+        "Dots are measured, lines are models. The fewer constants a model has, the more its distance from the dots tells about \
+         the physics; that a flexible one lies on them proves little.",
+        panels.collect(),
+    )
+}
+
+fn error_lines(view: &View<'_>) -> Figure {
+    let mut panel = Panel::new(contraction_axis(), Axis::log("error |F_{model} − F_{AVG}|/F_{B}", "%"));
+    for group in 0..view.levels.len() {
+        let mut of: Vec<(f64, f64)> = view
+            .fit
+            .chunks
+            .iter()
+            .filter(|c| c.group as usize == group)
+            .map(|c| (100.0 * c.contraction, c.percent.abs().max(2e-3)))
+            .collect();
+        of.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (x, y): (Vec<f64>, Vec<f64>) = of.into_iter().unzip();
+        panel = if view.fit.prepared.pressures.held {
+            panel.hair(view.name(group), view.colour(group), &x, &y)
+        } else {
+            panel.points(view.name(group), view.colour(group), &x, &y)
+        };
+    }
+    let panel = panel.with("1 % of blocked force", Colour::Ink, Mark::Level(1.0));
+    Figure::new(
+        "errors",
+        "Error of the table against contraction",
+        "Each line dives where model and measurement cross; what counts is how high its arches are, and whether all of \
+         them rise at the same contraction: there the model lacks something.",
+        panel,
+    )
+}
