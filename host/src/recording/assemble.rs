@@ -128,6 +128,12 @@ fn same(a: &str, b: &str) -> bool {
         || matches!((number(a), number(b)), (Some(x), Some(y)) if (x - y).abs() <= 1e-9 * x.abs().max(y.abs()))
 }
 
+/// Whether a muscle's name is this word, or ends in it as a word: `festo10-29cm` is called `29cm`.
+fn is_called(name: &str, word: &str) -> bool {
+    let before = name.trim().strip_suffix(word);
+    !word.is_empty() && before.is_some_and(|b| b.chars().next_back().is_none_or(|c| !c.is_alphanumeric()))
+}
+
 fn number(text: &str) -> Option<f64> {
     decimal::prefix(text.as_bytes()).and_then(|(v, used)| (used == text.len()).then_some(v))
 }
@@ -229,7 +235,7 @@ fn set_zero(job: &Job<'_>, table: &mut Table) {
             scale.map_or(0.0, |s| reading * s / own)
         }
         Zero::Found(FoundZero::First) => first_level(stroke),
-        Zero::Found(FoundZero::Longest) => medians_of_five(stroke).fold(f64::INFINITY, f64::min),
+        Zero::Found(FoundZero::Longest) => smallest(stroke),
         Zero::Found(FoundZero::LargestForce) => {
             force.map_or_else(|| first_level(stroke), |f| at_largest(stroke, f))
         }
@@ -254,15 +260,18 @@ fn first_level(column: &[f64]) -> f64 {
     start[start.len() / 2]
 }
 
-/// Running medians of five: a single wild reading must not become the zero.
-fn medians_of_five(column: &[f64]) -> impl Iterator<Item = f64> + '_ {
-    let width = column.len().min(5);
-    column.windows(width.max(1)).map(move |w| {
-        let mut sorted = [f64::INFINITY; 5];
-        sorted[..width].copy_from_slice(w);
-        sorted[..width].sort_unstable_by(f64::total_cmp);
-        sorted[width / 2]
-    })
+/// The smallest reading that a neighbour supports: a single wild one must not become the zero.
+fn smallest(column: &[f64]) -> f64 {
+    let some = &column[..column.len().min(1 << 16)];
+    let mut steps: Vec<f64> = some.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+    if steps.is_empty() {
+        return column.first().copied().unwrap_or(0.0);
+    }
+    let middle = steps.len() / 2;
+    let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let near = 3.0 * step + 6.0 * super::noise::white_noise(some);
+    let pairs = column.windows(2).filter(|w| (w[1] - w[0]).abs() <= near);
+    pairs.map(|w| w[0].min(w[1])).fold(f64::INFINITY, f64::min)
 }
 
 /// The median stroke where the force is among its largest thousandth.
@@ -300,7 +309,9 @@ fn keep(job: &Job<'_>, table: &Table, rows: usize) -> Result<Option<Vec<bool>>> 
                     // A tape measure is good to half a per cent at best; muscles of one shelf differ by more.
                     number(word.trim()).is_some_and(|w| (w - rest).abs() <= 5e-3 * rest)
                 }
-                Value::Text(t) if t == "{name}" => job.reader.muscle_name.is_some_and(|n| same(n, word)),
+                Value::Text(t) if t == "{name}" => {
+                    job.reader.muscle_name.is_some_and(|n| is_called(n, word.trim()))
+                }
                 Value::Text(t) => same(t, word),
             })
         };

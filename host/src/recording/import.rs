@@ -8,6 +8,7 @@
 //! decimal = "comma"                 # how decimals are written; "point" unless said otherwise
 //! sample_interval_s = 0.01          # when there is no column of time
 //! file_name = '(?<pressure_kPa>[0-9.]+)kPa'   # regular expression; what its named groups catch is constant per file
+//! preamble = 'pressure: (?<pressure_psi>[0-9.]+)' # the same for the skipped lines
 //! split_by = ["run"]                # one recording per value
 //!
 //! [columns.displacement]            # time, pressure, displacement, length, contraction, force, temperature,
@@ -176,6 +177,8 @@ pub struct Import {
     pub sample_interval_s: Option<f64>,
     /// A regular expression for the file's name.
     pub file_name: Option<String>,
+    /// A regular expression for the skipped lines.
+    pub preamble: Option<String>,
     /// Columns whose values set recordings apart.
     #[serde(default)]
     pub split_by: Vec<String>,
@@ -257,20 +260,10 @@ impl Import {
         if self.comment.is_some_and(|c| !c.is_ascii()) {
             return Err(invalid("comment must be one plain character".into()));
         }
-        self.pattern()?;
+        pattern("file_name", self.file_name.as_deref())?;
+        pattern("preamble", self.preamble.as_deref())?;
         self.delimiter()?;
         Ok(())
-    }
-
-    pub(super) fn pattern(&self) -> Result<Option<regex_lite::Regex>> {
-        let compile = |p: &String| {
-            regex_lite::Regex::new(p).map_err(|e| {
-                Error::new(Code::ImportInvalid, format!("file_name is not a regular expression: {e}"))
-                    .value(p)
-                    .help("for example '(?<pressure_kPa>[0-9.]+)kPa'")
-            })
-        };
-        self.file_name.as_ref().map(compile).transpose()
     }
 
     pub(super) fn delimiter(&self) -> Result<Option<u8>> {
@@ -301,6 +294,18 @@ impl Import {
     pub(super) fn described(&self, quantity: Quantity) -> Option<&Column> {
         self.columns.get(quantity.name())
     }
+}
+
+/// Compiles a regular expression of a description.
+pub(super) fn pattern(key: &str, pattern: Option<&str>) -> Result<Option<regex_lite::Regex>> {
+    let compile = |p: &str| {
+        regex_lite::Regex::new(p).map_err(|e| {
+            Error::new(Code::ImportInvalid, format!("{key} is not a regular expression: {e}"))
+                .value(p)
+                .help("for example '(?<pressure_kPa>[0-9.]+)kPa'")
+        })
+    };
+    pattern.map(compile).transpose()
 }
 
 /// The quantity of that name in an import description.

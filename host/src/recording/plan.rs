@@ -50,8 +50,8 @@ pub(super) struct Context<'a> {
     pub import: &'a Import,
     /// Whether there is an import description at all.
     pub foreign: bool,
-    /// Constants from the file's name, by header name.
-    pub from_name: Vec<(String, f64)>,
+    /// Constants from the file's name and its skipped lines, by header name.
+    pub constants: Vec<(String, f64)>,
     /// Row filters: column and what to compare with (only the column matters here).
     pub filters: Vec<String>,
     /// The header of the lookup table.
@@ -169,7 +169,7 @@ pub(super) fn plan(names: &[String], context: &Context<'_>) -> Result<Plan> {
 }
 
 fn named_constants<'a>(context: &'a Context<'_>) -> impl Iterator<Item = (&'a String, f64)> {
-    context.from_name.iter().map(|(n, v)| (n, *v))
+    context.constants.iter().map(|(n, v)| (n, *v))
 }
 
 fn described(quantity: Quantity, column: &Column) -> (Role, Want) {

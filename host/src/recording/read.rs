@@ -8,7 +8,7 @@ use super::blocks::{BlockError, Blocks, Rows, RowsError, read_rows};
 use super::campaign::Campaign;
 use super::cells::{Cells, Dialect, Fault, LineError};
 use super::columns::Recording;
-use super::import::{Decimal, Import, Value};
+use super::import::{Decimal, Import, Value, pattern as pattern_of};
 use super::plan::{Context, Plan, plan};
 use super::source;
 use crate::error::{Code, Error, Result};
@@ -111,7 +111,8 @@ impl<'a> Reader<'a> {
         let rest = &text[head.bytes..];
         let average = head.average_line(rest);
         blocks.put_back(rest);
-        let layout = self.layout(path, &head.names, &description)?;
+        let preamble = String::from_utf8_lossy(&text[..head.preamble]);
+        let layout = self.layout(path, &head.names, &description, &preamble)?;
         let rows =
             read_rows(blocks, head.dialect, &layout.plan.wanted, head.names.len(), source.size.or(average))
                 .map_err(|e| rows_error(e, &head, &description))?;
@@ -123,8 +124,17 @@ impl<'a> Reader<'a> {
     }
 
     /// Decides what to read of columns with these names.
-    pub(super) fn layout(&self, path: &Path, names: &[String], import: &Import) -> Result<Layout> {
-        let from_name = from_file_name(path, import)?;
+    pub(super) fn layout(
+        &self,
+        path: &Path,
+        names: &[String],
+        import: &Import,
+        preamble: &str,
+    ) -> Result<Layout> {
+        let mut constants = Constants::default();
+        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        constants.catch("the file's name is", "file_name", import.file_name.as_deref(), &name)?;
+        constants.catch("the skipped lines are", "preamble", import.preamble.as_deref(), preamble)?;
         let lookup = import.lookup.as_ref().map(|l| read_lookup(path, &l.file)).transpose()?;
         let mut filters: Vec<(String, Value)> =
             import.filters.iter().map(|(k, v)| (k.clone(), v.clone())).collect();
@@ -136,11 +146,11 @@ impl<'a> Reader<'a> {
         let context = Context {
             import,
             foreign: self.import.is_some(),
-            from_name: from_name.constants,
+            constants: constants.quantities,
             filters: filters.iter().map(|(n, _)| n.clone()).collect(),
             lookup: lookup.as_ref().map(|l| l.header.as_slice()),
         };
-        Ok(Layout { plan: plan(names, &context)?, filters, lookup, labels: from_name.labels })
+        Ok(Layout { plan: plan(names, &context)?, filters, lookup, labels: constants.labels })
     }
 
     pub(super) fn finish(
@@ -179,6 +189,8 @@ pub(super) struct Layout {
 struct Head {
     dialect: Dialect,
     names: Vec<String>,
+    /// Bytes above the header or the first row.
+    preamble: usize,
     /// Bytes and lines that the head takes.
     bytes: usize,
     lines: u64,
@@ -217,7 +229,7 @@ impl Head {
             })?;
             if import.header == Some(false) {
                 let names = (1..=cells.len()).map(|n| n.to_string()).collect();
-                return Ok(Self { dialect, names, bytes, lines });
+                return Ok(Self { dialect, names, preamble: bytes, bytes, lines });
             }
             let numbers = cells.iter().filter(|c| c.parse::<f64>().is_ok()).count();
             if numbers > 0 && numbers == cells.len() {
@@ -229,7 +241,7 @@ impl Head {
                          or describe the columns by number in an import description (--import)",
                     ));
             }
-            return Ok(Self { dialect, names: cells, bytes: bytes + end, lines: lines + 1 });
+            return Ok(Self { dialect, names: cells, preamble: bytes, bytes: bytes + end, lines: lines + 1 });
         }
     }
 
@@ -318,35 +330,38 @@ fn rows_error(error: RowsError, head: &Head, import: &Import) -> Error {
     }
 }
 
+/// What is constant over a file and stands in its name or above its table.
 #[derive(Default)]
-struct FromName {
-    constants: Vec<(String, f64)>,
+struct Constants {
+    quantities: Vec<(String, f64)>,
     labels: Vec<(String, String)>,
 }
 
-/// What the file's name says, by the description's pattern.
-fn from_file_name(path: &Path, import: &Import) -> Result<FromName> {
-    let mut found = FromName::default();
-    let Some(pattern) = import.pattern()? else { return Ok(found) };
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let Some(captures) = pattern.captures(&name) else {
-        return Err(Error::new(Code::ImportInvalid, "the file's name is not as the import description says")
-            .value(name)
-            .help(format!("it must match {}", pattern.as_str())));
-    };
-    for group in pattern.capture_names().flatten() {
-        let Some(text) = captures.name(group).map(|m| m.as_str()) else { continue };
-        if super::import::constant(group).is_ok() {
-            let value = text.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
-                Error::new(Code::ImportInvalid, format!("the file's name gives no number for {group}"))
-                    .value(text)
+impl Constants {
+    /// Takes what the named groups of `pattern` catch in `text`.
+    fn catch(&mut self, what: &str, key: &str, pattern: Option<&str>, text: &str) -> Result<()> {
+        let Some(pattern) = pattern_of(key, pattern)? else { return Ok(()) };
+        let Some(captures) = pattern.captures(text) else {
+            return Err(Error::new(
+                Code::ImportInvalid,
+                format!("{what} not as the import description says"),
+            )
+            .value(text)
+            .help(format!("{key} must match {}", pattern.as_str())));
+        };
+        for group in pattern.capture_names().flatten() {
+            let Some(caught) = captures.name(group).map(|m| m.as_str()) else { continue };
+            if super::import::constant(group).is_err() {
+                self.labels.push((group.to_owned(), caught.to_owned()));
+                continue;
+            }
+            let value = caught.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
+                Error::new(Code::ImportInvalid, format!("{key} catches no number for {group}")).value(caught)
             })?;
-            found.constants.push((group.to_owned(), value));
-        } else {
-            found.labels.push((group.to_owned(), text.to_owned()));
+            self.quantities.push((group.to_owned(), value));
         }
+        Ok(())
     }
-    Ok(found)
 }
 
 fn read_lookup(recording: &Path, file: &str) -> Result<LookupTable> {

@@ -274,12 +274,18 @@ impl Motion {
 /// The turns that the stroke makes.
 fn stroke_turns(track: &Track<'_>, legs: &[Leg], holds: &[Hold]) -> Vec<Turn> {
     let mut turns = Vec::with_capacity(legs.len());
-    let mut held = holds.iter().peekable();
     for (n, leg) in legs.iter().enumerate() {
-        // The hold that the leg starts from, if its start lies in one.
-        while held.next_if(|h| h.end + 1 < leg.start).is_some() {}
-        let rest = held.peek().filter(|h| h.start <= leg.start + 1 && h.end < leg.end);
-        let index = match (rest, n.checked_sub(1).map(|b| &legs[b])) {
+        let before = n.checked_sub(1).map(|b| &legs[b]);
+        // A rest where the leg starts: at its level, and not left before it.
+        let from = before.map_or(0, |b| track.nears(b, track.threshold));
+        let to = track.leaves(leg, track.threshold);
+        let first = holds.partition_point(|h| h.end < from);
+        let rest = holds[first..]
+            .iter()
+            .take_while(|h| h.start <= to)
+            .filter(|h| (h.stroke - leg.from).abs() <= track.threshold && h.end < leg.end)
+            .last();
+        let index = match (rest, before) {
             (Some(hold), _) => {
                 let tolerance = (3.0 * track.noise).min(track.threshold / 2.0);
                 let level = median(&track.raw[hold.start..=hold.end]);
@@ -308,7 +314,11 @@ fn with_pressure(stroke: Vec<Turn>, holds: &[Hold], air: &Track<'_>) -> Vec<Turn
         for leg in &legs {
             let leg = Leg { start: leg.start + hold.start, end: leg.end + hold.start, ..*leg };
             let tolerance = (3.0 * air.noise).max(0.25 * air.threshold);
-            let index = air.departure(&leg, leg.start, leg.from, tolerance);
+            let index = match air.departure(&leg, leg.start, leg.from, tolerance) {
+                // A recording that begins in the middle of filling has no rest to tell apart.
+                1 if leg.start == 0 => 0,
+                index => index,
+            };
             added.push(Turn {
                 index,
                 direction: if leg.sign() > 0.0 { 1 } else { -1 },

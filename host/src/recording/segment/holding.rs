@@ -113,16 +113,18 @@ fn longest(
     if !(duration > 4.0 * passing) {
         return Found::Short;
     }
-    // What stays so much longer is at rest even if it creeps.
-    if duration < 60.0 * passing && !flat(&smooth[start..end], scale) {
-        return Found::Round;
-    }
+    // The stretch includes what of the motion before and after stays within the threshold; that is no rest.
     let level = median(&smooth[start..end]);
     let tolerance = (3.0 * scale.smoothed_noise).max(0.1 * scale.threshold);
     let still = |i: &usize| (smooth[*i] - level).abs() <= tolerance;
     let (Some(first), Some(last)) = ((start..end).find(still), (start..end).rev().find(still)) else {
         return Found::Round;
     };
+    let rested = time[last] - time[first];
+    // What stays so much longer is at rest even if it creeps.
+    if rested < 4.0 * passing || rested < 60.0 * passing && !flat(&smooth[first..=last], scale) {
+        return Found::Round;
+    }
     holds.push(Hold { start: first, end: last, stroke: level });
     Found::Hold
 }
@@ -146,25 +148,32 @@ fn flat(smooth: &[f64], scale: &Scale) -> bool {
         qx += q * x;
     }
     let size = |square: f64, product: f64| if square > 0.0 { (product / square).abs() } else { 0.0 };
-    let most = (2.5 * scale.smoothed_noise).max(0.15 * scale.threshold);
+    let most = (2.0 * scale.smoothed_noise).max(0.15 * scale.threshold);
     size(pp, px) <= most && size(qq, qx) <= most
 }
 
-/// Joins holds at one level that a single wild sample has parted.
+/// Holds as long as they are, and joined where a wild sample has parted them: with its level known from many samples, a hold
+/// goes on as far as noise about that level explains the samples.
 fn joined(holds: Vec<Hold>, smooth: &[f64], scale: &Scale) -> Vec<Hold> {
+    let tolerance = (3.0 * scale.smoothed_noise).max(0.1 * scale.threshold);
+    let near = |level: f64, i: usize| (smooth[i] - level).abs() <= 0.6 * scale.threshold;
+    let at_rest = |level: f64, i: usize| (smooth[i] - level).abs() <= tolerance;
     let mut joined: Vec<Hold> = Vec::with_capacity(holds.len());
-    for hold in holds {
+    for mut hold in holds {
+        let level = hold.stroke;
+        if joined.last().is_some_and(|last| last.end >= hold.end) {
+            continue;
+        }
+        let after = (hold.end + 1..smooth.len()).take_while(|i| near(level, *i));
+        hold.end = after.filter(|i| at_rest(level, *i)).last().unwrap_or(hold.end);
+        // A hold found earlier ends where this one begins; it is extended first, so it owns what lies between.
+        let bound = joined.last().map_or(0, |last| last.end + 1);
+        let before = (bound..hold.start).rev().take_while(|i| near(level, *i));
+        hold.start = before.filter(|i| at_rest(level, *i)).last().unwrap_or(hold.start.max(bound));
         match joined.last_mut() {
             Some(last)
-                if (last.stroke - hold.stroke).abs() < 0.5 * scale.threshold
-                    && smooth[last.end..hold.start]
-                        .iter()
-                        .all(|x| (x - last.stroke).abs() < 1.5 * scale.threshold) =>
+                if hold.start <= last.end + 2 && (last.stroke - level).abs() < 0.5 * scale.threshold =>
             {
-                // The level of the longer one is the better known.
-                if hold.end - hold.start > last.end - last.start {
-                    last.stroke = hold.stroke;
-                }
                 last.end = hold.end;
             }
             _ => joined.push(hold),

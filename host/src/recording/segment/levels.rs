@@ -94,7 +94,9 @@ impl PressureLevels {
         // Uniformly spread samples would fill levels in proportion to their width alone.
         let by_chance = levels.len() as f64 * gap / (high - low);
         let share = on_levels as f64 / total.max(1) as f64;
-        if levels.len() > MOST || share < 0.8 || share < 1.25 * by_chance {
+        // Samples that merely fill the width of a level have a standard deviation of 0.29 of it.
+        let spread = levels.iter().map(|l| l.std * l.samples as f64).sum::<f64>() / on_levels.max(1) as f64;
+        if levels.len() > MOST || spread > 0.2 * gap || share < 0.8 || share < 1.25 * by_chance {
             return Self::Continuous { low, high };
         }
         levels.sort_by(|a, b| a.mean.total_cmp(&b.mean));

@@ -112,13 +112,13 @@ pub(super) struct Track<'a> {
 
 impl Track<'_> {
     /// First sample of the leg that is farther than `distance` from where the leg starts.
-    fn leaves(&self, leg: &Leg, distance: f64) -> usize {
+    pub fn leaves(&self, leg: &Leg, distance: f64) -> usize {
         let far = |i: &usize| (self.smooth[*i] - leg.from) * leg.sign() > distance;
         (leg.start..=leg.end).find(far).unwrap_or(leg.end)
     }
 
     /// Last sample of the leg that is farther than `distance` from where the leg ends.
-    fn nears(&self, leg: &Leg, distance: f64) -> usize {
+    pub fn nears(&self, leg: &Leg, distance: f64) -> usize {
         let far = |i: &usize| (leg.to - self.smooth[*i]) * leg.sign() > distance;
         (leg.start..=leg.end).rev().find(far).unwrap_or(leg.start)
     }

@@ -1,0 +1,153 @@
+//! Recordings that no one here made come in through the import descriptions of `examples`. Where the data are not present
+//! (they are not part of the project) these tests say that they skipped.
+
+use std::path::{Path, PathBuf};
+
+use host::muscle_description::MuscleDescription;
+use host::recording::segment::{Motion, PressureLevels};
+use host::recording::{Campaign, Clock, Import, Reader};
+
+fn project() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()
+}
+
+fn read(folder: &str, file: &str, import: &str, muscle: &str) -> Option<Campaign> {
+    let path = project().join("../shared/data").join(folder).join(file);
+    if !path.exists() {
+        eprintln!("skipped: {} is not here", path.display());
+        return None;
+    }
+    let import = Import::read(project().join("examples/imports").join(import)).unwrap();
+    let muscle = MuscleDescription::read(project().join("examples/muscles").join(muscle)).unwrap();
+    Some(Reader::of(&muscle).import(Some(&import)).campaign([path]).unwrap())
+}
+
+#[test]
+fn every_muscle_of_2022_has_its_settled_points() {
+    let rest = [83, 132, 182, 233, 281, 382];
+    let mut rows = 0;
+    for mm in rest {
+        let muscle = format!("festo10-2022-{mm}mm.toml");
+        let Some(campaign) =
+            read("aarl-festo-10mm-2022", "settled_points.csv", "festo-2022-settled.toml", &muscle)
+        else {
+            return;
+        };
+        assert_eq!(campaign.recordings.len(), 12, "four lengths of three runs");
+        assert_eq!(campaign.clock, Clock::Separate);
+        assert_eq!(campaign.warnings, Vec::<String>::new());
+        assert!(campaign.recordings.iter().all(|r| r.held_stroke().is_some() && r.force.is_some()));
+        assert!(matches!(PressureLevels::of(&campaign.recordings), PressureLevels::Continuous { .. }));
+        rows += campaign.samples();
+    }
+    assert_eq!(rows, 3925);
+}
+
+#[test]
+fn every_muscle_of_2021_has_its_settled_points() {
+    let mut rows = 0;
+    for name in ["13cm", "23cm", "27cm", "29cm", "30cm"] {
+        let muscle = format!("festo10-2021-{name}.toml");
+        let Some(campaign) =
+            read("aarl-festo-10mm-2021", "settled_points.csv", "festo-2021-settled.toml", &muscle)
+        else {
+            return;
+        };
+        assert!([30, 40].contains(&campaign.recordings.len()), "{}", campaign.recordings.len());
+        rows += campaign.samples();
+    }
+    assert_eq!(rows, 18_027);
+}
+
+#[test]
+fn the_pressure_alone_tells_filling_from_emptying() {
+    for mm in [83, 182, 382] {
+        let muscle = format!("festo10-2022-{mm}mm.toml");
+        let Some(campaign) =
+            read("aarl-festo-10mm-2022", "settled_points.csv", "festo-2022-settled.toml", &muscle)
+        else {
+            return;
+        };
+        for mut recording in campaign.recordings {
+            let told = recording.direction.take().unwrap();
+            let found = Motion::of(&recording).direction;
+            let wrong: Vec<usize> = (0..told.len()).filter(|i| told[*i] != found[*i]).collect();
+            // The file says what the valve was told. At the top it is told to empty up to one period before the pressure
+            // falls, and it is the pressure that the muscle feels.
+            let top = told.iter().position(|d| *d < 0).unwrap();
+            assert!(
+                wrong.iter().all(|i| *i == top || *i + 1 == top),
+                "{}: {wrong:?}, top {top}",
+                recording.name
+            );
+        }
+    }
+}
+
+#[test]
+fn staircases_come_in_with_the_list_of_their_runs() {
+    let Some(a) = read(
+        "aarl-festo-10mm-2022",
+        "festo10_cut200mm.csv",
+        "festo-2022-staircase.toml",
+        "festo10-2022-182mm.toml",
+    ) else {
+        return;
+    };
+    assert_eq!((a.recordings.len(), a.samples()), (12, 36_000));
+    let held: Vec<i64> =
+        a.recordings.iter().map(|r| (r.held_stroke().unwrap() * 1e6).round() as i64).collect();
+    assert_eq!(held, [0, 0, 0, 7500, 7500, 7500, 15_000, 15_000, 15_000, 22_500, 22_500, 22_500]);
+    let Some(b) = read(
+        "aarl-festo-10mm-2021",
+        "festo10_rest281mm_29cm.csv",
+        "festo-2021-staircase.toml",
+        "festo10-2021-29cm.toml",
+    ) else {
+        return;
+    };
+    assert_eq!(b.recordings.len(), 40);
+    assert!(b.recordings.iter().any(|r| (r.stroke[0] - 0.041).abs() < 1e-9));
+}
+
+#[test]
+fn a_muscle_that_is_not_in_the_file_is_told() {
+    let path = project().join("../shared/data/aarl-festo-10mm-2022/settled_points.csv");
+    if !path.exists() {
+        eprintln!("skipped: {} is not here", path.display());
+        return;
+    }
+    let import = Import::read(project().join("examples/imports/festo-2022-settled.toml")).unwrap();
+    let error = Reader::with_rest_length(0.1).import(Some(&import)).file(&path).unwrap_err();
+    assert!(error.to_string().starts_with("no row passes the filters for a muscle of 100 mm"), "{error}");
+    assert!(error.advice().unwrap().contains("83, 132, 182"), "{error:?}");
+}
+
+#[test]
+fn the_thesis_raw_form_comes_in_with_its_units() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("03_345kPa.txt");
+    let mut text =
+        "Test\tmini\npressure\t50\nFile\t3\nTime\tDisplacement\tCommand\tLoad\nsec\tin\tin\tV\n".to_owned();
+    for i in 0..100 {
+        let stroke_mm = 3.0 * (1.0 - (f64::from(i - 50).abs() / 50.0));
+        let force = 80.0 - 20.0 * stroke_mm;
+        let crosshead = 1.25 - stroke_mm / 25.4;
+        text += &format!(
+            "{:.4}\t{crosshead:.6}\t0\t{:.8}\n",
+            f64::from(i) / 30.0,
+            force / (508.41 * 4.448_221_615_260_5)
+        );
+    }
+    std::fs::write(&path, text).unwrap();
+    let import = Import::read(project().join("examples/imports/thesis.toml")).unwrap();
+    let campaign = Reader::new().import(Some(&import)).campaign([&path]).unwrap();
+    let recording = &campaign.recordings[0];
+    assert_eq!(recording.pressure[0], 345e3);
+    let close = |a: f64, b: f64, tolerance: f64| assert!((a - b).abs() < tolerance, "{a} {b}");
+    close(recording.stroke[50], 3.0e-3, 0.1e-3);
+    close(recording.force.as_ref().unwrap()[0], 80.0, 1e-3);
+    close(recording.force.as_ref().unwrap()[50], 20.0, 1e-3);
+    close(recording.stroke[0], 0.0, 0.15e-3);
+    assert_eq!(Motion::of(recording).turns.len(), 2);
+}
