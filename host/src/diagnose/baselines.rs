@@ -9,6 +9,7 @@
 //! is three or four orthogonal least-squares solutions.
 
 use model_core::spline;
+use rayon::prelude::*;
 
 use super::linear::{Basis, dot, energy, weighted};
 use super::rows::{ORDERS, Rows, YEOH};
@@ -148,6 +149,11 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
         for f in &functions.friction {
             columns.push((0..n).map(|i| -live[i] * rows.contexts[i].direction * quasi[i] * f[i]).collect());
         }
+        // A settling that is not quite exponential.
+        let settles = rows.settling.iter().any(|s| *s != 0.0);
+        if settles {
+            columns.push((0..n).map(|i| -live[i] * rows.sign[i] * quasi[i] * rows.settling[i]).collect());
+        }
         let own = columns.len();
         columns.extend(effects.iter().cloned());
         let y: Vec<f64> = (0..n)
@@ -161,6 +167,7 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
         let deadband = solution[0];
         // The model itself, not its linearisation, is what the residual is taken from.
         let first_friction = 1 + order * per_order + yeoh;
+        let settling_share = if settles { solution[own - 1] } else { 0.0 };
         for (c, d) in friction_coefficients.iter_mut().zip(&solution[first_friction..own]) {
             *c += d;
         }
@@ -193,7 +200,8 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
         let amplitudes = solution[own..].to_vec();
         let raw_residual: Vec<f64> = (0..n)
             .map(|i| {
-                let model = live[i] * quasi[i] * (1.0 - friction[i] * rows.contexts[i].direction);
+                let settling = if settles { settling_share * rows.sign[i] * rows.settling[i] } else { 0.0 };
+                let model = live[i] * quasi[i] * (1.0 - friction[i] * rows.contexts[i].direction - settling);
                 let added: f64 = effects.iter().zip(&amplitudes).map(|(e, a)| a * e[i]).sum();
                 rows.force[i] - model - added
             })
@@ -234,6 +242,45 @@ pub(crate) fn mask_slack(rows: &mut Rows, fitted: &Baseline) -> usize {
         }
     }
     masked
+}
+
+/// Settling times of friction at rest that are tried, s.
+const SETTLING: [f64; 8] = [0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 30.0, 100.0];
+
+/// Lets friction fade at rest as the recordings say: `s → s e^(−t/τ)`, `t` since the braid last moved.
+fn fade(rows: &mut Rows, time: f64) {
+    for i in 0..rows.len() {
+        let left = if rows.still[i] > 0.0 { (-rows.still[i] / time).exp() } else { 1.0 };
+        rows.contexts[i].direction = rows.sign[i] * left;
+        rows.settling[i] = if rows.still[i] > 0.0 { (-3.0 * rows.still[i] / time).exp() - left } else { 0.0 };
+    }
+}
+
+/// Finds out whether, and how fast, the gap between the branches closes while the muscle rests. A regulator's ripple shakes the
+/// braid, so that friction ends near the middle although the model holds it: that is no missing physics, but
+/// without it every effect that fades at rest would be mistaken for it.
+pub(crate) fn settle_friction(rows: &mut Rows) -> Option<f64> {
+    rows.settling = vec![0.0; rows.len()];
+    let resting = rows.still.iter().zip(&rows.root_weight).filter(|(s, w)| **s > 1.0 && **w > 0.0).count();
+    if resting * 50 < rows.effective() {
+        return None;
+    }
+    let kind = Kind::Flexible(4);
+    let held = energy(&fit(rows, kind, &[]).residual);
+    let tried: Vec<(f64, f64)> = SETTLING
+        .par_iter()
+        .map(|time| {
+            let mut faded = rows.clone();
+            fade(&mut faded, *time);
+            (*time, energy(&fit(&faded, kind, &[]).residual))
+        })
+        .collect();
+    let (time, left) = tried.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    if left < 0.8 * held {
+        fade(rows, time);
+        return Some(time);
+    }
+    None
 }
 
 /// Writes the baseline's forces and slopes into the rows' contexts, where effects look for them.

@@ -219,7 +219,9 @@ pub(crate) fn attempt(
     for i in 0..rows.len() {
         let fitted: f64 = a.iter().zip(&z).map(|(a, z)| a * z[i]).sum();
         trial.scores[rows.block[i] as usize] += fitted * residual[i];
-        let raw: f64 = a.iter().zip(&columns).map(|(a, c)| a * c[i]).sum();
+        // What has no amplitude yet keeps the proportion of peak to size of its first column.
+        let raw: f64 =
+            if gain > 0.0 { a.iter().zip(&columns).map(|(a, c)| a * c[i]).sum() } else { columns[0][i] };
         trial.size += (raw * rows.root_weight[i]).powi(2);
         if rows.root_weight[i] > 0.0 {
             trial.peak = trial.peak.max(raw.abs());

@@ -43,6 +43,10 @@ fn thin(rows: &Rows, traces: &[Vec<f64>]) -> (Rows, Vec<Vec<f64>>) {
         cycle: pick_u(&rows.cycle),
         level: pick_u(&rows.level),
         levels: rows.levels.clone(),
+        steady: rows.steady,
+        sign: pick(&rows.sign),
+        still: pick(&rows.still),
+        settling: pick(&rows.settling),
         largest: pick(&rows.largest),
         local_time: pick(&rows.local_time),
         blocks: rows.blocks,
@@ -66,7 +70,7 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> [f64
             let fitted = baselines::fit(&blind, kind, traces);
             let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
             for i in 0..rows.len() {
-                if split.group[i] == *g && rows.contexts[i].direction != 0.0 {
+                if split.group[i] == *g && rows.sign[i] != 0.0 {
                     let square = fitted.raw_residual[i].powi(2);
                     if square.is_finite() {
                         sums[1] += square;
@@ -90,9 +94,11 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> [f64
 
 /// Held-out error with and without the effects, by the strictest split that the recordings allow.
 pub(crate) fn held_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], noise: f64) -> HeldOut {
+    let kind = if let Kind::Flexible(m) = kind { Kind::Flexible(m.min(4)) } else { kind };
     let (thin, traces) = thin(rows, traces);
     let by_pressure = split("each pressure predicted from the others", &thin, &|i| thin.level[i]);
-    let by_cycle = split("each cycle predicted from the others", &thin, &|i| thin.cycle[i]);
+    let by_stroke =
+        split("every fourth cycle predicted from the others, in turn", &thin, &|i| thin.block[i] / 2 % 4);
     let by_recording = split("each recording predicted from the others", &thin, &|i| thin.recording[i]);
     let quarter = thin.blocks.div_ceil(4).max(1) as u32;
     let by_time =
@@ -100,8 +106,8 @@ pub(crate) fn held_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], noise: f64)
     // A pressure left out needs a baseline that reaches over pressures.
     let chosen = if matches!(kind, Kind::Stiff) && by_pressure.groups.len() >= 3 {
         by_pressure
-    } else if (2..=10).contains(&by_cycle.groups.len()) {
-        by_cycle
+    } else if thin.blocks >= 16 {
+        by_stroke
     } else if (2..=10).contains(&by_recording.groups.len()) && thin.levels.len() < 2 {
         by_recording
     } else {

@@ -31,6 +31,8 @@ pub(crate) struct Kinematics {
     pub sure: Vec<bool>,
     /// Whether the length was held.
     pub held: Vec<bool>,
+    /// Time since the braid last moved, by its length or by a change of pressure, s; zero while moving.
+    pub still: Vec<f64>,
 }
 
 /// What counts as motion; of the whole campaign.
@@ -212,6 +214,7 @@ pub(crate) fn kinematics(
         turns: vec![0; n],
         sure: vec![true; n],
         held,
+        still: vec![0.0; n],
         ..Kinematics::default()
     };
     let mut next = 0;
@@ -222,6 +225,8 @@ pub(crate) fn kinematics(
     let mut rested = 0.0;
     let mut hold_start: Option<usize> = None;
     let mut pressure_extreme = pressure[0];
+    let mut still_from = 0;
+    let mut still_pressure = pressure[0];
     for row in 0..n {
         let mut turned = false;
         if next < starts.len() && row >= starts[next].0 {
@@ -253,6 +258,11 @@ pub(crate) fn kinematics(
                 }
             }
         }
+        if !k.held[row] || turned || (pressure[row] - still_pressure).abs() > thresholds.pressure {
+            still_from = row;
+            still_pressure = pressure[row];
+        }
+        k.still[row] = time[row] - time[still_from];
         if turned {
             turns += 1;
             turn_row = row;

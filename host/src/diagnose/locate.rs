@@ -33,7 +33,7 @@ fn coordinates(rows: &Rows) -> Vec<Coordinate> {
             rows.levels[rows.level[i] as usize]
         }),
         of("contraction", "", false, &|i| c[i].contraction),
-        of("direction", "", true, &|i| c[i].direction),
+        of("direction", "", true, &|i| rows.sign[i]),
         of("speed", "m/s", false, &|i| c[i].speed.abs()),
         of("acceleration", "m/s²", false, &|i| c[i].acceleration),
         of("force", "N", false, &|i| c[i].quasi),

@@ -44,7 +44,7 @@ fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
             let speed = (c.speed.abs().ln() * 1.5).round() as i32;
             let bin = (c.contraction / width).round() as i32;
             let cell =
-                cells.entry((rows.level[i], c.direction as i8, bin, speed, rows.cycle[i])).or_default();
+                cells.entry((rows.level[i], rows.sign[i] as i8, bin, speed, rows.cycle[i])).or_default();
             cell.sum += residual[i];
             cell.squares += residual[i] * residual[i];
             cell.count += 1.0;

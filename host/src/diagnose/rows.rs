@@ -58,6 +58,14 @@ pub(crate) struct Rows {
     pub level: Vec<u32>,
     /// Mean pressure of each level, Pa, increasing.
     pub levels: Vec<f64>,
+    /// Whether the levels are pressures at which the muscle was worked (else they are places on the pressure's range).
+    pub steady: bool,
+    /// Which way the muscle moved last: the sign behind `direction`, which fades while friction settles.
+    pub sign: Vec<f64>,
+    /// Time since the braid last moved, s.
+    pub still: Vec<f64>,
+    /// How a settling of friction at rest departs from an exponential; all zeros where it does not settle.
+    pub settling: Vec<f64>,
     /// Largest contraction so far in the campaign.
     pub largest: Vec<f64>,
     /// Time within the recording, s.
@@ -194,7 +202,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
         let mut last_piece = None;
         while i < n {
             let mut j = i;
-            let (mut sums, mut count, mut good) = ([0.0_f64; 10], 0.0, 0.0);
+            let (mut sums, mut count, mut good) = ([0.0_f64; 11], 0.0, 0.0);
             let mut force_sum = 0.0;
             while j < n
                 && j - i < per_row
@@ -213,6 +221,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
                     k.since_reversal[j],
                     k.hold_time[j],
                     recording.temperature.as_ref().map_or(0.0, |t| t[j]),
+                    k.still[j],
                 ];
                 for (s, a) in sums.iter_mut().zip(add) {
                     *s += a;
@@ -238,6 +247,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
                 since,
                 hold,
                 temperature,
+                still,
             ] = mean;
             let local = time - start;
             let dt = match previous_time {
@@ -286,6 +296,9 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
             rows.recording.push(index as u32);
             rows.block.push(piece_number);
             rows.cycle.push(recording.cycle.as_ref().map_or(0, |c| c[i]));
+            rows.sign.push(k.direction[i]);
+            rows.still.push(still);
+            rows.settling.push(0.0);
             rows.largest.push(largest / braid.rest_length());
             rows.local_time.push(local);
             i = j;
@@ -339,6 +352,7 @@ fn levels(rows: &mut Rows, range: (f64, f64)) {
     found.retain(|(_, w)| *w * 200.0 > n as f64);
     if steady * 10 >= n * 6 && (1..=12).contains(&found.len()) {
         rows.levels = found.iter().map(|f| f.0).collect();
+        rows.steady = true;
     } else {
         let mut all: Vec<f64> = rows.contexts.iter().map(|c| c.pressure).collect();
         let mut levels: Vec<f64> = (0..7).map(|k| quantile(&mut all, f64::from(k) / 6.0)).collect();
@@ -373,6 +387,14 @@ fn mark_vented(rows: &mut Rows) {
         rows.levels.push(highest);
     }
     let last = rows.levels.len() as u32 - 1;
+    if rows.steady {
+        // Ramps below the lowest pressure worked at lead where no table reaches.
+        for i in 0..rows.len() {
+            if rows.contexts[i].pressure < 0.8 * rows.levels[0] && !rows.vented[i] {
+                rows.root_weight[i] = 0.0;
+            }
+        }
+    }
     let levels = rows.levels.clone();
     for (level, context) in rows.level.iter_mut().zip(&rows.contexts) {
         let p = context.pressure;

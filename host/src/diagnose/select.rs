@@ -15,6 +15,11 @@ pub(crate) const OWN_INEXACTNESS: f64 = 6e-4;
 /// What the stiff baseline is allowed to miss of a real bladder as a smooth surface before that is called a misfit, rms as a
 /// share of the blocked force.
 pub(crate) const STATIC_INEXACTNESS: f64 = 4e-3;
+/// A static effect is named from this peak on, as a share of the blocked force: below, an error of a tenth of a degree in the braid
+/// angle makes the same surface.
+pub(crate) const STATIC_PEAK: f64 = 0.025;
+/// Below this share of its energy outside the flexible tables an effect counts as concealed by them.
+const CONCEALED: f64 = 0.04;
 /// At most so many effects are named.
 pub(crate) const MAX_NAMED: usize = 3;
 /// A further effect must take this share of all misfit above noise …
@@ -77,7 +82,7 @@ fn best_of_each(trials: &[Trial], library: &[Candidate]) -> Vec<Trial> {
             *b = Some(t);
         }
     }
-    best.into_iter().flatten().cloned().collect()
+    best.into_iter().flatten().cloned().collect::<Vec<_>>()
 }
 
 /// Penalised evidence of a trial: how much the logarithm of the misfit falls, in units of independent rows, less what its
@@ -223,6 +228,15 @@ pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step:
     let above = (energy(&bare.residual) - noise_energy).max(0.02 * energy(&bare.residual)).max(1e-12);
     let (first_look, first_p) = look(library, rows, &bare);
 
+    // What the flexible tables imitate almost wholly is judged against the stiff baseline's own errors.
+    let concealed: Vec<bool> = first_look
+        .par_iter()
+        .map(|t| {
+            let c = &library[t.candidate];
+            attempt(t.candidate, c, &t.shapes, rows, &flexible.basis, &flexible.residual).visible < CONCEALED
+        })
+        .collect();
+    let worth_naming = |t: &Trial| !concealed[t.candidate] || t.peak >= STATIC_PEAK * blocked;
     let (mut full, mut traces) =
         if chosen.is_empty() { (bare.clone(), Vec::new()) } else { refit(rows, kind, &mut chosen, library) };
     while chosen.len() < MAX_NAMED {
@@ -237,7 +251,9 @@ pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step:
         let Some((at, winner)) = best
             .iter()
             .enumerate()
-            .filter(|(_, t)| !chosen.iter().any(|c| c.candidate == t.candidate) && t.gain > 0.0)
+            .filter(|(_, t)| {
+                !chosen.iter().any(|c| c.candidate == t.candidate) && t.gain > 0.0 && worth_naming(t)
+            })
             .max_by(|a, b| {
                 let score = |t: &Trial| evidence(t, &library[t.candidate], left, independent);
                 score(a.1).total_cmp(&score(b.1))
@@ -308,7 +324,7 @@ fn repair(
     tried.sort_by(|a, b| a.1.total_cmp(&b.1));
     let (winner, gap) = tried.first()?.clone();
     let left = (gap.max(0.0) / weight).sqrt();
-    if gap > 0.1 * deficit || left > STATIC_INEXACTNESS * blocked || winner.peak < 0.012 * blocked {
+    if gap > 0.1 * deficit || left > STATIC_INEXACTNESS * blocked || winner.peak < STATIC_PEAK * blocked {
         return None;
     }
     let floor = (0.5 * STATIC_INEXACTNESS * blocked).powi(2) * weight;
