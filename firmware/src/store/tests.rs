@@ -1,1 +1,297 @@
-//! The store on a flash whose power is cut.
+//! The store on a flash whose power is cut at every write and every erase, against an oracle of what may be there.
+
+use super::*;
+use embedded_storage_async::nor_flash::{ErrorType, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use model_core::link::messages::{Mode, SideSample, State};
+
+const PAGE: usize = 2048;
+const PAGES: usize = 6;
+const WORD: usize = 4;
+
+/// Flash in memory that counts its words and erases, and loses power after some of them.
+#[derive(Clone, Debug)]
+struct MockFlash {
+    bytes: Vec<u8, { PAGE * PAGES }>,
+    /// Words that may still be written (an erase of a page counts as one).
+    left: usize,
+    done: usize,
+    off: bool,
+    /// What a cut leaves of the word or page it hits: 0 nothing happened, 1 half, 2 all of it.
+    tear: usize,
+}
+
+#[derive(Debug)]
+struct PowerCut;
+
+impl NorFlashError for PowerCut {
+    fn kind(&self) -> NorFlashErrorKind {
+        NorFlashErrorKind::Other
+    }
+}
+
+impl MockFlash {
+    fn erased() -> Self {
+        let mut bytes = Vec::new();
+        bytes.resize(PAGE * PAGES, 0xFF).expect("its own size");
+        Self { bytes, left: usize::MAX, done: 0, off: false, tear: 0 }
+    }
+
+    /// Counts one operation; false when the power goes with it.
+    fn spend(&mut self) -> bool {
+        if self.left == 0 {
+            self.off = true;
+            return false;
+        }
+        self.left -= 1;
+        self.done += 1;
+        true
+    }
+
+    fn powered(mut self, left: usize, tear: usize) -> Self {
+        (self.left, self.off, self.done, self.tear) = (left, false, 0, tear);
+        self
+    }
+}
+
+impl ErrorType for MockFlash {
+    type Error = PowerCut;
+}
+
+impl ReadNorFlash for MockFlash {
+    const READ_SIZE: usize = 1;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), PowerCut> {
+        if self.off {
+            return Err(PowerCut);
+        }
+        let offset = offset as usize;
+        bytes.copy_from_slice(&self.bytes[offset..offset + bytes.len()]);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        PAGE * PAGES
+    }
+}
+
+impl NorFlash for MockFlash {
+    const WRITE_SIZE: usize = WORD;
+    const ERASE_SIZE: usize = PAGE;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), PowerCut> {
+        let (from, to) = (from as usize, to as usize);
+        assert!(from.is_multiple_of(PAGE) && to.is_multiple_of(PAGE), "an erase is of whole pages");
+        for page in (from..to).step_by(PAGE) {
+            if self.off {
+                return Err(PowerCut);
+            }
+            if self.spend() {
+                self.bytes[page..page + PAGE].fill(0xFF);
+            } else {
+                self.bytes[page..page + PAGE * self.tear / 2].fill(0xFF);
+                return Err(PowerCut);
+            }
+        }
+        Ok(())
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), PowerCut> {
+        let offset = offset as usize;
+        assert!(offset.is_multiple_of(WORD) && bytes.len().is_multiple_of(WORD), "a write is of whole words");
+        for (n, word) in bytes.chunks(WORD).enumerate() {
+            if self.off {
+                return Err(PowerCut);
+            }
+            let place = offset + n * WORD;
+            let there = &mut self.bytes[place..place + WORD];
+            // Bits can only be cleared between erases. A word that a cut left half written may be finished; the F446's flash
+            // has no error correction that would forbid it.
+            let clears_only = there.iter().zip(word).all(|(old, new)| old & new == *new);
+            assert!(clears_only, "a write cannot set bits");
+            if !self.spend() {
+                let torn = WORD * self.tear / 2;
+                self.bytes[place..place + torn].copy_from_slice(&word[..torn]);
+                return Err(PowerCut);
+            }
+            self.bytes[place..place + WORD].copy_from_slice(word);
+        }
+        Ok(())
+    }
+}
+
+fn table(fill: u8) -> [u8; 700] {
+    let mut bytes = [fill; 700];
+    for (n, byte) in bytes.iter_mut().enumerate() {
+        *byte ^= n as u8;
+    }
+    bytes
+}
+
+fn open(flash: MockFlash) -> Store<MockFlash> {
+    Store::open(flash).expect("six pages are a store")
+}
+
+fn kept(store: &mut Store<MockFlash>, side: Side) -> Option<std::vec::Vec<u8>> {
+    store.table(side).expect("what is selected is whole").map(<[u8]>::to_vec)
+}
+
+/// A store with some history, so that an operation meets pages that are nearly full and has to move what is alive.
+fn used(commits: u8) -> Store<MockFlash> {
+    let mut store = open(MockFlash::erased());
+    for n in 0..commits {
+        store.commit(Side::Agonist, &table(n)).expect("room");
+        store.commit(Side::Antagonist, &table(100 + n)).expect("room");
+        store.put_settings(&Settings::default()).expect("room");
+    }
+    store
+}
+
+/// Runs an operation with the power cut at every one of its writes and erases, each torn in three ways; looks at what is
+/// there after the power came back. Gives how many cuts were tried.
+fn cut_everywhere(
+    before: &MockFlash,
+    operation: impl Fn(&mut Store<MockFlash>) -> bool,
+    look: impl Fn(&mut Store<MockFlash>, usize),
+) -> usize {
+    let mut cuts = 0;
+    for tear in 0..3 {
+        for left in 0.. {
+            let flash = before.clone().powered(left, tear);
+            let mut store = open(flash);
+            let whole = operation(&mut store);
+            let flash = store.close();
+            if !flash.off {
+                assert!(whole, "with power it works");
+                assert!(flash.done > 0, "it writes something");
+                break;
+            }
+            cuts += 1;
+            look(&mut open(flash.powered(usize::MAX, 0)), left);
+        }
+    }
+    cuts
+}
+
+#[test]
+fn a_commit_that_loses_power_anywhere_leaves_the_old_table_or_the_new() {
+    let mut cuts = 0;
+    for commits in [1, 3, 6, 7] {
+        let mut store = used(commits);
+        let old = kept(&mut store, Side::Agonist);
+        let other = kept(&mut store, Side::Antagonist);
+        let new = table(77);
+        let before = store.close();
+        cuts += cut_everywhere(
+            &before,
+            |store| store.commit(Side::Agonist, &new).is_ok(),
+            |store, left| {
+                let now = kept(store, Side::Agonist);
+                assert!(now == old || now.as_deref() == Some(&new[..]), "after {left} words");
+                assert_eq!(kept(store, Side::Antagonist), other, "the other muscle is not touched");
+                assert_eq!(store.settings().expect("readable"), Some(Settings::default()));
+                // And the store still works.
+                store.commit(Side::Agonist, &table(3)).expect("it takes the next table");
+                assert_eq!(kept(store, Side::Agonist).as_deref(), Some(&table(3)[..]));
+            },
+        );
+    }
+    assert!(cuts > 2000, "{cuts} cuts tried");
+}
+
+#[test]
+fn a_roll_back_that_loses_power_leaves_one_of_both() {
+    let mut store = used(2);
+    let now = kept(&mut store, Side::Agonist);
+    let previous = table(0);
+    let before = store.close();
+    let cuts = cut_everywhere(
+        &before,
+        |store| store.roll_back(Side::Agonist).is_ok(),
+        |store, left| {
+            let after = kept(store, Side::Agonist);
+            assert!(after == now || after.as_deref() == Some(&previous[..]), "after {left} words");
+        },
+    );
+    assert!(cuts > 10, "{cuts} cuts tried");
+}
+
+#[test]
+fn settings_that_lose_power_are_the_old_or_the_new() {
+    let store = used(7);
+    let mut changed = Settings::default();
+    changed.limits.pressure_pa = 123e3;
+    let before = store.close();
+    cut_everywhere(
+        &before,
+        |store| store.put_settings(&changed).is_ok(),
+        |store, left| {
+            let after = store.settings().expect("readable");
+            assert!(after == Some(changed) || after == Some(Settings::default()), "after {left} words");
+        },
+    );
+}
+
+#[test]
+fn rolling_back_returns_and_there_and_back_again() {
+    let mut store = open(MockFlash::erased());
+    assert_eq!(store.roll_back(Side::Agonist), Err(StoreFault::NoPrevious));
+    store.commit(Side::Agonist, &table(1)).expect("room");
+    assert_eq!(store.roll_back(Side::Agonist), Err(StoreFault::NoPrevious));
+    store.commit(Side::Agonist, &table(2)).expect("room");
+    for expected in [1, 2, 1] {
+        let selected = store.roll_back(Side::Agonist).expect("there are two");
+        assert_eq!(selected.table.generation, u32::from(expected));
+        assert_eq!(kept(&mut store, Side::Agonist).as_deref(), Some(&table(expected)[..]));
+    }
+    assert_eq!(kept(&mut store, Side::Antagonist), None);
+}
+
+#[test]
+fn a_thousand_commits_wear_all_pages_and_lose_nothing() {
+    let mut store = open(MockFlash::erased());
+    for n in 0..1000_u32 {
+        let image = table(n as u8);
+        store.commit(Side::Agonist, &image).expect("room");
+        assert_eq!(kept(&mut store, Side::Agonist).as_deref(), Some(&image[..]));
+    }
+    assert_eq!(store.selected(Side::Agonist).expect("readable").map(|s| s.table.generation), Some(1000));
+}
+
+#[test]
+fn a_damaged_table_is_noticed() {
+    let store = used(1);
+    let image = table(0);
+    let mut flash = store.close();
+    let place = flash.bytes.windows(64).position(|w| w == &image[..64]).expect("it is on the flash");
+    flash.bytes[place + 10] ^= 0x10;
+    let mut store = open(flash);
+    // Its own check sum makes the damaged item vanish, or the table's does: it is never given out.
+    assert_ne!(store.table(Side::Agonist), Ok(Some(&image[..])));
+    assert!(matches!(store.table(Side::Agonist), Err(_) | Ok(None)));
+}
+
+#[test]
+fn the_log_keeps_the_last_faults_and_starts_are_counted() {
+    let mut store = open(MockFlash::erased());
+    assert_eq!(store.past_fault(0), Ok(None));
+    for n in 0..FAULT_LOG as u64 + 3 {
+        let report = FaultReport {
+            fault: model_core::link::messages::Fault::OverStroke,
+            side: Side::Agonist,
+            sensor: None,
+            from: State::Running,
+            mode: Mode::Force,
+            time_us: n,
+            value: 1.0,
+            limit: 0.5,
+            last: SideSample::default(),
+        };
+        store.put_fault(&report).expect("room");
+    }
+    for back in 0..FAULT_LOG as u8 {
+        let report = store.past_fault(back).expect("readable").expect("kept");
+        assert_eq!(report.time_us, FAULT_LOG as u64 + 2 - u64::from(back));
+    }
+    assert_eq!(store.past_fault(FAULT_LOG as u8), Ok(None));
+    assert_eq!((store.count_start(), store.count_start()), (Ok(1), Ok(2)));
+}
