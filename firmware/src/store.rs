@@ -10,7 +10,7 @@
 //! | 0x10 + side | which slot holds the table in use: [`Selected`], postcard |
 //! | 0x20 + 2·side + slot | image of a table |
 //! | 0x30 | [`Settings`], postcard |
-//! | 0x40 + side | memories of effects that survive a power cycle, postcard |
+//! | 0x40 + side | [`Remembered`]: memories of effects that survive a power cycle, postcard |
 //! | 0x50 + n | past fault n of a ring, postcard; 0x5F its next place |
 //! | 0x60 | starts of the device, `u32` |
 //!
@@ -69,6 +69,13 @@ impl Selected {
             has_previous: self.previous.is_some(),
         }
     }
+}
+
+/// What effects remember, and the generation of the table that they belong to: a new table brings its own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Remembered {
+    generation: u32,
+    memories: Memories,
 }
 
 /// What effects remember of one muscle.
@@ -226,23 +233,31 @@ impl<F: NorFlash> Store<F> {
         self.put_value(SETTINGS, settings)
     }
 
-    /// What effects remembered of a muscle.
+    /// What effects remembered of a muscle since its table was committed.
     ///
     /// # Errors
     /// [`StoreFault::Medium`].
     pub fn memories(&mut self, side: Side) -> Result<Option<Memories>, StoreFault> {
-        self.value(MEMORIES + side.index() as u8)
+        let generation = self.generation(side)?;
+        let kept: Option<Remembered> = self.value(MEMORIES + side.index() as u8)?;
+        Ok(kept.filter(|kept| kept.generation == generation).map(|kept| kept.memories))
     }
 
-    /// Keeps what effects remember, unless the same is kept already.
+    /// Keeps what effects remember, unless the same is kept already. An empty list forgets.
     ///
     /// # Errors
     /// As the medium fails.
     pub fn put_memories(&mut self, side: Side, memories: &Memories) -> Result<(), StoreFault> {
-        if self.memories(side)?.as_ref() == Some(memories) {
+        let generation = self.generation(side)?;
+        let new = Remembered { generation, memories: memories.clone() };
+        if self.value(MEMORIES + side.index() as u8)?.as_ref() == Some(&new) {
             return Ok(());
         }
-        self.put_value(MEMORIES + side.index() as u8, memories)
+        self.put_value(MEMORIES + side.index() as u8, &new)
+    }
+
+    fn generation(&mut self, side: Side) -> Result<u32, StoreFault> {
+        Ok(self.selected(side)?.map_or(0, |selected| selected.table.generation))
     }
 
     /// Adds a fault to the log.

@@ -18,8 +18,11 @@ const ANSWER_SYNC: u8 = 0x5A;
 const RESET: u8 = 1;
 const VENT: u8 = 2;
 
-/// How long an answer may take before the tick goes by without one.
-const PATIENCE: Duration = Duration::from_millis(250);
+/// How long an answer may take before the tick goes by without one. The bench is another process of a machine that may be
+/// busy, and time stands still with it; so only a bench that is gone is silent.
+const PATIENCE: Duration = Duration::from_secs(3);
+/// The same before the bench has answered at all: it may have been started later than the board.
+const FIRST_PATIENCE: Duration = Duration::from_millis(100);
 
 /// The pipes of a bench's UART.
 pub type BenchUart = Uart<64, 32>;
@@ -109,7 +112,8 @@ impl Bench {
     async fn exchange(&mut self, command: &Command, asked: f32) -> Option<Readings> {
         let request = self.request(command, asked);
         let Ok(()) = Sender(self.uart).write_all(&request).await;
-        match select(self.wait(), Timer::after(PATIENCE)).await {
+        let patience = if self.started { PATIENCE } else { FIRST_PATIENCE };
+        match select(self.wait(), Timer::after(patience)).await {
             Either::First(readings) => {
                 self.started = true;
                 self.tick = self.tick.wrapping_add(1);

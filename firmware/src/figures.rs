@@ -1,0 +1,286 @@
+//! Counts instructions on the emulated Cortex-M4F: `qemu-system-arm -M mps2-an386 -icount shift=0`.
+//!
+//! With `-icount shift=0` an instruction takes a nanosecond of virtual time, and SysTick counts the 25 MHz clock, so one tick
+//! is 40 instructions on every run. Each point is evaluated many times in a row, so that the resolution is better than one
+//! instruction; the cost of the empty loop is subtracted. Lines `name mean worst points` go to the debugger's console, and
+//! `tests/emulator` reads them.
+
+#![no_std]
+#![no_main]
+
+#[path = "boards/mps2_an386/semihosting.rs"]
+#[allow(dead_code, reason = "this image needs no files")]
+mod semihosting;
+
+use core::hint::black_box;
+use core::panic::PanicInfo;
+
+use cortex_m::peripheral::{SYST, syst::SystClkSource};
+use cortex_m_rt::entry;
+use cortex_m_semihosting::{debug, hprintln};
+use firmware::board::{Inputs, Readings};
+use firmware::control::Controller;
+use firmware::modes::Model;
+use model_core::effects::{EffectName, FittedEffect, MAX_PARAMETERS};
+use model_core::image;
+use model_core::link::messages::{Mode, Reference, Side};
+use model_core::link::settings::Settings;
+use model_core::motion::Motion;
+use model_core::muscle::Muscle;
+use model_core::table::{self, MuscleTable};
+use model_core::units::{Length, Pressure};
+use static_cell::StaticCell;
+
+/// This image serves no interrupts.
+#[unsafe(link_section = ".vector_table.interrupts")]
+#[unsafe(no_mangle)]
+#[used]
+pub static __INTERRUPTS: [usize; 1] = [0];
+
+const INSTRUCTIONS_PER_TICK: f32 = 40.0;
+const WRAP: u32 = 0x00FF_FFFF;
+
+/// Ticks that something takes; less than the 0.67 s of virtual time after which SysTick wraps.
+fn ticks(mut run: impl FnMut()) -> u32 {
+    let before = SYST::get_current();
+    run();
+    before.wrapping_sub(SYST::get_current()) & WRAP
+}
+
+/// Instructions of one of `repeats` equal calls, without the loop.
+fn instructions(repeats: u32, mut call: impl FnMut()) -> f32 {
+    let all = ticks(|| {
+        for n in 0..repeats {
+            black_box(n);
+            call();
+        }
+    });
+    let bare = ticks(|| {
+        for n in 0..repeats {
+            black_box(n);
+        }
+    });
+    (all as f32 - bare as f32) * INSTRUCTIONS_PER_TICK / repeats as f32
+}
+
+/// Mean and worst of a sweep.
+#[derive(Default)]
+struct Sweep {
+    sum: f32,
+    worst: f32,
+    points: u32,
+}
+
+impl Sweep {
+    fn add(&mut self, instructions: f32) {
+        self.sum += instructions;
+        self.worst = self.worst.max(instructions);
+        self.points += 1;
+    }
+
+    fn say(&self, name: &str) {
+        hprintln!("{} {:.1} {:.1} {}", name, self.sum / self.points.max(1) as f32, self.worst, self.points);
+    }
+}
+
+/// The formulas as they stand in the thesis, with libm's `powf` and `sqrtf`: what the run-time form is compared with.
+struct Direct {
+    rest_length: f32,
+    fibre: f32,
+    turns: f32,
+    volume: f32,
+    rest_radius: f32,
+    deadband: f32,
+}
+
+impl Direct {
+    fn of(table: &MuscleTable) -> Option<Self> {
+        let braid = table.geometry.cast::<f32>().build().ok()?;
+        Some(Self {
+            rest_length: braid.rest_length(),
+            fibre: braid.fibre_length(),
+            turns: braid.turns(),
+            volume: braid.bladder_volume(),
+            rest_radius: braid.rest_radius(),
+            deadband: table.deadband.pascals(),
+        })
+    }
+
+    fn force(&self, table: &MuscleTable, pressure: f32, stroke: f32, direction: f32) -> f32 {
+        use core::f32::consts::PI;
+        let length = self.rest_length - stroke;
+        let radius =
+            libm::sqrtf(libm::powf(self.fibre, 2.0) - libm::powf(length, 2.0)) / (2.0 * PI * self.turns);
+        let wall = radius - libm::sqrtf(libm::powf(radius, 2.0) - self.volume / (PI * length));
+        let radial = radius / self.rest_radius - 1.0;
+        let axial = length / self.rest_length - 1.0;
+        let gaylord = (pressure - self.deadband)
+            * (3.0 * libm::powf(length, 2.0) - libm::powf(self.fibre, 2.0))
+            / (4.0 * PI * libm::powf(self.turns, 2.0));
+        // Straight lines between the nodes stand for the curves: the cheapest that a direct port can do.
+        let last = table.nodes.len() - 1;
+        let after = table.nodes.iter().position(|node| *node > pressure).unwrap_or(last).clamp(1, last);
+        let (from, to) = (table.nodes[after - 1], table.nodes[after]);
+        let share = ((pressure - from) / (to - from)).clamp(0.0, 1.0);
+        let between = |values: &[f32]| values[after - 1] + (values[after] - values[after - 1]) * share;
+        let mut elastic = 0.0;
+        for (k, curve) in table.elastic.iter().enumerate() {
+            let power = (k + 1) as f32;
+            elastic += between(curve)
+                * (self.volume / length * libm::powf(axial, power)
+                    - wall * libm::powf(length, 2.0) * libm::powf(radial, power)
+                        / (2.0 * PI * libm::powf(self.turns, 2.0) * radius));
+        }
+        (gaylord + elastic) * (1.0 - between(&table.friction) * direction)
+    }
+}
+
+/// Pressures and strokes of the sweep: the table's range and somewhat beyond.
+fn sweep(mut at: impl FnMut(f32, f32, f32)) {
+    for p in 0..12 {
+        for x in 0..6 {
+            for direction in [-1.0, 1.0] {
+                at(90e3 + 43e3 * p as f32, 0.5e-3 * x as f32, direction);
+            }
+        }
+    }
+}
+
+fn functions(table: &MuscleTable, muscle: &Muscle<f32>) {
+    let mut force = Sweep::default();
+    let mut inverse = Sweep::default();
+    let mut direct = Sweep::default();
+    let port = Direct::of(table);
+    let search = muscle.search();
+    sweep(|p, x, s| {
+        let (pressure, stroke) = (Pressure::from_pascals(p), Length::from_metres(x));
+        force.add(instructions(64, || {
+            black_box(muscle.force(black_box(pressure), black_box(stroke), black_box(s)));
+        }));
+        let wanted = muscle.force(pressure, stroke, s);
+        let guess = Pressure::from_pascals(p + 5e3);
+        inverse.add(instructions(64, || {
+            let held = muscle.held(black_box(stroke));
+            black_box(muscle.pressure_for(black_box(wanted), &held, black_box(s), black_box(guess), &search));
+        }));
+        if let Some(port) = &port {
+            direct.add(instructions(16, || {
+                black_box(port.force(black_box(table), black_box(p), black_box(x), black_box(s)));
+            }));
+        }
+    });
+    force.say("force");
+    inverse.say("inverse");
+    direct.say("direct-port");
+}
+
+/// The whole 1 kHz step in force control: muscle moving, wave of force, telemetry at every tenth tick.
+fn whole_step(table: &MuscleTable) {
+    static CONTROLLER: StaticCell<Controller> = StaticCell::new();
+    let Ok(model) = Model::build(table) else { return };
+    let controller = CONTROLLER.init_with(|| Controller::new(Settings::default()));
+    controller.use_model(Side::Agonist, Some(model));
+    let inputs = |pressure_pa, stroke_m, force_n| Inputs {
+        sides: [Some(Readings { pressure_pa, stroke_m, force_n }), None],
+        ..Inputs::default()
+    };
+    controller.step(&inputs(100e3, 0.9e-3, 10.0));
+    let wave = Reference::Sine { mean: 45.0, amplitude: 20.0, frequency_hz: 2.0 };
+    let began = controller.arm().is_ok()
+        && controller.start(Mode::Force).is_ok()
+        && controller.reference(wave).is_ok();
+    controller.set_telemetry(10);
+    let mut sweep = Sweep::default();
+    let mut pressure = 100e3;
+    for tick in 0..4000_u32 {
+        let phase = (tick % 1000) as f32 / 1000.0;
+        let triangle = if phase < 0.5 { phase } else { 1.0 - phase };
+        let readings = inputs(pressure, 0.3e-3 + 2.4e-3 * triangle, 45.0 + phase);
+        let mut wanted = 0.0;
+        let spent =
+            ticks(|| wanted = black_box(controller.step(black_box(&readings))).outputs.sides[0].pressure_pa);
+        pressure += (wanted - pressure) * 0.03 + if tick % 2 == 0 { 3.0 } else { -3.0 };
+        sweep.add(spent as f32 * INSTRUCTIONS_PER_TICK);
+    }
+    if began && controller.mode() == Mode::Force {
+        sweep.say("step");
+    } else {
+        hprintln!("the step did not run: {:?}", controller.faults().latched);
+    }
+}
+
+/// What each effect adds to a tick: its step and its force.
+fn effects(table: &MuscleTable) {
+    let motion = Motion {
+        dt: 1e-3,
+        time: 1.0,
+        stroke: 1e-3,
+        speed: 2e-3,
+        direction: 1.0,
+        pressure_rate: 1e3,
+        travel: 1e-3,
+        since_reversal: 0.5,
+        ..Motion::default()
+    };
+    let mut without = None;
+    let bare = core::iter::once(None).chain(EffectName::ALL.iter().copied().map(Some));
+    for effect in bare {
+        let mut table = table.clone();
+        if let Some(effect) = effect {
+            let mut parameters = [0.0; MAX_PARAMETERS];
+            let of = effect.info().parameters;
+            for (to, parameter) in parameters.iter_mut().zip(of) {
+                *to = 0.5 * (parameter.low + parameter.high);
+            }
+            // The list is empty, so there is room for one.
+            let _ =
+                table.effects.push(FittedEffect::new(effect, &parameters[..of.len().min(MAX_PARAMETERS)]));
+        }
+        let Ok(mut model) = Model::build(&table) else { continue };
+        let mut tick = 0_u32;
+        let cost = instructions(64, || {
+            tick += 1;
+            let moved = Motion { stroke: 1e-3 + 1e-6 * tick as f32, ..motion };
+            black_box(model.moment(black_box(&moved), black_box(300e3)));
+        });
+        match effect {
+            None => {
+                without = Some(cost);
+                hprintln!("moment {:.1} {:.1} 64", cost, cost);
+            }
+            Some(effect) => {
+                let added = cost - without.unwrap_or(0.0);
+                hprintln!("effect:{} {:.1} {:.1} 64", effect.info().name, added, added);
+            }
+        }
+    }
+}
+
+#[entry]
+fn main() -> ! {
+    if let Some(mut core) = cortex_m::Peripherals::take() {
+        core.SYST.set_clock_source(SystClkSource::Core);
+        core.SYST.set_reload(WRAP);
+        core.SYST.clear_current();
+        core.SYST.enable_counter();
+    }
+    let table = table::example();
+    let mut buffer = [0; image::MAX_LEN];
+    let length = image::write(&table, &mut buffer).map_or(0, <[u8]>::len);
+    hprintln!("table-image {} {} 1", length, length);
+    if let Ok(muscle) = Muscle::<f32>::build(&table) {
+        functions(&table, &muscle);
+    }
+    whole_step(&table);
+    effects(&table);
+    hprintln!("end 0 0 0");
+    loop {
+        debug::exit(debug::EXIT_SUCCESS);
+    }
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    hprintln!("panic: {}", info);
+    semihosting::fail();
+}
