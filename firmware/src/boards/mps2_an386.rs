@@ -19,7 +19,7 @@ use core::panic::PanicInfo;
 
 use cortex_m::peripheral::NVIC;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
-use embassy_executor::{Executor, Spawner};
+use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::mutex::Mutex;
 use embassy_time::Timer;
@@ -71,13 +71,24 @@ extern "C" fn second_sent() {
     SECOND_BENCH.on_transmit();
 }
 
+/// Everything runs on an interrupt that no device uses, below all that do, and the main program sleeps: in QEMU only an
+/// interrupt wait lets the host's processor rest (an event wait, the thread executor's, spins).
+static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
+const EXECUTOR_LINE: Line = Line(10);
+
+extern "C" fn run_tasks() {
+    // SAFETY: this is the handler of the interrupt that the executor was started on.
+    unsafe { EXECUTOR.on_interrupt() }
+}
+
 const RESERVED: Vector = Vector { reserved: 0 };
 
-/// The board's interrupts by their numbers: three UARTs (receive, transmit), two GPIO blocks, two timers.
+/// The board's interrupts by their numbers: three UARTs (receive, transmit), two GPIO blocks, two timers, and the one that
+/// runs the tasks.
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 #[used]
-pub static __INTERRUPTS: [Vector; 10] = [
+pub static __INTERRUPTS: [Vector; 11] = [
     Vector { handler: link_received },
     Vector { handler: link_sent },
     Vector { handler: bench_received },
@@ -88,10 +99,11 @@ pub static __INTERRUPTS: [Vector; 10] = [
     RESERVED,
     Vector { handler: time::on_wrap },
     Vector { handler: time::on_alarm },
+    Vector { handler: run_tasks },
 ];
 
 /// An interrupt's number.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Line(u16);
 
 // SAFETY: the numbers below are those of the table above.
@@ -102,6 +114,11 @@ unsafe impl cortex_m::interrupt::InterruptNumber for Line {
 }
 
 fn start_interrupts() {
+    // SAFETY: before any interrupt is enabled; the lowest of the eight priorities that this core has.
+    unsafe {
+        let mut core = cortex_m::Peripherals::steal();
+        core.NVIC.set_priority(EXECUTOR_LINE, 0xE0);
+    }
     for line in [0, 1, 2, 3, 4, 5, 8, 9] {
         // SAFETY: every handler only touches its own registers and what critical sections guard.
         unsafe { NVIC::unmask(Line(line)) };
@@ -127,7 +144,7 @@ async fn link(port: &'static Port, shared: &'static Shared, mut server: Server<F
     cortex_m::peripheral::SCB::sys_reset();
 }
 
-fn spawn(spawner: Spawner, shared: &'static Shared, port: &'static Port) -> Result<(), &'static str> {
+fn spawn(spawner: SendSpawner, shared: &'static Shared, port: &'static Port) -> Result<(), &'static str> {
     let flash = FileFlash::open(c"pam-store.bin").ok_or("the file pam-store.bin cannot be opened")?;
     let identity = Identity {
         board: Board::Mps2An386,
@@ -149,7 +166,6 @@ fn spawn(spawner: Spawner, shared: &'static Shared, port: &'static Port) -> Resu
 fn main() -> ! {
     static SHARED: StaticCell<Shared> = StaticCell::new();
     static PORT: StaticCell<Port> = StaticCell::new();
-    static EXECUTOR: StaticCell<Executor> = StaticCell::new();
     time::start();
     for uart in [&BENCH, &SECOND_BENCH] {
         uart.start();
@@ -158,14 +174,15 @@ fn main() -> ! {
     start_interrupts();
     let shared: &'static Shared = SHARED.init_with(|| Shared::new(Settings::default()));
     let port: &'static Port = PORT.init_with(|| Mutex::new(Sender(&LINK)));
-    EXECUTOR.init_with(Executor::new).run(|spawner| {
-        if let Err(why) = spawn(spawner, shared, port) {
-            semihosting::print("firmware: ");
-            semihosting::print(why);
-            semihosting::print("\n");
-            semihosting::fail();
-        }
-    })
+    if let Err(why) = spawn(EXECUTOR.start(EXECUTOR_LINE), shared, port) {
+        semihosting::print("firmware: ");
+        semihosting::print(why);
+        semihosting::print("\n");
+        semihosting::fail();
+    }
+    loop {
+        cortex_m::asm::wfi();
+    }
 }
 
 #[panic_handler]

@@ -1,0 +1,262 @@
+//! Every fault that a plant or a host can cause, through the real link and the real image: noticed in time, vented or held,
+//! latched, counted, told, and left only by being cleared.
+
+use std::time::Duration;
+
+use emulator_tests::machine::Folder;
+use emulator_tests::{Machine, Options, Watched, tracking, upload};
+use host::device::{Client, Topic};
+use model_core::link::endpoints::{
+    Arm, ClearFault, GetFaults, GetPastFault, GetStatus, SetTelemetry, SetTo, StartMode, Stop,
+};
+use model_core::link::messages::{
+    Event, Fault, FaultReport, Mode, PastFault, Refusal, SetPoint, Side, Start, State, TelemetryRate,
+};
+use model_core::link::settings::Settings;
+use model_core::table;
+use virtual_bench::bench::BenchSpec;
+use virtual_bench::lockstep::Answer;
+use virtual_bench::plant::{Motion, PlantStation};
+use virtual_bench::presets;
+
+/// How a fault is caused: what happens to the readings from a period on (counted from the first).
+type Cause = fn(u64, &mut Answer);
+
+struct Case {
+    fault: Fault,
+    /// Periods from the cause to the changed command.
+    within: usize,
+    /// Settings that the case needs besides the defaults.
+    settings: fn(&mut Settings),
+    cause: Cause,
+}
+
+const NONE: fn(&mut Settings) = |_| ();
+
+const CASES: &[Case] = &[
+    // A broken wire vents within 3 ms.
+    Case { fault: Fault::SensorRange, within: 3, settings: NONE, cause: |_, a| a.force = -1.0e6 },
+    Case { fault: Fault::SensorRange, within: 3, settings: NONE, cause: |_, a| a.pressure = f32::NAN },
+    Case { fault: Fault::OverPressure, within: 3, settings: NONE, cause: |_, a| a.pressure = 720e3 },
+    Case { fault: Fault::OverStroke, within: 3, settings: NONE, cause: |_, a| a.stroke = 0.085 },
+    Case {
+        fault: Fault::OverForce,
+        within: 3,
+        settings: |s| s.limits.force_n = 150.0,
+        cause: |_, a| a.force = 160.0,
+    },
+    Case {
+        fault: Fault::OverSpeed,
+        within: 60,
+        settings: |s| s.limits.speed_m_per_s = 0.05,
+        cause: |n, a| a.stroke += 1.0e-4 * n as f32,
+    },
+    Case {
+        fault: Fault::SensorNoisy,
+        within: 20,
+        settings: NONE,
+        cause: |n, a| a.pressure += if n % 2 == 0 { 100e3 } else { -100e3 },
+    },
+    Case {
+        fault: Fault::PressureNotRising,
+        within: 260,
+        settings: |s| s.watch.follow_pa = 60e3,
+        cause: |_, a| a.pressure *= 0.5,
+    },
+    Case {
+        fault: Fault::PressureNotFalling,
+        within: 260,
+        settings: |s| s.watch.follow_pa = 60e3,
+        cause: |_, a| a.pressure *= 1.5,
+    },
+    Case {
+        fault: Fault::SensorsDisagree,
+        within: 260,
+        settings: |s| s.watch.disagree_n = 40.0,
+        cause: |_, a| a.force += 80.0,
+    },
+    Case {
+        fault: Fault::SensorStuck,
+        within: 600,
+        settings: |s| s.watch.follow_pa = 1e6,
+        cause: |_, a| a.pressure = 200e3,
+    },
+];
+
+fn station() -> Watched<PlantStation> {
+    let bench = BenchSpec::laboratory(presets::miniature(), 3);
+    Watched::new(PlantStation::new(bench, vec![Motion::Held { stroke_mm: 0.8 }], 1e-3))
+}
+
+fn board(folder: &Folder, station: &Watched<PlantStation>) -> Option<Machine> {
+    let options = Options { first: Some(Box::new(station.clone())), ..Options::default() };
+    Machine::start(folder.path(), options).ok()
+}
+
+/// Waits for the event of a fault.
+fn stopped(client: &mut Client) -> FaultReport {
+    for _ in 0..40 {
+        while let Some(topic) = client.topic(Duration::from_millis(500)).expect("the line is there") {
+            if let Topic::Event(Event::Fault(report)) = topic {
+                return report;
+            }
+        }
+    }
+    panic!("no fault was told");
+}
+
+/// Lets the plant go on for some periods.
+fn pass(station: &Watched<PlantStation>, periods: usize) {
+    let until = station.periods() + periods;
+    while station.periods() < until {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+#[test]
+fn every_fault_of_the_plant_is_noticed_in_time_and_latched() {
+    let folder = Folder::new();
+    let station = station();
+    let Some(machine) = board(&folder, &station) else { return };
+    let mut client = machine.client();
+    upload(&mut client, Side::Agonist, &table::example());
+    for (number, case) in CASES.iter().enumerate() {
+        let fault = case.fault;
+        tracking::set(&mut client, |settings| {
+            *settings = Settings::default();
+            (case.settings)(settings);
+        });
+        tracking::start(&mut client, Mode::Pressure);
+        client.call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 }).expect("quiet");
+        client.call::<SetTo>(&SetPoint::Pressure(250e3)).expect("a set-point");
+        pass(&station, 400);
+        let mut began = None;
+        let cause = case.cause;
+        let at = std::sync::Arc::new(std::sync::atomic::AtomicU64::new(u64::MAX));
+        let seen = at.clone();
+        station.disturb(move |period, answer| {
+            let first = *began.get_or_insert(period);
+            seen.store(first, std::sync::atomic::Ordering::Relaxed);
+            cause(period - first, answer);
+        });
+        if fault == Fault::SensorStuck {
+            pass(&station, 20);
+            client.call::<SetTo>(&SetPoint::Pressure(400e3)).expect("a set-point");
+        }
+        let report = stopped(&mut client);
+        pass(&station, 5);
+        let first = at.load(std::sync::atomic::Ordering::Relaxed) as usize;
+        let after = station.since(first);
+        let vented = after.iter().position(|exchange| exchange.command == 0.0);
+        station.heal();
+        assert_eq!(report.fault, fault, "case {number}: {report:?}");
+        assert_eq!((report.from, report.mode), (State::Running, Mode::Pressure));
+        assert!(
+            vented.is_some_and(|n| n <= case.within),
+            "{fault:?} (case {number}) vents after {vented:?} periods"
+        );
+        // It stays vented and says no to everything but being cleared.
+        assert_eq!(client.try_call::<Arm>(&()).expect("an answer"), Err(Refusal::Latched(fault)));
+        assert_eq!(client.call::<GetStatus>(&()).expect("a status").state, State::Fault);
+        let faults = client.call::<GetFaults>(&()).expect("its faults");
+        assert_eq!(faults.latched, Some(report));
+        assert!(faults.counts[usize::from(fault.code())] >= 1);
+        let past = client.call::<GetPastFault>(&PastFault { back: 0 }).expect("the log");
+        assert_eq!(past, Some(report), "it is kept");
+        pass(&station, 30);
+        client.call::<ClearFault>(&()).expect("it clears when the cause is gone");
+        assert_eq!(client.call::<GetStatus>(&()).expect("a status").state, State::Disarmed);
+    }
+}
+
+#[test]
+fn a_fault_whose_cause_is_still_there_is_not_cleared() {
+    let folder = Folder::new();
+    let station = station();
+    let Some(machine) = board(&folder, &station) else { return };
+    let mut client = machine.client();
+    tracking::start(&mut client, Mode::Pressure);
+    station.disturb(|_, answer| answer.force = 9e9);
+    stopped(&mut client);
+    pass(&station, 10);
+    let refused = client.try_call::<ClearFault>(&()).expect("an answer");
+    assert_eq!(refused, Err(Refusal::StillFaulty(Fault::SensorRange)));
+    station.heal();
+    pass(&station, 10);
+    client.call::<ClearFault>(&()).expect("now it clears");
+}
+
+#[test]
+fn a_host_that_falls_silent_and_a_hold_that_was_asked_for() {
+    let folder = Folder::new();
+    let station = station();
+    let Some(machine) = board(&folder, &station) else { return };
+    let mut client = machine.client();
+    tracking::set(&mut client, |settings| {
+        settings.watch.silence_ticks = 300;
+        settings.hold_on = 1 << Fault::SetPointSilence.code();
+    });
+    tracking::start(&mut client, Mode::Pressure);
+    client.call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 }).expect("quiet");
+    client.call::<SetTo>(&SetPoint::Pressure(300e3)).expect("a set-point");
+    let report = stopped(&mut client);
+    assert_eq!(report.fault, Fault::SetPointSilence);
+    pass(&station, 100);
+    let held = station.since(station.periods() - 1)[0].command;
+    assert!((held - 300e3).abs() < 2e3, "it holds {held} Pa");
+    // Held pressure can still be let go of without leaving the fault.
+    assert_eq!(client.call::<Stop>(&()).expect("it vents").state, State::Fault);
+    pass(&station, 5);
+    assert_eq!(station.since(station.periods() - 1)[0].command, 0.0);
+}
+
+#[test]
+fn a_mode_without_its_table_is_a_fault_and_nothing_starts_by_itself() {
+    let folder = Folder::new();
+    let station = station();
+    let Some(machine) = board(&folder, &station) else { return };
+    let mut client = machine.client();
+    pass(&station, 50);
+    client.call::<Arm>(&()).expect("it arms");
+    let refused = client.try_call::<StartMode>(&Start { mode: Mode::Force }).expect("an answer");
+    assert_eq!(refused, Err(Refusal::NoTable(Side::Agonist)));
+    let latched = client.call::<GetFaults>(&()).expect("its faults").latched.map(|report| report.fault);
+    assert_eq!(latched, Some(Fault::TableMissing));
+    client.call::<ClearFault>(&()).expect("it clears");
+    // A set-point to a device that does not run moves nothing.
+    let refused = client.try_call::<SetTo>(&SetPoint::Pressure(300e3)).expect("an answer");
+    assert_eq!(refused, Err(Refusal::WrongState(State::Disarmed)));
+    pass(&station, 50);
+    assert!(station.since(0).iter().all(|exchange| exchange.command == 0.0));
+}
+
+#[test]
+fn a_damaged_store_latches_a_fault_at_the_next_start() {
+    let folder = Folder::new();
+    let station = station();
+    let Some(machine) = board(&folder, &station) else { return };
+    let mut client = machine.client();
+    upload(&mut client, Side::Agonist, &table::example());
+    machine.kill();
+    let path = folder.path().join("pam-store.bin");
+    let mut bytes = std::fs::read(&path).expect("the store's file");
+    let place = bytes.windows(4).position(|four| four == b"PAMT").expect("the table is in it");
+    bytes[place + 60] ^= 4;
+    std::fs::write(&path, bytes).expect("the file");
+    let Some(machine) = board(&folder, &station) else { return };
+    let mut client = machine.client();
+    let latched = client.call::<GetFaults>(&()).expect("its faults").latched.map(|report| report.fault);
+    assert_eq!(latched, Some(Fault::TableInvalid));
+}
+
+#[test]
+fn a_bench_that_is_gone_stops_the_device() {
+    let folder = Folder::new();
+    let station = station();
+    let Some(machine) = board(&folder, &station) else { return };
+    let mut client = machine.client();
+    tracking::start(&mut client, Mode::Pressure);
+    client.call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 }).expect("quiet");
+    station.disturb(|_, _| std::thread::sleep(Duration::from_secs(10)));
+    assert_eq!(stopped(&mut client).fault, Fault::SensorsSilent);
+}
