@@ -294,6 +294,21 @@ impl<T: Scalar> Context<T> {
         self.quasi * (T::ONE - self.friction * self.direction)
     }
 
+    /// `g (1 − s k_F)`, m²: how much harder the muscle pulls per pascal at its gas. Not the slope of the table: `E_k` that change
+    /// from one test pressure to the next say how a fit took up other errors, not what a change of pressure does.
+    #[inline]
+    pub fn pull_per_pressure(&self) -> T {
+        self.area * (T::ONE - self.friction * self.direction)
+    }
+
+    /// What the memories of load are driven by, N: the elastic force and Gaylord's, of a muscle that pulls. A slack one carries
+    /// neither: its bladder does not press on the braid, and the braid buckles instead of straining it.
+    #[inline]
+    pub fn loads(&self) -> (T, T) {
+        let gaylord = self.gaylord.max(T::ZERO);
+        (self.elastic.max(-gaylord), gaylord)
+    }
+
     /// `c_1`, m²: the elastic force per pascal of a linear wall, `(V_B/L) ε_z − t L² ε_x/(2πN²R)`; negative in contraction.
     #[inline]
     pub fn unit_elastic(&self) -> T {
@@ -343,7 +358,7 @@ impl<T: Scalar> Context<T> {
 }
 
 /// How many numbers an effect may remember.
-pub const MEMORY: usize = 24;
+pub const MEMORY: usize = 28;
 /// How many parameters an effect may have.
 pub const MAX_PARAMETERS: usize = 6;
 /// How many numbers of a persistent memory a table may carry.

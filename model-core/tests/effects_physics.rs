@@ -28,6 +28,8 @@ impl Alone {
 
 fn moment() -> Context<f64> {
     Context {
+        // It pulls: the elastic force is smaller than Gaylord's.
+        gaylord: 500.0,
         rest_length: 0.1,
         length: 0.1,
         radius: 5e-3,
@@ -74,9 +76,9 @@ fn a_pause_of_a_month_or_without_end_relaxes_all_and_keeps_on() {
         let mut alone = Alone::new("log-creep", &[0.1, 0.0, 0.0, 1.0]);
         alone.at(moment());
         alone.at(Context { dt: 1e-6, elastic: -50.0, ..moment() });
-        close(alone.at(Context { dt: pause, elastic: -50.0, ..moment() }), 0.0, 1e-3 * 20.0);
+        close(alone.at(Context { dt: pause, elastic: -50.0, ..moment() }), 0.0, 1e-3 * 25.0);
         let again = alone.at(Context { dt: 1e-9, elastic: -60.0, ..moment() });
-        close(again, -0.1 * 4.0 * 10.0, 0.03);
+        close(again, -0.1 * 5.0 * 10.0, 0.03);
     }
 }
 
@@ -103,14 +105,25 @@ fn at_constant_length_and_pressure_the_force_settles_after_filling() {
     // A staircase of pressure at constant length: the force goes on rising at each level, in the next run as well.
     let mut alone = Alone::new("log-creep", &[0.0, 0.0, 0.02, 0.5]);
     alone.at(moment());
-    let filled = Context { gaylord: 150.0, ..moment() };
+    let filled = Context { gaylord: 650.0, ..moment() };
     let first = alone.at(Context { dt: 0.1, ..filled });
     let later = alone.at(Context { dt: 20.0, ..filled });
     assert!(first < later && later < 0.0, "{first} {later}");
-    let emptied = Context { dt: 0.1, gaylord: 0.0, ..moment() };
+    let emptied = Context { dt: 0.1, ..moment() };
     assert!(alone.at(emptied) > 0.0);
     let second_run = alone.at(Context { dt: 0.1, ..filled });
     assert!(second_run > first, "{second_run} {first}");
+}
+
+#[test]
+fn a_slack_muscle_loads_neither_bladder_nor_braid() {
+    let mut alone = Alone::new("stress-relaxation", &[0.2, 0.0, 0.1, 10.0]);
+    let vented = Context { gaylord: -20.0, elastic: -30.0, ..moment() };
+    alone.at(Context { gaylord: 0.0, elastic: 0.0, ..vented });
+    assert_eq!(alone.at(Context { dt: 1.0, ..vented }), 0.0);
+    // Pressurised until it just does not pull: the bladder carries what the pressure gives.
+    let barely = Context { dt: 1e-6, gaylord: 20.0, elastic: -30.0, ..moment() };
+    close(alone.at(barely), -0.2 * 20.0 - 0.1 * 20.0, 1e-4);
 }
 
 #[test]
@@ -190,9 +203,9 @@ fn an_inner_loop_closes_and_a_larger_one_wipes_it_out() {
 fn at_held_length_filling_slides_the_strands_as_shortening_does() {
     let mut memory = [0.0; MEMORY];
     BraidTravel::step(&Context { pressure: 1e5, ..moment() }, &mut memory, 0);
-    // 10 kPa with 1e-4 N/Pa pull 1 N more; at 10 N/mm that is 0.1 mm.
-    close(BraidTravel::step(&Context { pressure: 1.1e5, ..moment() }, &mut memory, 0), 1e-4, 1e-12);
-    close(BraidTravel::step(&Context { pressure: 1e5, ..moment() }, &mut memory, 0), -1e-4, 1e-12);
+    // 10 kPa on 1 cm² pull 1 N more; at 10 N/mm that is 0.1 mm of free motion, and a twentieth of it of slip.
+    close(BraidTravel::step(&Context { pressure: 1.1e5, ..moment() }, &mut memory, 0), 5e-6, 1e-12);
+    close(BraidTravel::step(&Context { pressure: 1e5, ..moment() }, &mut memory, 0), -5e-6, 1e-12);
     // Without stiffness the travel stays bounded.
     let limp = Context { pressure: 2e5, stiffness: 0.0, ..moment() };
     assert!(BraidTravel::step(&limp, &mut memory, 0).abs() <= 0.1);
@@ -226,7 +239,7 @@ fn the_first_stroke_is_stiff_and_later_ones_soft_up_to_the_same_strain() {
 #[test]
 fn after_a_rest_it_sticks_the_longer_the_rest_and_lets_go_over_its_distance() {
     let stuck = |rest: f64, gone: f64| {
-        let mut alone = Alone::new("breakaway-friction", &[5.0, 0.0, 0.2e-3, 10.0]);
+        let mut alone = Alone::new("breakaway-friction", &[5.0, 0.0, 0.0, 0.2e-3, 10.0]);
         let mut force = 0.0;
         for i in 1..=10 {
             force = alone.at(Context { hold_time: rest * f64::from(i) / 10.0, direction: 1.0, ..moment() });
@@ -358,7 +371,7 @@ fn a_late_pressure_costs_flow_times_resistance() {
 fn below_contact_the_pressure_does_not_pull_and_above_it_lost_what_contact_took() {
     let at = |corrected_pressure: f64| {
         let c = Context { corrected_pressure, radial_strain: 0.5, ..moment() };
-        corrected_pressure * c.area + Alone::new("contact-loss", &[1.0, 1e5]).at(c)
+        corrected_pressure * c.area + Alone::new("contact-loss", &[1.0, 0.0, 1e5]).at(c)
     };
     close(at(20e3), 0.0, 1e-12);
     close(at(50e3), 0.0, 1e-12);

@@ -1,4 +1,5 @@
-//! The pressure sensor is late: the true pressure is ahead by `τ dP/dt`, so `F_add = ∂F/∂P · τ · dP/dt`.
+//! The pressure sensor is late: the true pressure is ahead by `τ dP/dt`, so
+//! `F_add = g (1 − s k_F) · τ · dP/dt`.
 //!
 //! `τ`, s. First order: for ramps slower than the sensor. Invisible while the pressure is constant. The muscle's own lag behind the
 //! regulator (`pressure-lag`) has the opposite sign.
@@ -19,12 +20,12 @@ impl Effect for PressureSensorLag {
         alternatives: false,
         start: Start::Known,
         fading: &[],
-        equation: "F = ∂F/∂P·τ·dP/dt",
+        equation: "F = g·(1 − s·k_F)·τ·dP/dt",
         summary: "The pressure sensor responds late.",
         source: "first-order sensor; time constants of 1 to 50 ms are usual",
     };
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
-        parameters[0] * context.pressure_slope * context.pressure_rate
+        parameters[0] * context.pull_per_pressure() * context.pressure_rate
     }
 }

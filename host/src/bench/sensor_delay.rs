@@ -1,7 +1,7 @@
 //! The force reading is late against stroke and pressure.
 //!
 //! ```text
-//! F_add = −δ (∂F/∂x v + ∂F/∂P dP/dt)        or        F_add = −κ (F − LP_τ(F))
+//! F_add = −δ (∂F/∂x v + g (1 − s k_F) dP/dt)        or        F_add = −κ (F − LP_τ(F))
 //! ```
 //! `δ`, s, a skew between the channels, to first order and away from turns (negative: the stroke is the late one); or a first-order filter
 //! of time constant `τ`, s, in the force channel, `κ = 1` for the whole, which also rounds the jumps at turns. `F`, N, is the base model's
@@ -30,7 +30,7 @@ impl Effect for SensorDelay {
         alternatives: true,
         start: Start::Settled,
         fading: &[],
-        equation: "F = −δ·(∂F/∂x·v + ∂F/∂P·dP/dt), or F = −κ·(F − LP_τ(F))",
+        equation: "F = −δ·(∂F/∂x·v + g·(1 − s·k_F)·dP/dt), or F = −κ·(F − LP_τ(F))",
         summary: "The force channel is late against the other channels.",
         source: "first-order filter or skew; 1 to 100 ms are usual",
     };
@@ -40,7 +40,7 @@ impl Effect for SensorDelay {
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
-        let rate = context.stiffness * context.speed + context.pressure_slope * context.pressure_rate;
+        let rate = context.stiffness * context.speed + context.pull_per_pressure() * context.pressure_rate;
         -parameters[0] * rate - parameters[1] * Filter::value(memory, &[parameters[2]], 0, context.force())
     }
 }

@@ -1,12 +1,13 @@
 //! Static friction that has grown during a rest and is lost over the first tenths of a millimetre.
 //!
 //! ```text
-//! F_add = −s · (ΔF_s + κ |F_quasi|) · (1 − e^(−t_rest/τ_s)) · e^(−d/δ)
+//! F_add = −s · (m (ΔF_s + κ |F_quasi|) + κ_h |F_quasi|) · (1 − e^(−t_rest/τ_s)) · e^(−d/δ)
 //! ```
 //! `ΔF_s`, N, and `κ` (of the muscle's force, which presses the strands together) are the full excess: laws to choose from; `t_rest` how
 //! long the muscle rested, s, and `τ_s` how fast the excess grows; `d` the travel since the rest, m, and `δ` the distance over which it is
-//! lost. The memory notes where the muscle rested and how long; a turn without rest counts as a rest of no length. While the muscle
-//! rests the force is not added: which part of a static friction acts then, nobody can say from outside.
+//! lost. The memory notes where the muscle rested and how long; a turn without rest counts as a rest of no length. `m` is 1 in
+//! motion and 0 at rest: a static friction shows only once it is overcome. `κ_h` is for friction that changes during the rest itself:
+//! positive where contacts grip harder, negative where they creep and let the force go to the middle of the loop.
 
 use super::{Context, Effect, Info, Link, Memory, Parameter, Start, decay};
 use crate::scalar::Scalar;
@@ -21,6 +22,7 @@ impl Effect for BreakawayFriction {
         parameters: &[
             Parameter::amplitude("excess_friction", "N", 0.05, 20.0),
             Parameter::amplitude("excess_factor", "", 0.002, 0.2),
+            Parameter::amplitude("held_factor", "", -0.2, 0.2),
             Parameter::shape("loss_distance", "m", 5.0e-6, 1.0e-3),
             Parameter::shape("growth_time", "s", 0.3, 100.0),
         ],
@@ -29,7 +31,7 @@ impl Effect for BreakawayFriction {
         alternatives: true,
         start: Start::Known,
         fading: &[],
-        equation: "F = −s·(ΔF_s + κ·|F_quasi|)·(1 − exp(−t_rest/τ_s))·exp(−d/δ)",
+        equation: "F = −s·(m·(ΔF_s + κ·|F_quasi|) + κ_h·|F_quasi|)·(1 − exp(−t_rest/τ_s))·exp(−d/δ)",
         summary: "After a rest the muscle sticks: the first bit of motion needs an extra force that grows with the length of the rest.",
         source: "B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083–1138, doi 10.1016/0005-1098(94)90209-7",
     };
@@ -49,9 +51,10 @@ impl Effect for BreakawayFriction {
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
-        let gone = (context.stroke - memory[0]) / parameters[2].max(T::from_f32(1.0e-6));
-        let grown = T::ONE - decay(memory[1] / parameters[3].max(T::from_f32(1.0e-3)));
-        let excess = parameters[0] + parameters[1] * context.quasi.abs();
-        -context.direction * excess * memory[3] * grown * decay(gone)
+        let gone = (context.stroke - memory[0]) / parameters[3].max(T::from_f32(1.0e-6));
+        let grown = T::ONE - decay(memory[1] / parameters[4].max(T::from_f32(1.0e-3)));
+        let pull = context.quasi.abs();
+        let excess = memory[3] * (parameters[0] + parameters[1] * pull) + parameters[2] * pull;
+        -context.direction * excess * grown * decay(gone)
     }
 }

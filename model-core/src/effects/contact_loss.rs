@@ -1,11 +1,12 @@
-//! Where the muscle is shortened at low pressure the bladder has not yet swollen to the braid, and the pressure does not pull.
+//! Where the muscle is shortened its bladder has to swell to the braid first, and that pressure does not pull.
 //!
 //! ```text
-//! F_add = −λ · g(L) · clamp(P′, 0, p_c ε_x)
+//! F_add = −g(L) · [λ clamp(P′, 0, p_c ε_x) + p_1 ε_x]
 //! ```
-//! The bladder reaches the braid at `P′ = p_c ε_x`: the deadband grows with the radial strain `ε_x`, with slope `p_c`, Pa. Below, the force
-//! is missing; above, what it took to get there. `λ` (dimensionless) is 1 for the whole law, less if part of the bladder touches
-//! early. `g`, m², is the muscle's effective area. Past the neutral angle (`g < 0`) the sign turns with the base model's.
+//! Two laws to choose from. In the first the bladder reaches the braid at `P′ = p_c ε_x`: the deadband grows with the radial strain `ε_x`,
+//! with slope `p_c`, Pa; below, the force is missing, above, what it took to get there. `λ` (dimensionless) is 1 for the whole law,
+//! less if part of the bladder touches early. In the second, for pressures that are all above contact, the deadband grows by `p_1 ε_x`,
+//! Pa, without a kink. `g`, m², is the muscle's effective area; past the neutral angle (`g < 0`) the sign turns with the base model's.
 
 use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
 use crate::scalar::Scalar;
@@ -19,20 +20,22 @@ impl Effect for ContactLoss {
         link: Link::Braid,
         parameters: &[
             Parameter::amplitude("missing_part", "", 0.1, 1.5),
+            Parameter::amplitude("deadband_growth", "Pa", 1.0e3, 3.0e5),
             Parameter::shape("contact_pressure", "Pa", 3.0e3, 1.0e6),
         ],
         depends_on_pressure: true,
         persistent: false,
-        alternatives: false,
+        alternatives: true,
         start: Start::Known,
         fading: &[],
-        equation: "F = −λ·g·clamp(P′, 0, p_c·ε_x)",
+        equation: "F = −g·[λ·clamp(P′, 0, p_c·ε_x) + p_1·ε_x]",
         summary: "A shortened muscle needs some pressure before its bladder touches the braid and pulls.",
         source: "deadband that depends on length, after S. Davis and D. Caldwell, Int. J. Robotics Research 25 (2006) 359–369, doi 10.1177/0278364906063227",
     };
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
-        let needed = (parameters[1] * context.radial_strain).max(T::ZERO);
-        -parameters[0] * context.area * context.corrected_pressure.clamp(T::ZERO, needed)
+        let needed = (parameters[2] * context.radial_strain).max(T::ZERO);
+        let missing = parameters[0] * context.corrected_pressure.clamp(T::ZERO, needed);
+        -context.area * (missing + parameters[1] * context.radial_strain)
     }
 }

@@ -1,4 +1,4 @@
-//! A leak at the muscle draws a steady flow, and the line drops pressure for it: `F_add = −∂F/∂P · λ · P`.
+//! A leak at the muscle draws a steady flow, and the line drops pressure for it: `F_add = −g (1 − s k_F) · λ · P`.
 //!
 //! `λ` (dimensionless) is the part of the gauge pressure lost between sensor and muscle. It holds for a laminar leak behind a
 //! laminar line at a regulated pressure; a closed muscle that leaks shows it in the measured pressure itself, and nothing is
@@ -20,12 +20,12 @@ impl Effect for Leak {
         alternatives: false,
         start: Start::Known,
         fading: &[],
-        equation: "F = −∂F/∂P·λ·P",
+        equation: "F = −g·(1 − s·k_F)·λ·P",
         summary: "The muscle leaks, so a part of the pressure is lost on the way to it.",
         source: "continuity of laminar flow through line and leak in series; leak-down recordings of Festo muscles lose 5 to 480 kPa in two minutes",
     };
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
-        -context.pressure_slope * parameters[0] * context.pressure
+        -context.pull_per_pressure() * parameters[0] * context.pressure
     }
 }

@@ -1,36 +1,36 @@
-//! Creep that goes on with the logarithm of time: four fading branches, one per decade.
+//! Creep that goes on with the logarithm of time: five fading branches, one per decade.
 //!
 //! ```text
-//! dq_i/dt = du/dt − q_i/τ_i,  τ_i = τ_0 · (1, 10, 100, 1000)        F_add = a · Σ q_i
+//! dq_i/dt = du/dt − q_i/τ_i,  τ_i = τ_0 · (1, 10, … 10⁴)        F_add = a · Σ q_i
 //! ```
 //! After a step of the drive the sum falls by `a` times the step in each decade of time, as `−a log10(1 + 5 t/τ_0)` does to within 0.11 `a`
-//! up to `300 τ_0`, and then ends, as every real creep must. It remembers earlier runs: a load held for an hour
+//! up to `3000 τ_0`, and then ends, as every real creep must. It remembers earlier runs: a load held for an hour
 //! still shows in the next run.
 //!
 //! Three drives, three laws (their amplitudes may be tried singly):
 //!
 //! | amplitude | drive `u` | tells |
 //! | --- | --- | --- |
-//! | `relaxing_part_per_decade` | `F_el`, elastic force of the base model, N | stress fades in proportion to the bladder's stress |
+//! | `relaxing_part_per_decade` | `F_el` where the muscle pulls, N | stress fades in proportion to the bladder's stress |
 //! | `strain_modulus_per_decade`, Pa | `c_1 = (V_B/L) ε_z − t L² ε_x/(2πN²R)`, m² | stress fades in proportion to strain, whatever the pressure |
-//! | `settling_part_per_decade` | `−F_G(P′, L)`, N | the pull follows the pressure late: braid and wall settle under load, also at constant length |
+//! | `settling_part_per_decade` | `−F_G(P′, L)` where the muscle pulls, N | the pull follows the pressure late: braid and wall settle under load, also at constant length |
 //!
 //! The memory begins settled; over-stresses left from before fade on their own.
 
 use super::{Context, Effect, Fading, Info, Link, Memory, Parameter, Start};
 use crate::scalar::Scalar;
 
-type Spectrum = Fading<4, 3>;
+type Spectrum = Fading<5, 3>;
 
-fn times<T: Scalar>(first: T) -> [T; 4] {
-    [1.0, 10.0, 100.0, 1000.0].map(|decade| first * T::from_f32(decade))
+fn times<T: Scalar>(first: T) -> [T; 5] {
+    [1.0, 10.0, 100.0, 1000.0, 1.0e4].map(|decade| first * T::from_f32(decade))
 }
 
 /// See the [module](self).
 pub(super) struct LogCreep;
 
 impl Effect for LogCreep {
-    // memory: see Fading, four time constants, three drives
+    // memory: see Fading, five time constants, three drives
     const INFO: Info = Info {
         name: "log-creep",
         link: Link::Memory,
@@ -44,21 +44,29 @@ impl Effect for LogCreep {
         persistent: false,
         alternatives: true,
         start: Start::Settled,
-        fading: &[Spectrum::slot(0, 0), Spectrum::slot(0, 1), Spectrum::slot(0, 2), Spectrum::slot(0, 3)],
-        equation: "F = a·Σq_i(F_el) + E_c·Σq_i(c_1) − a_P·Σq_i(F_G), τ_i = τ_0·(1, 10, 100, 1000)",
+        fading: &[
+            Spectrum::slot(0, 0),
+            Spectrum::slot(0, 1),
+            Spectrum::slot(0, 2),
+            Spectrum::slot(0, 3),
+            Spectrum::slot(0, 4),
+        ],
+        equation: "F = a·Σq_i(F_el) + E_c·Σq_i(c_1) − a_P·Σq_i(F_G), τ_i = τ_0·(1, 10, … 10⁴)",
         summary: "At constant length and pressure the force creeps, as much in each tenfold of time, and remembers earlier runs.",
         source: "S. M. Clarke, F. Elias, E. M. Terentjev, European Physical Journal E 2 (2000) 335–341, doi 10.1007/s101890050015; W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     };
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
-        let drives = [context.elastic, context.unit_elastic(), context.gaylord];
+        let (elastic, gaylord) = context.loads();
+        let drives = [elastic, context.unit_elastic(), gaylord];
         Spectrum::step(memory, context.dt, &times(parameters[3]), &drives);
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
         let times = times(parameters[3]);
-        parameters[0] * Spectrum::value(memory, &times, 0, context.elastic)
+        let (elastic, gaylord) = context.loads();
+        parameters[0] * Spectrum::value(memory, &times, 0, elastic)
             + parameters[1] * Spectrum::value(memory, &times, 1, context.unit_elastic())
-            - parameters[2] * Spectrum::value(memory, &times, 2, context.gaylord)
+            - parameters[2] * Spectrum::value(memory, &times, 2, gaylord)
     }
 }

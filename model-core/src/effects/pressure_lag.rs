@@ -1,7 +1,7 @@
 //! The pressure at the muscle differs from that at the sensor while air flows between them.
 //!
 //! ```text
-//! δP = −R_f · LP_τ(dV/dt) − T · LP_τ(dP/dt)        dV/dt = g(L) v        F_add = ∂F/∂P · δP
+//! δP = −R_f · LP_τ(dV/dt) − T · LP_τ(dP/dt)        dV/dt = g(L) v        F_add = g (1 − s k_F) δP
 //! ```
 //! A shortening muscle swells (`g = dV/dx`, m², by virtual work) and draws air through its line: the pressure inside is lower
 //! than at the regulator by the flow times the line's resistance `R_f`, Pa·s/m³. When the regulator raises the pressure the muscle's follows
@@ -30,7 +30,7 @@ impl Effect for PressureLag {
         alternatives: true,
         start: Start::Settled,
         fading: &[],
-        equation: "F = −∂F/∂P·[R_f·LP_τ(g·v) + T·LP_τ(dP/dt)]",
+        equation: "F = −g·(1 − s·k_F)·[R_f·LP_τ(g·v) + T·LP_τ(dP/dt)]",
         summary: "Air takes time through the line, so the muscle does not have the pressure that the sensor shows.",
         source: "simplified lumped model for pneumatic tubes, doi 10.1080/13873954.2017.1280512; E. Richer and Y. Hurmuzlu, J. Dynamic Systems, Measurement and Control 122 (2000) 416–425",
     };
@@ -45,6 +45,6 @@ impl Effect for PressureLag {
         let flow = context.area * context.speed;
         let flow = flow - Line::value(memory, &times, 0, flow);
         let rise = context.pressure_rate - Line::value(memory, &times, 1, context.pressure_rate);
-        -context.pressure_slope * (parameters[0] * flow + parameters[1] * rise)
+        -context.pull_per_pressure() * (parameters[0] * flow + parameters[1] * rise)
     }
 }

@@ -7,9 +7,9 @@
 //!
 //! | amplitude | drive `u` | tells |
 //! | --- | --- | --- |
-//! | `relaxing_part` | `F_el`, elastic force of the base model, N | stress fades in proportion to the bladder's stress |
+//! | `relaxing_part` | `F_el` where the muscle pulls, N | stress fades in proportion to the bladder's stress |
 //! | `strain_modulus`, Pa | `c_1 = (V_B/L) ε_z − t L² ε_x/(2πN²R)`, m² | stress fades in proportion to strain, whatever the pressure |
-//! | `settling_part` | `−F_G(P′, L)`, N | the pull follows the pressure late: braid and wall settle under load, also at constant length |
+//! | `settling_part` | `−F_G(P′, L)` where the muscle pulls, N | the pull follows the pressure late: braid and wall settle under load, also at constant length |
 //!
 //! `q` is the over-stress of a drive. For a spectrum over decades see `log-creep`. The memory begins settled: at rest for long in the
 //! state of the first reading; an over-stress left from before fades as `e^(−t/τ)`.
@@ -44,14 +44,16 @@ impl Effect for StressRelaxation {
     };
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
-        let drives = [context.elastic, context.unit_elastic(), context.gaylord];
+        let (elastic, gaylord) = context.loads();
+        let drives = [elastic, context.unit_elastic(), gaylord];
         Solid::step(memory, context.dt, &[parameters[3]], &drives);
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
         let times = [parameters[3]];
-        parameters[0] * Solid::value(memory, &times, 0, context.elastic)
+        let (elastic, gaylord) = context.loads();
+        parameters[0] * Solid::value(memory, &times, 0, elastic)
             + parameters[1] * Solid::value(memory, &times, 1, context.unit_elastic())
-            - parameters[2] * Solid::value(memory, &times, 2, context.gaylord)
+            - parameters[2] * Solid::value(memory, &times, 2, gaylord)
     }
 }

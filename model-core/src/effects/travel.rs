@@ -6,9 +6,13 @@ use crate::scalar::Scalar;
 /// Follows the strands from reading to reading in two slots of a memory and a flag.
 ///
 /// While the muscle moves they slide with the stroke. While its length is held and the pressure changes, they creep the way
-/// the pressure drives them, as far as the muscle would have moved had it been free to: `Δξ = Δx + ΔP (∂F/∂P)/|∂F/∂x|`. Where the
-/// muscle moves because its pressure changes both parts have the same sign, and a memory of travel only forgets sooner.
+/// the pressure drives them, by a small part of what the muscle would have moved had it been free to:
+/// `Δξ = Δx + σ ΔP g/|∂F/∂x|`, `σ = 1/20`. How large that part is nobody has measured; it has to be small, or the ripple of a regulator
+/// would stir the strands of a moving muscle, and not zero, as pressure alone turns the friction of isometric recordings round.
 pub struct BraidTravel;
+
+/// `σ`: the part of the free motion that strands slip at held length.
+const SLIP: f64 = 0.05;
 
 impl BraidTravel {
     /// The slots it uses, from `at`: last stroke, last pressure, seen.
@@ -29,7 +33,7 @@ impl BraidTravel {
         // Where the stiffness vanishes the free stroke would be endless; a muscle does not move by more than its length
         // for one atmosphere.
         let limit = context.rest_length * T::from_f32(1.0e-5);
-        let per_pascal = (context.pressure_slope / context.stiffness.abs()).clamp(T::ZERO, limit);
+        let per_pascal = (context.area / context.stiffness.abs()).clamp(T::ZERO, limit) * T::from_f64(SLIP);
         moved + filled * per_pascal
     }
 }
