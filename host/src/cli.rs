@@ -54,6 +54,8 @@ enum Colours {
 enum Command {
     /// Fit a muscle's table to recordings.
     Fit(commands::fit::Arguments),
+    /// Score a fit on recordings that it has not seen.
+    Evaluate(commands::evaluate::Arguments),
     /// Compute the force of a table on recordings, and score it.
     Predict(commands::predict::Arguments),
     /// Say what the model leaves out of recordings: where, what, how sure, what to record next.
@@ -80,6 +82,7 @@ impl Command {
     fn run(self, console: &Console) -> Result<()> {
         match self {
             Self::Fit(a) => a.run(console),
+            Self::Evaluate(a) => a.run(console),
             Self::Predict(a) => a.run(console),
             Self::Diagnose(a) => a.run(console),
             Self::Table(a) => a.run(console),

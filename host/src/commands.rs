@@ -5,6 +5,7 @@ pub mod demo;
 pub mod device;
 pub mod diagnose;
 pub mod effects;
+pub mod evaluate;
 pub mod fit;
 pub mod flash;
 pub mod port;

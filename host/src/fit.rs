@@ -17,6 +17,7 @@
 //! | effective dimensions | [`geometry`] |
 //! | errors as the thesis measures them | [`errors`], [`midline`] |
 //! | the thesis's models side by side | [`models`] |
+//! | errors on what a fit did not see, published formulas | [`hold_out`], [`published`] |
 //! | how uncertain it all is | [`uncertainty`] |
 //! | all of it in order | [`prepare`], [`result`] |
 
@@ -24,6 +25,7 @@ pub mod basis;
 pub mod direction;
 pub mod errors;
 pub mod geometry;
+pub mod hold_out;
 pub mod joint;
 pub mod linear;
 pub mod midline;
@@ -31,6 +33,7 @@ pub mod models;
 pub mod nodes;
 pub mod points;
 pub mod prepare;
+pub mod published;
 pub mod result;
 pub mod screen;
 pub mod smoothing;
@@ -54,11 +57,20 @@ pub struct Options {
     pub fit_geometry: bool,
     /// Whether the length of each mounting may be corrected.
     pub fit_lengths: bool,
+    /// Whether the bladder's stress must rise with strain.
+    pub physical: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { order: 4, tip_correction: false, smoothing: None, fit_geometry: false, fit_lengths: false }
+        Self {
+            order: 4,
+            tip_correction: false,
+            smoothing: None,
+            fit_geometry: false,
+            fit_lengths: false,
+            physical: false,
+        }
     }
 }
 

@@ -15,4 +15,5 @@ pub mod output;
 pub mod predict;
 pub mod recording;
 pub mod report;
+pub mod table_export;
 pub mod table_file;

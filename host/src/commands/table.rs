@@ -1,4 +1,4 @@
-//! `host table`: look at a table, judge it.
+//! `host table`: look at a table, judge it, hand it to other programs.
 
 use std::path::PathBuf;
 
@@ -8,6 +8,8 @@ use serde_json::{Value, json};
 
 use crate::console::Console;
 use crate::error::Result;
+use crate::output::write_whole;
+use crate::table_export::{self, Format};
 use crate::table_file::TableFile;
 
 /// Arguments of `host table`.
@@ -30,6 +32,24 @@ enum Action {
         after_help = "Example:\n  host table check mini.pam && host flash mini.pam --port /dev/ttyACM0"
     )]
     Check(File),
+    /// Write a table for other programs: JSON, CSV, a C header, a MATLAB file.
+    Export(Export),
+}
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  host table export mini.pam -o mini.h\n  host table export mini.pam --format csv -o -"
+)]
+struct Export {
+    /// The table file.
+    #[arg(value_name = "TABLE.pam")]
+    table: PathBuf,
+    /// Where to write it; `-` is standard output.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// The form; by default what the output's name ends in.
+    #[arg(long, value_enum)]
+    format: Option<Format>,
 }
 
 #[derive(Debug, Args)]
@@ -64,6 +84,20 @@ impl Arguments {
                         console.result(format!("  note: {remark}"));
                     }
                 }
+            }
+            Action::Export(export) => {
+                let table = TableFile::read(&export.table)?;
+                let format = match export.format {
+                    Some(format) => format,
+                    None => Format::of(&export.output)?,
+                };
+                let bytes = match format {
+                    Format::Json => format!("{}\n", pretty(&to_json(&table))).into_bytes(),
+                    Format::Csv => table_export::csv(&table).into_bytes(),
+                    Format::C => table_export::c_header(&table).into_bytes(),
+                    Format::Matlab => table_export::matlab(&table),
+                };
+                write_whole(&export.output, &bytes)?;
             }
         }
         Ok(())

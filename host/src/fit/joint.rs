@@ -69,6 +69,8 @@ pub struct Design {
     pub origin: f64,
     /// How strongly `P0` is held at its origin, N² per Pa² of the data's weight; zero where the points alone decide.
     pub hold_deadband: f64,
+    /// A further penalty, where the user asks for more than the points say.
+    pub held: Option<Symmetric>,
     /// Weight of a penalty on `E_k` that change with pressure at all; zero but where dimensions are fitted too.
     pub level: f64,
 }
@@ -449,6 +451,9 @@ impl Design {
             }
         }
         penalty.add(Layout::DEADBAND, Layout::DEADBAND, self.hold_deadband);
+        if let Some(held) = &self.held {
+            penalty.add_scaled(held, 1.0);
+        }
         // Ten digits below the data: only what nothing else determines is held by it.
         let hold = 1e-10 * data.weight;
         for k in 0..layout.order {
@@ -555,6 +560,7 @@ pub(crate) mod tests {
             friction: true,
             origin: 0.0,
             hold_deadband: 0.0,
+            held: None,
             level: 0.0,
         };
         let layout = design.layout();

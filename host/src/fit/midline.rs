@@ -8,7 +8,6 @@ use std::collections::BTreeMap;
 
 use super::errors::CHUNKS;
 use super::prepare::Prepared;
-use super::screen::Use;
 
 /// One chunk of a mid-line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,7 +46,7 @@ pub fn midline(prepared: &Prepared) -> Vec<MidPoint> {
     let least = 0.05 * prepared.blocked(range.high).abs();
     let mut chunks: BTreeMap<(u32, u32, i64), [Branch; 3]> = BTreeMap::new();
     for (i, p) in prepared.points.list.iter().enumerate() {
-        if prepared.used[i] != Use::Fitted {
+        if !prepared.counts(i) {
             continue;
         }
         let group = prepared.design.bins[prepared.design.rows[i].bin as usize].group;

@@ -52,6 +52,8 @@ pub struct Prepared {
     pub deadband_std: Option<f64>,
     /// Dimensions and lengths that were found too.
     pub adjusted: Vec<Adjusted>,
+    /// Points of a slack muscle that take part because the model would pull there.
+    pub held_down: Vec<bool>,
     /// Corrected mountings.
     pub mountings: Vec<Mounting>,
     /// What was added to each point's stroke, m.
@@ -122,6 +124,7 @@ impl Prepared {
                 friction: false,
                 origin: 0.0,
                 hold_deadband: 0.0,
+                held: None,
                 level: 0.0,
             },
             points,
@@ -134,6 +137,7 @@ impl Prepared {
             goes_slack: false,
             clips,
             outliers,
+            held_down: Vec::new(),
             deadband_std: None,
             adjusted: Vec::new(),
             mountings: Vec::new(),
@@ -203,6 +207,7 @@ impl Prepared {
             friction: directed,
             origin: 0.0,
             hold_deadband: 0.0,
+            held: None,
             level: 0.0,
         }
     }
@@ -221,6 +226,12 @@ impl Prepared {
     pub fn fine_pressure(&self, pressure: f64) -> u32 {
         let range = self.points.pressure;
         if self.pressures.held { 0 } else { ((pressure - range.low) / range.span().max(1.0) * 100.0) as u32 }
+    }
+
+    /// Whether a point counts in errors: it took part, and the muscle was not slack.
+    #[must_use]
+    pub fn counts(&self, i: usize) -> bool {
+        self.used[i] == Use::Fitted && !self.held_down.get(i).copied().unwrap_or(false)
     }
 
     /// Whether enough points move either way for friction to be told from elasticity.
@@ -333,8 +344,109 @@ impl Prepared {
             None => smoothing::choose(&self.design, &self.parameters, &self.weights).0,
         };
         self.solve(self.smoothing, 12);
+        self.hold_slack_down();
+        if options.physical {
+            self.make_physical();
+        }
         self.soften();
         self.solve(self.smoothing, 8);
+    }
+
+    /// A slack muscle says that the model must not pull there: points set aside as slack come back where it would.
+    fn hold_slack_down(&mut self) {
+        let before: Vec<Use> = self.used.clone();
+        let set_aside = |u: Use| matches!(u, Use::Slack | Use::Clipped);
+        if !self.goes_slack && !before.contains(&Use::Clipped) {
+            return;
+        }
+        let tolerance = (0.005 * self.points.force.span()).max(2.0 * self.points.row_noise);
+        let upper = self.clips.1.map_or(f64::INFINITY, |c| c.force);
+        for _ in 0..8 {
+            let curves = self.design.curves(&self.parameters);
+            let mut changed = 0;
+            for i in 0..self.used.len() {
+                if !set_aside(before[i]) || self.points.list[i].force >= upper {
+                    continue;
+                }
+                let above = self.design.evaluate(i, &self.parameters, &curves).force
+                    > self.points.list[i].force + tolerance;
+                let wanted = if above { Use::Fitted } else { before[i] };
+                changed += usize::from(wanted != self.used[i]);
+                self.used[i] = wanted;
+            }
+            if changed * 1000 < self.used.len() {
+                break;
+            }
+            self.weigh();
+            self.solve(self.smoothing, 6);
+        }
+        self.held_down = self.used.iter().zip(&before).map(|(u, b)| u != b).collect();
+        // They count in the fit, not in its errors: what the sensor reads of a slack muscle is not the muscle's force.
+    }
+
+    /// Makes the bladder's stress `Σ E_k ε^k` rise with strain wherever the recordings strained it, in hoop and in axial
+    /// direction, at every node: slopes that would fall are held at zero by a penalty that grows until they do.
+    fn make_physical(&mut self) {
+        let used = |u: &Use| matches!(u, Use::Fitted | Use::NearTurn);
+        let strokes = super::points::Range::of(
+            self.points
+                .list
+                .iter()
+                .zip(&self.used)
+                .zip(&self.shift)
+                .filter(|((_, u), _)| used(u))
+                .map(|((p, _), s)| p.stroke + s),
+        );
+        let at = |x: f64| self.braid.posture(Length::from_metres(x));
+        let (a, b) = (at(strokes.low), at(strokes.high));
+        let layout = self.design.layout();
+        let order = layout.order;
+        let t = self.design.orthonormal.t.clone();
+        let strains: Vec<f64> = (0..=24)
+            .flat_map(|i| {
+                let part = f64::from(i) / 24.0;
+                let between = |x: f64, y: f64| x + (y - x) * part;
+                [between(a.radial_strain, b.radial_strain), between(a.axial_strain, b.axial_strain)]
+            })
+            .collect();
+        // dσ/dε = Σ_i i E_i ε^(i−1) with E = T ẽ.
+        let slopes: Vec<Vec<f64>> = strains
+            .iter()
+            .map(|e| {
+                (0..order)
+                    .map(|k| (0..=k).map(|i| (i + 1) as f64 * e.powi(i as i32) * t[i * order + k]).sum())
+                    .collect()
+            })
+            .collect();
+        let mut weight = 10.0;
+        for _ in 0..10 {
+            let data = self.design.normal(&self.parameters, &self.weights);
+            let scale = data.weight / layout.nodes as f64;
+            let mut held = super::linear::Symmetric::zeros(layout.len());
+            let mut worst = 0.0_f64;
+            for j in 0..layout.nodes {
+                for a in &slopes {
+                    let size = super::linear::dot(a, a).sqrt();
+                    let row: Vec<(usize, f64)> =
+                        a.iter().enumerate().map(|(k, v)| (layout.elastic(k, j), v / size)).collect();
+                    let slope: f64 = row.iter().map(|(i, v)| v * self.parameters[*i]).sum();
+                    worst = worst.min(slope);
+                    if slope < 0.0 {
+                        held.add_row(&row, weight * scale);
+                    }
+                }
+            }
+            if worst > -1e-4 * self.points.force.span() {
+                break;
+            }
+            // What was held stays held, or the next step would fall back.
+            match &mut self.design.held {
+                Some(all) => all.add_scaled(&held, 1.0),
+                none => *none = Some(held),
+            }
+            weight *= 2.0;
+            self.solve(self.smoothing, 6);
+        }
     }
 
     /// Finds `P0` by the highest order that the strokes determine, then holds it.

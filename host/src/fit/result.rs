@@ -290,7 +290,8 @@ fn table(prepared: &Prepared, muscle: &MuscleDescription) -> Result<MuscleTable>
     let order = prepared.design.layout().order;
     let elastic = (0..order).map(|k| at.iter().map(|(e, _)| e[k] as f32).collect()).collect();
     let max_pressure = muscle.max_pressure_kPa.map_or(prepared.points.pressure.high, |kpa| kpa * 1e3);
-    let highest = prepared.pressures.levels.last().copied().unwrap_or(prepared.points.pressure.high);
+    let last = prepared.pressures.levels.last().copied().filter(|_| prepared.pressures.held);
+    let highest = last.unwrap_or(prepared.points.pressure.high);
     let l0 = prepared.braid.rest_length();
     let (range, stroke) = (prepared.points.pressure, prepared.points.stroke);
     let table = MuscleTable {
@@ -345,7 +346,7 @@ pub fn chunks(prepared: &Prepared, residuals: &[f64], take: impl Fn(u32) -> bool
     let samples = (0..prepared.points.list.len()).filter_map(|i| {
         let p = &prepared.points.list[i];
         let group = prepared.design.bins[prepared.design.rows[i].bin as usize].group;
-        (matches!(prepared.used[i], Use::Fitted) && take(group)).then(|| Sample {
+        (prepared.counts(i) && take(group)).then(|| Sample {
             group,
             fine: prepared.fine_pressure(p.pressure),
             contraction: (p.stroke + prepared.shift[i]) / l0,
@@ -434,7 +435,7 @@ fn summarise(
             Use::Clipped => &mut rows.clipped,
             Use::Outlier => &mut rows.outliers,
         } += n;
-        if prepared.used[i] == Use::Fitted {
+        if prepared.counts(i) {
             square += n as f64 * residuals[i] * residuals[i];
             count += n as f64;
         }

@@ -1,0 +1,229 @@
+//! `host evaluate`: errors on recordings that a fit has not seen.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+
+use super::recordings::Recordings;
+use crate::console::Console;
+use crate::error::{Code, Error, Result};
+use crate::fit::Options;
+use crate::fit::hold_out::{HeldOut, Score, Split, hold_out, unseen_length};
+use crate::fit::published::Published;
+use crate::muscle_description::MuscleDescription;
+use crate::output::write_whole;
+use crate::recording::{Campaign, Reader};
+
+/// Arguments of `host evaluate`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    host evaluate --muscle mini.toml loops/*.csv\n  \
+    host evaluate --muscle short.toml --muscle long.toml --import festo.toml --fit-geometry --fit-lengths \\\n      \
+        --published bolen-10mm settled_points.csv\n\n\
+    Each run (or contraction) is left out in turn, the rest is fitted, and what was left out is scored. With several\n\
+    muscles of one stock each is also predicted by the table of the one next in length.")]
+pub struct Arguments {
+    /// A muscle's description; several, where the import description selects each muscle's rows.
+    #[arg(long, required = true, value_name = "MUSCLE.toml")]
+    muscle: Vec<PathBuf>,
+    #[command(flatten)]
+    recordings: Recordings,
+    /// What is left out in turn.
+    #[arg(long, value_enum, default_value_t = LeaveOut::Both)]
+    leave_out: LeaveOut,
+    /// Order M of the elastic polynomial.
+    #[arg(long, default_value_t = 4, value_name = "M", value_parser = clap::value_parser!(u8).range(1..=6))]
+    order: u8,
+    /// Find effective dimensions too, within bounds.
+    #[arg(long)]
+    fit_geometry: bool,
+    /// Correct the length of every mounting by up to 1 mm.
+    #[arg(long)]
+    fit_lengths: bool,
+    /// A published formula to compare with.
+    #[arg(long, value_name = "NAME")]
+    published: Option<String>,
+    /// Where to write the figures as JSON; `-` is standard output.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LeaveOut {
+    /// Every run.
+    Runs,
+    /// Every contraction.
+    Contractions,
+    /// One after the other.
+    Both,
+}
+
+struct Case {
+    muscle: MuscleDescription,
+    campaign: Campaign,
+    runs: Option<HeldOut>,
+    contractions: Option<HeldOut>,
+}
+
+impl Arguments {
+    /// Reads, fits, scores.
+    ///
+    /// # Errors
+    /// What is wrong with the input.
+    pub fn run(self, console: &Console) -> Result<()> {
+        let published = self.published.as_deref().map(Published::named).transpose()?;
+        let options = Options {
+            order: usize::from(self.order),
+            fit_geometry: self.fit_geometry,
+            fit_lengths: self.fit_lengths,
+            ..Options::default()
+        };
+        let mut cases = Vec::new();
+        for path in &self.muscle {
+            let muscle = MuscleDescription::read(path)?;
+            let campaign = self.recordings.read(Reader::of(&muscle))?;
+            let over = |split, wanted: bool| {
+                wanted.then(|| hold_out(&campaign, &muscle, &options, split, published.as_ref())).transpose()
+            };
+            let runs = over(Split::Run, self.leave_out != LeaveOut::Contractions)?;
+            let contractions = over(Split::Contraction, self.leave_out != LeaveOut::Runs)?;
+            console.detail(format!("{} done", muscle.name));
+            cases.push(Case { muscle, campaign, runs, contractions });
+        }
+        let lengths = (0..cases.len()).map(|i| by_neighbour(&cases, i)).collect::<Result<Vec<_>>>()?;
+        if let Some(path) = &self.json {
+            let all: Vec<Value> = cases.iter().zip(&lengths).map(|(c, l)| to_json(c, l.as_ref())).collect();
+            let text = serde_json::to_string_pretty(&json!({ "schema": "pam-evaluate/1", "muscles": all }))
+                .map_err(|e| Error::new(Code::FileUnwritable, e.to_string()))?;
+            write_whole(path, format!("{text}\n").as_bytes())?;
+            if path.as_os_str() == "-" {
+                return Ok(());
+            }
+        }
+        console.result(to_text(&cases, &lengths, self.published.as_deref()));
+        Ok(())
+    }
+}
+
+/// The muscle predicted by the table of the one next in length.
+fn by_neighbour(cases: &[Case], index: usize) -> Result<Option<(String, Score)>> {
+    let case = &cases[index];
+    let whole = |c: &Case| c.runs.as_ref().or(c.contractions.as_ref()).map(|h| h.whole.clone());
+    let apart = |c: &Case| (c.muscle.rest_length_mm / case.muscle.rest_length_mm).ln().abs();
+    let near = (0..cases.len())
+        .filter(|i| *i != index)
+        .min_by(|a, b| apart(&cases[*a]).total_cmp(&apart(&cases[*b])));
+    let (Some(near), Some(own)) = (near, whole(case)) else { return Ok(None) };
+    let Some(donor) = whole(&cases[near]) else { return Ok(None) };
+    let clip = own.prepared.clips.0.map(|c| c.force);
+    let score = unseen_length(&donor, &case.campaign, &case.muscle, clip)?;
+    Ok(Some((cases[near].muscle.name.clone(), score)))
+}
+
+fn percent(score: &Score, blocked: f64) -> (f64, f64) {
+    (100.0 * score.mean() / blocked, 100.0 * score.rms() / blocked)
+}
+
+fn to_text(cases: &[Case], lengths: &[Option<(String, Score)>], published: Option<&str>) -> String {
+    let mut text = format!(
+        "Errors on what the fit did not see: mean |F − F_model| in N, and in percent of the blocked force at the highest pressure.\n\
+         {:<22} {:>8} {:>17} {:>17} {:>17} {:>17}\n",
+        "muscle", "F_B N", "unseen runs", "same, published", "unseen contract.", "unseen length"
+    );
+    let cell = |s: Option<&Score>, blocked: f64| {
+        s.map_or("–".to_owned(), |s| format!("{:.2} N  {:.2} %", s.mean(), percent(s, blocked).0))
+    };
+    let mut sums = [(0.0, 0.0); 4];
+    for (case, length) in cases.iter().zip(lengths) {
+        let Some(any) = case.runs.as_ref().or(case.contractions.as_ref()) else { continue };
+        let b = any.blocked;
+        let columns = [
+            case.runs.as_ref().map(|h| h.table),
+            any.published,
+            case.contractions.as_ref().map(|h| h.table),
+            length.as_ref().map(|(_, s)| *s),
+        ];
+        for (sum, c) in sums.iter_mut().zip(&columns) {
+            if let Some(c) = c {
+                *sum = (sum.0 + percent(c, b).0, sum.1 + 1.0);
+            }
+        }
+        text += &format!(
+            "{:<22} {b:8.1} {:>17} {:>17} {:>17} {:>17}\n",
+            case.muscle.name,
+            cell(columns[0].as_ref(), b),
+            cell(columns[1].as_ref(), b),
+            cell(columns[2].as_ref(), b),
+            cell(columns[3].as_ref(), b)
+        );
+    }
+    let means: Vec<String> =
+        sums.iter().map(|(s, n)| if *n > 0.0 { format!("{:.2} %", s / n) } else { "–".into() }).collect();
+    text += &format!(
+        "{:<22} {:>8} {:>17} {:>17} {:>17} {:>17}\n",
+        "mean", "", means[0], means[1], means[2], means[3]
+    );
+    if let Some(name) = published {
+        text += &format!("published: {name}, on the rows of the first column\n");
+    }
+    text += "\nWhere it sits: mean error with its sign on unseen runs, N (filling or shortening / emptying or lengthening)\n";
+    for case in cases {
+        let Some(held) = &case.runs else { continue };
+        let mut contractions: Vec<i64> = held.spots.iter().map(|s| s.contraction).collect();
+        contractions.sort_unstable();
+        contractions.dedup();
+        // A moving muscle has no few contractions to list.
+        if contractions.len() > 8 {
+            continue;
+        }
+        let mut runs: Vec<&String> = held.spots.iter().map(|s| &s.left_out).collect();
+        runs.sort_by_key(|r| (r.len(), *r));
+        runs.dedup();
+        text += &format!("{}\n", case.muscle.name);
+        for run in runs {
+            text += &format!("  run {run:>4}:");
+            for c in &contractions {
+                let at = |d: i8| {
+                    held.spots
+                        .iter()
+                        .find(|s| s.left_out == *run && s.contraction == *c && s.direction == d)
+                        .map_or("–".to_owned(), |s| format!("{:+.1}", s.score.bias()))
+                };
+                text += &format!("  {:.3}: {:>6} / {:>6}", *c as f64 * 1e-3, at(1), at(-1));
+            }
+            text += "\n";
+        }
+    }
+    text
+}
+
+fn to_json(case: &Case, length: Option<&(String, Score)>) -> Value {
+    let blocked = case.runs.as_ref().or(case.contractions.as_ref()).map_or(f64::NAN, |h| h.blocked);
+    let score = |s: &Score| {
+        let (mean, rms) = percent(s, blocked);
+        json!({ "rows": s.rows, "mean_N": s.mean(), "rms_N": s.rms(), "mean_pct": mean, "rms_pct": rms, "bias_N": s.bias() })
+    };
+    let spots = |h: &HeldOut| -> Vec<Value> {
+        h.spots
+            .iter()
+            .map(|s| {
+                json!({ "left_out": s.left_out, "contraction": s.contraction as f64 * 1e-3, "direction": s.direction,
+                        "bias_N": s.score.bias(), "rms_N": s.score.rms(), "rows": s.score.rows })
+            })
+            .collect()
+    };
+    let held = |h: &Option<HeldOut>| {
+        h.as_ref().map(|h| {
+            json!({ "table": score(&h.table), "published": h.published.as_ref().map(score), "where": spots(h),
+                    "adjusted": h.whole.summary.adjusted })
+        })
+    };
+    json!({
+        "muscle": case.muscle.name,
+        "blocked_force_N": blocked,
+        "unseen_runs": held(&case.runs),
+        "unseen_contractions": held(&case.contractions),
+        "unseen_length": length.map(|(name, s)| json!({ "table_of": name, "table": score(s) })),
+    })
+}

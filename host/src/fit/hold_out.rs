@@ -1,0 +1,207 @@
+//! How good a table is on recordings that it has not seen.
+
+use std::collections::BTreeMap;
+
+use crate::error::{Code, Error, Result};
+use crate::muscle_description::MuscleDescription;
+use crate::predict::predict;
+use crate::recording::{Campaign, Recording};
+use crate::table_file::{About, TableFile};
+
+use super::published::Published;
+use super::result::Fit;
+use super::{Options, fit};
+
+/// What is kept from the fit, in turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Split {
+    /// Every run: recordings that share their label `run`, or else each recording by itself.
+    Run,
+    /// Every contraction that recordings were held at.
+    Contraction,
+}
+
+/// Sums of errors over rows.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Score {
+    /// Rows.
+    pub rows: f64,
+    /// `Σ |F − F_model|`, N.
+    pub absolute: f64,
+    /// `Σ (F − F_model)²`, N².
+    pub square: f64,
+    /// `Σ (F − F_model)`, N.
+    pub signed: f64,
+}
+
+impl Score {
+    fn add(&mut self, residual: f64) {
+        self.rows += 1.0;
+        self.absolute += residual.abs();
+        self.square += residual * residual;
+        self.signed += residual;
+    }
+
+    /// Mean size of the error, N.
+    #[must_use]
+    pub fn mean(&self) -> f64 {
+        self.absolute / self.rows.max(1.0)
+    }
+
+    /// Root mean square of the error, N.
+    #[must_use]
+    pub fn rms(&self) -> f64 {
+        (self.square / self.rows.max(1.0)).sqrt()
+    }
+
+    /// Mean error with its sign, N.
+    #[must_use]
+    pub fn bias(&self) -> f64 {
+        self.signed / self.rows.max(1.0)
+    }
+}
+
+/// Where errors sit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spot {
+    /// What was left out: a run's or a contraction's value.
+    pub left_out: String,
+    /// Contraction, in thousandths.
+    pub contraction: i64,
+    /// +1 filling or shortening, −1 emptying or lengthening.
+    pub direction: i8,
+    /// The errors there.
+    pub score: Score,
+}
+
+/// Errors on what was left out.
+#[derive(Debug, Clone)]
+pub struct HeldOut {
+    /// The table's.
+    pub table: Score,
+    /// A published formula's on the same rows, where one was given.
+    pub published: Option<Score>,
+    /// Where the table's errors sit.
+    pub spots: Vec<Spot>,
+    /// Force at rest length and the highest tested pressure, by the fit to everything, N.
+    pub blocked: f64,
+    /// The fit to everything.
+    pub whole: Fit,
+}
+
+/// A table file of a fit, with no more history than prediction needs.
+#[must_use]
+pub fn as_file(fit: &Fit) -> TableFile {
+    let mountings = fit.prepared.mountings.iter().map(|m| (m.stroke, m.offset)).collect();
+    TableFile { table: fit.table.clone(), about: About { mountings, ..About::default() } }
+}
+
+fn key(recording: &Recording, index: usize, split: Split) -> String {
+    match split {
+        Split::Run => {
+            let label = recording.labels.iter().find(|(name, _)| name.starts_with("run"));
+            label.map_or_else(|| format!("{} ({index})", recording.name), |(_, v)| v.clone())
+        }
+        Split::Contraction => {
+            let middle = recording.stroke.iter().sum::<f64>() / recording.len().max(1) as f64;
+            format!("{:.1} mm", middle * 1e3)
+        }
+    }
+}
+
+/// Leaves each run or contraction out in turn, fits the rest, and scores what was left out.
+///
+/// # Errors
+/// [`Code::FitUnderdetermined`] where there is but one, or a fit that fails.
+pub fn hold_out(
+    campaign: &Campaign,
+    muscle: &MuscleDescription,
+    options: &Options,
+    split: Split,
+    published: Option<&Published>,
+) -> Result<HeldOut> {
+    let keys: Vec<String> = campaign.recordings.iter().enumerate().map(|(i, r)| key(r, i, split)).collect();
+    let mut values = keys.clone();
+    values.sort();
+    values.dedup();
+    if values.len() < 2 {
+        return Err(Error::new(
+            Code::FitUnderdetermined,
+            "there is nothing to leave out: all recordings are one",
+        )
+        .help("give several recordings, or an import description that splits the file by run"));
+    }
+    let whole = fit(campaign, muscle, options)?;
+    let clip = whole.prepared.clips.0.map(|c| c.force);
+    let blocked = f64::from(whole.table.blocked_force.newtons());
+    let mut out = HeldOut { table: Score::default(), published: None, spots: Vec::new(), blocked, whole };
+    let mut reference = Score::default();
+    let mut spots: BTreeMap<(String, i64, i8), Score> = BTreeMap::new();
+    for value in &values {
+        let part = |inside: bool| Campaign {
+            recordings: campaign
+                .recordings
+                .iter()
+                .zip(&keys)
+                .filter(|(_, k)| (*k == value) == inside)
+                .map(|(r, _)| r.clone())
+                .collect(),
+            clock: campaign.clock,
+            warnings: Vec::new(),
+        };
+        let fitted = fit(&part(false), muscle, options)?;
+        let test = part(true);
+        let prediction = predict(&as_file(&fitted), &test)?;
+        let directions = super::direction::directions(&test);
+        for ((recording, predicted), direction) in
+            test.recordings.iter().zip(&prediction.recordings).zip(&directions)
+        {
+            let measured = recording.require_force()?;
+            for (i, force) in measured.iter().enumerate() {
+                // At the end of its range the sensor does not say what the force is.
+                if clip.is_some_and(|c| *force <= c) {
+                    continue;
+                }
+                let residual = force - predicted.force[i];
+                out.table.add(residual);
+                let contraction = recording.stroke[i] / muscle.rest_length();
+                let place = (value.clone(), (contraction * 1e3).round() as i64, direction[i]);
+                spots.entry(place).or_default().add(residual);
+                if let Some(p) = published {
+                    reference.add(force - p.force(muscle, recording.pressure[i], contraction));
+                }
+            }
+        }
+    }
+    out.published = published.map(|_| reference);
+    out.spots = spots
+        .into_iter()
+        .map(|((left_out, contraction, direction), score)| Spot { left_out, contraction, direction, score })
+        .collect();
+    Ok(out)
+}
+
+/// Scores the table of another muscle of the same stock, carried over to this muscle's rest length.
+///
+/// # Errors
+/// A table that cannot be used at this length.
+pub fn unseen_length(
+    donor: &Fit,
+    campaign: &Campaign,
+    muscle: &MuscleDescription,
+    clip: Option<f64>,
+) -> Result<Score> {
+    let mut table = donor.table.clone();
+    table.geometry.rest_length = model_core::units::Length::from_metres(muscle.rest_length() as f32);
+    let file = TableFile { table, about: About::default() };
+    let prediction = predict(&file, campaign)?;
+    let mut score = Score::default();
+    for (recording, predicted) in campaign.recordings.iter().zip(&prediction.recordings) {
+        for (force, model) in recording.require_force()?.iter().zip(&predicted.force) {
+            if clip.is_none_or(|c| *force > c) {
+                score.add(force - model);
+            }
+        }
+    }
+    Ok(score)
+}
