@@ -7,11 +7,18 @@ use crate::muscle::Muscle;
 use crate::protocol::{Place, Protocol, Step};
 use crate::rng::Rng;
 
-/// Six levels for a muscle, from well above its deadband to 90 % of what it is rated for, Pa, in whole kPa.
+/// Six levels for a muscle, from where it begins to move well (an eighth of its free stroke at the highest level) to 90 % of
+/// what it is rated for, Pa, in whole kPa.
 pub fn levels(muscle: &Muscle) -> Vec<f64> {
     let top = 0.9 * muscle.spec().max_pressure;
     let deadband = muscle.truth(&[]).deadband_kpa * 1e3;
-    let bottom = (top / 6.0).max(1.8 * deadband);
+    let enough = 0.125 * muscle.free_stroke(top);
+    let (mut low, mut high) = (deadband, top);
+    for _ in 0..30 {
+        let middle = 0.5 * (low + high);
+        if muscle.free_stroke(middle) < enough { low = middle } else { high = middle }
+    }
+    let bottom = (top / 6.0).max(1.8 * deadband).max(high).min(0.7 * top);
     (0..6).map(|i| ((bottom + (top - bottom) * f64::from(i) / 5.0) * 1e-3).round() * 1e3).collect()
 }
 

@@ -176,7 +176,7 @@ pub struct TruthAt {
 }
 
 /// Push at which a slack muscle buckles, part of the blocked force at the rated pressure.
-pub const BUCKLING: f64 = 0.004;
+pub const BUCKLING: f64 = 0.001;
 
 /// A muscle at work: tables built once, and its state.
 #[derive(Debug, Clone)]

@@ -152,6 +152,8 @@ pub fn ask(set: &Path, host: &Path) -> Result<(), Box<dyn Error>> {
         command.args(recordings(&trial));
         command.arg("--json").arg(&json).arg("-o").arg(answers.join(format!("{}.pam", name(id))));
         let start = Instant::now();
+        // What an earlier run left must not pass for an answer.
+        let _ = std::fs::remove_file(&json);
         let failed = run_limited(&mut command, LIMIT).err();
         if failed.is_some() || !json.exists() {
             let said = serde_json::json!({ "schema": "none", "failed": failed.unwrap_or("no JSON".into()) });

@@ -167,6 +167,7 @@ fn one(
     // The contact's own give stays below what one sample sees, so that the plain law of friction is the truth of a null.
     let travel = muscle.geometry.rest_length * r.log_range(2e-5, 1e-4);
     muscle.friction.bristles = vec![(1.0, travel)];
+    muscle.friction.slip = travel / r.range(400.0, 1200.0);
     let nasty = stratum == Stratum::NullNasty;
     if nasty && r.chance(0.5) {
         // A rubber that stiffens strongly: the elastic table is curved far more than a polynomial likes.
