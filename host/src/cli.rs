@@ -60,6 +60,8 @@ enum Command {
     Predict(commands::predict::Arguments),
     /// Say what the model leaves out of recordings: where, what, how sure, what to record next.
     Diagnose(commands::diagnose::Arguments),
+    /// Say before recording what a planned protocol can and cannot tell apart.
+    Plan(commands::plan::Arguments),
     /// Show, check or export a table.
     Table(commands::table::Arguments),
     /// The whole story on this machine, no hardware: record, fit, flash, track.
@@ -85,6 +87,7 @@ impl Command {
             Self::Evaluate(a) => a.run(console),
             Self::Predict(a) => a.run(console),
             Self::Diagnose(a) => a.run(console),
+            Self::Plan(a) => a.run(console),
             Self::Table(a) => a.run(console),
             Self::Demo(a) => a.run(console),
             Self::Flash(a) => a.run(console),

@@ -8,6 +8,7 @@ pub mod effects;
 pub mod evaluate;
 pub mod fit;
 pub mod flash;
+pub mod plan;
 pub mod port;
 pub mod predict;
 pub mod recordings;

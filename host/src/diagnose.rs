@@ -12,11 +12,14 @@
 //! | [`candidates`] | the library of effects as columns |
 //! | [`select`] | which effects, and when to abstain |
 //! | [`held_out`] | the improvement on rows that the fit had not seen |
+//! | [`model`] | the table refitted beside the named effects |
+//! | [`advise`], [`planned`] | the recording that would tell; what a planned protocol can tell |
 //! | [`verdict`] | the answer as values and JSON |
 //! | [`summary`] | the answer in words |
 //!
 //! Everything is computed in a fixed order with fixed seeds: the same recordings give the same answer on any number of threads.
 
+pub mod advise;
 mod answer;
 mod baselines;
 mod candidates;
@@ -24,7 +27,9 @@ mod held_out;
 mod kinematics;
 mod linear;
 mod locate;
+pub mod model;
 mod noise;
+pub mod planned;
 mod rows;
 mod select;
 pub mod summary;

@@ -1,40 +1,50 @@
 //! `host diagnose`: what the model leaves out of recordings, where, and how sure that is.
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use clap::Args;
 use model_core::braid::Geometry;
+use model_core::muscle::Muscle;
 use model_core::units::{Angle, Length};
 
-use super::reports::Reports;
+use super::recordings::Recordings;
 use crate::console::Console;
-use crate::diagnose::{self, Options, summary::summary};
+use crate::diagnose::{self, Options, advise, model, summary::summary};
 use crate::error::Result;
 use crate::muscle_description::MuscleDescription;
 use crate::output::write_whole;
-use crate::recording::{Import, Reader};
+use crate::predict::predict;
+use crate::recording::Reader;
 use crate::report::diagnose_page;
+use crate::table_file::{self, TableFile};
 
 /// Arguments of `host diagnose`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     host diagnose --muscle mini.toml loops/*.csv\n  \
-    host diagnose --muscle mini.toml loops/*.csv --report answer.html")]
+    host diagnose --muscle mini.toml loops/*.csv --json answer.json -o corrected.pam --report answer.html")]
 pub struct Arguments {
     /// The muscle's description.
     #[arg(long, value_name = "M.toml")]
     muscle: PathBuf,
-    /// Recordings of one muscle, in chronological order.
-    #[arg(required = true, value_name = "REC")]
-    recordings: Vec<PathBuf>,
-    /// How to read files that are not in the project's own form.
-    #[arg(long, value_name = "I.toml")]
-    import: Option<PathBuf>,
+    #[command(flatten)]
+    recordings: Recordings,
+    /// The table whose misfit is asked about; without it one is fitted to the recordings.
+    #[arg(long, value_name = "T.pam")]
+    table: Option<PathBuf>,
+    /// Write the table refitted beside the named effects; corrections of the bench stay apart in it.
+    #[arg(short, long, value_name = "T2.pam")]
+    output: Option<PathBuf>,
     /// Write the answer as JSON; `-` is standard output.
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
-    #[command(flatten)]
-    reports: Reports,
+    /// Write the answer as one page with pictures.
+    #[arg(long, value_name = "F.html")]
+    report: Option<PathBuf>,
+    /// Write the protocol of the recording that would tell confusable effects apart.
+    #[arg(long, value_name = "P.toml")]
+    next: Option<PathBuf>,
 }
 
 impl Arguments {
@@ -43,12 +53,13 @@ impl Arguments {
     /// # Errors
     /// Files that cannot be read or written, recordings without force.
     pub fn run(self, console: &Console) -> Result<()> {
+        let start = Instant::now();
         let muscle = MuscleDescription::read(&self.muscle)?;
-        let import = self.import.as_ref().map(Import::read).transpose()?;
-        let campaign = Reader::of(&muscle).import(import.as_ref()).campaign(&self.recordings)?;
+        let campaign = self.recordings.read(Reader::of(&muscle))?;
         for warning in &campaign.warnings {
             console.warning(warning);
         }
+        let given = self.table.as_ref().map(TableFile::read).transpose()?;
         let geometry = Geometry {
             rest_length: Length::from_millimetres(muscle.rest_length_mm),
             braid_angle: Angle::from_degrees(muscle.braid_angle_deg),
@@ -56,13 +67,69 @@ impl Arguments {
             wall: Length::from_millimetres(muscle.bladder_wall_mm),
             tip_correction: false,
         };
-        let answer = diagnose::diagnose(&campaign, &geometry, &Options { muscle: muscle.name.clone() })?;
+        let options = Options { muscle: muscle.name.clone() };
+        let mut answer = diagnose::diagnose(&campaign, &geometry, &options)?;
+        console.detail(format!("diagnosed in {:.3} s", start.elapsed().as_secs_f64()));
+        if let Some(table) = &given {
+            let predicted = predict(table, &campaign)?;
+            if let Some(rms) = predicted.rms {
+                answer.misfit_rms_N = rms;
+            }
+        }
+        let confusable = answer.missing.iter().any(|m| !m.confusable_with.is_empty());
+        if self.output.is_some() || confusable {
+            match model::refit(&campaign, &muscle, &answer) {
+                Ok(refitted) => self.with_model(console, &campaign, refitted, &mut answer)?,
+                // A table was asked for: then its absence is a failure. For advice alone it is not.
+                Err(e) if self.output.is_some() => return Err(e),
+                Err(e) => answer.remarks.push(format!("no advice on the next recording: {e}")),
+            }
+        }
         if let Some(path) = &self.json {
             write_whole(path, (answer.to_json() + "\n").as_bytes())?;
         }
-        self.reports.write(console, || diagnose_page::page(&answer, &geometry))?;
+        if let Some(path) = &self.report {
+            write_whole(path, diagnose_page::page(&answer, &geometry).html().as_bytes())?;
+        }
         if self.json.as_deref() != Some(std::path::Path::new("-")) {
             console.result(summary(&answer).trim_end());
+        }
+        console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));
+        Ok(())
+    }
+
+    fn with_model(
+        &self,
+        console: &Console,
+        campaign: &crate::recording::Campaign,
+        mut refitted: model::Refitted,
+        answer: &mut diagnose::Diagnosis,
+    ) -> Result<()> {
+        let tested = refitted.file.table.tested;
+        let (low, high) = (tested.pressure_low.pascals(), tested.pressure_high.pascals());
+        if let Ok(muscle) = Muscle::<f64>::build(&refitted.file.table) {
+            answer.next_experiment =
+                advise::next_experiment(answer, &muscle, f64::from(low), f64::from(high))?;
+        }
+        if let (Some(path), Some(next)) = (&self.next, &answer.next_experiment) {
+            write_whole(path, next.protocol.as_bytes())?;
+        }
+        let Some(path) = &self.output else { return Ok(()) };
+        for warning in &refitted.warnings {
+            console.detail(warning);
+        }
+        let files = &self.recordings.files;
+        let hashes = files.iter().map(table_file::sha256).collect::<Result<Vec<_>>>()?;
+        refitted.file.about.date = table_file::now_utc();
+        refitted.file.about.sources = table_file::sources(campaign, files, hashes);
+        refitted.file.write(path)?;
+        if refitted.rms_after < refitted.rms_before {
+            console.note(format!(
+                "{}: the table with the named effects predicts these recordings to {:.3} N, without them to {:.3} N",
+                path.display(),
+                refitted.rms_after,
+                refitted.rms_before
+            ));
         }
         Ok(())
     }

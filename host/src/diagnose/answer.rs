@@ -67,10 +67,14 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     // The model as it was: four orders, tables free over pressure.
     let production = baselines::fit(&rows, Kind::Flexible(4), &[]);
     let misfit = production.rms(&rows);
+    remarks.extend(tables_as_evidence(&production, &rows));
     let library = library(&rows);
     let found = search(&mut rows, &library, blocked, step);
     remarks.extend(found.remarks.iter().cloned());
     let sigma = found.noise.sigma;
+    if !found.noise.from_repeats {
+        remarks.push("no stroke is repeated under the same conditions: the noise is what the most flexible model leaves".to_owned());
+    }
 
     let missing = missing(&found, &library, &rows);
     let explained: f64 = if found.above > 0.0 && !missing.is_empty() {
@@ -129,6 +133,51 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
         profiles,
         trace: trace(&rows, &found),
     })
+}
+
+/// What the fitted tables themselves betray: flexible tables swallow physics, and keep its pattern over pressure.
+fn tables_as_evidence(production: &baselines::Baseline, rows: &Rows) -> Vec<String> {
+    let mut remarks = Vec::new();
+    let levels = &rows.levels;
+    if !rows.steady || levels.len() < 4 {
+        return remarks;
+    }
+    let fit_to = |values: &[f64], of: &dyn Fn(f64) -> f64| -> Option<(f64, f64, f64)> {
+        let n = values.len() as f64;
+        let x: Vec<f64> = levels.iter().map(|p| of(*p)).collect();
+        let (mx, my) = (x.iter().sum::<f64>() / n, values.iter().sum::<f64>() / n);
+        let sxx: f64 = x.iter().map(|v| (v - mx).powi(2)).sum();
+        let sxy: f64 = x.iter().zip(values).map(|(a, b)| (a - mx) * (b - my)).sum();
+        let syy: f64 = values.iter().map(|v| (v - my).powi(2)).sum();
+        (sxx > 0.0 && syy > 0.0).then(|| (my - sxy / sxx * mx, sxy / sxx, sxy * sxy / (sxx * syy)))
+    };
+    let k_f = &production.friction_nodes;
+    if let (Some((a, b, by_inverse)), Some((_, _, straight))) =
+        (fit_to(k_f, &|p| 1.0 / p), fit_to(k_f, &|p| p))
+    {
+        let lowest = b / levels[0];
+        if by_inverse > 0.97 && by_inverse > straight + 0.02 && b > 0.0 && lowest > 0.5 * a.abs() {
+            remarks.push(format!(
+                "k_F(P) follows {a:.3} + {:.1} kPa/P: what a friction that does not scale with the force (dry, seal, viscous at one \
+                 speed) leaves in the tables",
+                b * 1e-3
+            ));
+        }
+    }
+    if let Some(e_1) = production.elastic_nodes.first()
+        && let Some((a, b, share)) = fit_to(e_1, &|p| p)
+    {
+        let change = b * (levels[levels.len() - 1] - levels[0]);
+        if share > 0.9 && change.abs() > 0.3 * a.abs() {
+            remarks.push(format!(
+                "E_1 {} in a straight line with pressure, by {:.0} % over the range: one bladder should not; ends that are not \
+                 cylinders, a braid that stretches, a gain or a slow change in the order of testing leave this",
+                if change > 0.0 { "rises" } else { "falls" },
+                100.0 * change.abs() / a.abs().max(1e-9)
+            ));
+        }
+    }
+    remarks
 }
 
 /// The scale of forces: what the highest pressure would give at rest length, or the largest force seen.
@@ -275,7 +324,8 @@ fn missing(found: &Found, library: &[candidates::Candidate], rows: &Rows) -> Vec
             let confusable: Vec<String> = t
                 .rivals
                 .iter()
-                .filter(|r| r.1 > 0.05 || (r.2.abs() > 0.9 && r.1 > 0.02))
+                .filter(|r| r.1 > 0.1 || (r.2.abs() > 0.9 && r.1 > 0.02))
+                .take(6)
                 .map(|r| library[r.0].name().to_owned())
                 .collect();
             let share = (explained * t.share / total).clamp(0.0, 1.0);

@@ -41,11 +41,6 @@ impl Candidate {
         })
     }
 
-    /// How many amplitudes it has.
-    pub(crate) fn amplitudes(&self) -> usize {
-        self.info.amplitudes()
-    }
-
     /// Which sign each amplitude may have, by its plausible range.
     pub(crate) fn signs(&self) -> Vec<Sign> {
         self.info

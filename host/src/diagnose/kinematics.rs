@@ -31,6 +31,8 @@ pub(crate) struct Kinematics {
     pub sure: Vec<bool>,
     /// Whether the length was held.
     pub held: Vec<bool>,
+    /// Whether the pressure has left the place where this hold began.
+    pub ramped: Vec<bool>,
     /// Time since the braid last moved, by its length or by a change of pressure, s; zero while moving.
     pub still: Vec<f64>,
 }
@@ -215,6 +217,7 @@ pub(crate) fn kinematics(
         sure: vec![true; n],
         held,
         still: vec![0.0; n],
+        ramped: vec![false; n],
         ..Kinematics::default()
     };
     let mut next = 0;
@@ -226,6 +229,8 @@ pub(crate) fn kinematics(
     let mut hold_start: Option<usize> = None;
     let mut pressure_extreme = pressure[0];
     let mut still_from = 0;
+    let mut hold_pressure = pressure[0];
+    let mut ramped = false;
     let mut still_pressure = pressure[0];
     for row in 0..n {
         let mut turned = false;
@@ -239,6 +244,8 @@ pub(crate) fn kinematics(
         if k.held[row] && !turned {
             if hold_start.is_none() {
                 hold_start = Some(row);
+                hold_pressure = pressure[row];
+                ramped = false;
                 pressure_extreme = pressure[row];
             }
             let said = given.and_then(|g| g.get(row)).map_or(0.0, |g| f64::from(*g));
@@ -262,6 +269,8 @@ pub(crate) fn kinematics(
             still_from = row;
             still_pressure = pressure[row];
         }
+        ramped = k.held[row] && (ramped || (pressure[row] - hold_pressure).abs() > thresholds.pressure);
+        k.ramped[row] = ramped;
         k.still[row] = time[row] - time[still_from];
         if turned {
             turns += 1;

@@ -81,6 +81,7 @@ impl Basis {
     }
 
     /// How many independent columns it has.
+    #[cfg(test)]
     pub(crate) fn rank(&self) -> usize {
         self.q.len()
     }
@@ -230,10 +231,12 @@ impl Random {
         (self.next() % n.max(1) as u64) as usize
     }
     /// Uniform in [0, 1).
+    #[cfg(test)]
     pub(crate) fn uniform(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
     /// Standard normal (Box and Muller).
+    #[cfg(test)]
     pub(crate) fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform()).cos()

@@ -208,6 +208,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
                 && j - i < per_row
                 && k.piece[j] == k.piece[i]
                 && k.sure[j] == k.sure[i]
+                && k.ramped[j] == k.ramped[i]
                 && k.turns[j] == k.turns[i]
             {
                 let add = [
@@ -292,7 +293,10 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
             });
             rows.shapes.push(shape(braid, stroke));
             rows.force.push(if good > 0.0 { force_sum / good } else { 0.0 });
-            rows.root_weight.push(if good > 0.0 && k.sure[i] { (good / per_row as f64).sqrt() } else { 0.0 });
+            // How far friction turns on a ramp at held length the model only guesses; where the muscle also moves, its
+            // strokes are what is judged.
+            let judged = k.sure[i] && (rows.isometric || !k.ramped[i]);
+            rows.root_weight.push(if good > 0.0 && judged { (good / per_row as f64).sqrt() } else { 0.0 });
             rows.recording.push(index as u32);
             rows.block.push(piece_number);
             rows.cycle.push(recording.cycle.as_ref().map_or(0, |c| c[i]));

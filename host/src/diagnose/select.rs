@@ -10,8 +10,9 @@ use super::rows::Rows;
 
 /// The family-wise error that a name may have.
 pub(crate) const FAMILY_ALPHA: f64 = 0.01;
-/// Misfit below this share of the blocked force is the model's own: `M = 4` leaves 0.03 to 0.06 % on a hyperelastic wall.
-pub(crate) const OWN_INEXACTNESS: f64 = 6e-4;
+/// Misfit below this share of the blocked force is the model's own: `M = 4` leaves 0.03 to 0.06 % on a hyperelastic wall, and
+/// friction by its sign alone about as much again where contacts give a little before they slide.
+pub(crate) const OWN_INEXACTNESS: f64 = 1e-3;
 /// What the stiff baseline is allowed to miss of a real bladder as a smooth surface before that is called a misfit, rms as a
 /// share of the blocked force.
 pub(crate) const STATIC_INEXACTNESS: f64 = 4e-3;
@@ -20,6 +21,8 @@ pub(crate) const STATIC_INEXACTNESS: f64 = 4e-3;
 pub(crate) const STATIC_PEAK: f64 = 0.025;
 /// Below this share of its energy outside the flexible tables an effect counts as concealed by them.
 const CONCEALED: f64 = 0.04;
+/// And it must move the fit by this much, rms as a share of the blocked force.
+const STATIC_MOVED: f64 = 3.5e-3;
 /// At most so many effects are named.
 pub(crate) const MAX_NAMED: usize = 3;
 /// A further effect must take this share of all misfit above noise …
@@ -27,7 +30,7 @@ const FURTHER_OF_ALL: f64 = 0.06;
 /// … and this share of what its predecessors left.
 const FURTHER_OF_REST: f64 = 0.4;
 /// The first must take this share of the misfit above noise.
-const FIRST_OF_ALL: f64 = 0.25;
+const FIRST_OF_ALL: f64 = 0.4;
 /// Throws of the coin behind a family-wise p.
 const THROWS: usize = 1999;
 /// How many candidates are refined in their shapes at every step.
@@ -159,25 +162,30 @@ pub(crate) fn refit(
     (fitted, traces)
 }
 
-/// The weight of each rival against the winner, from the misfit each leaves.
+/// How much of the misfit two laws may differ by and still be equally believed, where the better one explains all …
+const TIE: f64 = 0.015;
+/// … and how that widens with what the better one leaves: a law that misses a third of the misfit is itself not exact, and small
+/// differences between inexact laws tell little.
+const TIE_WIDENS: f64 = 0.25;
+
+/// The weight of each rival against the winner, from the share of the misfit above noise that each leaves.
 fn rivals(
     winner: &Trial,
     best: &[Trial],
     library: &[Candidate],
     rows: &Rows,
     base: &Baseline,
-    independent: f64,
+    rest: f64,
 ) -> Vec<(usize, f64, f64)> {
-    let left = energy(&base.residual);
-    let n = independent.min(EVIDENCE_ROWS);
-    let score = |t: &Trial| evidence(t, &library[t.candidate], left, n);
-    let top = score(winner);
+    let share = |t: &Trial| (t.gain / rest).clamp(0.0, 1.0);
+    let top = share(winner);
+    let scale = TIE + TIE_WIDENS * (1.0 - top);
     let mine = candidates::projected_trace(winner, library, rows, &base.basis);
     let mut rivals: Vec<(usize, f64, f64)> = best
         .par_iter()
         .filter(|t| t.candidate != winner.candidate && t.gain > 0.0)
         .map(|t| {
-            let weight = (0.5 * (score(t) - top)).min(0.0).exp();
+            let weight = ((share(t) - top) / scale).min(0.0).exp();
             let c = if weight > 1e-3 {
                 cosine(&mine, &candidates::projected_trace(t, library, rows, &base.basis))
             } else {
@@ -236,7 +244,10 @@ pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step:
             attempt(t.candidate, c, &t.shapes, rows, &flexible.basis, &flexible.residual).visible < CONCEALED
         })
         .collect();
-    let worth_naming = |t: &Trial| !concealed[t.candidate] || t.peak >= STATIC_PEAK * blocked;
+    let worth_naming = |t: &Trial| {
+        let moved = (t.gain / total_weight).sqrt();
+        !concealed[t.candidate] || (t.peak >= STATIC_PEAK * blocked && moved >= STATIC_MOVED * blocked)
+    };
     let (mut full, mut traces) =
         if chosen.is_empty() { (bare.clone(), Vec::new()) } else { refit(rows, kind, &mut chosen, library) };
     while chosen.len() < MAX_NAMED {
@@ -252,7 +263,10 @@ pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step:
             .iter()
             .enumerate()
             .filter(|(_, t)| {
-                !chosen.iter().any(|c| c.candidate == t.candidate) && t.gain > 0.0 && worth_naming(t)
+                !chosen.iter().any(|c| c.candidate == t.candidate)
+                    && t.gain > 0.0
+                    && worth_naming(t)
+                    && !taken.iter().any(|k| k.rivals.iter().any(|r| r.0 == t.candidate))
             })
             .max_by(|a, b| {
                 let score = |t: &Trial| evidence(t, &library[t.candidate], left, independent);
@@ -274,7 +288,7 @@ pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step:
         if !(significant && worth && moved >= OWN_INEXACTNESS * blocked) {
             break;
         }
-        let rivals = rivals(winner, &best, library, rows, &full, independent);
+        let rivals = rivals(winner, &best, library, rows, &full, rest);
         let winner = winner.clone();
         let p = p[at];
         chosen.push(winner.clone());
@@ -284,6 +298,15 @@ pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step:
         if chosen.len() > 1 {
             exchange(&mut chosen, &mut taken, rows, library, kind, &mut full, &mut traces);
         }
+    }
+    // What the joint fit brought to nothing was not there.
+    let alive: Vec<bool> = chosen.iter().map(|c| c.amplitudes.iter().any(|a| *a != 0.0)).collect();
+    if alive.iter().any(|a| !a) {
+        let mut keep = alive.iter();
+        chosen.retain(|_| *keep.next().unwrap_or(&true));
+        let mut keep = alive.iter();
+        taken.retain(|_| *keep.next().unwrap_or(&true));
+        (full, traces) = refit(rows, kind, &mut chosen, library);
     }
     for (t, c) in taken.iter_mut().zip(&chosen) {
         t.trial.amplitudes.clone_from(&c.amplitudes);

@@ -1,0 +1,66 @@
+//! `host plan`: before anything is recorded, what a protocol can and cannot tell apart.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use model_core::muscle::Muscle;
+
+use crate::console::Console;
+use crate::diagnose::advise::isolability;
+use crate::diagnose::planned::Protocol;
+use crate::error::{Code, Error, Result};
+use crate::output::write_whole;
+use crate::table_file::TableFile;
+
+/// Arguments of `host plan`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  host plan --table mini.pam protocol.toml\n\n\
+    The table is one of the muscle or of one like it; the protocol is a file as virtual-bench runs it.")]
+pub struct Arguments {
+    /// A table of the muscle, or of one like it.
+    #[arg(long, value_name = "T.pam")]
+    table: PathBuf,
+    /// The planned protocol.
+    #[arg(value_name = "PROTOCOL.toml")]
+    protocol: PathBuf,
+    /// Write the matrix as JSON; `-` is standard output.
+    #[arg(long, value_name = "F")]
+    json: Option<PathBuf>,
+}
+
+impl Arguments {
+    /// Does what was asked.
+    ///
+    /// # Errors
+    /// Files that cannot be read, or a protocol that cannot be carried out.
+    pub fn run(self, console: &Console) -> Result<()> {
+        let file = TableFile::read(&self.table)?;
+        let muscle =
+            Muscle::<f64>::build(&file.table).map_err(|e| Error::new(Code::TableInvalid, e.to_string()))?;
+        let text =
+            std::fs::read_to_string(&self.protocol).map_err(|e| Error::unreadable(&self.protocol, &e))?;
+        let protocol = Protocol::parse(&text).map_err(|e| e.file(&self.protocol))?;
+        let rows = isolability(&protocol, &muscle)?;
+        if let Some(path) = &self.json {
+            let json =
+                serde_json::to_string_pretty(&serde_json::json!({ "schema": "pam-plan/1", "effects": rows }))
+                    .map_err(|e| Error::new(Code::FileUnwritable, e.to_string()))?;
+            write_whole(path, (json + "\n").as_bytes())?;
+        }
+        if self.json.as_deref() != Some(std::path::Path::new("-")) {
+            console.result(format!("{:<26}{:>9}   cannot be told from", "effect", "visible"));
+            for r in &rows {
+                let others: Vec<String> =
+                    r.not_told_from.iter().map(|(n, c)| format!("{n} ({c:.2})")).collect();
+                let seen =
+                    if r.visible < 1e-5 { "no".to_owned() } else { format!("{:.2} %", 100.0 * r.visible) };
+                console.result(format!("{:<26}{seen:>9}   {}", r.effect, others.join(", ")));
+            }
+            console.note(
+                "visible: share of the effect's trace that tables free over pressure cannot imitate; numbers behind names are \
+                 cosines after the tables are refitted",
+            );
+        }
+        Ok(())
+    }
+}
