@@ -47,7 +47,7 @@ mod tip_effect;
 mod viscous_damping;
 
 pub use fading::{Fading, decay};
-pub use travel::BraidTravel;
+pub use travel::{BraidTravel, stroke_direction};
 
 crate::effect_list! {
     /// An effect of the muscle, by name. On the wire and in files it is its place in this list: the order stays, and new

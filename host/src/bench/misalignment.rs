@@ -1,10 +1,10 @@
 //! Muscle and load cell are not in one line: `F_add = −a F (L0/L)² − b s |F|`.
 //!
 //! An offset `e` of the ends tilts the muscle by `φ = e/L`: the cell sees `F cos φ`, so `a = (e/L0)²/2`; the side force `F sin φ` rubs in the
-//! guide, `b = μ e/L0` (taken at the rest length). `F`, N, is the base model's force. One degree costs 0.015 % of gain but puts 1.7 % of
+//! guide, `b = μ e/L0` (taken at the rest length), against the direction `s` in which the stroke last went. `F`, N, is the base model's force. One degree costs 0.015 % of gain but puts 1.7 % of
 //! the force on the guide.
 
-use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start, stroke_direction};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -21,16 +21,21 @@ impl Effect for Misalignment {
         depends_on_pressure: true,
         persistent: false,
         alternatives: false,
-        start: Start::Known,
+        start: Start::Branch,
         fading: &[],
         equation: "F = −a·F·(L0/L)² − b·s·|F|",
         summary: "The muscle pulls at an angle, which loses some force and rubs in the guide.",
         source: "statics of an inclined pull",
     };
 
-    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
+    fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
+        // memory: [direction of the stroke]
+        stroke_direction(context, &mut memory[0]);
+    }
+
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
         let longer = context.rest_length / context.length.max(context.rest_length * T::from_f32(0.1));
         let pull = context.force();
-        -(parameters[0] * longer * longer * pull) - parameters[1] * context.direction * pull.abs()
+        -(parameters[0] * longer * longer * pull) - parameters[1] * memory[0] * pull.abs()
     }
 }

@@ -1,12 +1,13 @@
 //! Friction of constant size: `F_add = −s · F_c`.
 //!
-//! `s` is the direction of motion, `F_c` the friction force, N. It differs from the table's own friction, which is
+//! `s` is the direction in which the stroke last went (a change of pressure at held length does not turn it: what rubs is a guide or
+//! a fitting), `F_c` the friction force, N. It differs from the table's own friction, which is
 //! proportional to the muscle's force: it is still there where the force is zero, and shows in the tables as
 //! `k_F(P) ≈ a + b/P`. McKibben muscles have been reported with a hysteresis of 5–10 N that does not depend on speed.
-//! Holds while the muscle slides; within the first tenths of a millimetre after a turn see `presliding-hysteresis`. Where the
-//! direction is unknown (`s = 0`) it adds nothing.
+//! Holds while the muscle slides; within the first tenths of a millimetre after a turn see `presliding-hysteresis`. Until the
+//! muscle first moves `s` is unknown and nothing is added.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use super::{Context, Effect, Info, Link, Memory, Parameter, Start, stroke_direction};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -20,14 +21,19 @@ impl Effect for CoulombFriction {
         depends_on_pressure: false,
         persistent: false,
         alternatives: false,
-        start: Start::Known,
+        start: Start::Branch,
         fading: &[],
         equation: "F = −s·F_c",
         summary: "A friction force of constant size opposes every motion, whatever the muscle pulls.",
         source: "C.-P. Chou and B. Hannaford, IEEE Trans. Robotics and Automation 12 (1996) 90–102, doi 10.1109/70.481753",
     };
 
-    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
-        -context.direction * parameters[0]
+    fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
+        // memory: [direction of the stroke]
+        stroke_direction(context, &mut memory[0]);
+    }
+
+    fn force<T: Scalar>(parameters: &[T], _context: &Context<T>, memory: &Memory<T>) -> T {
+        -memory[0] * parameters[0]
     }
 }

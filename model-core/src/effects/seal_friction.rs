@@ -3,11 +3,11 @@
 //! ```text
 //! F_add = −s [F_0 + A_s (p_0 + P)] (1 + (k − 1) e^(−|v|/v_s))
 //! ```
-//! `F_0`, N, comes from the seal's interference fit; `A_s = μ_s π d w`, m², is the seal's rubbing area times its coefficient,
+//! `s` is the direction in which the stroke last went; `F_0`, N, comes from the seal's interference fit; `A_s = μ_s π d w`, m², is the seal's rubbing area times its coefficient,
 //! `p_0 = 101.3 kPa`; `k` the ratio of breakaway to running friction and `v_s`, m/s, the speed over which it falls off. Below 1 to
 //! 5 mm/s real seals stick and slip, which a mean force describes only on average.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start, decay};
+use super::{Context, Effect, Info, Link, Memory, Parameter, Start, decay, stroke_direction};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -26,18 +26,23 @@ impl Effect for SealFriction {
         depends_on_pressure: true,
         persistent: false,
         alternatives: false,
-        start: Start::Known,
+        start: Start::Branch,
         fading: &[],
         equation: "F = −s·[F_0 + A_s·(p_0 + P)]·(1 + (k−1)·exp(−|v|/v_s))",
         summary: "The seal around a push-rod rubs, the more the higher the pressure, and most when slow.",
         source: "B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083–1138, doi 10.1016/0005-1098(94)90209-7",
     };
 
-    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
+    fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
+        // memory: [direction of the stroke]
+        stroke_direction(context, &mut memory[0]);
+    }
+
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
         let atmosphere = T::from_f32(101.325e3);
         let slow =
             T::ONE + (parameters[2] - T::ONE) * decay(context.speed / parameters[3].max(T::from_f32(1.0e-6)));
         let running = parameters[0] + parameters[1] * (atmosphere + context.pressure.max(-atmosphere));
-        -context.direction * running * slow
+        -memory[0] * running * slow
     }
 }

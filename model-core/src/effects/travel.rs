@@ -37,3 +37,16 @@ impl BraidTravel {
         moved + filled * per_pascal
     }
 }
+
+/// Which way the stroke last went, in one slot of a memory: +1 shortening, −1 lengthening, 0 unknown.
+///
+/// A guide or a seal at held length does not slide when the pressure changes, as the strands of the braid do: the direction that
+/// [`Context::direction`] takes from filling and emptying is not theirs.
+pub fn stroke_direction<T: Scalar>(context: &Context<T>, way: &mut T) {
+    // Slower than a ten-thousandth of its length in a second the muscle rests.
+    let moving =
+        context.resting == T::ZERO && context.speed.abs() > context.rest_length * T::from_f32(1.0e-4);
+    if moving && context.direction != T::ZERO {
+        *way = context.direction;
+    }
+}
