@@ -142,15 +142,21 @@ pub fn ask(set: &Path, host: &Path) -> Result<(), Box<dyn Error>> {
     }
     let answers = set.join("answers");
     std::fs::create_dir_all(&answers)?;
+    let tables = writes_tables(host);
+    if !tables {
+        eprintln!("this tool's diagnose has no -o: there will be no held-out gain");
+    }
     let done = AtomicUsize::new(0);
     let total = ledger.truths.len();
     let one = |id: usize| {
         let trial = set.join("trials").join(name(id));
         let json = answers.join(format!("{}.json", name(id)));
         let mut command = Command::new(host);
-        command.arg("diagnose").arg("--muscle").arg(trial.join("muscle.toml"));
-        command.args(recordings(&trial));
-        command.arg("--json").arg(&json).arg("-o").arg(answers.join(format!("{}.pam", name(id))));
+        command.arg("diagnose").arg("--quiet").arg("--muscle").arg(trial.join("muscle.toml"));
+        command.args(recordings(&trial)).arg("--json").arg(&json);
+        if tables {
+            command.arg("-o").arg(answers.join(format!("{}.pam", name(id))));
+        }
         let start = Instant::now();
         // What an earlier run left must not pass for an answer.
         let _ = std::fs::remove_file(&json);
@@ -176,6 +182,16 @@ pub fn ask(set: &Path, host: &Path) -> Result<(), Box<dyn Error>> {
     ledger.tool = version(host);
     write_ledger(set, &ledger)?;
     Ok(())
+}
+
+/// Whether the tool's diagnosis can write the diagnosed table.
+fn writes_tables(host: &Path) -> bool {
+    let said = Command::new(host).arg("diagnose").arg("--help").output();
+    // A tool without help is given the option: the interface fixes it.
+    said.map_or(true, |o| {
+        let text = String::from_utf8_lossy(&o.stdout).into_owned();
+        text.is_empty() || text.lines().any(|l| l.trim_start().starts_with("-o"))
+    })
 }
 
 fn version(host: &Path) -> String {
