@@ -8,9 +8,15 @@ mod blocks;
 mod campaign;
 mod cells;
 mod columns;
+mod container;
 mod decimal;
+#[cfg(feature = "hdf5")]
+mod hdf5;
 pub mod import;
+mod matlab;
 mod noise;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod plan;
 mod quantity;
 mod read;

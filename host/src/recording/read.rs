@@ -8,6 +8,7 @@ use super::blocks::{BlockError, Blocks, Rows, RowsError, read_rows};
 use super::campaign::Campaign;
 use super::cells::{Cells, Dialect, Fault, LineError};
 use super::columns::Recording;
+use super::container::Container;
 use super::import::{Decimal, Import, Value, pattern as pattern_of};
 use super::plan::{Context, Plan, plan};
 use super::source;
@@ -75,7 +76,8 @@ impl<'a> Reader<'a> {
 
     /// Reads one file: one recording, or several when the import description splits it.
     ///
-    /// Text (CSV, tab-separated, or as described), also compressed by gzip or zstd.
+    /// Text (CSV, tab-separated, or as described), also compressed by gzip or zstd; MATLAB files of version 5 to 7.3, HDF5 and
+    /// Parquet, whose columns have the names that a text file's header would have.
     ///
     /// # Errors
     /// Any `file::`, `recording::` or `import::` code, with file, line, column and value as far as they apply.
@@ -88,7 +90,10 @@ impl<'a> Reader<'a> {
         if source.magic.is_empty() {
             return Err(Error::new(Code::RecordingEmpty, "the file is empty"));
         }
-        self.text(path, source)
+        match Container::of(&source.magic) {
+            Some(container) => super::container::read(self, path, container),
+            None => self.text(path, source),
+        }
     }
 
     fn text(&self, path: &Path, source: source::Source) -> Result<Vec<Recording>> {

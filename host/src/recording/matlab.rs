@@ -1,0 +1,195 @@
+//! MATLAB files of version 5 to 7 (not 7.3, which is HDF5): numeric arrays, also compressed, also as fields of a struct.
+//!
+//! Layout after "MAT-File Format", The MathWorks: a header of 128 bytes, then elements, each a tag of type and size and its
+//! data, padded to eight bytes; an array is an element of elements: flags, dimensions, name, data.
+
+use std::io::Read;
+
+use super::container::{Cells, Columns, damaged};
+use crate::error::Result;
+
+const COMPRESSED: u32 = 15;
+const MATRIX: u32 = 14;
+/// More than any recording holds; a compressed file that unfolds to more is refused.
+const LARGEST: u64 = 4 << 30;
+/// A struct in a struct in a struct is no recording any more.
+const DEEPEST: usize = 4;
+
+/// The vectors of a file. A matrix gives its columns as `name(:,k)`, a struct its fields as `name.field`, or as `field` alone
+/// when the file holds nothing else.
+pub(super) fn columns(bytes: &[u8]) -> Result<Columns> {
+    let header = bytes.get(..128).ok_or_else(|| damaged("it ends within its header"))?;
+    let big = match &header[126..128] {
+        b"IM" => false,
+        b"MI" => true,
+        _ => return Err(damaged("its byte order mark is neither IM nor MI")),
+    };
+    let mut columns = Vec::new();
+    let mut budget = LARGEST;
+    let mut top = Elements { bytes: &bytes[128..], big };
+    let mut arrays = 0;
+    let mut single = None;
+    while let Some((kind, data)) = top.next()? {
+        let before = columns.len();
+        match kind {
+            COMPRESSED => {
+                let mut unpacked = Vec::new();
+                flate2::read::ZlibDecoder::new(data)
+                    .take(budget)
+                    .read_to_end(&mut unpacked)
+                    .map_err(|e| damaged(format!("a compressed array is damaged ({e})")))?;
+                budget = budget.saturating_sub(unpacked.len() as u64);
+                if budget == 0 {
+                    return Err(damaged("it unfolds to more than 4 GiB"));
+                }
+                let mut inner = Elements { bytes: &unpacked, big };
+                while let Some((kind, data)) = inner.next()? {
+                    if kind == MATRIX {
+                        array(data, big, None, 0, &mut columns)?;
+                    }
+                }
+            }
+            MATRIX => array(data, big, None, 0, &mut columns)?,
+            _ => continue,
+        }
+        arrays += 1;
+        single = Some(before);
+    }
+    if arrays == 1 && single == Some(0) {
+        for (name, _) in &mut columns {
+            if let Some((_, field)) = name.split_once('.') {
+                *name = field.to_owned();
+            }
+        }
+    }
+    Ok(columns)
+}
+
+/// Elements one after the other.
+struct Elements<'a> {
+    bytes: &'a [u8],
+    big: bool,
+}
+
+impl<'a> Elements<'a> {
+    fn word(&self, at: usize) -> Option<u32> {
+        let word = self.bytes.get(at..at + 4)?.try_into().ok()?;
+        Some(if self.big { u32::from_be_bytes(word) } else { u32::from_le_bytes(word) })
+    }
+
+    fn next(&mut self) -> Result<Option<(u32, &'a [u8])>> {
+        if self.bytes.len() < 8 {
+            return Ok(None);
+        }
+        let cut = || damaged("it ends within an array");
+        let first = self.word(0).ok_or_else(cut)?;
+        let (kind, start, size) = match first >> 16 {
+            0 => (first, 8, self.word(4).ok_or_else(cut)? as usize),
+            // The small form: size and type share a word, up to four bytes of data follow in the tag.
+            size => (first & 0xffff, 4, size as usize),
+        };
+        let data = self.bytes.get(start..).and_then(|b| b.get(..size)).ok_or_else(cut)?;
+        // Compressed elements are not padded.
+        let end = match (start, kind) {
+            (4, _) => 8,
+            (_, COMPRESSED) => 8 + size,
+            _ => 8 + size.div_ceil(8) * 8,
+        };
+        self.bytes = self.bytes.get(end..).unwrap_or_default();
+        Ok(Some((kind, data)))
+    }
+
+    fn need(&mut self) -> Result<(u32, &'a [u8])> {
+        self.next()?.ok_or_else(|| damaged("an array lacks a part"))
+    }
+}
+
+fn array(bytes: &[u8], big: bool, name: Option<&str>, depth: usize, columns: &mut Columns) -> Result<()> {
+    if bytes.is_empty() {
+        return Ok(());
+    }
+    let mut parts = Elements { bytes, big };
+    let flags = numbers(parts.need()?, big)?;
+    let class = flags.first().map_or(0, |f| *f as u64 & 0xff);
+    let dimensions = numbers(parts.need()?, big)?;
+    let own = String::from_utf8_lossy(parts.need()?.1).into_owned();
+    let name = name.unwrap_or(&own);
+    match class {
+        6..=15 => {
+            let values = numbers(parts.need()?, big)?;
+            let rows = dimensions.first().map_or(0, |d| *d as usize);
+            let wide = dimensions.get(1).map_or(0, |d| *d as usize);
+            if dimensions.len() != 2 || rows.checked_mul(wide) != Some(values.len()) || values.is_empty() {
+                return Ok(());
+            }
+            if rows == 1 || wide == 1 {
+                columns.push((name.to_owned(), Cells::Numbers(values)));
+            } else {
+                let named =
+                    |(k, c): (usize, &[f64])| (format!("{name}(:,{})", k + 1), Cells::Numbers(c.to_vec()));
+                columns.extend(values.chunks_exact(rows).take(1000).enumerate().map(named));
+            }
+        }
+        2 if depth < DEEPEST => {
+            let width = numbers(parts.need()?, big)?.first().map_or(0, |w| *w as usize);
+            let (_, names) = parts.need()?;
+            if width == 0 || dimensions.iter().product::<f64>() != 1.0 {
+                return Ok(());
+            }
+            for field in names.chunks(width) {
+                let end = field.iter().position(|b| *b == 0).unwrap_or(field.len());
+                let field = format!("{name}.{}", String::from_utf8_lossy(&field[..end]));
+                let (kind, data) = parts.need()?;
+                if kind == MATRIX {
+                    array(data, big, Some(&field), depth + 1, columns)?;
+                }
+            }
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+/// Numbers of any stored type as doubles.
+fn numbers((kind, data): (u32, &[u8]), big: bool) -> Result<Vec<f64>> {
+    macro_rules! read {
+        ($t:ty) => {{
+            const SIZE: usize = size_of::<$t>();
+            let one = |b: &[u8]| {
+                let mut word = [0; SIZE];
+                word.copy_from_slice(b);
+                (if big { <$t>::from_be_bytes(word) } else { <$t>::from_le_bytes(word) }) as f64
+            };
+            Ok(data.chunks_exact(SIZE).map(one).collect())
+        }};
+    }
+    match kind {
+        1 => read!(i8),
+        2 => read!(u8),
+        3 => read!(i16),
+        4 => read!(u16),
+        5 => read!(i32),
+        6 => read!(u32),
+        7 => read!(f32),
+        9 => read!(f64),
+        12 => read!(i64),
+        13 => read!(u64),
+        other => Err(damaged(format!("an array has data of the unknown type {other}"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn no_bytes_make_it_panic(bytes: Vec<u8>, big: bool) {
+            let mut file = vec![b' '; 126];
+            file.extend(if big { b"MI" } else { b"IM" });
+            file.extend([14, 0, 0, 0, bytes.len() as u8, 0, 0, 0]);
+            file.extend(bytes);
+            let _ = super::columns(&file);
+        }
+    }
+}
