@@ -72,6 +72,10 @@ enum Command {
     Run(commands::run::Arguments),
     /// Vent the muscle and disarm the controller.
     Vent(commands::run::VentArguments),
+    /// The live view in the browser: connect, run, fit, flash, compare.
+    Studio(commands::studio::Arguments),
+    /// Two recordings, in numbers and in a picture.
+    Compare(commands::compare::Arguments),
     /// Ask a controller what it is, what it does and what went wrong; change its settings.
     Device(commands::device::Arguments),
     /// Explain what the model leaves out, effect by effect.
@@ -93,6 +97,8 @@ impl Command {
             Self::Flash(a) => a.run(console),
             Self::Run(a) => a.run(console),
             Self::Vent(a) => a.run(console),
+            Self::Studio(a) => a.run(console),
+            Self::Compare(a) => a.run(console),
             Self::Device(a) => a.run(console),
             Self::Effects(a) => a.run(console),
             Self::Completions(a) => a.run(&mut Cli::command(), console),

@@ -1,5 +1,6 @@
 //! The sub-commands, one file each: arguments in, library calls, results out.
 
+pub mod compare;
 pub mod completions;
 pub mod demo;
 pub mod device;
@@ -14,4 +15,5 @@ pub mod predict;
 pub mod recordings;
 pub mod reports;
 pub mod run;
+pub mod studio;
 pub mod table;

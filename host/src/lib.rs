@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod cli;
 pub mod commands;
+pub mod compare;
 pub mod console;
 pub mod demo;
 pub mod device;
@@ -15,5 +16,6 @@ pub mod output;
 pub mod predict;
 pub mod recording;
 pub mod report;
+pub mod studio;
 pub mod table_export;
 pub mod table_file;

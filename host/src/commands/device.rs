@@ -493,7 +493,7 @@ fn settings(arguments: &SettingsArguments, console: &Console) -> Result<()> {
 }
 
 /// The settings with one of them changed, by its dotted name.
-fn changed(settings: Settings, assignment: &str) -> Result<Settings> {
+pub(crate) fn changed(settings: Settings, assignment: &str) -> Result<Settings> {
     let wrong = |cause: String| {
         Error::new(Code::CallInvalid, cause)
             .value(assignment)

@@ -161,14 +161,15 @@ fn too_long() -> Error {
 }
 
 /// Steps that the host sends at their times.
-struct Steps {
+#[derive(Debug)]
+pub(crate) struct Steps {
     values: Vec<f32>,
     hold_s: f64,
     sent: usize,
 }
 
 impl Steps {
-    fn begin(client: &mut Client, plan: &Plan) -> Result<Self> {
+    pub(crate) fn begin(client: &mut Client, plan: &Plan) -> Result<Self> {
         let (values, hold_s) = match &plan.course {
             Course::Constant(value) => (vec![*value], f64::INFINITY),
             Course::Steps { values, hold_s } => (values.clone(), *hold_s),
@@ -187,7 +188,7 @@ impl Steps {
         Ok(Self { values, hold_s, sent: 0 })
     }
 
-    fn advance(&mut self, client: &mut Client, quantity: Quantity, elapsed: f64) -> Result<()> {
+    pub(crate) fn advance(&mut self, client: &mut Client, quantity: Quantity, elapsed: f64) -> Result<()> {
         let due = (elapsed / self.hold_s) as usize;
         if due > self.sent && !self.values.is_empty() {
             self.sent = due;

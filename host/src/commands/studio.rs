@@ -1,0 +1,61 @@
+//! `host studio`: the live view in the browser.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+
+use clap::Args;
+
+use crate::console::Console;
+use crate::error::{Code, Error, Result};
+use crate::studio::keeper::Order;
+use crate::studio::server::serve;
+
+/// Arguments of `host studio`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  host studio\n  host studio --port /dev/ttyACM0\n  host studio --emulate mini\n\n\
+    The page is for this machine only. Escape vents. When the last page closes, the controller is vented and disarmed."
+)]
+pub struct Arguments {
+    /// Connect to this device at once.
+    #[arg(short, long, value_name = "PORT", env = "PAM_PORT", conflicts_with = "emulate")]
+    port: Option<String>,
+    /// Start an emulated controller with this muscle of the virtual bench: mini, contractile, push or random:SEED.
+    #[arg(long, value_name = "MUSCLE")]
+    emulate: Option<String>,
+    /// The page's own port [default: any that is free].
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    web_port: u16,
+    /// The folder for recordings and tables.
+    #[arg(short, long, value_name = "FOLDER", default_value = "pam-studio")]
+    output: PathBuf,
+}
+
+impl Arguments {
+    /// Serves the page until Ctrl-C.
+    ///
+    /// # Errors
+    /// A port that cannot be used, a device that cannot be reached.
+    pub fn run(self, console: &Console) -> Result<()> {
+        let first = self.port.map(Order::Connect).or(self.emulate.map(Order::Emulate));
+        let (send, stop) = tokio::sync::oneshot::channel::<()>();
+        let send = Arc::new(Mutex::new(Some(send)));
+        ctrlc::set_handler(move || {
+            if let Ok(mut send) = send.lock()
+                && let Some(send) = send.take()
+            {
+                let _ = send.send(());
+            }
+        })
+        .map_err(|e| Error::new(Code::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
+        let ready = |address: &str| {
+            console.result(format!("open {address}"));
+            console.note("Ctrl-C here, or closing the last page, vents and disarms the controller");
+        };
+        serve(self.web_port, self.output, first, ready, async {
+            let _ = stop.await;
+        })?;
+        console.note("ended; the controller is vented");
+        Ok(())
+    }
+}

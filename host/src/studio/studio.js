@@ -1,0 +1,157 @@
+"use strict";
+const $ = (id) => document.getElementById(id);
+
+// The token goes from the address into this page's memory, so that it stands in no history and no screenshot.
+const token = new URLSearchParams(location.search).get("token") || sessionStorage.getItem("token") || "";
+sessionStorage.setItem("token", token);
+history.replaceState(null, "", location.pathname + "?token=" + token);
+
+let hideMessage = 0;
+function message(text) {
+  $("message").textContent = text; $("message").hidden = false;
+  clearTimeout(hideMessage); hideMessage = setTimeout(() => { $("message").hidden = true; }, 9000);
+}
+
+async function send(path, body) {
+  let response;
+  try { response = await fetch(path, { method: "POST", headers: { "x-studio-token": token }, body }); }
+  catch { message("The program on this machine does not answer. Is `host studio` still running?"); return null; }
+  let value = null;
+  try { value = await response.json(); } catch { /* a refusal is plain text */ }
+  if (response.ok) return value === null ? true : value;
+  message(value ? value.error + (value.at ? "\nat " + value.at : "") + (value.help ? "\n→ " + value.help : "") : "refused");
+  return null;
+}
+const order = (what, more = {}) => send("/api/order", JSON.stringify({ do: what, ...more }));
+
+// Live.
+const ring = new Ring(40000, ["t", "F", "P", "x", "c", "a", "m"]);
+const scopes = [
+  new Scope($("p-force"), ring, [["m", "--s2"], ["a", "--s1"], ["F", "--s0"]]),
+  new Scope($("p-pressure"), ring, [["c", "--s1"], ["P", "--s0"]]),
+  new Scope($("p-stroke"), ring, [["x", "--s0"]]),
+];
+const loop = new Axes($("p-loop"));
+let held = false, fresh = false, mode = "", samples = 0, state = {};
+
+function frame() {
+  requestAnimationFrame(frame);
+  if (!fresh || held) return;
+  fresh = false;
+  const seconds = Number($("window").value);
+  scopes[0].curves = mode === "force" ? [["m", "--s2"], ["a", "--s1"], ["F", "--s0"]] : [["m", "--s2"], ["F", "--s0"]];
+  scopes[1].curves = mode === "pressure" ? [["a", "--s2"], ["c", "--s1"], ["P", "--s0"]] : [["c", "--s1"], ["P", "--s0"]];
+  scopes[2].curves = mode === "stroke" ? [["a", "--s1"], ["x", "--s0"]] : [["x", "--s0"]];
+  for (const s of scopes) s.draw(seconds);
+  const from = ring.since(ring.last("t") - seconds), every = Math.max(1, Math.floor((ring.length - from) / 2000)), xs = [], ys = [];
+  for (let i = from; i < ring.length; i += every) { xs.push(ring.get("x", i)); ys.push(ring.get("F", i)); }
+  loop.begin(...extent(xs), ...extent(ys)); loop.line(xs, ys, "--s0", 1.2); loop.end();
+}
+requestAnimationFrame(frame);
+setInterval(() => { $("rate").textContent = state.connected ? `${samples} samples/s, ${state.lost || 0} lost` : ""; samples = 0; }, 1000);
+
+function show(s) {
+  state = s;
+  const running = s.state === "running" ? `running, ${s.mode}` : s.state;
+  $("state").textContent = s.connected ? running : "not connected";
+  $("state").className = "state " + (s.connected ? s.state : "");
+  $("device").textContent = s.connected ? `${s.board}${s.emulated ? ", emulated in " + s.emulated.replace("in ", "") : ""}, release ${s.release}, ${s.port}` : "";
+  $("fault").hidden = !(s.connected && s.fault); $("fault-text").textContent = s.fault || "";
+  const on = (id, yes) => { $(id).disabled = !yes; };
+  on("disconnect", s.connected); on("arm", s.state === "disarmed"); on("follow", s.state === "armed" || s.state === "running");
+  on("record", s.connected); on("mishap", !!s.emulated); on("set", s.connected); on("show", s.connected); on("difference", s.connected);
+  if (!s.connected) on("flash", false);
+  $("record").firstChild.textContent = s.recording === null || s.recording === undefined ? "Record " : `Stop (${s.recording} rows) `;
+}
+show({ connected: false });
+
+async function listen() {
+  for (;;) {
+    try {
+      const response = await fetch("/api/stream", { headers: { "x-studio-token": token } });
+      if (!response.ok) { message("The token is old: open the address that `host studio` printed."); return; }
+      const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
+      for (let rest = ""; ;) {
+        const { value, done } = await reader.read();
+        if (done) break;
+        const lines = (rest + value).split("\n"); rest = lines.pop();
+        for (const line of lines) {
+          const m = JSON.parse(line);
+          if (m.k === "t") {
+            if (ring.length && m.t[0] < ring.last("t")) ring.clear();
+            ring.push(m, m.t.length); samples += m.t.length; mode = m.mode; fresh = true;
+          } else if (m.k === "s") show(m);
+          else if (m.k === "e") message(m.text + (m.help ? "\n→ " + m.help : ""));
+        }
+      }
+    } catch { /* the connection broke: try again */ }
+    show({ connected: false });
+    await new Promise((go) => setTimeout(go, 1000));
+  }
+}
+listen();
+
+// Controller.
+const vent = () => order("vent");
+const click = (id, act) => $(id).addEventListener("click", act);
+click("vent", vent);
+click("connect", () => order("connect", { port: $("port").value }));
+click("disconnect", () => order("disconnect"));
+click("emulate", async () => { message("starting …"); const r = await order("emulate", { muscle: $("bench").value }); if (r) message("connected: " + r.controller); });
+$("mishap").addEventListener("change", () => order("mishap", { code: Number($("mishap").value) }));
+click("arm", () => order("arm"));
+click("follow", () => order("follow", { quantity: $("quantity").value, course: $("course").value }));
+click("record", async () => { if (typeof state.recording === "number") { const r = await order("end-record"); if (r) recordings(r); } else order("record"); });
+click("clear", () => order("clear"));
+click("hold", () => { held = !held; $("hold").firstChild.textContent = held ? "Go on " : "Hold picture "; });
+const settings = async (set) => { const r = await order("settings", { set }); if (r) { $("settings").hidden = false; $("settings").textContent = JSON.stringify(r, null, 1); if (set.length) message("written and read back"); } };
+click("set", () => settings([$("key").value + "=" + $("value").value]));
+click("show", () => settings([]));
+
+document.addEventListener("keydown", (event) => {
+  // Escape vents wherever the cursor is; letters only where nothing is being written.
+  if (event.key === "Escape") { event.preventDefault(); vent(); return; }
+  if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName)) return;
+  const button = { v: "vent", a: "arm", f: "follow", r: "record", h: "hold" }[event.key.toLowerCase()];
+  if (button && !$(button).disabled) $(button).click();
+});
+
+// Recordings.
+function recordings(r) {
+  $("list").replaceChildren(...r.recordings.map((name, number) => {
+    const item = document.createElement("li"), button = document.createElement("button");
+    button.type = "button"; button.textContent = name; button.addEventListener("click", () => view(number)); item.append(button); return item;
+  }));
+  for (const id of ["a", "b"]) $(id).replaceChildren(...r.recordings.map((name, number) => new Option(name, number)));
+  if (r.recordings.length > 1) $("b").value = "1";
+  if (r.muscle) $("muscle").value = r.muscle;
+}
+async function view(number) {
+  const r = await order("curves", { number });
+  if (!r) return;
+  $("view-figure").hidden = false; $("view-title").textContent = `${r.name}: ${r.rows} rows, ${r.F ? "force (N)" : "pressure (kPa)"} over time (s)`;
+  const y = r.F || r.P, axes = new Axes($("p-view"));
+  axes.begin(...extent(r.t), ...extent(y)); axes.line(r.t, y, "--s0", 1.2); axes.end();
+}
+$("files").addEventListener("change", async () => {
+  for (const file of $("files").files) { const r = await send("/api/recording?name=" + encodeURIComponent(file.name), file); if (r) recordings(r); }
+  $("files").value = "";
+});
+click("example", async () => { message("recording on the virtual bench …"); const r = await order("example", { muscle: $("bench").value }); if (r) { recordings(r); message(r.recordings.length + " recordings loaded"); } });
+const text = (id, value) => { $(id).hidden = false; $(id).textContent = value; };
+click("compare", async () => { const r = await order("compare", { a: Number($("a").value), b: Number($("b").value) }); if (r) text("comparison", r.text); });
+click("fit", async () => {
+  message("fitting …");
+  const r = await order("fit", { muscle: $("muscle").value });
+  if (!r) return;
+  $("message").hidden = true; text("fit-text", r.text); $("lines-figure").hidden = false;
+  const axes = new Axes($("p-lines")), n = r.lines.length, ink = (i) => `hsl(${220 - 190 * i / Math.max(1, n - 1)} 70% 52%)`;
+  axes.begin(...extent(...r.lines.map((l) => l.x)), ...extent(...r.lines.map((l) => l.F)));
+  r.lines.forEach((l, i) => axes.dots(l.x, l.F, ink(i))); r.lines.forEach((l, i) => axes.line(l.mx, l.mF, ink(i), 1.6));
+  axes.end();
+});
+click("diagnose", async () => { message("diagnosing …"); const r = await order("diagnose", { muscle: $("muscle").value }); if (r) { $("message").hidden = true; text("diagnosis", r.text); } });
+click("difference", async () => { const r = await order("difference"); if (r) { text("difference-text", r.text); $("flash").disabled = false; } });
+click("flash", async () => { const r = await order("flash"); if (r) { $("flash").disabled = true; message(`written and read back: ${r.bytes} bytes, check sum ${r.crc}`); } });
+order("recordings").then((r) => { if (r) recordings(r); });
+order("ports").then((r) => { if (Array.isArray(r)) $("ports").replaceChildren(...r.map((p) => new Option(p))); });
