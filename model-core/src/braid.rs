@@ -155,7 +155,7 @@ impl<T: Scalar> Braid<T> {
     /// ```
     /// Beyond the fibre's length (`L ≥ B`, pulled straight) and where the bladder would fill the whole sleeve, the
     /// roots' arguments are held at zero: the result stays finite there, but has no physical meaning.
-    #[inline]
+    #[inline(always)]
     pub fn posture(&self, stroke: Length<T>) -> Posture<T> {
         let length = self.rest_length - stroke.si();
         let radius = (self.fibre_squared - length * length).max(T::ZERO).sqrt() * self.inv_two_pi_turns;

@@ -129,7 +129,7 @@ impl<T: Scalar> Muscle<T> {
     }
 
     /// The muscle at one contraction stroke.
-    #[inline]
+    #[inline(always)]
     pub fn held(&self, stroke: Length<T>) -> Held<T> {
         let posture = self.braid.posture(stroke);
         let mut columns = [T::ZERO; MAX_ORDER];

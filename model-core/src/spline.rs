@@ -102,7 +102,7 @@ impl<T: Scalar> Nodes<T> {
     }
 
     /// The segment that `p` lies in.
-    #[inline]
+    #[inline(always)]
     pub fn place(&self, p: T) -> Place<T> {
         let last = self.segments() - 1;
         let mut index = 0;

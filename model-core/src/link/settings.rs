@@ -203,11 +203,11 @@ impl Default for Settings {
             regulator: Regulator {
                 gain: 1.0,
                 offset_pa: 0.0,
-                lag_s: 0.02,
+                lag_s: 0.03,
                 rate_pa_per_s: 20e6,
                 deadband_pa: 0.0,
                 command_max_pa: 650e3,
-                lead: 0.0,
+                lead: 1.0,
             },
             limits: Limits {
                 pressure_pa: 700e3,

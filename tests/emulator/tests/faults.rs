@@ -159,10 +159,11 @@ fn every_fault_of_the_plant_is_noticed_in_time_and_latched() {
         assert_eq!(client.try_call::<Arm>(&()).expect("an answer"), Err(Refusal::Latched(fault)));
         assert_eq!(client.call::<GetStatus>(&()).expect("a status").state, State::Fault);
         let faults = client.call::<GetFaults>(&()).expect("its faults");
-        assert_eq!(faults.latched, Some(report));
+        // Compared as text: a reading that is no number is not equal to itself.
+        assert_eq!(format!("{:?}", faults.latched), format!("{:?}", Some(report)));
         assert!(faults.counts[usize::from(fault.code())] >= 1);
         let past = client.call::<GetPastFault>(&PastFault { back: 0 }).expect("the log");
-        assert_eq!(past, Some(report), "it is kept");
+        assert_eq!(format!("{past:?}"), format!("{:?}", Some(report)), "it is kept");
         pass(&station, 30);
         client.call::<ClearFault>(&()).expect("it clears when the cause is gone");
         assert_eq!(client.call::<GetStatus>(&()).expect("a status").state, State::Disarmed);

@@ -1,0 +1,159 @@
+//! The control step on the plant, as physical statements, without the emulator.
+
+use emulator_tests::closed_loop::{self, Loop, Tick, rms};
+use emulator_tests::fitting;
+use model_core::link::messages::{Mode, Reference, SetPoint};
+use model_core::link::settings::{FeedForward, Settings};
+use model_core::muscle::Muscle;
+use model_core::table::MuscleTable;
+use model_core::units::{Length, Pressure};
+use virtual_bench::bench::BenchSpec;
+use virtual_bench::muscle::MuscleSpec;
+use virtual_bench::plant::Motion;
+use virtual_bench::presets;
+
+/// A muscle moved at 0.3 Hz over the first third of its free contraction, at a force of 40 % ± 15 % of blocked.
+struct Task {
+    spec: MuscleSpec,
+    table: MuscleTable,
+    motion: Motion,
+}
+
+impl Task {
+    fn of(spec: MuscleSpec) -> Self {
+        let table = fitting::fitted(&spec);
+        let rest_mm = f64::from(table.geometry.rest_length.si()) * 1e3;
+        let reach = f64::from(table.tested.contraction_high);
+        let motion = Motion::Sine {
+            mean_mm: 0.22 * reach * rest_mm,
+            amplitude_mm: 0.12 * reach * rest_mm,
+            frequency_hz: 0.3,
+        };
+        Self { spec, table, motion }
+    }
+
+    fn blocked(&self) -> f64 {
+        f64::from(self.table.blocked_force.newtons())
+    }
+
+    fn slope(&self) -> f32 {
+        Muscle::<f32>::build(&self.table).expect("valid").braid().posture(Length::ZERO).area
+    }
+
+    fn settings(&self, mut settings: Settings) -> Settings {
+        settings.limits.force_n = 2.0 * self.table.blocked_force.newtons();
+        settings
+    }
+
+    /// Rms error in % of blocked force for a sine of a frequency.
+    fn sine(&self, settings: Settings, frequency_hz: f32) -> f64 {
+        let bench = BenchSpec::laboratory(self.spec.clone(), 11);
+        let mut control =
+            Loop::start(&bench, &self.motion, &self.table, self.settings(settings), Mode::Force);
+        let blocked = self.table.blocked_force.newtons();
+        control.wave(Reference::Sine { mean: 0.4 * blocked, amplitude: 0.15 * blocked, frequency_hz });
+        control.run(700);
+        100.0 * rms(&control.run(4000), |tick| tick.force) / self.blocked()
+    }
+}
+
+#[test]
+fn feed_forward_by_the_table_beats_the_ideal_braid_and_pi_on_every_muscle() {
+    let mut failures = Vec::new();
+    for spec in [presets::miniature(), presets::contractile(), presets::push()] {
+        let name = spec.name.clone();
+        let task = Task::of(spec);
+        for hz in [0.5, 1.0] {
+            let table = task.sine(closed_loop::forward(FeedForward::Table), hz);
+            let gaylord = task.sine(closed_loop::forward(FeedForward::Gaylord), hz);
+            let pi = task.sine(closed_loop::pi_alone(task.slope()), hz);
+            eprintln!("{name} at {hz} Hz: table {table:.2} %, Gaylord {gaylord:.2} %, PI {pi:.2} %");
+            if !(table < 2.0 && gaylord > 3.0 * table) {
+                failures.push((name.clone(), hz, table, gaylord, pi));
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{failures:?}");
+}
+
+#[test]
+fn a_trim_on_the_load_cell_takes_away_what_a_wrong_table_leaves() {
+    let task = Task::of(presets::miniature());
+    let mut softer = task.table.clone();
+    for curve in &mut softer.elastic {
+        for modulus in curve.iter_mut() {
+            *modulus *= 0.8;
+        }
+    }
+    let wrong = Task { table: softer, spec: task.spec.clone(), motion: task.motion.clone() };
+    let alone = wrong.sine(closed_loop::forward(FeedForward::Table), 0.5);
+    let mut trimmed = closed_loop::forward(FeedForward::Table);
+    trimmed.force_loop.integral_pa_per_n_s = 25.0 / task.slope();
+    trimmed.force_loop.trim_limit_pa = 100e3;
+    let with_trim = wrong.sine(trimmed, 0.5);
+    eprintln!("bladder 20 % stiffer than its table: {alone:.2} % alone, {with_trim:.2} % with trim");
+    assert!(with_trim < 0.7 * alone && with_trim < 2.0);
+}
+
+#[test]
+fn stroke_is_reached_against_a_spring_without_a_lasting_error() {
+    let task = Task::of(presets::miniature());
+    let bench = BenchSpec::laboratory(task.spec.clone(), 5);
+    let load = Motion::Load { mass: 0.5, spring: 10.0, preload: 5.0, damper: 0.05 };
+    let mut control = Loop::start(&bench, &load, &task.table, Settings::default(), Mode::Stroke);
+    for millimetres in [0.8_f32, 1.6, 0.4] {
+        control.point(SetPoint::Stroke(millimetres * 1e-3));
+        control.run(1500);
+        let error = rms(&control.run(1000), |tick| tick.stroke);
+        eprintln!("stroke of {millimetres} mm: rms error {:.3} mm", error * 1e3);
+        assert!(error < 0.05e-3, "{error}");
+    }
+}
+
+#[test]
+fn ten_minutes_without_a_missed_tick_a_drift_or_a_leak() {
+    let task = Task::of(presets::miniature());
+    let bench = BenchSpec::laboratory(task.spec.clone(), 9);
+    let settings = task.settings(closed_loop::forward(FeedForward::Table));
+    let mut control = Loop::start(&bench, &task.motion, &task.table, settings, Mode::Force);
+    let blocked = task.table.blocked_force.newtons();
+    control.wave(Reference::Sine { mean: 0.4 * blocked, amplitude: 0.15 * blocked, frequency_hz: 0.5 });
+    control.run(1000);
+    let first: Vec<Tick> = control.run(10_000);
+    // PAM_LONG=1 makes it a day.
+    let ticks = if std::env::var_os("PAM_LONG").is_some() { 86_400_000 } else { 60_000 };
+    for _ in 0..ticks / 10_000 {
+        control.run(10_000);
+    }
+    let last = control.run(10_000);
+    let (before, after) = (rms(&first, |tick| tick.force), rms(&last, |tick| tick.force));
+    assert!((after - before).abs() < 0.25 * before, "{before} N at first, {after} N at last");
+    assert_eq!(control.controller.overruns(), 0);
+    let expected = 1 + 1000 + 10_000 + ticks / 10_000 * 10_000 + 10_000;
+    assert_eq!(control.controller.ticks(), u64::from(expected), "time is counted in ticks");
+}
+
+#[test]
+fn the_highest_pressure_of_the_table_is_never_passed() {
+    let task = Task::of(presets::miniature());
+    let bench = BenchSpec::laboratory(task.spec.clone(), 2);
+    let mut control = Loop::start(
+        &bench,
+        &Motion::Held { stroke_mm: 1.0 },
+        &task.table,
+        task.settings(Settings::default()),
+        Mode::Force,
+    );
+    control.point(SetPoint::Force(1e5));
+    let highest = control.run(2000).iter().map(|tick| tick.command).fold(0.0, f64::max);
+    let limit = f64::from(task.table.max_pressure.pascals());
+    assert!(highest <= limit + 1.0, "{highest}");
+    assert!(control.controller.saturated_ticks() > 1000);
+    let force = Muscle::<f64>::build(&task.table).expect("valid").force(
+        Pressure::from_pascals(limit),
+        Length::from_millimetres(1.0),
+        0.0,
+    );
+    let settled = control.run(100).last().map_or(0.0, |tick| tick.force);
+    assert!(settled < 1.15 * force.newtons(), "{settled} N");
+}
