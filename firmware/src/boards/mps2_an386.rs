@@ -18,6 +18,9 @@ mod uart;
 use core::panic::PanicInfo;
 
 use cortex_m::peripheral::NVIC;
+#[cfg(feature = "log")]
+use defmt_semihosting as _;
+
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
