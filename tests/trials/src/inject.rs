@@ -84,6 +84,7 @@ impl Injection {
             "contact-loss" => 4.0,
             "mullins-softening" => 4.0,
             "cyclic-softening" => 8.0,
+            "breakaway-friction" => 8.0,
             "clipped-cell" => 1.0,
             _ => 60.0,
         }

@@ -46,8 +46,8 @@ pub struct Spec {
     pub seed: u64,
     /// Part of the rows that is lost, for uneven sampling.
     pub lost_rows: f64,
-    /// Errors of ruler and protractor: relative length, and angle in degrees.
-    pub measured: (f64, f64),
+    /// Extra noise per file, parts of the force's noise: every level is as loud as it likes.
+    pub uneven_noise: f64,
 }
 
 /// Numbers of trials per stratum.
@@ -198,7 +198,7 @@ fn one(
         i.pressure.outliers = (r.log_range(1e-4, 1e-3), r.range(5.0, 15.0));
         i.stroke.white *= r.range(1.0, 4.0);
     }
-    let measured = if nasty { (0.002 * r.normal(), 0.1 * r.normal()) } else { (0.0, 0.0) };
+    let uneven_noise = if nasty { r.range(0.0, 3.0) } else { 0.0 };
     let lost_rows = if nasty && r.chance(0.6) { r.range(0.02, 0.3) } else { 0.0 };
     let effects = names
         .iter()
@@ -212,7 +212,7 @@ fn one(
             (Injection::new(name, r.bits()), size)
         })
         .collect();
-    Spec { id, stratum, protocol, effects, looks_like, bench, seed, lost_rows, measured }
+    Spec { id, stratum, protocol, effects, looks_like, bench, seed, lost_rows, uneven_noise }
 }
 
 #[cfg(test)]
