@@ -64,6 +64,18 @@ impl Shared {
     /// counted: the loop never waits for the link.
     pub fn step(&self, inputs: &crate::board::Inputs) -> Outputs {
         let Stepped { outputs, telemetry, event } = self.with(|controller| controller.step(inputs));
+        #[cfg(feature = "log")]
+        match &event {
+            Some(Event::Fault(report)) => {
+                defmt::warn!("fault {} at {} us", report.fault.code(), report.time_us);
+            }
+            Some(Event::State(state)) => defmt::info!("state {}", *state as u8),
+            Some(Event::TraceFull) => defmt::info!("trace full"),
+            None => {}
+        }
+        if event.is_some() {
+            self.changed.signal(());
+        }
         let said =
             [event.map(Spoken::Event), telemetry.map(|(number, sample)| Spoken::Sample(number, sample))];
         for spoken in said.into_iter().flatten() {
@@ -152,5 +164,44 @@ pub async fn telemetry<W: Write>(sender: &Gate<CriticalSectionRawMutex, W>, shar
         if sender.lock().await.write_all(&out[..length]).await.is_err() {
             return;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::board::{Inputs, Readings};
+
+    #[test]
+    fn a_change_of_state_wakes_the_link_to_keep_what_must_not_be_lost() {
+        let shared = Shared::new(Settings::default());
+        let inputs = Inputs { sides: [Some(Readings::default()), None], ..Inputs::default() };
+        shared.step(&inputs);
+        assert!(!shared.has_changed());
+        assert_eq!(shared.with(Controller::arm), Ok(()));
+        shared.step(&inputs);
+        assert!(shared.has_changed());
+        assert!(!shared.has_changed(), "once for each change");
+    }
+
+    #[test]
+    fn samples_without_room_are_dropped_counted_and_leave_a_gap_in_their_numbers() {
+        let shared = Shared::new(Settings::default());
+        shared.with(|controller| controller.set_telemetry(1));
+        for _ in 0..WAITING + 5 {
+            shared.step(&Inputs::default());
+        }
+        assert_eq!(shared.telemetry_dropped(), 5);
+        let mut out = [0; MAX_WIRE];
+        let mut accumulator = Accumulator::new();
+        let mut number = |shared: &Shared| {
+            let length = shared.next_spoken(&mut out)?;
+            out[..length].iter().find_map(|&byte| Some(accumulator.push(byte)?.ok()?.header.sequence))
+        };
+        assert_eq!(number(&shared), Some(0));
+        shared.step(&Inputs::default());
+        let rest: std::vec::Vec<_> = core::iter::from_fn(|| number(&shared)).collect();
+        assert_eq!(rest.last().copied(), Some(WAITING as u16 + 5));
+        assert_eq!(rest.len(), WAITING);
     }
 }
