@@ -1,0 +1,106 @@
+"""The notebook of the book, cell by cell, on recordings of the virtual bench.
+
+    python -m pytest host/python/tests      # or: python host/python/tests/test_notebook.py BENCH_FOLDER
+
+BENCH_FOLDER is made by `virtual-bench record --muscle mini --protocol thesis -o BENCH_FOLDER`; the environment variable
+PAM_BENCH names it for pytest.
+"""
+
+import os
+import pathlib
+import sys
+import tempfile
+
+import numpy as np
+import pamtools as pam
+
+
+def bench():
+    folder = pathlib.Path(os.environ.get("PAM_BENCH", "bench"))
+    assert (folder / "muscle.toml").exists(), f"no recordings in {folder}; see the head of this file"
+    return folder
+
+
+def everything():
+    folder = bench()
+    muscle = pam.Muscle.read(folder / "muscle.toml")
+    return muscle, pam.read(sorted(folder.glob("*.csv")), muscle)
+
+
+def test_recordings_are_arrays_in_si():
+    muscle, campaign = everything()
+    first = campaign.recordings[0]
+    assert isinstance(first.force, np.ndarray) and first.force.dtype == np.float64
+    assert len(first) == first.time.size == first.pressure.size
+    assert np.all(np.diff(first.time) > 0)
+    assert 1e5 < np.median(first.pressure) < 1e6, "pascals"
+    assert first.stroke.max() < 0.2 * muscle.rest_length, "metres"
+
+
+def test_a_fit_predicts_a_pressure_it_has_not_seen():
+    muscle, campaign = everything()
+    seen = pam.Campaign([r for i, r in enumerate(campaign.recordings) if i != 2])
+    fit = pam.fit(seen, muscle)
+    unseen = campaign.recordings[2]
+    (model,) = fit.table.predict(pam.Campaign([unseen]))
+    rms = np.sqrt(np.mean((unseen.force - model) ** 2))
+    assert rms < 0.02 * fit.summary["blocked_force_N"], rms
+    assert 6e4 < fit.table.deadband < 9e4
+    assert fit.summary["schema"] == "pam-fit/1"
+
+
+def test_the_table_is_evaluated_kept_and_read_back():
+    muscle, campaign = everything()
+    table = pam.fit(campaign, muscle).table
+    stroke = np.linspace(0, 0.04 * muscle.rest_length, 50)
+    shortening, lengthening = (table.force(np.full(50, 400e3), stroke, d) for d in (1, -1))
+    assert np.all(shortening < lengthening), "friction opposes motion"
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "mini.pam")
+        table.write(path)
+        again = pam.Table.read(path)
+        np.testing.assert_array_equal(again.force(np.full(50, 400e3), stroke, 1), shortening)
+
+
+def test_own_arrays_become_a_recording():
+    muscle, campaign = everything()
+    r = campaign.recordings[0]
+    own = pam.Recording("own", r.time, r.pressure, r.stroke, r.force)
+    np.testing.assert_array_equal(own.force, r.force)
+    fit = pam.fit(pam.Campaign([own]), muscle)
+    assert fit.summary["samples"] == len(r)
+
+
+def test_what_is_wrong_is_said():
+    time = np.arange(20.0)
+    try:
+        pam.Recording("back", time[::-1].copy(), time, time)
+    except pam.PamError as error:
+        assert error.args[1] == "recording::time-order"
+    else:
+        raise AssertionError("time that goes backwards was taken")
+    try:
+        pam.Muscle("m", -1.0, 77.4, 3.0, 0.5)
+    except ValueError as error:
+        assert "rest_length_mm" in str(error)
+    else:
+        raise AssertionError("a negative length was taken")
+
+
+def test_a_diagnosis_is_a_dict_and_a_report():
+    muscle, campaign = everything()
+    with tempfile.TemporaryDirectory() as folder:
+        report = os.path.join(folder, "why.html")
+        answer = pam.diagnose(campaign, muscle, report=report)
+        assert answer["schema"] == "pam-diagnose/1"
+        assert answer["verdict"] in {"consistent", "explained", "partly-explained", "unexplained"}
+        assert open(report, encoding="utf-8").read().startswith("<!DOCTYPE html>")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        os.environ["PAM_BENCH"] = sys.argv[1]
+    for name, test in list(globals().items()):
+        if name.startswith("test_"):
+            test()
+            print(name, "ok")
