@@ -256,8 +256,8 @@ impl Qemu {
                 .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"])
                 .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
                 .arg(&image)
-                .args(["-serial", &format!("tcp:127.0.0.1:{link_port},server=on,wait=off")])
-                .args(["-serial", &format!("tcp:127.0.0.1:{bench_port}"), "-serial", "null"])
+                .args(["-serial", &format!("tcp:127.0.0.1:{link_port},server=on,wait=off,nodelay=on")])
+                .args(["-serial", &format!("tcp:127.0.0.1:{bench_port},nodelay=on"), "-serial", "null"])
                 // The store's file is made where the emulator runs.
                 .current_dir(&folder)
                 .stdin(Stdio::null())

@@ -89,7 +89,7 @@ class Scope {
     let low = Infinity, high = -Infinity;
     for (const [name] of this.curves) for (let i = from; i < r.length; i++) { const v = r.get(name, i); if (v < low) low = v; if (v > high) high = v; }
     if (low > high) { low = 0; high = 1; }
-    const { X, Y, left, right } = this.axes.begin(end - seconds, end, low, high, (v, d) => v.toFixed(d) + " s");
+    const { X, Y, left, right } = this.axes.begin(Math.max(0, end - seconds), Math.max(end, seconds), low, high, (v, d) => v.toFixed(d) + " s");
     const g = this.axes.g, width = Math.max(1, Math.round(right - left));
     for (const [name, ink] of this.curves) {
       g.strokeStyle = colour(ink); g.lineWidth = 1.5; g.beginPath();

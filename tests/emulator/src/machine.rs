@@ -180,7 +180,7 @@ impl Machine {
             .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"])
             .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
             .arg(image)
-            .args(["-chardev", &format!("socket,id=link,host=127.0.0.1,port={link_port}")])
+            .args(["-chardev", &format!("socket,id=link,host=127.0.0.1,port={link_port},nodelay=on")])
             .args(["-serial", "chardev:link"]);
         let mut plugged = Vec::new();
         for (number, station) in [options.first, options.second].into_iter().enumerate() {
@@ -188,7 +188,7 @@ impl Machine {
                 Some(station) => {
                     let (bench, port) = listener();
                     command
-                        .args(["-chardev", &format!("socket,id=bench{number},host=127.0.0.1,port={port}")])
+                        .args(["-chardev", &format!("socket,id=bench{number},host=127.0.0.1,port={port},nodelay=on")])
                         .args(["-serial", &format!("chardev:bench{number}")]);
                     plugged.push((bench, station));
                 }
