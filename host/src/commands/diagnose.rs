@@ -9,6 +9,7 @@ use model_core::muscle::Muscle;
 use model_core::units::{Angle, Length};
 
 use super::recordings::Recordings;
+use super::reports::Reports;
 use crate::console::Console;
 use crate::diagnose::{self, Options, advise, model, summary::summary};
 use crate::error::Result;
@@ -39,9 +40,8 @@ pub struct Arguments {
     /// Write the answer as JSON; `-` is standard output.
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
-    /// Write the answer as one page with pictures.
-    #[arg(long, value_name = "F.html")]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    reports: Reports,
     /// Write the protocol of the recording that would tell confusable effects apart.
     #[arg(long, value_name = "P.toml")]
     next: Option<PathBuf>,
@@ -88,9 +88,7 @@ impl Arguments {
         if let Some(path) = &self.json {
             write_whole(path, (answer.to_json() + "\n").as_bytes())?;
         }
-        if let Some(path) = &self.report {
-            write_whole(path, diagnose_page::page(&answer, &geometry).html().as_bytes())?;
-        }
+        self.reports.write(console, || diagnose_page::page(&answer, &geometry))?;
         if self.json.as_deref() != Some(std::path::Path::new("-")) {
             console.result(summary(&answer).trim_end());
         }
