@@ -11,7 +11,38 @@
 //! evaluates the terms as regressors to find out which effect a recording shows, the controller adds them to its
 //! feed-forward, and `predict` runs them over a recording.
 //!
-//! Adding an effect: write its file, and and add it to the list below.
+//! A controller's tick, with a table that carries one effect:
+//!
+//! ```
+//! use model_core::effects::{Chain, EffectName, FittedEffect};
+//! use model_core::motion::{MotionSettings, MotionTracker};
+//! use model_core::muscle::Muscle;
+//! use model_core::units::{Force, Length, Pressure};
+//!
+//! let mut table = model_core::table::example();
+//! let relaxing = FittedEffect::new(EffectName::StressRelaxation, &[0.2, 0.0, 0.0, 10.0]);
+//! table.effects.push(relaxing).expect("room for four");
+//! let muscle = Muscle::<f32>::build(&table).expect("a valid table");
+//! let mut chain = Chain::resumed(&table.effects);
+//! let mut tracker = MotionTracker::new(MotionSettings::default());
+//! let mut command = Pressure::from_kilopascals(300.0);
+//! let wanted = Force::from_newtons(30.0);
+//! for tick in 0..=1000 {
+//!     let stroke = 1.0e-6 * tick as f32; // 1 mm in a second
+//!     let motion = tracker.step(1.0e-3, stroke, command.pascals());
+//!     let held = muscle.held(Length::from_metres(motion.stroke));
+//!     let context = muscle.context_held(&held, motion, command);
+//!     chain.step(&context);
+//!     command = muscle.pressure_with(wanted, &held, &chain, &context, command, &muscle.search()).pressure;
+//! }
+//! // A tenth of the time constant has gone by: most of the over-stress is still there, and costs pressure.
+//! let held = muscle.held(Length::from_metres(1.0e-3_f32));
+//! let settled = muscle.pressure_for(wanted, &held, 1.0, command, &muscle.search());
+//! let more = command.pascals() - settled.pressure.pascals();
+//! assert!(more > 1.0e3 && more < 30.0e3, "{more} Pa");
+//! ```
+//!
+//! Adding an effect: write its file, and add it to the list below.
 
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
