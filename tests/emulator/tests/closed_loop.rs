@@ -121,7 +121,7 @@ fn stroke_is_reached_against_a_spring_without_a_lasting_error() {
 }
 
 #[test]
-fn ten_minutes_without_a_missed_tick_a_drift_or_a_leak() {
+fn a_minute_without_a_missed_tick_a_drift_or_a_leak() {
     let task = Task::of(presets::miniature());
     let bench = BenchSpec::laboratory(task.spec.clone(), 9);
     let settings = task.settings(closed_loop::forward(FeedForward::Table));
