@@ -33,6 +33,8 @@ pub mod planned;
 mod rows;
 mod select;
 pub mod summary;
+#[cfg(test)]
+mod tests;
 pub mod verdict;
 
 pub use answer::{Options, diagnose};

@@ -117,6 +117,11 @@ fn over_pressure(rows: &Rows, kind: Kind) -> OverPressure {
     }
 }
 
+/// Where the friction's coefficients begin in a solution: behind `P0`, the elastic and the Yeoh ones.
+fn first_friction_of(order: usize, per_order: usize, yeoh: usize) -> usize {
+    1 + order * per_order + yeoh
+}
+
 /// Fits a baseline together with given effect columns (N per unit amplitude, unweighted).
 pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
     let n = rows.len();
@@ -149,6 +154,16 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
         for f in &functions.friction {
             columns.push((0..n).map(|i| -live[i] * rows.contexts[i].direction * quasi[i] * f[i]).collect());
         }
+        // At a few held lengths a tenth of a degree in the braid's angle, or a millimetre in the mounting, cannot be told from a
+        // scale of the effective area; where the muscle moves it shows in the shape and is held against the geometry.
+        let scaled = rows.isometric;
+        if scaled {
+            columns
+                .push((0..n).map(|i| factor[i] * rows.shapes[i].area * rows.contexts[i].pressure).collect());
+            columns.push(
+                (0..n).map(|i| factor[i] * rows.shapes[i].area_slope * rows.contexts[i].pressure).collect(),
+            );
+        }
         // A settling that is not quite exponential.
         let settles = rows.settling.iter().any(|s| *s != 0.0);
         if settles {
@@ -166,17 +181,22 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
         let solution = basis.solve(&y);
         let deadband = solution[0];
         // The model itself, not its linearisation, is what the residual is taken from.
-        let first_friction = 1 + order * per_order + yeoh;
+        let first_friction = first_friction_of(order, per_order, yeoh);
         let settling_share = if settles { solution[own - 1] } else { 0.0 };
-        for (c, d) in friction_coefficients.iter_mut().zip(&solution[first_friction..own]) {
+        let first_scale = first_friction_of(order, per_order, yeoh) + functions.friction.len();
+        let scale = if scaled { [solution[first_scale], solution[first_scale + 1]] } else { [0.0; 2] };
+        for (c, d) in friction_coefficients
+            .iter_mut()
+            .zip(&solution[first_friction..first_friction + functions.friction.len()])
+        {
             *c += d;
         }
         let mut gaylord = vec![0.0; n];
         let mut stiffness = vec![0.0; n];
         for i in 0..n {
             let (shape, p) = (&rows.shapes[i], rows.contexts[i].pressure);
-            gaylord[i] = (p - deadband) * shape.area;
-            stiffness[i] = (p - deadband) * shape.area_slope;
+            gaylord[i] = (p - deadband + scale[0] * p) * shape.area + scale[1] * p * shape.area_slope;
+            stiffness[i] = (p - deadband + scale[0] * p) * shape.area_slope;
             let mut elastic = 0.0;
             for k in 0..order {
                 let e: f64 = functions
@@ -262,7 +282,7 @@ fn fade(rows: &mut Rows, time: f64) {
 pub(crate) fn settle_friction(rows: &mut Rows) -> Option<f64> {
     rows.settling = vec![0.0; rows.len()];
     let resting = rows.still.iter().zip(&rows.root_weight).filter(|(s, w)| **s > 1.0 && **w > 0.0).count();
-    if resting * 50 < rows.effective() {
+    if rows.isometric || resting * 50 < rows.effective() {
         return None;
     }
     let kind = Kind::Flexible(4);

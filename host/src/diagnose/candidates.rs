@@ -172,6 +172,8 @@ pub(crate) struct Trial {
     pub peak: f64,
 }
 
+/// An amplitude may exceed its known range by this factor.
+const BEYOND: f64 = 10.0;
 /// The least share of a column's energy outside the baseline for it to be judged at all.
 pub(crate) const INVISIBLE: f64 = 1e-5;
 
@@ -209,7 +211,12 @@ pub(crate) fn attempt(
     }
     let gram: Vec<Vec<f64>> = z.iter().map(|a| z.iter().map(|b| dot(a, b)).collect()).collect();
     let moment: Vec<f64> = z.iter().map(|a| dot(a, residual)).collect();
-    let (a, gain) = amplitudes(&gram, &moment, &signs, if candidate.info.alternatives { 1 } else { 6 });
+    let (a, mut gain) = amplitudes(&gram, &moment, &signs, if candidate.info.alternatives { 1 } else { 6 });
+    // Ten times beyond what anybody has seen is another thing under this name.
+    let known = candidate.info.parameters.iter();
+    if known.zip(&a).any(|(p, a)| a.abs() > BEYOND * p.low.abs().max(p.high.abs())) {
+        gain = 0.0;
+    }
     trial.gain = gain;
     for i in 0..rows.len() {
         let fitted: f64 = a.iter().zip(&z).map(|(a, z)| a * z[i]).sum();

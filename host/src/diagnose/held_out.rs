@@ -44,6 +44,7 @@ fn thin(rows: &Rows, traces: &[Vec<f64>]) -> (Rows, Vec<Vec<f64>>) {
         level: pick_u(&rows.level),
         levels: rows.levels.clone(),
         steady: rows.steady,
+        isometric: rows.isometric,
         sign: pick(&rows.sign),
         still: pick(&rows.still),
         settling: pick(&rows.settling),
@@ -100,11 +101,15 @@ pub(crate) fn held_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], noise: f64)
     let by_stroke =
         split("every fourth cycle predicted from the others, in turn", &thin, &|i| thin.block[i] / 2 % 4);
     let by_recording = split("each recording predicted from the others", &thin, &|i| thin.recording[i]);
+    let by_run =
+        split("every tenth recording predicted from the others, in turn", &thin, &|i| thin.recording[i] % 10);
     let quarter = thin.blocks.div_ceil(4).max(1) as u32;
     let by_time =
         split("each quarter of the time predicted from the rest", &thin, &|i| thin.block[i] / quarter);
     // A pressure left out needs a baseline that reaches over pressures.
-    let chosen = if matches!(kind, Kind::Stiff) && by_pressure.groups.len() >= 3 {
+    let chosen = if rows.isometric && rows.names.len() >= 4 {
+        by_run
+    } else if matches!(kind, Kind::Stiff) && by_pressure.groups.len() >= 3 {
         by_pressure
     } else if thin.blocks >= 16 {
         by_stroke

@@ -35,16 +35,22 @@ fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (c, _)| {
             (l.min(c.contraction), h.max(c.contraction))
         });
+    let top = rows.contexts.iter().map(|c| c.pressure).fold(1.0, f64::max);
     let width = ((range.1 - range.0) / 25.0).max(1e-6);
     let mut cells: BTreeMap<(u32, i8, i32, i32, u32), Cell> = BTreeMap::new();
     for i in 0..rows.len() {
         let c = &rows.contexts[i];
-        if rows.root_weight[i] > 0.0 && !rows.vented[i] && c.speed != 0.0 {
+        if rows.root_weight[i] > 0.0 && !rows.vented[i] && (c.speed != 0.0 || rows.isometric) {
             // Repeats at another speed are no repeats.
-            let speed = (c.speed.abs().ln() * 1.5).round() as i32;
+            // (At held length the place on the staircase takes the speed's part, and the run the cycle's.)
+            let speed = if rows.isometric {
+                (c.pressure / top * 40.0).round() as i32
+            } else {
+                (c.speed.abs().ln() * 1.5).round() as i32
+            };
+            let turn = if rows.isometric { rows.recording[i] } else { rows.cycle[i] };
             let bin = (c.contraction / width).round() as i32;
-            let cell =
-                cells.entry((rows.level[i], rows.sign[i] as i8, bin, speed, rows.cycle[i])).or_default();
+            let cell = cells.entry((rows.level[i], rows.sign[i] as i8, bin, speed, turn)).or_default();
             cell.sum += residual[i];
             cell.squares += residual[i] * residual[i];
             cell.count += 1.0;

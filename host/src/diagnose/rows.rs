@@ -172,7 +172,12 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
     let total = campaign.samples();
     let per_row = total.div_ceil(TARGET_ROWS).max(1);
     let mut rows = Rows { samples: total, has_temperature: total > 0, ..Rows::default() };
-    rows.isometric = strokes.1 - strokes.0 <= thresholds.stroke;
+    // Mounted at several lengths, but never moved while recording, is held all the same.
+    rows.isometric = campaign.recordings.iter().all(|r| {
+        let (low, high) =
+            r.stroke.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(*s), h.max(*s)));
+        !(high - low > 3.0 * thresholds.stroke.max(stroke_noise))
+    });
     let mut clock = 0.0;
     let mut turns_before = 0_u32;
     let mut piece_number = 0_u32;

@@ -23,6 +23,9 @@ pub(crate) const STATIC_PEAK: f64 = 0.025;
 const CONCEALED: f64 = 0.04;
 /// And it must move the fit by this much, rms as a share of the blocked force.
 const STATIC_MOVED: f64 = 3.5e-3;
+/// A trace that must be larger than this share of the blocked force to explain a small misfit is no explanation: nearly all of it
+/// would have to be cancelled by the tables.
+const LARGEST_PEAK: f64 = 0.25;
 /// At most so many effects are named.
 pub(crate) const MAX_NAMED: usize = 3;
 /// A further effect must take this share of all misfit above noise …
@@ -109,8 +112,9 @@ fn p_values(best: &[Trial], all: &[Trial]) -> Vec<f64> {
 }
 
 /// One step: every candidate beside the present baseline, the best refined.
-fn look(library: &[Candidate], rows: &Rows, base: &Baseline) -> (Vec<Trial>, Vec<f64>) {
-    let all = scan(library, rows, &base.basis, &base.residual);
+fn look(library: &[Candidate], rows: &Rows, base: &Baseline, blocked: f64) -> (Vec<Trial>, Vec<f64>) {
+    let mut all = scan(library, rows, &base.basis, &base.residual);
+    forbid_cancelling(&mut all, blocked);
     let mut best = best_of_each(&all, library);
     let mut order: Vec<usize> = (0..best.len()).collect();
     order.sort_by(|a, b| best[*b].gain.total_cmp(&best[*a].gain));
@@ -119,8 +123,18 @@ fn look(library: &[Candidate], rows: &Rows, base: &Baseline) -> (Vec<Trial>, Vec
             best[i] = refine(&best[i], library, rows, &base.basis, &base.residual);
         }
     }
+    forbid_cancelling(&mut best, blocked);
     let p = p_values(&best, &all);
     (best, p)
+}
+
+/// Takes away the gain of trials whose trace is implausibly large.
+fn forbid_cancelling(trials: &mut [Trial], blocked: f64) {
+    for t in trials {
+        if t.gain > 0.0 && t.peak > LARGEST_PEAK * blocked {
+            t.gain = 0.0;
+        }
+    }
 }
 
 /// Refits the baseline with the effects of `trials` beside it, renewing what the effects see of the model.
@@ -162,6 +176,10 @@ pub(crate) fn refit(
     (fitted, traces)
 }
 
+/// A rival of at least this weight against the winner is confusable with it.
+pub(crate) const CONFUSABLE: f64 = 0.1;
+/// With more rivals than this a name says nothing.
+const MOST_RIVALS: usize = 8;
 /// How much of the misfit two laws may differ by and still be equally believed, where the better one explains all …
 const TIE: f64 = 0.015;
 /// … and how that widens with what the better one leaves: a law that misses a third of the misfit is itself not exact, and small
@@ -234,7 +252,7 @@ pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step:
     let total_weight = weight;
     let noise_energy = noise.sigma * noise.sigma * total_weight;
     let above = (energy(&bare.residual) - noise_energy).max(0.02 * energy(&bare.residual)).max(1e-12);
-    let (first_look, first_p) = look(library, rows, &bare);
+    let (first_look, first_p) = look(library, rows, &bare, blocked);
 
     // What the flexible tables imitate almost wholly is judged against the stiff baseline's own errors.
     let concealed: Vec<bool> = first_look
@@ -254,7 +272,7 @@ pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step:
         let (best, p) = if chosen.is_empty() {
             (first_look.clone(), first_p.clone())
         } else {
-            look(library, rows, &full)
+            look(library, rows, &full, blocked)
         };
         let left = energy(&full.residual);
         let rest = (left - noise_energy).max(0.02 * left);
@@ -279,7 +297,15 @@ pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step:
         let of_rest = winner.gain / rest;
         let moved = (winner.gain / total_weight).sqrt();
         let big = evidence(winner, &library[winner.candidate], left, independent.min(EVIDENCE_ROWS));
-        let significant = p[at] <= FAMILY_ALPHA || (of_rest > 0.5 && big > 30.0 && p[at] <= 0.2);
+        // What lives in a few strokes can never give a large sum over blocks in units of its scatter: six strokes that all agree
+        // happen by chance once in 64. There a gain that nothing else comes near counts instead.
+        let next = best
+            .iter()
+            .filter(|t| t.candidate != winner.candidate && worth_naming(t))
+            .map(|t| t.gain)
+            .fold(0.0, f64::max);
+        let alone = of_rest > 0.55 && big > 30.0 && next < 0.75 * winner.gain;
+        let significant = p[at] <= FAMILY_ALPHA || (alone && p[at] <= 0.5);
         let worth = if chosen.is_empty() {
             share >= FIRST_OF_ALL
         } else {
@@ -289,6 +315,18 @@ pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step:
             break;
         }
         let rivals = rivals(winner, &best, library, rows, &full, rest);
+        let open = rivals.iter().filter(|r| r.1 > CONFUSABLE).count();
+        if open > MOST_RIVALS {
+            let named: Vec<&str> = rivals.iter().take(open).map(|r| library[r.0].name()).collect();
+            remarks.push(format!(
+                "{} would explain {:.0} % of the misfit, but so would, nearly as well, {}: these recordings cannot say which, so none \
+                 is named",
+                library[winner.candidate].name(),
+                100.0 * of_rest,
+                named.join(", ")
+            ));
+            break;
+        }
         let winner = winner.clone();
         let p = p[at];
         chosen.push(winner.clone());
@@ -326,7 +364,9 @@ fn repair(
     blocked: f64,
 ) -> Option<Taken> {
     let weight = energy(&rows.root_weight).max(1e-12);
-    let on_stiff = best_of_each(&scan(library, rows, &stiff.basis, &stiff.residual), library);
+    let mut all = scan(library, rows, &stiff.basis, &stiff.residual);
+    forbid_cancelling(&mut all, blocked);
+    let on_stiff = best_of_each(&all, library);
     let mut tried: Vec<(Trial, f64)> = on_stiff
         .par_iter()
         .filter(|t| t.gain > 0.3 * deficit)

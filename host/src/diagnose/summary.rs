@@ -95,7 +95,7 @@ pub fn summary(d: &Diagnosis) -> String {
             None => format!("{} of any size", c.effect),
         })
         .collect();
-    if !hidden.is_empty() {
+    if !hidden.is_empty() && d.noise_N > 0.0 {
         let _ = writeln!(s, "\nCould be hidden in these recordings: {}", hidden.join(", "));
     }
     if !d.remarks.is_empty() {

@@ -1,0 +1,178 @@
+//! Nulls with noise that is anything but white, one effect of each kind from equations written here, and bad input.
+//!
+//! The force comes from a table muscle, friction and faults from plain formulas below, not from the library of effects.
+
+use model_core::braid::Geometry;
+use model_core::muscle::Muscle;
+use model_core::table;
+
+use super::linear::Random;
+use super::planned::{Place, Protocol, Step};
+use super::verdict::Verdict;
+use super::{Diagnosis, Options, diagnose};
+use crate::recording::{Campaign, Recording};
+
+fn muscle() -> Muscle<f64> {
+    let mut one_bladder = table::example();
+    for curve in &mut one_bladder.elastic {
+        let middle = curve[2];
+        curve.iter_mut().for_each(|e| *e = middle);
+    }
+    Muscle::build(&one_bladder).expect("the example table")
+}
+
+fn geometry() -> Geometry {
+    table::example().geometry.cast()
+}
+
+/// Classic loops: six pressures, three triangular cycles each, one or more speeds (mm/s).
+fn loops(speeds: &[f64]) -> Campaign {
+    let mut step = Vec::new();
+    for p in [230.0, 290.0, 350.0, 410.0, 480.0, 550.0] {
+        step.push(Step::Pressure { to_kpa: p, rate_kpa_s: Some(50.0), settle_s: 1.0 });
+        step.push(Step::File { name: format!("{p:.0}kPa") });
+        for v in speeds {
+            let to = Place { free: Some(0.95), ..Place::default() };
+            step.push(Step::Cycles { to, speed_mm_s: *v, count: if speeds.len() > 1 { 2 } else { 3 } });
+        }
+        step.push(Step::EndFile);
+    }
+    let protocol = Protocol { name: "loops".into(), sample_hz: 10.0, step };
+    protocol.play(&muscle()).expect("playable")
+}
+
+/// Puts friction of 8 %, an effect and noise on the forces. `effect` sees speed, direction and the friction-free force.
+fn recorded(
+    mut campaign: Campaign,
+    seed: u64,
+    noise: impl Fn(&mut Random, &mut [f64; 2]) -> f64,
+    effect: impl Fn(f64, f64, f64) -> f64,
+) -> Campaign {
+    let mut random = Random(seed);
+    for r in &mut campaign.recordings {
+        let Recording { time, stroke, force: Some(force), .. } = r else { continue };
+        let mut state = [0.0; 2];
+        let mut sign = 1.0;
+        for i in 0..force.len() {
+            let j = i.max(1);
+            let v = (stroke[j] - stroke[j - 1]) / (time[j] - time[j - 1]);
+            if v != 0.0 {
+                sign = f64::signum(v);
+            }
+            let quasi = force[i];
+            force[i] = quasi * (1.0 - 0.08 * sign) + effect(v, sign, quasi) + noise(&mut random, &mut state);
+        }
+        for x in stroke.iter_mut() {
+            *x += 1e-6 * random.normal();
+        }
+    }
+    campaign
+}
+
+fn ask(campaign: &Campaign) -> Diagnosis {
+    diagnose(campaign, &geometry(), &Options { muscle: "test".into() }).expect("an answer")
+}
+
+fn names(d: &Diagnosis) -> Vec<&str> {
+    d.missing.iter().map(|m| m.effect.as_str()).collect()
+}
+
+/// AR(1) of the given size and correlation time at 10 Hz.
+fn coloured(size: f64, tau: f64) -> impl Fn(&mut Random, &mut [f64; 2]) -> f64 {
+    let a = (-0.1 / tau).exp();
+    move |r, s| {
+        s[0] = a * s[0] + size * (1.0 - a * a).sqrt() * r.normal();
+        s[0] + 0.3 * size * r.normal()
+    }
+}
+
+#[test]
+fn correlated_noise_is_not_named() {
+    for seed in 0..4 {
+        let d = ask(&recorded(loops(&[0.2]), seed, coloured(0.3, 10.0), |_, _, _| 0.0));
+        assert_eq!(d.verdict, Verdict::Consistent, "seed {seed}: {:?}", names(&d));
+        assert!(d.missing.is_empty());
+    }
+}
+
+#[test]
+fn wandering_noise_and_outliers_are_not_named() {
+    for seed in 10..13 {
+        let wander = |r: &mut Random, s: &mut [f64; 2]| {
+            s[0] += 0.02 * r.normal();
+            let outlier = if r.uniform() < 2e-3 { 20.0 * r.normal() } else { 0.0 };
+            s[0] + 0.1 * r.normal() + outlier
+        };
+        let d = ask(&recorded(loops(&[0.1, 0.4]), seed, wander, |_, _, _| 0.0));
+        assert!(d.missing.is_empty(), "seed {seed}: {:?}", names(&d));
+    }
+}
+
+#[test]
+fn constant_friction_is_found_with_its_size() {
+    let d = ask(&recorded(loops(&[0.1, 0.4]), 3, coloured(0.1, 2.0), |_, sign, _| -4.0 * sign));
+    let first = d.missing.first().expect("something is missing");
+    let set: Vec<&str> = std::iter::once(first.effect.as_str())
+        .chain(first.confusable_with.iter().map(String::as_str))
+        .collect();
+    assert!(set.contains(&"coulomb-friction"), "{set:?}");
+    assert!(d.held_out.rms_after_N < 0.5 * d.held_out.rms_before_N, "{:?}", d.held_out);
+    assert!((first.peak_N - 4.0).abs() < 1.0, "{} N", first.peak_N);
+}
+
+#[test]
+fn viscous_damping_is_found_with_its_size() {
+    let d = ask(&recorded(loops(&[0.05, 0.2, 0.8]), 4, coloured(0.1, 2.0), |v, _, _| -5.0e3 * v));
+    assert_eq!(names(&d).first(), Some(&"viscous-damping"), "{:?}", names(&d));
+    let c = &d.missing[0].parameters[0];
+    let std = c.std.expect("determined");
+    assert!((c.value - 5.0e3).abs() < 4.0 * std.max(150.0), "{} ± {std}", c.value);
+}
+
+#[test]
+fn the_answer_does_not_depend_on_the_number_of_threads() {
+    let campaign = recorded(loops(&[0.2]), 5, coloured(0.1, 2.0), |_, sign, _| -3.0 * sign);
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| ask(&campaign).to_json())
+    };
+    assert_eq!(on(1), on(3));
+}
+
+#[test]
+fn bad_input_is_answered_in_words() {
+    let straight = |n: usize, f: &dyn Fn(f64) -> (f64, f64, f64)| {
+        let mut r = Recording { name: "r".into(), ..Recording::default() };
+        let mut force = Vec::new();
+        for i in 0..n {
+            let t = i as f64 * 0.1;
+            let (p, x, y) = f(t);
+            r.time.push(t);
+            r.pressure.push(p);
+            r.stroke.push(x);
+            force.push(y);
+        }
+        r.force = Some(force);
+        Campaign::new(vec![r])
+    };
+    let cases = [
+        ("fifty rows", straight(50, &|t| (3e5, 1e-4 * t, 50.0 - t))),
+        ("two rows", straight(2, &|t| (3e5, 1e-4 * t, 50.0 - t))),
+        ("constant force", straight(2000, &|t| (3e5, 1e-3 * (t * 0.1).sin(), 40.0))),
+        ("no force at all", straight(2000, &|t| (3e5, 1e-3 * (t * 0.1).sin(), 0.0))),
+        ("one way only", straight(2000, &|t| (3e5, 1e-5 * t, 60.0 - 0.1 * t))),
+        ("nothing moves", straight(2000, &|_| (3e5, 0.0, 60.0))),
+        ("no pressure", straight(2000, &|t| (0.0, 1e-3 * (t * 0.1).sin(), 1.0))),
+        ("pushed only", straight(2000, &|t| (3e5, 1e-3 * (t * 0.1).sin(), -5.0 - t))),
+        (
+            "stairs of pressure at one length",
+            straight(3000, &|t| ((t / 10.0).floor() * 2e4, 1e-3, (t / 10.0).floor() * 4.0)),
+        ),
+    ];
+    for (what, campaign) in cases {
+        let d = ask(&campaign);
+        assert!(d.missing.is_empty(), "{what}: {:?}", names(&d));
+        assert!(!d.remarks.is_empty(), "{what}");
+        assert!(!d.to_json().contains("null,\n  \"missing\""), "{what}");
+    }
+}
