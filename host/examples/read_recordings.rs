@@ -1,9 +1,11 @@
-//! Reads recordings and says what was in them and how long it took: `read_recordings [--import F] [--muscle M] FILE…`.
+//! Reads recordings and says what was in them and how long it took: `read_recordings [--import F] [--muscle M]
+//! [--motion] FILE…`. With `--motion` it also finds out how the muscle was moved.
 
 use std::process::ExitCode;
 use std::time::Instant;
 
 use host::muscle_description::MuscleDescription;
+use host::recording::segment::Motion;
 use host::recording::{Import, Reader};
 
 fn main() -> ExitCode {
@@ -18,12 +20,13 @@ fn main() -> ExitCode {
 }
 
 fn run() -> host::error::Result<()> {
-    let (mut import, mut muscle, mut files) = (None, None, Vec::new());
+    let (mut import, mut muscle, mut files, mut motion) = (None, None, Vec::new(), false);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--import" => import = Some(Import::read(arguments.next().unwrap_or_default())?),
             "--muscle" => muscle = Some(MuscleDescription::read(arguments.next().unwrap_or_default())?),
+            "--motion" => motion = true,
             _ => files.push(argument),
         }
     }
@@ -40,5 +43,12 @@ fn run() -> host::error::Result<()> {
         campaign.samples(),
         campaign.clock
     );
+    if motion {
+        let start = Instant::now();
+        let motions = Motion::of_campaign(&campaign);
+        let turns: usize = motions.iter().map(|m| m.turns.len()).sum();
+        let holds: usize = motions.iter().map(|m| m.holds.len()).sum();
+        println!("{turns} turns and {holds} holds, found in {:.3} s", start.elapsed().as_secs_f64());
+    }
     Ok(())
 }

@@ -102,12 +102,10 @@ fn longest(
         *leg += 1;
     }
     // The slower of the legs around it says how long the motion would take for this distance.
-    let slowest = legs[*leg..]
-        .iter()
-        .take_while(|l| l.start <= end)
-        .take(3)
-        .map(|l| l.amplitude() / (time[l.end] - time[l.start]).max(f64::MIN_POSITIVE))
-        .fold(f64::INFINITY, f64::min);
+    let around = || legs[*leg..].iter().take_while(|l| l.start <= end).take(3);
+    let lasting = |l: &Leg| (time[l.end] - time[l.start]).max(f64::MIN_POSITIVE);
+    let slowest = around().map(|l| l.amplitude() / lasting(l)).fold(f64::INFINITY, f64::min);
+    let shortest = around().map(lasting).fold(f64::INFINITY, f64::min);
     let duration = time[end - 1] - time[start];
     let passing = scale.threshold / slowest;
     if !(duration > 4.0 * passing) {
@@ -121,8 +119,17 @@ fn longest(
         return Found::Round;
     };
     let rested = time[last] - time[first];
-    // What stays so much longer is at rest even if it creeps.
-    if rested < 4.0 * passing || rested < 60.0 * passing && !flat(&smooth[first..=last], scale) {
+    // What stays so much longer is at rest even if it creeps. About the turns of a sine both bounds are never passed at once:
+    // with amplitude A, a share of 0.9 √(θ/A) of a leg is within the threshold θ, 1.8 √(A/θ) times what passing takes.
+    let long = rested > 60.0 * passing && rested > 0.1 * shortest;
+    if rested < 4.0 * passing || !long && !flat(&smooth[first..=last], scale) {
+        return Found::Round;
+    }
+    // The middle of a smooth turn is flat too, but it is not left at the speed of the motion.
+    let far = |i: &usize| (smooth[*i] - level).abs() > scale.threshold;
+    let entered = (0..first).rev().find(far).map_or(0.0, |i| time[first] - time[i]);
+    let left = (last + 1..smooth.len()).find(far).map_or(0.0, |i| time[i] - time[last]);
+    if !long && entered.min(left) > 2.5 * passing && entered.min(left) > 0.3 * rested {
         return Found::Round;
     }
     holds.push(Hold { start: first, end: last, stroke: level });
@@ -148,7 +155,10 @@ fn flat(smooth: &[f64], scale: &Scale) -> bool {
         qx += q * x;
     }
     let size = |square: f64, product: f64| if square > 0.0 { (product / square).abs() } else { 0.0 };
-    let most = (2.0 * scale.smoothed_noise).max(0.15 * scale.threshold);
+    // Rise and bend of mere noise have standard deviations of 1.7 and 3.4 of it, over the root of the independent samples.
+    let independent = n * (scale.smoothed_noise / scale.noise.max(f64::MIN_POSITIVE)).powi(2).min(1.0);
+    let times = (10.0 / independent.max(1.0).sqrt()).clamp(0.5, 2.0);
+    let most = (times * scale.smoothed_noise).max(0.05 * scale.threshold);
     size(pp, px) <= most && size(qq, qx) <= most
 }
 

@@ -108,6 +108,38 @@ fn without_any_noise_every_sample_is_right() {
 }
 
 #[test]
+fn smooth_turns_are_no_rests() {
+    // Off by no more than the time in which a sine moves by some standard deviations of the noise about its turn.
+    for (rate, noise, allowed) in
+        [(10.0, 0.0, 0), (100.0, 0.0, 0), (1000.0, 0.0, 0), (1000.0, 5e-6, 40), (100.0, 2e-6, 4)]
+    {
+        let mut random = Noise(7);
+        let n = (rate * 60.0) as usize;
+        let time: Vec<f64> = (0..n).map(|i| i as f64 / rate).collect();
+        let recording = Recording {
+            stroke: time
+                .iter()
+                .map(|t| 5.0 * MM * (1.0 - (0.713 * t).cos()) + noise * random.normal())
+                .collect(),
+            pressure: time.iter().map(|t| 300e3 + 5e3 * (0.713 * t).sin()).collect(),
+            time,
+            ..Recording::default()
+        };
+        let found = Motion::of(&recording);
+        let turns: Vec<usize> = found.turns.iter().skip(1).map(|t| t.index).collect();
+        assert_eq!(turns.len(), 13, "{rate} Hz {noise} m: {:?}", found.turns);
+        for (k, turn) in turns.iter().enumerate() {
+            let truth = ((k + 1) as f64 * std::f64::consts::PI / 0.713 * rate).ceil() as i64;
+            assert!(
+                (*turn as i64 - truth).abs() <= allowed,
+                "{rate} Hz {noise} m: {turn} for {truth} {:?}",
+                found.holds
+            );
+        }
+    }
+}
+
+#[test]
 fn slow_motion_under_noise_turns_within_what_noise_hides() {
     // 1 kHz at 0.3 mm/s: a step is 0.3 µm, the noise 10 µm. Lines through some hundred samples on either side meet within a
     // few standard errors: 10 µm / √100 / 0.3 µm, some 3 to 10 samples.
