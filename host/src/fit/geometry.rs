@@ -137,7 +137,7 @@ impl Prepared {
         self.design.extra = vec![0.0; self.design.rows.len() * unknowns.len()];
         self.design.extra_prior = unknowns.iter().map(|u| u.prior().0.powi(-2)).collect();
         // With the dimensions free, trends of E_k with pressure are theirs to explain first.
-        self.design.level = 1e-3;
+        self.design.level = 0.03;
         self.parameters.extend(&at);
         for round in 0..12 {
             self.apply(&nominal, &unknowns, &at, &mounting);

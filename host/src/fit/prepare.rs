@@ -316,6 +316,13 @@ impl Prepared {
 
     /// The whole search, from a start that knows nothing.
     fn find(&mut self, options: &Options) {
+        if options.fit_geometry || options.fit_lengths {
+            // With the dimensions open, a few lengths leave P0 open too: a muscle begins to pull at a small share of its
+            // working pressure.
+            let usual = 0.1 * self.points.pressure.high;
+            self.design.origin = usual;
+            self.design.hold_deadband = usual.powi(-2);
+        }
         self.parameters = self.design.start(0.1 * self.points.pressure.high);
         self.mark_turns(self.turn_zone);
         self.find_slack();
@@ -341,7 +348,13 @@ impl Prepared {
         self.settle_deadband(options);
         self.smoothing = match options.smoothing {
             Some(weight) => Smoothing { elastic: weight, friction: weight },
-            None => smoothing::choose(&self.design, &self.parameters, &self.weights).0,
+            None => {
+                if !self.pressures.held {
+                    self.design.level =
+                        smoothing::choose_level(&mut self.design.clone(), &self.parameters, &self.weights);
+                }
+                smoothing::choose(&self.design, &self.parameters, &self.weights).0
+            }
         };
         self.solve(self.smoothing, 12);
         self.hold_slack_down();
@@ -356,7 +369,7 @@ impl Prepared {
     fn hold_slack_down(&mut self) {
         let before: Vec<Use> = self.used.clone();
         let set_aside = |u: Use| matches!(u, Use::Slack | Use::Clipped);
-        if !self.goes_slack && !before.contains(&Use::Clipped) {
+        if !before.iter().any(|u| set_aside(*u)) {
             return;
         }
         let tolerance = (0.005 * self.points.force.span()).max(2.0 * self.points.row_noise);
@@ -550,7 +563,10 @@ impl Prepared {
             }
         }
         self.weigh();
+        // No trend with pressure at all: what slack points would say about it must not be said by others' continuation.
+        let level = std::mem::replace(&mut self.design.level, 10.0);
         self.solve(Smoothing::STRAIGHT, 10);
+        self.design.level = level;
         self.used = fitted;
         let curves = self.design.curves(&self.parameters);
         let mut slack = 0.0;

@@ -74,6 +74,37 @@ pub fn choose(design: &Design, parameters: &[f64], weights: &[f64]) -> (Smoothin
     (Smoothing { elastic, friction }, trials)
 }
 
+/// Chooses how strongly `E_k` are held constant over pressure, where pressure moved through a range and the muscle was slack
+/// at part of it: there a curve without data would run away.
+#[must_use]
+pub fn choose_level(design: &mut Design, parameters: &[f64], weights: &[f64]) -> f64 {
+    let candidates = [1e-4, 1e-3, 1e-2, 1e-1, 1.0];
+    let groups = design.normal_by_group(parameters, weights);
+    let used: Vec<usize> = (0..groups.len()).filter(|g| groups[*g].weight > 0.0).collect();
+    if used.len() < 3 {
+        return candidates[1];
+    }
+    let mut total = groups[used[0]].clone();
+    for g in &used[1..] {
+        total.add_scaled(&groups[*g], 1.0);
+    }
+    let scores: Vec<f64> = candidates
+        .iter()
+        .map(|level| {
+            design.level = *level;
+            let smoothing = [1e-3, 1e-1, 10.0].map(|elastic| Smoothing { elastic, ..Smoothing::START });
+            // All groups, the ends too: continuation is what this penalty is for.
+            smoothing
+                .map(|s| leave_out(design, parameters, &total, &groups, &used, s))
+                .into_iter()
+                .fold(f64::INFINITY, f64::min)
+        })
+        .collect();
+    let least = scores.iter().copied().fold(f64::INFINITY, f64::min);
+    let best = candidates.iter().zip(&scores).filter(|(_, s)| **s <= 1.05 * least).map(|(c, _)| *c);
+    best.fold(candidates[0], f64::max)
+}
+
 fn leave_out(
     design: &Design,
     parameters: &[f64],
