@@ -126,7 +126,7 @@ fn stated_intervals_cover() {
     let levels = presets::miniature_pressures();
     let base = thesis(&spec, &levels, 3, 6.0);
     let muscle = description(&spec);
-    let options = Options { order: 2, smoothing: Some(1.0), ..Options::default() };
+    let options = Options { order: 2, ..Options::default() };
     let truth = fit(&base, &muscle, &options).expect("a fit");
     // The truth is the model itself on the recording's motion; what is left after a turn is the model's too.
     let table = host::fit::hold_out::as_file(&truth);

@@ -80,16 +80,31 @@ impl Arguments {
             ..Options::default()
         };
         let mut cases = Vec::new();
+        let mut failure: Option<Error> = None;
         for path in &self.muscle {
             let muscle = MuscleDescription::read(path)?;
             let campaign = self.recordings.read(Reader::of(&muscle))?;
-            let over = |split, wanted: bool| {
-                wanted.then(|| hold_out(&campaign, &muscle, &options, split, published.as_ref())).transpose()
+            let mut over = |split, wanted: bool| {
+                let score = || hold_out(&campaign, &muscle, &options, split, published.as_ref());
+                // One split that cannot be fitted does not take the other figures away.
+                wanted.then(score).and_then(|scored| match scored {
+                    Ok(held) => Some(held),
+                    Err(e) => {
+                        console.warning(format!("{}: {e}", muscle.name));
+                        failure.get_or_insert(e);
+                        None
+                    }
+                })
             };
-            let runs = over(Split::Run, self.leave_out != LeaveOut::Contractions)?;
-            let contractions = over(Split::Contraction, self.leave_out != LeaveOut::Runs)?;
+            let runs = over(Split::Run, self.leave_out != LeaveOut::Contractions);
+            let contractions = over(Split::Contraction, self.leave_out != LeaveOut::Runs);
             console.detail(format!("{} done", muscle.name));
             cases.push(Case { muscle, campaign, runs, contractions });
+        }
+        if cases.iter().all(|c| c.runs.is_none() && c.contractions.is_none())
+            && let Some(e) = failure
+        {
+            return Err(e);
         }
         let lengths = (0..cases.len()).map(|i| by_neighbour(&cases, i)).collect::<Result<Vec<_>>>()?;
         if let Some(path) = &self.json {

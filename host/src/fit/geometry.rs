@@ -148,7 +148,12 @@ impl Prepared {
                 row.force = forces[i] + super::linear::dot(z, &at);
             }
             self.parameters[size..].copy_from_slice(&at);
-            self.solve(Smoothing::START, 6);
+            let misfit = self.solve(Smoothing::START, 6);
+            // Weights take the model for nearly right. Where it is not, they overstate what the points know by as much as the
+            // misfit exceeds them, and the priors have to keep up.
+            let excess = (misfit / self.cells).max(1.0);
+            self.design.extra_prior = unknowns.iter().map(|u| excess * u.prior().0.powi(-2)).collect();
+            self.design.hold_deadband = excess * self.design.origin.max(1.0).powi(-2);
             let mut moved = 0.0_f64;
             for (a, (u, new)) in at.iter_mut().zip(unknowns.iter().zip(&self.parameters[size..])) {
                 let (sigma, bound) = u.prior();

@@ -36,6 +36,8 @@ pub struct Prepared {
     pub used: Vec<Use>,
     /// Weight of each point; zero where it does not take part. About 1/variance, N⁻².
     pub weights: Vec<f64>,
+    /// Chunks of stroke, pressure and direction that have points: as many independent witnesses as the weights assume.
+    pub cells: f64,
     /// The solution, in the order of [`Layout`].
     pub parameters: Vec<f64>,
     /// The penalty on bending.
@@ -131,6 +133,7 @@ impl Prepared {
             nominal: geometry,
             geometry,
             braid,
+            cells: 1.0,
             parameters: Vec::new(),
             smoothing: Smoothing::START,
             turn_zone: 0.05,
@@ -287,6 +290,7 @@ impl Prepared {
                 *counts.entry(cell(p, *g)).or_default() += f64::from(p.rows);
             }
         }
+        self.cells = counts.len().max(1) as f64;
         let force = self.points.force.high.abs().max(self.points.force.low.abs());
         let noise = self.points.row_noise.max(1e-6 * force).powi(2);
         let scale = (pressure.high - deadband).max(0.1 * pressure.high.abs()).max(1.0);
@@ -308,10 +312,11 @@ impl Prepared {
             .collect();
     }
 
-    pub(super) fn solve(&mut self, smoothing: Smoothing, steps: usize) {
+    /// Solves in place; returns `Σ w r²`.
+    pub(super) fn solve(&mut self, smoothing: Smoothing, steps: usize) -> f64 {
         let data = self.design.normal(&self.parameters, &self.weights);
         let penalty = self.design.penalty(&data, smoothing.elastic, smoothing.friction);
-        self.design.solve(&mut self.parameters, &self.weights, &penalty, steps);
+        self.design.solve(&mut self.parameters, &self.weights, &penalty, steps).misfit
     }
 
     /// The whole search, from a start that knows nothing.

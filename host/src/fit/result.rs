@@ -3,6 +3,7 @@
 use model_core::muscle::Muscle;
 use model_core::table::{Kind as TableKind, MuscleTable, Tested};
 use model_core::units::{Force, Length, Pressure};
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::error::{Code, Error, Result};
@@ -375,6 +376,7 @@ fn left_out(prepared: &Prepared, options: &Options) -> Vec<Option<f64>> {
         return vec![None; groups];
     }
     (0..groups)
+        .into_par_iter()
         .map(|g| {
             if !used[g] {
                 return None;

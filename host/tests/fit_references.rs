@@ -1,0 +1,82 @@
+//! The fit against numbers of another implementation (tests/references/separate_fits.py: numpy and SciPy).
+
+use std::fs;
+use std::path::PathBuf;
+
+use host::fit::{Options, fit, midline::midline, models};
+use host::muscle_description::MuscleDescription;
+use host::recording::{Campaign, Recording};
+
+fn table(name: &str) -> Vec<Vec<f64>> {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/references").join(name);
+    let text = fs::read_to_string(path).expect("a reference file");
+    text.lines().skip(1).map(|l| l.split(',').map(|c| c.parse().expect("a number")).collect()).collect()
+}
+
+/// The points as a recording with both branches, a friction factor of 0.1 about the mid-line; one sample per chunk and branch.
+fn loops(points: &[Vec<f64>]) -> Campaign {
+    let mut levels: Vec<f64> = points.iter().map(|p| p[0]).collect();
+    levels.dedup();
+    let recordings = levels
+        .iter()
+        .enumerate()
+        .map(|(k, level)| {
+            let of: Vec<&Vec<f64>> = points.iter().filter(|p| p[0] == *level).collect();
+            let mut r =
+                Recording { name: format!("{level}"), force: Some(Vec::new()), ..Recording::default() };
+            let mut time = k as f64 * 1e4;
+            // Three cycles; every pass over a chunk takes a second.
+            for pass in 0..6 {
+                let up = pass % 2 == 0;
+                let order: Vec<usize> =
+                    if up { (0..of.len()).collect() } else { (0..of.len()).rev().collect() };
+                for i in order {
+                    time += 1.0;
+                    r.time.push(time);
+                    r.pressure.push(*level);
+                    r.stroke.push(of[i][1]);
+                    let friction = if up { -0.1 } else { 0.1 };
+                    r.force.iter_mut().for_each(|f| f.push(of[i][2] * (1.0 + friction)));
+                }
+            }
+            r
+        })
+        .collect();
+    Campaign::new(recordings)
+}
+
+#[test]
+fn separate_fits_are_those_of_numpy() {
+    let campaign = loops(&table("separate_fits_points.csv"));
+    let muscle = MuscleDescription::parse(
+        "name=\"m\"\nkind=\"contractile\"\nrest_length_mm=39.16\nbraid_angle_deg=77.4\n\
+         bladder_outer_diameter_mm=3.0\nbladder_wall_mm=0.5\n",
+    )
+    .expect("valid");
+    let mut fitted = fit(&campaign, &muscle, &Options::default()).expect("a fit");
+    assert!((fitted.summary.deadband_kPa - 76.5).abs() < 0.5, "P0 {}", fitted.summary.deadband_kPa);
+    // The reference takes P0 as given.
+    fitted.prepared.design.origin = 76.5e3;
+    fitted.prepared.parameters[0] = 0.0;
+    let mid = midline(&fitted.prepared);
+    let all = models::side_by_side(&fitted.prepared, &mid, None);
+    let m4 = all.iter().find(|m| m.name == "m4").expect("a model");
+    let expected = table("separate_fits.csv");
+    // The reference has every chunk; here the ones right at the turns are set aside, so the comparison is of forces.
+    for (g, row) in expected.iter().enumerate() {
+        let at = |i: usize| {
+            let c = host::fit::basis::columns(&fitted.prepared.braid, mid[i].stroke);
+            let reference: f64 = (0..4).map(|k| row[1 + k] * 1e6 * c.elastic[k]).sum();
+            (row[0] - 76.5e3) * c.area + reference
+        };
+        for i in (0..mid.len()).filter(|i| mid[*i].group as usize == g) {
+            assert!(
+                (at(i) - m4.force[i]).abs() < 0.02,
+                "at {} Pa: {} N, numpy {} N",
+                row[0],
+                m4.force[i],
+                at(i)
+            );
+        }
+    }
+}
