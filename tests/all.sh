@@ -19,8 +19,9 @@ done
 
 command -v cargo >/dev/null || { echo "tests/all.sh: no Rust compiler; install one from https://rustup.rs" >&2; exit 1; }
 [ -d ../shared/data ] || echo "tests/all.sh: tests on real recordings are skipped: ../shared/data is not there"
-command -v chromium >/dev/null || command -v google-chrome >/dev/null ||
-    echo "tests/all.sh: the test of the page is skipped: there is no Chromium"
+browser=no
+if command -v chromedriver >/dev/null && command -v python3 >/dev/null; then browser=yes; fi
+[ $browser = yes ] || echo "tests/all.sh: the test of the page is skipped: there is no chromedriver, or no python3"
 
 began=$SECONDS
 echo "== firmware images =="
@@ -35,6 +36,11 @@ fi
 echo "== tests =="
 failed=0
 cargo test --workspace --locked --no-fail-fast || failed=$?
+
+if [ "$browser" = yes ]; then
+    echo "== the page in a browser =="
+    { cargo build --quiet --locked --package host && python3 tests/studio.py target/debug/host; } || failed=$?
+fi
 
 if [ "$lint" = yes ]; then
     echo "== lints =="

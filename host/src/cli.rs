@@ -66,6 +66,8 @@ enum Command {
     Table(commands::table::Arguments),
     /// The whole story on this machine, no hardware: record, fit, flash, track.
     Demo(commands::demo::Arguments),
+    /// Describe a muscle by answering what to measure, with drawings.
+    New(commands::new::Arguments),
     /// Send a table to a controller, or program its chip.
     Flash(commands::flash::Arguments),
     /// Let a controller follow a course of force, pressure or stroke, and record it.
@@ -94,6 +96,7 @@ impl Command {
             Self::Plan(a) => a.run(console),
             Self::Table(a) => a.run(console),
             Self::Demo(a) => a.run(console),
+            Self::New(a) => a.run(console),
             Self::Flash(a) => a.run(console),
             Self::Run(a) => a.run(console),
             Self::Vent(a) => a.run(console),

@@ -9,6 +9,7 @@ pub mod effects;
 pub mod evaluate;
 pub mod fit;
 pub mod flash;
+pub mod new;
 pub mod plan;
 pub mod port;
 pub mod predict;

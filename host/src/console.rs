@@ -48,6 +48,12 @@ impl Console {
         !self.quiet && std::io::stderr().is_terminal()
     }
 
+    /// Whether only results and errors are wanted.
+    #[must_use]
+    pub fn quiet(&self) -> bool {
+        self.quiet
+    }
+
     /// Whether details were asked for.
     #[must_use]
     pub fn verbose(&self) -> bool {
