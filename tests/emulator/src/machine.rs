@@ -188,7 +188,10 @@ impl Machine {
                 Some(station) => {
                     let (bench, port) = listener();
                     command
-                        .args(["-chardev", &format!("socket,id=bench{number},host=127.0.0.1,port={port},nodelay=on")])
+                        .args([
+                            "-chardev",
+                            &format!("socket,id=bench{number},host=127.0.0.1,port={port},nodelay=on"),
+                        ])
                         .args(["-serial", &format!("chardev:bench{number}")]);
                     plugged.push((bench, station));
                 }
