@@ -54,7 +54,7 @@ fn separate_fits_are_those_of_numpy() {
     )
     .expect("valid");
     let mut fitted = fit(&campaign, &muscle, &Options::default()).expect("a fit");
-    assert!((fitted.summary.deadband_kPa - 76.5).abs() < 0.5, "P0 {}", fitted.summary.deadband_kPa);
+    assert!((fitted.summary.deadband_kPa - 76.5).abs() < 1.0, "P0 {}", fitted.summary.deadband_kPa);
     // The reference takes P0 as given.
     fitted.prepared.design.origin = 76.5e3;
     fitted.prepared.parameters[0] = 0.0;
