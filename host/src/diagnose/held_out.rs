@@ -56,8 +56,25 @@ fn thin(rows: &Rows, traces: &[Vec<f64>]) -> (Rows, Vec<Vec<f64>>) {
     (thinned, traces.iter().map(pick).collect())
 }
 
+/// Rows that belong to a turn: set aside for their direction alone. Slack rows and ramps beyond the tested pressures, set aside
+/// for other reasons, say nothing about a model that does not claim them.
+fn claimed(rows: &Rows) -> Vec<bool> {
+    let sure = || (0..rows.len()).filter(|i| rows.root_weight[*i] > 0.0);
+    let strongest = sure().map(|i| rows.force[i]).fold(0.0, f64::max);
+    let low = sure().map(|i| rows.contexts[i].pressure).fold(f64::INFINITY, f64::min);
+    let high = sure().map(|i| rows.contexts[i].pressure).fold(f64::NEG_INFINITY, f64::max);
+    (0..rows.len())
+        .map(|i| {
+            let pressure = rows.contexts[i].pressure;
+            rows.root_weight[i] > 0.0
+                || (rows.force[i] > 0.02 * strongest && low <= pressure && pressure <= high)
+        })
+        .collect()
+}
+
 /// Sums of squares on rows that the fit did not see: on the sure rows, and with those about the turns.
 fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> [f64; 2] {
+    let claimed = claimed(rows);
     let parts: Vec<([f64; 2], [f64; 2])> = split
         .groups
         .par_iter()
@@ -71,7 +88,7 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> [f64
             let fitted = baselines::fit(&blind, kind, traces);
             let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
             for i in 0..rows.len() {
-                if split.group[i] == *g && rows.sign[i] != 0.0 {
+                if split.group[i] == *g && rows.sign[i] != 0.0 && claimed[i] {
                     let square = fitted.raw_residual[i].powi(2);
                     if square.is_finite() {
                         sums[1] += square;

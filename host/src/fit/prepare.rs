@@ -379,7 +379,7 @@ impl Prepared {
         }
         let tolerance = (0.005 * self.points.force.span()).max(2.0 * self.points.row_noise);
         let upper = self.clips.1.map_or(f64::INFINITY, |c| c.force);
-        for _ in 0..8 {
+        for round in 0..16 {
             let curves = self.design.curves(&self.parameters);
             let mut changed = 0;
             for i in 0..self.used.len() {
@@ -388,11 +388,13 @@ impl Prepared {
                 }
                 let above = self.design.evaluate(i, &self.parameters, &curves).force
                     > self.points.list[i].force + tolerance;
-                let wanted = if above { Use::Fitted } else { before[i] };
+                // Points let go may rise again, and take turns for ever: after a few rounds none is let go any more.
+                let kept = round >= 4 && self.used[i] == Use::Fitted;
+                let wanted = if above || kept { Use::Fitted } else { before[i] };
                 changed += usize::from(wanted != self.used[i]);
                 self.used[i] = wanted;
             }
-            if changed * 1000 < self.used.len() {
+            if changed == 0 {
                 break;
             }
             self.weigh();
