@@ -99,7 +99,7 @@ impl Task {
                 (Course::Wave(reference), 5.0)
             }
             Self::Steps => {
-                (Course::Steps { values: vec![part(0.8), part(1.2), part(1.0), part(1.3)], hold_s: 1.0 }, 5.0)
+                (Course::Steps { values: vec![part(0.8), part(1.2), part(1.0), part(1.3)], hold_s: 1.0 }, 4.0)
             }
         };
         Plan { quantity: Quantity::Force, course, seconds: Some(seconds), every_ticks: 1 }
