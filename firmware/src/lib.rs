@@ -6,7 +6,7 @@
 //! | pressure for force, stroke, a pair of muscles | [`modes`] |
 //! | states and faults, each in one table | [`safety`] |
 //! | how faults are noticed | [`watch`] |
-//! | sine, trapezoid, chirp, table | [`reference`] |
+//! | sine, trapezoid, chirp, table | [`mod@reference`] |
 //! | lag, limits and scaling of the pressure regulator | [`regulator`] |
 //! | the record of every loop variable | [`trace`] |
 //! | tables and settings in flash | [`store`] |

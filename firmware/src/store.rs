@@ -10,7 +10,7 @@
 //! | 0x10 + side | which slot holds the table in use: [`Selected`], postcard |
 //! | 0x20 + 2·side + slot | image of a table |
 //! | 0x30 | [`Settings`], postcard |
-//! | 0x40 + side | [`Remembered`]: memories of effects that survive a power cycle, postcard |
+//! | 0x40 + side | `Remembered`: memories of effects that survive a power cycle, postcard |
 //! | 0x50 + n | past fault n of a ring, postcard; 0x5F its next place |
 //! | 0x60 | starts of the device, `u32` |
 //!

@@ -44,14 +44,15 @@ pub fn compare(a: &Recording, b: &Recording) -> Result<Comparison> {
     if rows < 2 || b.len() < 2 {
         return Err(Error::new(Code::RecordingTooShort, "the recordings have no stretch of time in common"));
     }
-    let pairs: [(&str, &str, f64, Option<&Vec<f64>>, Option<&Vec<f64>>); 3] = [
-        ("force", "N", 1.0, a.force.as_ref(), b.force.as_ref()),
-        ("pressure", "kPa", 1e-3, Some(&a.pressure), Some(&b.pressure)),
-        ("displacement", "mm", 1e3, Some(&a.stroke), Some(&b.stroke)),
+    let force = a.force.as_ref().zip(b.force.as_ref());
+    let pairs = [
+        ("force", "N", 1.0, force),
+        ("pressure", "kPa", 1e-3, Some((&a.pressure, &b.pressure))),
+        ("displacement", "mm", 1e3, Some((&a.stroke, &b.stroke))),
     ];
     let mut columns = Vec::new();
-    for (name, unit, scale, x, y) in pairs {
-        let (Some(x), Some(y)) = (x, y) else { continue };
+    for (name, unit, scale, values) in pairs {
+        let Some((x, y)) = values else { continue };
         let mut column = Column { name, unit, rms: 0.0, mean: 0.0, largest: 0.0, largest_at: 0.0 };
         let mut at = 1;
         for i in 0..rows {

@@ -5,13 +5,13 @@
 //! ```
 //! | file | what |
 //! | --- | --- |
-//! | [`kinematics`], [`rows`] | block averages that keep turns, with the motion in each |
-//! | [`baselines`] | tables free over pressure, and one bladder for all pressures |
-//! | [`noise`] | what repeats tell; tests by whole blocks |
-//! | [`locate`] | where the misfit sits |
-//! | [`candidates`] | the library of effects as columns |
-//! | [`select`] | which effects, and when to abstain |
-//! | [`held_out`] | the improvement on rows that the fit had not seen |
+//! | `kinematics`, `rows` | block averages that keep turns, with the motion in each |
+//! | `baselines` | tables free over pressure, and one bladder for all pressures |
+//! | `noise` | what repeats tell; tests by whole blocks |
+//! | `locate` | where the misfit sits |
+//! | `candidates` | the library of effects as columns |
+//! | `select` | which effects, and when to abstain |
+//! | `held_out` | the improvement on rows that the fit had not seen |
 //! | [`model`] | the table refitted beside the named effects |
 //! | [`advise`], [`planned`] | the recording that would tell; what a planned protocol can tell |
 //! | [`verdict`] | the answer as values and JSON |

@@ -17,7 +17,7 @@ fn connect(address: &Address) -> Result<Client, Error> {
 }
 
 fn image() -> Vec<u8> {
-    (0..900u32).map(|i| (i * i >> 3) as u8).collect()
+    (0..900u32).map(|i| ((i * i) >> 3) as u8).collect()
 }
 
 #[test]

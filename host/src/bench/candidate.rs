@@ -215,7 +215,7 @@ impl Fitted {
         known.zip(self.parameters.iter().copied()).filter(|(p, v)| {
             // An amplitude that was not used is not out of range.
             let unused = p.role == Role::Amplitude && *v == 0.0;
-            !unused && !(*v >= p.low && *v <= p.high)
+            !(unused || *v >= p.low && *v <= p.high)
         })
     }
 }

@@ -33,6 +33,9 @@ use super::prepare::Prepared;
 /// Young's modulus of the thesis's silicone, Pa: stands in where the description names none.
 pub const THESIS_MODULUS: f64 = 1.75e6;
 
+/// A fitted constant: its name, the group of rows that it belongs to (none for all), its value in SI units.
+pub type Constant = (String, Option<u32>, f64);
+
 /// One model on the mid-lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
@@ -40,8 +43,8 @@ pub struct Model {
     pub name: &'static str,
     /// Its force at every mid-point, N; friction-free.
     pub force: Vec<f64>,
-    /// What was fitted, in words and numbers: name, group (none for all), value in SI units.
-    pub constants: Vec<(String, Option<u32>, f64)>,
+    /// What was fitted.
+    pub constants: Vec<Constant>,
     /// Mean error by eq. 24, percent.
     pub mean_error: f64,
     /// Largest error by eq. 24, percent.
@@ -104,12 +107,7 @@ fn with_tip(geometry: Geometry, tip_correction: bool) -> Option<Braid<f64>> {
     Geometry { tip_correction, ..geometry }.build().ok()
 }
 
-fn judge(
-    name: &'static str,
-    mid: &[MidPoint],
-    force: Vec<f64>,
-    constants: Vec<(String, Option<u32>, f64)>,
-) -> Model {
+fn judge(name: &'static str, mid: &[MidPoint], force: Vec<f64>, constants: Vec<Constant>) -> Model {
     let errors = mid.iter().zip(&force).map(|(m, f)| 100.0 * (f - m.force).abs() / m.blocked);
     let max_error = errors.clone().fold(0.0, f64::max);
     let mean_error = errors.sum::<f64>() / mid.len().max(1) as f64;
@@ -123,7 +121,7 @@ fn separate(
     braid: &Braid<f64>,
     order: usize,
     part: &dyn Fn(&[usize]) -> Option<Vec<usize>>,
-) -> (Vec<f64>, Vec<(String, Option<u32>, f64)>) {
+) -> (Vec<f64>, Vec<Constant>) {
     let p0 = prepared.deadband();
     let mut force = vec![0.0; mid.len()];
     let mut constants = Vec::new();

@@ -180,7 +180,8 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// What the base model can imitate: `P0`, one bladder's elasticity up to the third order, friction. Orthonormal.
 fn imitations(contexts: &[Context<f64>]) -> Vec<Vec<f64>> {
-    let columns: [&dyn Fn(&Context<f64>) -> f64; 5] = [
+    type Column<'a> = &'a dyn Fn(&Context<f64>) -> f64;
+    let columns: [Column<'_>; 5] = [
         &|c| c.area,
         &Context::unit_elastic,
         &|c| c.unit_elastic() * c.contraction,

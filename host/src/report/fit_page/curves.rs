@@ -30,7 +30,8 @@ fn over_pressure(view: &View<'_>) -> Figure {
     let curves: Vec<(Vec<f64>, f64)> = at.iter().map(|p| prepared.curves_at(*p)).collect();
     let at_nodes: Vec<(Vec<f64>, f64)> = nodes.iter().map(|p| prepared.curves_at(*p)).collect();
     let axis = || Axis::new("pressure P", "kPa");
-    let curve = |y: Axis, k: usize, scale: f64, take: &dyn Fn(&(Vec<f64>, f64)) -> f64| {
+    type Take<'a> = &'a dyn Fn(&(Vec<f64>, f64)) -> f64;
+    let curve = |y: Axis, k: usize, scale: f64, take: Take<'_>| {
         let values: Vec<f64> = curves.iter().map(|c| take(c) * scale).collect();
         let std: Vec<f64> = (0..PLACES).map(|i| root.std(1 + k * PLACES + i) * scale).collect();
         let edge =
