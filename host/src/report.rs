@@ -31,6 +31,8 @@ mod markdown;
 mod marks;
 mod numbers;
 mod page;
+mod paper;
+mod parts;
 mod svg;
 mod thin;
 

@@ -313,19 +313,6 @@ impl Figure {
         self
     }
 
-    /// The numbers behind the picture as CSV: one row a point, with the panel and the layer it belongs to. Columns are
-    /// named by the axes; an interval has two ordinates, `low` and `high`.
-    #[must_use]
-    pub fn csv(&self) -> String {
-        super::numbers::csv(self)
-    }
-
-    /// The picture as a file of its own, wide enough for a page.
-    #[must_use]
-    pub fn svg(&self) -> String {
-        super::svg::standalone(self)
-    }
-
     /// All words of the picture without mark-up, for readers that cannot see it.
     pub(crate) fn description(&self) -> String {
         let names: Vec<String> =

@@ -12,8 +12,15 @@ use super::svg::{self, Layout};
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
-/// The whole file.
-pub(crate) fn page(page: &Page) -> String {
+impl Page {
+    /// The report as one HTML file that needs no other.
+    #[must_use]
+    pub fn html(&self) -> String {
+        file(self)
+    }
+}
+
+fn file(page: &Page) -> String {
     let contents = page.sections.len() > 3;
     let markup = html! {
         (DOCTYPE)

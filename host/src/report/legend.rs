@@ -6,8 +6,8 @@ use super::axis::figures;
 use super::colour::Colour;
 use super::figure::{Figure, Layer, Look, Mark};
 use super::marks;
+use super::paper::{LETTER, px, text};
 use super::rich;
-use super::svg::{LETTER, px, text};
 
 const ROW: f64 = 20.0;
 const SWATCH: f64 = 22.0;

@@ -5,8 +5,16 @@ use std::fmt::Write as _;
 use super::page::{Block, Page, Table, Tone};
 use super::rich;
 
+impl Page {
+    /// The summary as Markdown, for pasting.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        summary(self)
+    }
+}
+
 /// Title, verdict, facts, and the sections marked for the summary; pictures become one line.
-pub(crate) fn page(page: &Page) -> String {
+fn summary(page: &Page) -> String {
     let mut out = format!("# {}\n", rich::markdown(&page.title));
     if !page.subtitle.is_empty() {
         let _ = write!(out, "\n{}\n", rich::markdown(&page.subtitle));

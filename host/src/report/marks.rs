@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::figure::{Layer, Look, Mark, bar_half_width};
-use super::svg::{Frame, px};
+use super::paper::{Frame, px};
 use super::thin;
 
 /// Which marks come first: regions and fields, then bands, then everything else.

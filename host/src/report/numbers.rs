@@ -9,8 +9,17 @@ use super::{rich, thin};
 /// The most rows of one layer that are written; longer series are thinned as they are for drawing.
 const MOST_ROWS: usize = 1_500;
 
-/// One row a point: panel (where there are several), layer, abscissa, ordinate. See [`Figure::csv`].
-pub(crate) fn csv(figure: &Figure) -> String {
+impl Figure {
+    /// The numbers behind the picture as CSV: one row a point, with the panel and the layer it belongs to. Columns are
+    /// named by the axes; an interval has two ordinates, `low` and `high`.
+    #[must_use]
+    pub fn csv(&self) -> String {
+        csv(self)
+    }
+}
+
+/// One row a point: panel (where there are several), layer, abscissa, ordinate.
+fn csv(figure: &Figure) -> String {
     let mut out = String::new();
     let several = figure.panels.len() > 1;
     let mut head = None;

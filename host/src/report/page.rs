@@ -1,9 +1,6 @@
 //! A report as plain values: what it says, in which order. [`Page::html`] and [`Page::markdown`] give it a form.
 
-use std::path::{Path, PathBuf};
-
 use super::figure::Figure;
-use crate::error::{Error, Result};
 
 /// How a fact or a notice is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -214,40 +211,5 @@ impl Page {
             Block::Figure(figure) => Some(figure.as_ref()),
             _ => None,
         })
-    }
-
-    /// The report as one HTML file that needs no other.
-    #[must_use]
-    pub fn html(&self) -> String {
-        super::html::page(self)
-    }
-
-    /// The summary as Markdown, for pasting.
-    #[must_use]
-    pub fn markdown(&self) -> String {
-        super::markdown::page(self)
-    }
-
-    /// Writes every picture as `ID.svg` with its numbers as `ID.csv`, and the summary as `summary.md`, into a directory,
-    /// which is made where it is missing. Returns the files written.
-    ///
-    /// # Errors
-    /// [`crate::error::Code::FileUnwritable`].
-    pub fn write_parts(&self, directory: impl AsRef<Path>) -> Result<Vec<PathBuf>> {
-        let directory = directory.as_ref();
-        std::fs::create_dir_all(directory).map_err(|e| Error::unwritable(directory, &e))?;
-        let mut written = Vec::new();
-        let mut write = |name: String, text: String| {
-            let path = directory.join(name);
-            crate::output::write_whole(&path, text.as_bytes())?;
-            written.push(path);
-            Ok(())
-        };
-        for figure in self.figures() {
-            write(format!("{}.svg", figure.id), figure.svg())?;
-            write(format!("{}.csv", figure.id), figure.csv())?;
-        }
-        write("summary.md".into(), self.markdown())?;
-        Ok(written)
     }
 }

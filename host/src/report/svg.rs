@@ -10,6 +10,7 @@ use super::colour::{self, Colour};
 use super::figure::{Figure, Panel};
 use super::legend;
 use super::marks;
+use super::paper::{Frame, LETTER, px, text};
 use super::rich;
 
 /// For what width a picture is laid out.
@@ -38,58 +39,13 @@ impl Layout {
     }
 }
 
-/// Size of the letters on ticks and in legends, px.
-pub(crate) const LETTER: f64 = 12.0;
-
-/// A coordinate, to a tenth of a pixel.
-pub(crate) fn px(value: f64) -> String {
-    let tenths = (value * 10.0).round() as i64;
-    if tenths % 10 == 0 { format!("{}", tenths / 10) } else { format!("{:.1}", tenths as f64 / 10.0) }
-}
-
-/// Where a panel's numbers lie on the paper.
-#[derive(Debug, Clone)]
-pub(crate) struct Frame {
-    pub left: f64,
-    pub top: f64,
-    pub width: f64,
-    pub height: f64,
-    pub x_ends: (f64, f64),
-    pub y_ends: (f64, f64),
-    pub x_log: bool,
-    pub y_log: bool,
-    /// Names run from the top down, numbers from the bottom up.
-    pub y_down: bool,
-}
-
-fn fraction(value: f64, ends: (f64, f64), log: bool) -> f64 {
-    if log {
-        if value > 0.0 { (value / ends.0).ln() / (ends.1 / ends.0).ln() } else { f64::NAN }
-    } else {
-        (value - ends.0) / (ends.1 - ends.0)
+impl Figure {
+    /// The picture as a file of its own, wide enough for a page.
+    #[must_use]
+    pub fn svg(&self) -> String {
+        let style = format!("<style>{}{TEXT_STYLE}</style>", colour::style_sheet());
+        draw(self, Layout::Wide, Some(&style))
     }
-}
-
-impl Frame {
-    pub(crate) fn x(&self, value: f64) -> f64 {
-        self.left + self.width * fraction(value, self.x_ends, self.x_log)
-    }
-
-    pub(crate) fn y(&self, value: f64) -> f64 {
-        let up = fraction(value, self.y_ends, self.y_log);
-        self.top + self.height * if self.y_down { up } else { 1.0 - up }
-    }
-
-    /// The height of zero, or of the bottom where zero is not shown.
-    pub(crate) fn base(&self) -> f64 {
-        if self.y_log { self.top + self.height } else { self.y(0.0_f64.clamp(self.y_ends.0, self.y_ends.1)) }
-    }
-}
-
-/// The picture as a file of its own.
-pub(crate) fn standalone(figure: &Figure) -> String {
-    let style = format!("<style>{}{TEXT_STYLE}</style>", colour::style_sheet());
-    draw(figure, Layout::Wide, Some(&style))
 }
 
 /// The picture as part of a page that carries [`page_style`].
@@ -192,20 +148,6 @@ fn draw(figure: &Figure, layout: Layout, style: Option<&str>) -> String {
     out.push_str(&body);
     out.push_str("</svg>");
     out
-}
-
-/// A text element. `anchor` is `start`, `middle` or `end`.
-pub(crate) fn text(out: &mut String, x: f64, y: f64, anchor: &str, colour: Colour, extra: &str, words: &str) {
-    let _ = write!(
-        out,
-        "<text x=\"{}\" y=\"{}\"{} class=\"F {}\" fill=\"{}\"{extra}>{}</text>",
-        px(x),
-        px(y),
-        if anchor == "start" { String::new() } else { format!(" text-anchor=\"{anchor}\"") },
-        colour.class(),
-        colour.literal(),
-        rich::svg(words)
-    );
 }
 
 /// Draws one panel at `place` (left, top, width) and returns its height.
