@@ -14,6 +14,7 @@ pub mod fit;
 pub mod muscle_description;
 pub mod output;
 pub mod predict;
+pub mod progress;
 pub mod recording;
 pub mod report;
 pub mod studio;

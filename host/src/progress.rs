@@ -1,0 +1,162 @@
+//! How far a piece of work has come, and how long it still takes: one line on the terminal, nothing where nobody watches.
+
+use std::io::Write;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use crate::console::Console;
+
+/// Time between two pictures of the line.
+const REDRAW: Duration = Duration::from_millis(100);
+/// Work that is done sooner shows no line at all: a flash on the screen tells nothing.
+const PATIENCE: Duration = Duration::from_millis(400);
+/// Width of the bar, characters.
+const BAR: u64 = 24;
+
+/// The line of one piece of work. Steps may be counted from several threads; the line goes when this is dropped.
+///
+/// ```
+/// use host::progress::Progress;
+/// let progress = Progress::silent();
+/// progress.total(200);
+/// (0..200).for_each(|_| progress.step());
+/// assert_eq!(progress.done(), 200);
+/// ```
+#[derive(Debug)]
+pub struct Progress {
+    what: String,
+    live: bool,
+    begun: Instant,
+    done: AtomicU64,
+    total: AtomicU64,
+    /// Milliseconds after `begun` when the line was last drawn; 0: never.
+    drawn: AtomicU64,
+}
+
+impl Progress {
+    /// A line that begins with `what` is done, on a terminal and without `--quiet` only.
+    #[must_use]
+    pub fn new(console: &Console, what: impl Into<String>) -> Self {
+        Self::begin(what.into(), console.live())
+    }
+
+    /// One that says nothing, for libraries and tests.
+    #[must_use]
+    pub fn silent() -> Self {
+        Self::begin(String::new(), false)
+    }
+
+    fn begin(what: String, live: bool) -> Self {
+        Self {
+            what,
+            live,
+            begun: Instant::now(),
+            done: AtomicU64::new(0),
+            total: AtomicU64::new(0),
+            drawn: AtomicU64::new(0),
+        }
+    }
+
+    /// States how many steps there are altogether; may be said again when more is known. 0: not known.
+    pub fn total(&self, steps: u64) {
+        self.total.store(steps, Ordering::Relaxed);
+    }
+
+    /// One step is done.
+    pub fn step(&self) {
+        self.add(1);
+    }
+
+    /// Several steps are done.
+    pub fn add(&self, steps: u64) {
+        let before = self.done.fetch_add(steps, Ordering::Relaxed);
+        self.draw(before.saturating_add(steps));
+    }
+
+    /// So many steps are done by now.
+    pub fn set(&self, done: u64) {
+        self.done.store(done, Ordering::Relaxed);
+        self.draw(done);
+    }
+
+    fn draw(&self, done: u64) {
+        if !self.live {
+            return;
+        }
+        let elapsed = self.begun.elapsed();
+        let now = elapsed.as_millis() as u64;
+        let last = self.drawn.load(Ordering::Relaxed);
+        let due = now >= PATIENCE.as_millis() as u64 && now.saturating_sub(last) >= REDRAW.as_millis() as u64;
+        // Of several threads that find the line due, one draws it.
+        if due && self.drawn.compare_exchange(last, now, Ordering::Relaxed, Ordering::Relaxed).is_ok() {
+            let text = line(&self.what, done, self.total.load(Ordering::Relaxed), elapsed);
+            let _ = write!(std::io::stderr().lock(), "\r\u{1b}[2K{text}");
+        }
+    }
+
+    /// Steps done so far.
+    #[must_use]
+    pub fn done(&self) -> u64 {
+        self.done.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if self.drawn.load(Ordering::Relaxed) > 0 {
+            let _ = write!(std::io::stderr().lock(), "\r\u{1b}[2K");
+        }
+    }
+}
+
+/// The line: what, a bar, the share, and the time that is left if the rest goes as fast as what is done.
+fn line(what: &str, done: u64, total: u64, elapsed: Duration) -> String {
+    if total == 0 {
+        return format!("{what}  {done}  {}", span(elapsed));
+    }
+    let done = done.min(total);
+    let full = BAR * done / total;
+    let bar: String = (0..BAR).map(|i| if i < full { '█' } else { '░' }).collect();
+    let left = match done {
+        0 => String::new(),
+        _ => format!("  {} left", span(elapsed.mul_f64((total - done) as f64 / done as f64))),
+    };
+    format!("{what}  {bar} {:3} %{left}", 100 * done / total)
+}
+
+/// A time in the unit that a person would say.
+fn span(time: Duration) -> String {
+    let seconds = time.as_secs_f64().round() as u64;
+    match seconds {
+        0..60 => format!("{seconds} s"),
+        60..3600 => format!("{} min {:02} s", seconds / 60, seconds % 60),
+        _ => format!("{} h {:02} min", seconds / 3600, seconds % 3600 / 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_tells_share_and_remaining_time() {
+        let quarter = line("fit", 25, 100, Duration::from_secs(20));
+        assert_eq!(quarter, "fit  ██████░░░░░░░░░░░░░░░░░░  25 %  1 min 00 s left");
+        assert!(line("fit", 0, 100, Duration::from_secs(9)).ends_with("  0 %"));
+        // More steps than were said is a wrong total, not a share above one.
+        assert!(line("fit", 300, 100, Duration::from_secs(9)).ends_with("100 %  0 s left"));
+        assert_eq!(line("record", 1234, 0, Duration::from_secs(5)), "record  1234  5 s");
+        assert_eq!(span(Duration::from_secs(7_260)), "2 h 01 min");
+    }
+
+    #[test]
+    fn steps_are_counted_from_several_threads() {
+        let progress = Progress::silent();
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| (0..1000).for_each(|_| progress.step()));
+            }
+        });
+        assert_eq!(progress.done(), 4000);
+    }
+}
