@@ -87,6 +87,8 @@ pub struct Controller {
     asked: f32,
     asked_second: f32,
     asked_age: u32,
+    /// Ticks since a host's last frame.
+    host_age: u32,
     sides: [Actuator; 2],
     pair: PairState,
     tick: u64,
@@ -124,6 +126,7 @@ impl Controller {
             asked: 0.0,
             asked_second: 0.0,
             asked_age: 0,
+            host_age: 0,
             sides: [Actuator::new(&settings), Actuator::new(&settings)],
             settings,
             pair: PairState::default(),
@@ -218,6 +221,11 @@ impl Controller {
     /// Uses another table, or none.
     pub fn use_model(&mut self, side: Side, model: Option<Model>) {
         self.sides[side.index()].model = model;
+    }
+
+    /// A whole frame of a host has come.
+    pub fn heard(&mut self) {
+        self.host_age = 0;
     }
 
     /// One telemetry sample every so many ticks, 0 for none.
@@ -500,10 +508,15 @@ impl Controller {
                 f32::from(settings.watch.overrun_ticks),
             );
         }
+        self.host_age = self.host_age.saturating_add(1);
+        let silence = settings.watch.host_silence_ticks;
+        let controls = self.machine.state() == State::Running && self.mode != Mode::Vent;
+        if controls && !settings.watch.autonomous && self.host_age > silence {
+            return plain(Fault::HostSilence, self.host_age as f32, silence as f32);
+        }
         self.asked_age = self.asked_age.saturating_add(1);
         let silence = settings.watch.silence_ticks;
-        if silence > 0 && self.generator.is_set_point() && self.mode != Mode::Vent && self.asked_age > silence
-        {
+        if controls && silence > 0 && self.generator.is_set_point() && self.asked_age > silence {
             return plain(Fault::SetPointSilence, self.asked_age as f32, silence as f32);
         }
         None
@@ -745,7 +758,12 @@ pub fn check_settings(settings: &Settings) -> Result<(), Refusal> {
             Field::SensorWatch,
             watched(&settings.pressure) && watched(&settings.stroke) && watched(&settings.force),
         ),
-        (Field::Watch, not_negative(settings.watch.disagree_n) && positive(settings.watch.follow_pa)),
+        (
+            Field::Watch,
+            not_negative(settings.watch.disagree_n)
+                && positive(settings.watch.follow_pa)
+                && settings.watch.host_silence_ticks > 0,
+        ),
         (Field::Bands, positive(settings.motion_band_m) && positive(settings.pressure_band_pa)),
     ];
     match groups.into_iter().find(|(_, good)| !good) {

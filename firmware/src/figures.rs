@@ -197,6 +197,7 @@ fn whole_step(table: &MuscleTable) {
         let triangle = if phase < 0.5 { phase } else { 1.0 - phase };
         let readings = inputs(pressure, 0.3e-3 + 2.4e-3 * triangle, 45.0 + phase);
         let mut wanted = 0.0;
+        controller.heard();
         let spent =
             ticks(|| wanted = black_box(controller.step(black_box(&readings))).outputs.sides[0].pressure_pa);
         pressure += (wanted - pressure) * 0.03 + if tick % 2 == 0 { 3.0 } else { -3.0 };

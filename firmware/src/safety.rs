@@ -60,7 +60,7 @@ const fn rule(fault: Fault, while_armed: bool, may_hold: bool) -> Rule {
 }
 
 /// Every fault, in the order of its code. How long each takes to be noticed is in [`watch`](crate::watch).
-pub const RULES: [Rule; 18] = [
+pub const RULES: [Rule; 19] = [
     rule(Fault::SensorRange, true, true),
     rule(Fault::SensorStuck, false, true),
     rule(Fault::SensorNoisy, true, true),
@@ -79,6 +79,7 @@ pub const RULES: [Rule; 18] = [
     rule(Fault::BrownOut, true, false),
     rule(Fault::Watchdog, true, false),
     rule(Fault::NotANumber, false, false),
+    rule(Fault::HostSilence, false, true),
 ];
 
 /// The rule of a fault.

@@ -163,6 +163,7 @@ impl<F: NorFlash> Server<F> {
         if request.header.kind != Kind::Request {
             return 0;
         }
+        shared.with(Controller::heard);
         let answered = Header { kind: Kind::Response, ..request.header };
         let written = if request.header.id == hello::ID {
             frame::encode_bytes(answered, &self.hello().to_bytes(), out)

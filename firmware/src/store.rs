@@ -9,7 +9,7 @@
 //! | --- | --- |
 //! | 0x10 + side | which slot holds the table in use: [`Selected`], postcard |
 //! | 0x20 + 2·side + slot | image of a table |
-//! | 0x30 | [`Settings`], postcard |
+//! | 0x31 | [`Settings`], postcard (0x30 held those of layout 1, which are not read) |
 //! | 0x40 + side | `Remembered`: memories of effects that survive a power cycle, postcard |
 //! | 0x50 + n | past fault n of a ring, postcard; 0x5F its next place |
 //! | 0x60 | starts of the device, `u32` |
@@ -33,7 +33,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 /// Version of the layout.
-pub const FORMAT: u16 = 1;
+pub const FORMAT: u16 = 2;
 /// Longest item with its key, rounded up to the largest word of flash.
 const BUFFER: usize = image::MAX_LEN + 64;
 
@@ -85,7 +85,7 @@ type NoCache = Cache<Uncached, Uncached, Uncached, u8>;
 
 const SELECTED: u8 = 0x10;
 const IMAGE: u8 = 0x20;
-const SETTINGS: u8 = 0x30;
+const SETTINGS: u8 = 0x31;
 const MEMORIES: u8 = 0x40;
 const PAST_FAULT: u8 = 0x50;
 const PAST_FAULT_NEXT: u8 = 0x5F;

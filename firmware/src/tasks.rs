@@ -76,14 +76,27 @@ impl Shared {
         if event.is_some() {
             self.changed.signal(());
         }
-        let said =
-            [event.map(Spoken::Event), telemetry.map(|(number, sample)| Spoken::Sample(number, sample))];
-        for spoken in said.into_iter().flatten() {
-            if self.spoken.try_send(spoken).is_err() {
-                self.dropped.fetch_add(1, Ordering::Relaxed);
+        if let Some(event) = event {
+            // The host must hear of it, whatever else waits: the oldest sample makes room.
+            if self.spoken.is_full() && self.spoken.try_receive().is_ok() {
+                self.drop_one();
             }
+            self.say(Spoken::Event(event));
+        }
+        if let Some((number, sample)) = telemetry {
+            self.say(Spoken::Sample(number, sample));
         }
         outputs
+    }
+
+    fn say(&self, spoken: Spoken) {
+        if self.spoken.try_send(spoken).is_err() {
+            self.drop_one();
+        }
+    }
+
+    fn drop_one(&self) {
+        self.dropped.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Whether the state has changed since this was last asked.

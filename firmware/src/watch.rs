@@ -8,6 +8,7 @@
 //! | sensors disagree | `disagree_ticks` of table and load cell apart by `disagree_n` |
 //! | pressure not following | `follow_ticks` of pressure and regulator's model apart by `follow_pa` |
 //! | set-point silence | `silence_ticks` without one |
+//! | host silence | `host_silence_ticks` without a whole frame, while running and not `autonomous` |
 //! | loop overrun | `overrun_ticks` missed in a row |
 //!
 //! Over-speed looks at the filtered speed (time constant 20 ms of the motion tracker).

@@ -14,6 +14,7 @@ mod register;
 mod semihosting;
 mod time;
 mod uart;
+mod watchdog;
 
 use core::panic::PanicInfo;
 
@@ -30,7 +31,6 @@ use firmware::board::Identity;
 use firmware::server::Server;
 use firmware::tasks::{self, Shared};
 use model_core::link::hello::Board;
-use model_core::link::messages::StartedBy;
 use model_core::link::settings::Settings;
 use static_cell::StaticCell;
 
@@ -144,7 +144,7 @@ async fn link(port: &'static Port, shared: &'static Shared, mut server: Server<F
     tasks::link(&mut Receiver(&LINK), port, &mut server, shared).await;
     // The answer is on its way out of the pipe.
     Timer::after_millis(20).await;
-    cortex_m::peripheral::SCB::sys_reset();
+    watchdog::restart_on_request();
 }
 
 fn spawn(spawner: SendSpawner, shared: &'static Shared, port: &'static Port) -> Result<(), &'static str> {
@@ -153,12 +153,12 @@ fn spawn(spawner: SendSpawner, shared: &'static Shared, port: &'static Port) -> 
         board: Board::Mps2An386,
         muscles: 2,
         serial: *b"emulated\0\0\0\0",
-        // The emulator does not tell a restart from power.
-        started_by: StartedBy::Power,
+        started_by: watchdog::started_by(),
     };
     let server = Server::start(identity, flash, shared).map_err(|_| "the store cannot be opened")?;
     let full = |_| "a task does not fit its place";
     spawner.spawn(control(shared).map_err(full)?);
+    watchdog::start();
     spawner.spawn(telemetry(port, shared).map_err(full)?);
     spawner.spawn(link(port, shared, server).map_err(full)?);
     super::log!("started");

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use model_core::link::endpoints::{EVENT, Endpoint, TELEMETRY};
+use model_core::link::endpoints::{EVENT, Endpoint, GetStatus, TELEMETRY};
 use model_core::link::frame::{Accumulator, Header, Kind, MAX_BODY, MAX_WIRE, encode, encode_bytes};
 use model_core::link::hello::{self, Board, Hello};
 use model_core::link::messages::{Event, Refusal, Telemetry};
@@ -14,6 +14,10 @@ use crate::error::{Code, Error, Result};
 
 /// Telemetry that nobody fetches is kept up to this many samples: a minute at 1 kHz.
 const BACKLOG: usize = 60_000;
+
+/// A running controller hears from its host at least this often; it stops by itself after `watch.host_silence_ticks`, a
+/// second unless set otherwise.
+const HEARTBEAT: Duration = Duration::from_millis(100);
 
 /// How long to wait for answers.
 #[derive(Debug, Clone, Copy)]
@@ -71,6 +75,7 @@ pub struct Client {
     expected: Option<u16>,
     losses: Losses,
     patience: Patience,
+    spoke: Instant,
 }
 
 impl std::fmt::Debug for Client {
@@ -127,6 +132,7 @@ impl Client {
             expected: None,
             losses: Losses::default(),
             patience,
+            spoke: Instant::now(),
         };
         let mut heard = Heard::default();
         for _ in 0..patience.tries.max(1) {
@@ -206,6 +212,19 @@ impl Client {
         self.ask::<E>(request, self.patience.answer, self.patience.tries)
     }
 
+    /// Lets the device know that its host is alive, if nothing was sent for [a while](HEARTBEAT). Nothing is waited for:
+    /// the answer is passed over when it comes.
+    ///
+    /// # Errors
+    /// [`Code::DeviceSilent`] when the line is gone.
+    pub fn keep_alive(&mut self) -> Result<()> {
+        if self.spoke.elapsed() < HEARTBEAT {
+            return Ok(());
+        }
+        let header = Header { kind: Kind::Request, id: GetStatus::ID, sequence: self.next_sequence() };
+        self.transmit(header, &[])
+    }
+
     /// The next thing the device said by itself, waiting at most `patience` for one.
     ///
     /// # Errors
@@ -272,6 +291,7 @@ impl Client {
     }
 
     fn send(&mut self, bytes: &[u8]) -> Result<()> {
+        self.spoke = Instant::now();
         self.port.write_all(bytes).map_err(|e| lost(&self.port, &e))
     }
 
@@ -398,7 +418,7 @@ impl Heard {
 fn lost(port: &Port, reason: &std::io::Error) -> Error {
     Error::new(Code::DeviceSilent, format!("the connection to the device is gone: {reason}"))
         .value(port.name())
-        .help("look at cable and supply, then try again; a controller without its host vents when it is told to watch set-points")
+        .help("look at cable and supply, then try again; a running controller without its host stops itself within a second, unless it was set otherwise")
 }
 
 fn version_error(port: &Port, hello: &Hello) -> Error {

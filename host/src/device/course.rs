@@ -91,8 +91,8 @@ pub enum Course {
     },
 }
 
-/// Points of a table reference that are made from a file, before the device's own capacity is known.
-const POINTS: usize = 512;
+/// Points of a table reference that are made from a file: as many as the firmware holds.
+const POINTS: usize = 256;
 
 fn wrong(cause: impl Into<String>) -> Error {
     Error::new(Code::CallInvalid, cause).help(

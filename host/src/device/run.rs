@@ -101,6 +101,7 @@ fn follow(
         if stop() {
             return Ok(Ending::Stopped);
         }
+        client.keep_alive()?;
         match client.topic(Duration::from_millis(50))? {
             Some(Topic::Telemetry(s)) => {
                 heard = Instant::now();

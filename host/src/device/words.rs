@@ -86,7 +86,7 @@ pub fn fault(fault: Fault) -> FaultWords {
         Fault::SetPointSilence => (
             "set-point-silence",
             "no new set-point came in time",
-            "is the sending program still running? references made by the device need no stream",
+            "is the sending program still running, and quick enough?",
             "ticks",
         ),
         Fault::LoopOverrun => (
@@ -119,6 +119,13 @@ pub fn fault(fault: Fault) -> FaultWords {
             "a calculation gave something that is no number",
             "look at settings and table with `host device settings` and `host table check`; please report it",
             "",
+        ),
+        Fault::HostSilence => (
+            "host-silence",
+            "nothing was heard from the host while running",
+            "was the program ended, or the cable pulled? start it again; how long silence may last is watch.host_silence_ticks, \
+             and watch.autonomous=true lets a run go on without a host",
+            "ticks",
         ),
     };
     FaultWords { name, cause, remedy, unit }

@@ -232,6 +232,7 @@ impl Connected {
     }
 
     fn listen(&mut self, say: &broadcast::Sender<String>) -> Result<()> {
+        self.client.keep_alive()?;
         let until = Instant::now() + Duration::from_millis(8);
         while let Some(topic) = self.client.topic(until.saturating_duration_since(Instant::now()))? {
             match topic {

@@ -139,6 +139,10 @@ pub struct Watch {
     pub follow_ticks: u16,
     /// How long a streamed set-point stays good, ticks; 0 for ever. References of the device are not set-points.
     pub silence_ticks: u32,
+    /// How long a running mode goes on without any whole frame of a host, ticks; above zero.
+    pub host_silence_ticks: u32,
+    /// Whether a running mode may go on without a host for ever. Off unless somebody asks for it.
+    pub autonomous: bool,
     /// Ticks missed in a row before the fault.
     pub overrun_ticks: u16,
 }
@@ -228,6 +232,8 @@ impl Default for Settings {
                 follow_pa: 150e3,
                 follow_ticks: 200,
                 silence_ticks: 0,
+                host_silence_ticks: 1_000,
+                autonomous: false,
                 overrun_ticks: 5,
             },
             hold_on: 0,

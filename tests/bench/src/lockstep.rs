@@ -25,7 +25,7 @@
 //! | offset | size | field |
 //! | --- | --- | --- |
 //! | 0 | 1 | sync, `0x5A` |
-//! | 1 | 1 | status: bit 0 [`Answer::BAD_COMMAND`], bit 1 [`Answer::SCRIPT_DONE`], bit 2 [`Answer::BURST`] |
+//! | 1 | 1 | status: bit 0 [`Answer::BAD_COMMAND`], bit 1 [`Answer::SCRIPT_DONE`], bit 2 [`Answer::BURST`], bit 3 [`Answer::SUPPLY_LOW`], bits 4–7 [`Answer::late`] |
 //! | 2 | 2 | `temperature` i16, hundredths of a degree Celsius, of the bladder |
 //! | 4 | 4 | `tick` u32 of the request that is answered |
 //! | 8 | 4 | `pressure` f32, Pa gauge, as the sensor reads it |
@@ -114,7 +114,7 @@ impl Request {
 /// What the bench answers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Answer {
-    /// Bits [`Self::BAD_COMMAND`], [`Self::SCRIPT_DONE`], [`Self::BURST`].
+    /// Bits [`Self::BAD_COMMAND`], [`Self::SCRIPT_DONE`], [`Self::BURST`], [`Self::SUPPLY_LOW`], and [`Self::late`].
     pub status: u8,
     /// Bladder temperature in hundredths of a degree Celsius.
     pub temperature_centi: i16,
@@ -135,6 +135,13 @@ impl Answer {
     pub const SCRIPT_DONE: u8 = 2;
     /// The true pressure passed what the muscle is rated for: the controller did something dangerous.
     pub const BURST: u8 = 4;
+    /// The supply that board and bench share sags.
+    pub const SUPPLY_LOW: u8 = 8;
+
+    /// The status of a bench on which `periods` (at most 15) have passed without a request: the board was late.
+    pub const fn late(periods: u8) -> u8 {
+        periods << 4
+    }
 
     /// The frame of this answer.
     pub fn encode(&self) -> [u8; ANSWER_LEN] {

@@ -14,7 +14,7 @@
 use crate::bench::BenchSpec;
 use crate::lockstep::{Answer, Station};
 use crate::muscle::Muscle;
-use crate::pneumatics::Air;
+use crate::pneumatics::{Air, Pneumatics};
 use crate::rig::RigState;
 use crate::sensors::Channel;
 use serde::{Deserialize, Serialize};
@@ -238,6 +238,18 @@ impl Plant {
         self.readings = Readings { pressure, stroke, force, temperature: self.temperature };
     }
 
+    /// Moves the free end to a stroke (m) within the next `dt` (s), at equal speed; it stays there. For a bench that works
+    /// out itself how the muscle moves.
+    pub fn drive_to(&mut self, stroke: f64, dt: f64) {
+        let points = vec![(self.time, self.stroke * 1e3), (self.time + dt, stroke * 1e3)];
+        self.motion = Motion::Path { points };
+    }
+
+    /// The air supply, to break it while it runs.
+    pub fn pneumatics(&mut self) -> &mut Pneumatics {
+        self.air.pneumatics()
+    }
+
     /// The last readings.
     pub fn readings(&self) -> Readings {
         self.readings
@@ -297,6 +309,11 @@ impl PlantStation {
         let scripts = if scripts.is_empty() { vec![Motion::Held { stroke_mm: 0.0 }] } else { scripts };
         let plant = Plant::new(&bench, &scripts[0]);
         Self { bench, scripts, period, plant, script: 0, time: 0.0, log: Vec::new() }
+    }
+
+    /// The plant.
+    pub fn plant(&mut self) -> &mut Plant {
+        &mut self.plant
     }
 
     /// What happened, one row per period.

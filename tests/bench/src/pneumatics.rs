@@ -105,6 +105,11 @@ impl Air {
         self.muscle
     }
 
+    /// What it is made of, to break it while it runs.
+    pub fn pneumatics(&mut self) -> &mut Pneumatics {
+        &mut self.with
+    }
+
     /// The pressure that the sensor sees, Pa.
     pub fn seen(&self) -> f64 {
         if self.with.sensor_at_regulator { self.regulator } else { self.muscle }

@@ -42,9 +42,11 @@ impl Loop {
         bench: &BenchSpec,
         motion: &Motion,
         table: &MuscleTable,
-        settings: Settings,
+        mut settings: Settings,
         mode: Mode,
     ) -> Self {
+        // There is no link here, and so no host to hear from.
+        settings.watch.autonomous = true;
         let mut controller = Controller::new(settings);
         controller.use_model(Side::Agonist, Some(Model::build(table).expect("a valid table")));
         let mut this = Self { controller, plant: Plant::new(bench, motion), outputs: Outputs::default() };

@@ -5,9 +5,13 @@
 //! that says what to run, unless `PAM_SKIP_EMULATOR=1` is set.
 
 pub mod closed_loop;
+pub mod debugger;
 pub mod figures;
 pub mod fitting;
+pub mod joint;
+pub mod line;
 pub mod machine;
+pub mod program;
 pub mod stations;
 pub mod tracking;
 

@@ -12,6 +12,8 @@ use std::time::{Duration, Instant};
 use host::device::{Client, Patience, Port};
 use virtual_bench::lockstep::{self, Station};
 
+use crate::debugger::Debugger;
+
 /// The emulator was left out on request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Skipped;
@@ -122,6 +124,8 @@ pub struct Options {
     pub first: Option<Box<dyn Station + Send>>,
     /// The bench of the second.
     pub second: Option<Box<dyn Station + Send>>,
+    /// Whether a debugger may be attached.
+    pub debugged: bool,
 }
 
 /// A running board.
@@ -129,6 +133,7 @@ pub struct Options {
 pub struct Machine {
     child: Child,
     link: TcpStream,
+    debugger: Option<u16>,
     benches: Vec<JoinHandle<()>>,
 }
 
@@ -182,6 +187,11 @@ impl Machine {
             .arg(image)
             .args(["-chardev", &format!("socket,id=link,host=127.0.0.1,port={link_port},nodelay=on")])
             .args(["-serial", "chardev:link"]);
+        // QEMU opens this port itself; it was free a moment ago.
+        let debugger = options.debugged.then(|| listener().1);
+        if let Some(port) = debugger {
+            command.args(["-gdb", &format!("tcp:127.0.0.1:{port},server=on,wait=off")]);
+        }
         let mut plugged = Vec::new();
         for (number, station) in [options.first, options.second].into_iter().enumerate() {
             match station {
@@ -218,7 +228,7 @@ impl Machine {
                 })
             })
             .collect();
-        Ok(Self { child, link, benches })
+        Ok(Self { child, link, debugger, benches })
     }
 
     /// The raw link. Every value is the same line: one reads what another did not.
@@ -243,6 +253,14 @@ impl Machine {
     /// When the board does not say hello.
     pub fn client(&self) -> Client {
         self.try_client().expect("the board says hello")
+    }
+
+    /// Stops the processor for a debugger.
+    ///
+    /// # Panics
+    /// Without [`Options::debugged`].
+    pub fn debugger(&self) -> Debugger {
+        Debugger::attach(self.debugger.expect("a board that may be debugged"))
     }
 
     /// Pulls the plug.

@@ -57,6 +57,7 @@ pub fn compare(feed_forward: FeedForward, proportional: f32, integral: f32) -> i
 pub fn sample(client: &mut Client) -> Result<Telemetry, Event> {
     let deadline = Instant::now() + Duration::from_secs(10);
     loop {
+        client.keep_alive().expect("the line is there");
         match client.topic(Duration::from_millis(500)).expect("the line is there") {
             Some(Topic::Telemetry(sample)) => return Ok(sample),
             Some(Topic::Event(event @ Event::Fault(_))) => return Err(event),

@@ -75,6 +75,9 @@ const CASES: &[Case] = &[
         settings: |s| s.watch.disagree_n = 40.0,
         cause: |_, a| a.force += 80.0,
     },
+    Case { fault: Fault::BrownOut, within: 3, settings: NONE, cause: |_, a| a.status |= Answer::SUPPLY_LOW },
+    // Three ticks of two missed ones each are more than five.
+    Case { fault: Fault::LoopOverrun, within: 4, settings: NONE, cause: |_, a| a.status |= Answer::late(2) },
     Case {
         fault: Fault::SensorStuck,
         within: 600,

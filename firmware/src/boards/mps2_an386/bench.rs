@@ -4,12 +4,14 @@
 //! The bench keeps the time: a tick is one answer. Without an answer the request is repeated, which advances nothing; after
 //! [`PATIENCE`] the tick goes by without readings, so that the device stays alive on a bench that is gone.
 
+use embassy_futures::poll_once;
 use embassy_futures::select::{Either, select};
 use embassy_time::{Duration, Instant, Timer};
 use embedded_io_async::{Read, Write};
 use firmware::board::{Command, Inputs, Outputs, Plant, Readings};
 
 use super::uart::{Receiver, Sender, Uart};
+use super::watchdog;
 
 const REQUEST: usize = 18;
 const ANSWER: usize = 22;
@@ -17,12 +19,24 @@ const REQUEST_SYNC: u8 = 0xA5;
 const ANSWER_SYNC: u8 = 0x5A;
 const RESET: u8 = 1;
 const VENT: u8 = 2;
+const SUPPLY_LOW: u8 = 8;
+/// Ticks between two questions whether there is a second bench.
+const LOOK_EVERY: u8 = 100;
 
 /// How long an answer may take before the tick goes by without one. The bench is another process of a machine that may be
 /// busy, and time stands still with it; so only a bench that is gone is silent.
 const PATIENCE: Duration = Duration::from_secs(3);
 /// The same before the bench has answered at all: it may have been started later than the board.
 const FIRST_PATIENCE: Duration = Duration::from_millis(100);
+
+/// What a bench says each tick.
+struct Said {
+    readings: Readings,
+    /// The bench's supply sags.
+    supply_low: bool,
+    /// Periods that passed on the bench without a command.
+    missed: u16,
+}
 
 /// The pipes of a bench's UART.
 pub type BenchUart = Uart<64, 32>;
@@ -68,7 +82,7 @@ impl Bench {
     }
 
     /// The whole answer to this tick, if it has come.
-    fn answer(&mut self) -> Option<Readings> {
+    fn answer(&mut self) -> Option<Said> {
         let number = |at: usize| {
             f32::from_le_bytes([
                 self.buffer[at],
@@ -80,11 +94,15 @@ impl Bench {
         let crc = u16::from_le_bytes([self.buffer[20], self.buffer[21]]);
         let good = self.buffer[0] == ANSWER_SYNC && crc16(&self.buffer[..20]) == crc;
         let ours = self.buffer[4..8] == self.tick.to_le_bytes();
-        (good && ours).then(|| Readings { pressure_pa: number(8), stroke_m: number(12), force_n: number(16) })
+        (good && ours).then(|| Said {
+            readings: Readings { pressure_pa: number(8), stroke_m: number(12), force_n: number(16) },
+            supply_low: self.buffer[1] & SUPPLY_LOW != 0,
+            missed: u16::from(self.buffer[1] >> 4),
+        })
     }
 
     /// Waits for the answer to this tick, passing over anything else.
-    async fn wait(&mut self) -> Readings {
+    async fn wait(&mut self) -> Said {
         loop {
             while self.held < ANSWER {
                 let room = &mut self.buffer[self.held..];
@@ -102,22 +120,32 @@ impl Bench {
             };
             self.buffer.copy_within(next.., 0);
             self.held = ANSWER - next;
-            if let Some(readings) = found {
-                return readings;
+            if let Some(said) = found {
+                return said;
             }
         }
     }
 
+    /// Whether a bench has been plugged in here: asked now and then, and never waited for.
+    fn look(&mut self) -> bool {
+        if poll_once(self.wait()).is_ready() {
+            self.started = true;
+            self.tick = self.tick.wrapping_add(1);
+        }
+        self.started
+    }
+
     /// One exchange.
-    async fn exchange(&mut self, command: &Command, asked: f32) -> Option<Readings> {
+    async fn exchange(&mut self, command: &Command, asked: f32) -> Option<Said> {
+        watchdog::feed();
         let request = self.request(command, asked);
         let Ok(()) = Sender(self.uart).write_all(&request).await;
         let patience = if self.started { PATIENCE } else { FIRST_PATIENCE };
         match select(self.wait(), Timer::after(patience)).await {
-            Either::First(readings) => {
+            Either::First(said) => {
                 self.started = true;
                 self.tick = self.tick.wrapping_add(1);
-                Some(readings)
+                Some(said)
             }
             Either::Second(()) => {
                 // The same tick is asked for again: if only the answer was lost, nothing advances twice.
@@ -129,19 +157,20 @@ impl Bench {
     }
 }
 
-/// Up to two muscles. The second bench is asked only once it has answered, so that a board with one muscle does not wait
+/// Up to two muscles. The second bench is waited for only once it has answered, so that a board with one muscle does not wait
 /// for another.
 pub struct Benches {
     first: Bench,
     second: Bench,
-    looks_for_second: u8,
+    /// Ticks until the second is asked again whether it is there.
+    until_asked: u8,
     stepped_at: Instant,
 }
 
 impl Benches {
     /// Benches behind two UARTs.
     pub fn new(first: Bench, second: Bench) -> Self {
-        Self { first, second, looks_for_second: 1, stepped_at: Instant::now() }
+        Self { first, second, until_asked: 0, stepped_at: Instant::now() }
     }
 }
 
@@ -150,14 +179,23 @@ impl Plant for Benches {
         let step_us = self.stepped_at.elapsed().as_micros() as f32;
         let first = self.first.exchange(&outputs.sides[0], outputs.asked).await;
         let mut second = None;
-        if self.second.started || self.looks_for_second == 0 {
+        if self.second.started || self.second.look() {
             second = self.second.exchange(&outputs.sides[1], 0.0).await;
-            self.looks_for_second = 100;
-        } else if first.is_none() {
-            // Only a board that idles looks for another bench; a running one must not lose a tick to it.
-            self.looks_for_second -= 1;
+        } else if self.until_asked == 0 {
+            self.until_asked = LOOK_EVERY;
+            let request = self.second.request(&outputs.sides[1], 0.0);
+            let Ok(()) = Sender(self.second.uart).write_all(&request).await;
+        } else {
+            self.until_asked -= 1;
         }
         self.stepped_at = Instant::now();
-        Inputs { sides: [first, second], missed_ticks: 0, supply_low: false, step_us }
+        let benches = [first, second];
+        let said = || benches.iter().flatten();
+        Inputs {
+            missed_ticks: said().map(|one| one.missed).max().unwrap_or(0),
+            supply_low: said().any(|one| one.supply_low),
+            sides: benches.each_ref().map(|one| one.as_ref().map(|one| one.readings)),
+            step_us,
+        }
     }
 }

@@ -1,0 +1,92 @@
+//! What a host asks a controller to do.
+
+use heapless::Vec;
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+use super::Mode;
+
+/// Points of a reference table in one piece.
+pub const REFERENCE_PIECE: usize = 32;
+
+/// Starts a mode; from `Armed`, or from `Running` to change over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Start {
+    /// What to control.
+    pub mode: Mode,
+}
+
+/// What is wanted, in the terms of a mode.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub enum SetPoint {
+    /// Pressure, Pa.
+    Pressure(f32),
+    /// Force, N.
+    Force(f32),
+    /// Stroke, m.
+    Stroke(f32),
+    /// A joint.
+    Pair {
+        /// Angle, rad.
+        angle_rad: f32,
+        /// Stiffness, N·m/rad.
+        stiffness_nm_per_rad: f32,
+    },
+}
+
+/// A wave that the device makes itself, in the unit of the mode's first value (Pa, N, m, rad); it begins at once and
+/// holds its last value at its end. A pair's stiffness is the last set-point's.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub enum Reference {
+    /// None: set-points of the host.
+    SetPoint,
+    /// `mean + amplitude · sin(2π f t)`, for ever.
+    Sine {
+        /// Mean.
+        mean: f32,
+        /// Amplitude.
+        amplitude: f32,
+        /// Frequency, Hz.
+        frequency_hz: f32,
+    },
+    /// Rise, hold, fall, rest, again and again.
+    Trapezoid {
+        /// Lower value.
+        low: f32,
+        /// Upper value.
+        high: f32,
+        /// Time of each ramp, s.
+        ramp_s: f32,
+        /// Time at each value, s.
+        hold_s: f32,
+    },
+    /// A sine whose frequency goes from one value to another in proportion to time.
+    Chirp {
+        /// Mean.
+        mean: f32,
+        /// Amplitude.
+        amplitude: f32,
+        /// First frequency, Hz.
+        from_hz: f32,
+        /// Last frequency, Hz.
+        to_hz: f32,
+        /// Duration, s.
+        duration_s: f32,
+    },
+    /// The points sent by `reference_points`, joined by straight lines.
+    Table {
+        /// Time between points, s.
+        step_s: f32,
+        /// Whether to begin again at the end.
+        repeat: bool,
+    },
+}
+
+/// Points of the reference table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct ReferencePoints {
+    /// Place of the first; 0 begins a new table.
+    pub offset: u16,
+    /// The points, in the unit of the mode.
+    pub points: Vec<f32, REFERENCE_PIECE>,
+}

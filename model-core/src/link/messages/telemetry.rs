@@ -1,0 +1,61 @@
+//! What a device says by itself.
+
+use heapless::Vec;
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+use super::{FaultReport, Mode, State};
+
+/// Sets the stream of telemetry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct TelemetryRate {
+    /// One sample every so many ticks; 0 stops.
+    pub every_ticks: u16,
+}
+
+/// One muscle at one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+pub struct SideSample {
+    /// Measured gauge pressure, Pa.
+    pub pressure_pa: f32,
+    /// Measured stroke, m.
+    pub stroke_m: f32,
+    /// Measured force, N.
+    pub force_n: f32,
+    /// Wanted pressure, Pa: feed-forward and trim.
+    pub wanted_pa: f32,
+    /// Command to the regulator, Pa.
+    pub command_pa: f32,
+    /// Force by the table at the measured pressure and stroke, N; 0 without a table.
+    pub model_n: f32,
+}
+
+/// One tick as the device saw it. The frame's sequence number counts samples: a gap is a loss on the way.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Telemetry {
+    /// Device time of the tick, µs.
+    pub time_us: u64,
+    /// Number of the tick.
+    pub tick: u64,
+    /// State of safety.
+    pub state: State,
+    /// Mode.
+    pub mode: Mode,
+    /// What was asked for, in the unit of the mode.
+    pub asked: f32,
+    /// A pair's second value.
+    pub asked_second: f32,
+    /// The muscles in use.
+    pub sides: Vec<SideSample, 2>,
+}
+
+/// Something that happened, told without being asked.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub enum Event {
+    /// A fault stopped the device.
+    Fault(FaultReport),
+    /// The state changed.
+    State(State),
+    /// A trace is full.
+    TraceFull,
+}

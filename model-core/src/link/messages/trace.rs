@@ -1,0 +1,105 @@
+//! A record of the loop's variables.
+
+use heapless::Vec;
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+/// Variables that one trace records.
+pub const TRACE_VARIABLES: usize = 16;
+
+/// Values in one [`TracePiece`].
+pub const TRACE_PIECE: usize = 64;
+
+/// Variables of the loop that a trace can record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Variable {
+    /// Measured pressure, Pa.
+    Pressure,
+    /// Measured stroke, m.
+    Stroke,
+    /// Measured force, N.
+    Force,
+    /// Speed of stroke, m/s.
+    Speed,
+    /// Direction of friction, −1 to 1.
+    Direction,
+    /// First value asked for.
+    Asked,
+    /// Wanted force, N.
+    WantedForce,
+    /// Feed-forward pressure, Pa.
+    FeedForward,
+    /// Trim, Pa.
+    Trim,
+    /// Wanted pressure after its limits, Pa.
+    WantedPressure,
+    /// Command to the regulator, Pa.
+    Command,
+    /// Pressure of the regulator's model, Pa.
+    ModelPressure,
+    /// Force by the table, N.
+    ModelForce,
+    /// State of safety as a number.
+    State,
+    /// Time that the step took, µs.
+    StepTime,
+    /// Measured pressure of the second muscle, Pa.
+    SecondPressure,
+    /// Measured stroke of the second muscle, m.
+    SecondStroke,
+    /// Measured force of the second muscle, N.
+    SecondForce,
+    /// Command to the second regulator, Pa.
+    SecondCommand,
+}
+
+/// When a trace begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Trigger {
+    /// At once.
+    Now,
+    /// With the next start of a mode or reference.
+    Start,
+    /// It runs round and round and stops with a fault, so that it shows what led there.
+    UntilFault,
+}
+
+/// Arms a trace; what an earlier one recorded is forgotten.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct TraceArm {
+    /// What to record.
+    pub variables: Vec<Variable, TRACE_VARIABLES>,
+    /// One record every so many ticks, at least 1.
+    pub every_ticks: u16,
+    /// When.
+    pub trigger: Trigger,
+}
+
+/// A trace as it stands.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct TraceInfo {
+    /// Whether it has ended and can be read.
+    pub complete: bool,
+    /// Records in it.
+    pub records: u32,
+    /// Tick of the first record.
+    pub first_tick: u64,
+    /// Ticks between records.
+    pub every_ticks: u16,
+    /// The variables of each record, in order.
+    pub variables: Vec<Variable, TRACE_VARIABLES>,
+}
+
+/// Asks for values of a trace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct TraceRead {
+    /// Record to begin with.
+    pub record: u32,
+}
+
+/// Values of whole records, one record after the other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct TracePiece {
+    /// The values.
+    pub values: Vec<f32, TRACE_PIECE>,
+}

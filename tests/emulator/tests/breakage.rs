@@ -1,0 +1,228 @@
+//! What breaks beside the readings: the host, the air, the supply, the program itself; through the real image, link and plant.
+
+use std::process::Child;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use emulator_tests::line::{self, Line};
+use emulator_tests::machine::Folder;
+use emulator_tests::{Machine, Options, Watched, program, tracking, upload};
+use host::device::{Client, Topic};
+use model_core::link::endpoints::{Arm, ClearFault, GetFaults, GetInfo, GetStatus, SetTo, StartMode};
+use model_core::link::messages::{
+    Event, Fault, FaultReport, Mode, Refusal, SetPoint, Side, Start, StartedBy, State,
+};
+use model_core::table;
+use virtual_bench::bench::BenchSpec;
+use virtual_bench::plant::{Motion, PlantStation};
+use virtual_bench::pneumatics::Pneumatics;
+use virtual_bench::presets;
+
+type Station = Watched<PlantStation>;
+
+fn station() -> Station {
+    let bench = BenchSpec::laboratory(presets::miniature(), 3);
+    Watched::new(PlantStation::new(bench, vec![Motion::Held { stroke_mm: 0.8 }], 1e-3))
+}
+
+fn board(folder: &Folder, station: &Station, debugged: bool) -> Option<Machine> {
+    let options = Options { first: Some(Box::new(station.clone())), debugged, ..Options::default() };
+    Machine::start(folder.path(), options).ok()
+}
+
+/// Lets the plant go on until something is so.
+fn until(station: &Station, what: &str, so: impl Fn(usize) -> bool) {
+    let mut last = (station.periods(), Instant::now());
+    while !so(station.periods()) {
+        if station.periods() != last.0 {
+            last = (station.periods(), Instant::now());
+        }
+        assert!(last.1.elapsed() < Duration::from_secs(30), "{what}: the plant stands still");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn command(station: &Station) -> f32 {
+    station.periods().checked_sub(1).map_or(0.0, |last| station.since(last)[0].command)
+}
+
+/// A program that lets the device make a wave, killed without a word after some hundred ticks of it.
+fn killed_in_a_wave(station: &Station, line: &Line, folder: &Folder) {
+    let wave = ["run", "--pressure", "sine mean=250 amplitude=50 frequency=1"];
+    let mut child: Child = program::start(line, folder.path(), &wave);
+    until(station, "the wave", |_| command(station) > 150e3);
+    let begun = station.periods();
+    // It lives as long as the program does, silence or not.
+    until(station, "the wave goes on", |now| now > begun + 1_500);
+    assert!(command(station) > 150e3, "the wave was stopped while its host was alive");
+    // SIGKILL: nothing of the program runs any more.
+    child.kill().expect("it is killed");
+    child.wait().expect("it is gone");
+}
+
+#[test]
+fn a_host_that_is_killed_during_a_wave_of_the_devices_own_stops_it() {
+    let folder = Folder::new();
+    let station = station();
+    let Some(machine) = board(&folder, &station, false) else { return };
+    let heard = Arc::new(AtomicUsize::new(0));
+    let (note, clock) = (heard.clone(), station.clone());
+    let counted = Box::new(move |_: &mut Vec<u8>| note.store(clock.periods(), Ordering::Relaxed));
+    let line = Line::tcp(&machine, counted, line::clean());
+    killed_in_a_wave(&station, &line, &folder);
+    let last_heard = heard.load(Ordering::Relaxed);
+    until(&station, "the vent", |now| now > last_heard + 1_200);
+    let after = station.since(last_heard);
+    let vented = after.iter().position(|exchange| exchange.command == 0.0);
+    // A frame takes a few ticks to the board, whose own count begins when it is whole.
+    assert!(
+        vented.is_some_and(|n| (1_000..1_060).contains(&n)),
+        "vents {vented:?} ticks after the last frame"
+    );
+    assert!(after[vented.unwrap_or(0)..].iter().all(|exchange| exchange.command == 0.0), "and stays vented");
+    let said = program::done(&line, folder.path(), &["device", "faults", "--clear"]);
+    assert!(said.contains("latched: nothing was heard from the host while running"), "{said}");
+    assert!(said.contains("against 1000 ticks") && said.contains("while running in pressure mode"), "{said}");
+    assert!(said.contains("what to do: was the program ended"), "{said}");
+    let said = program::done(&line, folder.path(), &["device", "info", "--json"]);
+    assert!(said.contains("\"state\": \"disarmed\""), "{said}");
+}
+
+#[test]
+fn a_device_that_was_told_to_go_on_alone_does_and_holds_where_it_was_told_to_hold() {
+    let folder = Folder::new();
+    let station = station();
+    let Some(machine) = board(&folder, &station, false) else { return };
+    let line = Line::tcp(&machine, line::clean(), line::clean());
+    let set = |settings: &[&str]| {
+        let mut arguments = vec!["device", "settings"];
+        for one in settings {
+            arguments.extend(["--set", one]);
+        }
+        program::done(&line, folder.path(), &arguments)
+    };
+    set(&["watch.autonomous=true"]);
+    killed_in_a_wave(&station, &line, &folder);
+    let killed = station.periods();
+    until(&station, "it goes on", |now| now > killed + 3_000);
+    assert!(station.since(killed + 100).iter().all(|exchange| exchange.command > 100e3), "it went on alone");
+    program::done(&line, folder.path(), &["vent"]);
+    let hold = format!("hold_on={}", 1_u32 << Fault::HostSilence.code());
+    set(&["watch.autonomous=false", "watch.host_silence_ticks=400", &hold]);
+    killed_in_a_wave(&station, &line, &folder);
+    let killed = station.periods();
+    until(&station, "it holds", |now| now > killed + 1_500);
+    let held = station.since(killed + 1_000);
+    assert!(held[0].command > 190e3 && held.iter().all(|exchange| exchange.command == held[0].command));
+    program::done(&line, folder.path(), &["vent"]);
+    let vented = station.periods();
+    until(&station, "it vents", |now| now > vented + 50);
+    assert_eq!(command(&station), 0.0);
+}
+
+/// Waits for the event of a fault.
+fn stopped(client: &mut Client) -> FaultReport {
+    let deadline = Instant::now() + Duration::from_secs(30);
+    while Instant::now() < deadline {
+        client.keep_alive().expect("the line is there");
+        if let Some(Topic::Event(Event::Fault(report))) =
+            client.topic(Duration::from_millis(50)).expect("the line is there")
+        {
+            return report;
+        }
+    }
+    panic!("no fault was told");
+}
+
+/// A way for the air to break, and the pressure asked for after it broke.
+struct Break {
+    name: &'static str,
+    fault: Fault,
+    how: fn(&mut Pneumatics),
+    then_asked: f32,
+}
+
+/// A regulator that no longer moves.
+fn stands_still(air: &mut Pneumatics) {
+    air.rate = 0.0;
+}
+
+const BREAKS: [Break; 4] = [
+    Break { name: "burst", fault: Fault::PressureNotRising, how: |air| air.leak = 5.0, then_asked: 250e3 },
+    Break { name: "leak", fault: Fault::PressureNotRising, how: |air| air.leak = 1.0, then_asked: 400e3 },
+    Break { name: "no supply", fault: Fault::PressureNotRising, how: stands_still, then_asked: 500e3 },
+    Break { name: "jammed valve", fault: Fault::PressureNotFalling, how: stands_still, then_asked: 20e3 },
+];
+
+#[test]
+fn a_burst_a_leak_a_closed_supply_and_a_jammed_valve_are_noticed_on_the_plant_itself() {
+    let folder = Folder::new();
+    let station = station();
+    let Some(machine) = board(&folder, &station, false) else { return };
+    let mut client = machine.client();
+    upload(&mut client, Side::Agonist, &table::example());
+    for Break { name, fault, how, then_asked } in BREAKS {
+        tracking::start(&mut client, Mode::Pressure);
+        client.call::<SetTo>(&SetPoint::Pressure(250e3)).expect("a set-point");
+        let begun = station.periods();
+        until(&station, name, |now| now > begun + 400);
+        let whole = station.with(|bench| *bench.plant().pneumatics());
+        station.with(|bench| how(bench.plant().pneumatics()));
+        let broken = station.periods();
+        client.call::<SetTo>(&SetPoint::Pressure(then_asked)).expect("a set-point");
+        let report = stopped(&mut client);
+        let told = station.periods();
+        until(&station, name, |now| now > told + 5);
+        // The regulator's lead may command zero for a moment on the way down; venting stays.
+        let vented = station.since(broken).iter().rposition(|exchange| exchange.command > 0.0);
+        assert_eq!(report.fault, fault, "{name}: {report:?}");
+        // 200 ticks of `follow_ticks`, and the time in which air and model part.
+        assert!(vented.is_some_and(|n| (200..400).contains(&n)), "{name}: vents after {vented:?} ticks");
+        station.with(|bench| *bench.plant().pneumatics() = whole);
+        until(&station, name, |now| now > told + 300);
+        client.call::<ClearFault>(&()).expect("it clears when the air is whole");
+    }
+}
+
+/// The vector of the interrupt that runs the tasks: the eleventh behind the sixteen of the core.
+const TASKS_VECTOR: u32 = (16 + 10) * 4;
+/// `b .`: for ever here.
+const HANG: u16 = 0xE7FE;
+
+#[test]
+fn a_program_that_hangs_is_restarted_vented_and_says_so() {
+    let folder = Folder::new();
+    let station = station();
+    let Some(machine) = board(&folder, &station, true) else { return };
+    let mut client = machine.client();
+    assert_eq!(client.call::<GetInfo>(&()).expect("its limits").started_by, StartedBy::Power);
+    tracking::start(&mut client, Mode::Pressure);
+    client.call::<SetTo>(&SetPoint::Pressure(250e3)).expect("a set-point");
+    until(&station, "it runs", |_| command(&station) > 200e3);
+    drop(client);
+    let mut debugger = machine.debugger();
+    let tasks = debugger.word(TASKS_VECTOR) & !1;
+    debugger.patch(tasks, HANG);
+    debugger.detach();
+    // The bench is started anew by a board that starts, and so its record.
+    let deadline = Instant::now() + Duration::from_secs(20);
+    while command(&station) > 0.0 {
+        assert!(Instant::now() < deadline, "the watchdog does not bite");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let mut client = machine.client();
+    assert_eq!(client.call::<GetInfo>(&()).expect("its limits").started_by, StartedBy::Watchdog);
+    let faults = client.call::<GetFaults>(&()).expect("its faults");
+    assert_eq!(faults.latched.map(|report| report.fault), Some(Fault::Watchdog));
+    assert_eq!(faults.counts[usize::from(Fault::Watchdog.code())], 1);
+    // Nothing starts by itself, and nothing can be started before somebody has looked.
+    assert_eq!(client.try_call::<Arm>(&()).expect("an answer"), Err(Refusal::Latched(Fault::Watchdog)));
+    let begun = station.periods();
+    until(&station, "it stays vented", |now| now > begun + 500);
+    assert!(station.since(0).iter().all(|exchange| exchange.command == 0.0));
+    client.call::<ClearFault>(&()).expect("it clears");
+    client.call::<Arm>(&()).expect("it arms");
+    client.call::<StartMode>(&Start { mode: Mode::Pressure }).expect("it runs again");
+    assert_eq!(client.call::<GetStatus>(&()).expect("a status").state, State::Running);
+}
