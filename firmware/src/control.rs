@@ -16,7 +16,7 @@ use model_core::link::settings::{FeedForward, Reaction, Settings};
 use model_core::motion::{MotionSettings, MotionTracker};
 
 use crate::board::{Command, Inputs, Outputs, Readings};
-use crate::modes::{self, Integral, Model, Moment, PairState, Posed};
+use crate::modes::{self, Integral, Model, PairState, Posed};
 use crate::reference::Generator;
 use crate::regulator::RegulatorState;
 use crate::safety::{self, Cause, Machine};
@@ -47,6 +47,8 @@ struct Actuator {
     wanted_n: f32,
     forward_pa: f32,
     trim_pa: f32,
+    /// Force by the table at this tick's readings, N; none without a table or without readings that are numbers.
+    model_n: Option<f32>,
 }
 
 impl Actuator {
@@ -65,7 +67,13 @@ impl Actuator {
             wanted_n: 0.0,
             forward_pa: 0.0,
             trim_pa: 0.0,
+            model_n: None,
         }
+    }
+
+    /// The table, if it has been brought to this tick.
+    fn present(&self) -> Option<&Model> {
+        self.model.as_ref().filter(|_| self.model_n.is_some())
     }
 }
 
@@ -426,8 +434,11 @@ impl Controller {
     pub fn step(&mut self, inputs: &Inputs) -> Stepped {
         self.tick += 1;
         self.step_us = inputs.step_us;
-        let moments = [self.look(Side::Agonist, inputs), self.look(Side::Antagonist, inputs)];
-        let finding = self.watch(inputs, &moments);
+        for side in Side::ALL {
+            let model_n = self.look(side, inputs);
+            self.sides[side.index()].model_n = model_n;
+        }
+        let finding = self.watch(inputs);
         self.present = finding.map(|(_, finding)| finding.fault);
         if let Some((side, finding)) = finding {
             let state = self.machine.state();
@@ -444,15 +455,15 @@ impl Controller {
             if let Some(value) = self.generator.step() {
                 self.asked = value;
             }
-            self.drive(&moments);
+            self.drive();
         } else {
             self.rest();
         }
         self.record()
     }
 
-    /// Takes one muscle's readings.
-    fn look(&mut self, side: Side, inputs: &Inputs) -> Option<Moment> {
+    /// Takes one muscle's readings; the force that its table gives at them.
+    fn look(&mut self, side: Side, inputs: &Inputs) -> Option<f32> {
         let actuator = &mut self.sides[side.index()];
         let Readings { pressure_pa, stroke_m, force_n } = inputs.sides[side.index()]?;
         actuator.sample.pressure_pa = pressure_pa;
@@ -464,12 +475,12 @@ impl Controller {
             return None;
         }
         let motion = actuator.motion.step(TICK_S, stroke_m, pressure_pa);
-        let moment = actuator.model.as_mut().map(|model| model.moment(motion, pressure_pa))?;
-        actuator.sample.model_n = moment.model_n;
-        Some(moment)
+        let model_n = actuator.model.as_mut()?.tick(motion, pressure_pa);
+        actuator.sample.model_n = model_n;
+        Some(model_n)
     }
 
-    fn watch(&mut self, inputs: &Inputs, moments: &[Option<Moment>; 2]) -> Option<(Side, Finding)> {
+    fn watch(&mut self, inputs: &Inputs) -> Option<(Side, Finding)> {
         let settings = &self.settings;
         self.overruns = self.overruns.saturating_add(u32::from(inputs.missed_ticks));
         self.missed_in_a_row = if inputs.missed_ticks > 0 {
@@ -488,7 +499,7 @@ impl Controller {
                 speed_m_per_s: actuator.motion.motion().speed,
                 command: actuator.command,
                 expected_pa: actuator.regulator.model_pa(),
-                model_n: moments[side.index()].as_ref().map(|moment| moment.model_n),
+                model_n: actuator.model_n,
             };
             let finding = actuator.watch.check(&seen, settings);
             found = found.or(finding.map(|finding| (side, finding)));
@@ -523,13 +534,13 @@ impl Controller {
     }
 
     /// Makes the commands of the running mode.
-    fn drive(&mut self, moments: &[Option<Moment>; 2]) {
+    fn drive(&mut self) {
         let settings = self.settings;
         let mut wishes = [(0.0, true); 2];
         match self.mode {
             Mode::Vent => {}
             Mode::Pressure => wishes[0] = (self.asked, true),
-            Mode::Force => wishes[0] = self.force_wish(0, self.asked, &moments[0]),
+            Mode::Force => wishes[0] = self.force_wish(0, self.asked),
             Mode::Stroke => {
                 let side = &mut self.sides[0];
                 let speed = side.motion.motion().speed;
@@ -541,12 +552,12 @@ impl Controller {
                     speed,
                     side.cut,
                 );
-                wishes[0] = self.force_wish(0, force, &moments[0]);
+                wishes[0] = self.force_wish(0, force);
             }
             Mode::Pair => {
-                let forces = self.pair_forces(moments);
-                wishes[0] = self.force_wish(0, forces[0], &moments[0]);
-                wishes[1] = self.force_wish(1, forces[1], &moments[1]);
+                let forces = self.pair_forces();
+                wishes[0] = self.force_wish(0, forces[0]);
+                wishes[1] = self.force_wish(1, forces[1]);
             }
         }
         let mut bad = None;
@@ -580,11 +591,11 @@ impl Controller {
     }
 
     /// Feed-forward and trim for a wanted force.
-    fn force_wish(&mut self, at: usize, force_n: f32, moment: &Option<Moment>) -> (f32, bool) {
+    fn force_wish(&mut self, at: usize, force_n: f32) -> (f32, bool) {
         let settings = &self.settings;
         let actuator = &mut self.sides[at];
         actuator.wanted_n = force_n;
-        let model = actuator.model.as_ref().zip(moment.as_ref());
+        let model = actuator.present();
         let (forward, reached) = modes::feed_forward(settings, model, force_n, actuator.guess_pa);
         actuator.guess_pa = forward;
         actuator.forward_pa = forward;
@@ -598,11 +609,10 @@ impl Controller {
         (forward + actuator.trim_pa, reached)
     }
 
-    fn pair_forces(&mut self, moments: &[Option<Moment>; 2]) -> [f32; 2] {
+    fn pair_forces(&mut self) -> [f32; 2] {
         let joint = self.settings.joint;
         let [first, second] = &self.sides;
-        let (Some(a), Some(b), Some(ma), Some(mb)) = (&first.model, &second.model, &moments[0], &moments[1])
-        else {
+        let (Some(a), Some(b)) = (first.present(), second.present()) else {
             return [0.0; 2];
         };
         let speeds = first.motion.motion().speed - second.motion.motion().speed;
@@ -612,7 +622,7 @@ impl Controller {
             measured_rad: (first.sample.stroke_m - second.sample.stroke_m) / (2.0 * joint.radius_m),
             rate_rad_per_s: speeds / (2.0 * joint.radius_m),
         };
-        let sides = [(a, ma, first.sample.stroke_m), (b, mb, second.sample.stroke_m)];
+        let sides = [(a, first.sample.stroke_m), (b, second.sample.stroke_m)];
         self.pair.forces(&joint, &posed, sides, first.cut - second.cut)
     }
 

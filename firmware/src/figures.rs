@@ -23,12 +23,13 @@ use firmware::control::Controller;
 use firmware::modes::Model;
 use model_core::effects::{EffectName, FittedEffect, MAX_PARAMETERS};
 use model_core::image;
+use model_core::inverse::Search;
 use model_core::link::messages::{Mode, Reference, Side};
 use model_core::link::settings::Settings;
 use model_core::motion::Motion;
 use model_core::muscle::Muscle;
 use model_core::table::{self, MuscleTable};
-use model_core::units::{Length, Pressure};
+use model_core::units::{Force, Length, Pressure};
 use static_cell::StaticCell;
 
 /// This image serves no interrupts.
@@ -47,17 +48,16 @@ fn ticks(mut run: impl FnMut()) -> u32 {
     before.wrapping_sub(SYST::get_current()) & WRAP
 }
 
-/// Instructions of one of `repeats` equal calls, without the loop.
-fn instructions(repeats: u32, mut call: impl FnMut()) -> f32 {
+/// Instructions of one of `repeats` equal calls, without the loop and what hands the arguments over.
+fn instructions<A: Copy, R>(repeats: u32, arguments: A, mut call: impl FnMut(A) -> R) -> f32 {
     let all = ticks(|| {
-        for n in 0..repeats {
-            black_box(n);
-            call();
+        for _ in 0..repeats {
+            black_box(call(black_box(arguments)));
         }
     });
     let bare = ticks(|| {
-        for n in 0..repeats {
-            black_box(n);
+        for _ in 0..repeats {
+            black_box(arguments);
         }
     });
     (all as f32 - bare as f32) * INSTRUCTIONS_PER_TICK / repeats as f32
@@ -146,6 +146,29 @@ fn sweep(mut at: impl FnMut(f32, f32, f32)) {
     }
 }
 
+/// As a program calls it: not grown into the loop that counts.
+#[inline(never)]
+fn force_of(muscle: &Muscle<f32>, pressure: Pressure<f32>, stroke: Length<f32>, s: f32) -> f32 {
+    muscle.force(pressure, stroke, s).newtons()
+}
+
+#[inline(never)]
+fn pressure_of(
+    muscle: &Muscle<f32>,
+    wanted: Force<f32>,
+    stroke: Length<f32>,
+    s: f32,
+    guess: Pressure<f32>,
+    search: &Search<f32>,
+) -> f32 {
+    muscle.pressure_for(wanted, &muscle.held(stroke), s, guess, search).pressure.pascals()
+}
+
+#[inline(never)]
+fn direct_force_of(port: &Direct, table: &MuscleTable, p: f32, x: f32, s: f32) -> f32 {
+    port.force(table, p, x, s)
+}
+
 fn functions(table: &MuscleTable, muscle: &Muscle<f32>) {
     let mut force = Sweep::default();
     let mut inverse = Sweep::default();
@@ -154,19 +177,16 @@ fn functions(table: &MuscleTable, muscle: &Muscle<f32>) {
     let search = muscle.search();
     sweep(|p, x, s| {
         let (pressure, stroke) = (Pressure::from_pascals(p), Length::from_metres(x));
-        force.add(instructions(64, || {
-            black_box(muscle.force(black_box(pressure), black_box(stroke), black_box(s)));
+        force.add(instructions(64, (pressure, stroke, s), |(pressure, stroke, s)| {
+            force_of(muscle, pressure, stroke, s)
         }));
         let wanted = muscle.force(pressure, stroke, s);
         let guess = Pressure::from_pascals(p + 5e3);
-        inverse.add(instructions(64, || {
-            let held = muscle.held(black_box(stroke));
-            black_box(muscle.pressure_for(black_box(wanted), &held, black_box(s), black_box(guess), &search));
+        inverse.add(instructions(64, (wanted, stroke, s, guess), |(wanted, stroke, s, guess)| {
+            pressure_of(muscle, wanted, stroke, s, guess, &search)
         }));
         if let Some(port) = &port {
-            direct.add(instructions(16, || {
-                black_box(port.force(black_box(table), black_box(p), black_box(x), black_box(s)));
-            }));
+            direct.add(instructions(16, (p, x, s), |(p, x, s)| direct_force_of(port, table, p, x, s)));
         }
     });
     force.say("force");
@@ -239,15 +259,15 @@ fn effects(table: &MuscleTable) {
         }
         let Ok(mut model) = Model::build(&table) else { continue };
         let mut tick = 0_u32;
-        let cost = instructions(64, || {
+        let cost = instructions(64, 300e3, |pressure_pa| {
             tick += 1;
             let moved = Motion { stroke: 1e-3 + 1e-6 * tick as f32, ..motion };
-            black_box(model.moment(black_box(&moved), black_box(300e3)));
+            model.tick(black_box(&moved), pressure_pa)
         });
         match effect {
             None => {
                 without = Some(cost);
-                hprintln!("moment {:.1} {:.1} 64", cost, cost);
+                hprintln!("tick-of-model {:.1} {:.1} 64", cost, cost);
             }
             Some(effect) => {
                 let added = cost - without.unwrap_or(0.0);

@@ -1,22 +1,24 @@
 //! Which pressure a mode wants: the mathematics between a set-point and the regulator.
 
-use model_core::effects::{Chain, Context};
-use model_core::inverse::{Reach, Search};
+use model_core::effects::Chain;
+use model_core::inverse::{Reach, Search, Solution};
 use model_core::link::settings::{FeedForward, ForceLoop, Joint, Settings, StrokeLoop};
 use model_core::motion::Motion;
-use model_core::muscle::{Held, Muscle};
+use model_core::muscle::{Held, Moment, Muscle};
 use model_core::table::{MuscleTable, TableError};
 use model_core::units::{Force, Length, Pressure};
 
 use crate::control::TICK_S;
 
-/// A muscle's table in use: the form that is evaluated, and its effects with what they remember.
+/// A muscle's table in use: the form that is evaluated, its effects with what they remember, and the present tick.
 #[derive(Clone, Debug)]
 pub struct Model {
     /// Force and inverse.
     pub muscle: Muscle<f32>,
     /// Physics beyond the base model.
     pub chain: Chain<f32>,
+    /// The muscle in this tick. Without effects its shape and direction are all that is kept up.
+    now: Moment<f32>,
 }
 
 impl Model {
@@ -25,58 +27,53 @@ impl Model {
     /// # Errors
     /// The number of the table that cannot be used.
     pub fn build(table: &MuscleTable) -> Result<Self, TableError> {
-        Ok(Self { muscle: Muscle::build(table)?, chain: Chain::resumed(&table.effects) })
+        let muscle = Muscle::build(table)?;
+        Ok(Self { chain: Chain::resumed(&table.effects), now: muscle.moment(), muscle })
     }
-}
 
-/// One tick of one muscle: the shape at the measured stroke, computed once.
-#[derive(Clone, Copy, Debug)]
-pub struct Moment {
-    /// The muscle at the measured stroke.
-    pub held: Held<f32>,
-    /// What effects look at; only where there are effects.
-    pub context: Option<Context<f32>>,
-    /// Direction of friction.
-    pub direction: f32,
-    /// Force by the table at the measured pressure, N.
-    pub model_n: f32,
-}
-
-impl Model {
-    /// Lets one tick pass: steps the effects and evaluates the force at the readings.
-    pub fn moment(&mut self, motion: &Motion<f32>, pressure_pa: f32) -> Moment {
-        let held = self.muscle.held(Length::from_metres(motion.stroke));
+    /// Lets one tick pass: the shape at the measured stroke, a step of the effects, and the force at the readings, N.
+    pub fn tick(&mut self, motion: &Motion<f32>, pressure_pa: f32) -> f32 {
+        let Self { muscle, chain, now } = self;
         let pressure = Pressure::from_pascals(pressure_pa);
-        let parts = self.muscle.parts(&held, pressure);
-        let mut newtons = parts.force(motion.direction);
-        let mut context = None;
-        if !self.chain.is_empty() {
-            let now = self.muscle.context_held(&held, motion, pressure);
-            self.chain.step(&now);
-            newtons += self.chain.force(&now);
-            context = Some(now);
-        }
-        Moment { held, context, direction: motion.direction, model_n: self.muscle.pull(newtons).newtons() }
+        let newtons = if chain.is_empty() {
+            now.held = muscle.held(Length::from_metres(motion.stroke));
+            now.context.direction = motion.direction;
+            muscle.force_posed(&now.held.posture, pressure, motion.direction)
+        } else {
+            muscle.update(now, motion, pressure);
+            chain.step(&now.context);
+            now.context.force() + chain.force(&now.context)
+        };
+        muscle.pull(newtons).newtons()
     }
 
-    /// The pressure for a wanted force, and whether it can be had.
-    pub fn pressure_for(&self, force_n: f32, moment: &Moment, guess_pa: f32) -> (f32, bool) {
+    /// Direction of friction in this tick.
+    pub fn direction(&self) -> f32 {
+        self.now.context.direction
+    }
+
+    /// The muscle at this tick's stroke.
+    pub fn held(&self) -> &Held<f32> {
+        &self.now.held
+    }
+
+    /// The pressure for a wanted force in this tick, and whether it can be had.
+    pub fn pressure_for(&self, force_n: f32, guess_pa: f32) -> (f32, bool) {
         let search = Search { tolerance: Pressure::from_pascals(20.0), ..self.muscle.search() };
         let force = Force::from_newtons(force_n);
         let guess = Pressure::from_pascals(guess_pa);
-        let found = match &moment.context {
-            Some(context) => {
-                self.muscle.pressure_with(force, &moment.held, &self.chain, context, guess, &search)
-            }
-            None => self.muscle.pressure_for(force, &moment.held, moment.direction, guess, &search),
+        let found = if self.chain.is_empty() {
+            base_pressure(&self.muscle, &self.now.held, self.direction(), force, guess, &search)
+        } else {
+            self.muscle.pressure_with(force, &self.chain, &self.now, guess, &search)
         };
         (found.pressure.pascals(), found.reach == Reach::Reached)
     }
 
     /// `P = F / g`, the ideal braid alone, `g = (3L² − B²)/(4πN²)`; the highest pressure past the neutral angle.
-    pub fn gaylord_pressure(&self, force_n: f32, moment: &Moment) -> (f32, bool) {
+    pub fn gaylord_pressure(&self, force_n: f32) -> (f32, bool) {
         let high = self.muscle.max_pressure().pascals();
-        let area = moment.held.posture.area;
+        let area = self.now.held.posture.area;
         if area <= 0.0 {
             return (high, false);
         }
@@ -86,17 +83,25 @@ impl Model {
     }
 }
 
+/// [`Muscle::pressure_for`], once in the image for all who ask.
+#[inline(never)]
+pub fn base_pressure(
+    muscle: &Muscle<f32>,
+    held: &Held<f32>,
+    direction: f32,
+    force: Force<f32>,
+    guess: Pressure<f32>,
+    search: &Search<f32>,
+) -> Solution<f32> {
+    muscle.pressure_for(force, held, direction, guess, search)
+}
+
 /// The feed-forward pressure of a wanted force, Pa; without a table there is none.
-pub fn feed_forward(
-    settings: &Settings,
-    model: Option<(&Model, &Moment)>,
-    force_n: f32,
-    guess_pa: f32,
-) -> (f32, bool) {
+pub fn feed_forward(settings: &Settings, model: Option<&Model>, force_n: f32, guess_pa: f32) -> (f32, bool) {
     match (settings.feed_forward, model) {
         (FeedForward::Off, _) | (_, None) => (0.0, true),
-        (FeedForward::Table, Some((model, moment))) => model.pressure_for(force_n, moment, guess_pa),
-        (FeedForward::Gaylord, Some((model, moment))) => model.gaylord_pressure(force_n, moment),
+        (FeedForward::Table, Some(model)) => model.pressure_for(force_n, guess_pa),
+        (FeedForward::Gaylord, Some(model)) => model.gaylord_pressure(force_n),
     }
 }
 
@@ -187,18 +192,12 @@ impl PairState {
     ///
     /// The joint's stiffness at held pressures is `r² Σ −∂F_i/∂x`; one Newton step a tick moves the common pressure to where
     /// it is the wanted one. Around the forces that this pressure gives, the torque of the angle's loop is split evenly.
-    pub fn forces(
-        &mut self,
-        joint: &Joint,
-        posed: &Posed,
-        sides: [(&Model, &Moment, f32); 2],
-        cut: f32,
-    ) -> [f32; 2] {
+    pub fn forces(&mut self, joint: &Joint, posed: &Posed, sides: [(&Model, f32); 2], cut: f32) -> [f32; 2] {
         let r = joint.radius_m;
         let probe_pa = 10e3;
         let mut stiffness = [0.0; 2];
         let mut common_n = [0.0; 2];
-        for ((model, moment, stroke_m), common) in sides.into_iter().zip(&mut common_n) {
+        for ((model, stroke_m), common) in sides.into_iter().zip(&mut common_n) {
             let h = model.muscle.braid().rest_length() * 1.0e-3;
             let nearer = model.muscle.held(Length::from_metres(stroke_m - h));
             let farther = model.muscle.held(Length::from_metres(stroke_m + h));
@@ -209,8 +208,8 @@ impl PairState {
             }
             *common = model
                 .muscle
-                .parts(&moment.held, Pressure::from_pascals(self.common_pa))
-                .force(moment.direction);
+                .parts(model.held(), Pressure::from_pascals(self.common_pa))
+                .force(model.direction());
         }
         let high = sides[0].0.muscle.max_pressure().min(sides[1].0.muscle.max_pressure()).pascals();
         let slope = (stiffness[1] - stiffness[0]) / probe_pa;

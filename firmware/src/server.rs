@@ -19,7 +19,7 @@ use model_core::units::{Length, Pressure};
 
 use crate::board::Identity;
 use crate::control::{self, Controller, TICKS_PER_S};
-use crate::modes::Model;
+use crate::modes::{self, Model};
 use crate::reference;
 use crate::store::{self, Memories, Store};
 use crate::tasks::Shared;
@@ -423,8 +423,14 @@ impl<F: NorFlash> Service for Session<'_, F> {
                 let held = model.muscle.held(Length::from_metres(point.stroke_m));
                 let pressure = Pressure::from_pascals(point.pressure_pa);
                 let force = model.muscle.force(pressure, Length::from_metres(point.stroke_m), direction);
-                let found =
-                    model.muscle.pressure_for(force, &held, direction, pressure, &model.muscle.search());
+                let found = modes::base_pressure(
+                    &model.muscle,
+                    &held,
+                    direction,
+                    force,
+                    pressure,
+                    &model.muscle.search(),
+                );
                 Some(Value { force_n: force.newtons(), pressure_pa: found.pressure.pascals() })
             });
             values.push(value.ok_or(Refusal::NoTable(request.side))?).map_err(|_| Refusal::Range)?;

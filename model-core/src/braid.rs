@@ -94,8 +94,9 @@ impl<T: Scalar> Geometry<T> {
             inv_rest_radius: of(2.0 / d0),
             rest_radius: of(d0 / 2.0),
             fibre_squared: of(fibre * fibre),
-            inv_two_pi_turns: of(1.0 / (2.0 * PI * turns)),
-            inv_four_pi_turns_squared: of(1.0 / four_pi_n2),
+            widening: of(1.0 / (PI * four_pi_n2)),
+            three_inv_four_pi_turns_squared: of(3.0 / four_pi_n2),
+            fibre_area: of(fibre * fibre / four_pi_n2),
             inv_two_pi_turns_squared: of(2.0 / four_pi_n2),
             bladder_volume: of(volume),
             bladder_volume_over_pi: of(volume / PI),
@@ -106,6 +107,10 @@ impl<T: Scalar> Geometry<T> {
     }
 }
 
+/// What the sleeve keeps of its radius where its fibres are straight, m²: a micrometre, squared. A constant that is known to be
+/// positive, so that the compiler needs no way out of the square root.
+const LEAST_RADIUS_SQUARED: f32 = 1.0e-12;
+
 /// The sleeve's constants, ready for use at any length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Braid<T> {
@@ -114,8 +119,13 @@ pub struct Braid<T> {
     rest_radius: T,
     inv_rest_radius: T,
     fibre_squared: T,
-    inv_two_pi_turns: T,
-    inv_four_pi_turns_squared: T,
+    /// `1/(2πN)²`.
+    widening: T,
+    /// `3/(4πN²)`.
+    three_inv_four_pi_turns_squared: T,
+    /// `B²/(4πN²)`.
+    fibre_area: T,
+    /// `1/(2πN²)`.
     inv_two_pi_turns_squared: T,
     bladder_volume: T,
     bladder_volume_over_pi: T,
@@ -151,26 +161,20 @@ impl<T: Scalar> Braid<T> {
     /// The shape at contraction stroke `ΔL = L0 − L`.
     ///
     /// ```text
-    /// R = sqrt(B² − L²) / (2 π N)      t = R − sqrt(R² − V_B/(π L))
+    /// R² = (B² − L²)/(2 π N)²      t = R − sqrt(R² − V_B/(π L))
     /// ```
-    /// Beyond the fibre's length (`L ≥ B`, pulled straight) and where the bladder would fill the whole sleeve, the
-    /// roots' arguments are held at zero: the result stays finite there, but has no physical meaning.
+    /// Beyond the fibre's length (`L ≥ B`, pulled straight) the radius is held at a micrometre, and where the bladder would fill the whole sleeve the wall is the radius: the result stays finite there, but has no physical
+    /// meaning.
     #[inline(always)]
     pub fn posture(&self, stroke: Length<T>) -> Posture<T> {
         let length = self.rest_length - stroke.si();
-        let radius = (self.fibre_squared - length * length).max(T::ZERO).sqrt() * self.inv_two_pi_turns;
-        let inv_length = T::ONE / length;
-        let bore_squared = (radius * radius - self.bladder_volume_over_pi * inv_length).max(T::ZERO);
-        let wall = radius - bore_squared.sqrt();
+        let radius_squared = ((self.fibre_squared - length * length) * self.widening)
+            .at_least(T::from_f32(LEAST_RADIUS_SQUARED));
+        let radius = radius_squared.sqrt();
+        let bore = (radius_squared - self.bladder_volume_over_pi / length).at_least(T::ZERO).sqrt();
+        let wall = radius - bore;
         let load_length = length - self.tip * (radius - self.rest_radius);
         let squared = load_length * load_length;
-        let axial_area = if self.tip == T::ZERO {
-            self.bladder_volume * inv_length
-        } else {
-            self.bladder_volume / load_length
-        };
-        // R > 0 wherever the sleeve has a bore; the floor keeps the quotient finite in the meaningless region.
-        let radius_floor = radius.max(self.rest_radius * T::from_f32(1.0e-3));
         Posture {
             length,
             load_length,
@@ -178,9 +182,9 @@ impl<T: Scalar> Braid<T> {
             wall,
             axial_strain: load_length * self.inv_rest_length - T::ONE,
             radial_strain: radius * self.inv_rest_radius - T::ONE,
-            area: (squared + squared + squared - self.fibre_squared) * self.inv_four_pi_turns_squared,
-            axial_area,
-            hoop_area: wall * squared * self.inv_two_pi_turns_squared / radius_floor,
+            area: squared * self.three_inv_four_pi_turns_squared - self.fibre_area,
+            axial_area: self.bladder_volume / load_length,
+            hoop_area: wall * (squared * self.inv_two_pi_turns_squared) / radius,
         }
     }
 
@@ -193,8 +197,9 @@ impl<T: Scalar> Braid<T> {
             rest_radius: to(self.rest_radius),
             inv_rest_radius: to(self.inv_rest_radius),
             fibre_squared: to(self.fibre_squared),
-            inv_two_pi_turns: to(self.inv_two_pi_turns),
-            inv_four_pi_turns_squared: to(self.inv_four_pi_turns_squared),
+            widening: to(self.widening),
+            three_inv_four_pi_turns_squared: to(self.three_inv_four_pi_turns_squared),
+            fibre_area: to(self.fibre_area),
             inv_two_pi_turns_squared: to(self.inv_two_pi_turns_squared),
             bladder_volume: to(self.bladder_volume),
             bladder_volume_over_pi: to(self.bladder_volume_over_pi),
@@ -207,6 +212,10 @@ impl<T: Scalar> Braid<T> {
     /// `L0`, m.
     pub fn rest_length(&self) -> T {
         self.rest_length
+    }
+    /// `1/L0`, 1/m.
+    pub fn inv_rest_length(&self) -> T {
+        self.inv_rest_length
     }
     /// `R0`, m.
     pub fn rest_radius(&self) -> T {
@@ -274,19 +283,19 @@ impl<T: Scalar> Braid<T> {
     #[inline]
     pub fn slopes(&self, posture: &Posture<T>) -> PostureSlopes<T> {
         let small = self.rest_radius * T::from_f32(1.0e-3);
-        let radius = posture.radius.max(small);
+        let radius = posture.radius.at_least(small);
         let inv_length = T::ONE / posture.length;
-        let widening = posture.length * self.inv_two_pi_turns * self.inv_two_pi_turns / radius;
+        let widening = posture.length * self.widening / radius;
         let bore = posture.radius - posture.wall;
         let squeezed = T::from_f32(0.5) * self.bladder_volume_over_pi * inv_length * inv_length;
         // Where the bladder fills the sleeve the posture holds the bore at zero, and the wall is the radius.
         let thinning = if bore > small { widening - (radius * widening - squeezed) / bore } else { widening };
         let shortening = -T::ONE - self.tip * widening;
         let per_length = shortening / posture.load_length;
-        let squared = self.inv_four_pi_turns_squared * posture.load_length * shortening;
-        let thin = thinning / posture.wall.max(small);
+        let area = self.three_inv_four_pi_turns_squared * posture.load_length * shortening;
+        let thin = thinning / posture.wall.at_least(small);
         PostureSlopes {
-            area: (squared + squared + squared) * T::from_f32(2.0),
+            area: area + area,
             axial_area: -posture.axial_area * per_length,
             hoop_area: posture.hoop_area * (thin + per_length + per_length - widening / radius),
             axial_strain: shortening * self.inv_rest_length,

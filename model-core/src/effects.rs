@@ -25,15 +25,15 @@
 //! let muscle = Muscle::<f32>::build(&table).expect("a valid table");
 //! let mut chain = Chain::resumed(&table.effects);
 //! let mut tracker = MotionTracker::new(MotionSettings::default());
+//! let mut moment = muscle.moment();
 //! let mut command = Pressure::from_kilopascals(300.0);
 //! let wanted = Force::from_newtons(30.0);
 //! for tick in 0..=1000 {
 //!     let stroke = 1.0e-6 * tick as f32; // 1 mm in a second
 //!     let motion = tracker.step(1.0e-3, stroke, command.pascals());
-//!     let held = muscle.held(Length::from_metres(motion.stroke));
-//!     let context = muscle.context_held(&held, motion, command);
-//!     chain.step(&context);
-//!     command = muscle.pressure_with(wanted, &held, &chain, &context, command, &muscle.search()).pressure;
+//!     muscle.update(&mut moment, motion, command);
+//!     chain.step(&moment.context);
+//!     command = muscle.pressure_with(wanted, &chain, &moment, command, &muscle.search()).pressure;
 //! }
 //! // A tenth of the time constant has gone by: most of the over-stress is still there, and costs pressure.
 //! let held = muscle.held(Length::from_metres(1.0e-3_f32));

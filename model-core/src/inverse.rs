@@ -4,7 +4,7 @@
 //! together once, and Newton's method runs on them; a bracket keeps it from leaving, so that it ends for every table.
 
 use crate::effects::{Chain, Context};
-use crate::muscle::{FRICTION, Held, Muscle};
+use crate::muscle::{COMMON_ORDER, Held, HeldSlopes, Moment, Muscle, Piece};
 use crate::scalar::Scalar;
 use crate::spline::{self, Cubic};
 use crate::units::{Force, Pressure};
@@ -49,8 +49,113 @@ pub struct Search<T> {
 
 const MAX_STEPS: u8 = 40;
 
-/// One segment's cubics at a held stroke.
-struct Segment<T> {
+/// Force as a function of pressure alone, piece by piece smooth.
+trait Curve<T> {
+    /// Makes ready the piece around a pressure.
+    fn enter(&mut self, p: T);
+    /// Whether a pressure lies on the piece that was entered.
+    fn holds(&self, p: T) -> bool;
+    /// Force and its slope at a pressure of the piece.
+    fn force_and_slope(&mut self, p: T) -> (T, T);
+}
+
+/// The pressures between which the answer lies, if force rises with pressure and the answer is within the limits. An end that
+/// has not been tried lies a tolerance outside.
+struct Bracket<T> {
+    low: T,
+    high: T,
+}
+
+impl<T: Scalar> Bracket<T> {
+    /// Where to go instead of a step that leaves the bracket or is no number.
+    #[cold]
+    #[inline(never)]
+    fn instead(&self, lowest: T, highest: T) -> T {
+        if self.low < lowest {
+            lowest
+        } else if self.high > highest {
+            highest
+        } else {
+            (self.low + self.high) * T::from_f32(0.5)
+        }
+    }
+}
+
+/// Newton's method within a bracket, which ends for every curve.
+///
+/// It ends with a step below the tolerance. It also ends when the step `s` and the one before it, `s₀`, both on one piece,
+/// foretell that the next would be: steps of Newton's method shrink by a ratio that shrinks itself, so that it would be less
+/// than `s²/s₀`.
+#[inline(always)]
+fn solve<T: Scalar>(
+    curve: &mut impl Curve<T>,
+    wanted: T,
+    guess: Pressure<T>,
+    search: &Search<T>,
+) -> Solution<T> {
+    let (lowest, highest, tolerance) = (search.low.si(), search.high.si(), search.tolerance.si());
+    let mut bracket = Bracket { low: lowest - tolerance, high: highest + tolerance };
+    let mut p = guess.si().at_least(lowest).at_most(highest);
+    let mut steps = 0;
+    let (miss, slope) = 'search: loop {
+        curve.enter(p);
+        let mut before = T::ZERO;
+        loop {
+            let (force, slope) = curve.force_and_slope(p);
+            let miss = force - wanted;
+            if miss > T::ZERO {
+                bracket.high = p;
+            } else {
+                bracket.low = p;
+            }
+            let mut next = p - miss / slope;
+            // `!(…)` also catches a quotient that is not a number.
+            if !(next > bracket.low && next < bracket.high) && !((next - p).abs() <= tolerance) {
+                next = bracket.instead(lowest, highest);
+            }
+            let size = (next - p).abs();
+            p = next;
+            steps += 1;
+            if size <= tolerance || steps >= MAX_STEPS {
+                break 'search (miss, slope);
+            }
+            if !curve.holds(p) {
+                break;
+            }
+            if size * size <= tolerance * before {
+                break 'search (miss, slope);
+            }
+            before = size;
+        }
+    };
+    let mut reach = Reach::Reached;
+    if !(p > lowest && p < highest && steps < MAX_STEPS) {
+        p = p.at_least(lowest).at_most(highest);
+        reach = judge(miss, slope, tolerance);
+    }
+    Solution { pressure: Pressure::from_pascals(p), slope, reach, steps }
+}
+
+/// Why a search ended at a limit: by what was missed at its last pressure.
+#[cold]
+#[inline(never)]
+fn judge<T: Scalar>(miss: T, slope: T, tolerance: T) -> Reach {
+    if miss.abs() <= slope.abs() * tolerance * T::from_f32(2.0) {
+        Reach::Reached
+    } else if !(slope > T::ZERO) {
+        Reach::NotRising
+    } else if miss < T::ZERO {
+        Reach::BeyondBlockedForce
+    } else {
+        Reach::BelowDeadband
+    }
+}
+
+/// The base model at one stroke and direction: one product of two cubics in each piece.
+struct Base<'a, T> {
+    muscle: &'a Muscle<T>,
+    held: &'a Held<T>,
+    direction: T,
     quasi: Cubic<T>,
     grip: Cubic<T>,
     /// The pressure that the cubics count from.
@@ -60,13 +165,83 @@ struct Segment<T> {
     to: T,
 }
 
-impl<T: Scalar> Segment<T> {
-    #[inline]
-    fn force_and_slope(&self, p: T) -> (T, T) {
+impl<'a, T: Scalar> Base<'a, T> {
+    /// Without cubics yet; they are put together where the search enters.
+    #[inline(always)]
+    fn new(muscle: &'a Muscle<T>, held: &'a Held<T>, direction: T) -> Self {
+        let (quasi, grip) = ([T::ZERO; 4], [T::ZERO; 4]);
+        Self { muscle, held, direction, quasi, grip, origin: T::ZERO, from: T::ZERO, to: T::ZERO }
+    }
+}
+
+impl<T: Scalar> Curve<T> for Base<'_, T> {
+    #[inline(always)]
+    fn enter(&mut self, p: T) {
+        let muscle = self.muscle;
+        let index = muscle.nodes.find(p);
+        (self.from, self.to) = muscle.nodes.bounds(index);
+        let Piece { origin, elastic: e, friction } = &muscle.pieces[index];
+        let (c, area, s) = (&self.held.columns, self.held.posture.area, -self.direction);
+        let sum = |n: usize, of: T| of + c[0] * e[0][n] + c[1] * e[1][n] + c[2] * e[2][n] + c[3] * e[3][n];
+        let steady = (*origin - muscle.deadband) * area;
+        self.quasi = [sum(0, steady), sum(1, area), sum(2, T::ZERO), sum(3, T::ZERO)];
+        if muscle.order > COMMON_ORDER {
+            let more = |n: usize| c[4] * e[4][n] + c[5] * e[5][n];
+            let [q0, q1, q2, q3] = self.quasi;
+            self.quasi = [q0 + more(0), q1 + more(1), q2 + more(2), q3 + more(3)];
+        }
+        self.origin = *origin;
+        self.grip = [T::ONE + s * friction[0], s * friction[1], s * friction[2], s * friction[3]];
+    }
+
+    #[inline(always)]
+    fn holds(&self, p: T) -> bool {
+        p >= self.from && p <= self.to
+    }
+
+    #[inline(always)]
+    fn force_and_slope(&mut self, p: T) -> (T, T) {
         let u = p - self.origin;
-        let quasi = spline::value(&self.quasi, u);
-        let grip = spline::value(&self.grip, u);
-        (quasi * grip, spline::slope(&self.quasi, u) * grip + quasi * spline::slope(&self.grip, u))
+        let (quasi, quasi_slope) = spline::value_and_slope(&self.quasi, u);
+        let (grip, grip_slope) = spline::value_and_slope(&self.grip, u);
+        (quasi * grip, quasi_slope * grip + quasi * grip_slope)
+    }
+}
+
+/// The base model and effects that change with pressure.
+struct Whole<'a, T> {
+    muscle: &'a Muscle<T>,
+    held: &'a Held<T>,
+    slopes: &'a HeldSlopes<T>,
+    chain: &'a Chain<T>,
+    /// The present moment, moved to the pressures that are tried.
+    context: Context<T>,
+    /// The last pressure tried and what the effects added there.
+    last: Option<(T, T)>,
+    /// `∂F_effects/∂P` by the last two.
+    effect_slope: T,
+}
+
+impl<T: Scalar> Curve<T> for Whole<'_, T> {
+    fn enter(&mut self, _: T) {}
+
+    /// Never: effects may bend anywhere, so that no step foretells the next.
+    fn holds(&self, _: T) -> bool {
+        false
+    }
+
+    fn force_and_slope(&mut self, p: T) -> (T, T) {
+        let direction = self.context.direction;
+        let pressure = Pressure::from_pascals(p);
+        let parts = self.muscle.move_to(&mut self.context, self.held, self.slopes, pressure);
+        let extra = self.chain.force(&self.context);
+        if let Some((p0, extra0)) = self.last
+            && p != p0
+        {
+            self.effect_slope = (extra - extra0) / (p - p0);
+        }
+        self.last = Some((p, extra));
+        (parts.force(direction) + extra, parts.slope(direction) + self.effect_slope)
     }
 }
 
@@ -83,6 +258,7 @@ impl<T: Scalar> Muscle<T> {
     /// The pressure for a wanted force of the base model, starting from a guess (best: the last tick's answer).
     ///
     /// `direction` as in [`Muscle::force`]. A force out of reach gives the nearest allowed pressure, and says so.
+    #[inline(always)]
     pub fn pressure_for(
         &self,
         force: Force<T>,
@@ -91,65 +267,10 @@ impl<T: Scalar> Muscle<T> {
         guess: Pressure<T>,
         search: &Search<T>,
     ) -> Solution<T> {
-        let wanted = force.si();
-        let (mut low, mut high) = (search.low.si(), search.high.si());
-        let mut p = guess.si().clamp(low, high);
-        if p != p {
-            p = low;
-        }
-        let mut segment = self.segment(held, direction, p);
-        let mut slope = T::ZERO;
-        let mut steps = 0;
-        // Whether the bracket's ends are known to enclose the answer, or are only the limits.
-        let (mut low_tried, mut high_tried) = (false, false);
-        while steps < MAX_STEPS {
-            steps += 1;
-            if p < segment.from || p > segment.to {
-                segment = self.segment(held, direction, p);
-            }
-            let (f, df) = segment.force_and_slope(p);
-            slope = df;
-            let miss = f - wanted;
-            if miss > T::ZERO {
-                high = p;
-                high_tried = true;
-            } else {
-                low = p;
-                low_tried = true;
-            }
-            let step = miss / df;
-            if step.abs() <= search.tolerance.si() {
-                p = (p - step).clamp(search.low.si(), search.high.si());
-                break;
-            }
-            let mut next = p - step;
-            // `!(…)` also catches a quotient that is not a number.
-            if !(next > low && next < high) {
-                if !low_tried {
-                    next = search.low.si();
-                    low_tried = true;
-                } else if !high_tried {
-                    next = search.high.si();
-                    high_tried = true;
-                } else {
-                    next = (low + high) * T::from_f32(0.5);
-                }
-            }
-            let moved = (next - p).abs();
-            p = next;
-            if moved <= search.tolerance.si() {
-                break;
-            }
-        }
-        let reach = if p <= search.low.si() || p >= search.high.si() {
-            self.why_not(held, direction, wanted, search, p, slope)
-        } else {
-            Reach::Reached
-        };
-        Solution { pressure: Pressure::from_pascals(p), slope, reach, steps }
+        solve(&mut Base::new(self, held, direction), force.si(), guess, search)
     }
 
-    /// The pressure for a wanted force with effects: `context` is the present moment, to which `chain` has been stepped.
+    /// The pressure for a wanted force with effects, at a moment to which `chain` has been stepped.
     ///
     /// What the effects add regardless of pressure is subtracted exactly. Where an effect's force depends on the pressure the
     /// whole force is solved for, by Newton's method with the base model's slope and a secant for that of the effects, within
@@ -158,133 +279,20 @@ impl<T: Scalar> Muscle<T> {
     pub fn pressure_with(
         &self,
         force: Force<T>,
-        held: &Held<T>,
         chain: &Chain<T>,
-        context: &Context<T>,
+        moment: &Moment<T>,
         guess: Pressure<T>,
         search: &Search<T>,
     ) -> Solution<T> {
-        let direction = context.direction;
-        if chain.is_empty() {
-            return self.pressure_for(force, held, direction, guess, search);
-        }
+        let Moment { held, slopes, context } = moment;
         if !chain.depends_on_pressure() {
             let rest = Force::from_newtons(force.si() - chain.force(context));
-            return self.pressure_for(rest, held, direction, guess, search);
+            return self.pressure_for(rest, held, context.direction, guess, search);
         }
-        let slopes = self.slopes(held);
-        let at = |p: T| {
-            let (moved, parts) = self.at_pressure(context, held, &slopes, Pressure::from_pascals(p));
-            (parts.force(direction), parts.slope(direction), chain.force(&moved))
-        };
-        let wanted = force.si();
-        let tolerance = search.tolerance.si();
-        let (mut low, mut high) = (search.low.si(), search.high.si());
-        let mut p = guess.si().clamp(low, high);
-        if p != p {
-            p = low;
-        }
-        let (mut low_tried, mut high_tried) = (false, false);
-        let (mut effect_slope, mut last): (T, Option<(T, T)>) = (T::ZERO, None);
-        let (mut miss, mut slope) = (T::ZERO, T::ZERO);
-        let mut steps = 0;
-        while steps < MAX_STEPS {
-            steps += 1;
-            let (base, base_slope, extra) = at(p);
-            if let Some((p0, extra0)) = last
-                && p != p0
-            {
-                effect_slope = (extra - extra0) / (p - p0);
-            }
-            last = Some((p, extra));
-            slope = base_slope + effect_slope;
-            miss = base + extra - wanted;
-            if miss > T::ZERO {
-                high = p;
-                high_tried = true;
-            } else {
-                low = p;
-                low_tried = true;
-            }
-            // The first step has no secant yet; a small miss there does not say that the pressure is right to the tolerance.
-            if miss.abs() <= slope.abs() * tolerance * T::from_f32(0.5) {
-                break;
-            }
-            let mut next = p - miss / slope;
-            // `!(…)` also catches a quotient that is not a number.
-            if !(next > low && next < high) {
-                if !low_tried {
-                    next = search.low.si();
-                    low_tried = true;
-                } else if !high_tried {
-                    next = search.high.si();
-                    high_tried = true;
-                } else {
-                    next = (low + high) * T::from_f32(0.5);
-                }
-            }
-            if next == p || high - low <= tolerance * T::from_f32(0.01) {
-                break;
-            }
-            p = next;
-        }
-        let at_limit = p <= search.low.si() || p >= search.high.si();
-        let reach = if miss.abs() <= slope.abs() * tolerance * T::from_f32(2.0) {
-            Reach::Reached
-        } else if !at_limit || !(slope > T::ZERO) {
-            Reach::NotRising
-        } else if miss < T::ZERO {
-            Reach::BeyondBlockedForce
-        } else {
-            Reach::BelowDeadband
-        };
-        Solution { pressure: Pressure::from_pascals(p), slope, reach, steps }
-    }
-
-    /// The cubics of the segment around `p`, valid up to its ends and, in the outer ones, beyond.
-    fn segment(&self, held: &Held<T>, direction: T, p: T) -> Segment<T> {
-        let place = self.nodes.place(p);
-        let (from, to) = self.nodes.bounds(place.index);
-        let cubics = &self.segments[place.index];
-        let far = T::from_f32(f32::MAX);
-        let area = held.posture.area;
-        let base = (from - self.deadband) * area;
-        if place.clamped {
-            // Beyond the nodes the curves keep their end values: only pressure times area is left to vary.
-            let below = p < from;
-            let at_end = |c: &Cubic<T>| spline::value(c, if below { T::ZERO } else { to - from });
-            let mut quasi = base;
-            for (column, cubic) in held.columns.iter().zip(cubics).take(self.order) {
-                quasi += *column * at_end(cubic);
-            }
-            let grip = [T::ONE - direction * at_end(&cubics[FRICTION]), T::ZERO, T::ZERO, T::ZERO];
-            let (origin, from, to) = if below { (from, -far, from) } else { (to, to, far) };
-            quasi += (origin - self.nodes.bounds(place.index).0) * area;
-            return Segment { quasi: [quasi, area, T::ZERO, T::ZERO], grip, origin, from, to };
-        }
-        let mut quasi = [base, area, T::ZERO, T::ZERO];
-        for (column, cubic) in held.columns.iter().zip(cubics).take(self.order) {
-            for (sum, c) in quasi.iter_mut().zip(cubic) {
-                *sum += *column * *c;
-            }
-        }
-        let k = &cubics[FRICTION];
-        let grip = [T::ONE - direction * k[0], -direction * k[1], -direction * k[2], -direction * k[3]];
-        Segment { quasi, grip, origin: from, from, to }
-    }
-
-    fn why_not(&self, held: &Held<T>, direction: T, wanted: T, search: &Search<T>, p: T, slope: T) -> Reach {
-        let (f, _) = self.segment(held, direction, p).force_and_slope(p);
-        let near = slope.abs() * search.tolerance.si() * T::from_f32(2.0);
-        if (f - wanted).abs() <= near {
-            Reach::Reached
-        } else if !(slope > T::ZERO) {
-            Reach::NotRising
-        } else if f < wanted {
-            Reach::BeyondBlockedForce
-        } else {
-            Reach::BelowDeadband
-        }
+        let context = *context;
+        let mut whole =
+            Whole { muscle: self, held, slopes, chain, context, last: None, effect_slope: T::ZERO };
+        solve(&mut whole, force.si(), guess, search)
     }
 }
 

@@ -11,11 +11,9 @@ use crate::braid::{Braid, Posture};
 use crate::effects::{Chain, Context};
 use crate::motion::Motion;
 use crate::scalar::Scalar;
-use crate::spline::{self, Cubic, MAX_NODES, Nodes};
+use crate::spline::{self, Cubic, MAX_NODES, MAX_PIECES, Nodes};
 use crate::table::{Kind, MAX_ORDER, MuscleTable, TableError};
 use crate::units::{Force, Length, Pressure};
-
-const SEGMENTS: usize = MAX_NODES - 1;
 
 /// A muscle ready to be evaluated, built once from its [`MuscleTable`].
 #[derive(Clone, Debug, PartialEq)]
@@ -24,16 +22,29 @@ pub struct Muscle<T> {
     pub(crate) nodes: Nodes<T>,
     pub(crate) order: usize,
     order_scalar: T,
-    /// Per segment: `E_1…E_M` and, in the last place, `k_F`.
-    pub(crate) segments: [[Cubic<T>; MAX_ORDER + 1]; SEGMENTS],
+    /// The curves, piece by piece of the line of pressures.
+    pub(crate) pieces: [Piece<T>; MAX_PIECES],
     pub(crate) deadband: T,
     pub(crate) max_pressure: T,
+    /// The least force that is exerted: zero for a muscle that goes slack.
+    least_force: T,
     goes_slack: bool,
     kind: Kind,
 }
 
-/// The friction curve's place among a segment's cubics.
-pub(crate) const FRICTION: usize = MAX_ORDER;
+/// All curves on one piece of the line of pressures.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Piece<T> {
+    /// The pressure that the cubics count from.
+    pub(crate) origin: T,
+    /// `E_1…E_M`, and zeros up to the largest order.
+    pub(crate) elastic: [Cubic<T>; MAX_ORDER],
+    /// `k_F`.
+    pub(crate) friction: Cubic<T>,
+}
+
+/// Up to this order the sums over `k` are written out without asking for the table's own: the coefficients beyond it are zero.
+pub(crate) const COMMON_ORDER: usize = 4;
 
 /// The muscle held at one stroke: what remains is a function of pressure alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,12 +56,23 @@ pub struct Held<T> {
 }
 
 /// How a [`Held`] muscle's coefficients change with stroke `x`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HeldSlopes<T> {
     /// `dg/dx`, m.
     pub area: T,
     /// `dc_k/dx`, m.
     pub columns: [T; MAX_ORDER],
+}
+
+/// One moment of a muscle with effects, kept from tick to tick so that what never changes is written once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment<T> {
+    /// The muscle at the measured stroke.
+    pub held: Held<T>,
+    /// How that changes with stroke.
+    pub slopes: HeldSlopes<T>,
+    /// What effects look at.
+    pub context: Context<T>,
 }
 
 /// The parts of the base model's force at one moment, N and N/Pa.
@@ -106,24 +128,28 @@ impl<T: Scalar> Muscle<T> {
             nodes: Nodes::new(nodes),
             order: table.order(),
             order_scalar: T::from_f32(table.order() as f32),
-            segments: [[[T::ZERO; 4]; MAX_ORDER + 1]; SEGMENTS],
+            pieces: [Piece::default(); MAX_PIECES],
             deadband: T::from_f32(table.deadband.pascals()),
             max_pressure: T::from_f32(table.max_pressure.pascals()),
+            least_force: if table.goes_slack { T::ZERO } else { T::from_f32(f32::MIN) },
             goes_slack: table.goes_slack,
             kind: table.kind,
         };
-        let curves = table.elastic.iter().enumerate().chain(core::iter::once((FRICTION, &table.friction)));
-        for (curve, values) in curves {
+        let pieces_of = |values: &[f32]| {
             let mut value = [0.0_f64; MAX_NODES];
             for (to, from) in value.iter_mut().zip(values) {
                 *to = f64::from(*from);
             }
-            let mut cubics = [[0.0_f64; 4]; SEGMENTS];
-            cubics[0][0] = value[0];
-            spline::natural_cubic(nodes, &value[..count], &mut cubics);
-            for (to, from) in muscle.segments.iter_mut().zip(cubics) {
-                to[curve] = from.map(T::from_f64);
+            Nodes::<T>::pieces(nodes, &value[..count])
+        };
+        for (k, values) in table.elastic.iter().enumerate() {
+            for (to, from) in muscle.pieces.iter_mut().zip(pieces_of(values)) {
+                to.elastic[k] = from.map(T::from_f64);
             }
+        }
+        for (n, (to, from)) in muscle.pieces.iter_mut().zip(pieces_of(&table.friction)).enumerate() {
+            to.friction = from.map(T::from_f64);
+            to.origin = muscle.nodes.origin(n);
         }
         Ok(muscle)
     }
@@ -132,39 +158,64 @@ impl<T: Scalar> Muscle<T> {
     #[inline(always)]
     pub fn held(&self, stroke: Length<T>) -> Held<T> {
         let posture = self.braid.posture(stroke);
-        let mut columns = [T::ZERO; MAX_ORDER];
-        let mut axial = posture.axial_area;
-        let mut hoop = posture.hoop_area;
-        for column in columns.iter_mut().take(self.order) {
-            axial *= posture.axial_strain;
-            hoop *= posture.radial_strain;
-            *column = axial - hoop;
+        let (z, x) = (posture.axial_strain, posture.radial_strain);
+        let (a1, h1) = (posture.axial_area * z, posture.hoop_area * x);
+        let (a2, h2) = (a1 * z, h1 * x);
+        let (a3, h3) = (a2 * z, h2 * x);
+        let (a4, h4) = (a3 * z, h3 * x);
+        let mut columns = [a1 - h1, a2 - h2, a3 - h3, a4 - h4, T::ZERO, T::ZERO];
+        if self.order > COMMON_ORDER {
+            let (a5, h5) = (a4 * z, h4 * x);
+            columns[4] = a5 - h5;
+            columns[5] = a5 * z - h5 * x;
         }
         Held { posture, columns }
+    }
+
+    /// The curves around a pressure, and the pressure above the one that they count from.
+    #[inline(always)]
+    fn around(&self, pressure: T) -> (&Piece<T>, T) {
+        let piece = &self.pieces[self.nodes.find(pressure)];
+        (piece, pressure - piece.origin)
     }
 
     /// The parts of the force at a held stroke and a pressure.
     #[inline]
     pub fn parts(&self, held: &Held<T>, pressure: Pressure<T>) -> Parts<T> {
+        self.parts_and_stiffness(held, &HeldSlopes::default(), pressure).0
+    }
+
+    /// The same, and `∂F_quasi/∂x`, N/m, from how the coefficients change with stroke.
+    #[inline(always)]
+    fn parts_and_stiffness(
+        &self,
+        held: &Held<T>,
+        slopes: &HeldSlopes<T>,
+        pressure: Pressure<T>,
+    ) -> (Parts<T>, T) {
         let p = pressure.si();
-        let place = self.nodes.place(p);
-        let segment = &self.segments[place.index];
-        let u = place.offset;
-        let mut elastic = T::ZERO;
-        let mut elastic_slope = T::ZERO;
-        for (column, cubic) in held.columns.iter().zip(segment.iter()).take(self.order) {
-            elastic += *column * spline::value(cubic, u);
-            elastic_slope += *column * spline::slope(cubic, u);
-        }
-        let within = !place.clamped;
+        let (piece, u) = self.around(p);
+        let corrected = p - self.deadband;
         let area = held.posture.area;
-        Parts {
-            gaylord: (p - self.deadband) * area,
-            elastic,
-            friction: spline::value(&segment[FRICTION], u),
-            pressure_slope: if within { area + elastic_slope } else { area },
-            friction_slope: if within { spline::slope(&segment[FRICTION], u) } else { T::ZERO },
+        let (mut elastic, mut pressure_slope) = (T::ZERO, area);
+        let mut stiffness = corrected * slopes.area;
+        let mut add = |k: usize| {
+            let (value, slope) = spline::value_and_slope(&piece.elastic[k], u);
+            elastic += held.columns[k] * value;
+            pressure_slope += held.columns[k] * slope;
+            stiffness += slopes.columns[k] * value;
+        };
+        add(0);
+        add(1);
+        add(2);
+        add(3);
+        if self.order > COMMON_ORDER {
+            add(4);
+            add(5);
         }
+        let (friction, friction_slope) = spline::value_and_slope(&piece.friction, u);
+        let gaylord = corrected * area;
+        (Parts { gaylord, elastic, friction, pressure_slope, friction_slope }, stiffness)
     }
 
     /// The force of the base model, without effects. `direction` is +1 while shortening, −1 while lengthening, 0 for the
@@ -178,71 +229,111 @@ impl<T: Scalar> Muscle<T> {
     /// let area = muscle.braid().posture(Length::ZERO).area;
     /// assert!((blocked.newtons() - (500.0e3 - deadband) * area).abs() < 1e-3, "no elastic force at rest length");
     /// ```
-    #[inline]
+    #[inline(always)]
     pub fn force(&self, pressure: Pressure<T>, stroke: Length<T>, direction: T) -> Force<T> {
-        let held = self.held(stroke);
-        let place = self.nodes.place(pressure.si());
-        let segment = &self.segments[place.index];
-        let mut quasi = (pressure.si() - self.deadband) * held.posture.area;
-        for (column, cubic) in held.columns.iter().zip(segment.iter()).take(self.order) {
-            quasi += *column * spline::value(cubic, place.offset);
+        self.pull(self.force_posed(&self.braid.posture(stroke), pressure, direction))
+    }
+
+    /// The same at a posture, N, and below zero where the muscle would have to push.
+    ///
+    /// `Σ E_k c_k = (V_B/L) ε_z Σ E_k ε_z^(k−1) − (t L²/2πN²R) ε_x Σ E_k ε_x^(k−1)`: the curves once, and two polynomials.
+    #[inline(always)]
+    pub fn force_posed(&self, posture: &Posture<T>, pressure: Pressure<T>, direction: T) -> T {
+        let p = pressure.si();
+        let piece = &self.pieces[self.nodes.place(p)];
+        let u = p - piece.origin;
+        let (z, x) = (posture.axial_strain, posture.radial_strain);
+        let e = |k: usize| spline::value(&piece.elastic[k], u);
+        let (mut axial, mut hoop) = (e(3), e(3));
+        if self.order > COMMON_ORDER {
+            axial += z * (e(4) + z * e(5));
+            hoop += x * (e(4) + x * e(5));
         }
-        let friction = spline::value(&segment[FRICTION], place.offset);
-        self.pull(quasi * (T::ONE - friction * direction))
+        let (e1, e2, e3) = (e(0), e(1), e(2));
+        axial = e1 + z * (e2 + z * (e3 + z * axial));
+        hoop = e1 + x * (e2 + x * (e3 + x * hoop));
+        let quasi = (p - self.deadband) * posture.area + posture.axial_area * z * axial
+            - posture.hoop_area * x * hoop;
+        quasi * (T::ONE - spline::value(&piece.friction, u) * direction)
     }
 
     /// A computed force as the muscle can exert it: a slack one does not push.
-    #[inline]
+    #[inline(always)]
     pub fn pull(&self, newtons: T) -> Force<T> {
-        Force::from_newtons(if self.goes_slack { newtons.max(T::ZERO) } else { newtons })
+        Force::from_newtons(if newtons < self.least_force { self.least_force } else { newtons })
     }
 
     /// All that an effect may look at, from a motion and a pressure.
     pub fn context(&self, motion: &Motion<T>, pressure: Pressure<T>) -> Context<T> {
-        let held = self.held(Length::from_metres(motion.stroke));
-        self.context_held(&held, motion, pressure)
+        let mut moment = self.moment();
+        self.update(&mut moment, motion, pressure);
+        moment.context
     }
 
-    /// The same where the stroke's part is known already.
-    pub fn context_held(&self, held: &Held<T>, motion: &Motion<T>, pressure: Pressure<T>) -> Context<T> {
-        let parts = self.parts(held, pressure);
-        let stiffness = self.stiffness_at(pressure.si(), &self.slopes(held));
-        Context {
-            dt: motion.dt,
-            time: motion.time,
-            pressure: pressure.si(),
-            corrected_pressure: pressure.si() - self.deadband,
-            pressure_rate: motion.pressure_rate,
-            stroke: motion.stroke,
-            contraction: motion.stroke / self.braid.rest_length(),
-            length: held.posture.length,
-            speed: motion.speed,
-            acceleration: motion.acceleration,
-            direction: motion.direction,
-            travel: motion.travel,
-            since_reversal: motion.since_reversal,
-            hold_time: motion.hold_time,
-            resting: motion.resting,
-            cycles: motion.cycles,
-            temperature: motion.temperature,
+    /// A moment at rest length without pressure, to begin with.
+    pub fn moment(&self) -> Moment<T> {
+        let held = self.held(Length::ZERO);
+        let context = Context {
             rest_length: self.braid.rest_length(),
             fibre_length: self.braid.fibre_length(),
             turns: self.braid.turns(),
-            radius: held.posture.radius,
             rest_radius: self.braid.rest_radius(),
-            radial_strain: held.posture.radial_strain,
-            axial_strain: held.posture.axial_strain,
-            axial_area: held.posture.axial_area,
-            hoop_area: held.posture.hoop_area,
-            area: held.posture.area,
-            gaylord: parts.gaylord,
-            elastic: parts.elastic,
-            quasi: parts.quasi(),
-            friction: parts.friction,
             order: self.order_scalar,
-            stiffness,
-            pressure_slope: parts.pressure_slope,
-        }
+            ..Context::default()
+        };
+        Moment { slopes: self.slopes(&held), held, context }
+    }
+
+    /// Brings a moment to a motion and a pressure.
+    #[inline]
+    pub fn update(&self, moment: &mut Moment<T>, motion: &Motion<T>, pressure: Pressure<T>) {
+        let Moment { held, slopes, context } = moment;
+        *held = self.held(Length::from_metres(motion.stroke));
+        *slopes = self.slopes(held);
+        let posture = &held.posture;
+        context.dt = motion.dt;
+        context.time = motion.time;
+        context.pressure_rate = motion.pressure_rate;
+        context.stroke = motion.stroke;
+        context.contraction = motion.stroke * self.braid.inv_rest_length();
+        context.length = posture.length;
+        context.speed = motion.speed;
+        context.acceleration = motion.acceleration;
+        context.direction = motion.direction;
+        context.travel = motion.travel;
+        context.since_reversal = motion.since_reversal;
+        context.hold_time = motion.hold_time;
+        context.resting = motion.resting;
+        context.cycles = motion.cycles;
+        context.temperature = motion.temperature;
+        context.radius = posture.radius;
+        context.radial_strain = posture.radial_strain;
+        context.axial_strain = posture.axial_strain;
+        context.axial_area = posture.axial_area;
+        context.hoop_area = posture.hoop_area;
+        context.area = posture.area;
+        self.move_to(context, held, slopes, pressure);
+    }
+
+    /// Moves a moment's context to another pressure than the measured one: what the force there would be.
+    #[inline]
+    pub fn move_to(
+        &self,
+        context: &mut Context<T>,
+        held: &Held<T>,
+        slopes: &HeldSlopes<T>,
+        pressure: Pressure<T>,
+    ) -> Parts<T> {
+        let (parts, stiffness) = self.parts_and_stiffness(held, slopes, pressure);
+        context.pressure = pressure.si();
+        context.corrected_pressure = pressure.si() - self.deadband;
+        context.gaylord = parts.gaylord;
+        context.elastic = parts.elastic;
+        context.quasi = parts.quasi();
+        context.friction = parts.friction;
+        context.stiffness = stiffness;
+        context.pressure_slope = parts.pressure_slope;
+        parts
     }
 
     /// How the coefficients of pressure and of the `E_k` change with stroke.
@@ -255,50 +346,23 @@ impl<T: Scalar> Muscle<T> {
         let (mut axial_power, mut hoop_power) = (T::ONE, T::ONE);
         let mut axial = slopes.axial_area * posture.axial_strain;
         let mut hoop = slopes.hoop_area * posture.radial_strain;
-        for column in columns.iter_mut().take(self.order) {
-            axial += posture.axial_area * slopes.axial_strain;
-            hoop += posture.hoop_area * slopes.radial_strain;
-            *column = axial * axial_power - hoop * hoop_power;
+        let by_strain = (posture.axial_area * slopes.axial_strain, posture.hoop_area * slopes.radial_strain);
+        let mut next = |k: usize| {
+            axial += by_strain.0;
+            hoop += by_strain.1;
+            columns[k] = axial * axial_power - hoop * hoop_power;
             axial_power *= posture.axial_strain;
             hoop_power *= posture.radial_strain;
+        };
+        next(0);
+        next(1);
+        next(2);
+        next(3);
+        if self.order > COMMON_ORDER {
+            next(4);
+            next(5);
         }
         HeldSlopes { area: slopes.area, columns }
-    }
-
-    /// The moment with another pressure in place of the measured one: what the force there would be.
-    #[inline]
-    pub fn at_pressure(
-        &self,
-        context: &Context<T>,
-        held: &Held<T>,
-        slopes: &HeldSlopes<T>,
-        pressure: Pressure<T>,
-    ) -> (Context<T>, Parts<T>) {
-        let parts = self.parts(held, pressure);
-        let moved = Context {
-            pressure: pressure.si(),
-            corrected_pressure: pressure.si() - self.deadband,
-            gaylord: parts.gaylord,
-            elastic: parts.elastic,
-            quasi: parts.quasi(),
-            friction: parts.friction,
-            stiffness: self.stiffness_at(pressure.si(), slopes),
-            pressure_slope: parts.pressure_slope,
-            ..*context
-        };
-        (moved, parts)
-    }
-
-    /// `∂F_quasi/∂x` at a pressure, N/m.
-    #[inline]
-    fn stiffness_at(&self, pressure: T, slopes: &HeldSlopes<T>) -> T {
-        let place = self.nodes.place(pressure);
-        let segment = &self.segments[place.index];
-        let mut sum = (pressure - self.deadband) * slopes.area;
-        for (column, cubic) in slopes.columns.iter().zip(segment.iter()).take(self.order) {
-            sum += *column * spline::value(cubic, place.offset);
-        }
-        sum
     }
 
     /// The force with the effects of `chain` at a moment that the chain has been stepped to.

@@ -57,11 +57,18 @@ pub trait Scalar:
     fn tanh(self) -> Self;
     /// Whether this is neither infinite nor NaN.
     fn is_finite(self) -> bool;
-
     /// Absolute value.
-    #[inline]
-    fn abs(self) -> Self {
-        if self < Self::ZERO { -self } else { self }
+    fn abs(self) -> Self;
+
+    /// This, or `bound` where it is less or NaN: one comparison, for bounds that are numbers.
+    #[inline(always)]
+    fn at_least(self, bound: Self) -> Self {
+        if self > bound { self } else { bound }
+    }
+    /// This, or `bound` where it is more or NaN: one comparison, for bounds that are numbers.
+    #[inline(always)]
+    fn at_most(self, bound: Self) -> Self {
+        if self < bound { self } else { bound }
     }
     /// The larger of two; the other one where one is NaN.
     #[inline]
@@ -138,6 +145,10 @@ macro_rules! scalar {
             fn is_finite(self) -> bool {
                 $t::is_finite(self)
             }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                $t::abs(self)
+            }
         }
     };
 }
@@ -149,27 +160,28 @@ scalar!(f64, libm::sqrt, exp, expm1, log, log1p, pow, erf, tanh);
 core::arch::global_asm!(
     ".syntax unified",
     ".fpu fpv4-sp-d16",
-    ".section .text.pam_vsqrt_f32,\"ax\",%progbits",
-    ".global pam_vsqrt_f32",
-    ".type pam_vsqrt_f32,%function",
+    ".section .text.sqrtf,\"ax\",%progbits",
+    ".global sqrtf",
+    ".type sqrtf,%function",
     ".thumb_func",
-    "pam_vsqrt_f32:",
+    "sqrtf:",
     "vsqrt.f32 s0, s0",
     "bx lr",
-    ".size pam_vsqrt_f32, . - pam_vsqrt_f32",
+    ".size sqrtf, . - sqrtf",
     ".text",
 );
 
 /// The square root of the floating-point unit. Stable Rust has no name for that instruction without `std`, and refuses
-/// single-precision registers in inline assembly on this target; a two-instruction function is the way left.
+/// single-precision registers in inline assembly on this target; a two-instruction function is the way left. Under the C
+/// library's name the compiler knows it, and puts the instruction in its place wherever the argument is not negative.
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
-#[inline]
+#[inline(always)]
 fn sqrt_f32(value: f32) -> f32 {
     unsafe extern "C" {
-        fn pam_vsqrt_f32(value: f32) -> f32;
+        fn sqrtf(value: f32) -> f32;
     }
     // SAFETY: the function above reads and writes one floating-point register, by the hard-float calling convention.
-    unsafe { pam_vsqrt_f32(value) }
+    unsafe { sqrtf(value) }
 }
 
 #[cfg(not(all(target_arch = "arm", target_abi = "eabihf")))]

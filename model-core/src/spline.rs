@@ -62,69 +62,91 @@ pub fn slope<T: Scalar>(c: &Cubic<T>, u: T) -> T {
     c[1] + u * (twice + u * thrice)
 }
 
-/// Increasing nodes, and the search for the segment a pressure lies in.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Nodes<T> {
-    at: [T; MAX_NODES],
-    count: usize,
+/// A cubic's value and slope together: Horner's rule and its derivative.
+#[inline(always)]
+pub fn value_and_slope<T: Scalar>(c: &Cubic<T>, u: T) -> (T, T) {
+    let third = c[2] + u * c[3];
+    let second = c[1] + u * third;
+    let slope = second + u * (third + u * c[3]);
+    (c[0] + u * second, slope)
 }
 
-/// Where a pressure lies on the nodes: in segment `index`, `offset` above its lower node; clamped to the ends.
+/// The pieces that `n` nodes cut the line of pressures into: below the first, between each two, above the last.
+pub const MAX_PIECES: usize = MAX_NODES + 1;
+
+/// Increasing nodes, and the search for the piece that a pressure lies in.
+///
+/// Outside the nodes lie two pieces more, in which curves stay what they are at the outer nodes: so evaluation is the same
+/// everywhere, and knows no special case.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place<T> {
-    /// The segment, or 0 where there is but one node.
-    pub index: usize,
-    /// Distance above the segment's lower node.
-    pub offset: T,
-    /// Whether the pressure lay outside and was moved to the nearest node.
-    pub clamped: bool,
+pub struct Nodes<T> {
+    /// The ends of the pieces: `−∞`, the nodes, and infinity in all places behind them.
+    edges: [T; MAX_PIECES + 1],
+    count: usize,
 }
 
 impl<T: Scalar> Nodes<T> {
     /// From increasing numbers; more than [`MAX_NODES`] are cut off.
     pub fn new(nodes: &[f64]) -> Self {
         let count = nodes.len().min(MAX_NODES);
-        let mut at = [T::ZERO; MAX_NODES];
-        for (to, from) in at.iter_mut().zip(nodes) {
+        let mut edges = [T::from_f64(f64::INFINITY); MAX_PIECES + 1];
+        edges[0] = T::from_f64(f64::NEG_INFINITY);
+        for (to, from) in edges[1..=count].iter_mut().zip(nodes) {
             *to = T::from_f64(*from);
         }
-        Self { at, count }
+        Self { edges, count }
     }
 
     /// The nodes.
     pub fn as_slice(&self) -> &[T] {
-        &self.at[..self.count]
+        &self.edges[1..=self.count]
     }
 
-    /// The number of segments between them, at least 1 for the purpose of storage.
-    pub fn segments(&self) -> usize {
-        self.count.saturating_sub(1).max(1)
+    /// The pressure that a piece's curves count from: its lower node, and the first node for the piece below it.
+    pub fn origin(&self, piece: usize) -> T {
+        self.edges[piece.max(1)]
     }
 
-    /// The segment that `p` lies in.
+    /// The ends of a piece; infinite outside the nodes.
     #[inline(always)]
-    pub fn place(&self, p: T) -> Place<T> {
-        let last = self.segments() - 1;
-        let mut index = 0;
-        while index < last && p >= self.at[index + 1] {
-            index += 1;
-        }
-        let offset = p - self.at[index];
-        let width = if self.count > 1 { self.at[index + 1] - self.at[index] } else { T::ZERO };
-        if offset < T::ZERO {
-            Place { index, offset: T::ZERO, clamped: true }
-        } else if offset > width {
-            Place { index, offset: width, clamped: true }
-        } else {
-            Place { index, offset, clamped: false }
-        }
+    pub fn bounds(&self, piece: usize) -> (T, T) {
+        (self.edges[piece], self.edges[piece + 1])
     }
 
-    /// The ends of segment `index`.
-    #[inline]
-    pub fn bounds(&self, index: usize) -> (T, T) {
-        let lower = self.at[index];
-        (lower, if index + 1 < self.count { self.at[index + 1] } else { lower })
+    /// The piece that `p` lies in: how many nodes lie at or below it. A pressure that is no number lies below the first.
+    ///
+    /// Written out, so that every index is a constant and needs no check.
+    #[inline(always)]
+    pub fn place(&self, p: T) -> usize {
+        macro_rules! first_above {
+            ($($next:literal)+) => {
+                $(if !(p >= self.edges[$next]) {
+                    return $next - 1;
+                })+
+            };
+        }
+        const { assert!(MAX_NODES == 16) };
+        first_above!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16);
+        MAX_NODES
+    }
+
+    /// The same, where the code should not grow by it.
+    #[inline(never)]
+    pub fn find(&self, p: T) -> usize {
+        self.place(p)
+    }
+
+    /// The cubics of all pieces of a curve that [`natural_cubic`] runs through `values` at these nodes.
+    pub fn pieces(nodes: &[f64], values: &[f64]) -> [Cubic<f64>; MAX_PIECES] {
+        let mut pieces = [[0.0; 4]; MAX_PIECES];
+        let count = nodes.len().min(values.len()).min(MAX_NODES);
+        if count == 0 {
+            return pieces;
+        }
+        pieces[0][0] = values[0];
+        natural_cubic(nodes, values, &mut pieces[1..]);
+        pieces[count] = [values[count - 1], 0.0, 0.0, 0.0];
+        pieces
     }
 }
 
@@ -132,9 +154,10 @@ impl<T: Scalar> Nodes<T> {
 mod tests {
     use super::*;
 
-    fn at(nodes: &[f64], segments: &[Cubic<f64>], p: f64) -> f64 {
-        let place = Nodes::<f64>::new(nodes).place(p);
-        value(&segments[place.index], place.offset)
+    fn at(nodes: &[f64], values: &[f64], p: f64) -> f64 {
+        let places = Nodes::<f64>::new(nodes);
+        let piece = places.place(p);
+        value(&Nodes::<f64>::pieces(nodes, values)[piece], p - places.origin(piece))
     }
 
     #[test]
@@ -144,7 +167,7 @@ mod tests {
         let mut s = [[0.0; 4]; 4];
         natural_cubic(&nodes, &values, &mut s);
         for (n, v) in nodes.iter().zip(values) {
-            assert!((at(&nodes, &s, *n) - v).abs() < 1e-12);
+            assert!((at(&nodes, &values, *n) - v).abs() < 1e-12);
         }
         for i in 0..3 {
             let h = nodes[i + 1] - nodes[i];
@@ -158,14 +181,9 @@ mod tests {
     fn reference_values_of_an_independent_implementation() {
         // scipy.interpolate.CubicSpline([0,1,2,4], [0,1,0,2], bc_type="natural") at 0.5, 1.5, 3.0
         let nodes = [0.0, 1.0, 2.0, 4.0];
-        let mut s = [[0.0; 4]; 3];
-        natural_cubic(&nodes, &[0.0, 1.0, 0.0, 2.0], &mut s);
         for (p, expected) in SCIPY {
-            assert!(
-                (at(&nodes, &s, p) - expected).abs() < 1e-12,
-                "{p}: {} not {expected}",
-                at(&nodes, &s, p)
-            );
+            let found = at(&nodes, &[0.0, 1.0, 0.0, 2.0], p);
+            assert!((found - expected).abs() < 1e-12, "{p}: {found} not {expected}");
         }
     }
     const SCIPY: [(f64, f64); 3] =
@@ -173,12 +191,36 @@ mod tests {
 
     #[test]
     fn straight_lines_stay_straight_and_ends_are_held() {
-        let nodes = [1.0, 2.0, 4.0];
-        let mut s = [[0.0; 4]; 2];
-        natural_cubic(&nodes, &[3.0, 5.0, 9.0], &mut s);
-        assert!((at(&nodes, &s, 3.3) - 7.6).abs() < 1e-12);
-        assert!((at(&nodes, &s, 0.0) - 3.0).abs() < 1e-12);
-        assert!((at(&nodes, &s, 9.0) - 9.0).abs() < 1e-12);
-        assert!(Nodes::<f64>::new(&nodes).place(9.0).clamped);
+        let (nodes, values) = ([1.0, 2.0, 4.0], [3.0, 5.0, 9.0]);
+        for (p, expected) in [(3.3, 7.6), (0.0, 3.0), (9.0, 9.0), (1.0, 3.0), (4.0, 9.0)] {
+            assert!((at(&nodes, &values, p) - expected).abs() < 1e-12, "at {p}");
+        }
+    }
+
+    #[test]
+    fn one_node_is_a_constant_and_sixteen_find_every_piece() {
+        for p in [-1.0, 5.0, 7.0] {
+            assert_eq!(at(&[5.0], &[2.5], p), 2.5);
+        }
+        let nodes: Vec<f64> = (0..MAX_NODES).map(|n| n as f64).collect();
+        let places = Nodes::<f64>::new(&nodes);
+        for n in 0..MAX_NODES {
+            assert_eq!((places.place(n as f64 + 0.5), places.origin(n + 1)), (n + 1, n as f64));
+            assert_eq!(places.bounds(n + 1).0, n as f64);
+        }
+        assert_eq!((places.place(-0.5), places.origin(0)), (0, 0.0));
+        assert_eq!(places.place(f64::NAN), 0);
+        assert_eq!(places.place(f64::INFINITY), MAX_NODES);
+        assert_eq!(places.bounds(0), (f64::NEG_INFINITY, 0.0));
+        assert_eq!(places.bounds(MAX_NODES), (15.0, f64::INFINITY));
+    }
+
+    #[test]
+    fn value_and_slope_are_those_of_each_alone() {
+        let c = [0.3, -1.7, 0.9, 2.2];
+        for u in [-1.3, 0.0, 0.4, 2.0] {
+            let (v, d) = value_and_slope(&c, u);
+            assert!((v - value(&c, u)).abs() < 1e-12 && (d - slope(&c, u)).abs() < 1e-12);
+        }
     }
 }

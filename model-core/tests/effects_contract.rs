@@ -6,7 +6,7 @@ use model_core::effects::{
 };
 use model_core::inverse::Reach;
 use model_core::motion::{MotionSettings, MotionTracker};
-use model_core::muscle::Muscle;
+use model_core::muscle::{Moment, Muscle};
 use model_core::table;
 use model_core::units::{Force, Length, Pressure};
 use proptest::prelude::*;
@@ -307,8 +307,10 @@ proptest! {
                 let now = contexts.last().expect("readings");
                 let held = muscle.held(Length::from_metres(now.stroke));
                 let slopes = muscle.slopes(&held);
+                let moment = Moment { held, slopes, context: *now };
                 let force_at = |p: f64| {
-                    let (moved, _) = muscle.at_pressure(now, &held, &slopes, Pressure::from_pascals(p));
+                    let mut moved = *now;
+                    muscle.move_to(&mut moved, &held, &slopes, Pressure::from_pascals(p));
                     moved.force() + chain.force(&moved)
                 };
                 // Only a force that rises with pressure has one pressure that belongs to it.
@@ -318,7 +320,7 @@ proptest! {
                 }
                 let wanted = force_at(truth);
                 let found = muscle.pressure_with(
-                    Force::from_newtons(wanted), &held, &chain, now, Pressure::from_pascals(guess), &muscle.search(),
+                    Force::from_newtons(wanted), &chain, &moment, Pressure::from_pascals(guess), &muscle.search(),
                 );
                 prop_assert_eq!(found.reach, Reach::Reached, "{:?}", names);
                 let again = force_at(found.pressure.pascals());
@@ -347,10 +349,11 @@ proptest! {
         for c in &contexts {
             chain.step(&c.cast());
         }
-        let now = contexts.last().expect("readings").cast::<f32>();
-        let held = muscle.held(Length::from_metres(now.stroke));
+        let context = contexts.last().expect("readings").cast::<f32>();
+        let held = muscle.held(Length::from_metres(context.stroke));
+        let moment = Moment { slopes: muscle.slopes(&held), held, context };
         let found = muscle.pressure_with(
-            Force::from_newtons(wanted), &held, &chain, &now, Pressure::from_kilopascals(300.0), &muscle.search(),
+            Force::from_newtons(wanted), &chain, &moment, Pressure::from_kilopascals(300.0), &muscle.search(),
         );
         prop_assert!(found.pressure.pascals() >= 0.0 && found.pressure <= muscle.max_pressure());
         if found.reach == Reach::BeyondBlockedForce {

@@ -60,24 +60,19 @@ impl Baseline {
 }
 
 /// The cardinal functions of the natural spline on the levels, at pressure `p` (held at the ends).
-fn cardinal(levels: &[f64], cubics: &[Vec<[f64; 4]>], p: f64, out: &mut [f64]) {
-    if levels.len() < 2 {
-        out.fill(1.0);
-        return;
-    }
-    let place = spline::Nodes::<f64>::new(levels).place(p);
+fn cardinal(levels: &[f64], cubics: &[[spline::Cubic<f64>; spline::MAX_PIECES]], p: f64, out: &mut [f64]) {
+    let places = spline::Nodes::<f64>::new(levels);
+    let piece = places.place(p);
     for (o, c) in out.iter_mut().zip(cubics) {
-        *o = spline::value(&c[place.index], place.offset);
+        *o = spline::value(&c[piece], p - places.origin(piece));
     }
 }
 
-fn cardinal_cubics(levels: &[f64]) -> Vec<Vec<[f64; 4]>> {
+fn cardinal_cubics(levels: &[f64]) -> Vec<[spline::Cubic<f64>; spline::MAX_PIECES]> {
     (0..levels.len())
         .map(|j| {
             let unit: Vec<f64> = (0..levels.len()).map(|i| f64::from(u8::from(i == j))).collect();
-            let mut cubics = vec![[0.0; 4]; levels.len().saturating_sub(1).max(1)];
-            spline::natural_cubic(levels, &unit, &mut cubics);
-            cubics
+            spline::Nodes::<f64>::pieces(levels, &unit)
         })
         .collect()
 }

@@ -11,7 +11,7 @@
 //! `c̃ = c T` that are orthonormal over the strokes of the recordings, with `T` upper triangular: `E = T ẽ` at every node.
 
 use model_core::braid::Braid;
-use model_core::spline::{self, Cubic, MAX_NODES, Nodes};
+use model_core::spline::{self, Cubic, MAX_NODES, MAX_PIECES, Nodes};
 use model_core::table::MAX_ORDER;
 use model_core::units::Length;
 use nalgebra::DMatrix;
@@ -38,7 +38,7 @@ pub struct PressureBasis {
     nodes: Vec<f64>,
     places: Nodes<f64>,
     /// Per function, its cubics.
-    cubics: Vec<[Cubic<f64>; MAX_NODES]>,
+    cubics: Vec<[Cubic<f64>; MAX_PIECES]>,
 }
 
 impl PressureBasis {
@@ -50,10 +50,7 @@ impl PressureBasis {
             .map(|j| {
                 let mut unit = [0.0; MAX_NODES];
                 unit[j] = 1.0;
-                let mut cubics = [[0.0; 4]; MAX_NODES];
-                cubics[0][0] = unit[0];
-                spline::natural_cubic(nodes, &unit[..nodes.len()], &mut cubics);
-                cubics
+                Nodes::<f64>::pieces(nodes, &unit[..nodes.len()])
             })
             .collect();
         Self { nodes: nodes.to_vec(), places: Nodes::new(nodes), cubics }
@@ -68,8 +65,9 @@ impl PressureBasis {
     /// `φ_1(P) … φ_J(P)`.
     #[must_use]
     pub fn at(&self, pressure: f64) -> Vec<f64> {
-        let place = self.places.place(pressure);
-        self.cubics.iter().map(|c| spline::value(&c[place.index], place.offset)).collect()
+        let piece = self.places.place(pressure);
+        let above = pressure - self.places.origin(piece);
+        self.cubics.iter().map(|c| spline::value(&c[piece], above)).collect()
     }
 }
 
