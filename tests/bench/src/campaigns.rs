@@ -133,7 +133,8 @@ pub fn enriched(muscle: &Muscle, levels: &[f64], seed: u64) -> Protocol {
     Protocol { name: "B".into(), sample_hz: 10.0, step }
 }
 
-/// Protocol C: B with a tare after every level, half an hour of vented rest, and the first level once more.
+/// Protocol C: B with a tare after every level, half an hour of vented rest, and the first level once more. Its checks of the
+/// bench are in [`crate::checks`].
 pub fn complete(muscle: &Muscle, levels: &[f64], seed: u64) -> Protocol {
     let (v, mut n) = (slow(muscle, levels), 0);
     let top = levels.iter().copied().fold(0.0, f64::max);

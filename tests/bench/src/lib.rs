@@ -3,6 +3,7 @@
 
 pub mod bench;
 pub mod campaigns;
+pub mod checks;
 pub mod friction;
 pub mod lockstep;
 pub mod material;

@@ -63,6 +63,13 @@ pub struct Physics {
     /// A fold of the bladder that snaps through: outside the catalogue.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fold: Option<Fold>,
+    /// Bristles that are damped as they bend: outside the catalogue.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bristle_damping: Option<BristleDamping>,
+    /// A room whose temperature swings and stiffens the rubber with it: relative amplitude, and period in s. Outside the
+    /// catalogue.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub room_swing: Option<(f64, f64)>,
 }
 
 /// Strands that lock: the force falls by `F exp((x − x_j)/w)`.
@@ -107,6 +114,15 @@ pub struct Fold {
     pub width: f64,
 }
 
+/// The rate-dependent part of LuGre's bristles (C. Canudas de Wit et al., doi 10.1109/9.376053): `c dz/dt`, a pulse at each turn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct BristleDamping {
+    /// Damping c per bristle deflection, N s.
+    pub damping: f64,
+    /// Breaking travel, m.
+    pub travel: f64,
+}
+
 /// What the muscle is doing in a step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Moment {
@@ -147,6 +163,7 @@ pub struct PhysicsState {
     clock: f64,
     set: f64,
     exchanged: f64,
+    bristle: f64,
 }
 
 impl PhysicsState {
@@ -164,6 +181,7 @@ impl PhysicsState {
             clock: 0.0,
             set: 0.0,
             exchanged: 0.0,
+            bristle: 0.0,
             on: on.clone(),
         }
     }
@@ -187,6 +205,9 @@ impl PhysicsState {
         if let Some(law) = self.on.heat {
             self.exchanged = law.hysteresis * (force * m.dx).abs();
             force *= 1.0 + law.stiffness * self.warm.bladder;
+        }
+        if let Some((part, period)) = self.on.room_swing {
+            force *= 1.0 + part * (std::f64::consts::TAU * self.clock / period.max(1e-3)).sin();
         }
         if self.on.relaxation.is_some() {
             force += self.relaxation.add(force, m.dt);
@@ -247,6 +268,14 @@ impl PhysicsState {
         }
         if let Some(law) = self.on.relays {
             drag += self.rubbing.remembered(&law, m.pressure, m.stroke);
+        }
+        if let Some(law) = self.on.bristle_damping
+            && m.dt > 0.0
+        {
+            let way = if m.dx > 0.0 { 1.0 } else { -1.0 };
+            let bent = way + (self.bristle - way) * (-m.dx.abs() / law.travel.max(1e-9)).exp();
+            drag += law.damping * (bent - self.bristle) / m.dt;
+            self.bristle = bent;
         }
         drag
     }

@@ -1,12 +1,14 @@
 //! The tool's answers: asked once per trial, frozen by their hashes before any seal is opened.
 
 use crate::ledger::{Ledger, name, read_ledger, sha256, write_ledger};
+use crate::progress::Progress;
 use rayon::prelude::*;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::error::Error;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// What is read of `host diagnose --json`.
@@ -89,10 +91,33 @@ pub struct Considered {
     pub effect: String,
     /// Why it was not taken.
     pub why_not: String,
+    /// Up to which force it could be there unseen, N; absent where it cannot be seen at all.
+    #[serde(rename = "hidden_up_to_N")]
+    pub hidden_up_to: Option<f64>,
+    /// Share of its trace that the base does not swallow.
+    pub visible: Option<f64>,
 }
 
-/// Longest time for one trial.
-const LIMIT: Duration = Duration::from_secs(120);
+/// How a set is answered.
+#[derive(Debug, Clone)]
+pub struct Asking {
+    /// The tool.
+    pub host: PathBuf,
+    /// Longest time for one trial.
+    pub limit: Duration,
+    /// Trials that are not begun by then stay unanswered.
+    pub until: Option<Instant>,
+}
+
+/// A line of `frozen.jsonl`: an answer's hash, written as soon as the answer is there, so that a run that was broken off can go
+/// on without asking anything twice.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Frozen {
+    id: usize,
+    sha256: String,
+    seconds: f64,
+    tool: String,
+}
 
 /// CSV files of a directory in order of their names, which is the order of time.
 pub fn recordings(dir: &Path) -> Vec<PathBuf> {
@@ -134,64 +159,123 @@ pub fn run_limited(command: &mut Command, limit: Duration) -> Result<(), String>
     }
 }
 
-/// Ask the tool about every trial and freeze what it says.
-pub fn ask(set: &Path, host: &Path) -> Result<(), Box<dyn Error>> {
+fn frozen_so_far(set: &Path) -> Vec<Frozen> {
+    let text = std::fs::read_to_string(set.join("frozen.jsonl")).unwrap_or_default();
+    text.lines().filter_map(|l| serde_json::from_str(l).ok()).collect()
+}
+
+/// Ask the tool about every trial that has no answer yet and freeze what it says. True when all are answered.
+pub fn ask(set: &Path, how: &Asking) -> Result<bool, Box<dyn Error>> {
     let mut ledger: Ledger = read_ledger(set)?;
     if !ledger.answers.is_empty() {
         return Err("this set has been answered; answers are given once".into());
     }
     let answers = set.join("answers");
     std::fs::create_dir_all(&answers)?;
-    let tables = writes_tables(host);
-    if !tables {
-        eprintln!("this tool's diagnose has no -o: there will be no held-out gain");
+    let tool = version(&how.host);
+    let so_far = frozen_so_far(set);
+    if let Some(other) = so_far.iter().find(|f| f.tool != tool) {
+        return Err(format!("answers were begun by another tool ({}); a set has one", other.tool).into());
     }
-    let done = AtomicUsize::new(0);
+    let help = help(&how.host);
     let total = ledger.truths.len();
-    let one = |id: usize| {
+    let open: Vec<usize> = (0..total).filter(|id| so_far.iter().all(|f| f.id != *id)).collect();
+    let file = std::fs::OpenOptions::new().create(true).append(true).open(set.join("frozen.jsonl"))?;
+    let lines = Mutex::new(file);
+    let progress = Progress::new("answered", open.len());
+    let one = |&id: &usize| -> Result<(), String> {
+        if how.until.is_some_and(|t| Instant::now() > t) {
+            return Ok(());
+        }
         let trial = set.join("trials").join(name(id));
         let json = answers.join(format!("{}.json", name(id)));
-        let mut command = Command::new(host);
+        let table = answers.join(format!("{}.pam", name(id)));
+        // What an earlier run left must not pass for an answer.
+        let _ = (std::fs::remove_file(&json), std::fs::remove_file(&table));
+        let mut command = Command::new(&how.host);
         command.arg("diagnose").arg("--quiet").arg("--muscle").arg(trial.join("muscle.toml"));
         command.args(recordings(&trial)).arg("--json").arg(&json);
-        if tables {
-            command.arg("-o").arg(answers.join(format!("{}.pam", name(id))));
+        if help.tables {
+            command.arg("-o").arg(&table);
+        }
+        if help.checks {
+            for check in recordings(&trial.join("checks")) {
+                command.arg("--check").arg(check);
+            }
         }
         let start = Instant::now();
-        // What an earlier run left must not pass for an answer.
-        let _ = std::fs::remove_file(&json);
-        let failed = run_limited(&mut command, LIMIT).err();
+        let failed = run_limited(&mut command, how.limit).err();
+        let seconds = (start.elapsed().as_secs_f64() * 100.0).round() / 100.0;
         if failed.is_some() || !json.exists() {
             let said = serde_json::json!({ "schema": "none", "failed": failed.unwrap_or("no JSON".into()) });
             std::fs::write(&json, said.to_string()).map_err(|e| e.to_string())?;
         }
-        let bytes = std::fs::read(&json).map_err(|e| e.to_string())?;
-        let table = std::fs::read(answers.join(format!("{}.pam", name(id)))).unwrap_or_default();
-        let n = done.fetch_add(1, Ordering::Relaxed) + 1;
-        if n.is_multiple_of(10) || n == total {
-            eprintln!("answered {n} of {total}");
-        }
-        Ok((sha256(&[bytes, table].concat()), start.elapsed().as_secs_f64()))
+        let sha256 = hash_of(set, id).map_err(|e| e.to_string())?;
+        let line = Frozen { id, sha256, seconds, tool: tool.clone() };
+        let mut text = serde_json::to_string(&line).map_err(|e| e.to_string())?;
+        text.push('\n');
+        let mut file = lines.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        file.write_all(text.as_bytes()).map_err(|e| e.to_string())?;
+        progress.one();
+        Ok(())
     };
     // One at a time per core: the tool is threaded itself, and the time of an answer should mean something.
-    let got: Result<Vec<(String, f64)>, String> =
-        (0..total).collect::<Vec<_>>().par_iter().with_max_len(1).map(|&id| one(id)).collect();
-    let got = got?;
-    ledger.seconds = got.iter().map(|g| (g.1 * 100.0).round() / 100.0).collect();
-    ledger.answers = got.into_iter().map(|g| g.0).collect();
-    ledger.tool = version(host);
+    open.par_iter().with_max_len(1).map(one).collect::<Result<(), String>>()?;
+    let mut all = frozen_so_far(set);
+    if all.len() < total {
+        return Ok(false);
+    }
+    all.sort_by_key(|f| f.id);
+    ledger.seconds = all.iter().map(|f| f.seconds).collect();
+    ledger.answers = all.into_iter().map(|f| f.sha256).collect();
+    ledger.tool = tool;
     write_ledger(set, &ledger)?;
-    Ok(())
+    Ok(true)
 }
 
-/// Whether the tool's diagnosis can write the diagnosed table.
-fn writes_tables(host: &Path) -> bool {
+/// End the answering of a set of which a part only was answered: the rest is left out for good. What is judged is the part of
+/// the numbers, in order, that is answered without a gap; trials are mixed, so that it is a stratified share.
+pub fn close(set: &Path) -> Result<usize, Box<dyn Error>> {
+    let mut ledger: Ledger = read_ledger(set)?;
+    if !ledger.answers.is_empty() {
+        return Ok(ledger.answers.len());
+    }
+    let mut all = frozen_so_far(set);
+    all.sort_by_key(|f| f.id);
+    let n = all.iter().enumerate().take_while(|(i, f)| *i == f.id).count();
+    if n == 0 {
+        return Err("nothing has been answered".into());
+    }
+    all.truncate(n);
+    ledger.tool = all[0].tool.clone();
+    ledger.seconds = all.iter().map(|f| f.seconds).collect();
+    ledger.answers = all.into_iter().map(|f| f.sha256).collect();
+    write_ledger(set, &ledger)?;
+    Ok(n)
+}
+
+/// Hash of an answer: its JSON and its table.
+fn hash_of(set: &Path, id: usize) -> std::io::Result<String> {
+    let dir = set.join("answers");
+    let bytes = std::fs::read(dir.join(format!("{}.json", name(id))))?;
+    let table = std::fs::read(dir.join(format!("{}.pam", name(id)))).unwrap_or_default();
+    Ok(sha256(&[bytes, table].concat()))
+}
+
+/// What a tool's diagnosis can be given.
+struct Help {
+    /// Whether it can write the diagnosed table.
+    tables: bool,
+    /// Whether it takes checks of the bench.
+    checks: bool,
+}
+
+fn help(host: &Path) -> Help {
     let said = Command::new(host).arg("diagnose").arg("--help").output();
-    // A tool without help is given the option: the interface fixes it.
-    said.map_or(true, |o| {
-        let text = String::from_utf8_lossy(&o.stdout).into_owned();
-        text.is_empty() || text.lines().any(|l| l.trim_start().starts_with("-o"))
-    })
+    let text = said.map_or(String::new(), |o| String::from_utf8_lossy(&o.stdout).into_owned());
+    // A tool without help is given what the interface fixes.
+    let has = |option: &str| text.lines().any(|l| l.trim_start().starts_with(option));
+    Help { tables: text.is_empty() || has("-o"), checks: has("--check ") || has("--check=") }
 }
 
 fn version(host: &Path) -> String {
@@ -203,11 +287,9 @@ fn version(host: &Path) -> String {
 
 /// The frozen answer of a trial, its hash checked.
 pub fn frozen(set: &Path, ledger: &Ledger, id: usize) -> Result<Result<Answer, String>, Box<dyn Error>> {
-    let dir = set.join("answers");
-    let bytes = std::fs::read(dir.join(format!("{}.json", name(id))))?;
-    let table = std::fs::read(dir.join(format!("{}.pam", name(id)))).unwrap_or_default();
     let expected = ledger.answers.get(id).ok_or("the set has not been answered")?;
-    if sha256(&[bytes.clone(), table].concat()) != *expected {
+    let bytes = std::fs::read(set.join("answers").join(format!("{}.json", name(id))))?;
+    if hash_of(set, id)? != *expected {
         return Err(format!("answer {} was changed after it was frozen", name(id)).into());
     }
     let value: serde_json::Value = serde_json::from_slice(&bytes)?;

@@ -1,11 +1,13 @@
 //! Making a trial: the campaign with its effects, its twin without, held-out recordings, and the sealed truth.
 
 use crate::inject::{Injection, Parameter, Scale};
-use crate::spec::{Spec, Stratum};
+use crate::residuals::Residuals;
+use crate::spec::{Operator, Spec, Stratum};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
+use virtual_bench::checks::{self, Check};
 use virtual_bench::friction::BraidFriction;
 use virtual_bench::muscle::Muscle;
 use virtual_bench::pneumatics::Pneumatics;
@@ -50,6 +52,12 @@ pub struct TrialTruth {
     pub noise: f64,
     /// Correlation time of the coloured part, s.
     pub noise_time_s: f64,
+    /// Where the coloured part comes from: `synthetic`, or `real residuals`.
+    #[serde(default)]
+    pub noise_source: String,
+    /// What the person at the bench did wrong.
+    #[serde(default)]
+    pub operator: Operator,
     /// Blocked force at the highest level, N.
     #[serde(rename = "blocked_force_N")]
     pub blocked_force: f64,
@@ -72,6 +80,8 @@ pub struct Trial {
     pub twin: (Vec<Recording>, Vec<Recording>),
     /// Where what is hidden sits, as a table.
     pub trace: String,
+    /// Checks of the bench without its muscle, where the protocol has them.
+    pub checks: Vec<Check>,
     /// The sealed truth.
     pub truth: TrialTruth,
 }
@@ -120,7 +130,7 @@ fn duration(protocol: &Protocol, bench: &BenchSpec) -> f64 {
 /// The bench with instruments and regulator that add nothing of their own, so that two runs differ by the effect alone.
 fn silent(bench: &BenchSpec) -> BenchSpec {
     let mut b = bench.clone();
-    let keep = |s: Sensor| Sensor { white: 0.0, coloured: (0.0, 1.0), outliers: (0.0, 0.0), ..s };
+    let keep = |s: Sensor| Sensor { white: 0.0, coloured: (0.0, 1.0), outliers: (0.0, 0.0), stuck: 0.0, ..s };
     b.instruments.force = keep(b.instruments.force);
     b.instruments.pressure = keep(b.instruments.pressure);
     b.instruments.stroke = keep(b.instruments.stroke);
@@ -277,12 +287,62 @@ fn disturb(files: &mut [Recording], most: f64, seed: u64) {
     }
 }
 
+/// Put resampled real residuals of deviation `deviation` (N) on the force.
+fn resample(files: &mut [Recording], residuals: &Residuals, deviation: f64, seed: u64) {
+    let mut r = Rng::stream(seed, "real residuals");
+    for f in files {
+        let series = residuals.series(f.rows.len(), RATE, &mut r);
+        f.rows.iter_mut().zip(series).for_each(|(row, v)| row.force += deviation * v);
+    }
+}
+
+/// Samples per second of every protocol used here.
+const RATE: f64 = 10.0;
+
+/// What the person at the bench makes of the files.
+fn mishandle(files: &mut Vec<Recording>, o: &Operator, blocked: f64, seed: u64) {
+    let mut r = Rng::stream(seed, "operator");
+    let tare = |f: &Recording| f.name.contains("tare");
+    let lost = |r: &mut Rng, most: f64| if r.chance(0.34) { (r.range(0.0, most) * RATE) as usize } else { 0 };
+    for f in files.iter_mut().filter(|f| !tare(f)) {
+        let (first, last) = (lost(&mut r, o.late_s), lost(&mut r, o.early_s));
+        if f.rows.len() > 2 * (first + last) {
+            f.rows.drain(..first);
+            f.rows.truncate(f.rows.len() - last);
+        }
+        let away = o.tared_drift * blocked * r.range(-1.0, 1.0) / f.rows.len().max(1) as f64;
+        f.rows.iter_mut().enumerate().for_each(|(i, row)| row.force += away * i as f64);
+    }
+    let tares: Vec<usize> = (0..files.len()).filter(|&i| tare(&files[i])).collect();
+    if o.forgot_tare && tares.len() > 1 {
+        files.remove(tares[r.index(tares.len())]);
+    }
+    let long: Vec<usize> = (0..files.len()).filter(|&i| files[i].rows.len() > 600).collect();
+    if o.restarted && !long.is_empty() {
+        let at = long[r.index(long.len())];
+        let cut = (files[at].rows.len() as f64 * r.range(0.3, 0.7)) as usize;
+        let mut rows = files[at].rows.split_off(cut);
+        rows.drain(..40);
+        let name = format!("{}_again", files[at].name);
+        files.insert(at + 1, Recording { name, rows });
+    }
+    for row in files.iter_mut().flat_map(|f| &mut f.rows) {
+        row.time *= 1.0 + o.clock_skew;
+    }
+}
+
 /// Make one trial.
-pub fn make(spec: &Spec) -> Trial {
+pub fn make(spec: &Spec, residuals: &Residuals) -> Trial {
     let muscle = Muscle::new(spec.bench.muscle.clone());
     let levels = campaigns::levels(&muscle);
     let speed = campaigns::slow(&muscle, &levels);
-    let protocol = campaigns::by_name(spec.protocol, &muscle, &levels, spec.seed)
+    let mut order = levels.clone();
+    if let Some(i) = spec.operator.swapped
+        && i + 1 < order.len()
+    {
+        order.swap(i, i + 1);
+    }
+    let protocol = campaigns::by_name(spec.protocol, &muscle, &order, spec.seed)
         .unwrap_or_else(|| campaigns::classic(&muscle, &levels));
     let protocol = in_millimetres(protocol, &muscle);
     let seconds = duration(&protocol, &spec.bench);
@@ -340,18 +400,36 @@ pub fn make(spec: &Spec) -> Trial {
         });
     }
     let after = in_millimetres(held_out_protocol(&levels, speed), &muscle);
+    let real = spec.real_noise && !residuals.is_empty();
     let campaign = |b: &BenchSpec| {
-        let mut at = Bench::new(b);
+        let coloured = b.instruments.force.coloured.0;
+        let mut b = b.clone();
+        if real {
+            b.instruments.force.coloured.0 = 0.0;
+        }
+        let mut at = Bench::new(&b);
         let mut first = at.run(&protocol).unwrap_or_default();
+        let clock = at.clock();
         let mut second = at.run(&after).unwrap_or_default();
         for (files, seed) in [(&mut first, spec.seed), (&mut second, spec.seed ^ 1)] {
-            thin(files, spec.lost_rows, seed);
+            if real {
+                resample(files, residuals, coloured, seed);
+            }
             disturb(files, spec.uneven_noise * b.instruments.force.white, seed);
+            mishandle(files, &spec.operator, scale.force, seed);
+            thin(files, spec.lost_rows, seed);
         }
+        let checked = spec.protocol == "C";
+        let checks = if checked { checks::all(&b, scale.force, scale.pressure, clock) } else { Vec::new() };
+        (first, second, checks)
+    };
+    let (recordings, held_out, checks) = campaign(&bench);
+    let twin = if spec.effects.is_empty() {
+        (Vec::new(), Vec::new())
+    } else {
+        let (first, second, _) = campaign(&spec.bench);
         (first, second)
     };
-    let (recordings, held_out) = campaign(&bench);
-    let twin = if spec.effects.is_empty() { (Vec::new(), Vec::new()) } else { campaign(&spec.bench) };
     let force = bench.instruments.force;
     let mut salt = Rng::stream(spec.seed, "salt");
     let truth = TrialTruth {
@@ -362,10 +440,12 @@ pub fn make(spec: &Spec) -> Trial {
         looks_like: spec.looks_like.map(Into::into),
         noise: force.white.hypot(force.coloured.0),
         noise_time_s: force.coloured.1,
+        noise_source: if real { "real residuals" } else { "synthetic" }.into(),
+        operator: spec.operator,
         blocked_force: scale.force,
         bench,
         salt: format!("{:016x}{:016x}", salt.bits(), salt.bits()),
     };
     let trace = crate::locate::trace(&without, &together, geometry.rest_length);
-    Trial { description: spec.bench.muscle.description(), recordings, held_out, twin, trace, truth }
+    Trial { description: spec.bench.muscle.description(), recordings, held_out, twin, trace, checks, truth }
 }

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::muscle::Muscle;
 use virtual_bench::physics::{
-    Activated, Ageing, Fold, Heat, Jam, Mullins, Relaxation, Relays, Seal, Set, Slip, Slow, StrandContact,
-    Viscous, Wear,
+    Activated, Ageing, BristleDamping, Fold, Heat, Jam, Mullins, Relaxation, Relays, Seal, Set, Slip, Slow,
+    StrandContact, Viscous, Wear,
 };
 use virtual_bench::rng::Rng;
 
@@ -298,6 +298,12 @@ impl Injection {
                 let fold = Fold { force: 0.01 * f * s, stroke: x * r.range(0.25, 0.7), width: 0.05 * x };
                 physics.fold = Some(fold);
             }
+            "bristle-damping" => {
+                let travel = x * r.log_range(0.02, 0.08);
+                physics.bristle_damping =
+                    Some(BristleDamping { damping: 0.01 * f * s * travel / (2.0 * v), travel });
+            }
+            "room-swing" => physics.room_swing = Some((0.03 * s, r.range(250.0, 900.0))),
             "breathing-room" => rig.room = (0.01 * f * s, r.range(90.0, 400.0)),
             "stick-slip-mounts" => rig.stick_slip = (0.01 * f * s, x * r.range(0.02, 0.08)),
             "mains-beat" => rig.hum = (0.01 * f * s, r.range(0.3, 1.7)),

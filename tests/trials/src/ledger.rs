@@ -1,6 +1,8 @@
 //! Files of a set: what the tool may see, what is sealed, and the ledger of hashes that is written first.
 
 use crate::generate::{Trial, TrialTruth, make};
+use crate::progress::Progress;
+use crate::residuals::Residuals;
 use crate::spec::Spec;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -97,24 +99,67 @@ fn put_trial(output: &Path, trial: &Trial) -> Result<String, String> {
         put_recordings(&sealed.join("twin"), &trial.twin.0)?;
         put_recordings(&sealed.join("twin_held_out"), &trial.twin.1)?;
     }
+    if !trial.checks.is_empty() {
+        let checks = open.join("checks");
+        directory(&checks)?;
+        for c in &trial.checks {
+            put(&checks.join(format!("{}.csv", c.name)), &c.csv)?;
+        }
+    }
     let truth = serde_json::to_string_pretty(&trial.truth).map_err(|e| e.to_string())?;
-    put(&sealed.join("truth.json"), &truth)?;
+    // Whole or not at all: a truth that is there means that the trial is.
+    let unfinished = sealed.join("truth.unfinished");
+    put(&unfinished, &truth)?;
+    std::fs::rename(&unfinished, sealed.join("truth.json")).map_err(|e| e.to_string())?;
     Ok(sha256(truth.as_bytes()))
 }
 
-/// Make and write a set; the ledger comes last, when every hash is known, and before any answer.
-pub fn write_set(output: &Path, set: &str, seed: u64, specs: &[Spec]) -> Result<(), Box<dyn Error>> {
+/// What is done to make a set.
+#[derive(Debug, Clone, Copy)]
+pub struct Plan<'a> {
+    /// `dev` or `final`.
+    pub set: &'a str,
+    /// Its seed.
+    pub seed: u64,
+    /// What noise is resampled from.
+    pub residuals: &'a Residuals,
+}
+
+/// The seed of a set that was begun and not finished.
+pub fn begun(output: &Path) -> Option<u64> {
+    std::fs::read_to_string(output.join("sealed").join("seed.txt")).ok()?.trim().parse().ok()
+}
+
+/// Make and write a set; the ledger comes last, when every hash is known, and before any answer. A set that was begun is gone
+/// on with: a trial's truth is the last of its files.
+pub fn write_set(output: &Path, plan: &Plan<'_>, specs: &[Spec]) -> Result<(), Box<dyn Error>> {
     if output.join("ledger.json").exists() {
         return Err(
             format!("{}: there is a set already; a set is never overwritten", output.display()).into()
         );
     }
+    if begun(output).is_some_and(|seed| seed != plan.seed) {
+        return Err(format!("{}: another set was begun here", output.display()).into());
+    }
     directory(&output.join("sealed"))?;
-    put(&output.join("sealed").join("seed.txt"), &seed.to_string())?;
-    let truths: Result<Vec<String>, String> = specs.par_iter().map(|s| put_trial(output, &make(s))).collect();
+    put(&output.join("sealed").join("seed.txt"), &plan.seed.to_string())?;
+    let progress = Progress::new("made", specs.len());
+    let truths: Result<Vec<String>, String> = specs
+        .par_iter()
+        .with_max_len(1)
+        .map(|s| {
+            let truth = output.join("sealed").join(name(s.id)).join("truth.json");
+            let hash = match std::fs::read(&truth) {
+                Ok(bytes) => Ok(sha256(&bytes)),
+                Err(_) => put_trial(output, &make(s, plan.residuals)),
+            };
+            progress.one();
+            hash
+        })
+        .collect();
     let ledger = Ledger {
-        set: set.into(),
-        seed_sha256: sha256(seed.to_string().as_bytes()),
+        set: plan.set.into(),
+        seed_sha256: sha256(plan.seed.to_string().as_bytes()),
         truths: truths?,
         answers: Vec::new(),
         tool: String::new(),

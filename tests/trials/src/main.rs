@@ -9,23 +9,70 @@ mod inject;
 mod ledger;
 mod locate;
 mod names;
+mod progress;
 mod report;
+mod residuals;
 mod score;
 mod semi;
 mod spec;
 
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 use rayon::prelude::*;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::{Duration, Instant};
 
 /// Sealed trials of the diagnosis.
 #[derive(Parser)]
 #[command(version, about)]
 struct Cli {
+    /// Trials at a time.
+    #[arg(long, global = true, default_value_t = 2)]
+    jobs: usize,
     #[command(subcommand)]
     command: Command,
+}
+
+/// Which set.
+#[derive(Args)]
+struct Set {
+    /// How many trials; the mixture of the final set is kept.
+    #[arg(long, default_value_t = 330)]
+    n: usize,
+    /// Seed instead of the set's own.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Real recordings whose residuals half of the trials get as noise, where they are.
+    #[arg(long, default_value = "../shared/data")]
+    data: PathBuf,
+    /// Where to. What an earlier run has done there is gone on with.
+    #[arg(short, long)]
+    output: PathBuf,
+}
+
+/// How the tool is asked.
+#[derive(Args)]
+struct Tool {
+    /// The tool.
+    #[arg(long, default_value = "target/release/host")]
+    host: PathBuf,
+    /// Longest time for one answer, s.
+    #[arg(long, default_value_t = 120)]
+    limit: u64,
+    /// Begin no further trial after this many minutes; the same command goes on later.
+    #[arg(long)]
+    minutes: Option<f64>,
+}
+
+impl Tool {
+    fn asking(&self) -> answer::Asking {
+        answer::Asking {
+            host: self.host.clone(),
+            limit: Duration::from_secs(self.limit),
+            until: self.minutes.map(|m| Instant::now() + Duration::from_secs_f64(60.0 * m.max(0.0))),
+        }
+    }
 }
 
 #[derive(Subcommand)]
@@ -35,23 +82,15 @@ enum Command {
         /// dev (public seed) or final (secret seed from the system, or --seed).
         #[arg(long, default_value = "dev")]
         set: String,
-        /// How many trials; the mixture of the final set is kept.
-        #[arg(long, default_value_t = 330)]
-        n: usize,
-        /// Seed instead of the set's own.
-        #[arg(long)]
-        seed: Option<u64>,
-        /// Where to.
-        #[arg(short, long)]
-        output: PathBuf,
+        #[command(flatten)]
+        what: Set,
     },
-    /// Ask `host diagnose` about every trial of a set, once, and freeze the answers.
+    /// Ask `host diagnose` about every trial of a set, once, and freeze the answers; goes on where it was broken off.
     Answer {
         /// The set's directory.
         set: PathBuf,
-        /// The tool.
-        #[arg(long, default_value = "target/release/host")]
-        host: PathBuf,
+        #[command(flatten)]
+        tool: Tool,
     },
     /// Open the seals of an answered set and write report.md and report.json.
     Score {
@@ -63,6 +102,9 @@ enum Command {
         /// Leave the held-out recordings alone (quicker).
         #[arg(long)]
         no_held_out: bool,
+        /// End the answering of a set of which a part only is answered, for good, and judge that part.
+        #[arg(long)]
+        close: bool,
     },
     /// Put effects into the real recordings of the 10 mm fluidic muscle and ask what was put in.
     Semi {
@@ -76,23 +118,15 @@ enum Command {
         #[arg(long, default_value = "target/release/host")]
         host: PathBuf,
     },
-    /// Generate, answer and score in one go.
+    /// Generate, answer and score in one go; each goes on where an earlier run was broken off.
     Prove {
         /// dev or final.
         #[arg(long, default_value = "final")]
         set: String,
-        /// How many trials.
-        #[arg(long, default_value_t = 330)]
-        n: usize,
-        /// Seed instead of the set's own.
-        #[arg(long)]
-        seed: Option<u64>,
-        /// Where to.
-        #[arg(short, long)]
-        output: PathBuf,
-        /// The tool.
-        #[arg(long, default_value = "target/release/host")]
-        host: PathBuf,
+        #[command(flatten)]
+        what: Set,
+        #[command(flatten)]
+        tool: Tool,
         /// The short version: no held-out recordings, and fail where a wrong name was given to a clean null or, with
         /// confidence, to something outside the library, or where any answer is missing.
         #[arg(long)]
@@ -101,15 +135,18 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let done = match Cli::parse().command {
-        Command::Generate { set, n, seed, output } => generate(&set, n, seed, &output),
-        Command::Answer { set, host } => answer::ask(&set, &host),
-        Command::Score { set, host, no_held_out } => score(&set, &host, !no_held_out).map(|_| ()),
+    let cli = Cli::parse();
+    // A second pool cannot be asked for: this is the only call.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(cli.jobs.max(1)).build_global();
+    let done = match cli.command {
+        Command::Generate { set, what } => generate(&set, &what),
+        Command::Answer { set, tool } => answer::ask(&set, &tool.asking()).map(|all| told(&set, all)),
+        Command::Score { set, host, no_held_out, close } => {
+            let closed = if close { answer::close(&set).map(|_| ()) } else { Ok(()) };
+            closed.and_then(|()| score(&set, &host, !no_held_out)).map(|_| ())
+        }
         Command::Semi { data, output, host } => semi::run(&data, &output, &host),
-        Command::Prove { set, n, seed, output, host, check } => generate(&set, n, seed, &output)
-            .and_then(|()| answer::ask(&output, &host))
-            .and_then(|()| score(&output, &host, !check))
-            .and_then(|all| if check { short(&all) } else { Ok(()) }),
+        Command::Prove { set, what, tool, check } => prove(&set, &what, &tool, check),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -120,32 +157,61 @@ fn main() -> ExitCode {
     }
 }
 
+fn told(set: &Path, all: bool) {
+    if !all {
+        println!(
+            "not every trial is answered; `answer` goes on, `score --close {}` judges what there is",
+            set.display()
+        );
+    }
+}
+
+fn prove(set: &str, what: &Set, tool: &Tool, check: bool) -> Result<(), Box<dyn Error>> {
+    let output = &what.output;
+    if !output.join("ledger.json").exists() {
+        generate(set, what)?;
+    }
+    if ledger::read_ledger(output)?.answers.is_empty() && !answer::ask(output, &tool.asking())? {
+        told(output, false);
+        return Ok(());
+    }
+    let all = score(output, &tool.host, !check)?;
+    if check { short(&all) } else { Ok(()) }
+}
+
 /// The development set's seed is public.
 const DEVELOPMENT: u64 = 20_261_121;
 
-fn generate(set: &str, n: usize, seed: Option<u64>, output: &Path) -> Result<(), Box<dyn Error>> {
-    let seed = match (seed, set) {
+fn generate(set: &str, what: &Set) -> Result<(), Box<dyn Error>> {
+    let output = &what.output;
+    let seed = match (what.seed, set) {
         (Some(s), _) => s,
         (None, "dev") => DEVELOPMENT,
-        (None, "final") => ledger::secret_seed()?,
+        // A final set that was begun keeps its seed.
+        (None, "final") => ledger::begun(output).map_or_else(ledger::secret_seed, Ok)?,
         (None, other) => return Err(format!("no set \"{other}\": take dev or final").into()),
     };
-    let composition = if n == 330 { spec::Composition::FINAL } else { spec::Composition::scaled(n) };
-    let specs = spec::draw(seed, composition);
-    let start = std::time::Instant::now();
-    ledger::write_set(output, set, seed, &specs)?;
+    let composition =
+        if what.n == 330 { spec::Composition::FINAL } else { spec::Composition::scaled(what.n) };
+    let specs = spec::draw(seed, set, composition);
+    let residuals = residuals::Residuals::read(&what.data);
+    if residuals.is_empty() {
+        eprintln!("no real recordings in {}: all noise is synthetic", what.data.display());
+    }
+    let start = Instant::now();
+    ledger::write_set(output, &ledger::Plan { set, seed, residuals: &residuals }, &specs)?;
     println!("{} trials in {} ({:.1} s)", specs.len(), output.display(), start.elapsed().as_secs_f64());
     Ok(())
 }
 
 fn score(set: &Path, host: &Path, held_out: bool) -> Result<Vec<report::Scored>, Box<dyn Error>> {
     let ledger = ledger::read_ledger(set)?;
-    if ledger.answers.len() != ledger.truths.len() {
+    if ledger.answers.is_empty() {
         return Err("the set has not been answered: seals stay closed until the answers are frozen".into());
     }
     let mut scored: Vec<report::Scored> = Vec::new();
     let mut truths = Vec::new();
-    for id in 0..ledger.truths.len() {
+    for id in 0..ledger.answers.len() {
         let answer = answer::frozen(set, &ledger, id)?;
         let truth = ledger::open(set, &ledger, id)?;
         let seconds = ledger.seconds.get(id).copied().unwrap_or(0.0);

@@ -53,7 +53,7 @@ pub const SINGLES: [(&str, Owner); 36] = [
 ];
 
 /// Mechanisms that no name of the catalogue describes.
-pub const OUTSIDE: [&str; 7] = [
+pub const OUTSIDE: [&str; 9] = [
     "hose-spring",
     "bladder-fold",
     "breathing-room",
@@ -61,6 +61,8 @@ pub const OUTSIDE: [&str; 7] = [
     "mains-beat",
     "clipped-cell",
     "coarse-converter",
+    "bristle-damping",
+    "room-swing",
 ];
 
 /// The classes, K1 to K7 of the catalogue and the two families that share a trace by construction (hysteresis with memory;

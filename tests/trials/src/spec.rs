@@ -48,6 +48,51 @@ pub struct Spec {
     pub lost_rows: f64,
     /// Extra noise per file, parts of the force's noise: every level is as loud as it likes.
     pub uneven_noise: f64,
+    /// Whether the coloured part of the force's noise is resampled from residuals of real recordings, where these are.
+    pub real_noise: bool,
+    /// What the person at the bench does wrong.
+    pub operator: Operator,
+}
+
+/// Mistakes of the person at the bench.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Operator {
+    /// The recorder is started late, by up to this many seconds, in a third of the files.
+    pub late_s: f64,
+    /// It is stopped early by up to as many seconds, in a third of the files.
+    pub early_s: f64,
+    /// Two neighbouring levels are done in the wrong order, the first of them this one.
+    pub swapped: Option<usize>,
+    /// One tare is forgotten.
+    pub forgot_tare: bool,
+    /// The recorder fails within one file and is started again: two files.
+    pub restarted: bool,
+    /// The recorder's clock runs fast by this part.
+    pub clock_skew: f64,
+    /// The cell's zero is set before each file and runs away by up to this within it, parts of the blocked force.
+    pub tared_drift: f64,
+}
+
+impl Operator {
+    /// Somebody careful, as most are: hardly late, and a clock that is off by some parts in a hundred thousand.
+    fn careful(r: &mut Rng) -> Self {
+        let late = if r.chance(0.25) { r.range(0.5, 6.0) } else { 0.0 };
+        let swapped = r.chance(0.1).then(|| r.index(5));
+        Self { late_s: late, swapped, clock_skew: r.range(-5e-5, 5e-5), ..Self::default() }
+    }
+
+    /// Somebody who is not.
+    fn careless(r: &mut Rng) -> Self {
+        Self {
+            late_s: if r.chance(0.7) { r.range(1.0, 25.0) } else { 0.0 },
+            early_s: if r.chance(0.5) { r.range(1.0, 25.0) } else { 0.0 },
+            swapped: r.chance(0.4).then(|| r.index(5)),
+            forgot_tare: r.chance(0.3),
+            restarted: r.chance(0.3),
+            clock_skew: r.range(-5e-4, 5e-4),
+            tared_drift: if r.chance(0.5) { r.range(0.0, 8e-4) } else { 0.0 },
+        }
+    }
 }
 
 /// Numbers of trials per stratum.
@@ -111,11 +156,13 @@ const DECOYS: [(&str, &str); 5] = [
     ("rig-compliance", "braid-elasticity"),
 ];
 
-/// Draw a set of trials.
-pub fn draw(seed: u64, composition: Composition) -> Vec<Spec> {
-    let mut r = Rng::stream(seed, "set");
+/// Draw a set of trials. `family` sets its random numbers apart: no seed of the development set makes a trial of the final one.
+///
+/// Strata are mixed, so that the first trials of a set are a stratified share of it, and a number tells nothing.
+pub fn draw(seed: u64, family: &str, composition: Composition) -> Vec<Spec> {
+    let mut r = Rng::stream(seed, &format!("{family} set"));
     let mut singles: Vec<usize> = (0..SINGLES.len()).collect();
-    let mut strata = composition.strata();
+    let mut strata = mixed(composition.strata(), &mut r);
     // Singles go round the catalogue in shuffled order, so that every name comes as often as any other.
     r.shuffle(&mut singles);
     let mut single = 0;
@@ -125,7 +172,7 @@ pub fn draw(seed: u64, composition: Composition) -> Vec<Spec> {
         let n: &mut usize = per_stratum.entry(stratum).or_insert(0);
         // Three protocols equally within each stratum; for singles shifted on every round of the catalogue.
         let protocol = ["A", "D", "C"][(*n + *n / SINGLES.len()) % 3];
-        let mut mine = Rng::stream(seed, &format!("trial {id}"));
+        let mut mine = Rng::stream(seed, &format!("{family} trial {id}"));
         let names: Vec<&'static str> = match stratum {
             Stratum::NullClean | Stratum::NullNasty => Vec::new(),
             Stratum::Single => {
@@ -141,6 +188,23 @@ pub fn draw(seed: u64, composition: Composition) -> Vec<Spec> {
         specs.push(one(id, stratum, protocol, &names, looks_like, &mut mine));
     }
     specs
+}
+
+/// Every stratum spread evenly over the set.
+fn mixed(strata: Vec<Stratum>, r: &mut Rng) -> Vec<Stratum> {
+    let count = |of: Stratum| strata.iter().filter(|s| **s == of).count() as f64;
+    let mut so_far = std::collections::HashMap::new();
+    let mut keyed: Vec<(f64, Stratum)> = strata
+        .iter()
+        .map(|&s| {
+            let n = so_far.entry(s).or_insert(0.0);
+            let key = (*n + r.unit()) / count(s);
+            *n += 1.0;
+            (key, s)
+        })
+        .collect();
+    keyed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    keyed.into_iter().map(|k| k.1).collect()
 }
 
 fn pair(r: &mut Rng, same_class: bool) -> Vec<&'static str> {
@@ -193,7 +257,15 @@ fn one(
     let range = i.force.coloured.0 / 3e-4;
     i.force.white = louder * range * r.log_range(1e-4, 4e-4);
     i.force.coloured = (louder * range * r.log_range(2e-4, 6e-4), r.log_range(1.0, 15.0));
+    // Data-sheet errors of any good instrument; one filter before all converters, so that no channel lags another.
+    i.force.bend = (r.range(-2e-4, 2e-4), range);
+    i.force.creep = (r.range(-2e-4, 2e-4), r.log_range(20.0, 400.0));
+    let filter = r.log_range(1e-3, 8e-3);
+    [i.force.anti_alias, i.pressure.anti_alias, i.stroke.anti_alias] = [filter; 3];
     if nasty {
+        i.force.bend.0 = r.range(-1e-3, 1e-3);
+        i.force.creep.0 = r.range(-5e-4, 5e-4);
+        i.force.stuck = if r.chance(0.4) { r.log_range(1e-3, 3e-2) } else { 0.0 };
         i.force.outliers = (r.log_range(2e-4, 3e-3), r.range(8.0, 40.0));
         i.pressure.outliers = (r.log_range(1e-4, 1e-3), r.range(5.0, 15.0));
         i.stroke.white *= r.range(1.0, 4.0);
@@ -212,7 +284,21 @@ fn one(
             (Injection::new(name, r.bits()), size)
         })
         .collect();
-    Spec { id, stratum, protocol, effects, looks_like, bench, seed, lost_rows, uneven_noise }
+    let operator = if nasty { Operator::careless(r) } else { Operator::careful(r) };
+    let real_noise = r.chance(0.5);
+    Spec {
+        id,
+        stratum,
+        protocol,
+        effects,
+        looks_like,
+        bench,
+        seed,
+        lost_rows,
+        uneven_noise,
+        real_noise,
+        operator,
+    }
 }
 
 #[cfg(test)]
@@ -221,7 +307,7 @@ mod tests {
 
     #[test]
     fn the_final_set_is_composed_as_registered() {
-        let specs = draw(1, Composition::FINAL);
+        let specs = draw(1, "final", Composition::FINAL);
         assert_eq!(specs.len(), 330);
         for protocol in ["A", "C", "D"] {
             let n = specs.iter().filter(|s| s.protocol == protocol).count();
@@ -239,8 +325,20 @@ mod tests {
     }
 
     #[test]
+    fn the_first_trials_are_a_stratified_share_and_families_differ() {
+        let specs = draw(1, "final", Composition::FINAL);
+        let half = &specs[..165];
+        let count = |s: Stratum| half.iter().filter(|t| t.stratum == s).count();
+        for (stratum, whole) in [(Stratum::NullClean, 30), (Stratum::NullNasty, 30), (Stratum::Single, 180)] {
+            assert!((whole / 2 - 3..=whole / 2 + 3).contains(&count(stratum)), "{stratum:?}");
+        }
+        let other = draw(1, "dev", Composition::FINAL);
+        assert!(specs.iter().zip(&other).all(|(a, b)| a.bench.muscle.geometry != b.bench.muscle.geometry));
+    }
+
+    #[test]
     fn a_name_meets_more_than_one_protocol() {
-        let specs = draw(2, Composition::FINAL);
+        let specs = draw(2, "final", Composition::FINAL);
         for (name, _) in SINGLES {
             let mut met: Vec<&str> = specs
                 .iter()
