@@ -4,11 +4,12 @@
 
 use std::process::ExitCode;
 
-use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::commands;
 use crate::console::{Colour, Console};
 use crate::error::Result;
+use crate::settings::{all_settings, apply};
 
 /// Recordings of pneumatic artificial muscles to tables, tables to controllers.
 #[derive(Debug, Parser)]
@@ -29,23 +30,28 @@ pub struct Cli {
 #[derive(Debug, Clone, Args)]
 pub struct Output {
     /// Say nothing but results and errors.
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = "Messages")]
     quiet: bool,
     /// Say more about what is done, and how long it took.
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, help_heading = "Messages")]
     verbose: bool,
-    /// Colours in messages.
-    #[arg(long, global = true, value_enum, default_value_t = Colours::Auto, value_name = "WHEN")]
+    /// Colours in messages: auto (on a terminal, and not where `NO_COLOR` is set), always or never.
+    #[arg(
+        long,
+        global = true,
+        value_enum,
+        default_value_t = Colours::Auto,
+        value_name = "WHEN",
+        hide_possible_values = true,
+        help_heading = "Messages"
+    )]
     color: Colours,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Colours {
-    /// On a terminal only, and not where `NO_COLOR` is set.
     Auto,
-    /// Always.
     Always,
-    /// Never.
     Never,
 }
 
@@ -72,6 +78,10 @@ enum Command {
     Flash(commands::flash::Arguments),
     /// Let a controller follow a course of force, pressure or stroke, and record it.
     Run(commands::run::Arguments),
+    /// Record what a controller measures, as CSV or MCAP.
+    Record(commands::record::Arguments),
+    /// Make a whole recording of one that was cut off.
+    Recover(commands::record::RecoverArguments),
     /// Vent the muscle and disarm the controller.
     Vent(commands::run::VentArguments),
     /// The live view in the browser: connect, run, fit, flash, compare.
@@ -82,8 +92,12 @@ enum Command {
     Device(commands::device::Arguments),
     /// Explain what the model leaves out, effect by effect.
     Effects(commands::effects::Arguments),
+    /// Show which settings files count here, and what they say.
+    Settings(commands::settings::Arguments),
     /// Print a completion script for a shell.
     Completions(commands::completions::Arguments),
+    /// Write manual pages.
+    Man(commands::man::Arguments),
 }
 
 impl Command {
@@ -99,20 +113,52 @@ impl Command {
             Self::New(a) => a.run(console),
             Self::Flash(a) => a.run(console),
             Self::Run(a) => a.run(console),
+            Self::Record(a) => a.run(console),
+            Self::Recover(a) => a.run(console),
             Self::Vent(a) => a.run(console),
             Self::Studio(a) => a.run(console),
             Self::Compare(a) => a.run(console),
             Self::Device(a) => a.run(console),
             Self::Effects(a) => a.run(console),
+            Self::Settings(a) => a.run(&Cli::command(), console),
             Self::Completions(a) => a.run(&mut Cli::command(), console),
+            Self::Man(a) => a.run(built(), console),
         }
     }
 }
 
+/// The command line with everything that is found out when it is parsed: shared options in every command.
+fn built() -> clap::Command {
+    let mut command = Cli::command();
+    command.build();
+    command
+}
+
+/// Reads the command line with the settings files behind it.
+fn parse() -> Result<Cli> {
+    let settings = match all_settings(&Cli::command()) {
+        Ok(settings) => settings,
+        // To vent must not hang on a file that is not right.
+        Err(error) if std::env::args().any(|a| a == "vent") => {
+            Console::new(false, false, Colour::OnTerminal).warning(&error);
+            Vec::new()
+        }
+        Err(error) => return Err(error),
+    };
+    // clap itself prints usage errors and ends with status 2.
+    let matches = apply(Cli::command(), &settings).get_matches();
+    Ok(Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit()))
+}
+
 /// Reads the command line, runs it, prints what went wrong, and gives the exit status.
 pub fn main() -> ExitCode {
-    // clap itself prints usage errors and ends with status 2.
-    let cli = Cli::parse();
+    let cli = match parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            Console::new(false, false, Colour::OnTerminal).error(&error);
+            return ExitCode::from(error.exit_status());
+        }
+    };
     let colour = match cli.output.color {
         Colours::Auto => Colour::OnTerminal,
         Colours::Always => Colour::Always,

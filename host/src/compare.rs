@@ -6,7 +6,7 @@ use crate::error::{Code, Error, Result};
 use crate::recording::Recording;
 
 /// One quantity of both recordings.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Column {
     /// Its name.
     pub name: &'static str,
@@ -20,6 +20,8 @@ pub struct Column {
     pub largest: f64,
     /// When that was, s after the start.
     pub largest_at: f64,
+    /// B − A at every row that was compared.
+    pub difference: Vec<f64>,
 }
 
 /// What a comparison gives.
@@ -29,6 +31,8 @@ pub struct Comparison {
     pub overlap: f64,
     /// Rows of A that were compared.
     pub rows: usize,
+    /// Time of each of them after the start, s.
+    pub time: Vec<f64>,
     /// The quantities that both have.
     pub columns: Vec<Column>,
 }
@@ -53,7 +57,8 @@ pub fn compare(a: &Recording, b: &Recording) -> Result<Comparison> {
     let mut columns = Vec::new();
     for (name, unit, scale, values) in pairs {
         let Some((x, y)) = values else { continue };
-        let mut column = Column { name, unit, rms: 0.0, mean: 0.0, largest: 0.0, largest_at: 0.0 };
+        let mut column =
+            Column { name, unit, rms: 0.0, mean: 0.0, largest: 0.0, largest_at: 0.0, difference: Vec::new() };
         let mut at = 1;
         for i in 0..rows {
             let since = a.time[i] - start(a);
@@ -65,6 +70,7 @@ pub fn compare(a: &Recording, b: &Recording) -> Result<Comparison> {
             let difference = scale * (y[at - 1] + share * (y[at] - y[at - 1]) - x[i]);
             column.rms += difference * difference;
             column.mean += difference;
+            column.difference.push(difference);
             if difference.abs() > column.largest {
                 (column.largest, column.largest_at) = (difference.abs(), since);
             }
@@ -73,7 +79,8 @@ pub fn compare(a: &Recording, b: &Recording) -> Result<Comparison> {
         column.mean /= rows as f64;
         columns.push(column);
     }
-    Ok(Comparison { overlap, rows, columns })
+    let time = a.time[..rows].iter().map(|t| t - start(a)).collect();
+    Ok(Comparison { overlap, rows, time, columns })
 }
 
 impl Comparison {
@@ -81,11 +88,11 @@ impl Comparison {
     #[must_use]
     pub fn to_text(&self) -> String {
         let mut text = format!("{} rows over {:.3} s, B − A\n", self.rows, self.overlap);
-        text += &format!("{:<14}{:>12}{:>12}{:>12}{:>10}\n", "", "rms", "mean", "largest", "at s");
+        text += &format!("{:<18}{:>12}{:>12}{:>12}{:>10}\n", "", "rms", "mean", "largest", "at s");
         for c in &self.columns {
             let name = format!("{}, {}", c.name, c.unit);
             text += &format!(
-                "{name:<14}{:>12.4}{:>12.4}{:>12.4}{:>10.3}\n",
+                "{name:<18}{:>12.4}{:>12.4}{:>12.4}{:>10.3}\n",
                 c.rms, c.mean, c.largest, c.largest_at
             );
         }
@@ -127,7 +134,7 @@ mod tests {
         };
         let found = compare(&ramp(0.0, 100.0, 301, 0.0), &ramp(50.0, 33.0, 67, 2.0)).unwrap();
         assert!((found.overlap - 2.0).abs() < 1e-9 && found.rows == 201, "{found:?}");
-        let force = found.columns[0];
+        let force = &found.columns[0];
         assert!((force.rms - 2.0).abs() < 1e-9 && (force.mean - 2.0).abs() < 1e-9, "{force:?}");
         assert_eq!(found.columns[1].rms, 0.0);
         assert!(compare(&ramp(0.0, 1.0, 1, 0.0), &ramp(0.0, 1.0, 9, 0.0)).is_err());

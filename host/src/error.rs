@@ -90,6 +90,8 @@ codes! {
     ImportInvalid = "import::invalid", Input;
     /// A muscle description is not valid.
     MuscleInvalid = "muscle::invalid", Input;
+    /// A settings file is not valid.
+    SettingsInvalid = "settings::invalid", Input;
     /// The data do not allow the fit that was asked for.
     FitUnderdetermined = "fit::underdetermined", Input;
     /// A table file is damaged or from another version.

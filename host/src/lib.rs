@@ -17,6 +17,7 @@ pub mod predict;
 pub mod progress;
 pub mod recording;
 pub mod report;
+pub mod settings;
 pub mod studio;
 pub mod table_export;
 pub mod table_file;

@@ -14,6 +14,7 @@ mod decimal;
 mod hdf5;
 pub mod import;
 mod matlab;
+mod mcap;
 mod noise;
 #[cfg(feature = "parquet")]
 mod parquet;

@@ -63,6 +63,10 @@ fn run(command: &str, folder: &Path, bin: &Path) -> (String, bool) {
         .env("PATH", path)
         .env("NO_COLOR", "1")
         .env("COLUMNS", "100")
+        // Settings of whoever runs the tests do not count.
+        .env("XDG_CONFIG_HOME", bin)
+        .env_remove("PAM_SETTINGS")
+        .env_remove("PAM_PORT")
         .env_remove("RUST_BACKTRACE")
         .output()
         .expect("a shell");

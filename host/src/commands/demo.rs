@@ -6,7 +6,6 @@ use std::time::Instant;
 
 use clap::Args;
 use model_core::image;
-use model_core::link::endpoints::GetSettings;
 use model_core::link::messages::Side;
 use serde_json::{Value, json};
 use virtual_bench::plant::Motion;
@@ -15,7 +14,7 @@ use crate::console::Console;
 use crate::demo::campaign::{Made, record};
 use crate::demo::page::{Story, page, rms};
 use crate::demo::tracking::{Law, Task, Track, choose, track};
-use crate::device::recorder::{Recorder, about_device, about_losses};
+use crate::device::recorder::{Recorder, about_losses, about_start};
 use crate::device::{Client, regulator, tables};
 use crate::emulated::{Emulated, Kind, Stand};
 use crate::error::{Code, Error, Result};
@@ -236,19 +235,14 @@ impl Arguments {
 
     fn keep(&self, client: &mut Client, track: &Track) -> Result<PathBuf> {
         let path = self.output.join(format!("run-{}-{}.csv", track.law.key(), track.task.name()));
-        let mut recorder = Recorder::create(&path)?;
+        let mut about = about_start("pam-run/1", client)?;
+        let mut recorder = Recorder::create(std::slice::from_ref(&path), &about)?;
         for sample in &track.samples {
             recorder.push(sample)?;
         }
-        let info = client.call::<model_core::link::endpoints::GetInfo>(&())?;
-        let settings = client.call::<GetSettings>(&())?;
-        recorder.finish(&json!({
-            "schema": "pam-run/1",
-            "date": table_file::now_utc(),
-            "host": env!("CARGO_PKG_VERSION"),
-            "device": about_device(client.hello(), &info, &settings),
-            "losses": about_losses(client.losses()),
-        }))
+        about["losses"] = about_losses(client.losses());
+        about["ended_by"] = json!("time");
+        recorder.finish(&about)
     }
 }
 

@@ -13,6 +13,7 @@ use super::port::{Muscle, PortOption};
 use crate::console::Console;
 use crate::device::{Client, difference, recorder, tables};
 use crate::error::{Code, Error, Result};
+use crate::progress::Progress;
 use crate::table_file::{About, TableFile, now_utc};
 
 /// Arguments of `host flash`.
@@ -89,7 +90,10 @@ impl Arguments {
             if let Some(before) = &before {
                 done["backup"] = self.keep(path, before, &client, console)?;
             }
-            let kept = tables::write(&mut client, side, image, |_| ())?;
+            let progress = Progress::new(console, "flash");
+            progress.total(image.len() as u64);
+            let kept = tables::write(&mut client, side, image, |sent| progress.set(sent as u64))?;
+            drop(progress);
             console.note(format!(
                 "written and read back: {} bytes, check sum {:08x}, generation {}",
                 kept.length, kept.crc, kept.generation

@@ -7,16 +7,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::{Args, ValueEnum};
 use model_core::link::endpoints::{GetInfo, GetSettings, SetSettings};
 use model_core::link::settings::FeedForward;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::port::PortOption;
 use crate::console::Console;
 use crate::device::course::{Course, Quantity};
-use crate::device::recorder::{Recorder, about_device, about_losses};
+use crate::device::recorder::{Recorder, about_losses, about_start};
 use crate::device::run::{Ending, Plan, run, vent};
 use crate::device::{Client, words};
 use crate::error::{Code, Error, Result};
-use crate::table_file::now_utc;
+use crate::progress::Progress;
 
 /// Arguments of `host run`.
 #[derive(Debug, Args)]
@@ -37,9 +37,9 @@ pub struct Arguments {
     /// How long, s of device time [default: until Ctrl-C].
     #[arg(short, long, value_name = "S")]
     seconds: Option<f64>,
-    /// The recording; a side file OUT.csv.json says how it was made.
-    #[arg(short, long, value_name = "OUT.csv")]
-    output: Option<PathBuf>,
+    /// The recording, as CSV or (by the ending .mcap) MCAP; may be given again for both. OUT.json says how it was made.
+    #[arg(short, long, value_name = "OUT")]
+    output: Vec<PathBuf>,
     /// Samples per second, at most the controller's own rate [default: its own rate].
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
@@ -106,19 +106,26 @@ impl Arguments {
         if let Some(source) = self.feed_forward {
             choose_feed_forward(&mut client, source)?;
         }
-        let info = client.call::<GetInfo>(&())?;
-        let settings = client.call::<GetSettings>(&())?;
-        let ticks = f64::from(info.ticks_per_s);
+        let ticks = f64::from(client.call::<GetInfo>(&())?.ticks_per_s);
         let every_ticks = self.rate.map_or(1.0, |rate| (ticks / rate).round()).clamp(1.0, 60_000.0) as u16;
-        let mut recorder = self.output.as_deref().map(Recorder::create).transpose()?;
+        let mut about = about_start("pam-run/1", &mut client)?;
+        about["mode"] = json!(words::mode(quantity.mode()));
+        let asked = &self.quantity;
+        about["course"] =
+            json!(asked.force.as_deref().or(asked.pressure.as_deref()).or(asked.stroke.as_deref()));
+        about["unit"] = json!(quantity.unit());
+        let mut recorder = begin(&self.output, &about, console)?;
         let plan = Plan { quantity, course, seconds: self.seconds, every_ticks };
-        let date = now_utc();
         let mut errors = Errors::default();
+        let progress = Progress::new(console, "run");
+        progress.total(self.seconds.map_or(0, |s| (s * 1e3) as u64));
+        let mut start = None;
         let outcome = run(
             &mut client,
             &plan,
             |sample| {
                 errors.add(quantity, sample);
+                progress.set((sample.time_us - *start.get_or_insert(sample.time_us)) / 1000);
                 match &mut recorder {
                     Some(recorder) => recorder.push(sample),
                     None => Ok(()),
@@ -126,33 +133,20 @@ impl Arguments {
             },
             || interrupted.load(Ordering::Relaxed),
         );
+        drop(progress);
         let losses = client.losses();
-        let about = json!({
-            "schema": "pam-run/1",
-            "date": date,
-            "host": env!("CARGO_PKG_VERSION"),
-            "device": about_device(client.hello(), &info, &settings),
-            "mode": words::mode(quantity.mode()),
-            "course": self.quantity.force.as_deref().or(self.quantity.pressure.as_deref()).or(self.quantity.stroke.as_deref()),
-            "unit": quantity.unit(),
-            "samples": errors.samples,
-            "tracking_rms": errors.rms(quantity),
-            "losses": about_losses(losses),
-            "ended_by": match &outcome {
-                Ok(Ending::Done) => "time".to_owned(),
-                Ok(Ending::Stopped) => "interrupt".to_owned(),
-                Err(e) => e.to_string(),
-            },
+        about["samples"] = json!(errors.samples);
+        about["tracking_rms"] = json!(errors.rms(quantity));
+        about["losses"] = about_losses(losses);
+        about["ended_by"] = json!(match &outcome {
+            Ok(Ending::Done) => "time".to_owned(),
+            Ok(Ending::Stopped) => "interrupt".to_owned(),
+            Err(e) => e.to_string(),
         });
-        let mut kept = None;
-        if let Some(recorder) = recorder {
-            if recorder.skipped() > 0 {
-                console.warning(format!("{} samples without numbers were left out", recorder.skipped()));
-            }
-            // What led to a fault is worth keeping: the recording is whole up to there.
-            kept = Some(recorder.finish(&about)?);
-        }
+        // What led to a fault is worth keeping: the recording is whole up to there.
+        let kept = recorder.map(|recorder| end(recorder, &about, console)).transpose();
         let ending = outcome?;
+        let kept = kept?;
         if losses.samples > 0 {
             console
                 .warning(format!("{} samples were lost on the way, in {} gaps", losses.samples, losses.gaps));
@@ -215,8 +209,28 @@ fn choose_feed_forward(client: &mut Client, source: Source) -> Result<()> {
     Ok(())
 }
 
+/// Begins a recording in the files that are named, if any are.
+pub(super) fn begin(files: &[PathBuf], about: &Value, console: &Console) -> Result<Option<Recorder>> {
+    if files.is_empty() {
+        return Ok(None);
+    }
+    let recorder = Recorder::create(files, about)?;
+    for file in recorder.rescued() {
+        console.note(format!("a recording that was cut off under this name is now {}", file.display()));
+    }
+    Ok(Some(recorder))
+}
+
+/// Ends it.
+pub(super) fn end(recorder: Recorder, about: &Value, console: &Console) -> Result<PathBuf> {
+    if recorder.skipped() > 0 {
+        console.warning(format!("{} samples without numbers were left out", recorder.skipped()));
+    }
+    recorder.finish(about)
+}
+
 /// A flag that Ctrl-C and a request to end set.
-fn interrupts() -> Result<Arc<AtomicBool>> {
+pub(super) fn interrupts() -> Result<Arc<AtomicBool>> {
     let flag = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&flag);
     ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))
@@ -226,10 +240,13 @@ fn interrupts() -> Result<Arc<AtomicBool>> {
 
 /// Arguments of `host vent`.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  host vent --port /dev/ttyACM0")]
+#[command(after_help = "Examples:\n  host vent --port /dev/ttyACM0\n  host vent --json")]
 pub struct VentArguments {
     #[command(flatten)]
     port: PortOption,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 impl VentArguments {
@@ -239,7 +256,12 @@ impl VentArguments {
     /// A device that does not answer; then it must be vented by hand.
     pub fn run(self, console: &Console) -> Result<()> {
         let status = vent(&mut self.port.connect(console)?)?;
-        console.result(format!("vented; the device is {}", words::state(status.state)));
+        let state = words::state(status.state);
+        console.result(if self.json {
+            json!({ "schema": "pam-vent/1", "vented": true, "state": state }).to_string()
+        } else {
+            format!("vented; the device is {state}")
+        });
         Ok(())
     }
 }

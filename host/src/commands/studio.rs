@@ -17,8 +17,8 @@ use crate::studio::server::serve;
     The page is for this machine only. Escape vents. When the last page closes, the controller is vented and disarmed."
 )]
 pub struct Arguments {
-    /// Connect to this device at once.
-    #[arg(short, long, value_name = "PORT", env = "PAM_PORT", conflicts_with = "emulate")]
+    /// Connect to this device at once, unless an emulated one is asked for.
+    #[arg(short, long, value_name = "PORT", env = "PAM_PORT")]
     port: Option<String>,
     /// Start an emulated controller with this muscle of the virtual bench: mini, contractile, push or random:SEED.
     #[arg(long, value_name = "MUSCLE")]
@@ -37,7 +37,7 @@ impl Arguments {
     /// # Errors
     /// A port that cannot be used, a device that cannot be reached.
     pub fn run(self, console: &Console) -> Result<()> {
-        let first = self.port.map(Order::Connect).or(self.emulate.map(Order::Emulate));
+        let first = self.emulate.map(Order::Emulate).or(self.port.map(Order::Connect));
         let (send, stop) = tokio::sync::oneshot::channel::<()>();
         let send = Arc::new(Mutex::new(Some(send)));
         ctrlc::set_handler(move || {

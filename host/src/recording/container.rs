@@ -8,7 +8,7 @@ use std::path::Path;
 use super::blocks::Rows;
 use super::cells::{Want, Words};
 use super::read::Reader;
-use super::{Recording, matlab};
+use super::{Recording, matlab, mcap};
 use crate::error::{Code, Error, Result};
 
 /// Named columns as they stand in a file, not yet in SI.
@@ -38,6 +38,7 @@ pub(super) enum Container {
     Matlab5,
     Hdf5,
     Parquet,
+    Mcap,
 }
 
 impl Container {
@@ -49,6 +50,8 @@ impl Container {
             Some(Self::Hdf5)
         } else if magic.starts_with(b"PAR1") {
             Some(Self::Parquet)
+        } else if magic.starts_with(mcap::MAGIC) {
+            Some(Self::Mcap)
         } else {
             None
         }
@@ -59,17 +62,18 @@ impl Container {
             Self::Matlab5 => "MATLAB",
             Self::Hdf5 => "MATLAB 7.3 or HDF5",
             Self::Parquet => "Parquet",
+            Self::Mcap => "MCAP",
         }
     }
 
     fn columns(self, path: &Path) -> Result<Columns> {
         let mut file = File::open(path).map_err(|e| Error::unreadable(path, &e))?;
         match self {
-            Self::Matlab5 => {
+            Self::Matlab5 | Self::Mcap => {
                 let mut bytes = Vec::new();
                 file.seek(SeekFrom::Start(0)).map_err(|e| Error::unreadable(path, &e))?;
                 file.read_to_end(&mut bytes).map_err(|e| Error::unreadable(path, &e))?;
-                matlab::columns(&bytes)
+                if self == Self::Mcap { mcap::columns(&bytes) } else { matlab::columns(&bytes) }
             }
             #[cfg(feature = "hdf5")]
             Self::Hdf5 => super::hdf5::columns(path),

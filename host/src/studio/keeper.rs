@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use model_core::image;
 use model_core::link::endpoints::{
-    Arm, ClearFault, GetFaults, GetInfo, GetSettings, GetStatus, SetSettings, SetTelemetry, StartMode, Stop,
+    Arm, ClearFault, GetFaults, GetSettings, GetStatus, SetSettings, SetTelemetry, StartMode, Stop,
 };
 use model_core::link::frame::crc32;
 use model_core::link::hello::Board;
@@ -20,12 +20,12 @@ use virtual_bench::plant::Motion;
 
 use crate::demo::campaign::muscle;
 use crate::device::course::{Course, Quantity};
-use crate::device::recorder::{Recorder, about_device, about_losses, serial};
+use crate::device::recorder::{Recorder, about_losses, about_start, serial};
 use crate::device::run::{Plan, Steps, vent};
 use crate::device::{Client, Topic, difference, tables, words};
 use crate::emulated::{Emulated, Kind, Stand};
 use crate::error::{Code, Error, Result};
-use crate::table_file::{TableFile, now_utc};
+use crate::table_file::TableFile;
 
 /// What the page may ask of the controller.
 #[derive(Debug)]
@@ -75,7 +75,7 @@ struct Connected {
     status: Status,
     emulated: Option<(Emulated, Arc<AtomicU8>)>,
     running: Option<(Quantity, Steps, Option<u64>)>,
-    recorder: Option<(Recorder, PathBuf)>,
+    recorder: Option<(Recorder, Value)>,
     fault: Option<String>,
     batch: Vec<Telemetry>,
     sent: Instant,
@@ -106,6 +106,10 @@ pub fn keep(orders: &Receiver<Asked>, say: &broadcast::Sender<String>) {
         };
         if let Err(error) = now.listen(say) {
             tell(say, "bad", &error);
+            // What was recorded until the cable was pulled is kept.
+            if let Err(error) = now.end_recording() {
+                tell(say, "bad", &error);
+            }
             connected = None;
             report(None, say);
             continue;
@@ -237,7 +241,10 @@ impl Connected {
         while let Some(topic) = self.client.topic(until.saturating_duration_since(Instant::now()))? {
             match topic {
                 Topic::Telemetry(sample) => self.take(sample, say)?,
-                Topic::Event(Event::Fault(_) | Event::State(_)) => {
+                Topic::Event(event @ (Event::Fault(_) | Event::State(_))) => {
+                    if let Some((recorder, _)) = &mut self.recorder {
+                        recorder.event(&event)?;
+                    }
                     self.status = self.client.call::<GetStatus>(&())?;
                     self.note_fault()?;
                     report(Some(self), say);
@@ -267,7 +274,7 @@ impl Connected {
         {
             // A full disk must not take the controller out of sight.
             tell(say, "bad", &error);
-            self.recorder = None;
+            let _ = self.end_recording();
         }
         if sample.state == State::Running {
             if let Some((quantity, steps, start)) = &mut self.running {
@@ -326,7 +333,8 @@ impl Connected {
             Order::Flash(path) => return self.flash(&path),
             Order::Record(path) => {
                 self.end_recording()?;
-                self.recorder = Some((Recorder::create(&path)?, path));
+                let about = about_start("pam-run/1", &mut self.client)?;
+                self.recorder = Some((Recorder::create(std::slice::from_ref(&path), &about)?, about));
             }
             Order::EndRecord => {
                 let path = self.end_recording()?;
@@ -380,16 +388,9 @@ impl Connected {
     }
 
     fn end_recording(&mut self) -> Result<Option<PathBuf>> {
-        let Some((recorder, _)) = self.recorder.take() else { return Ok(None) };
-        let info = self.client.call::<GetInfo>(&())?;
-        let settings = self.client.call::<GetSettings>(&())?;
-        let about = json!({
-            "schema": "pam-run/1",
-            "date": now_utc(),
-            "host": env!("CARGO_PKG_VERSION"),
-            "device": about_device(self.client.hello(), &info, &settings),
-            "losses": about_losses(self.client.losses()),
-        });
+        let Some((recorder, mut about)) = self.recorder.take() else { return Ok(None) };
+        about["losses"] = about_losses(self.client.losses());
+        about["ended_by"] = json!("the page");
         recorder.finish(&about).map(Some)
     }
 }

@@ -2,7 +2,13 @@
 // Curves on a canvas: a ring of samples, drawn as one vertical stroke from least to greatest in each column of pixels, so that the
 // work of a frame depends on its width and not on the rate of samples.
 
-const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+// Colours of the page, asked once: asking makes the browser compute styles, sixty times a second and curve.
+const ink = new Map();
+function colour(name) {
+  let value = ink.get(name);
+  if (value === undefined) { value = getComputedStyle(document.documentElement).getPropertyValue(name).trim(); ink.set(name, value); }
+  return value;
+}
 
 class Ring {
   constructor(size, names) {
@@ -91,8 +97,8 @@ class Scope {
     if (low > high) { low = 0; high = 1; }
     const { X, Y, left, right } = this.axes.begin(Math.max(0, end - seconds), Math.max(end, seconds), low, high, (v, d) => v.toFixed(d) + " s");
     const g = this.axes.g, width = Math.max(1, Math.round(right - left));
-    for (const [name, ink] of this.curves) {
-      g.strokeStyle = colour(ink); g.lineWidth = 1.5; g.beginPath();
+    for (const [name, shade] of this.curves) {
+      g.strokeStyle = colour(shade); g.lineWidth = 1.5; g.beginPath();
       let column = -1, least = 0, most = 0, first = 0, last = 0, begun = false;
       const flush = () => {
         if (column < 0) return;

@@ -11,7 +11,7 @@ use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use axum::body::{Body, Bytes};
-use axum::extract::{DefaultBodyLimit, Query, Request, State};
+use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
@@ -109,6 +109,7 @@ fn router(shared: Shared) -> Router {
         .route("/studio.css", get(text("text/css; charset=utf-8", STYLE)))
         .route("/studio.js", get(text("text/javascript; charset=utf-8", SCRIPT)))
         .route("/plot.js", get(text("text/javascript; charset=utf-8", PLOT)))
+        .route("/report/{name}", get(report))
         .route("/api/stream", get(stream))
         .route("/api/order", post(order))
         .route("/api/recording", post(upload))
@@ -161,8 +162,12 @@ async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Re
     let mut response = next.run(request).await;
     let policy = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; \
                   base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+    // A report carries its style and script in itself, and says so.
+    response
+        .headers_mut()
+        .entry(header::CONTENT_SECURITY_POLICY)
+        .or_insert(axum::http::HeaderValue::from_static(policy));
     for (name, value) in [
-        (header::CONTENT_SECURITY_POLICY, policy),
         (header::CACHE_CONTROL, "no-store"),
         (header::REFERRER_POLICY, "no-referrer"),
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
@@ -184,6 +189,24 @@ async fn page(State(shared): State<Shared>, Query(given): Query<Token>) -> Respo
         return (StatusCode::FORBIDDEN, why).into_response();
     }
     ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], PAGE).into_response()
+}
+
+/// The report of the last fit or diagnosis: one of two names, never a path.
+async fn report(
+    State(shared): State<Shared>,
+    Path(name): Path<String>,
+    Query(given): Query<Token>,
+) -> Response {
+    if !same(&given.token, &shared.token) {
+        return (StatusCode::FORBIDDEN, "the token is missing or old").into_response();
+    }
+    let Some(text) = shared.lock().report(&name) else {
+        return (StatusCode::NOT_FOUND, "there is no such report yet: fit or diagnose first").into_response();
+    };
+    let policy = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; \
+                  base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+    ([(header::CONTENT_TYPE, "text/html; charset=utf-8"), (header::CONTENT_SECURITY_POLICY, policy)], text)
+        .into_response()
 }
 
 /// Lines of JSON for as long as the page is open; when it closes, the keeper notices that nobody looks.

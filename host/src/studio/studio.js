@@ -34,9 +34,19 @@ const scopes = [
 const loop = new Axes($("p-loop"));
 let held = false, fresh = false, mode = "", samples = 0, state = {};
 
-function frame() {
+// How long the last pictures took to draw and how far apart they were, in ms: rings again, so that they cannot grow.
+const perf = { frames: 0, draw: new Float64Array(512), gap: new Float64Array(512), last: 0 };
+
+function frame(now) {
   requestAnimationFrame(frame);
   if (!fresh || held) return;
+  const begun = performance.now();
+  draw();
+  perf.draw[perf.frames % perf.draw.length] = performance.now() - begun;
+  perf.gap[perf.frames % perf.gap.length] = now - perf.last;
+  perf.frames++; perf.last = now;
+}
+function draw() {
   fresh = false;
   const seconds = Number($("window").value);
   scopes[0].curves = mode === "force" ? [["m", "--s2"], ["a", "--s1"], ["F", "--s0"]] : [["m", "--s2"], ["F", "--s0"]];
@@ -48,6 +58,23 @@ function frame() {
   loop.begin(...extent(xs), ...extent(ys)); loop.line(xs, ys, "--s0", 1.2); loop.end();
 }
 requestAnimationFrame(frame);
+
+// Pictures that are drawn once are drawn again when the page's size or its colours change.
+const stills = new Map();
+function picture(canvas, paint) { stills.set(canvas, paint); paint(new Axes($(canvas))); }
+function redraw() { ink.clear(); fresh = ring.length > 0; for (const [canvas, paint] of stills) paint(new Axes($(canvas))); }
+addEventListener("resize", redraw);
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+
+// One message of the stream.
+function take(m) {
+  if (m.k === "t") {
+    if (ring.length && m.t[0] < ring.last("t")) ring.clear();
+    ring.push(m, m.t.length); samples += m.t.length; mode = m.mode; fresh = true;
+  } else if (m.k === "s") show(m);
+  else if (m.k === "e") message(m.text + (m.help ? "\n→ " + m.help : ""));
+}
+
 setInterval(() => { $("rate").textContent = state.connected ? `${samples} samples/s, ${state.lost || 0} lost` : ""; samples = 0; }, 1000);
 
 function show(s) {
@@ -59,6 +86,7 @@ function show(s) {
   $("fault").hidden = !(s.connected && s.fault); $("fault-text").textContent = s.fault || "";
   const on = (id, yes) => { $(id).disabled = !yes; };
   on("disconnect", s.connected); on("arm", s.state === "disarmed"); on("follow", s.state === "armed" || s.state === "running");
+  $("mishap-label").hidden = !s.emulated;
   on("record", s.connected); on("mishap", !!s.emulated); on("set", s.connected); on("show", s.connected); on("difference", s.connected);
   if (!s.connected) on("flash", false);
   $("record").firstChild.textContent = s.recording === null || s.recording === undefined ? "Record " : `Stop (${s.recording} rows) `;
@@ -75,14 +103,7 @@ async function listen() {
         const { value, done } = await reader.read();
         if (done) break;
         const lines = (rest + value).split("\n"); rest = lines.pop();
-        for (const line of lines) {
-          const m = JSON.parse(line);
-          if (m.k === "t") {
-            if (ring.length && m.t[0] < ring.last("t")) ring.clear();
-            ring.push(m, m.t.length); samples += m.t.length; mode = m.mode; fresh = true;
-          } else if (m.k === "s") show(m);
-          else if (m.k === "e") message(m.text + (m.help ? "\n→ " + m.help : ""));
-        }
+        for (const line of lines) take(JSON.parse(line));
       }
     } catch { /* the connection broke: try again */ }
     show({ connected: false });
@@ -130,27 +151,48 @@ async function view(number) {
   const r = await order("curves", { number });
   if (!r) return;
   $("view-figure").hidden = false; $("view-title").textContent = `${r.name}: ${r.rows} rows, ${r.F ? "force (N)" : "pressure (kPa)"} over time (s)`;
-  const y = r.F || r.P, axes = new Axes($("p-view"));
-  axes.begin(...extent(r.t), ...extent(y)); axes.line(r.t, y, "--s0", 1.2); axes.end();
+  const y = r.F || r.P;
+  picture("p-view", (axes) => { axes.begin(...extent(r.t), ...extent(y)); axes.line(r.t, y, "--s0", 1.2); axes.end(); });
 }
+async function compare() {
+  const [a, b] = [Number($("a").value), Number($("b").value)];
+  const r = await order("compare", { a, b });
+  if (!r) return;
+  text("comparison", r.text);
+  const [one, other] = [await order("curves", { number: a }), await order("curves", { number: b })];
+  if (!one || !other) return;
+  const both = one.F && other.F ? "F" : "P";
+  $("compare-figure").hidden = false;
+  $("compare-title").replaceChildren(`${both === "F" ? "Force (N)" : "Pressure (kPa)"} over time (s). Where the curves part, the recordings differ. `,
+    key("s0", "A: " + one.name), " ", key("s1", "B: " + other.name));
+  picture("p-compare", (axes) => {
+    axes.begin(...extent(one.t, other.t), ...extent(one[both], other[both]));
+    axes.line(one.t, one[both], "--s0", 1.2); axes.line(other.t, other[both], "--s1", 1.2); axes.end();
+  });
+}
+function key(name, what) { const span = document.createElement("span"); span.className = "key " + name; span.textContent = what; return span; }
 $("files").addEventListener("change", async () => {
   for (const file of $("files").files) { const r = await send("/api/recording?name=" + encodeURIComponent(file.name), file); if (r) recordings(r); }
   $("files").value = "";
 });
 click("example", async () => { message("recording on the virtual bench …"); const r = await order("example", { muscle: $("bench").value }); if (r) { recordings(r); message(r.recordings.length + " recordings loaded"); } });
 const text = (id, value) => { $(id).hidden = false; $(id).textContent = value; };
-click("compare", async () => { const r = await order("compare", { a: Number($("a").value), b: Number($("b").value) }); if (r) text("comparison", r.text); });
+const report = (id, name) => { $(id).hidden = false; $(id).firstChild.href = `/report/${name}?token=${token}`; };
+click("compare", compare);
 click("fit", async () => {
   message("fitting …");
   const r = await order("fit", { muscle: $("muscle").value });
   if (!r) return;
-  $("message").hidden = true; text("fit-text", r.text); $("lines-figure").hidden = false;
-  const axes = new Axes($("p-lines")), n = r.lines.length, ink = (i) => `hsl(${220 - 190 * i / Math.max(1, n - 1)} 70% 52%)`;
-  axes.begin(...extent(...r.lines.map((l) => l.x)), ...extent(...r.lines.map((l) => l.F)));
-  r.lines.forEach((l, i) => axes.dots(l.x, l.F, ink(i))); r.lines.forEach((l, i) => axes.line(l.mx, l.mF, ink(i), 1.6));
-  axes.end();
+  $("message").hidden = true; text("fit-text", r.text); report("fit-report", "fit"); $("lines-figure").hidden = false;
+  const n = r.lines.length, shade = (i) => `hsl(${220 - 190 * i / Math.max(1, n - 1)} 70% 52%)`;
+  $("lines-key").replaceChildren(...r.lines.map((l, i) => { const k = key("", l.kPa.toFixed(0) + " kPa"); k.style.color = shade(i); return k; }));
+  picture("p-lines", (axes) => {
+    axes.begin(...extent(...r.lines.map((l) => l.x)), ...extent(...r.lines.map((l) => l.F)));
+    r.lines.forEach((l, i) => axes.dots(l.x, l.F, shade(i))); r.lines.forEach((l, i) => axes.line(l.mx, l.mF, shade(i), 1.6));
+    axes.end();
+  });
 });
-click("diagnose", async () => { message("diagnosing …"); const r = await order("diagnose", { muscle: $("muscle").value }); if (r) { $("message").hidden = true; text("diagnosis", r.text); } });
+click("diagnose", async () => { message("diagnosing …"); const r = await order("diagnose", { muscle: $("muscle").value }); if (r) { $("message").hidden = true; text("diagnosis", r.text); report("diagnosis-report", "diagnosis"); } });
 click("difference", async () => { const r = await order("difference"); if (r) { text("difference-text", r.text); $("flash").disabled = false; } });
 click("flash", async () => { const r = await order("flash"); if (r) { $("flash").disabled = true; message(`written and read back: ${r.bytes} bytes, check sum ${r.crc}`); } });
 order("recordings").then((r) => { if (r) recordings(r); });

@@ -1,5 +1,6 @@
 //! Recordings on the page: loaded, fitted, diagnosed, compared. Files lie in one folder, under names of our own making.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use model_core::braid::Geometry;
@@ -15,6 +16,7 @@ use crate::fit::{Options, fit};
 use crate::muscle_description::MuscleDescription;
 use crate::output::write_whole;
 use crate::recording::{Campaign, Reader, Recording};
+use crate::report::{diagnose_page, fit_page};
 use crate::table_file::{self, About, TableFile};
 
 /// Points of a curve that are sent to the page.
@@ -26,6 +28,7 @@ pub struct Workshop {
     folder: PathBuf,
     recordings: Vec<(String, PathBuf)>,
     table: Option<PathBuf>,
+    reports: BTreeMap<&'static str, String>,
 }
 
 impl Workshop {
@@ -35,7 +38,7 @@ impl Workshop {
     /// [`Code::FileUnwritable`].
     pub fn new(folder: PathBuf) -> Result<Self> {
         std::fs::create_dir_all(&folder).map_err(|e| Error::unwritable(&folder, &e))?;
-        Ok(Self { folder, recordings: Vec::new(), table: None })
+        Ok(Self { folder, recordings: Vec::new(), table: None, reports: BTreeMap::new() })
     }
 
     /// The fitted table, if there is one.
@@ -46,6 +49,12 @@ impl Workshop {
         self.table.clone().ok_or_else(|| {
             Error::new(Code::CallInvalid, "there is no table yet").help("fit recordings first")
         })
+    }
+
+    /// The page of the last fit (`fit`) or diagnosis (`diagnosis`).
+    #[must_use]
+    pub fn report(&self, name: &str) -> Option<String> {
+        self.reports.get(name).cloned()
     }
 
     /// A path for the next recording of the controller.
@@ -162,7 +171,8 @@ impl Workshop {
     /// As [`fit`], and for a muscle description that is not right.
     pub fn fit(&mut self, muscle: &str) -> Result<Value> {
         let (muscle, campaign) = self.read(muscle)?;
-        let fitted = fit(&campaign, &muscle, &Options::default())?;
+        let options = Options::default();
+        let fitted = fit(&campaign, &muscle, &options)?;
         let files: Vec<PathBuf> = self.recordings.iter().map(|r| r.1.clone()).collect();
         let hashes = files.iter().map(table_file::sha256).collect::<Result<Vec<_>>>()?;
         let about = About {
@@ -179,6 +189,7 @@ impl Workshop {
         TableFile { table: fitted.table.clone(), about }.write(&path)?;
         let lines = lines(&campaign, &fitted.table)?;
         self.table = Some(path.clone());
+        self.reports.insert("fit", fit_page::page(&fitted, &campaign, &options).html());
         Ok(
             json!({ "summary": fitted.summary, "text": fitted.summary.to_string(), "lines": lines, "table": path.display().to_string() }),
         )
@@ -188,7 +199,7 @@ impl Workshop {
     ///
     /// # Errors
     /// As [`diagnose::diagnose`].
-    pub fn diagnose(&self, muscle: &str) -> Result<Value> {
+    pub fn diagnose(&mut self, muscle: &str) -> Result<Value> {
         let (muscle, campaign) = self.read(muscle)?;
         let geometry = Geometry {
             rest_length: Length::from_metres(muscle.rest_length()),
@@ -199,6 +210,7 @@ impl Workshop {
         };
         let answer =
             diagnose::diagnose(&campaign, &geometry, &diagnose::Options { muscle: muscle.name.clone() })?;
+        self.reports.insert("diagnosis", diagnose_page::page(&answer, &geometry).html());
         Ok(json!({ "text": diagnose::summary::summary(&answer) }))
     }
 

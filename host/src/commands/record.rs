@@ -1,0 +1,223 @@
+//! `host record` and `host recover`: what a controller measures, to a recording that outlives whatever goes wrong.
+
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use model_core::link::endpoints::{GetInfo, GetStatus, SetTelemetry};
+use model_core::link::messages::TelemetryRate;
+use serde_json::json;
+
+use super::port::PortOption;
+use super::run::{begin, end, interrupts};
+use crate::console::Console;
+use crate::device::recorder::{Recorder, about_losses, about_start, rescue};
+use crate::device::{Client, Topic, words};
+use crate::error::{Code, Error, Result};
+use crate::progress::Progress;
+use crate::table_file::now_utc;
+
+/// Arguments of `host record`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    host record --port /dev/ttyACM0\n  \
+    host record --seconds 60 -o run.csv -o run.mcap\n  \
+    host record --rate 100 --folder campaign\n\n\
+    It only watches: what the controller does, it goes on doing. Every 0.1 s goes to the disk; a program that is killed, a cable\n\
+    that is pulled or a disk that fills leaves everything until then. CSV and MCAP are read by `host fit` and all others;\n\
+    MCAP opens in the viewers of robotics. OUT.json says which versions, table and settings the controller had.")]
+pub struct Arguments {
+    #[command(flatten)]
+    port: PortOption,
+    /// The recording, as CSV or (by the ending .mcap) MCAP; may be given again for both [default: FOLDER/DATE.csv].
+    #[arg(short, long, value_name = "OUT")]
+    output: Vec<PathBuf>,
+    /// The folder for recordings that are not named.
+    #[arg(long, value_name = "FOLDER", default_value = ".", conflicts_with = "output")]
+    folder: PathBuf,
+    /// How long, s of device time [default: until Ctrl-C].
+    #[arg(short, long, value_name = "S")]
+    seconds: Option<f64>,
+    /// Samples per second, at most the controller's own rate [default: its own rate].
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// Replace recordings of the same name.
+    #[arg(long)]
+    force: bool,
+    /// Print what was recorded as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Silence of the telemetry after which the device is asked what is wrong.
+const SILENCE: Duration = Duration::from_secs(2);
+
+/// How a recording ended.
+enum Ending {
+    Time,
+    Interrupt,
+}
+
+impl Arguments {
+    /// Records until the time is over, Ctrl-C, or the device is gone.
+    ///
+    /// # Errors
+    /// A device that is silent or refuses, a file that cannot be written; what was recorded until then is kept.
+    pub fn run(self, console: &Console) -> Result<()> {
+        for (option, value) in [("--seconds", self.seconds), ("--rate", self.rate)] {
+            if value.is_some_and(|v| !(v > 0.0 && v.is_finite())) {
+                return Err(Error::new(Code::CallInvalid, format!("{option} must be above zero"))
+                    .value(value.unwrap_or_default().to_string())
+                    .help("leave the option out to record at the controller's own rate until Ctrl-C"));
+            }
+        }
+        let output = if self.output.is_empty() {
+            std::fs::create_dir_all(&self.folder).map_err(|e| Error::unwritable(&self.folder, &e))?;
+            vec![self.folder.join(format!("{}.csv", now_utc().replace(':', "-")))]
+        } else {
+            self.output.clone()
+        };
+        if let Some(there) = output.iter().find(|f| f.exists())
+            && !self.force
+        {
+            return Err(Error::new(Code::CallInvalid, "the recording is there already")
+                .file(there)
+                .help("name another one with -o, or replace it with --force"));
+        }
+        let interrupted = interrupts()?;
+        let mut client = self.port.connect(console)?;
+        let ticks = f64::from(client.call::<GetInfo>(&())?.ticks_per_s);
+        let every_ticks = self.rate.map_or(1.0, |rate| (ticks / rate).round()).clamp(1.0, 60_000.0) as u16;
+        let mut about = about_start("pam-record/1", &mut client)?;
+        about["samples_per_s"] = json!(ticks / f64::from(every_ticks));
+        let Some(mut recorder) = begin(&output, &about, console)? else {
+            return Err(Error::new(Code::CallInvalid, "a recording needs a file"));
+        };
+        console.note(format!("recording to {}; Ctrl-C ends it", output[0].display()));
+        let progress = Progress::new(console, "record");
+        progress.total(self.seconds.map_or(0, |s| (s * 1e3) as u64));
+        let watched = watch(&mut client, every_ticks, self.seconds, &mut recorder, &progress, || {
+            interrupted.load(Ordering::Relaxed)
+        });
+        drop(progress);
+        let losses = client.losses();
+        about["losses"] = about_losses(losses);
+        about["ended_by"] = json!(match &watched {
+            Ok(Ending::Time) => "time".to_owned(),
+            Ok(Ending::Interrupt) => "interrupt".to_owned(),
+            Err(e) => e.to_string(),
+        });
+        let rows = recorder.rows();
+        about["rows"] = json!(rows);
+        about["files"] = json!(output.iter().map(|f| f.display().to_string()).collect::<Vec<_>>());
+        let kept = end(recorder, &about, console);
+        // A device that is gone cannot be asked to be quiet; the recording is whole all the same.
+        let quiet = client.try_call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 });
+        if let Err(error) = &watched
+            && kept.is_ok()
+        {
+            console.note(format!("{rows} samples until then are in {}", output[0].display()));
+            console.detail(error.to_string());
+        }
+        watched?;
+        kept?;
+        quiet?.map_err(|refusal| words::refused("telemetry", refusal))?;
+        if losses.samples > 0 {
+            console
+                .warning(format!("{} samples were lost on the way, in {} gaps", losses.samples, losses.gaps));
+        }
+        console.result(if self.json {
+            format!("{about:#}")
+        } else {
+            format!("{rows} samples in {}, {} lost", output[0].display(), losses.samples)
+        });
+        Ok(())
+    }
+}
+
+/// Hands every sample and event to the recorder.
+fn watch(
+    client: &mut Client,
+    every_ticks: u16,
+    seconds: Option<f64>,
+    recorder: &mut Recorder,
+    progress: &Progress,
+    stop: impl Fn() -> bool,
+) -> Result<Ending> {
+    client
+        .try_call::<SetTelemetry>(&TelemetryRate { every_ticks })?
+        .map_err(|refusal| words::refused("telemetry", refusal))?;
+    let (mut first, mut last) = (None, 0);
+    let mut heard = Instant::now();
+    while !stop() {
+        match client.topic(Duration::from_millis(50))? {
+            Some(Topic::Telemetry(sample)) => {
+                heard = Instant::now();
+                if sample.time_us < last {
+                    return Err(Error::new(Code::DeviceSilent, "the device restarted while it was recorded")
+                        .help("`host device faults` says whether a fault did it; look at its supply"));
+                }
+                last = sample.time_us;
+                let elapsed = last - *first.get_or_insert(last);
+                if seconds.is_some_and(|end| elapsed as f64 * 1e-6 >= end) {
+                    return Ok(Ending::Time);
+                }
+                recorder.push(&sample)?;
+                progress.set(elapsed / 1000);
+            }
+            Some(Topic::Event(event)) => recorder.event(&event)?,
+            None if heard.elapsed() > SILENCE => {
+                let status = client.call::<GetStatus>(&())?;
+                return Err(Error::new(
+                    Code::DeviceSilent,
+                    format!("the device answers, but sends no telemetry; it is {}", words::state(status.state)),
+                )
+                .help("it may have restarted: `host device info` shows for how long it runs, and whether ticks are counted"));
+            }
+            None => {}
+        }
+    }
+    Ok(Ending::Interrupt)
+}
+
+/// Arguments of `host recover`.
+#[derive(Debug, Args)]
+#[command(
+    arg_required_else_help = true,
+    after_help = "Example:\n  host recover run.csv.part run.mcap.part\n\n\
+    A recording is named NAME.part while it grows. This takes away the sample that was being written when the program was\n\
+    killed, ends the file and gives it its name. The next recording of the same name does so by itself."
+)]
+pub struct RecoverArguments {
+    /// Recordings that were cut off.
+    #[arg(required = true, value_name = "NAME.part")]
+    files: Vec<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl RecoverArguments {
+    /// Makes whole recordings.
+    ///
+    /// # Errors
+    /// Files that are no `.part`, or cannot be read or written.
+    pub fn run(self, console: &Console) -> Result<()> {
+        let mut done = Vec::new();
+        for file in &self.files {
+            let name = rescue(file)?;
+            if !self.json {
+                console.result(match &name {
+                    Some(name) => format!("{} is now {}", file.display(), name.display()),
+                    None => format!("{} held nothing and is removed", file.display()),
+                });
+            }
+            done.push(json!({ "part": file.display().to_string(), "recording": name.map(|n| n.display().to_string()) }));
+        }
+        if self.json {
+            console.result(format!("{:#}", json!({ "schema": "pam-recover/1", "recovered": done })));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,376 @@
+//! The settings file: what stands in for options that are not given, so that a bench's port and muscle are written once.
+//!
+//! ```toml
+//! # pam.toml
+//! port = "/dev/ttyACM0"          # for every command that has --port
+//! muscle = "mini.toml"           # a path is taken from the folder of this file
+//!
+//! [fit]
+//! order = 3                      # for `host fit` only
+//! ```
+//!
+//! An option takes its value from the first of: the command line; the environment (`PAM_PORT`); the nearest `pam.toml`, in the
+//! folder where the program runs or one above it; the user's own `pam/pam.toml` in the configuration folder; the built-in
+//! default. The environment variable `PAM_SETTINGS` names another file in place of both, and none when it is empty.
+
+use std::any::TypeId;
+use std::path::{Path, PathBuf};
+
+use clap::{Arg, ArgAction, Command};
+use toml::de::{DeTable, DeValue};
+
+use crate::error::{Code, Error, Result, nearest};
+use crate::muscle_description::toml_error;
+
+/// The name of the file.
+pub const NAME: &str = "pam.toml";
+
+/// Options that must be meant each time they are used.
+const NEVER: [&str; 6] = ["force", "pressure", "stroke", "clear", "help", "version"];
+
+/// One setting, found and understood.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Setting {
+    /// The command that it is for, such as `fit` or `device log`; empty: every command that has the option.
+    pub command: String,
+    /// The option, without dashes.
+    pub option: String,
+    /// Its values; a path is absolute or from where the program runs.
+    pub values: Vec<String>,
+    /// The file.
+    pub file: PathBuf,
+    /// The line, counted from 1.
+    pub line: u64,
+}
+
+/// Files that count here, the one that yields first.
+///
+/// # Errors
+/// [`Code::FileUnreadable`] when `PAM_SETTINGS` names a file that is not there.
+pub fn files() -> Result<Vec<PathBuf>> {
+    if let Some(named) = std::env::var_os("PAM_SETTINGS") {
+        if named.is_empty() {
+            return Ok(Vec::new());
+        }
+        let named = PathBuf::from(named);
+        return match std::fs::metadata(&named) {
+            Ok(_) => Ok(vec![named]),
+            Err(e) => Err(Error::unreadable(&named, &e)
+                .help("the environment variable PAM_SETTINGS names this file; unset it, or make it empty to use none")),
+        };
+    }
+    let folder = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
+    let configuration = folder("XDG_CONFIG_HOME")
+        .or_else(|| folder("APPDATA"))
+        .or_else(|| folder("HOME").map(|home| home.join(".config")));
+    let own = configuration.map(|c| c.join("pam").join(NAME)).filter(|f| f.is_file());
+    let here = std::env::current_dir().ok();
+    let near = here.as_deref().and_then(|here| here.ancestors().map(|f| f.join(NAME)).find(|f| f.is_file()));
+    Ok(own.into_iter().chain(near).collect())
+}
+
+/// Reads the settings of a file for a command line.
+///
+/// # Errors
+/// [`Code::FileUnreadable`]; [`Code::SettingsInvalid`] with the line for text that is no TOML, an option that no command has, a
+/// value that it cannot take.
+pub fn read(file: &Path, command: &Command) -> Result<Vec<Setting>> {
+    let text = std::fs::read_to_string(file).map_err(|e| Error::unreadable(file, &e))?;
+    let parsed = DeTable::parse(&text).map_err(|e| {
+        toml_error(Code::SettingsInvalid, &text, &e)
+            .file(file)
+            .help("`host settings --example` prints a file to begin with")
+    })?;
+    let mut settings = Vec::new();
+    let reading = Reading { text: &text, file };
+    reading.table(parsed.get_ref(), command, "", &mut settings)?;
+    Ok(settings)
+}
+
+struct Reading<'a> {
+    text: &'a str,
+    file: &'a Path,
+}
+
+impl Reading<'_> {
+    fn line(&self, at: usize) -> u64 {
+        self.text.bytes().take(at).filter(|b| *b == b'\n').count() as u64 + 1
+    }
+
+    fn wrong(&self, at: usize, key: &str, cause: impl Into<String>) -> Error {
+        Error::new(Code::SettingsInvalid, cause).file(self.file).line(self.line(at)).column(key)
+    }
+
+    /// `path` names the commands from the program down to `command`.
+    fn table(
+        &self,
+        table: &DeTable<'_>,
+        command: &Command,
+        path: &str,
+        out: &mut Vec<Setting>,
+    ) -> Result<()> {
+        let places = if path.is_empty() { all(command) } else { vec![command] };
+        for (key, value) in table.iter() {
+            let (at, key) = (key.span().start, key.get_ref().as_ref());
+            if let DeValue::Table(inner) = value.get_ref() {
+                let sub = command.get_subcommands().find(|c| c.get_name() == key).ok_or_else(|| {
+                    let names: Vec<&str> = command.get_subcommands().map(Command::get_name).collect();
+                    let near = nearest(key, names.iter().copied()).map(|n| format!("did you mean [{n}]? "));
+                    self.wrong(at, key, "no command has this name").help(format!(
+                        "{}commands here: {}",
+                        near.unwrap_or_default(),
+                        names.join(", ")
+                    ))
+                })?;
+                self.table(inner, sub, format!("{path} {key}").trim(), out)?;
+                continue;
+            }
+            let option = key.replace('_', "-");
+            if NEVER.contains(&option.as_str()) {
+                return Err(self
+                    .wrong(at, key, "this option must be meant each time")
+                    .help("give it on the command line"));
+            }
+            let found: Vec<&Arg> = places.iter().filter_map(|c| with(c, &option)).collect();
+            if found.is_empty() {
+                let mut names: Vec<&str> =
+                    places.iter().flat_map(|c| c.get_arguments()).filter_map(Arg::get_long).collect();
+                names.sort_unstable();
+                names.dedup();
+                let near = nearest(&option, names.iter().copied()).map(|n| format!("did you mean {n}? "));
+                let whose = if path.is_empty() {
+                    "no command has".into()
+                } else {
+                    format!("`host {path}` does not have")
+                };
+                return Err(self.wrong(at, key, format!("{whose} this option")).help(format!(
+                    "{}options here: {}",
+                    near.unwrap_or_default(),
+                    names.join(", ")
+                )));
+            }
+            let texts = self.texts(at, key, value.get_ref())?;
+            let fits: Vec<Result<Vec<String>>> =
+                found.iter().map(|arg| self.values(at, key, arg, &texts)).collect();
+            // An option of one name may mean different things to two commands; it must suit one of them.
+            let mut good = fits.iter().filter_map(|f| f.as_ref().ok());
+            match good.next() {
+                Some(values) => out.push(Setting {
+                    command: path.to_owned(),
+                    option,
+                    values: values.clone(),
+                    file: self.file.to_owned(),
+                    line: self.line(at),
+                }),
+                None => return fits.into_iter().next().map_or(Ok(()), |first| first.map(|_| ())),
+            }
+        }
+        Ok(())
+    }
+
+    fn texts(&self, at: usize, key: &str, value: &DeValue<'_>) -> Result<Vec<String>> {
+        Ok(match value {
+            DeValue::String(s) => vec![s.to_string()],
+            DeValue::Integer(i) => vec![i.to_string()],
+            DeValue::Float(f) => vec![f.to_string()],
+            DeValue::Boolean(b) => vec![b.to_string()],
+            DeValue::Array(list) => {
+                let mut out = Vec::new();
+                for one in list {
+                    out.extend(self.texts(at, key, one.get_ref())?);
+                }
+                out
+            }
+            _ => {
+                return Err(self
+                    .wrong(at, key, "a date or a table is no value of an option")
+                    .help("write a text, a number, true or a list"));
+            }
+        })
+    }
+
+    /// The values as the option takes them, or why it does not.
+    fn values(&self, at: usize, key: &str, arg: &Arg, texts: &[String]) -> Result<Vec<String>> {
+        let flag = matches!(arg.get_action(), ArgAction::SetTrue);
+        if flag {
+            return match texts {
+                [one] if one == "true" || one == "false" => Ok(texts.to_vec()),
+                _ => Err(self
+                    .wrong(at, key, "this option takes no value")
+                    .value(texts.join(" "))
+                    .help("write true or false")),
+            };
+        }
+        if texts.len() != 1 && !matches!(arg.get_action(), ArgAction::Append) {
+            return Err(self.wrong(at, key, "this option takes one value").help("write one text or number"));
+        }
+        let is_path = arg.get_value_parser().type_id() == TypeId::of::<PathBuf>();
+        let folder = self.file.parent().unwrap_or(Path::new(""));
+        let mut out = Vec::new();
+        for text in texts {
+            let text = if is_path && text != "-" {
+                folder.join(text).to_string_lossy().into_owned()
+            } else {
+                text.clone()
+            };
+            // The option's own parser judges, alone: rules between options are for the command line.
+            let alone =
+                Arg::new("value").long("value").num_args(1).value_parser(arg.get_value_parser().clone());
+            let probe = Command::new("host").no_binary_name(true).arg(alone);
+            if let Err(reason) = probe.try_get_matches_from([format!("--value={text}")]) {
+                let reason = reason.to_string();
+                let said: Vec<&str> = reason.lines().map(str::trim).filter(|l| !l.is_empty()).collect();
+                let help = said.iter().find(|l| l.starts_with("[possible")).map_or_else(
+                    || {
+                        said.first()
+                            .and_then(|l| l.split_once(": "))
+                            .map_or("see --help", |(_, why)| why)
+                            .to_owned()
+                    },
+                    |l| l.trim_matches(['[', ']']).to_owned(),
+                );
+                return Err(self
+                    .wrong(at, key, format!("--{} does not take this value", key.replace('_', "-")))
+                    .value(text)
+                    .help(help.replace(" for '--value <value>'", "")));
+            }
+            out.push(text);
+        }
+        Ok(out)
+    }
+}
+
+/// A command and all below it.
+fn all(command: &Command) -> Vec<&Command> {
+    let mut out = vec![command];
+    for sub in command.get_subcommands() {
+        out.extend(all(sub));
+    }
+    out
+}
+
+fn with<'a>(command: &'a Command, option: &str) -> Option<&'a Arg> {
+    command.get_arguments().find(|a| a.get_long() == Some(option))
+}
+
+/// Makes settings the defaults of a command line. Later ones go before earlier ones.
+#[must_use]
+pub fn apply(mut command: Command, settings: &[Setting]) -> Command {
+    for setting in settings {
+        let path: Vec<&str> = setting.command.split_whitespace().collect();
+        command = apply_one(command, &path, setting, setting.command.is_empty());
+    }
+    command
+}
+
+fn apply_one(mut command: Command, path: &[&str], setting: &Setting, everywhere: bool) -> Command {
+    if everywhere || path.is_empty() {
+        let suits = |arg: &&Arg| {
+            arg.get_long() == Some(&setting.option)
+                && matches!(arg.get_action(), ArgAction::SetTrue)
+                    == setting.values.iter().all(|v| v == "true" || v == "false")
+        };
+        let id = command.get_arguments().find(suits).map(|a| a.get_id().clone());
+        if let Some(id) = id {
+            // The parser keeps defaults for the life of the program, and there are few.
+            let values: Vec<&'static str> =
+                setting.values.iter().map(|v| &*Box::leak(v.clone().into_boxed_str())).collect();
+            command = command.mut_arg(id, |arg| arg.required(false).default_values(values));
+        }
+    }
+    let names: Vec<String> = command.get_subcommands().map(|c| c.get_name().to_owned()).collect();
+    for name in names {
+        if everywhere {
+            command = command.mut_subcommand(name, |sub| apply_one(sub, &[], setting, true));
+        } else if path.first() == Some(&name.as_str()) {
+            command = command.mut_subcommand(name, |sub| apply_one(sub, &path[1..], setting, false));
+        }
+    }
+    command
+}
+
+/// All settings that count here; those that go before others come later.
+///
+/// # Errors
+/// As [`files`] and [`read`].
+pub fn all_settings(command: &Command) -> Result<Vec<Setting>> {
+    let mut out = Vec::new();
+    for file in files()? {
+        let mut settings = read(&file, command)?;
+        // A command's own section goes before what is said for all, whatever the order in the file.
+        settings.sort_by_key(|s| s.command.split_whitespace().count());
+        out.extend(settings);
+    }
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn command() -> Command {
+        Command::new("host")
+            .arg(Arg::new("quiet").long("quiet").action(ArgAction::SetTrue))
+            .subcommand(
+                Command::new("fit")
+                    .arg(
+                        Arg::new("muscle")
+                            .long("muscle")
+                            .required(true)
+                            .value_parser(clap::value_parser!(PathBuf)),
+                    )
+                    .arg(
+                        Arg::new("order")
+                            .long("order")
+                            .default_value("4")
+                            .value_parser(clap::value_parser!(u8).range(1..=6)),
+                    ),
+            )
+            .subcommand(
+                Command::new("run").arg(Arg::new("force").long("force")).arg(Arg::new("port").long("port")),
+            )
+    }
+
+    fn of(text: &str) -> Result<Vec<Setting>> {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join(NAME);
+        std::fs::write(&file, text).unwrap();
+        read(&file, &command())
+    }
+
+    #[test]
+    fn the_command_line_goes_before_the_file_and_the_file_before_the_default() {
+        let settings = of("port = \"COM3\"\nmuscle = \"m.toml\"\n[fit]\norder = 3\n").unwrap();
+        let order = |line: &[&str]| {
+            let matches = apply(command(), &settings).try_get_matches_from(line).unwrap();
+            let fit = matches.subcommand_matches("fit").unwrap();
+            (fit.get_one::<u8>("order").copied().unwrap(), fit.get_one::<PathBuf>("muscle").unwrap().clone())
+        };
+        let (three, muscle) = order(&["host", "fit"]);
+        assert!(three == 3 && muscle.is_absolute() && muscle.ends_with("m.toml"), "{muscle:?}");
+        assert_eq!(order(&["host", "fit", "--order", "2", "--muscle", "x"]), (2, "x".into()));
+        let matches = apply(command(), &settings).try_get_matches_from(["host", "run"]).unwrap();
+        assert_eq!(matches.subcommand_matches("run").unwrap().get_one::<String>("port").unwrap(), "COM3");
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_its_line_and_a_remedy() {
+        for (text, line, said) in [
+            ("\nprot = 1\n", 2, "did you mean port"),
+            ("[fit]\norder = 9\n", 2, "9 is not in 1..=6"),
+            ("[fitt]\n", 1, "did you mean [fit]"),
+            ("[run]\norder = 3\n", 2, "options here"),
+            ("force = \"40\"\n", 1, "on the command line"),
+            ("quiet = \"yes\"\n", 1, "true or false"),
+            ("a = = b\n", 1, ""),
+        ] {
+            let error = of(text).unwrap_err();
+            assert_eq!(
+                (error.code(), error.place().line),
+                (Code::SettingsInvalid, Some(line)),
+                "{text}: {error}"
+            );
+            assert!(error.advice().unwrap_or_default().contains(said), "{text}: {:?}", error.advice());
+        }
+    }
+}

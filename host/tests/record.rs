@@ -1,0 +1,161 @@
+//! Recordings outlive what goes wrong: a program that is killed, a device that is gone, a disk that is full.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used)] // what fails here fails the test
+
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use host::device::recorder::side_file;
+use host::emulated::{Emulated, Kind, Stand};
+use host::recording::{Reader, Recording};
+use virtual_bench::bench::BenchSpec;
+use virtual_bench::plant::Motion;
+use virtual_bench::presets;
+
+fn controller() -> Emulated {
+    let spec = BenchSpec::laboratory(presets::miniature(), 3);
+    let motion = Motion::Sine { mean_mm: 0.6, amplitude_mm: 0.2, frequency_hz: 0.5 };
+    Emulated::start(Stand::new(spec, motion), Some(Kind::Native), 1.0).unwrap()
+}
+
+fn host(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_host"));
+    command.args(arguments).current_dir(folder).env("PAM_SETTINGS", "");
+    command
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout)
+}
+
+fn read(file: &Path) -> Recording {
+    Reader::new().file(file).unwrap_or_else(|e| panic!("{}: {e}", file.display())).remove(0)
+}
+
+/// Waits until a file has so many bytes.
+fn grown(file: &Path, bytes: u64) {
+    let end = Instant::now() + Duration::from_secs(20);
+    while std::fs::metadata(file).map_or(0, |m| m.len()) < bytes {
+        assert!(Instant::now() < end, "{} does not grow", file.display());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+fn start(folder: &Path, port: &str, more: &[&str]) -> Child {
+    let line = [&["record", "--port", port, "-o", "run.csv", "-o", "run.mcap"], more].concat();
+    host(folder, &line).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+#[test]
+fn both_forms_hold_the_same_samples_and_say_how_they_were_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let controller = controller();
+    let port = controller.address().to_string();
+    let output = start(folder.path(), &port, &["--seconds", "1"]).wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+    let (csv, mcap) = (folder.path().join("run.csv"), folder.path().join("run.mcap"));
+    let (a, b) = (read(&csv), read(&mcap));
+    assert!((995..=1000).contains(&a.len()), "{} samples of a second at 1 kHz", a.len());
+    assert_eq!((&a.time, &a.pressure, &a.stroke), (&b.time, &b.pressure, &b.stroke));
+    assert_eq!((&a.force, &a.pressure_command), (&b.force, &b.pressure_command));
+    let about: serde_json::Value = serde_json::from_slice(&std::fs::read(side_file(&csv)).unwrap()).unwrap();
+    assert_eq!(about["schema"], "pam-record/1");
+    assert_eq!(about["host"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(about["rows"], a.len());
+    assert!(about["device"]["settings"]["limits"].is_object() && about["device"]["schema"].is_string());
+    assert!(about["device"]["tables"].is_array() && about["losses"]["samples"] == 0);
+    // The same stands in the MCAP itself.
+    let bytes = std::fs::read(&mcap).unwrap();
+    let text = String::from_utf8_lossy(&bytes);
+    for word in
+        ["device.release", "device.schema", "device.tables", "device.settings", "pam.Telemetry", "about.json"]
+    {
+        assert!(text.contains(word), "{word}");
+    }
+    // A second one of the same name is refused, and nothing happens to the first.
+    let again = host(folder.path(), &["record", "--port", &port, "-o", "run.csv"]).output().unwrap();
+    assert!(again.status.code() == Some(2) && said(&again).contains("--force"), "{}", said(&again));
+    assert_eq!(read(&csv).len(), a.len());
+}
+
+#[test]
+fn a_program_that_is_killed_leaves_all_but_the_last_moment() {
+    let folder = tempfile::tempdir().unwrap();
+    let controller = controller();
+    let mut child = start(folder.path(), &controller.address().to_string(), &[]);
+    let (csv, mcap) = (folder.path().join("run.csv.part"), folder.path().join("run.mcap.part"));
+    grown(&csv, 60_000);
+    let begun = Instant::now();
+    let before = std::fs::metadata(&csv).unwrap().len();
+    std::thread::sleep(Duration::from_millis(700));
+    let lived = begun.elapsed().as_secs_f64();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    // The rows of the time that was watched are there, but for the piece that was being collected.
+    let after = std::fs::read(&csv).unwrap();
+    let rows = after[before as usize..].iter().filter(|b| **b == b'\n').count();
+    assert!(rows as f64 > 1000.0 * (lived - 0.35), "{rows} rows in {lived} s");
+    let output = host(folder.path(), &["recover", "run.csv.part", "run.mcap.part"]).output().unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+    let (a, b) = (read(&folder.path().join("run.csv")), read(&folder.path().join("run.mcap")));
+    assert!(!csv.exists() && !mcap.exists());
+    assert!(a.len().abs_diff(b.len()) <= 350, "{} rows of CSV and {} of MCAP", a.len(), b.len());
+    let about = std::fs::read_to_string(side_file(&folder.path().join("run.csv"))).unwrap();
+    assert!(about.contains("it was cut off") && about.contains("link_version"), "{about}");
+}
+
+#[test]
+fn a_device_that_is_gone_ends_the_recording_and_keeps_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let controller = controller();
+    let child = start(folder.path(), &controller.address().to_string(), &[]);
+    grown(&folder.path().join("run.csv.part"), 40_000);
+    drop(controller);
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert!(
+        said(&output).contains("error[device::silent]") && said(&output).contains("run.csv"),
+        "{}",
+        said(&output)
+    );
+    let (a, b) = (read(&folder.path().join("run.csv")), read(&folder.path().join("run.mcap")));
+    assert!(a.len() > 100 && a.len() == b.len(), "{} and {}", a.len(), b.len());
+    let about = std::fs::read_to_string(side_file(&folder.path().join("run.csv"))).unwrap();
+    assert!(about.contains("connection"), "{about}");
+}
+
+#[test]
+fn a_full_disk_ends_the_files_at_a_whole_sample_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let controller = controller();
+    // A limit of the system stands for the end of the disk: writes beyond it fail half-way.
+    let script = format!(
+        "trap '' XFSZ; ulimit -f 100; exec '{}' record --port {} -o run.csv -o run.mcap",
+        env!("CARGO_BIN_EXE_host"),
+        controller.address()
+    );
+    let output = Command::new("bash")
+        .args(["-c", &script])
+        .current_dir(folder.path())
+        .env("PAM_SETTINGS", "")
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert!(
+        said(&output).contains("error[file::unwritable]") && said(&output).contains("run."),
+        "{}",
+        said(&output)
+    );
+    let (a, b) = (read(&folder.path().join("run.csv")), read(&folder.path().join("run.mcap")));
+    assert!(a.len() > 100 && b.len() > 100, "{} and {}", a.len(), b.len());
+    // The table of what a disk holds ends there, too: nothing was taken of a device such as /dev/full.
+    let full = host(
+        folder.path(),
+        &["record", "--port", &controller.address().to_string(), "--folder", "/dev/full"],
+    )
+    .output()
+    .unwrap();
+    assert_eq!(full.status.code(), Some(1), "{}", said(&full));
+}
