@@ -187,7 +187,11 @@ fn located(d: &Diagnosis) -> Section {
         section.figure(Figure::new(
             "misfit-time",
             "Measured minus computed force over time",
-            "The plain model's misfit; the dark line is what the found effects make of it, and what remains should be noise.",
+            if d.missing.is_empty() {
+                "The plain model's misfit: where it is a band of even width around zero, it is noise."
+            } else {
+                "The plain model's misfit; the dark line is what the found effects make of it, and what remains should be noise."
+            },
             panel,
         ));
     }

@@ -91,13 +91,19 @@ function extent(...lists) {
 class Scope {
   constructor(canvas, ring, curves) { this.axes = new Axes(canvas); this.ring = ring; this.curves = curves; }
   draw(seconds) {
-    const r = this.ring, end = r.last("t"), from = r.since(end - seconds);
+    const r = this.ring, size = r.size, end = r.last("t"), from = r.since(end - seconds), count = r.length - from, start = r.index(from);
+    // Plain loops over the ring's own arrays: this runs over every sample of the window in every picture.
     let low = Infinity, high = -Infinity;
-    for (const [name] of this.curves) for (let i = from; i < r.length; i++) { const v = r.get(name, i); if (v < low) low = v; if (v > high) high = v; }
+    for (const [name] of this.curves) {
+      const values = r.columns[name];
+      for (let k = 0, i = start; k < count; k++) { const v = values[i]; if (v < low) low = v; if (v > high) high = v; if (++i === size) i = 0; }
+    }
     if (low > high) { low = 0; high = 1; }
-    const { X, Y, left, right } = this.axes.begin(Math.max(0, end - seconds), Math.max(end, seconds), low, high, (v, d) => v.toFixed(d) + " s");
-    const g = this.axes.g, width = Math.max(1, Math.round(right - left));
+    const x0 = Math.max(0, end - seconds), x1 = Math.max(end, seconds);
+    const { Y, left, right } = this.axes.begin(x0, x1, low, high, (v, d) => v.toFixed(d) + " s");
+    const g = this.axes.g, width = Math.max(1, Math.round(right - left)), scale = (right - left) / (x1 - x0), times = r.columns.t;
     for (const [name, shade] of this.curves) {
+      const values = r.columns[name];
       g.strokeStyle = colour(shade); g.lineWidth = 1.5; g.beginPath();
       let column = -1, least = 0, most = 0, first = 0, last = 0, begun = false;
       const flush = () => {
@@ -107,10 +113,11 @@ class Scope {
         if (most > least) { g.lineTo(x, Y(most)); g.lineTo(x, Y(least)); }
         g.lineTo(x, Y(last));
       };
-      for (let i = from; i < r.length; i++) {
-        const v = r.get(name, i), c = Math.min(width, Math.floor(X(r.get("t", i)) - left));
+      for (let k = 0, i = start; k < count; k++) {
+        const v = values[i], c = Math.min(width, ((times[i] - x0) * scale) | 0);
         if (c !== column) { flush(); column = c; least = most = first = v; } else { if (v < least) least = v; if (v > most) most = v; }
         last = v;
+        if (++i === size) i = 0;
       }
       flush(); g.stroke();
     }
