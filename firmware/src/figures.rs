@@ -230,8 +230,8 @@ fn whole_step(table: &MuscleTable) {
     }
 }
 
-/// What each effect adds to a tick: its step and its force.
-fn effects(table: &MuscleTable) {
+/// Instructions of a tick of a model whose table carries these effects.
+fn tick_with(table: &MuscleTable, effects: &[FittedEffect]) -> Option<f32> {
     let motion = Motion {
         dt: 1e-3,
         time: 1.0,
@@ -243,38 +243,38 @@ fn effects(table: &MuscleTable) {
         since_reversal: 0.5,
         ..Motion::default()
     };
-    let mut without = None;
-    let bare = core::iter::once(None).chain(EffectName::ALL.iter().copied().map(Some));
-    for effect in bare {
-        let mut table = table.clone();
-        if let Some(effect) = effect {
-            let mut parameters = [0.0; MAX_PARAMETERS];
-            let of = effect.info().parameters;
-            for (to, parameter) in parameters.iter_mut().zip(of) {
-                *to = 0.5 * (parameter.low + parameter.high);
-            }
-            // The list is empty, so there is room for one.
-            let _ =
-                table.effects.push(FittedEffect::new(effect, &parameters[..of.len().min(MAX_PARAMETERS)]));
+    let mut table = table.clone();
+    table.effects.extend(effects.iter().cloned());
+    let mut model = Model::build(&table).ok()?;
+    let mut tick = 0_u32;
+    Some(instructions(64, 300e3, |pressure_pa| {
+        tick += 1;
+        let moved = Motion { stroke: 1e-3 + 1e-6 * tick as f32, ..motion };
+        model.tick(black_box(&moved), pressure_pa)
+    }))
+}
+
+/// What the first effect of a table costs a tick more than another would, the context that all look at; and what each effect
+/// adds on top, by its step and its force.
+fn effects(table: &MuscleTable) {
+    let Some(bare) = tick_with(table, &[]) else { return };
+    hprintln!("tick-of-model {:.1} {:.1} 64", bare, bare);
+    let mut context = Sweep::default();
+    for effect in EffectName::ALL {
+        let mut parameters = [0.0; MAX_PARAMETERS];
+        let of = effect.info().parameters;
+        for (to, parameter) in parameters.iter_mut().zip(of) {
+            *to = 0.5 * (parameter.low + parameter.high);
         }
-        let Ok(mut model) = Model::build(&table) else { continue };
-        let mut tick = 0_u32;
-        let cost = instructions(64, 300e3, |pressure_pa| {
-            tick += 1;
-            let moved = Motion { stroke: 1e-3 + 1e-6 * tick as f32, ..motion };
-            model.tick(black_box(&moved), pressure_pa)
-        });
-        match effect {
-            None => {
-                without = Some(cost);
-                hprintln!("tick-of-model {:.1} {:.1} 64", cost, cost);
-            }
-            Some(effect) => {
-                let added = cost - without.unwrap_or(0.0);
-                hprintln!("effect:{} {:.1} {:.1} 64", effect.info().name, added, added);
-            }
-        }
+        let one = FittedEffect::new(*effect, &parameters[..of.len().min(MAX_PARAMETERS)]);
+        let both = [one.clone(), one];
+        let (Some(once), Some(twice)) = (tick_with(table, &both[..1]), tick_with(table, &both)) else {
+            return;
+        };
+        context.add(once - (twice - once) - bare);
+        hprintln!("effect:{} {:.1} {:.1} 64", effect.info().name, twice - once, twice - once);
     }
+    context.say("context-of-effects");
 }
 
 #[entry]

@@ -389,7 +389,7 @@ impl<T: Scalar> Context<T> {
 }
 
 /// How many numbers an effect may remember.
-pub const MEMORY: usize = 28;
+pub const MEMORY: usize = 29;
 /// How many parameters an effect may have.
 pub const MAX_PARAMETERS: usize = 6;
 /// How many numbers of a persistent memory a table may carry.

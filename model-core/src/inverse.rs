@@ -109,8 +109,9 @@ fn solve<T: Scalar>(
                 bracket.low = p;
             }
             let mut next = p - miss / slope;
-            // `!(…)` also catches a quotient that is not a number.
-            if !(next > bracket.low && next < bracket.high) && !((next - p).abs() <= tolerance) {
+            // A quotient that is not a number is not within either.
+            let within = next > bracket.low && next < bracket.high;
+            if !within && !((next - p).abs() <= tolerance) {
                 next = bracket.instead(lowest, highest);
             }
             let size = (next - p).abs();

@@ -285,7 +285,7 @@ impl<T: Scalar> Muscle<T> {
     }
 
     /// Brings a moment to a motion and a pressure.
-    #[inline]
+    #[inline(never)]
     pub fn update(&self, moment: &mut Moment<T>, motion: &Motion<T>, pressure: Pressure<T>) {
         let Moment { held, slopes, context } = moment;
         *held = self.held(Length::from_metres(motion.stroke));
@@ -316,7 +316,7 @@ impl<T: Scalar> Muscle<T> {
     }
 
     /// Moves a moment's context to another pressure than the measured one: what the force there would be.
-    #[inline]
+    #[inline(always)]
     pub fn move_to(
         &self,
         context: &mut Context<T>,
@@ -337,7 +337,7 @@ impl<T: Scalar> Muscle<T> {
     }
 
     /// How the coefficients of pressure and of the `E_k` change with stroke.
-    #[inline]
+    #[inline(always)]
     pub fn slopes(&self, held: &Held<T>) -> HeldSlopes<T> {
         let posture = &held.posture;
         let slopes = self.braid.slopes(posture);

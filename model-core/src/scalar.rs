@@ -49,12 +49,6 @@ pub trait Scalar:
     fn ln(self) -> Self;
     /// Natural logarithm of one more than this; keeps its digits near zero.
     fn ln_1p(self) -> Self;
-    /// This to a real power.
-    fn powf(self, exponent: Self) -> Self;
-    /// The error function.
-    fn erf(self) -> Self;
-    /// Hyperbolic tangent.
-    fn tanh(self) -> Self;
     /// Whether this is neither infinite nor NaN.
     fn is_finite(self) -> bool;
     /// Absolute value.
@@ -99,7 +93,7 @@ pub trait Scalar:
 }
 
 macro_rules! scalar {
-    ($t:ident, $sqrt:expr, $exp:ident, $expm1:ident, $ln:ident, $ln1p:ident, $pow:ident, $erf:ident, $tanh:ident) => {
+    ($t:ident, $sqrt:expr, $exp:ident, $expm1:ident, $ln:ident, $ln1p:ident) => {
         impl Scalar for $t {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
@@ -132,15 +126,6 @@ macro_rules! scalar {
             fn ln_1p(self) -> Self {
                 libm::$ln1p(self)
             }
-            fn powf(self, exponent: Self) -> Self {
-                libm::$pow(self, exponent)
-            }
-            fn erf(self) -> Self {
-                libm::$erf(self)
-            }
-            fn tanh(self) -> Self {
-                libm::$tanh(self)
-            }
             #[inline]
             fn is_finite(self) -> bool {
                 $t::is_finite(self)
@@ -153,8 +138,8 @@ macro_rules! scalar {
     };
 }
 
-scalar!(f32, sqrt_f32, expf, expm1f, logf, log1pf, powf, erff, tanhf);
-scalar!(f64, libm::sqrt, exp, expm1, log, log1p, pow, erf, tanh);
+scalar!(f32, sqrt_f32, expf, expm1f, logf, log1pf);
+scalar!(f64, libm::sqrt, exp, expm1, log, log1p);
 
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
 core::arch::global_asm!(

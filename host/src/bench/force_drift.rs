@@ -11,13 +11,13 @@ use model_core::effects::{Context, Effect, Fading, Info, Link, Memory, Parameter
 use model_core::scalar::Scalar;
 
 type Cell = Fading<1, 1>;
-const FIRST_TEMPERATURE: usize = 8;
+const FIRST_TEMPERATURE: usize = Cell::SLOTS;
 
 /// See the [module](self).
 pub(super) struct ForceDrift;
 
 impl Effect for ForceDrift {
-    // memory: see Fading (eight slots), then the first temperature
+    // memory: see Fading, then the first temperature
     const INFO: Info = Info {
         name: "force-drift",
         link: Link::Reading,
@@ -46,9 +46,8 @@ impl Effect for ForceDrift {
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
-        let times = [parameters[4]];
         let load = context.force();
-        let crept = load - Cell::value(memory, &times, 0, load);
+        let crept = load - Cell::value(memory, 0, load);
         let warmed = T::ONE - decay(context.time.max(T::ZERO) / parameters[4].max(T::from_f32(1.0e-3)));
         let warmth = if context.temperature > T::ZERO {
             context.temperature - memory[FIRST_TEMPERATURE]

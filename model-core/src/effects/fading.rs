@@ -18,7 +18,8 @@ use crate::scalar::Scalar;
 
 /// `N` time constants for each of `D` drives, kept in an effect's memory.
 ///
-/// Layout: seen, pending time, step that the shares hold for, `N` shares `1 − a`, `D` last drives, `D × N` over-stresses.
+/// Layout: seen, pending time, step that the shares hold for, `N` shares `1 − a`, `D` last drives, `N × D` over-stresses, `D` sums
+/// of what is left of them. The sums are taken once a step, so that a search for pressure asks for them at no cost.
 pub struct Fading<const N: usize, const D: usize>;
 
 const SEEN: usize = 0;
@@ -38,46 +39,77 @@ fn small_share<T: Scalar>(x: T) -> T {
 impl<const N: usize, const D: usize> Fading<N, D> {
     const LAST: usize = SHARES + N;
     const FIRST: usize = SHARES + N + D;
-    const FITS: () = assert!(SHARES + N + D + N * D <= MEMORY);
+    const SUMS: usize = SHARES + N + D + N * D;
+    const FITS: () = assert!(Self::SUMS + D <= MEMORY);
+
+    /// How many slots of a memory it uses, from the first.
+    pub const SLOTS: usize = Self::SUMS + D;
 
     /// Where the over-stress of drive `drive` and time constant `branch` is kept.
     pub const fn slot(drive: usize, branch: usize) -> usize {
-        Self::FIRST + drive * N + branch
+        Self::FIRST + branch * D + drive
     }
 
     /// Lets `dt ≥ 0` seconds pass, while the drives ran straight to `drives`. `times` are in seconds, the shortest first.
     ///
     /// The first call only takes note of the drives: they are assumed to have been there for long.
+    #[inline(always)]
     pub fn step<T: Scalar>(memory: &mut Memory<T>, dt: T, times: &[T; N], drives: &[T; D]) {
         let () = Self::FITS;
-        if memory[SEEN] == T::ZERO {
-            memory[SEEN] = T::ONE;
-            memory[Self::LAST..Self::FIRST].copy_from_slice(drives);
-            return;
-        }
-        let dt = dt.max(T::ZERO);
-        let full = times[0].max(T::from_f32(SHORTEST)) * T::from_f32(0.02);
-        if dt < full {
-            Self::step_short(memory, dt, full, times, drives);
+        let first = memory[SEEN] == T::ZERO;
+        let dt = dt.at_least(T::ZERO);
+        let full = times[0].at_least(T::from_f32(SHORTEST)) * T::from_f32(0.02);
+        if !first && dt < full && memory[PENDING] + dt < full {
+            Self::step_short(memory, dt, times, drives);
         } else {
-            Self::step_long(memory, dt, times, drives);
+            Self::step_whole(memory, dt, full, times, drives);
         }
     }
 
-    fn step_short<T: Scalar>(memory: &mut Memory<T>, dt: T, full: T, times: &[T; N], drives: &[T; D]) {
+    /// A step after which the fading still pends: the drives' change is taken in at once.
+    #[inline(always)]
+    fn step_short<T: Scalar>(memory: &mut Memory<T>, dt: T, times: &[T; N], drives: &[T; D]) {
         let middle = memory[PENDING] + dt * T::from_f32(0.5);
-        let changes: [T; D] = core::array::from_fn(|d| drives[d] - memory[Self::LAST + d]);
-        memory[Self::LAST..Self::FIRST].copy_from_slice(drives);
-        for (i, tau) in times.iter().enumerate() {
-            let x = middle / tau.max(T::from_f32(SHORTEST));
+        let pending = memory[PENDING] + dt;
+        memory[PENDING] = pending;
+        let mut changes = *drives;
+        for (d, change) in changes.iter_mut().enumerate() {
+            *change -= memory[Self::LAST + d];
+            memory[Self::LAST + d] = drives[d];
+        }
+        let mut sums = [T::ZERO; D];
+        for (branch, tau) in memory[Self::FIRST..Self::SUMS].chunks_exact_mut(D).zip(times) {
+            let rate = T::ONE / tau.at_least(T::from_f32(SHORTEST));
+            let x = middle * rate;
             let late = T::ONE + x + x * x * T::from_f32(0.5);
-            for (d, change) in changes.iter().enumerate() {
-                memory[Self::slot(d, i)] += *change * late;
+            let kept = T::ONE - small_share(pending * rate);
+            for ((q, change), sum) in branch.iter_mut().zip(&changes).zip(&mut sums) {
+                *q += *change * late;
+                *sum += *q * kept;
             }
         }
-        memory[PENDING] += dt;
-        if memory[PENDING] >= full {
+        memory[Self::SUMS..Self::SLOTS].copy_from_slice(&sums);
+    }
+
+    /// Any other step.
+    #[inline(never)]
+    fn step_whole<T: Scalar>(memory: &mut Memory<T>, dt: T, full: T, times: &[T; N], drives: &[T; D]) {
+        if memory[SEEN] == T::ZERO {
+            memory[SEEN] = T::ONE;
+            memory[Self::LAST..Self::FIRST].copy_from_slice(drives);
+        } else if dt < full {
+            Self::step_short(memory, dt, times, drives);
             Self::settle(memory, times);
+        } else {
+            Self::step_long(memory, dt, times, drives);
+        }
+        // Nothing pends, so all of every over-stress is left.
+        for d in 0..D {
+            let mut sum = T::ZERO;
+            for i in 0..N {
+                sum += memory[Self::slot(d, i)];
+            }
+            memory[Self::SUMS + d] = sum;
         }
     }
 
@@ -88,7 +120,7 @@ impl<const N: usize, const D: usize> Fading<N, D> {
             // An endless pause is not worth remembering, and would not be a finite number.
             memory[SHARES_FOR] = if dt.is_finite() { dt } else { T::ZERO };
             for (share, tau) in memory[SHARES..].iter_mut().zip(times) {
-                *share = -(-(dt / tau.max(shortest))).exp_m1();
+                *share = -(-(dt / tau.at_least(shortest))).exp_m1();
             }
         }
         for (d, drive) in drives.iter().enumerate() {
@@ -97,7 +129,7 @@ impl<const N: usize, const D: usize> Fading<N, D> {
             for (i, tau) in times.iter().enumerate() {
                 let share = memory[SHARES + i];
                 let q = &mut memory[Self::slot(d, i)];
-                *q = *q - *q * share + change * (share * (tau.max(shortest) / dt));
+                *q = *q - *q * share + change * (share * (tau.at_least(shortest) / dt));
             }
         }
     }
@@ -110,7 +142,7 @@ impl<const N: usize, const D: usize> Fading<N, D> {
         }
         memory[PENDING] = T::ZERO;
         for (i, tau) in times.iter().enumerate() {
-            let share = small_share(pending / tau.max(T::from_f32(SHORTEST)));
+            let share = small_share(pending / tau.at_least(T::from_f32(SHORTEST)));
             for d in 0..D {
                 let q = &mut memory[Self::slot(d, i)];
                 *q = *q - *q * share;
@@ -119,15 +151,12 @@ impl<const N: usize, const D: usize> Fading<N, D> {
     }
 
     /// The sum over the time constants of one drive's over-stresses, with the drive now at `now`.
-    #[inline]
-    pub fn value<T: Scalar>(memory: &Memory<T>, times: &[T; N], drive: usize, now: T) -> T {
-        let change = if memory[SEEN] == T::ZERO { T::ZERO } else { now - memory[Self::LAST + drive] };
-        let mut sum = T::ZERO;
-        for (i, tau) in times.iter().enumerate() {
-            let q = memory[Self::slot(drive, i)];
-            sum += q - q * small_share(memory[PENDING] / tau.max(T::from_f32(SHORTEST))) + change;
+    #[inline(always)]
+    pub fn value<T: Scalar>(memory: &Memory<T>, drive: usize, now: T) -> T {
+        if memory[SEEN] == T::ZERO {
+            return T::ZERO;
         }
-        sum
+        memory[Self::SUMS + drive] + T::from_f32(N as f32) * (now - memory[Self::LAST + drive])
     }
 }
 

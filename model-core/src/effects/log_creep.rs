@@ -63,10 +63,9 @@ impl Effect for LogCreep {
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
-        let times = times(parameters[3]);
         let (elastic, gaylord) = context.loads();
-        parameters[0] * Spectrum::value(memory, &times, 0, elastic)
-            + parameters[1] * Spectrum::value(memory, &times, 1, context.unit_elastic())
-            - parameters[2] * Spectrum::value(memory, &times, 2, gaylord)
+        parameters[0] * Spectrum::value(memory, 0, elastic)
+            + parameters[1] * Spectrum::value(memory, 1, context.unit_elastic())
+            - parameters[2] * Spectrum::value(memory, 2, gaylord)
     }
 }

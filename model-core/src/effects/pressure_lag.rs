@@ -41,10 +41,8 @@ impl Effect for PressureLag {
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
-        let times = [parameters[2]];
-        let flow = context.area * context.speed;
-        let flow = flow - Line::value(memory, &times, 0, flow);
-        let rise = context.pressure_rate - Line::value(memory, &times, 1, context.pressure_rate);
+        let (flow, rise) = (context.area * context.speed, context.pressure_rate);
+        let (flow, rise) = (flow - Line::value(memory, 0, flow), rise - Line::value(memory, 1, rise));
         -context.pull_per_pressure() * (parameters[0] * flow + parameters[1] * rise)
     }
 }

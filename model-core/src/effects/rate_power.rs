@@ -31,7 +31,8 @@ impl Effect for RatePower {
         // memory: [(|v|/v_1)^m], so that a search for pressure does not compute the power again.
         let speed = context.speed.abs() * T::from_f32(1.0e3);
         memory[0] = if speed > T::ZERO {
-            speed.min(T::from_f32(1.0e6)).powf(parameters[1].clamp(T::ZERO, T::from_f32(3.0)))
+            let exponent = parameters[1].clamp(T::ZERO, T::from_f32(3.0));
+            (exponent * speed.min(T::from_f32(1.0e6)).ln()).exp()
         } else {
             T::ZERO
         };

@@ -50,10 +50,9 @@ impl Effect for StressRelaxation {
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
-        let times = [parameters[3]];
         let (elastic, gaylord) = context.loads();
-        parameters[0] * Solid::value(memory, &times, 0, elastic)
-            + parameters[1] * Solid::value(memory, &times, 1, context.unit_elastic())
-            - parameters[2] * Solid::value(memory, &times, 2, gaylord)
+        parameters[0] * Solid::value(memory, 0, elastic)
+            + parameters[1] * Solid::value(memory, 1, context.unit_elastic())
+            - parameters[2] * Solid::value(memory, 2, gaylord)
     }
 }
