@@ -31,6 +31,8 @@ pub struct Answer {
     pub next_experiment: Option<serde_json::Value>,
     /// What was weighed and not taken.
     pub considered: Vec<Considered>,
+    /// What else is said, in words.
+    pub remarks: Vec<String>,
 }
 
 /// A region of the misfit.

@@ -11,6 +11,8 @@ use crate::names::{SINGLES, class};
 use crate::report::{Rate, Scored, big_and_visible};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use serde::Deserialize;
+use std::collections::HashMap;
 use std::error::Error;
 use std::path::Path;
 use virtual_bench::rng::Rng;
@@ -39,12 +41,57 @@ pub fn all(set: &Path, truths: &[TrialTruth], scored: &[Scored]) -> Result<Vec<L
         };
         (what.to_string(), count(true), count(false))
     };
-    Ok(vec![
+    let mut lines = vec![
         line(0, "random name"),
         line(1, "the largest class, always"),
         line(2, "largest ΔBIC"),
         line(3, "sparse regression (STLSQ)"),
-    ])
+    ];
+    if let Some(others) = Others::read(set) {
+        let said: Vec<(&&TrialTruth, &str)> =
+            judged.iter().filter_map(|t| Some((t, others.pysindy.get(&name(t.id))?.as_str()))).collect();
+        let rate = |right: &dyn Fn(&TrialTruth, &str) -> bool| {
+            Rate::new(said.iter().filter(|(t, g)| right(t, g)).count(), said.len())
+        };
+        lines.push((format!("PySINDy's STLSQ, apart ({})", others.versions), rate(&is), rate(&is_class)));
+    }
+    Ok(lines)
+}
+
+/// What baselines.py wrote.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Others {
+    /// Names by PySINDy.
+    pysindy: HashMap<String, String>,
+    /// Errors on held-out recordings of a plain table with a Gaussian process on top, N.
+    #[serde(rename = "gp_N")]
+    gp: HashMap<String, f64>,
+    /// Versions of the libraries.
+    versions: String,
+}
+
+impl Others {
+    /// Of a set, where the script was run.
+    pub fn read(set: &Path) -> Option<Self> {
+        serde_json::from_str(&std::fs::read_to_string(set.join("guesses.json")).ok()?).ok()
+    }
+
+    /// Median held-out gain of the Gaussian process and of the tool on the same trials, and how many these are.
+    pub fn gains(&self, scored: &[Scored]) -> Option<(f64, f64, usize)> {
+        let pairs: Vec<(f64, f64)> = scored
+            .iter()
+            .filter_map(|(o, h)| {
+                let (h, error) = ((*h)?, self.gp.get(&name(o.id))?);
+                Some(((h.plain - error) / (h.plain - h.twin), h.gain()?))
+            })
+            .collect();
+        let median = |mut v: Vec<f64>| {
+            v.sort_by(f64::total_cmp);
+            v.get(v.len() / 2).copied()
+        };
+        let process = median(pairs.iter().map(|p| p.0).collect())?;
+        Some((process, median(pairs.iter().map(|p| p.1).collect())?, pairs.len()))
+    }
 }
 
 fn random(truth: &TrialTruth) -> &'static str {

@@ -3,13 +3,13 @@
 use crate::answer::{recordings, run_limited};
 use crate::generate::TrialTruth;
 use crate::ledger::name;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
 /// Rms error on held-out recordings, N.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
     /// A plain fit of the campaign.
     #[serde(rename = "plain_N")]
@@ -74,6 +74,10 @@ pub fn held_out(set: &Path, host: &Path, truth: &TrialTruth) -> Result<HeldOut, 
     let (trial, sealed) = (set.join("trials").join(&id), set.join("sealed").join(&id));
     let work = set.join("work").join(&id);
     std::fs::create_dir_all(&work).map_err(|e| e.to_string())?;
+    let known = work.join("held_out.json");
+    if let Some(done) = std::fs::read(&known).ok().and_then(|b| serde_json::from_slice(&b).ok()) {
+        return Ok(done);
+    }
     let muscle = trial.join("muscle.toml");
     let (history, held) = (recordings(&trial), recordings(&sealed.join("held_out")));
     let plain_table = work.join("plain.pam");
@@ -94,5 +98,8 @@ pub fn held_out(set: &Path, host: &Path, truth: &TrialTruth) -> Result<HeldOut, 
         let held = recordings(&sealed.join("twin_held_out"));
         predict(host, &table, &twin_history, &held, &work.join("twin.json"))?
     };
-    Ok(HeldOut { plain, diagnosed, twin })
+    let all = HeldOut { plain, diagnosed, twin };
+    let text = serde_json::to_string(&all).map_err(|e| e.to_string())?;
+    std::fs::write(known, text).map_err(|e| e.to_string())?;
+    Ok(all)
 }

@@ -331,20 +331,45 @@ fn mishandle(files: &mut Vec<Recording>, o: &Operator, blocked: f64, seed: u64) 
     }
 }
 
-/// Make one trial.
-pub fn make(spec: &Spec, residuals: &Residuals) -> Trial {
-    let muscle = Muscle::new(spec.bench.muscle.clone());
-    let levels = campaigns::levels(&muscle);
-    let speed = campaigns::slow(&muscle, &levels);
-    let mut order = levels.clone();
+/// The campaign of a trial, every position in mm.
+fn protocol_of(spec: &Spec, muscle: &Muscle, levels: &[f64]) -> Protocol {
+    let mut order = levels.to_vec();
     if let Some(i) = spec.operator.swapped
         && i + 1 < order.len()
     {
         order.swap(i, i + 1);
     }
-    let protocol = campaigns::by_name(spec.protocol, &muscle, &order, spec.seed)
-        .unwrap_or_else(|| campaigns::classic(&muscle, &levels));
-    let protocol = in_millimetres(protocol, &muscle);
+    let protocol = campaigns::by_name(spec.protocol, muscle, &order, spec.seed)
+        .unwrap_or_else(|| campaigns::classic(muscle, levels));
+    in_millimetres(protocol, muscle)
+}
+
+/// What a further protocol records on the muscle of a trial, with its effects in `bench`, after the trial's campaign.
+pub fn after(spec: &Spec, bench: &BenchSpec, residuals: &Residuals, next: &Protocol) -> Vec<Recording> {
+    let muscle = Muscle::new(spec.bench.muscle.clone());
+    let levels = campaigns::levels(&muscle);
+    let real = spec.real_noise && !residuals.is_empty();
+    let mut b = bench.clone();
+    let coloured = b.instruments.force.coloured.0;
+    if real {
+        b.instruments.force.coloured.0 = 0.0;
+    }
+    let mut at = Bench::new(&b);
+    // Both protocols were checked when they were made or read.
+    let _ = at.run(&protocol_of(spec, &muscle, &levels));
+    let mut files = at.run(next).unwrap_or_default();
+    if real {
+        resample(&mut files, residuals, coloured, spec.seed ^ 2);
+    }
+    files
+}
+
+/// Make one trial.
+pub fn make(spec: &Spec, residuals: &Residuals) -> Trial {
+    let muscle = Muscle::new(spec.bench.muscle.clone());
+    let levels = campaigns::levels(&muscle);
+    let speed = campaigns::slow(&muscle, &levels);
+    let protocol = protocol_of(spec, &muscle, &levels);
     let seconds = duration(&protocol, &spec.bench);
     let scale = Scale::new(&muscle, &levels, speed * 1e-3, seconds);
     let geometry = spec.bench.muscle.geometry;

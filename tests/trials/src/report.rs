@@ -2,7 +2,9 @@
 
 use crate::clopper::interval;
 use crate::fitted::HeldOut;
-use crate::names::{Owner, class, owner};
+use crate::limits::{Limit, limit, said};
+use crate::locate::Located;
+use crate::names::{CLASSES, Owner, class, owner};
 use crate::score::Outcome;
 use crate::spec::Stratum;
 use serde::Serialize;
@@ -59,6 +61,9 @@ impl std::fmt::Display for Rate {
     }
 }
 
+/// A tenth of stated probability: stated, exact, right class, how many.
+pub type Bin = (f64, f64, f64, usize);
+
 /// Figures of one protocol, or of all.
 #[derive(Debug, Clone, Serialize)]
 pub struct Figures {
@@ -94,12 +99,30 @@ pub struct Figures {
     pub outside_silent: Rate,
     /// Regions that sit where the effect is.
     pub located: Rate,
+    /// Regions whose overlap with the true one is more than half.
+    pub overlapping: Rate,
+    /// Mean overlap of regions, rows in both over rows in either.
+    pub overlap: f64,
+    /// Sizes noticed in half and in nine tenths of the single effects.
+    pub detection: Option<Limit>,
+    /// Sizes named by the right class in half and in nine tenths.
+    pub naming: Option<Limit>,
+    /// Concealed effects that are in the set, or are said to be possible unseen.
+    pub concealed_admitted: Rate,
+    /// … and of which it is said what to do.
+    pub concealed_advised: Rate,
     /// Stated 95 % intervals that hold.
     pub parameters: Rate,
     /// Expected calibration error of the probabilities (ten bins), of exact names.
     pub calibration_error: f64,
-    /// Brier score of the same.
+    /// Calibration error where a name counts as right when its class is.
+    pub calibration_error_class: f64,
+    /// Brier score of exact names.
     pub brier: f64,
+    /// Mean of −ln of the probability given to what turned out, exact names.
+    pub log_score: f64,
+    /// Per tenth of stated probability: mean stated, share that was exact, share of the right class, how many.
+    pub reliability: Vec<Bin>,
     /// How many probabilities that is.
     pub probabilities: usize,
     /// Median gain on held-out recordings against the twin, effects of the muscle where a gain is possible.
@@ -131,17 +154,33 @@ impl Figures {
             let said: Vec<&str> = o.named.iter().map(|n| class(&n.0)).collect();
             o.truth.iter().filter(|t| said.contains(&class(&t.0))).count()
         };
-        let (mut bins, mut brier, mut count) = ([(0.0, 0.0, 0usize); 10], 0.0, 0usize);
+        let (mut bins, mut brier, mut log_score, mut count) =
+            ([(0.0, 0.0, 0.0, 0usize); 10], 0.0, 0.0, 0usize);
         for o in it() {
             for (name, p) in &o.named {
                 let hit = f64::from(o.truth.iter().any(|t| t.0 == *name));
+                let near = f64::from(o.truth.iter().any(|t| class(&t.0) == class(name)));
                 let b = &mut bins[((p * 10.0) as usize).min(9)];
-                *b = (b.0 + p, b.1 + hit, b.2 + 1);
+                *b = (b.0 + p, b.1 + hit, b.2 + near, b.3 + 1);
                 brier += (p - hit) * (p - hit);
+                log_score -= (if hit > 0.5 { *p } else { 1.0 - p }).max(1e-3).ln();
                 count += 1;
             }
         }
-        let calibration = bins.iter().map(|b| (b.0 - b.1).abs()).sum::<f64>() / count.max(1) as f64;
+        let error = |of: &dyn Fn(&Bin) -> f64| {
+            bins.iter().map(|b| (b.0 - of(b)).abs()).sum::<f64>() / count.max(1) as f64
+        };
+        let per = |v: f64, n: usize| v / n.max(1) as f64;
+        let reliability: Vec<Bin> = bins
+            .iter()
+            .filter(|b| b.3 > 0)
+            .map(|b| (per(b.0, b.3), per(b.1, b.3), per(b.2, b.3), b.3))
+            .collect();
+        let sizes = |right: &dyn Fn(&Outcome) -> bool| {
+            let singles = it().filter(|o| o.stratum == Stratum::Single);
+            limit(&singles.map(|o| (o.amplitude_pct, right(o))).collect::<Vec<_>>())
+        };
+        let regions: Vec<Located> = it().filter_map(|o| o.located).collect();
         let mut gains: Vec<f64> = all
             .iter()
             .filter(|s| s.0.visible && s.0.truth.iter().all(|t| owner(&t.0) == Some(Owner::Muscle)))
@@ -181,10 +220,23 @@ impl Figures {
                 o.named.iter().any(|n| n.1 > 0.8)
             }),
             outside_silent: Rate::of(it().filter(|o| o.stratum == Stratum::Outside), |o| o.named.is_empty()),
-            located: Rate::of(it().filter(|o| o.located.is_some()), |o| o.located == Some(true)),
+            located: Rate::new(regions.iter().filter(|l| l.dense).count(), regions.len()),
+            overlapping: Rate::new(regions.iter().filter(|l| l.overlap > 0.5).count(), regions.len()),
+            overlap: regions.iter().map(|l| l.overlap).sum::<f64>() / regions.len() as f64,
+            detection: sizes(&|o| o.alarmed),
+            naming: sizes(&|o| o.class_right),
+            concealed_admitted: Rate::of(it().filter(|o| o.concealed.is_some()), |o| {
+                o.concealed.is_some_and(|c| c.admitted)
+            }),
+            concealed_advised: Rate::of(it().filter(|o| o.concealed.is_some()), |o| {
+                o.concealed.is_some_and(|c| c.advised)
+            }),
             parameters: Rate::new(covered.0, covered.1),
-            calibration_error: calibration,
-            brier: brier / count.max(1) as f64,
+            calibration_error: error(&|b| b.1),
+            calibration_error_class: error(&|b| b.2),
+            brier: per(brier, count),
+            log_score: per(log_score, count),
+            reliability,
             probabilities: count,
             median_gain: gains.get(gains.len() / 2).copied().unwrap_or(f64::NAN),
             gains: gains.len(),
@@ -195,7 +247,7 @@ impl Figures {
 
 type Line = (&'static str, &'static str, fn(&Figures) -> String);
 
-const LINES: [Line; 22] = [
+const LINES: [Line; 31] = [
     ("False alarms, clean nulls", "≤ 3 of 60 together", |f| f.false_alarms_clean.to_string()),
     ("False alarms, nasty nulls", "", |f| f.false_alarms_nasty.to_string()),
     ("Nulls not called consistent", "", |f| f.nulls_not_consistent.to_string()),
@@ -211,14 +263,27 @@ const LINES: [Line; 22] = [
     ("Pairs, both classes right", "", |f| f.pair_both_right.to_string()),
     ("Outside the library, confident name", "≤ 5 %", |f| f.outside_confident.to_string()),
     ("Outside the library, nothing named", "", |f| f.outside_silent.to_string()),
+    ("Concealed effect in the set or admitted as possible", "≥ 90 %", |f| f.concealed_admitted.to_string()),
+    ("… and told what to do about it", "≥ 90 %", |f| f.concealed_advised.to_string()),
+    ("Noticed in half of the trials from, % of blocked force", "", |f| size(f.detection.map(|l| l.half))),
+    ("Noticed in nine tenths from, %", "", |f| size(f.detection.map(|l| l.nine_tenths))),
+    ("Class right in half of the trials from, %", "", |f| size(f.naming.map(|l| l.half))),
+    ("Class right in nine tenths from, %", "", |f| size(f.naming.map(|l| l.nine_tenths))),
     ("Region sits on the effect", "", |f| f.located.to_string()),
+    ("Region overlaps the true one by more than half", "", |f| f.overlapping.to_string()),
+    ("Mean overlap of regions", "", |f| format!("{:.2}", f.overlap)),
     ("Parameter intervals that hold", "90–98 %", |f| f.parameters.to_string()),
     ("Calibration error", "≤ 0.08", |f| format!("{:.3} of {}", f.calibration_error, f.probabilities)),
+    ("… where the class counts", "", |f| format!("{:.3}", f.calibration_error_class)),
     ("Brier score", "", |f| format!("{:.3}", f.brier)),
+    ("Log score", "", |f| format!("{:.3}", f.log_score)),
     ("Median held-out gain", "≥ 0.9", |f| format!("{:.2} of {}", f.median_gain, f.gains)),
     ("Harmed", "≤ 3 %", |f| f.harmed.to_string()),
-    ("Probabilities given", "", |f| f.probabilities.to_string()),
 ];
+
+fn size(of: Option<(f64, f64, f64)>) -> String {
+    of.map_or("–".into(), |(at, low, high)| format!("{} ({}–{})", said(at), said(low), said(high)))
+}
 
 /// Detection against size: (from %, to %, rate of visible and invisible singles that were noticed).
 pub fn detection(all: &[Scored]) -> Vec<(f64, f64, Rate)> {
@@ -265,6 +330,39 @@ pub fn markdown(title: &str, all: &[Scored], baselines: &[(String, Rate, Rate)])
     let _ = writeln!(m, "| this tool | {} | {} |", columns[0].1.exact, columns[0].1.class_right);
     for (name, exact, class) in baselines {
         let _ = writeln!(m, "| {name} | {exact} | {class} |");
+    }
+    m.push_str("\n## Calibration: stated probability against what turned out\n\n| stated, mean | exact | right class | names |\n| --- | --- | --- | --- |\n");
+    for (stated, exact, near, n) in &columns[0].1.reliability {
+        let _ = writeln!(m, "| {stated:.2} | {exact:.2} | {near:.2} | {n} |");
+    }
+    m.push_str("\n## Answers in order of their confidence (all trials with a name)\n\n| most confident | right class |\n| --- | --- |\n");
+    let mut sure: Vec<&Outcome> = all.iter().map(|s| &s.0).filter(|o| !o.named.is_empty()).collect();
+    sure.sort_by(|a, b| b.named[0].1.total_cmp(&a.named[0].1));
+    for part in [0.25, 0.5, 0.75, 1.0] {
+        let n = (sure.len() as f64 * part).round() as usize;
+        let rate = Rate::of(sure.iter().take(n).copied(), |o| o.class_right);
+        let _ = writeln!(m, "| {:.0} % | {rate} |", 100.0 * part);
+    }
+    m.push_str("\n## By class (single and decoy, 2 % and more, visible)\n\n| class hidden | noticed | class right | classes named first |\n| --- | --- | --- | --- |\n");
+    let judged: Vec<&Outcome> = all.iter().map(|s| &s.0).filter(|o| big_and_visible(o)).collect();
+    let mut classes: Vec<&str> = judged.iter().filter_map(|o| o.truth.first()).map(|t| class(&t.0)).collect();
+    // The registered classes first, in their order, then what stands alone.
+    classes.sort_by_key(|c| (CLASSES.iter().position(|r| r.0 == *c).unwrap_or(CLASSES.len()), *c));
+    classes.dedup();
+    for c in classes {
+        let mine = || judged.iter().filter(|o| o.truth.first().is_some_and(|t| class(&t.0) == c)).copied();
+        let mut said: BTreeMap<&str, usize> = BTreeMap::new();
+        for o in mine() {
+            *said.entry(o.named.first().map_or("nothing", |n| class(&n.0))).or_default() += 1;
+        }
+        let said: Vec<String> = said.iter().map(|(c, n)| format!("{c} {n}")).collect();
+        let _ = writeln!(
+            m,
+            "| {c} | {} | {} | {} |",
+            Rate::of(mine(), |o| o.alarmed),
+            Rate::of(mine(), |o| o.class_right),
+            said.join(", ")
+        );
     }
     m.push_str("\n## By effect (single, visible, any size)\n\n| effect | trials | exact | class | named instead |\n| --- | --- | --- | --- | --- |\n");
     let mut by: BTreeMap<&str, Vec<&Outcome>> = BTreeMap::new();

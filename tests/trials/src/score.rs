@@ -4,6 +4,7 @@
 
 use crate::answer::{Answer, Missing};
 use crate::generate::TrialTruth;
+use crate::locate::Located;
 use crate::names::class;
 use crate::spec::Stratum;
 use serde::Serialize;
@@ -11,6 +12,18 @@ use serde::Serialize;
 /// An effect counts as visible when a stiff base leaves at least this many noise deviations (rms) of it. Below, the right
 /// answer is silence.
 pub const VISIBLE: f64 = 0.5;
+
+/// Effects of which loops of one muscle show nothing or next to nothing: other means must.
+const CONCEALED: [&str; 5] = ["tip-effect", "gravity", "contact-loss", "gauge-gain", "force-offset"];
+
+/// What was said of a concealed effect.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Concealed {
+    /// It is in the set, or it is said that it could be there unseen at its true size.
+    pub admitted: bool,
+    /// And what to do about it is said: a recording is proposed, or the remarks tell what to measure.
+    pub advised: bool,
+}
 
 /// What one trial showed.
 #[derive(Debug, Clone, Serialize)]
@@ -41,8 +54,10 @@ pub struct Outcome {
     pub in_set: bool,
     /// Something was said to be wrong.
     pub alarmed: bool,
-    /// Hit of the stated regions: the effect's energy there is denser than elsewhere; absent where none was stated.
-    pub located: Option<bool>,
+    /// How the stated region meets the true one; absent where none was stated.
+    pub located: Option<Located>,
+    /// For an effect of the concealed kind: what was said of it; absent for others.
+    pub concealed: Option<Concealed>,
     /// Stated intervals of parameters that contain the truth, and how many could be compared.
     pub covered: (usize, usize),
     /// A recording was proposed.
@@ -78,7 +93,7 @@ pub fn judge(
     truth: &TrialTruth,
     answer: &Result<Answer, String>,
     seconds: f64,
-    located: Option<bool>,
+    located: Option<Located>,
 ) -> Outcome {
     let empty = Answer::default();
     let (a, verdict) = match answer {
@@ -118,6 +133,7 @@ pub fn judge(
         alarmed: !named.is_empty()
             || matches!(a.verdict.as_str(), "unexplained" | "partly-explained" | "explained"),
         located,
+        concealed: concealed(truth, a, &set),
         covered: coverage(truth, &missing),
         proposed: a.next_experiment.as_ref().is_some_and(|n| !n.is_null()),
         verdict,
@@ -125,6 +141,23 @@ pub fn judge(
         set,
         seconds,
     }
+}
+
+fn concealed(truth: &TrialTruth, a: &Answer, set: &[String]) -> Option<Concealed> {
+    let [effect] = &truth.effects[..] else { return None };
+    if !CONCEALED.contains(&effect.name.as_str()) {
+        return None;
+    }
+    let peak = 0.01 * effect.amplitude_pct * truth.blocked_force;
+    let unseen = a.considered.iter().any(|c| {
+        c.effect == effect.name
+            && (c.why_not.contains("unseen") || c.hidden_up_to.is_some_and(|n| n >= 0.8 * peak))
+    });
+    let admitted = set.contains(&effect.name) || unseen;
+    let measures = ["weigh", "photo", "gauge", "tare", "calliper", "second length", "dead weight", "vented"];
+    let told = a.remarks.iter().any(|r| measures.iter().any(|m| r.contains(m)));
+    let proposed = a.next_experiment.as_ref().is_some_and(|n| !n.is_null());
+    Some(Concealed { admitted, advised: admitted && (proposed || told) })
 }
 
 /// Effects whose parameter means the same on both sides.

@@ -72,6 +72,38 @@ fn a_silent_tool_raises_no_alarm_and_names_nothing_and_seals_hold() {
 }
 
 #[test]
+fn answering_goes_on_where_it_was_broken_off_and_a_part_can_be_judged() {
+    let dir = scratch("part");
+    let set = dir.join("set");
+    let set_name = set.display().to_string();
+    assert!(trials(&["generate", "--set", "dev", "--n", "8", "-o", &set_name]).status.success());
+    let silent = tool(&dir, "silent", SILENT).display().to_string();
+    let none = trials(&["answer", &set_name, "--host", &silent, "--minutes", "0"]);
+    assert!(none.status.success() && !set.join("answers").join("0000.json").exists());
+    assert!(trials(&["answer", &set_name, "--host", &silent]).status.success());
+    let lines = std::fs::read_to_string(set.join("frozen.jsonl")).expect("frozen answers");
+    assert_eq!(lines.lines().count(), 8);
+    // As if it had been broken off before the last three were asked.
+    let ledger = std::fs::read_to_string(set.join("ledger.json")).expect("a ledger");
+    let mut open: serde_json::Value = serde_json::from_str(&ledger).expect("JSON");
+    (open["answers"], open["seconds"]) = (serde_json::json!([]), serde_json::json!([]));
+    std::fs::write(set.join("ledger.json"), open.to_string()).expect("written");
+    let kept: Vec<&str> = lines
+        .lines()
+        .filter(|l| !["5", "6", "7"].iter().any(|i| l.contains(&format!("\"id\":{i},"))))
+        .collect();
+    std::fs::write(set.join("frozen.jsonl"), kept.join("\n") + "\n").expect("written");
+    let other = tool(&dir, "other", &SILENT.replace("consistent", "unexplained")).display().to_string();
+    assert!(!trials(&["answer", &set_name, "--host", &other]).status.success(), "a set has one tool");
+    assert!(!trials(&["score", &set_name, "--no-held-out"]).status.success(), "seals stay closed");
+    assert!(trials(&["score", &set_name, "--no-held-out", "--close"]).status.success());
+    let report = std::fs::read_to_string(set.join("report.json")).expect("a report");
+    let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+    assert_eq!(report["trials"].as_array().map(Vec::len), Some(5));
+    let _ = std::fs::remove_dir_all(&dir);
+}
+
+#[test]
 fn a_tool_that_always_cries_wolf_is_blamed_for_every_null() {
     let dir = scratch("wolf");
     let set = dir.join("set").display().to_string();
@@ -86,5 +118,13 @@ fn a_tool_that_always_cries_wolf_is_blamed_for_every_null() {
         assert_eq!(report["all"][null]["k"], report["all"][null]["n"], "{null}");
     }
     assert!(report["all"]["calibration_error"].as_f64() > Some(0.5));
+    // The short proof fails for it, and for a tool that never says anything.
+    let silent = tool(&dir, "silent", SILENT).display().to_string();
+    for host in [&wolf, &silent] {
+        let other = dir.join("short").display().to_string();
+        let _ = std::fs::remove_dir_all(&other);
+        let proof = trials(&["prove", "--set", "dev", "--n", "8", "--check", "-o", &other, "--host", host]);
+        assert!(!proof.status.success(), "{host} passes");
+    }
     let _ = std::fs::remove_dir_all(&dir);
 }
