@@ -108,7 +108,7 @@ impl<F: NorFlash> Server<F> {
             Model::build(&table).map_err(|error| Refusal::Table(table_fault(ImageError::Table(error))))?;
         if let Ok(Some(memories)) = self.store.memories(side) {
             for (position, memory) in memories.iter().enumerate() {
-                let persists = table.effects.get(position).is_some_and(|one| one.effect.info().persistent);
+                let persists = table.effects.get(position).is_some_and(|one| one.effect.is_persistent());
                 if persists && memory.iter().all(|value| value.is_finite()) {
                     model.chain.restore(position, *memory);
                 }
@@ -208,7 +208,7 @@ fn persistent_memories(model: &Model) -> Memories {
     let mut memories = Memories::new();
     let mut any = false;
     for (effect, memory) in model.chain.memories() {
-        any |= effect.info().persistent;
+        any |= effect.is_persistent();
         // The chain is no longer than the vector.
         let _ = memories.push(*memory);
     }

@@ -49,6 +49,28 @@ impl core::fmt::Display for GeometryError {
 
 impl core::error::Error for GeometryError {}
 
+/// Sine and cosine of an angle between 0° and 90°, by their Taylor series about the nearer end: to 10⁻¹⁵ of each, in a
+/// tenth of the code that reduces any angle.
+fn sine_and_cosine(angle: f64) -> (f64, f64) {
+    let series = |x: f64, first: f64| {
+        let (mut term, mut sum) = (first, first);
+        let mut n = if first == 1.0 { 1.0 } else { 2.0 };
+        // Below 45° the term after the twelfth is less than 10⁻²⁴.
+        for _ in 0..12 {
+            term *= -x * x / (n * (n + 1.0));
+            sum += term;
+            n += 2.0;
+        }
+        sum
+    };
+    if angle <= PI / 4.0 {
+        (series(angle, angle), series(angle, 1.0))
+    } else {
+        let rest = PI / 2.0 - angle;
+        (series(rest, 1.0), series(rest, rest))
+    }
+}
+
 impl<T: Scalar> Geometry<T> {
     /// The same dimensions in another number type.
     pub fn cast<U: Scalar>(&self) -> Geometry<U> {
@@ -82,8 +104,9 @@ impl<T: Scalar> Geometry<T> {
         if !(t0 > 0.0 && t0 < d0 / 2.0) {
             return Err(GeometryError::Wall);
         }
-        let fibre = l0 / libm::sin(alpha);
-        let turns = fibre * libm::cos(alpha) / (PI * d0);
+        let (sine, cosine) = sine_and_cosine(alpha);
+        let fibre = l0 / sine;
+        let turns = fibre * cosine / (PI * d0);
         let inner = d0 - 2.0 * t0;
         let volume = PI / 4.0 * l0 * (d0 * d0 - inner * inner);
         let four_pi_n2 = 4.0 * PI * turns * turns;
@@ -378,6 +401,16 @@ mod tests {
         let braid = miniature().build().expect("a valid geometry");
         let force = (552.0e3 - 76.5e3) * braid.posture(Length::ZERO).area;
         assert!((force - 135.7).abs() < 0.05 * 135.7, "{force} N");
+    }
+
+    #[test]
+    fn sine_and_cosine_are_those_of_the_library() {
+        for n in 1..9000_i32 {
+            let angle = f64::from(n) * PI / 18_000.0;
+            let (sine, cosine) = sine_and_cosine(angle);
+            assert!((sine / angle.sin() - 1.0).abs() < 1e-15, "sine of {angle}");
+            assert!((cosine / angle.cos() - 1.0).abs() < 1e-15, "cosine of {angle}");
+        }
     }
 
     #[test]

@@ -436,7 +436,7 @@ impl FittedEffect {
     #[must_use]
     pub fn left_with(mut self, memory: &Memory<f64>) -> Self {
         self.remembered.clear();
-        if self.effect.info().persistent {
+        if self.effect.is_persistent() {
             let used = memory.iter().rposition(|m| *m != 0.0).map_or(0, |last| last + 1);
             self.remembered.extend(memory[..used.min(REMEMBERED)].iter().map(|m| *m as f32));
         }
@@ -467,7 +467,7 @@ impl<T: Scalar> Chain<T> {
             // The iterator is no longer than the vector.
             let _ = effects.push(Running { effect: one.effect, parameters, memory: [T::ZERO; MEMORY] });
         }
-        let depends_on_pressure = fitted.iter().any(|e| e.effect.info().depends_on_pressure);
+        let depends_on_pressure = fitted.iter().any(|e| e.effect.depends_on_pressure());
         Self { effects, depends_on_pressure }
     }
 

@@ -162,7 +162,7 @@ impl MuscleTable {
             return Err(TableError::BlockedForce);
         }
         for (i, e) in self.effects.iter().enumerate() {
-            if e.parameters.len() != e.effect.info().parameters.len()
+            if e.parameters.len() != e.effect.parameter_count()
                 || e.parameters.iter().chain(&e.remembered).any(|p| !p.is_finite())
             {
                 return Err(TableError::Effect(i as u8));

@@ -20,6 +20,33 @@ macro_rules! effect_list {
                 }
             }
 
+            // What a controller asks of an effect, apart from its description: a program that asks for no more carries none of
+            // the texts.
+
+            /// How many parameters it has.
+            pub const fn parameter_count(self) -> usize {
+                match self {
+                    $(Self::$variant =>
+                        const { <$module::$variant as $crate::effects::Effect>::INFO.parameters.len() },)+
+                }
+            }
+
+            /// [`Info::depends_on_pressure`]($crate::effects::Info::depends_on_pressure).
+            pub const fn depends_on_pressure(self) -> bool {
+                match self {
+                    $(Self::$variant =>
+                        const { <$module::$variant as $crate::effects::Effect>::INFO.depends_on_pressure },)+
+                }
+            }
+
+            /// [`Info::persistent`]($crate::effects::Info::persistent).
+            pub const fn is_persistent(self) -> bool {
+                match self {
+                    $(Self::$variant =>
+                        const { <$module::$variant as $crate::effects::Effect>::INFO.persistent },)+
+                }
+            }
+
             /// Lets time pass in its memory.
             pub fn step<T: $crate::scalar::Scalar>(
                 self,
