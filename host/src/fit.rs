@@ -11,34 +11,83 @@
 //! | rows to means over short pieces of motion | [`points`] |
 //! | which pressures were tested, where curves get nodes | [`nodes`] |
 //! | which points may take part | [`screen`] |
-//! | columns of the linear problem | [`basis`] |
-//! | the solution | [`joint`], [`linear`] |
-//! | how much curves may bend | [`smoothing`] |
+//! | which readings do not belong to the rest, where the muscle is slack, where friction turns round | [`outliers`], [`slack`], [`turns`] |
+//! | how much each point counts | [`weights`] |
+//! | columns of the linear problem, the problem | [`basis`], [`design`] |
+//! | the solution | [`normal`], [`penalty`], [`joint`], [`linear`] |
+//! | `P0` by itself | [`deadband`] |
+//! | how much curves may bend, stress that rises with strain | [`smoothing`], [`physical`] |
 //! | effective dimensions | [`geometry`] |
 //! | errors as the thesis measures them | [`errors`], [`midline`] |
 //! | the thesis's models side by side | [`models`] |
 //! | errors on what a fit did not see, published formulas | [`hold_out`], [`published`] |
-//! | how uncertain it all is | [`uncertainty`] |
-//! | all of it in order | [`prepare`], [`result`] |
+//! | how uncertain it all is, what is not determined | [`uncertainty`], [`determined`] |
+//! | each pressure predicted from the others | [`left_out`] |
+//! | all of it in order | [`prepare`], [`result`], [`summary`] |
+//!
+//! ```
+//! use host::fit::{Options, fit};
+//! use host::muscle_description::MuscleDescription;
+//! use host::recording::{Campaign, Recording};
+//! use model_core::muscle::Muscle;
+//! use model_core::units::{Length, Pressure};
+//!
+//! // Two loops at each of three pressures, of a table that is known: P0 = 76.5 kPa, k_F = 0.12, 0.08, 0.047.
+//! let known = Muscle::<f64>::build(&model_core::table::example())?;
+//! let recordings = [276e3, 414e3, 552e3].iter().enumerate().map(|(file, &p)| {
+//!     let way = |i: usize| if i % 400 < 200 { 1.0 } else { -1.0 };
+//!     let stroke: Vec<f64> = (0..=800).map(|i| 1.5e-3 * (1.0 - (1.0 - (i % 400) as f64 / 200.0).abs())).collect();
+//!     let force = |(i, x): (usize, &f64)| known.force(Pressure::from_pascals(p), Length::from_metres(*x), way(i)).newtons();
+//!     Recording {
+//!         name: format!("{file}"),
+//!         time: (0..=800).map(|i| 100.0 * file as f64 + 0.1 * i as f64).collect(),
+//!         pressure: vec![p; 801],
+//!         force: Some(stroke.iter().enumerate().map(force).collect()),
+//!         stroke,
+//!         ..Recording::default()
+//!     }
+//! });
+//! let muscle = MuscleDescription::parse(
+//!     "name = 'mini'\nkind = 'contractile'\nrest_length_mm = 39.16\nbraid_angle_deg = 77.4\n\
+//!      bladder_outer_diameter_mm = 3.0\nbladder_wall_mm = 0.5\n",
+//! )?;
+//! let fitted = fit(&Campaign::new(recordings.collect()), &muscle, &Options::default())?;
+//! assert!((fitted.summary.deadband_kPa - 76.5).abs() < 0.1);
+//! assert!((fitted.summary.pressures[1].k_F - 0.08).abs() < 1e-3);
+//! assert!(fitted.summary.max_error_pct < 0.1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod basis;
+pub mod deadband;
+pub mod design;
+pub mod determined;
 pub mod direction;
 pub mod errors;
 pub mod geometry;
 pub mod hold_out;
 pub mod joint;
+pub mod left_out;
 pub mod linear;
 pub mod midline;
 pub mod models;
 pub mod nodes;
+pub mod normal;
+pub mod outliers;
+pub mod penalty;
+pub mod physical;
 pub mod points;
 pub mod prepare;
 pub mod published;
 pub mod result;
 pub mod screen;
+pub mod slack;
 pub mod smoothing;
+pub mod summary;
+pub mod turns;
 pub mod uncertainty;
 pub mod warnings;
+pub mod weights;
 
 use crate::error::Result;
 use crate::muscle_description::MuscleDescription;
@@ -81,5 +130,13 @@ impl Default for Options {
 /// [`crate::error::Code::CallInvalid`] for options out of range.
 pub fn fit(campaign: &Campaign, muscle: &MuscleDescription, options: &Options) -> Result<result::Fit> {
     let prepared = prepare::Prepared::new(campaign, muscle, options)?;
-    result::Fit::of(prepared, campaign, muscle, options)
+    let mut fitted = result::Fit::of(prepared, campaign, muscle, options)?;
+    if options.physical {
+        let free = fit(campaign, muscle, &Options { physical: false, ..options.clone() })?.summary;
+        fitted.summary.physical = Some(summary::PhysicalCost {
+            free_mean_error_pct: free.mean_error_pct,
+            free_max_error_pct: free.max_error_pct,
+        });
+    }
+    Ok(fitted)
 }

@@ -1,5 +1,6 @@
 //! Recordings of muscles to tables: reading, fitting, checking, writing.
 
+pub mod band;
 pub mod bench;
 pub mod cli;
 pub mod commands;

@@ -10,7 +10,9 @@ use std::fs;
 use model_core::effects::{Chain, Memory};
 use model_core::muscle::Muscle;
 use model_core::units::{Force, Length, Pressure};
+use rayon::prelude::*;
 
+use crate::band::{ForceBand, HALF_95};
 use crate::bench::Candidate;
 use crate::error::{Code, Error, Result};
 use crate::fit::direction::Follower;
@@ -36,6 +38,20 @@ pub struct Predicted {
     pub force: Vec<f64>,
     /// Root mean square of `F − F_model`, N; `None` without a force column.
     pub rms: Option<f64>,
+    /// How uncertain it is, where that was asked for and the table knows.
+    pub bands: Option<Bands>,
+}
+
+/// The uncertainty of a predicted recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bands {
+    /// Half the width of the 95 % interval of the base model's force, N, per row: what the table's numbers leave open.
+    pub half: Vec<f64>,
+    /// Its mean, N.
+    pub mean: f64,
+    /// The share of measured forces within the 95 % interval of single readings, which adds what the table does not describe;
+    /// `None` without a force column.
+    pub inside: Option<f64>,
 }
 
 /// Runs a table over a campaign.
@@ -43,6 +59,34 @@ pub struct Predicted {
 /// # Errors
 /// [`Code::TableInvalid`] where the table cannot be evaluated, or names a correction that this program does not know.
 pub fn predict(file: &TableFile, campaign: &Campaign) -> Result<Prediction> {
+    run(file, campaign, None)
+}
+
+/// As [`predict`], with the bands of the forces.
+///
+/// # Errors
+/// As [`predict`].
+pub fn predict_with_bands(file: &TableFile, campaign: &Campaign) -> Result<Prediction> {
+    run(file, campaign, ForceBand::of(file).as_ref())
+}
+
+fn bands(band: &ForceBand, recording: &Recording, motion: &Motion, force: &[f64]) -> Bands {
+    let at = |i: usize| (recording.pressure[i], recording.stroke[i], f64::from(motion.direction[i]));
+    let stds = (0..recording.len()).into_par_iter().map(|i| {
+        let (pressure, stroke, direction) = at(i);
+        band.std(pressure, stroke, direction)
+    });
+    let stds: Vec<f64> = stds.collect();
+    let inside = recording.force.as_ref().map(|measured| {
+        let near = |i: &usize| (measured[*i] - force[*i]).abs() <= HALF_95 * band.with_scatter(stds[*i]);
+        (0..measured.len()).filter(near).count() as f64 / measured.len().max(1) as f64
+    });
+    let half: Vec<f64> = stds.iter().map(|s| HALF_95 * s).collect();
+    let mean = half.iter().sum::<f64>() / half.len().max(1) as f64;
+    Bands { half, mean, inside }
+}
+
+fn run(file: &TableFile, campaign: &Campaign, band: Option<&ForceBand>) -> Result<Prediction> {
     let muscle =
         Muscle::<f64>::build(&file.table).map_err(|e| Error::new(Code::TableInvalid, e.to_string()))?;
     let mut chain = Chain::<f64>::new(&file.table.effects);
@@ -94,7 +138,8 @@ pub fn predict(file: &TableFile, campaign: &Campaign) -> Result<Prediction> {
             rows += measured.len() as f64;
             (sum / measured.len().max(1) as f64).sqrt()
         });
-        recordings.push(Predicted { force, rms });
+        let bands = band.map(|band| bands(band, recording, &motion, &force));
+        recordings.push(Predicted { force, rms, bands });
     }
     let rms = (rows > 0.0).then(|| (square / rows).sqrt());
     Ok(Prediction { recordings, rms, warnings: beyond(file, campaign) })
@@ -144,7 +189,7 @@ fn beyond(file: &TableFile, campaign: &Campaign) -> Vec<String> {
 }
 
 /// The recordings with a column `force_model_N` added, as one CSV table; with several recordings the first column is
-/// `file`.
+/// `file`. Where the prediction has bands, a last column `force_model_band_N` is half the width of the force's 95 % interval.
 ///
 /// Where all files are plain text with one header their cells are kept as they are, other columns included. Recordings
 /// that came in by an import description, or from other containers, are written in the usual columns instead.
@@ -156,6 +201,7 @@ pub fn to_csv(campaign: &Campaign, prediction: &Prediction, imported: bool) -> V
 
 fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
     let several = campaign.recordings.len() > 1;
+    let banded = prediction.recordings.iter().all(|p| p.bands.is_some());
     let mut out = String::new();
     let mut header: Option<(String, char)> = None;
     for (recording, predicted) in campaign.recordings.iter().zip(&prediction.recordings) {
@@ -169,7 +215,8 @@ fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
         match &header {
             None => {
                 let file = if several { format!("file{delimiter}") } else { String::new() };
-                let _ = writeln!(out, "{file}{first}{delimiter}force_model_N");
+                let band = if banded { format!("{delimiter}force_model_band_N") } else { String::new() };
+                let _ = writeln!(out, "{file}{first}{delimiter}force_model_N{band}");
                 header = Some((first.to_owned(), delimiter));
             }
             Some((known, _)) if known != first => return None,
@@ -179,11 +226,12 @@ fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
         if rows.len() != predicted.force.len() {
             return None;
         }
-        for (row, force) in rows.iter().zip(&predicted.force) {
+        for (i, (row, force)) in rows.iter().zip(&predicted.force).enumerate() {
             if several {
                 let _ = write!(out, "{}{delimiter}", cell(&recording.name, delimiter));
             }
-            let _ = writeln!(out, "{row}{delimiter}{force:.6}");
+            let _ = write!(out, "{row}{delimiter}{force:.6}");
+            end_line(&mut out, predicted, i, delimiter);
         }
     }
     Some(out)
@@ -211,7 +259,11 @@ fn standard(campaign: &Campaign, prediction: &Prediction) -> String {
             out += name;
         }
     }
-    out += ",force_model_N\n";
+    out += ",force_model_N";
+    if prediction.recordings.iter().all(|p| p.bands.is_some()) {
+        out += ",force_model_band_N";
+    }
+    out.push('\n');
     for (r, predicted) in campaign.recordings.iter().zip(&prediction.recordings) {
         let name = cell(&r.name, ',');
         for i in 0..r.len() {
@@ -231,10 +283,18 @@ fn standard(campaign: &Campaign, prediction: &Prediction) -> String {
             if let (true, Some(cycles)) = (cycle, &r.cycle) {
                 let _ = write!(out, ",{}", cycles[i]);
             }
-            let _ = writeln!(out, ",{:.6}", predicted.force[i]);
+            let _ = write!(out, ",{:.6}", predicted.force[i]);
+            end_line(&mut out, predicted, i, ',');
         }
     }
     out
+}
+
+fn end_line(out: &mut String, predicted: &Predicted, row: usize, delimiter: char) {
+    if let Some(bands) = &predicted.bands {
+        let _ = write!(out, "{delimiter}{:.6}", bands.half[row]);
+    }
+    out.push('\n');
 }
 
 /// A name as one cell: quoted where it holds the delimiter or a quote.

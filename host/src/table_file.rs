@@ -10,14 +10,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use model_core::image;
-use model_core::muscle::Muscle;
 use model_core::table::MuscleTable;
-use model_core::units::{Length, Pressure};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::error::{Code, Error, Result};
-use crate::fit::basis::PressureBasis;
 use crate::output::write_whole;
 use crate::recording::Campaign;
 
@@ -185,39 +182,6 @@ impl TableFile {
         let table = image::read(&body.image).map_err(|e| wrong(e.to_string()).help(damaged))?;
         body.about.check()?;
         Ok(Self { table, about: body.about })
-    }
-
-    /// Standard deviation of the base model's force at a pressure (Pa), a stroke (m) and a direction, N; `None` where the file
-    /// holds no uncertainty. What the table's numbers leave open; the scatter of single readings comes on top
-    /// ([`Uncertainty::residual_newtons`]).
-    #[must_use]
-    pub fn force_std(&self, pressure: f64, stroke: f64, direction: f64) -> Option<f64> {
-        let u = self.about.uncertainty.as_ref()?;
-        let table = &self.table;
-        let (nodes, order) = (table.nodes.len(), table.order());
-        let columns = u.columns as usize;
-        if u.rows as usize != 1 + (order + 1) * nodes || columns == 0 {
-            return None;
-        }
-        let muscle = Muscle::<f64>::build(table).ok()?;
-        let held = muscle.held(Length::from_metres(stroke));
-        let parts = muscle.parts(&held, Pressure::from_pascals(pressure));
-        let at: Vec<f64> = table.nodes.iter().map(|p| f64::from(*p)).collect();
-        let phi = PressureBasis::new(&at).at(pressure);
-        let grip = 1.0 - parts.friction * direction;
-        // ∂F/∂P0, ∂F/∂E_kj, ∂F/∂k_F,j in the order of the rows.
-        let mut gradient = vec![-grip * held.posture.area];
-        for c in &held.columns[..order] {
-            gradient.extend(phi.iter().map(|f| grip * c * f));
-        }
-        gradient.extend(phi.iter().map(|f| -direction * parts.quasi() * f));
-        let mut sum = vec![0.0; columns];
-        for (g, row) in gradient.iter().zip(u.root.chunks_exact(columns)) {
-            for (s, x) in sum.iter_mut().zip(row) {
-                *s += g * x;
-            }
-        }
-        Some(sum.iter().map(|s| s * s).sum::<f64>().sqrt())
     }
 
     /// Reads a file.

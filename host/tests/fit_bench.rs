@@ -1,40 +1,14 @@
 //! The fit on muscles of other physics than its own: the virtual bench's, which store energy in a hyperelastic tube.
 
+use host::band::ForceBand;
 use host::fit::{Options, fit, result::Fit};
-use host::muscle_description::MuscleDescription;
-use host::recording::{Campaign, Recording};
-use proptest::prelude::*;
-use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
-use virtual_bench::muscle::{Muscle, MuscleSpec};
+use virtual_bench::muscle::Muscle;
 use virtual_bench::presets;
 
-fn description(spec: &MuscleSpec) -> MuscleDescription {
-    MuscleDescription::parse(&spec.description()).expect("the bench describes its muscles")
-}
+mod bench_campaign;
 
-/// The thesis's test of a muscle: three slow loops at each pressure.
-fn thesis(spec: &MuscleSpec, levels: &[f64], seed: u64, hz: f64) -> Campaign {
-    let muscle = Muscle::new(spec.clone());
-    let mut protocol = campaigns::thesis(&muscle, levels);
-    protocol.sample_hz = hz;
-    let files = Bench::new(&BenchSpec::laboratory(spec.clone(), seed)).run(&protocol).expect("a protocol");
-    let column = |f: &virtual_bench::recording::Recording, of: fn(&virtual_bench::recording::Row) -> f64| {
-        f.rows.iter().map(of).collect::<Vec<f64>>()
-    };
-    let recordings = files
-        .iter()
-        .map(|f| Recording {
-            name: f.name.clone(),
-            time: column(f, |r| r.time),
-            pressure: column(f, |r| r.pressure),
-            stroke: column(f, |r| r.stroke),
-            force: Some(column(f, |r| r.force)),
-            ..Recording::default()
-        })
-        .collect();
-    Campaign::new(recordings)
-}
+use bench_campaign::{description, thesis};
 
 /// The three muscles of the thesis: errors, P0 and k_F against the truth, with bounds on both sides so that a change for the
 /// better is noticed too.
@@ -156,10 +130,9 @@ fn stated_intervals_cover() {
             // The force at half the free stroke stands for the curve: single E_k trade with each other.
             let x = 0.5 * t.free_contraction.expect("a free contraction") * muscle.rest_length();
             let p = fitted.prepared.pressures.levels[i];
-            let std = host::fit::hold_out::as_file(&fitted);
-            let mut with_band = std;
+            let mut with_band = host::fit::hold_out::as_file(&fitted);
             with_band.about.uncertainty = Some(fitted.stored_uncertainty());
-            let band = with_band.force_std(p, x, 0.0).expect("a band");
+            let band = ForceBand::of(&with_band).expect("a band").std(p, x, 0.0);
             for (off, std) in [
                 (f.k_F - t.k_F, f.k_F_std),
                 (fitted.prepared.quasi(p, x) - truth.prepared.quasi(p, x), band),
@@ -173,59 +146,6 @@ fn stated_intervals_cover() {
     let share = f64::from(inside as u32) / f64::from(all as u32);
     println!("{inside} of {all} inside: {:.1} %", 100.0 * share);
     assert!((0.90..=0.98).contains(&share), "{share}");
-}
-
-/// What a fit says of a campaign, as few numbers that hang together.
-fn figures(fitted: &Fit) -> Vec<f64> {
-    let s = &fitted.summary;
-    let mut all = vec![s.deadband_kPa, s.mean_error_pct, s.rms_N];
-    for p in &s.pressures {
-        all.extend([p.k_F, p.blocked_force_N, p.mean_error_pct]);
-    }
-    all
-}
-
-#[test]
-fn the_order_of_files_changes_nothing() {
-    let spec = presets::miniature();
-    let campaign = thesis(&spec, &presets::miniature_pressures(), 5, 6.0);
-    let mut turned = campaign.clone();
-    turned.recordings.reverse();
-    let muscle = description(&spec);
-    let one = figures(&fit(&campaign, &muscle, &Options::default()).expect("a fit"));
-    let other = figures(&fit(&turned, &muscle, &Options::default()).expect("a fit"));
-    for (a, b) in one.iter().zip(&other) {
-        assert!((a - b).abs() <= 2e-3 * (1.0 + a.abs()), "{a} {b}");
-    }
-}
-
-/// A muscle ten times as long and thick in every direction pulls a hundred times as hard, with the same table.
-#[test]
-fn scaling_the_muscle_scales_the_force_and_nothing_else() {
-    let spec = presets::miniature();
-    let campaign = thesis(&spec, &presets::miniature_pressures(), 5, 6.0);
-    let mut large = campaign.clone();
-    for r in &mut large.recordings {
-        r.stroke.iter_mut().for_each(|x| *x *= 10.0);
-        r.force.iter_mut().flatten().for_each(|f| *f *= 100.0);
-    }
-    let small = description(&spec);
-    let mut big = small.clone();
-    big.rest_length_mm *= 10.0;
-    big.bladder_outer_diameter_mm *= 10.0;
-    big.bladder_wall_mm *= 10.0;
-    let a = fit(&campaign, &small, &Options::default()).expect("a fit");
-    let b = fit(&large, &big, &Options::default()).expect("a fit");
-    assert!((a.summary.deadband_kPa - b.summary.deadband_kPa).abs() < 0.02);
-    for (x, y) in a.summary.pressures.iter().zip(&b.summary.pressures) {
-        assert!(
-            (x.k_F - y.k_F).abs() < 1e-3
-                && (100.0 * x.blocked_force_N - y.blocked_force_N).abs() < 1e-3 * y.blocked_force_N
-        );
-        for (e, f) in x.E_MPa.iter().zip(&y.E_MPa) {
-            assert!((e - f).abs() < 0.02 * (1.0 + e.abs()), "{e} {f}");
-        }
-    }
 }
 
 #[test]
@@ -295,52 +215,4 @@ fn stress_rises_with_strain_where_it_is_asked_for() {
         }
     }
     assert!(fitted.summary.mean_error_pct < 2.0);
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(60))]
-
-    /// Whatever a valid recording holds, a usable table comes out, or an error that says what is wrong.
-    #[test]
-    fn any_valid_recording_gives_a_usable_table_or_a_clear_error(
-        rows in 3_usize..120,
-        levels in 1_usize..4,
-        stroke in 0.0_f64..0.12,
-        force in prop_oneof![Just(0.0), 0.1_f64..300.0, Just(1e6)],
-        jitter in 0.0_f64..2.0,
-        seed in any::<u32>(),
-        order in 1_usize..7,
-        geometry in any::<bool>(),
-    ) {
-        let muscle = MuscleDescription::parse(
-            "name=\"m\"\nkind=\"contractile\"\nrest_length_mm=100.0\nbraid_angle_deg=72.0\n\
-             bladder_outer_diameter_mm=10.0\nbladder_wall_mm=1.0\n").expect("valid");
-        let mut state = u64::from(seed) | 1;
-        let mut next = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
-        };
-        let recordings = (0..levels).map(|l| {
-            let phase = |i: usize| (i as f64 / rows as f64 * 3.0).fract();
-            let x: Vec<f64> = (0..rows).map(|i| 0.1 * stroke * (1.0 - (1.0 - 2.0 * phase(i)).abs())).collect();
-            Recording {
-                name: format!("{l}"),
-                time: (0..rows).map(|i| l as f64 * 1e3 + i as f64).collect(),
-                pressure: (0..rows).map(|_| 1e5 * (1.0 + l as f64) + 1e3 * jitter * next()).collect(),
-                force: Some(x.iter().map(|x| force * (1.0 - 50.0 * x) + jitter * next()).collect()),
-                stroke: x,
-                ..Recording::default()
-            }
-        }).collect();
-        let options = Options { order, fit_geometry: geometry, fit_lengths: geometry, ..Options::default() };
-        match fit(&Campaign::new(recordings), &muscle, &options) {
-            Ok(fitted) => {
-                prop_assert!(fitted.table.check().is_ok());
-                prop_assert!(fitted.summary.rms_N.is_finite() && fitted.summary.mean_error_pct.is_finite());
-                let bytes = host::fit::hold_out::as_file(&fitted).to_bytes().expect("a file");
-                prop_assert!(host::table_file::TableFile::from_bytes(&bytes).is_ok());
-            }
-            Err(e) => prop_assert!(e.advice().is_some() && !e.cause().is_empty(), "{e}"),
-        }
-    }
 }

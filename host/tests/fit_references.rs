@@ -1,8 +1,9 @@
-//! The fit against numbers of another implementation (tests/references/separate_fits.py: numpy and SciPy).
+//! The fit against numbers of other implementations (tests/references/separate_fits.py and joint_fit.py: numpy and SciPy).
 
 use std::fs;
 use std::path::PathBuf;
 
+use host::fit::design::{Design, Measured};
 use host::fit::{Options, fit, midline::midline, models};
 use host::muscle_description::MuscleDescription;
 use host::recording::{Campaign, Recording};
@@ -76,6 +77,41 @@ fn separate_fits_are_those_of_numpy() {
                 row[0],
                 m4.force[i],
                 at(i)
+            );
+        }
+    }
+}
+
+/// P0, every E_k and every k_F at once, both branches, nothing smoothed: the least squares of SciPy's minimiser.
+#[test]
+fn the_joint_fit_is_that_of_scipy() {
+    let points: Vec<Measured> = table("joint_fit_points.csv")
+        .iter()
+        .map(|r| Measured { pressure: r[0], stroke: r[1], direction: r[2], force: r[3] })
+        .collect();
+    let braid = model_core::braid::miniature().build().expect("a valid geometry");
+    let design = Design::at_levels(&points, &braid, 4, true);
+    let weights = vec![1.0; points.len()];
+    let mut found = design.start(50e3);
+    let mut penalty = design.penalty(&design.normal(&found, &weights), 0.0, 0.0);
+    penalty.a.fill(0.0);
+    let end = design.solve(&mut found, &weights, &penalty, 50);
+    let layout = design.layout();
+    for (j, row) in table("joint_fit.csv").iter().enumerate() {
+        let (deadband, std, friction, square) = (row[1], row[2], row[3], row[8]);
+        assert!(
+            (found[0] / 1e3 - deadband).abs() < 1e-3 * std,
+            "P0 {} kPa, SciPy {deadband}",
+            found[0] / 1e3
+        );
+        assert!((end.misfit - square).abs() < 1e-8 * square, "{} N², SciPy {square}", end.misfit);
+        assert!((found[layout.friction(j)] - friction).abs() < 1e-6, "k_F {}", found[layout.friction(j)]);
+        let reduced: Vec<f64> = (0..4).map(|k| found[layout.elastic(k, j)]).collect();
+        for (e, expected) in design.orthonormal.to_moduli(&reduced).iter().zip(&row[4..8]) {
+            assert!(
+                (e * 1e-6 - expected).abs() < 1e-4 * (1.0 + expected.abs()),
+                "{} MPa, SciPy {expected}",
+                e * 1e-6
             );
         }
     }

@@ -13,6 +13,7 @@ use crate::fit::hold_out::{HeldOut, Score, Split, hold_out, unseen_length};
 use crate::fit::published::Published;
 use crate::muscle_description::MuscleDescription;
 use crate::output::write_whole;
+use crate::progress::Progress;
 use crate::recording::{Campaign, Reader};
 
 /// Arguments of `host evaluate`.
@@ -79,6 +80,10 @@ impl Arguments {
             fit_lengths: self.fit_lengths,
             ..Options::default()
         };
+        let watched = if self.json.is_some() { Console::silent() } else { console.clone() };
+        let splits = if self.leave_out == LeaveOut::Both { 2 } else { 1 };
+        let progress = Progress::new(&watched, "leaving out");
+        progress.total(splits * self.muscle.len() as u64);
         let mut cases = Vec::new();
         let mut failure: Option<Error> = None;
         for path in &self.muscle {
@@ -87,20 +92,23 @@ impl Arguments {
             let mut over = |split, wanted: bool| {
                 let score = || hold_out(&campaign, &muscle, &options, split, published.as_ref());
                 // One split that cannot be fitted does not take the other figures away.
-                wanted.then(score).and_then(|scored| match scored {
+                let scored = wanted.then(score)?;
+                progress.step();
+                match scored {
                     Ok(held) => Some(held),
                     Err(e) => {
                         console.warning(format!("{}: {e}", muscle.name));
                         failure.get_or_insert(e);
                         None
                     }
-                })
+                }
             };
             let runs = over(Split::Run, self.leave_out != LeaveOut::Contractions);
             let contractions = over(Split::Contraction, self.leave_out != LeaveOut::Runs);
             console.detail(format!("{} done", muscle.name));
             cases.push(Case { muscle, campaign, runs, contractions });
         }
+        drop(progress);
         if cases.iter().all(|c| c.runs.is_none() && c.contractions.is_none())
             && let Some(e) = failure
         {

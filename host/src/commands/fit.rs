@@ -72,7 +72,9 @@ impl Arguments {
         }
         let start = Instant::now();
         let muscle = MuscleDescription::read(&self.muscle)?;
-        let campaign = self.recordings.read(Reader::of(&muscle))?;
+        // Whoever asks for JSON is a program, or will look at that.
+        let watched = if self.json.is_some() { Console::silent() } else { console.clone() };
+        let campaign = self.recordings.read_watched(Reader::of(&muscle), &watched)?;
         console.detail(format!("read {} rows in {:.3} s", campaign.samples(), start.elapsed().as_secs_f64()));
         let started = Instant::now();
         let options = Options {
@@ -113,16 +115,6 @@ impl Arguments {
             write_whole(path, format!("{json}\n").as_bytes())?;
         }
         self.reports.write(console, || fit_page::page(&fitted, &campaign, &options))?;
-        if self.physical {
-            let free = fit(&campaign, &muscle, &Options { physical: false, ..options.clone() })?;
-            console.note(format!(
-                "stress that rises with strain costs error: {:.3} % mean and {:.3} % at most, against {:.3} % and {:.3} % without",
-                fitted.summary.mean_error_pct,
-                fitted.summary.max_error_pct,
-                free.summary.mean_error_pct,
-                free.summary.max_error_pct
-            ));
-        }
         for warning in &fitted.summary.warnings {
             console.warning(warning);
         }

@@ -9,7 +9,7 @@ use super::recordings::Recordings;
 use crate::console::Console;
 use crate::error::{Code, Error, Result};
 use crate::output::write_whole;
-use crate::predict::{predict, to_csv};
+use crate::predict::{predict_with_bands, to_csv};
 use crate::recording::Reader;
 use crate::table_file::TableFile;
 
@@ -18,6 +18,8 @@ use crate::table_file::TableFile;
 #[command(after_help = "Examples:\n  \
     host predict --table mini.pam new.csv -o predicted.csv\n  \
     host predict --table mini.pam first.csv second.csv --json scores.json\n\n\
+    The column force_model_band_N is half the width of the 95 % interval of the table's own force (of its base model, where it\n\
+    carries effects); readings scatter beyond it by what the table does not describe.\n\
     Several recordings are one history: effects with a memory run through them in order. The output is one table; with\n\
     several recordings its first column is `file`.")]
 pub struct Arguments {
@@ -44,11 +46,13 @@ impl Arguments {
         let rest_length = f64::from(table.table.geometry.rest_length.metres());
         let mut reader = Reader::with_rest_length(rest_length);
         reader.muscle_name = Some(&table.about.muscle);
-        let campaign = self.recordings.read(reader)?;
+        // Whoever asks for JSON is a program, or will look at that.
+        let watched = if self.json.is_some() { Console::silent() } else { console.clone() };
+        let campaign = self.recordings.read_watched(reader, &watched)?;
         for warning in &campaign.warnings {
             console.warning(warning);
         }
-        let prediction = predict(&table, &campaign).map_err(|e| e.file(&self.table))?;
+        let prediction = predict_with_bands(&table, &campaign).map_err(|e| e.file(&self.table))?;
         for warning in &prediction.warnings {
             console.warning(warning);
         }
@@ -60,7 +64,14 @@ impl Arguments {
                 .recordings
                 .iter()
                 .zip(&prediction.recordings)
-                .map(|(r, p)| json!({ "file": r.name, "samples": r.len(), "rms_N": p.rms }))
+                .map(|(r, p)| {
+                    let mut one = json!({ "file": r.name, "samples": r.len(), "rms_N": p.rms });
+                    if let Some(bands) = &p.bands {
+                        one["band_N"] = json!(bands.mean);
+                        one["inside_pct"] = json!(bands.inside.map(|share| 100.0 * share));
+                    }
+                    one
+                })
                 .collect();
             let json =
                 json!({ "schema": "pam-predict/1", "rms_N": prediction.rms, "recordings": recordings });
@@ -70,7 +81,13 @@ impl Arguments {
         }
         for (recording, p) in campaign.recordings.iter().zip(&prediction.recordings) {
             let rms = p.rms.map_or("no force to compare with".to_owned(), |r| format!("rms {r:.3} N"));
-            console.note(format!("{}: {} rows, {rms}", recording.name, recording.len()));
+            let band = p.bands.as_ref().map_or(String::new(), |bands| {
+                let inside = bands.inside.map_or(String::new(), |share| {
+                    format!(", {:.1} % of the readings inside their 95 % band", 100.0 * share)
+                });
+                format!(", force ± {:.3} N{inside}", bands.mean)
+            });
+            console.note(format!("{}: {} rows, {rms}{band}", recording.name, recording.len()));
         }
         if self.output.is_none() && self.json.is_none() {
             console.detail("nothing is written: give -o or --json");

@@ -1,10 +1,13 @@
 //! The recordings of a call, and how they are read: the same options wherever recordings are taken.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
 
+use crate::console::Console;
 use crate::error::{Code, Error, Result};
+use crate::progress::Progress;
 use crate::recording::{Campaign, Import, Reader};
 
 /// Recordings on the command line.
@@ -38,5 +41,17 @@ impl Recordings {
             reader.filters.push((column.trim().to_owned(), value.trim().to_owned()));
         }
         reader.campaign(&self.files)
+    }
+
+    /// As [`Recordings::read`], with a bar where somebody watches the console.
+    ///
+    /// # Errors
+    /// As [`Recordings::read`].
+    pub fn read_watched(&self, mut reader: Reader<'_>, console: &Console) -> Result<Campaign> {
+        let sizes = self.files.iter().filter_map(|f| std::fs::metadata(f).ok());
+        let progress = Arc::new(Progress::new(console, "reading"));
+        progress.total(sizes.map(|m| m.len()).sum());
+        reader.progress = Some(progress);
+        self.read(reader)
     }
 }

@@ -97,17 +97,6 @@ impl Orthonormal {
         let scaled = DMatrix::from_fn(columns.len(), order, |i, k| {
             if scale[k] > 0.0 { columns[i].elastic[k] / scale[k] } else { 0.0 }
         });
-        let (largest, smallest) = if columns.is_empty() {
-            (0.0, 0.0)
-        } else {
-            let singular = scaled.clone().svd(false, false).singular_values;
-            (singular.max(), singular.min())
-        };
-        let condition = if smallest > 1e-12 * largest && columns.len() >= order {
-            largest / smallest
-        } else {
-            f64::INFINITY
-        };
         // Modified Gram–Schmidt, each column twice: enough for condition numbers far beyond those met here.
         let mut q: Vec<Vec<f64>> = Vec::with_capacity(order);
         let mut t = vec![0.0; order * order];
@@ -143,6 +132,12 @@ impl Orthonormal {
             }
             q.push(v);
         }
+        // The scaled columns are Q T⁻¹ with orthonormal Q, so their condition number is that of T.
+        let singular = DMatrix::from_row_slice(order, order, &t).singular_values();
+        let condition = match (rank == order, singular.max() / singular.min()) {
+            (true, ratio) if ratio < 1e12 => ratio,
+            _ => f64::INFINITY,
+        };
         for i in 0..order {
             for k in 0..order {
                 t[i * order + k] = if scale[i] > 0.0 { t[i * order + k] / scale[i] } else { 0.0 };

@@ -23,10 +23,12 @@
 //! ```
 
 use model_core::braid::{Braid, Geometry};
+use model_core::table::MAX_ORDER;
 use model_core::units::Length;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::basis::columns;
+use super::design::Measured;
 use super::midline::MidPoint;
 use super::prepare::Prepared;
 
@@ -131,11 +133,14 @@ fn separate(
             continue;
         }
         let fitted = part(&of).unwrap_or_else(|| of.clone());
-        let at = |i: usize| columns(braid, mid[i].stroke);
-        let target = fitted.iter().map(|i| mid[*i].force - (mid[*i].pressure - p0) * at(*i).area);
-        let moduli = least_squares(&fitted, target.collect(), order, |i, k| at(i).elastic[k]);
+        let measured = |i: &usize| {
+            let MidPoint { pressure, stroke, force, .. } = mid[*i];
+            Measured { pressure, stroke, direction: 0.0, force }
+        };
+        let points: Vec<Measured> = fitted.iter().map(measured).collect();
+        let moduli = moduli_at_one_pressure(&points, &vec![1.0; points.len()], braid, p0, order);
         for i in of {
-            let c = at(i);
+            let c = columns(braid, mid[i].stroke);
             let elastic: f64 = moduli.iter().zip(c.elastic).map(|(e, c)| e * c).sum();
             force[i] = (mid[i].pressure - p0) * c.area + elastic;
         }
@@ -144,23 +149,74 @@ fn separate(
     (force, constants)
 }
 
-/// Least squares by SVD on scaled columns; directions that the points do not determine stay at zero.
-fn least_squares(
-    rows: &[usize],
-    target: Vec<f64>,
+/// `E_1 … E_M` in pascals at one pressure, `P0` given: weighted least squares,
+///
+/// ```text
+/// min Σ_i w_i (F_i − (P_i − P0) g_i − Σ_k E_k c_k,i)²
+/// ```
+/// With `w_i = F_i⁻²` it is the objective of the thesis (eq. 23), which is linear in the `E_k`.
+///
+/// ```
+/// use host::fit::basis::columns;
+/// use host::fit::design::Measured;
+/// use host::fit::models::moduli_at_one_pressure;
+/// use model_core::braid::miniature;
+///
+/// let braid = miniature().build()?;
+/// let points: Vec<Measured> = (0..20)
+///     .map(|i| {
+///         let stroke = 1e-4 * f64::from(i);
+///         let c = columns(&braid, stroke);
+///         let force = (414e3 - 76.5e3) * c.area + 2e6 * c.elastic[0] - 1e6 * c.elastic[1];
+///         Measured { pressure: 414e3, stroke, direction: 0.0, force }
+///     })
+///     .collect();
+/// let moduli = moduli_at_one_pressure(&points, &[1.0; 20], &braid, 76.5e3, 2);
+/// assert!((moduli[0] - 2e6).abs() < 1.0 && (moduli[1] + 1e6).abs() < 10.0);
+/// # Ok::<(), model_core::braid::GeometryError>(())
+/// ```
+#[must_use]
+pub fn moduli_at_one_pressure(
+    points: &[Measured],
+    weights: &[f64],
+    braid: &Braid<f64>,
+    deadband: f64,
     order: usize,
-    column: impl Fn(usize, usize) -> f64,
 ) -> Vec<f64> {
+    let rows = points.iter().zip(weights).map(|(p, w)| {
+        let c = columns(braid, p.stroke);
+        let root = w.max(0.0).sqrt();
+        (c.elastic.map(|c| root * c), root * (p.force - (p.pressure - deadband) * c.area))
+    });
+    least_squares(&rows.collect::<Vec<_>>(), order.min(MAX_ORDER))
+}
+
+/// Least squares: columns scaled, made orthonormal by Householder's reflections, and the small triangle that is left solved by
+/// its singular values, so that directions which the rows do not determine stay at zero. A row is its columns and its target.
+fn least_squares(rows: &[([f64; MAX_ORDER], f64)], order: usize) -> Vec<f64> {
     if rows.is_empty() || order == 0 {
         return vec![0.0; order];
     }
-    let mut a = DMatrix::from_fn(rows.len(), order, |i, k| column(rows[i], k));
-    let scale: Vec<f64> =
-        (0..order).map(|k| Some(a.column(k).norm()).filter(|s| *s > 0.0).unwrap_or(1.0)).collect();
-    for (k, s) in scale.iter().enumerate() {
-        a.column_mut(k).unscale_mut(*s);
-    }
-    let solution = a.svd(true, true).solve(&DVector::from_vec(target), 1e-9);
+    let size = |k: usize| rows.iter().map(|(c, _)| c[k] * c[k]).sum::<f64>().sqrt();
+    let scale: Vec<f64> = (0..order).map(|k| Some(size(k)).filter(|s| *s > 0.0).unwrap_or(1.0)).collect();
+    // The target is one more column: what is left of it above the triangle's last row is Qᵀ b.
+    let height = rows.len().max(order + 1);
+    let all = DMatrix::from_fn(height, order + 1, |i, k| match rows.get(i) {
+        Some((c, target)) => {
+            if k < order {
+                c[k] / scale[k]
+            } else {
+                *target
+            }
+        }
+        None => 0.0,
+    });
+    let triangle = all.qr().unpack_r();
+    let solution = triangle
+        .view((0, 0), (order, order))
+        .into_owned()
+        .svd(true, true)
+        .solve(&triangle.view((0, order), (order, 1)).into_owned(), 1e-9);
     match solution {
         Ok(x) => x.iter().zip(&scale).map(|(x, s)| x / s).collect(),
         Err(_) => vec![0.0; order],
@@ -256,16 +312,19 @@ fn invariants(geometry: &Geometry, braid: &Braid<f64>, stroke: f64) -> [f64; 3] 
 
 fn yeoh(mid: &[MidPoint], braid: &Braid<f64>, wall: &[[f64; 3]]) -> Model {
     let area: Vec<f64> = mid.iter().map(|m| columns(braid, m.stroke).area).collect();
-    let rows: Vec<usize> = (0..mid.len()).collect();
     // Errors count against the blocked force of each pressure, so the equations are divided by it.
-    let target =
-        rows.iter().map(|i| (mid[*i].force - mid[*i].pressure * area[*i]) / mid[*i].blocked).collect();
-    let x = least_squares(&rows, target, 4, |i, k| {
-        -(if k == 0 { area[i] } else { wall[i][k - 1] }) / mid[i].blocked
-    });
-    let force = rows
-        .iter()
-        .map(|&i| (mid[i].pressure - x[0]) * area[i] - (0..3).map(|k| x[k + 1] * wall[i][k]).sum::<f64>())
+    let row = |((m, area), wall): ((&MidPoint, &f64), &[f64; 3])| {
+        let mut columns = [0.0; MAX_ORDER];
+        columns[0] = -area / m.blocked;
+        for (to, w) in columns[1..].iter_mut().zip(wall) {
+            *to = -w / m.blocked;
+        }
+        (columns, (m.force - m.pressure * area) / m.blocked)
+    };
+    let rows: Vec<_> = mid.iter().zip(&area).zip(wall).map(row).collect();
+    let x = least_squares(&rows, 4);
+    let force = (0..mid.len())
+        .map(|i| (mid[i].pressure - x[0]) * area[i] - (0..3).map(|k| x[k + 1] * wall[i][k]).sum::<f64>())
         .collect();
     let names = ["P0", "C1", "C2", "C3"];
     let constants = names.iter().zip(&x).map(|(n, v)| ((*n).to_owned(), None, *v)).collect();

@@ -10,11 +10,12 @@ use crate::recording::Campaign;
 
 use super::Options;
 use super::basis::{Columns, Orthonormal, PressureBasis, columns};
+use super::design::{Bin, Design, Layout, Row};
 use super::geometry::{Adjusted, Mounting};
-use super::joint::{Bin, Design, Layout, Row};
 use super::nodes::{Pressures, pressures};
-use super::points::{Points, median, points};
-use super::screen::{self, Clip, Outlier, Use};
+use super::outliers::{Outlier, despike};
+use super::points::{Points, points};
+use super::screen::{self, Clip, Use};
 use super::smoothing::{self, Smoothing};
 
 /// A campaign, solved: everything that results and diagnoses are drawn from.
@@ -64,8 +65,6 @@ pub struct Prepared {
     pub warnings: Vec<String>,
 }
 
-/// Of the blocked force: what the model may miss although it is the right one for the purpose; more rows do not help below it.
-const INEXACT: f64 = 0.002;
 const BINS: usize = 1024;
 
 impl Prepared {
@@ -109,26 +108,19 @@ impl Prepared {
         check_strokes(&points, &braid)?;
         let max_pressure = muscle.max_pressure_kPa.map_or(points.pressure.high, |kpa| kpa * 1e3);
         let clips = screen::clip(campaign, &points);
-        let outliers = screen::despike(campaign, &mut points);
+        let outliers = despike(campaign, &mut points);
         let mut prepared = Self {
             pressures: pressures(&points, max_pressure),
             used: vec![Use::Fitted; points.list.len()],
             weights: Vec::new(),
-            design: Design {
-                basis: PressureBasis::new(&[]),
-                orthonormal: Orthonormal::over(&[], options.order),
-                rows: Vec::new(),
-                bins: Vec::new(),
-                groups: 0,
-                extra: Vec::new(),
-                extras: 0,
-                extra_prior: Vec::new(),
-                friction: false,
-                origin: 0.0,
-                hold_deadband: 0.0,
-                held: None,
-                level: 0.0,
-            },
+            design: Design::new(
+                PressureBasis::new(&[]),
+                Orthonormal::over(&[], options.order),
+                Vec::new(),
+                Vec::new(),
+                0,
+                false,
+            ),
             points,
             nominal: geometry,
             geometry,
@@ -161,7 +153,7 @@ impl Prepared {
     }
 
     /// Builds the linear problem on the present nodes.
-    fn build_design(&self, order: usize) -> Design {
+    pub(super) fn build_design(&self, order: usize) -> Design {
         let basis = PressureBasis::new(&self.pressures.nodes);
         let columns = self.columns(&self.shift);
         let orthonormal = Orthonormal::over(&spread(&self.points, &columns, &self.used), order);
@@ -189,30 +181,12 @@ impl Prepared {
             .list
             .iter()
             .zip(&columns)
-            .map(|(p, c)| Row {
-                pressure: p.pressure,
-                area: c.area,
-                elastic: orthonormal.apply(c),
-                direction: if directed { p.direction } else { 0.0 },
-                force: p.force,
-                bin: index[raw(p.pressure)],
+            .map(|(p, c)| {
+                let direction = if directed { p.direction } else { 0.0 };
+                Row::new(p.pressure, p.force, direction, c, &orthonormal, index[raw(p.pressure)])
             })
             .collect();
-        Design {
-            basis,
-            orthonormal,
-            rows,
-            bins,
-            groups: self.pressures.levels.len(),
-            extra: Vec::new(),
-            extras: 0,
-            extra_prior: Vec::new(),
-            friction: directed,
-            origin: 0.0,
-            hold_deadband: 0.0,
-            held: None,
-            level: 0.0,
-        }
+        Design::new(basis, orthonormal, rows, bins, self.pressures.levels.len(), directed)
     }
 
     /// The tested level, or the interval, that a pressure belongs to.
@@ -265,51 +239,6 @@ impl Prepared {
                 *used = Use::UnknownDirection;
             }
         }
-    }
-
-    /// Weights from scratch: every chunk of stroke at every pressure and direction counts alike, as far as its rows carry it.
-    fn weigh(&mut self) {
-        let deadband = self.design.origin + self.parameters.first().copied().unwrap_or(0.0);
-        let stroke = self.points.stroke;
-        let pressure = self.points.pressure;
-        let chunk = |x: f64, range: super::points::Range, n: f64| {
-            if range.span() > 0.0 { ((x - range.low) / range.span() * n).min(n - 1.0) as usize } else { 0 }
-        };
-        let (fine_p, fine_x) = (if self.pressures.held { 1.0 } else { 64.0 }, 64.0);
-        let cell = |p: &super::points::Point, group: u32| {
-            let place =
-                if self.pressures.held { group as usize } else { chunk(p.pressure, pressure, fine_p) };
-            let branch = (p.direction + 1.0) as usize;
-            (place * 64 + chunk(p.stroke, stroke, fine_x)) * 3 + branch
-        };
-        let groups: Vec<u32> =
-            self.design.rows.iter().map(|r| self.design.bins[r.bin as usize].group).collect();
-        let mut counts: std::collections::HashMap<usize, f64> = std::collections::HashMap::new();
-        for ((p, used), g) in self.points.list.iter().zip(&self.used).zip(&groups) {
-            if *used == Use::Fitted {
-                *counts.entry(cell(p, *g)).or_default() += f64::from(p.rows);
-            }
-        }
-        self.cells = counts.len().max(1) as f64;
-        let force = self.points.force.high.abs().max(self.points.force.low.abs());
-        let noise = self.points.row_noise.max(1e-6 * force).powi(2);
-        let scale = (pressure.high - deadband).max(0.1 * pressure.high.abs()).max(1.0);
-        self.weights = self
-            .points
-            .list
-            .iter()
-            .zip(&self.used)
-            .zip(&groups)
-            .map(|((p, used), g)| {
-                if *used != Use::Fitted {
-                    return 0.0;
-                }
-                let n = counts.get(&cell(p, *g)).copied().unwrap_or(1.0).max(1.0);
-                // Blocked force is proportional to P − P0: errors are judged against it, pressure by pressure.
-                let blocked = force * ((p.pressure - deadband) / scale).clamp(0.1, 1.0);
-                f64::from(p.rows) / n / (noise / n + (INEXACT * blocked).powi(2))
-            })
-            .collect();
     }
 
     /// Solves in place; returns `Σ w r²`.
@@ -368,297 +297,6 @@ impl Prepared {
         }
         self.soften();
         self.solve(self.smoothing, 8);
-    }
-
-    /// A slack muscle says that the model must not pull there: points set aside as slack come back where it would.
-    fn hold_slack_down(&mut self) {
-        let before: Vec<Use> = self.used.clone();
-        let set_aside = |u: Use| matches!(u, Use::Slack | Use::Clipped);
-        if !before.iter().any(|u| set_aside(*u)) {
-            return;
-        }
-        let tolerance = (0.005 * self.points.force.span()).max(2.0 * self.points.row_noise);
-        let upper = self.clips.1.map_or(f64::INFINITY, |c| c.force);
-        for round in 0..16 {
-            let curves = self.design.curves(&self.parameters);
-            let mut changed = 0;
-            for i in 0..self.used.len() {
-                if !set_aside(before[i]) || self.points.list[i].force >= upper {
-                    continue;
-                }
-                let above = self.design.evaluate(i, &self.parameters, &curves).force
-                    > self.points.list[i].force + tolerance;
-                // Points let go may rise again, and take turns for ever: after a few rounds none is let go any more.
-                let kept = round >= 4 && self.used[i] == Use::Fitted;
-                let wanted = if above || kept { Use::Fitted } else { before[i] };
-                changed += usize::from(wanted != self.used[i]);
-                self.used[i] = wanted;
-            }
-            if changed == 0 {
-                break;
-            }
-            self.weigh();
-            self.solve(self.smoothing, 6);
-        }
-        self.held_down = self.used.iter().zip(&before).map(|(u, b)| u != b).collect();
-        // They count in the fit, not in its errors: what the sensor reads of a slack muscle is not the muscle's force.
-    }
-
-    /// Makes the bladder's stress `Σ E_k ε^k` rise with strain wherever the recordings strained it, in hoop and in axial
-    /// direction, at every node: slopes that would fall are held at zero by a penalty that grows until they do.
-    fn make_physical(&mut self) {
-        let used = |u: &Use| matches!(u, Use::Fitted | Use::NearTurn);
-        let strokes = super::points::Range::of(
-            self.points
-                .list
-                .iter()
-                .zip(&self.used)
-                .zip(&self.shift)
-                .filter(|((_, u), _)| used(u))
-                .map(|((p, _), s)| p.stroke + s),
-        );
-        let at = |x: f64| self.braid.posture(Length::from_metres(x));
-        let (a, b) = (at(strokes.low), at(strokes.high));
-        let layout = self.design.layout();
-        let order = layout.order;
-        let t = self.design.orthonormal.t.clone();
-        let strains: Vec<f64> = (0..=24)
-            .flat_map(|i| {
-                let part = f64::from(i) / 24.0;
-                let between = |x: f64, y: f64| x + (y - x) * part;
-                [between(a.radial_strain, b.radial_strain), between(a.axial_strain, b.axial_strain)]
-            })
-            .collect();
-        // dσ/dε = Σ_i i E_i ε^(i−1) with E = T ẽ.
-        let slopes: Vec<Vec<f64>> = strains
-            .iter()
-            .map(|e| {
-                (0..order)
-                    .map(|k| (0..=k).map(|i| (i + 1) as f64 * e.powi(i as i32) * t[i * order + k]).sum())
-                    .collect()
-            })
-            .collect();
-        let mut weight = 10.0;
-        for _ in 0..10 {
-            let data = self.design.normal(&self.parameters, &self.weights);
-            let scale = data.weight / layout.nodes as f64;
-            let mut held = super::linear::Symmetric::zeros(layout.len());
-            let mut worst = 0.0_f64;
-            for j in 0..layout.nodes {
-                for a in &slopes {
-                    let size = super::linear::dot(a, a).sqrt();
-                    let row: Vec<(usize, f64)> =
-                        a.iter().enumerate().map(|(k, v)| (layout.elastic(k, j), v / size)).collect();
-                    let slope: f64 = row.iter().map(|(i, v)| v * self.parameters[*i]).sum();
-                    worst = worst.min(slope);
-                    if slope < 0.0 {
-                        held.add_row(&row, weight * scale);
-                    }
-                }
-            }
-            if worst > -1e-4 * self.points.force.span() {
-                break;
-            }
-            // What was held stays held, or the next step would fall back.
-            match &mut self.design.held {
-                Some(all) => all.add_scaled(&held, 1.0),
-                none => *none = Some(held),
-            }
-            weight *= 2.0;
-            self.solve(self.smoothing, 6);
-        }
-    }
-
-    /// Finds `P0` by the highest order that the strokes determine, then holds it.
-    ///
-    /// At rest length no elastic term acts, so `P0` is the blocked force's intercept. Away from it `P0` and the `E_k` trade, and
-    /// what a low order cannot describe about the bladder would be put into `P0`: with M = 4 on a hyperelastic wall it
-    /// is off by up to 1 kPa, with M = 6 by a fifth of that.
-    fn settle_deadband(&mut self, options: &Options) {
-        let order = MAX_ORDER;
-        if options.order >= order
-            || options.fit_geometry
-            || options.fit_lengths
-            || self.pressures.levels.len() < 2
-        {
-            return;
-        }
-        let mut finer = self.clone();
-        finer.design = finer.build_design(order);
-        let reaches_rest = self.points.stroke.low <= 0.02 * self.points.stroke.high;
-        if finer.design.orthonormal.rank < order || !reaches_rest {
-            return;
-        }
-        finer.parameters = finer.design.start(self.deadband());
-        finer.solve(Smoothing::START, 8);
-        let smoothing = match options.smoothing {
-            Some(weight) => Smoothing { elastic: weight, friction: weight },
-            None => smoothing::choose(&finer.design, &finer.parameters, &finer.weights).0,
-        };
-        finer.solve(smoothing, 6);
-        let data = finer.design.normal(&finer.parameters, &finer.weights);
-        let penalty = finer.design.penalty(&data, smoothing.elastic, smoothing.friction);
-        self.deadband_std = Some(super::uncertainty::jackknife(&finer, &penalty).root.std(Layout::DEADBAND));
-        let found = finer.deadband();
-        self.parameters[Layout::DEADBAND] = 0.0;
-        self.design.origin = found;
-        // Stiffer than all the points together.
-        let own =
-            self.design.normal(&self.parameters, &self.weights).matrix.at(Layout::DEADBAND, Layout::DEADBAND);
-        self.design.hold_deadband = 1e4 * own;
-    }
-
-    fn mark_turns(&mut self, zone: f64) {
-        self.turn_zone = zone;
-        for (p, used) in self.points.list.iter().zip(&mut self.used) {
-            match *used {
-                Use::Fitted if p.since_turn < zone => *used = Use::NearTurn,
-                Use::NearTurn if p.since_turn >= zone => *used = Use::Fitted,
-                _ => {}
-            }
-        }
-    }
-
-    fn size_turn_zone(&mut self) {
-        if !self.design.friction {
-            self.mark_turns(0.0);
-            return;
-        }
-        let curves = self.design.curves(&self.parameters);
-        let layout = self.design.layout();
-        let noise = self.points.row_noise;
-        let force = self.points.force.span();
-        let shares = (0..self.points.list.len()).filter_map(|i| {
-            let p = &self.points.list[i];
-            if !matches!(self.used[i], Use::Fitted | Use::NearTurn) {
-                return None;
-            }
-            let e = self.design.evaluate(i, &self.parameters, &curves);
-            let friction = (1.0 - e.grip) * e.quasi * p.direction;
-            let residual = p.direction * (p.force - e.force);
-            // A friction below the noise tells nothing about where it turned.
-            (friction > 2.0 * noise && friction > 1e-3 * force)
-                .then(|| (p.since_turn, residual / friction, f64::from(p.rows) * friction * friction))
-        });
-        let zone = screen::turn_zone(shares.collect::<Vec<_>>());
-        debug_assert!(layout.len() == self.parameters.len());
-        self.mark_turns(zone);
-    }
-
-    /// Finds where the muscle is slack: the force stands near zero where straight curves, fitted to points that pull,
-    /// would push. Flexible curves would bend until they described slackness as elasticity.
-    fn find_slack(&mut self) {
-        let force = self.points.force.high.max(-self.points.force.low);
-        let floor = self.clips.0.map_or(0.0, |c| c.force).max(self.points.force.low).min(0.0);
-        let near_zero = floor + (0.02 * force).max(4.0 * self.points.row_noise);
-        let candidates: Vec<bool> = self.points.list.iter().map(|p| p.force <= near_zero).collect();
-        let rows: f64 = self
-            .points
-            .list
-            .iter()
-            .zip(&candidates)
-            .filter(|(_, c)| **c)
-            .map(|(p, _)| f64::from(p.rows))
-            .sum();
-        if rows < 0.002 * self.points.rows as f64 {
-            return;
-        }
-        let fitted = self.used.clone();
-        for (used, candidate) in self.used.iter_mut().zip(&candidates) {
-            if *candidate && *used == Use::Fitted {
-                *used = Use::Slack;
-            }
-        }
-        self.weigh();
-        // No trend with pressure at all: what slack points would say about it must not be said by others' continuation.
-        let level = std::mem::replace(&mut self.design.level, 10.0);
-        self.solve(Smoothing::STRAIGHT, 10);
-        self.design.level = level;
-        self.used = fitted;
-        let curves = self.design.curves(&self.parameters);
-        let mut slack = 0.0;
-        for i in 0..self.used.len() {
-            let e = self.design.evaluate(i, &self.parameters, &curves);
-            if candidates[i] && e.force < floor - 0.03 * force {
-                if self.used[i] != Use::Clipped {
-                    self.used[i] = Use::Slack;
-                }
-                slack += f64::from(self.points.list[i].rows);
-            }
-        }
-        self.goes_slack = slack > 0.005 * self.points.rows as f64;
-        if !self.goes_slack {
-            self.used = self.used.iter().map(|u| if *u == Use::Slack { Use::Fitted } else { *u }).collect();
-        }
-    }
-
-    /// Scatter of residuals about the model in each group, by the median.
-    #[must_use]
-    pub fn scatter(&self, residuals: &[f64]) -> Vec<f64> {
-        let mut by_group: Vec<Vec<f64>> = vec![Vec::new(); self.design.groups.max(1)];
-        for ((row, used), r) in self.design.rows.iter().zip(&self.used).zip(residuals) {
-            if *used == Use::Fitted {
-                by_group[self.design.bins[row.bin as usize].group as usize].push(r.abs());
-            }
-        }
-        let force = self.points.force.span();
-        by_group
-            .iter_mut()
-            .map(|r| (median(r) / 0.6745).max(self.points.row_noise).max(1e-6 * force))
-            .collect()
-    }
-
-    /// Points far off the model for a moment only: spikes. A long stretch off the model is a misfit, and stays.
-    fn find_outliers(&mut self) {
-        let residuals = self.design.residuals(&self.parameters);
-        let scatter = self.scatter(&residuals);
-        let group = |i: usize| self.design.bins[self.design.rows[i].bin as usize].group as usize;
-        let force = self.points.force.span();
-        let far = |i: usize| {
-            residuals[i].abs() > (8.0 * scatter[group(i)]).max(0.01 * force) && self.used[i] == Use::Fitted
-        };
-        let n = self.used.len();
-        let mut i = 0;
-        let mut marked = Vec::new();
-        while i < n {
-            if !far(i) {
-                i += 1;
-                continue;
-            }
-            let start = i;
-            while i < n && far(i) {
-                i += 1;
-            }
-            // The neighbours on both sides must be well: then it is a spike of the reading.
-            let calm = |k: usize| residuals[k].abs() < 4.0 * scatter[group(k)];
-            if i - start <= 3 && start > 0 && i < n && calm(start - 1) && calm(i) {
-                marked.extend(start..i);
-            }
-        }
-        for i in marked {
-            self.used[i] = Use::Outlier;
-            let p = &self.points.list[i];
-            self.outliers.push(Outlier {
-                recording: p.recording,
-                row: p.first_row,
-                time: p.time,
-                force: p.force,
-                off: residuals[i],
-            });
-        }
-    }
-
-    /// Huber's weights: what lies beyond four times the scatter counts in proportion to its distance, not its square.
-    fn soften(&mut self) {
-        let residuals = self.design.residuals(&self.parameters);
-        let scatter = self.scatter(&residuals);
-        for (i, w) in self.weights.iter_mut().enumerate() {
-            let limit = 4.0 * scatter[self.design.bins[self.design.rows[i].bin as usize].group as usize];
-            let r = residuals[i].abs();
-            if r > limit {
-                *w *= limit / r;
-            }
-        }
     }
 
     /// `P0`, Pa.

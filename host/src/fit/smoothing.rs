@@ -3,8 +3,9 @@
 //! Around a solution the problem is linear, so leaving a group of points out is a subtraction from the normal equations:
 //! every candidate weight is tried on every group without touching the points again.
 
-use super::joint::{Design, Normal};
+use super::design::Design;
 use super::linear::dot;
+use super::normal::Normal;
 
 /// Weights of the penalty on bending, relative to the data.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -15,11 +15,22 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::joint::{Design, Layout};
+use super::design::{Design, Layout};
 use super::linear::{Symmetric, dot};
 use super::prepare::Prepared;
 
 /// A square root of a covariance, `C = S Sᵀ`, row after row.
+///
+/// ```
+/// use host::fit::uncertainty::Root;
+///
+/// // Two numbers that share one source of error and have one each of their own.
+/// let root = Root { rows: 2, columns: 3, s: vec![3.0, 4.0, 0.0, 3.0, 0.0, 4.0] };
+/// assert_eq!((root.std(0), root.std(1)), (5.0, 5.0));
+/// assert_eq!(root.correlation(0, 1), Some(9.0 / 25.0));
+/// // var(a − b) = 25 + 25 − 2 · 9: what they share cancels.
+/// assert_eq!(root.variance(&[1.0, -1.0]), 32.0);
+/// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Root {
     /// Rows: one per number.
@@ -48,6 +59,14 @@ impl Root {
     pub fn std(&self, i: usize) -> f64 {
         let row = &self.s[i * self.columns..(i + 1) * self.columns];
         dot(row, row).sqrt()
+    }
+
+    /// The correlation of numbers `i` and `j`; none where one of them is not uncertain.
+    #[must_use]
+    pub fn correlation(&self, i: usize, j: usize) -> Option<f64> {
+        let row = |i: usize| &self.s[i * self.columns..(i + 1) * self.columns];
+        let size = self.std(i) * self.std(j);
+        (size > 0.0).then(|| if i == j { 1.0 } else { dot(row(i), row(j)) / size })
     }
 
     /// Adds one more column: an independent source of uncertainty.

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::path::Path;
+use std::sync::Arc;
 
 use super::assemble::{Job, LookupTable, assemble};
 use super::blocks::{BlockError, Blocks, Rows, RowsError, read_rows};
@@ -14,6 +15,7 @@ use super::plan::{Context, Plan, plan};
 use super::source;
 use crate::error::{Code, Error, Result};
 use crate::muscle_description::MuscleDescription;
+use crate::progress::Progress;
 
 /// How to read recordings, and what is known of the muscle that made them.
 #[derive(Debug, Clone, Default)]
@@ -28,6 +30,8 @@ pub struct Reader<'a> {
     pub filters: Vec<(String, String)>,
     /// Files with fewer rows are refused.
     pub min_rows: usize,
+    /// Told of every byte that is read.
+    pub progress: Option<Arc<Progress>>,
 }
 
 /// Fewer rows than this are no recording of a muscle, but a mistake.
@@ -79,6 +83,20 @@ impl<'a> Reader<'a> {
     /// Text (CSV, tab-separated, or as described), also compressed by gzip or zstd; MATLAB files of version 5 to 7.3, HDF5 and
     /// Parquet, whose columns have the names that a text file's header would have.
     ///
+    /// ```
+    /// use host::recording::Reader;
+    ///
+    /// let file = tempfile::NamedTempFile::new()?;
+    /// let rows: String = (0..10).map(|i| format!("{i},45,{},2\n", 0.1 * f64::from(i))).collect();
+    /// std::fs::write(&file, format!("time_s,pressure_psi,displacement_in,force_lbf\n{rows}"))?;
+    /// let recording = &Reader::new().file(file.path())?[0];
+    /// // One pound-force per square inch is 6894.757 Pa, an inch 25.4 mm, one pound-force 4.448222 N.
+    /// assert!((recording.pressure[0] - 45.0 * 6894.757).abs() < 0.1);
+    /// assert!((recording.stroke[9] - 0.9 * 25.4e-3).abs() < 1e-9);
+    /// assert!((recording.require_force()?[0] - 2.0 * 4.448222).abs() < 1e-5);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// Any `file::`, `recording::` or `import::` code, with file, line, column and value as far as they apply.
     pub fn file(&self, path: &Path) -> Result<Vec<Recording>> {
@@ -86,7 +104,7 @@ impl<'a> Reader<'a> {
     }
 
     fn open(&self, path: &Path) -> Result<Vec<Recording>> {
-        let source = source::open(path)?;
+        let source = source::open(path, self.progress.as_ref())?;
         if source.magic.is_empty() {
             return Err(Error::new(Code::RecordingEmpty, "the file is empty"));
         }

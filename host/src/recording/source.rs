@@ -3,8 +3,10 @@
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::error::{Code, Error, Result};
+use crate::progress::Progress;
 
 /// Compression is recognised by the first bytes, not by the name: files get renamed.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
@@ -19,18 +21,19 @@ pub(super) struct Source {
     pub magic: Vec<u8>,
 }
 
-pub(super) fn open(path: &Path) -> Result<Source> {
+pub(super) fn open(path: &Path, progress: Option<&Arc<Progress>>) -> Result<Source> {
     let unreadable = |e: io::Error| Error::unreadable(path, &e);
     let mut file = File::open(path).map_err(unreadable)?;
     let meta = file.metadata().map_err(unreadable)?;
     if meta.is_dir() {
         return Err(Error::new(Code::FileUnreadable, "is a folder").file(path).help("name the files in it"));
     }
+    let counted = |file: File| Counted { file, progress: progress.cloned() };
     let mut magic = Vec::new();
     (&mut file).take(512).read_to_end(&mut magic).map_err(unreadable)?;
     if magic.starts_with(&GZIP) || magic.starts_with(&ZSTD) {
         // A pipe cannot be rewound, so the bytes already read go in front again.
-        let whole = io::Cursor::new(magic.clone()).chain(file);
+        let whole = io::Cursor::new(magic.clone()).chain(counted(file));
         let reader: Box<dyn Read + Send> = if magic.starts_with(&GZIP) {
             Box::new(flate2::read::MultiGzDecoder::new(whole))
         } else {
@@ -43,9 +46,25 @@ pub(super) fn open(path: &Path) -> Result<Source> {
     }
     if meta.is_file() {
         file.seek(SeekFrom::Start(0)).map_err(unreadable)?;
-        return Ok(Source { reader: Box::new(file), size: Some(meta.len()), magic });
+        return Ok(Source { reader: Box::new(counted(file)), size: Some(meta.len()), magic });
     }
-    Ok(Source { reader: Box::new(io::Cursor::new(magic.clone()).chain(file)), size: None, magic })
+    Ok(Source { reader: Box::new(io::Cursor::new(magic.clone()).chain(counted(file))), size: None, magic })
+}
+
+/// A file that tells how far it is read.
+struct Counted {
+    file: File,
+    progress: Option<Arc<Progress>>,
+}
+
+impl Read for Counted {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.file.read(buffer)?;
+        if let Some(progress) = &self.progress {
+            progress.add(count as u64);
+        }
+        Ok(count)
+    }
 }
 
 /// Refuses what is not UTF-8 text, from the first block of it, and gives the length of a byte order mark to be skipped.

@@ -1,5 +1,6 @@
 //! The report of a fit: every figure of the thesis for any muscle, and what one expects of a fit besides.
 
+mod controller;
 mod curves;
 mod loads;
 mod parameters;
@@ -37,8 +38,9 @@ pub fn page(fit: &Fit, campaign: &Campaign, options: &Options) -> Page {
     page.push(loads::section(&view));
     page.push(loads::models(&view));
     page.push(curves::section(&view));
+    page.push(controller::section(&view));
     page.push(residuals::section(&view));
-    page.push(parameters::section(&view, options));
+    page.push(parameters::section(&view));
     for recording in &campaign.recordings {
         page.origin(&recording.name, format!("{} rows", recording.len()));
     }
@@ -115,6 +117,18 @@ fn remarks(view: &View<'_>) -> Section {
     let mut section = Section::new("To be known first").summarised();
     for warning in &s.warnings {
         section.notice(Tone::Caution, capital(warning));
+    }
+    if let Some(free) = &s.physical {
+        section.notice(
+            Tone::Plain,
+            format!(
+                "Stress was made to rise with strain. That costs error: {} % mean and {} % at most, against {} % and {} % without.",
+                figures(s.mean_error_pct, 2),
+                figures(s.max_error_pct, 2),
+                figures(free.free_mean_error_pct, 2),
+                figures(free.free_max_error_pct, 2)
+            ),
+        );
     }
     let rows = &s.rows;
     let set_aside = [

@@ -29,6 +29,7 @@ pub(super) fn holds(time: &[f64], smooth: &[f64], scale: &Scale, legs: &[Leg]) -
         return vec![Hold { start: 0, end: n - 1, stroke: median(smooth) }];
     }
     let mut holds: Vec<Hold> = Vec::new();
+    let speeds: Vec<f64> = legs.iter().map(|l| speed(time, smooth, l, scale.threshold)).collect();
     let (mut lows, mut highs) = (VecDeque::new(), VecDeque::new());
     let mut start = 0;
     let mut leg = 0;
@@ -50,12 +51,13 @@ pub(super) fn holds(time: &[f64], smooth: &[f64], scale: &Scale, legs: &[Leg]) -
             };
             broken = spread(&lows, &highs) > scale.threshold;
             if broken {
-                let behind = match longest(time, &mut holds, smooth, scale, legs, &mut leg, start, end) {
-                    Found::Hold => end,
-                    // Testing this stretch again sample by sample would take quadratic time.
-                    Found::Round => start + (end - start) / 4,
-                    Found::Short => start + 1,
-                };
+                let behind =
+                    match longest(time, &mut holds, smooth, scale, legs, &speeds, &mut leg, start, end) {
+                        Found::Hold => end,
+                        // Testing this stretch again sample by sample would take quadratic time.
+                        Found::Round => start + (end - start) / 4,
+                        Found::Short => start + 1,
+                    };
                 while start < behind || spread(&lows, &highs) > scale.threshold {
                     start += 1;
                     while lows.front().is_some_and(|i| *i < start) {
@@ -69,10 +71,26 @@ pub(super) fn holds(time: &[f64], smooth: &[f64], scale: &Scale, legs: &[Leg]) -
             }
         }
         if broken {
-            longest(time, &mut holds, smooth, scale, legs, &mut leg, start, end);
+            longest(time, &mut holds, smooth, scale, legs, &speeds, &mut leg, start, end);
         }
     }
     joined(holds, smooth, scale)
+}
+
+/// The mean speed of a leg while it moves: what it spends within the threshold of its ends may be rest.
+fn speed(time: &[f64], smooth: &[f64], leg: &Leg, threshold: f64) -> f64 {
+    let over = |distance: f64, duration: f64| distance / duration.max(f64::MIN_POSITIVE);
+    let whole = over(leg.amplitude(), time[leg.end] - time[leg.start]);
+    if leg.amplitude() < 4.0 * threshold {
+        return whole;
+    }
+    let gone = |i: usize| (smooth[i] - leg.from) * leg.sign();
+    let left = (leg.start..=leg.end).find(|i| gone(*i) > threshold);
+    let near = (leg.start..=leg.end).rev().find(|i| gone(*i) < leg.amplitude() - threshold);
+    match (left, near) {
+        (Some(left), Some(near)) if near > left => over(gone(near) - gone(left), time[near] - time[left]),
+        _ => whole,
+    }
 }
 
 /// What a stretch turned out to be.
@@ -91,6 +109,7 @@ fn longest(
     smooth: &[f64],
     scale: &Scale,
     legs: &[Leg],
+    speeds: &[f64],
     leg: &mut usize,
     start: usize,
     end: usize,
@@ -102,10 +121,9 @@ fn longest(
         *leg += 1;
     }
     // The slower of the legs around it says how long the motion would take for this distance.
-    let around = || legs[*leg..].iter().take_while(|l| l.start <= end).take(3);
-    let lasting = |l: &Leg| (time[l.end] - time[l.start]).max(f64::MIN_POSITIVE);
-    let slowest = around().map(|l| l.amplitude() / lasting(l)).fold(f64::INFINITY, f64::min);
-    let shortest = around().map(lasting).fold(f64::INFINITY, f64::min);
+    let around = || legs[*leg..].iter().zip(&speeds[*leg..]).take_while(|(l, _)| l.start <= end).take(3);
+    let slowest = around().map(|(_, speed)| *speed).fold(f64::INFINITY, f64::min);
+    let shortest = around().map(|(l, _)| time[l.end] - time[l.start]).fold(f64::INFINITY, f64::min);
     let duration = time[end - 1] - time[start];
     let passing = scale.threshold / slowest;
     if !(duration > 4.0 * passing) {
@@ -155,11 +173,14 @@ fn flat(smooth: &[f64], scale: &Scale) -> bool {
         qx += q * x;
     }
     let size = |square: f64, product: f64| if square > 0.0 { (product / square).abs() } else { 0.0 };
-    // Rise and bend of mere noise have standard deviations of 1.7 and 3.4 of it, over the root of the independent samples.
+    // Rise and bend of mere noise have standard deviations of 1.7 and 3.4 of it, over the root of the independent samples. Five of
+    // them hold all but one rest in a million; but half way to what a smooth turn shows, a turn is the likelier of the two.
     let independent = n * (scale.smoothed_noise / scale.noise.max(f64::MIN_POSITIVE)).powi(2).min(1.0);
-    let times = (10.0 / independent.max(1.0).sqrt()).clamp(0.5, 2.0);
-    let most = (times * scale.smoothed_noise).max(0.05 * scale.threshold);
-    size(pp, px) <= most && size(qq, qx) <= most
+    let most = |share: f64| {
+        let noise = share * scale.smoothed_noise / independent.max(1.0).sqrt();
+        (5.0 * noise).clamp(0.05 * scale.threshold, 0.25 * scale.threshold)
+    };
+    size(pp, px) <= most(1.7) && size(qq, qx) <= most(3.4)
 }
 
 /// Holds as long as they are, and joined where a wild sample has parted them: with its level known from many samples, a hold

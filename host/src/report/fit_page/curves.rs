@@ -1,7 +1,8 @@
 //! What was fitted, over pressure and over strain.
 
 use super::super::{Axis, Colour, Figure, Panel, Section, figures, fixed};
-use super::view::View;
+use super::view::{Banded, View};
+use crate::band::HALF_95;
 use crate::fit::uncertainty;
 
 /// Places along the pressure axis.
@@ -34,8 +35,9 @@ fn over_pressure(view: &View<'_>) -> Figure {
     let curve = |y: Axis, k: usize, scale: f64, take: Take<'_>| {
         let values: Vec<f64> = curves.iter().map(|c| take(c) * scale).collect();
         let std: Vec<f64> = (0..PLACES).map(|i| root.std(1 + k * PLACES + i) * scale).collect();
-        let edge =
-            |sign: f64| -> Vec<f64> { values.iter().zip(&std).map(|(v, s)| v + sign * 1.96 * s).collect() };
+        let edge = |sign: f64| -> Vec<f64> {
+            values.iter().zip(&std).map(|(v, s)| v + sign * HALF_95 * s).collect()
+        };
         let ring: Vec<f64> = at_nodes.iter().map(|c| take(c) * scale).collect();
         Panel::new(axis(), y)
             .band("95 % interval", Colour::Series(0), &kpa, &edge(-1.0), &edge(1.0))
@@ -87,24 +89,45 @@ fn stress(view: &View<'_>) -> Figure {
         Panel::new(Axis::new("radial strain ε_{x}", "%"), Axis::new("stress Σ E_{k} ε_{x}^{k}", "MPa"))
             .titled("Around the muscle");
     let mut falls = Vec::new();
+    let order = prepared.design.layout().order;
     for group in 0..view.levels.len() {
         let (moduli, _) = prepared.curves_at(view.levels[group]);
+        let root = uncertainty::of_table(prepared, &view.fit.uncertain.root, &view.levels[group..=group]);
+        let half = |strain: f64| {
+            let mut gradient = vec![0.0; root.rows];
+            for (k, g) in gradient[1..=order].iter_mut().enumerate() {
+                *g = strain.powi(k as i32 + 1);
+            }
+            HALF_95 * root.variance(&gradient).sqrt() * 1e-6
+        };
         let stress = |strain: f64| moduli.iter().rev().fold(0.0, |sum, e| strain * (sum + e)) * 1e-6;
         let postures: Vec<_> = view
             .strokes(group, 60)
             .into_iter()
             .map(|x| prepared.braid.posture(model_core::units::Length::from_metres(x)))
             .collect();
-        let line = |strain: &dyn Fn(&model_core::braid::Posture<f64>) -> f64| -> (Vec<f64>, Vec<f64>) {
-            postures.iter().map(|p| (100.0 * strain(p), stress(strain(p)))).unzip()
+        let line = |strain: &dyn Fn(&model_core::braid::Posture<f64>) -> f64| -> (Vec<f64>, Banded) {
+            let at = postures.iter().map(strain);
+            let banded = at.clone().map(|e| [stress(e), stress(e) - half(e), stress(e) + half(e)]);
+            (at.map(|e| 100.0 * e).collect(), banded.collect())
+        };
+        let drawn = |panel: Panel, x: &[f64], y: &Banded| {
+            let band = if group == 0 { "95 % interval" } else { "" };
+            panel.band(band, view.colour(group), x, &y.low, &y.high).line(
+                view.name(group),
+                view.colour(group),
+                x,
+                &y.middle,
+            )
         };
         let (x, y) = line(&|p| p.axial_strain);
-        axial = axial.line(view.name(group), view.colour(group), &x, &y);
+        axial = drawn(axial, &x, &y);
         let (x, y) = line(&|p| p.radial_strain);
+        radial = drawn(radial, &x, &y);
+        let y = y.middle;
         if y.windows(2).any(|w| w[1] < w[0] - 1e-3 * y.iter().fold(0.0_f64, |m, v| m.max(v.abs()))) {
             falls.push(view.name(group));
         }
-        radial = radial.line(view.name(group), view.colour(group), &x, &y);
     }
     let warning = if falls.is_empty() {
         "Here it rises everywhere.".to_owned()

@@ -1,7 +1,7 @@
 //! Load lines, loops, blocked force and free contraction, the deadband line, and the models side by side.
 
 use super::super::{Axis, Colour, Figure, Mark, Panel, Section, Table, figures, fixed};
-use super::view::View;
+use super::view::{Banded, View};
 use crate::fit::basis::columns;
 
 /// At most this many small panels: more cannot be compared by eye.
@@ -80,19 +80,23 @@ fn loops(view: &View<'_>) -> Figure {
         let strokes = view.strokes(group, 80);
         let at: Vec<f64> = strokes.iter().map(|x| view.contraction(*x)).collect();
         let pressure = view.levels[group];
-        let branch = |s: f64| -> Vec<f64> { strokes.iter().map(|x| view.force(pressure, *x, s)).collect() };
         let mut panel = Panel::new(contraction_axis(), Axis::new("force F", "N"))
             .titled(view.name(group))
             .points("measured", Colour::Muted, &xs, &ys);
-        if friction {
-            panel = panel.line("table, shortening", Colour::Series(0), &at, &branch(1.0)).line(
-                "table, lengthening",
-                Colour::Series(1),
-                &at,
-                &branch(-1.0),
-            );
+        let branches: &[(f64, &str)] = if friction {
+            &[(1.0, "table, shortening"), (-1.0, "table, lengthening")]
         } else {
-            panel = panel.line("table", Colour::Series(0), &at, &branch(0.0));
+            &[(0.0, "table")]
+        };
+        for (i, (direction, name)) in branches.iter().enumerate() {
+            let line = view.banded(pressure, &strokes, *direction);
+            let band = if i == 0 { "95 % interval of the table" } else { "" };
+            panel = panel.band(band, Colour::Series(i), &at, &line.low, &line.high).line(
+                *name,
+                Colour::Series(i),
+                &at,
+                &line.middle,
+            );
         }
         panel
     });
@@ -102,7 +106,9 @@ fn loops(view: &View<'_>) -> Figure {
     Figure::multiples(
         "loops",
         "The full model on the loops",
-        format!("Each line should run through the middle of its branch's dots.{left}"),
+        format!(
+            "Each line should run through the middle of its branch's dots. The shade about it is what the table's numbers leave open.{left}"
+        ),
         panels.collect(),
     )
 }
@@ -167,10 +173,7 @@ fn repeat(view: &View<'_>, group: usize, number: usize, branches: [(usize, usize
     let blocked = off(&|c| c < 0.1 * reach.max(0.01)).map(|d| at.blocked_force_N + d);
     let free = at.free_contraction.and_then(|free| {
         let shift = off(&|c| (c - free).abs() < 0.12 * free.max(0.01))?;
-        let h = 1e-4;
-        let slope = (view.force(pressure, (free + h) * view.l0, 0.0)
-            - view.force(pressure, (free - h) * view.l0, 0.0))
-            / (2.0 * h);
+        let slope = view.slope(pressure, free);
         (slope < 0.0).then(|| free - shift / slope)
     });
     Repeat { group, number, blocked, free }
@@ -181,16 +184,29 @@ fn ends(view: &View<'_>) -> Figure {
     let most = all.iter().map(|r| r.number).max().unwrap_or(0).min(8);
     let kpa: Vec<f64> = view.levels.iter().map(|p| p / 1e3).collect();
     let s = &view.fit.summary.pressures;
-    let blocked: Vec<f64> = s.iter().map(|p| p.blocked_force_N).collect();
-    let free: Vec<f64> = s.iter().map(|p| p.free_contraction.map_or(f64::NAN, |c| 100.0 * c)).collect();
+    let blocked: Banded = view.levels.iter().map(|p| view.banded_at(*p, 0.0, 0.0)).collect();
+    // The force's interval, carried over to the contraction by the slope of the load line.
+    let free: Banded = view
+        .levels
+        .iter()
+        .zip(s)
+        .map(|(pressure, p)| {
+            let Some(at) = p.free_contraction else { return [f64::NAN; 3] };
+            let [force, low, _] = view.banded_at(*pressure, at * view.l0, 0.0);
+            let half = ((force - low) / view.slope(*pressure, at)).abs();
+            [100.0 * at, 100.0 * (at - half), 100.0 * (at + half)]
+        })
+        .collect();
     let pressure = || Axis::new("pressure P", "kPa");
+    let panel = |title: &str, y: Axis, line: &Banded| {
+        Panel::new(pressure(), y.from_zero())
+            .titled(title)
+            .band("95 % interval of the table", Colour::Muted, &kpa, &line.low, &line.high)
+            .line("table", Colour::Muted, &kpa, &line.middle)
+    };
     let mut panels = [
-        Panel::new(pressure(), Axis::new("blocked force F_{B}", "N").from_zero())
-            .titled("Blocked force")
-            .line("table", Colour::Muted, &kpa, &blocked),
-        Panel::new(pressure(), Axis::new("free contraction", "%").from_zero())
-            .titled("Free contraction")
-            .line("table", Colour::Muted, &kpa, &free),
+        panel("Blocked force", Axis::new("blocked force F_{B}", "N"), &blocked),
+        panel("Free contraction", Axis::new("free contraction", "%"), &free),
     ];
     for number in 1..=most {
         let name =
@@ -305,15 +321,12 @@ fn against_midline(view: &View<'_>) -> Figure {
         }
         let strokes: Vec<f64> = of.iter().map(|i| view.fit.midline[*i].stroke).collect();
         let pressure = view.levels[group];
-        let mid: Vec<f64> = strokes.iter().map(|s| view.force(pressure, *s, 0.0)).collect();
-        let std = view.force_std(pressure, &strokes);
-        let edge =
-            |sign: f64| -> Vec<f64> { mid.iter().zip(&std).map(|(f, s)| f + sign * 1.96 * s).collect() };
-        panel.band("table, 95 %", Colour::Series(0), &x, &edge(-1.0), &edge(1.0)).line(
+        let line = view.banded(pressure, &strokes, 0.0);
+        panel.band("95 % interval of the table", Colour::Series(0), &x, &line.low, &line.high).line(
             "table",
             Colour::Series(0),
             &x,
-            &mid,
+            &line.middle,
         )
     });
     Figure::multiples(

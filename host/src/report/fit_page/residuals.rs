@@ -38,6 +38,17 @@ fn trend(x: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
     sums.iter().filter(|s| s.2 >= least).map(|s| (s.0 / s.2, s.1 / s.2)).unzip()
 }
 
+/// Mean of the residual at each tested pressure: bins of a range would cut levels in two.
+fn by_level(view: &View<'_>, rows: &[usize], residual: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let mut sums = vec![(0.0, 0.0); view.levels.len()];
+    for (i, r) in rows.iter().zip(residual) {
+        let sum = &mut sums[view.group(*i)];
+        *sum = (sum.0 + r, sum.1 + 1.0);
+    }
+    let known = sums.iter().zip(view.levels).filter(|(s, _)| s.1 > 0.0);
+    known.map(|((sum, count), p)| (p / 1e3, sum / count)).unzip()
+}
+
 fn coordinates(view: &View<'_>) -> Figure {
     let rows: Vec<usize> = (0..view.points().len()).filter(|i| view.fitted(*i)).collect();
     let points = view.points();
@@ -59,8 +70,10 @@ fn coordinates(view: &View<'_>) -> Figure {
     if rows.iter().all(|i| warm(*i).is_some()) && !rows.is_empty() {
         coordinates.push(("temperature", "°C", of(&|i| warm(i).unwrap_or(f64::NAN))));
     }
+    let held = view.fit.prepared.pressures.held;
     let panels = coordinates.into_iter().map(|(label, unit, x)| {
-        let (at, mean) = trend(&x, &residual);
+        let (at, mean) =
+            if held && unit == "kPa" { by_level(view, &rows, &residual) } else { trend(&x, &residual) };
         Panel::new(Axis::new(label, unit), axis())
             .titled(format!("against {}", label.split(' ').next().unwrap_or(label)))
             .points("each point", Colour::Muted, &x, &residual)

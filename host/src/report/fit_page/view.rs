@@ -3,12 +3,12 @@
 use model_core::units::{Length, Pressure};
 
 use super::super::{Colour, figures, fixed};
-use crate::fit::basis::columns;
+use crate::band::{ForceBand, HALF_95};
 use crate::fit::points::Point;
 use crate::fit::result::Fit;
 use crate::fit::screen::Use;
-use crate::fit::uncertainty;
 use crate::recording::Campaign;
+use crate::table_file::{About, TableFile};
 
 /// A fit, ready to be drawn.
 pub(super) struct View<'a> {
@@ -21,6 +21,26 @@ pub(super) struct View<'a> {
     /// `F − F_model` of every point by the table itself, N.
     pub residual: Vec<f64>,
     muscle: Option<model_core::muscle::Muscle<f64>>,
+    band: Option<ForceBand>,
+}
+
+/// A curve with the edges of its interval.
+pub(super) struct Banded {
+    pub middle: Vec<f64>,
+    pub low: Vec<f64>,
+    pub high: Vec<f64>,
+}
+
+impl FromIterator<[f64; 3]> for Banded {
+    fn from_iter<I: IntoIterator<Item = [f64; 3]>>(values: I) -> Self {
+        let mut all = Self { middle: Vec::new(), low: Vec::new(), high: Vec::new() };
+        for [middle, low, high] in values {
+            all.middle.push(middle);
+            all.low.push(low);
+            all.high.push(high);
+        }
+        all
+    }
 }
 
 impl<'a> View<'a> {
@@ -28,7 +48,10 @@ impl<'a> View<'a> {
         let muscle = model_core::muscle::Muscle::<f64>::build(&fit.table).ok();
         let l0 = fit.prepared.braid.rest_length();
         let levels = fit.prepared.pressures.levels.as_slice();
-        let mut view = Self { fit, campaign, levels, l0, residual: Vec::new(), muscle };
+        let uncertainty = Some(fit.stored_uncertainty());
+        let about = About { uncertainty, ..About::default() };
+        let band = ForceBand::of(&TableFile { table: fit.table.clone(), about });
+        let mut view = Self { fit, campaign, levels, l0, residual: Vec::new(), muscle, band };
         view.residual = view
             .points()
             .iter()
@@ -50,6 +73,13 @@ impl<'a> View<'a> {
         self.muscle.as_ref().map_or(f64::NAN, |m| {
             m.force(Pressure::from_pascals(pressure), Length::from_metres(stroke), direction).newtons()
         })
+    }
+
+    /// Slope of the friction-free force over contraction, N.
+    pub fn slope(&self, pressure: f64, contraction: f64) -> f64 {
+        let h = 1e-4;
+        let at = |c: f64| self.force(pressure, c * self.l0, 0.0);
+        (at(contraction + h) - at(contraction - h)) / (2.0 * h)
     }
 
     /// The tested pressure that a point belongs to.
@@ -101,21 +131,21 @@ impl<'a> View<'a> {
         (0..count).map(|i| low + (high - low) * i as f64 / (count - 1).max(1) as f64).collect()
     }
 
-    /// Standard deviation of the friction-free force, N.
-    pub fn force_std(&self, pressure: f64, strokes: &[f64]) -> Vec<f64> {
-        let prepared = &self.fit.prepared;
-        let root = uncertainty::of_table(prepared, &self.fit.uncertain.root, &[pressure]);
-        let order = prepared.design.layout().order;
-        strokes
-            .iter()
-            .map(|x| {
-                let c = columns(&prepared.braid, *x);
-                let mut g = vec![-c.area];
-                g.extend(&c.elastic[..order]);
-                g.push(0.0);
-                root.variance(&g).sqrt()
-            })
-            .collect()
+    /// The table's force with the edges of its 95 % interval along some strokes at one pressure, N.
+    pub fn banded(&self, pressure: f64, strokes: &[f64], direction: f64) -> Banded {
+        strokes.iter().map(|x| self.banded_at(pressure, *x, direction)).collect()
+    }
+
+    /// The same at one pressure and one stroke: force, lower and upper edge.
+    pub fn banded_at(&self, pressure: f64, stroke: f64, direction: f64) -> [f64; 3] {
+        let force = self.force(pressure, stroke, direction);
+        let half = self.band.as_ref().map_or(f64::NAN, |b| HALF_95 * b.std(pressure, stroke, direction));
+        [force, force - half, force + half]
+    }
+
+    /// Half the width of the 95 % interval of single readings, N.
+    pub fn half_of_readings(&self, pressure: f64, stroke: f64, direction: f64) -> f64 {
+        self.band.as_ref().map_or(f64::NAN, |b| HALF_95 * b.reading_std(pressure, stroke, direction))
     }
 
     /// Where the largest error is, in words.

@@ -1,0 +1,175 @@
+//! Normal equations, summed bin by bin.
+//!
+//! Points of nearly one pressure share their `φ_j`. Their normal equations are summed as a small matrix in the columns
+//! `(c̃_1 … c̃_M, −s q, g, z)` and spread over the nodes only once per such bin, so that the work per point does not grow
+//! with the number of nodes.
+
+use std::ops::Range;
+
+use super::design::{Curves, Design, Layout};
+use super::linear::Symmetric;
+
+/// Normal equations at some parameters: `Σ w J Jᵀ`, `Σ w J r`, `Σ w r²`, `Σ w`.
+#[derive(Debug, Clone)]
+pub struct Normal {
+    /// `Σ w J Jᵀ`.
+    pub matrix: Symmetric,
+    /// `Σ w J r`.
+    pub right: Vec<f64>,
+    /// `Σ w r²`.
+    pub misfit: f64,
+    /// `Σ w`.
+    pub weight: f64,
+}
+
+impl Normal {
+    pub(super) fn zeros(n: usize) -> Self {
+        Self { matrix: Symmetric::zeros(n), right: vec![0.0; n], misfit: 0.0, weight: 0.0 }
+    }
+
+    /// `self + factor · other`.
+    pub fn add_scaled(&mut self, other: &Self, factor: f64) {
+        self.matrix.add_scaled(&other.matrix, factor);
+        for (x, y) in self.right.iter_mut().zip(&other.right) {
+            *x += factor * y;
+        }
+        self.misfit += factor * other.misfit;
+        self.weight += factor * other.weight;
+    }
+}
+
+/// Small sums of one bin.
+struct Sums {
+    square: Vec<f64>,
+    right: Vec<f64>,
+    misfit: f64,
+    weight: f64,
+}
+
+impl Design {
+    /// Sums by bin over a stretch of rows; bins without weight there are absent.
+    fn sums(
+        &self,
+        rows: Range<usize>,
+        parameters: &[f64],
+        curves: &Curves,
+        weights: &[f64],
+    ) -> Vec<(u32, Sums)> {
+        let d = self.orthonormal.order + 2 + self.extras;
+        let mut place = vec![u32::MAX; self.bins.len()];
+        let mut sums: Vec<(u32, Sums)> = Vec::new();
+        let mut y = vec![0.0; d];
+        for i in rows {
+            let (row, w) = (&self.rows[i], weights[i]);
+            if w <= 0.0 {
+                continue;
+            }
+            let e = self.evaluate(i, parameters, curves);
+            let r = row.force - e.force;
+            self.small_columns(i, &e, &mut y);
+            let at = &mut place[row.bin as usize];
+            if *at == u32::MAX {
+                *at = sums.len() as u32;
+                let empty = Sums { square: vec![0.0; d * d], right: vec![0.0; d], misfit: 0.0, weight: 0.0 };
+                sums.push((row.bin, empty));
+            }
+            let s = &mut sums[*at as usize].1;
+            for (a, ya) in y.iter().enumerate() {
+                let wy = w * ya;
+                s.right[a] += wy * r;
+                for (to, yb) in s.square[a * d..=a * d + a].iter_mut().zip(&y) {
+                    *to += wy * yb;
+                }
+            }
+            s.misfit += w * r * r;
+            s.weight += w;
+        }
+        sums
+    }
+
+    fn expand(&self, sums: &Sums, phi: &[f64], into: &mut Normal) {
+        if sums.weight <= 0.0 {
+            return;
+        }
+        let layout = self.layout();
+        let (m, nodes, n) = (layout.order, layout.nodes, layout.len());
+        let d = m + 2 + self.extras;
+        into.misfit += sums.misfit;
+        into.weight += sums.weight;
+        self.spread(&sums.right, phi, 1.0, &mut into.right);
+        // Functions that vanish here are left out: with few nodes none does, and nothing is lost.
+        let live: Vec<usize> = (0..nodes).filter(|j| phi[*j] != 0.0).collect();
+        let place = |a: usize| if a == m + 1 { Layout::DEADBAND } else { layout.extra(a - m - 2) };
+        for a in 0..d {
+            for b in 0..=a {
+                let value = sums.square[a * d + b];
+                if value == 0.0 {
+                    continue;
+                }
+                match (a <= m, b <= m) {
+                    (true, true) => {
+                        for &i in &live {
+                            let row = layout.elastic(a, i) * n;
+                            let column = layout.elastic(b, 0);
+                            let v = value * phi[i];
+                            for &j in &live {
+                                into.matrix.a[row + column + j] += v * phi[j];
+                            }
+                        }
+                        if a != b {
+                            for &i in &live {
+                                let row = layout.elastic(b, i) * n;
+                                let column = layout.elastic(a, 0);
+                                let v = value * phi[i];
+                                for &j in &live {
+                                    into.matrix.a[row + column + j] += v * phi[j];
+                                }
+                            }
+                        }
+                    }
+                    (false, true) => {
+                        for &j in &live {
+                            into.matrix.add(place(a), layout.elastic(b, j), value * phi[j]);
+                        }
+                    }
+                    _ => into.matrix.add(place(a), place(b), value),
+                }
+            }
+        }
+    }
+
+    /// The normal equations of all points.
+    #[must_use]
+    pub fn normal(&self, parameters: &[f64], weights: &[f64]) -> Normal {
+        self.normal_of(0..self.rows.len(), parameters, &self.curves(parameters), weights)
+    }
+
+    /// The normal equations of a stretch of points. `curves` are those of `parameters`.
+    #[must_use]
+    pub fn normal_of(
+        &self,
+        rows: Range<usize>,
+        parameters: &[f64],
+        curves: &Curves,
+        weights: &[f64],
+    ) -> Normal {
+        let mut normal = Normal::zeros(self.layout().len());
+        for (bin, s) in self.sums(rows, parameters, curves, weights) {
+            self.expand(&s, &self.bins[bin as usize].phi, &mut normal);
+        }
+        normal
+    }
+
+    /// The normal equations of each group by itself.
+    #[must_use]
+    pub fn normal_by_group(&self, parameters: &[f64], weights: &[f64]) -> Vec<Normal> {
+        let mut normals = vec![Normal::zeros(self.layout().len()); self.groups];
+        for (bin, s) in self.sums(0..self.rows.len(), parameters, &self.curves(parameters), weights) {
+            let bin = &self.bins[bin as usize];
+            if let Some(normal) = normals.get_mut(bin.group as usize) {
+                self.expand(&s, &bin.phi, normal);
+            }
+        }
+        normals
+    }
+}

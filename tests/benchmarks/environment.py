@@ -1,0 +1,31 @@
+"""The peers' own Python: made once under target/, entered by every benchmark."""
+
+import os
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+PLACE = ROOT / "target" / "benchmarks-python"
+
+
+def enter() -> None:
+    """Starts the script again in an environment that has what requirements.txt names, made at the first call."""
+    python = PLACE / "bin" / "python"
+    if Path(sys.prefix) == PLACE:
+        return
+    wanted = HERE / "requirements.txt"
+    done = PLACE / "requirements.txt"
+    if not done.exists() or done.read_text() != wanted.read_text():
+        venv.create(PLACE, with_pip=True)
+        subprocess.run([python, "-m", "pip", "install", "--quiet", "-r", wanted], check=True)
+        done.write_text(wanted.read_text())
+    os.execv(python, [str(python), *sys.argv])
+
+
+def built(*arguments: str) -> Path:
+    """Builds a release program of `host` and gives the folder it is in."""
+    subprocess.run(["cargo", "build", "--release", "--quiet", "--package", "host", *arguments], cwd=ROOT, check=True)
+    return ROOT / "target" / "release"
