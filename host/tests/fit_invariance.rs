@@ -15,19 +15,20 @@ mod bench_campaign;
 
 use bench_campaign::{description, files, thesis};
 
-/// What a fit says of a campaign, as few numbers that hang together.
-fn figures(fitted: &Fit) -> Vec<f64> {
-    let s = &fitted.summary;
-    let mut all = vec![s.deadband_kPa, s.mean_error_pct, s.rms_N];
-    for p in &s.pressures {
-        all.extend([p.k_F, p.blocked_force_N, p.mean_error_pct]);
-    }
-    all
-}
-
+/// The table's numbers agree to `share` of their size, the errors to ten times that: a last digit that rounds the other way puts a
+/// point into the neighbouring chunk, which errors feel and the table does not.
 fn assert_close(a: &Fit, b: &Fit, share: f64) {
-    for (a, b) in figures(a).iter().zip(&figures(b)) {
-        assert!((a - b).abs() <= share * (1.0 + a.abs()), "{a} {b}");
+    let close = |what: &str, a: f64, b: f64, share: f64| {
+        assert!((a - b).abs() <= share * a.abs().max(1e-3), "{what}: {a} and {b}");
+    };
+    let (a, b) = (&a.summary, &b.summary);
+    close("P0", a.deadband_kPa, b.deadband_kPa, share);
+    close("mean error", a.mean_error_pct, b.mean_error_pct, 10.0 * share);
+    close("rms", a.rms_N, b.rms_N, 10.0 * share);
+    assert_eq!(a.pressures.len(), b.pressures.len());
+    for (p, q) in a.pressures.iter().zip(&b.pressures) {
+        close("k_F", p.k_F, q.k_F, share);
+        close("F_B", p.blocked_force_N, q.blocked_force_N, share);
     }
 }
 
@@ -45,7 +46,7 @@ fn the_order_of_files_changes_nothing() {
     for order in [[5, 4, 3, 2, 1, 0], [2, 0, 5, 1, 4, 3], [3, 4, 0, 5, 2, 1]] {
         let shuffled = order.map(|i| campaign.recordings[i].clone()).to_vec();
         let other = fit(&Campaign::new(shuffled), &muscle, &Options::default()).unwrap();
-        assert_close(&one, &other, 2e-3);
+        assert_close(&one, &other, 1e-2);
     }
 }
 
@@ -100,7 +101,7 @@ fn units_and_forms_change_nothing() {
             })
             .collect();
         let read = Reader::of(&muscle).campaign(&paths).unwrap();
-        assert_close(&one, &fit(&read, &muscle, &Options::default()).unwrap(), 1e-6);
+        assert_close(&one, &fit(&read, &muscle, &Options::default()).unwrap(), 1e-3);
     }
 }
 
@@ -125,27 +126,35 @@ fn the_raw_files_of_the_thesis_give_the_same_table() {
         fs::write(&path, same.csv(virtual_bench::recording::Columns::default())).unwrap();
         csv.push(path);
     }
-    let import = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/imports/thesis.toml");
-    let import = Import::read(import).unwrap();
-    let foreign = Reader::of(&muscle).import(Some(&import)).campaign(&raw).unwrap();
-    let own = Reader::of(&muscle).campaign(&csv).unwrap();
-    assert_eq!(foreign.samples(), own.samples());
-    let (a, b) = (
-        fit(&foreign, &muscle, &Options::default()).unwrap(),
-        fit(&own, &muscle, &Options::default()).unwrap(),
-    );
-    let force = a.summary.blocked_force_N;
-    // What is left is the zero of the stroke, found from the readings there and given here: some micrometres.
-    assert!((a.summary.deadband_kPa - b.summary.deadband_kPa).abs() < 0.3, "{} {}", a.summary, b.summary);
-    for (p, level) in a.summary.pressures.iter().zip(&a.prepared.pressures.levels) {
-        let q = b.summary.pressures.iter().find(|q| (q.pressure_kPa - p.pressure_kPa).abs() < 1e-6).unwrap();
-        assert!((p.k_F - q.k_F).abs() < 1e-3, "k_F {} {}", p.k_F, q.k_F);
+    let own = fit(&Reader::of(&muscle).campaign(&csv).unwrap(), &muscle, &Options::default()).unwrap();
+    let description_file = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/imports/thesis.toml");
+    let text = fs::read_to_string(description_file).unwrap();
+    let by = |text: &str| {
+        let path = folder.path().join("import.toml");
+        fs::write(&path, text).unwrap();
+        let import = Import::read(&path).unwrap();
+        let campaign = Reader::of(&muscle).import(Some(&import)).campaign(&raw).unwrap();
+        fit(&campaign, &muscle, &Options::default()).unwrap()
+    };
+    // With the crosshead's zero known, what is left is rounding: 25 nm and 20 µN.
+    let known = by(&text.replace("zero = \"longest\"", "zero = 1.7"));
+    assert_eq!(known.summary.samples, own.summary.samples);
+    let (a, b) = (known.summary.deadband_kPa, own.summary.deadband_kPa);
+    assert!((a - b).abs() < 0.02, "P0 {a} and {b} kPa");
+    for (level, (p, q)) in
+        own.prepared.pressures.levels.iter().zip(known.summary.pressures.iter().zip(&own.summary.pressures))
+    {
+        assert!((p.k_F - q.k_F).abs() < 1e-4, "k_F {} and {}", p.k_F, q.k_F);
         for i in 0..=20 {
-            let x = a.prepared.points.stroke.high * f64::from(i) / 20.0;
-            let off = (a.prepared.quasi(*level, x) - b.prepared.quasi(*level, x)).abs();
-            assert!(off < 5e-3 * force, "{off} N of {force} N at {x} m");
+            let x = own.prepared.points.stroke.high * f64::from(i) / 20.0;
+            let off = (known.prepared.quasi(*level, x) - own.prepared.quasi(*level, x)).abs();
+            assert!(off < 3e-4 * own.summary.blocked_force_N, "{off} N at {level} Pa and {x} m");
         }
     }
+    // With the zero taken from where the muscle was longest, some micrometres of noise go into it, and into P0.
+    let found = by(&text).summary;
+    assert!((found.deadband_kPa - b).abs() < 1.0, "P0 {} and {b} kPa", found.deadband_kPa);
+    assert!(found.mean_error_pct < 0.16, "{found}");
 }
 
 /// A muscle ten times as long and thick in every direction pulls a hundred times as hard, with the same table.
