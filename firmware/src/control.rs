@@ -577,6 +577,9 @@ impl Controller {
             let most =
                 actuator.model.as_ref().map_or(f32::MAX, |model| model.muscle.max_pressure().pascals());
             let high = most.min(settings.limits.pressure_pa);
+            if settings.pressure.fitted {
+                actuator.regulator.observe(TICK_S, actuator.sample.pressure_pa, &settings.regulator);
+            }
             let driven = actuator.regulator.step(TICK_S, wish, high, &settings.regulator, &settings.limits);
             actuator.cut = if driven.saturated { wish - driven.wanted_pa } else { 0.0 };
             if !reached || driven.saturated {
@@ -595,13 +598,20 @@ impl Controller {
         let settings = &self.settings;
         let actuator = &mut self.sides[at];
         actuator.wanted_n = force_n;
-        let model = actuator.present();
+        let model_n = actuator.model_n;
+        let model = actuator.model.as_mut().filter(|_| model_n.is_some());
         let (forward, reached) = modes::feed_forward(settings, model, force_n, actuator.guess_pa);
         actuator.guess_pa = forward;
         actuator.forward_pa = forward;
         let measures = settings.force.fitted && actuator.sample.force_n.is_finite();
         actuator.trim_pa = if measures {
-            let error = force_n - actuator.sample.force_n;
+            let expected_n = match (settings.feed_forward, model_n, &actuator.model) {
+                (FeedForward::Table, Some(model_n), Some(model)) => {
+                    model_n - model.slope() * actuator.trim_pa
+                }
+                _ => force_n,
+            };
+            let error = expected_n - actuator.sample.force_n;
             modes::trim(&settings.force_loop, &mut actuator.trim, error, actuator.cut)
         } else {
             0.0

@@ -1,9 +1,9 @@
 //! Which pressure a mode wants: the mathematics between a set-point and the regulator.
 
-use model_core::effects::Chain;
+use model_core::effects::{Chain, EffectName};
 use model_core::inverse::{Reach, Search, Solution};
 use model_core::link::settings::{FeedForward, ForceLoop, Joint, Settings, StrokeLoop};
-use model_core::motion::Motion;
+use model_core::motion::{Motion, Slide};
 use model_core::muscle::{Held, Moment, Muscle};
 use model_core::table::{MuscleTable, TableError};
 use model_core::units::{Force, Length, Pressure};
@@ -19,7 +19,22 @@ pub struct Model {
     pub chain: Chain<f32>,
     /// The muscle in this tick. Without effects its shape and direction are all that is kept up.
     now: Moment<f32>,
+    /// Direction of friction; none where an effect of the table says how friction goes over from one to the other.
+    slide: Option<Slide<f32>>,
+    /// Distances of [`Slide`] in a metre of stroke, and in a pascal at held length.
+    per_metre: f32,
+    per_pascal: f32,
+    last: Option<(f32, f32)>,
+    /// `∂F/∂P` where the last search ended, N/Pa.
+    slope: f32,
 }
+
+/// Travel over which friction goes over, as a part of the tested contraction: some micrometres of a small muscle, some tens of a
+/// large one. What it is of one muscle only the effect `presliding-hysteresis` knows.
+const SLIDE: f32 = 2.0e-3;
+/// The part of the free motion that strands slip at held length. Half of what [`model_core::effects::BraidTravel`] takes: friction
+/// that goes over with the pressure asks for more pressure, and must not ask for more than what turned it.
+const SLIP: f32 = 0.025;
 
 impl Model {
     /// Builds it from a table.
@@ -27,20 +42,46 @@ impl Model {
     /// # Errors
     /// The number of the table that cannot be used.
     pub fn build(table: &MuscleTable) -> Result<Self, TableError> {
-        let muscle = Muscle::build(table)?;
-        Ok(Self { chain: Chain::resumed(&table.effects), now: muscle.moment(), muscle })
+        let muscle = Muscle::<f32>::build(table)?;
+        let now = muscle.moment();
+        let reach_m = table.tested.contraction_high.max(1.0e-2) * muscle.braid().rest_length();
+        let distance_m = SLIDE * reach_m;
+        // Free, the muscle would go all its way for the pressure that holds its blocked force.
+        let blocked_pa = table.blocked_force.newtons().abs().max(1.0e-3) / now.held.posture.area;
+        let slip = SLIP * reach_m / blocked_pa.abs().max(1.0);
+        let knows = table.effects.iter().any(|e| e.effect == EffectName::PreslidingHysteresis);
+        Ok(Self {
+            chain: Chain::resumed(&table.effects),
+            slide: (!knows).then(Slide::default),
+            per_metre: 1.0 / distance_m,
+            per_pascal: slip / distance_m,
+            last: None,
+            slope: now.held.posture.area,
+            now,
+            muscle,
+        })
+    }
+
+    /// Direction of friction at these readings.
+    fn slid(&mut self, motion: &Motion<f32>, pressure_pa: f32) -> f32 {
+        let now = (motion.stroke, pressure_pa);
+        let (stroke, pressure) = self.last.replace(now).unwrap_or(now);
+        let travel = (motion.stroke - stroke) * self.per_metre + (pressure_pa - pressure) * self.per_pascal;
+        self.slide.as_mut().map_or(motion.direction, |slide| slide.step(travel))
     }
 
     /// Lets one tick pass: the shape at the measured stroke, a step of the effects, and the force at the readings, N.
     pub fn tick(&mut self, motion: &Motion<f32>, pressure_pa: f32) -> f32 {
-        let Self { muscle, chain, now } = self;
+        let direction = self.slid(motion, pressure_pa);
+        let Self { muscle, chain, now, .. } = self;
         let pressure = Pressure::from_pascals(pressure_pa);
         let newtons = if chain.is_empty() {
             now.held = muscle.held(Length::from_metres(motion.stroke));
-            now.context.direction = motion.direction;
-            muscle.force_posed(&now.held.posture, pressure, motion.direction)
+            now.context.direction = direction;
+            muscle.force_posed(&now.held.posture, pressure, direction)
         } else {
             muscle.update(now, motion, pressure);
+            now.context.direction = direction;
             chain.step(&now.context);
             now.context.force() + chain.force(&now.context)
         };
@@ -58,7 +99,7 @@ impl Model {
     }
 
     /// The pressure for a wanted force in this tick, and whether it can be had.
-    pub fn pressure_for(&self, force_n: f32, guess_pa: f32) -> (f32, bool) {
+    pub fn pressure_for(&mut self, force_n: f32, guess_pa: f32) -> (f32, bool) {
         let search = Search { tolerance: Pressure::from_pascals(20.0), ..self.muscle.search() };
         let force = Force::from_newtons(force_n);
         let guess = Pressure::from_pascals(guess_pa);
@@ -67,7 +108,13 @@ impl Model {
         } else {
             self.muscle.pressure_with(force, &self.chain, &self.now, guess, &search)
         };
+        self.slope = found.slope;
         (found.pressure.pascals(), found.reach == Reach::Reached)
+    }
+
+    /// `∂F/∂P` where the last search ended, N/Pa.
+    pub fn slope(&self) -> f32 {
+        self.slope
     }
 
     /// `P = F / g`, the ideal braid alone, `g = (3L² − B²)/(4πN²)`; the highest pressure past the neutral angle.
@@ -97,7 +144,12 @@ pub fn base_pressure(
 }
 
 /// The feed-forward pressure of a wanted force, Pa; without a table there is none.
-pub fn feed_forward(settings: &Settings, model: Option<&Model>, force_n: f32, guess_pa: f32) -> (f32, bool) {
+pub fn feed_forward(
+    settings: &Settings,
+    model: Option<&mut Model>,
+    force_n: f32,
+    guess_pa: f32,
+) -> (f32, bool) {
     match (settings.feed_forward, model) {
         (FeedForward::Off, _) | (_, None) => (0.0, true),
         (FeedForward::Table, Some(model)) => model.pressure_for(force_n, guess_pa),
@@ -131,8 +183,11 @@ impl Integral {
 
 /// Trim of force on the load cell, Pa. `cut` is the sign of what the last command's limits took away.
 ///
-/// Its bandwidth beside the feed-forward: the muscle's slope `g = ∂F/∂P` makes the loop `L(s) = g (K_p + K_i/s)`, so it
-/// crosses over near `g K_i` rad/s; the regulator's lag asks for a good deal less than `1/lag`.
+/// Without a table the error is that of the wanted force, and the loop `L(s) = g (K_p + K_i/s)` with `g = ∂F/∂P` crosses over
+/// near `g K_i` rad/s; the regulator's lag asks for a good deal less than `1/lag`. With one it is that of the force which the
+/// table gives at the measured pressure, less what the trim has added: an observer of what the table leaves out. The
+/// regulator's lag is not in that loop, which has to wait for nothing but its own filter of `g K_i` rad/s, and the trim does not
+/// answer a wave with a wave of its own.
 pub fn trim(force_loop: &ForceLoop, integral: &mut Integral, error_n: f32, cut: f32) -> f32 {
     let limit = force_loop.trim_limit_pa;
     if limit <= 0.0 {

@@ -4,13 +4,21 @@
 //! target = gain · (command + offset)
 //! dp/dt  = clamp((target − p) / lag, ±rate), 0 while |target − p| < deadband
 //! ```
-//! Gain and offset are inverted exactly, the lag by lead as far as the settings ask: `target = p* + lead · lag · dp*/dt`, the
-//! rate smoothed over a tenth of the lag so that a sensor's noise is not made ten times as large or more.
+//! Gain and offset are inverted exactly, the lag by lead as far as the settings ask: `target = p* + lead · (lag + 1.5 ticks) ·
+//! dp*/dt`, the rate smoothed over a tenth of the lag so that a sensor's noise is not made ten times as large or more.
 //! A rate limit and a deadband cannot be inverted; they are only predicted, so that the watch on pressure knows what to
-//! expect.
+//! expect. What the measured pressure lacks of the predicted is added slowly ([`RegulatorState::observe`]).
 
 use model_core::link::settings::{Limits, Regulator};
 
+use crate::control::TICK_S;
+
+/// Time constant of the observer of what the regulator's model leaves out, s: slower than its lag, quicker than its drift.
+const OBSERVER_S: f32 = 0.15;
+/// The most that the observer adds, as a part of the largest command.
+const BIAS: f32 = 0.02;
+/// What the loop itself is late by: readings are a tick old when they are answered, and a command holds for a tick.
+const LOOP_S: f32 = 1.5 * TICK_S;
 /// Share of the lag over which the lead's rate is smoothed.
 const SMOOTHING: f32 = 0.1;
 
@@ -21,6 +29,8 @@ pub struct RegulatorState {
     rate_pa_per_s: f32,
     model_pa: f32,
     command_pa: f32,
+    /// What the regulator's own model leaves out, added to what is commanded.
+    bias_pa: f32,
 }
 
 /// What [`RegulatorState::step`] decided.
@@ -41,6 +51,17 @@ impl RegulatorState {
         self.wanted_pa = pressure_pa;
         self.rate_pa_per_s = 0.0;
         self.model_pa = pressure_pa;
+        self.bias_pa = 0.0;
+    }
+
+    /// Takes a tick's measured pressure: what it lacks of the model's is given slowly to the command. Zero and gain of a
+    /// regulator drift, and it ripples; its lag is in the model and stirs nothing.
+    pub fn observe(&mut self, dt: f32, measured_pa: f32, regulator: &Regulator) {
+        let lack = self.model_pa - measured_pa;
+        if lack.is_finite() {
+            let most = BIAS * regulator.command_max_pa;
+            self.bias_pa = (self.bias_pa + lack * dt / OBSERVER_S).clamp(-most, most);
+        }
     }
 
     /// Pressure that the regulator should have brought about by now, Pa.
@@ -68,11 +89,16 @@ impl RegulatorState {
         self.rate_pa_per_s += (rate - self.rate_pa_per_s) * dt / (dt + SMOOTHING * regulator.lag_s);
         self.wanted_pa = wanted;
         // Lead never commands more than the muscle may bear, not even for a moment: a regulator may be faster than its model.
-        let target =
-            (wanted + regulator.lead * regulator.lag_s * self.rate_pa_per_s).clamp(0.0, high_pa.max(0.0));
-        let free = target / regulator.gain - regulator.offset_pa;
-        let command = free.clamp(0.0, regulator.command_max_pa);
-        self.predict(dt, command, regulator);
+        let target = (wanted + regulator.lead * (regulator.lag_s + LOOP_S) * self.rate_pa_per_s)
+            .clamp(0.0, high_pa.max(0.0));
+        let modelled = (target / regulator.gain - regulator.offset_pa).clamp(0.0, regulator.command_max_pa);
+        let free = (target + self.bias_pa) / regulator.gain - regulator.offset_pa;
+        let command = free.clamp(
+            0.0,
+            regulator.command_max_pa.min(high_pa.max(0.0) / regulator.gain - regulator.offset_pa),
+        );
+        self.predict(dt, modelled, regulator);
+        self.command_pa = command;
         Driven { wanted_pa: wanted, command_pa: command, saturated: wanted != wish_pa || command != free }
     }
 
@@ -128,6 +154,24 @@ mod tests {
         let mut state = RegulatorState::default();
         let driven = state.step(1e-3, 900e3, 500e3, &settings.regulator, &settings.limits);
         assert!(driven.saturated && driven.command_pa <= 500e3);
+    }
+
+    #[test]
+    fn a_drift_of_the_regulator_is_taken_away_and_a_broken_one_is_not_chased() {
+        let settings = Settings::default();
+        let run = |drift: f32| {
+            let mut state = RegulatorState::default();
+            let mut pressure = 0.0_f32;
+            for _ in 0..3000 {
+                let driven = state.step(1e-3, 300e3, 600e3, &settings.regulator, &settings.limits);
+                pressure += (driven.command_pa + drift - pressure) / 31.0;
+                state.observe(1e-3, pressure, &settings.regulator);
+            }
+            (pressure - 300e3, state.command_pa())
+        };
+        assert!(run(5e3).0.abs() < 50.0, "{:?}", run(5e3));
+        let most = 300e3 + BIAS * settings.regulator.command_max_pa;
+        assert!((run(-200e3).1 - most).abs() < 1.0, "{:?}", run(-200e3));
     }
 
     #[test]
