@@ -7,21 +7,28 @@
 //! ```
 //! Watches look at every tick before the command is made, so a fault changes the command of the tick it is noticed in.
 
-use heapless::Vec;
 use model_core::link::messages::{
-    Event, Fault, FaultReport, Field, Mode, Reference, Refusal, SetPoint, Side, SideSample, State, Telemetry,
-    Variable,
+    Event, Fault, FaultReport, Field, Mode, Reference, Refusal, SetPoint, Side, State, Telemetry,
 };
 use model_core::link::settings::{FeedForward, Reaction, Settings};
 use model_core::motion::{MotionSettings, MotionTracker};
 
 use crate::board::{Command, Inputs, Outputs, Readings};
-use crate::modes::{self, Integral, Model, PairState, Posed};
+use crate::modes::{Model, PairState};
 use crate::reference::Generator;
-use crate::regulator::RegulatorState;
 use crate::safety::{self, Cause, Machine};
 use crate::trace::Trace;
-use crate::watch::{Finding, Seen, SideWatch};
+use crate::watch::{Finding, SideWatch};
+
+mod actuator;
+mod check;
+mod drive;
+mod look_out;
+mod record;
+
+pub use check::check_settings;
+
+use actuator::Actuator;
 
 /// Control ticks in a second.
 pub const TICKS_PER_S: u32 = 1000;
@@ -29,53 +36,6 @@ pub const TICKS_PER_S: u32 = 1000;
 pub const TICK_S: f32 = 1.0e-3;
 /// Length of a tick, µs.
 pub const TICK_US: u64 = 1000;
-
-/// One muscle at work.
-#[derive(Clone, Debug)]
-struct Actuator {
-    model: Option<Model>,
-    motion: MotionTracker<f32>,
-    watch: SideWatch,
-    regulator: RegulatorState,
-    trim: Integral,
-    stroke_loop: Integral,
-    guess_pa: f32,
-    /// Sign of what the limits took from the last wish.
-    cut: f32,
-    sample: SideSample,
-    command: Command,
-    wanted_n: f32,
-    forward_pa: f32,
-    trim_pa: f32,
-    /// Force by the table at this tick's readings, N; none without a table or without readings that are numbers.
-    model_n: Option<f32>,
-}
-
-impl Actuator {
-    fn new(settings: &Settings) -> Self {
-        Self {
-            model: None,
-            motion: MotionTracker::new(motion_settings(settings)),
-            watch: SideWatch::default(),
-            regulator: RegulatorState::default(),
-            trim: Integral::default(),
-            stroke_loop: Integral::default(),
-            guess_pa: 0.0,
-            cut: 0.0,
-            sample: SideSample::default(),
-            command: Command { pressure_pa: 0.0, vent: true },
-            wanted_n: 0.0,
-            forward_pa: 0.0,
-            trim_pa: 0.0,
-            model_n: None,
-        }
-    }
-
-    /// The table, if it has been brought to this tick.
-    fn present(&self) -> Option<&Model> {
-        self.model.as_ref().filter(|_| self.model_n.is_some())
-    }
-}
 
 fn motion_settings(settings: &Settings) -> MotionSettings<f32> {
     MotionSettings {
@@ -478,316 +438,5 @@ impl Controller {
         let model_n = actuator.model.as_mut()?.tick(motion, pressure_pa);
         actuator.sample.model_n = model_n;
         Some(model_n)
-    }
-
-    fn watch(&mut self, inputs: &Inputs) -> Option<(Side, Finding)> {
-        let settings = &self.settings;
-        self.overruns = self.overruns.saturating_add(u32::from(inputs.missed_ticks));
-        self.missed_in_a_row = if inputs.missed_ticks > 0 {
-            self.missed_in_a_row.saturating_add(inputs.missed_ticks)
-        } else {
-            0
-        };
-        let mut found = None;
-        for side in Side::ALL {
-            if !(side == Side::Agonist || self.mode == Mode::Pair) {
-                continue;
-            }
-            let actuator = &mut self.sides[side.index()];
-            let seen = Seen {
-                readings: inputs.sides[side.index()],
-                speed_m_per_s: actuator.motion.motion().speed,
-                command: actuator.command,
-                expected_pa: actuator.regulator.model_pa(),
-                model_n: actuator.model_n,
-            };
-            let finding = actuator.watch.check(&seen, settings);
-            found = found.or(finding.map(|finding| (side, finding)));
-        }
-        let plain =
-            |fault, value, limit| Some((Side::Agonist, Finding { fault, sensor: None, value, limit }));
-        if found.is_some() {
-            return found;
-        }
-        if inputs.supply_low {
-            return plain(Fault::BrownOut, 0.0, 0.0);
-        }
-        if self.missed_in_a_row >= settings.watch.overrun_ticks.max(1) {
-            return plain(
-                Fault::LoopOverrun,
-                f32::from(self.missed_in_a_row),
-                f32::from(settings.watch.overrun_ticks),
-            );
-        }
-        self.host_age = self.host_age.saturating_add(1);
-        let silence = settings.watch.host_silence_ticks;
-        let controls = self.machine.state() == State::Running && self.mode != Mode::Vent;
-        if controls && !settings.watch.autonomous && self.host_age > silence {
-            return plain(Fault::HostSilence, self.host_age as f32, silence as f32);
-        }
-        self.asked_age = self.asked_age.saturating_add(1);
-        let silence = settings.watch.silence_ticks;
-        if controls && silence > 0 && self.generator.is_set_point() && self.asked_age > silence {
-            return plain(Fault::SetPointSilence, self.asked_age as f32, silence as f32);
-        }
-        None
-    }
-
-    /// Makes the commands of the running mode.
-    fn drive(&mut self) {
-        let settings = self.settings;
-        let mut wishes = [(0.0, true); 2];
-        match self.mode {
-            Mode::Vent => {}
-            Mode::Pressure => wishes[0] = (self.asked, true),
-            Mode::Force => wishes[0] = self.force_wish(0, self.asked),
-            Mode::Stroke => {
-                let side = &mut self.sides[0];
-                let speed = side.motion.motion().speed;
-                let force = modes::stroke_force(
-                    &settings.stroke_loop,
-                    &mut side.stroke_loop,
-                    self.asked,
-                    side.sample.stroke_m,
-                    speed,
-                    side.cut,
-                );
-                wishes[0] = self.force_wish(0, force);
-            }
-            Mode::Pair => {
-                let forces = self.pair_forces();
-                wishes[0] = self.force_wish(0, forces[0]);
-                wishes[1] = self.force_wish(1, forces[1]);
-            }
-        }
-        let mut bad = None;
-        for side in Side::ALL {
-            let used = self.uses(side) && self.mode != Mode::Vent;
-            let actuator = &mut self.sides[side.index()];
-            let (wish, reached) = wishes[side.index()];
-            if !used {
-                actuator.regulator.vent(TICK_S, &settings.regulator);
-                actuator.command = Command { pressure_pa: 0.0, vent: true };
-                continue;
-            }
-            if !wish.is_finite() {
-                bad = Some((side, wish));
-                continue;
-            }
-            let most =
-                actuator.model.as_ref().map_or(f32::MAX, |model| model.muscle.max_pressure().pascals());
-            let high = most.min(settings.limits.pressure_pa);
-            if settings.pressure.fitted {
-                actuator.regulator.observe(TICK_S, actuator.sample.pressure_pa, &settings.regulator);
-            }
-            let driven = actuator.regulator.step(TICK_S, wish, high, &settings.regulator, &settings.limits);
-            actuator.cut = if driven.saturated { wish - driven.wanted_pa } else { 0.0 };
-            if !reached || driven.saturated {
-                self.saturated_ticks = self.saturated_ticks.saturating_add(1);
-            }
-            actuator.command = Command { pressure_pa: driven.command_pa, vent: false };
-            actuator.sample.wanted_pa = driven.wanted_pa;
-        }
-        if let Some((side, value)) = bad {
-            self.raise(side, &Finding { fault: Fault::NotANumber, sensor: None, value, limit: 0.0 });
-        }
-    }
-
-    /// Feed-forward and trim for a wanted force.
-    fn force_wish(&mut self, at: usize, force_n: f32) -> (f32, bool) {
-        let settings = &self.settings;
-        let actuator = &mut self.sides[at];
-        actuator.wanted_n = force_n;
-        let model_n = actuator.model_n;
-        let model = actuator.model.as_mut().filter(|_| model_n.is_some());
-        let (forward, reached) = modes::feed_forward(settings, model, force_n, actuator.guess_pa);
-        actuator.guess_pa = forward;
-        actuator.forward_pa = forward;
-        let measures = settings.force.fitted && actuator.sample.force_n.is_finite();
-        actuator.trim_pa = if measures {
-            let expected_n = match (settings.feed_forward, model_n, &actuator.model) {
-                (FeedForward::Table, Some(model_n), Some(model)) => {
-                    model_n - model.slope() * actuator.trim_pa
-                }
-                _ => force_n,
-            };
-            let error = expected_n - actuator.sample.force_n;
-            modes::trim(&settings.force_loop, &mut actuator.trim, error, actuator.cut)
-        } else {
-            0.0
-        };
-        (forward + actuator.trim_pa, reached)
-    }
-
-    fn pair_forces(&mut self) -> [f32; 2] {
-        let joint = self.settings.joint;
-        let [first, second] = &self.sides;
-        let (Some(a), Some(b)) = (first.present(), second.present()) else {
-            return [0.0; 2];
-        };
-        let speeds = first.motion.motion().speed - second.motion.motion().speed;
-        let posed = Posed {
-            angle_rad: self.asked,
-            stiffness_nm_per_rad: self.asked_second,
-            measured_rad: (first.sample.stroke_m - second.sample.stroke_m) / (2.0 * joint.radius_m),
-            rate_rad_per_s: speeds / (2.0 * joint.radius_m),
-        };
-        let sides = [(a, first.sample.stroke_m), (b, second.sample.stroke_m)];
-        self.pair.forces(&joint, &posed, sides, first.cut - second.cut)
-    }
-
-    /// Keeps the commands of a state that does not control: vented, or held by a fault.
-    fn rest(&mut self) {
-        let regulator = self.settings.regulator;
-        for side in &mut self.sides {
-            if self.machine.state() == State::Fault && !side.command.vent {
-                side.regulator.hold(TICK_S, &regulator);
-            } else {
-                side.regulator.vent(TICK_S, &regulator);
-                side.command = Command { pressure_pa: 0.0, vent: true };
-                side.sample.wanted_pa = 0.0;
-            }
-        }
-    }
-
-    fn record(&mut self) -> Stepped {
-        for side in &mut self.sides {
-            side.sample.command_pa = if side.command.vent { 0.0 } else { side.command.pressure_pa };
-        }
-        let outputs = Outputs {
-            sides: [self.sides[0].command, self.sides[1].command],
-            asked: if self.mode == Mode::Force { self.asked } else { self.sides[0].wanted_n },
-        };
-        let Self { trace, sides, machine, tick, asked, step_us, .. } = self;
-        let state = machine.state();
-        let full = trace.sample(*tick, |variable| value_of(variable, sides, state, *asked, *step_us));
-        if full {
-            self.event = self.event.or(Some(Event::TraceFull));
-        }
-        Stepped { outputs, telemetry: self.telemetry(), event: self.event.take() }
-    }
-
-    fn telemetry(&mut self) -> Option<(u16, Telemetry)> {
-        if self.telemetry_every == 0 {
-            return None;
-        }
-        if self.telemetry_countdown > 0 {
-            self.telemetry_countdown -= 1;
-            return None;
-        }
-        self.telemetry_countdown = self.telemetry_every - 1;
-        let number = self.telemetry_number;
-        self.telemetry_number = number.wrapping_add(1);
-        let used = if self.uses(Side::Antagonist) { 2 } else { 1 };
-        let sides: Vec<SideSample, 2> = self.sides.iter().take(used).map(|side| side.sample).collect();
-        let sample = Telemetry {
-            time_us: self.time_us(),
-            tick: self.tick,
-            state: self.machine.state(),
-            mode: self.mode,
-            asked: self.asked,
-            asked_second: self.asked_second,
-            sides,
-        };
-        Some((number, sample))
-    }
-}
-
-fn value_of(variable: Variable, sides: &[Actuator; 2], state: State, asked: f32, step_us: f32) -> f32 {
-    let [first, second] = sides;
-    match variable {
-        Variable::Pressure => first.sample.pressure_pa,
-        Variable::Stroke => first.sample.stroke_m,
-        Variable::Force => first.sample.force_n,
-        Variable::Speed => first.motion.motion().speed,
-        Variable::Direction => first.motion.motion().direction,
-        Variable::Asked => asked,
-        Variable::WantedForce => first.wanted_n,
-        Variable::FeedForward => first.forward_pa,
-        Variable::Trim => first.trim_pa,
-        Variable::WantedPressure => first.sample.wanted_pa,
-        Variable::Command => first.sample.command_pa,
-        Variable::ModelPressure => first.regulator.model_pa(),
-        Variable::ModelForce => first.sample.model_n,
-        Variable::State => f32::from(state as u8),
-        Variable::StepTime => step_us,
-        Variable::SecondPressure => second.sample.pressure_pa,
-        Variable::SecondStroke => second.sample.stroke_m,
-        Variable::SecondForce => second.sample.force_n,
-        Variable::SecondCommand => second.sample.command_pa,
-    }
-}
-
-/// Looks at every number of new settings.
-///
-/// # Errors
-/// [`Refusal::Value`] with the group that a wrong number is in.
-pub fn check_settings(settings: &Settings) -> Result<(), Refusal> {
-    let positive = |value: f32| value > 0.0 && value.is_finite();
-    let not_negative = |value: f32| value >= 0.0 && value.is_finite();
-    let f = &settings.force_loop;
-    let s = &settings.stroke_loop;
-    let j = &settings.joint;
-    let r = &settings.regulator;
-    let l = &settings.limits;
-    let watched = |w: &model_core::link::settings::SensorWatch| {
-        w.low.is_finite() && w.high.is_finite() && w.low < w.high && positive(w.jump)
-    };
-    let groups = [
-        (
-            Field::ForceLoop,
-            [f.proportional_pa_per_n, f.integral_pa_per_n_s, f.trim_limit_pa].into_iter().all(not_negative),
-        ),
-        (
-            Field::StrokeLoop,
-            [s.proportional_n_per_m, s.integral_n_per_m_s, s.damping_n_s_per_m].into_iter().all(not_negative)
-                && s.load_n.is_finite()
-                && s.load_stiffness_n_per_m.is_finite()
-                && positive(s.force_limit_n),
-        ),
-        (
-            Field::Joint,
-            [j.proportional_nm_per_rad, j.integral_nm_per_rad_s, j.damping_nm_s_per_rad]
-                .into_iter()
-                .all(not_negative)
-                && positive(j.radius_m)
-                && j.rest_stroke_m.is_finite()
-                && positive(j.torque_limit_nm),
-        ),
-        (
-            Field::Regulator,
-            positive(r.gain)
-                && r.offset_pa.is_finite()
-                && not_negative(r.lag_s)
-                && positive(r.rate_pa_per_s)
-                && not_negative(r.deadband_pa)
-                && positive(r.command_max_pa)
-                && (0.0..=1.0).contains(&r.lead),
-        ),
-        (
-            Field::Limits,
-            positive(l.pressure_pa)
-                && l.stroke_min_m.is_finite()
-                && l.stroke_max_m.is_finite()
-                && l.stroke_min_m < l.stroke_max_m
-                && positive(l.speed_m_per_s)
-                && positive(l.force_n)
-                && positive(l.slew_pa_per_s),
-        ),
-        (
-            Field::SensorWatch,
-            watched(&settings.pressure) && watched(&settings.stroke) && watched(&settings.force),
-        ),
-        (
-            Field::Watch,
-            not_negative(settings.watch.disagree_n)
-                && positive(settings.watch.follow_pa)
-                && settings.watch.host_silence_ticks > 0,
-        ),
-        (Field::Bands, positive(settings.motion_band_m) && positive(settings.pressure_band_pa)),
-    ];
-    match groups.into_iter().find(|(_, good)| !good) {
-        Some((field, _)) => Err(Refusal::Value(field)),
-        None => Ok(()),
     }
 }

@@ -1,0 +1,58 @@
+//! One muscle at work: its table, its readings, its loops and its regulator.
+
+use model_core::link::messages::SideSample;
+use model_core::link::settings::Settings;
+use model_core::motion::MotionTracker;
+
+use super::motion_settings;
+use crate::board::Command;
+use crate::modes::{Integral, Model};
+use crate::regulator::RegulatorState;
+use crate::watch::SideWatch;
+
+/// One muscle at work.
+#[derive(Clone, Debug)]
+pub(super) struct Actuator {
+    pub(super) model: Option<Model>,
+    pub(super) motion: MotionTracker<f32>,
+    pub(super) watch: SideWatch,
+    pub(super) regulator: RegulatorState,
+    pub(super) trim: Integral,
+    pub(super) stroke_loop: Integral,
+    pub(super) guess_pa: f32,
+    /// Sign of what the limits took from the last wish.
+    pub(super) cut: f32,
+    pub(super) sample: SideSample,
+    pub(super) command: Command,
+    pub(super) wanted_n: f32,
+    pub(super) forward_pa: f32,
+    pub(super) trim_pa: f32,
+    /// Force by the table at this tick's readings, N; none without a table or without readings that are numbers.
+    pub(super) model_n: Option<f32>,
+}
+
+impl Actuator {
+    pub(super) fn new(settings: &Settings) -> Self {
+        Self {
+            model: None,
+            motion: MotionTracker::new(motion_settings(settings)),
+            watch: SideWatch::default(),
+            regulator: RegulatorState::default(),
+            trim: Integral::default(),
+            stroke_loop: Integral::default(),
+            guess_pa: 0.0,
+            cut: 0.0,
+            sample: SideSample::default(),
+            command: Command { pressure_pa: 0.0, vent: true },
+            wanted_n: 0.0,
+            forward_pa: 0.0,
+            trim_pa: 0.0,
+            model_n: None,
+        }
+    }
+
+    /// The table, if it has been brought to this tick.
+    pub(super) fn present(&self) -> Option<&Model> {
+        self.model.as_ref().filter(|_| self.model_n.is_some())
+    }
+}
