@@ -45,6 +45,13 @@ if [ "$browser" = yes ]; then
     { cargo build --quiet --locked --package host && python3 tests/studio.py target/debug/host; } || failed=$?
 fi
 
+if command -v python3 >/dev/null; then
+    echo "== Python =="
+    bash host/python/tests/run.sh || failed=$?
+else
+    echo "tests/all.sh: the Python bindings are not tested: there is no python3"
+fi
+
 if [ "$lint" = yes ]; then
     echo "== lints =="
     cargo clippy --workspace --all-targets --locked -- -D warnings || failed=$?

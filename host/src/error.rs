@@ -30,7 +30,7 @@ impl Fault {
 }
 
 macro_rules! codes {
-    ($($(#[$doc:meta])* $name:ident = $text:literal, $fault:ident;)*) => {
+    ($($(#[$doc:meta])* $name:ident = $text:literal, $fault:ident, $remedy:literal;)*) => {
         /// The stable name of a kind of failure.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         #[non_exhaustive]
@@ -46,6 +46,12 @@ macro_rules! codes {
                 match self { $(Self::$name => $text,)* }
             }
 
+            /// What to do about failures of this kind, where nothing better is known.
+            #[must_use]
+            pub fn remedy(self) -> &'static str {
+                match self { $(Self::$name => $remedy,)* }
+            }
+
             /// Who is at fault.
             #[must_use]
             pub fn fault(self) -> Fault {
@@ -57,61 +63,89 @@ macro_rules! codes {
 
 codes! {
     /// A file does not exist, may not be read, or ends early.
-    FileUnreadable = "file::unreadable", Input;
+    FileUnreadable = "file::unreadable", Input,
+        "look at the name, the folder, and whether this user may read it";
     /// A result could not be written; what stood there before is untouched.
-    FileUnwritable = "file::unwritable", Input;
+    FileUnwritable = "file::unwritable", Input,
+        "check that the folder exists and may be written to, and that the disk has room";
     /// A file holds nothing at all.
-    RecordingEmpty = "recording::empty", Input;
+    RecordingEmpty = "recording::empty", Input,
+        "record again, or name the file that holds the rows";
     /// A file is binary, or text in an encoding other than UTF-8.
-    RecordingNotText = "recording::not-text", Input;
+    RecordingNotText = "recording::not-text", Input,
+        "give a CSV or tab-separated file in UTF-8";
     /// A required column is absent.
-    RecordingMissingColumn = "recording::missing-column", Input;
+    RecordingMissingColumn = "recording::missing-column", Input,
+        "name the columns as `host fit --help` shows, or write an import description";
     /// Two columns give the same quantity.
-    RecordingDuplicateColumn = "recording::duplicate-column", Input;
+    RecordingDuplicateColumn = "recording::duplicate-column", Input,
+        "keep one of them, or choose it by an import description";
     /// A column's name ends in a unit that its quantity does not have.
-    RecordingUnknownUnit = "recording::unknown-unit", Input;
+    RecordingUnknownUnit = "recording::unknown-unit", Input,
+        "write the unit behind the last underscore, such as pressure_kPa";
     /// A cell holds something that is not a number.
-    RecordingNotANumber = "recording::not-a-number", Input;
+    RecordingNotANumber = "recording::not-a-number", Input,
+        "write numbers with a point, and leave such rows out";
     /// A cell holds NaN or an infinity.
-    RecordingNotFinite = "recording::not-finite", Input;
+    RecordingNotFinite = "recording::not-finite", Input,
+        "leave such rows out; missing values are not filled in silently";
     /// A line has too few or too many cells.
-    RecordingWrongWidth = "recording::wrong-width", Input;
+    RecordingWrongWidth = "recording::wrong-width", Input,
+        "every line has as many cells as the header";
     /// Time stands still or goes backwards.
-    RecordingTimeOrder = "recording::time-order", Input;
+    RecordingTimeOrder = "recording::time-order", Input,
+        "put the rows into the order in which they were measured";
     /// A number is outside what is physically possible.
-    RecordingOutOfRange = "recording::out-of-range", Input;
+    RecordingOutOfRange = "recording::out-of-range", Input,
+        "is the unit in the column's name the one of its numbers?";
     /// Too few rows to be of use.
-    RecordingTooShort = "recording::too-short", Input;
+    RecordingTooShort = "recording::too-short", Input,
+        "record longer, or name another file";
     /// The file's container (compression, MATLAB, Parquet) is damaged or not supported.
-    RecordingContainer = "recording::container", Input;
+    RecordingContainer = "recording::container", Input,
+        "save the file again, or export it as CSV";
     /// Lengths are given, but not the muscle's rest length that turns them into a stroke.
-    RecordingRestLength = "recording::rest-length", Call;
+    RecordingRestLength = "recording::rest-length", Call,
+        "give the muscle's description with --muscle";
     /// An import description is not valid, or does not fit the file.
-    ImportInvalid = "import::invalid", Input;
+    ImportInvalid = "import::invalid", Input,
+        "compare with the descriptions in examples/imports";
     /// A muscle description is not valid.
-    MuscleInvalid = "muscle::invalid", Input;
+    MuscleInvalid = "muscle::invalid", Input,
+        "compare with the descriptions in examples/muscles, or make one with `host new`";
     /// A settings file is not valid.
-    SettingsInvalid = "settings::invalid", Input;
+    SettingsInvalid = "settings::invalid", Input,
+        "`host settings --example` prints a file to begin with";
     /// The data do not allow the fit that was asked for.
-    FitUnderdetermined = "fit::underdetermined", Input;
+    FitUnderdetermined = "fit::underdetermined", Input,
+        "record more pressures, or longer strokes";
     /// A table file is damaged or from another version.
-    TableInvalid = "table::invalid", Input;
+    TableInvalid = "table::invalid", Input,
+        "fit the muscle anew with `host fit`";
     /// The port cannot be opened.
-    DevicePort = "device::port", Input;
+    DevicePort = "device::port", Input,
+        "`host device list` shows the ports here";
     /// The device does not answer, or stopped answering.
-    DeviceSilent = "device::silent", Input;
+    DeviceSilent = "device::silent", Input,
+        "look at cable and supply, then try again";
     /// Something answers, and it is not a controller of ours.
-    DeviceForeign = "device::foreign", Input;
+    DeviceForeign = "device::foreign", Input,
+        "is this the controller's port? if it is its board, flash the firmware first";
     /// The device speaks another version.
-    DeviceVersion = "device::version", Input;
+    DeviceVersion = "device::version", Input,
+        "build and flash program and firmware from the same release";
     /// The device refused what was asked.
-    DeviceRefused = "device::refused", Input;
+    DeviceRefused = "device::refused", Input,
+        "`host device info` shows what it is doing, `host device settings` what it allows";
     /// What the device keeps is not what it was sent.
-    DeviceVerify = "device::verify", Input;
+    DeviceVerify = "device::verify", Input,
+        "send it again; if it comes back, the device's memory is failing";
     /// The device stopped because of a fault.
-    DeviceFault = "device::fault", Input;
+    DeviceFault = "device::fault", Input,
+        "`host device faults` tells it in words, with the remedy";
     /// Options that contradict each other or are out of range.
-    CallInvalid = "call::invalid", Call;
+    CallInvalid = "call::invalid", Call,
+        "--help behind the command shows what it takes, with examples";
 }
 
 /// Where in the input a failure was found. Unknown parts stay empty.
@@ -251,10 +285,16 @@ impl Error {
         &self.0.place
     }
 
-    /// What to do, if there is advice.
+    /// What to do: the advice that was given, or that for all failures of this kind.
     #[must_use]
     pub fn advice(&self) -> Option<&str> {
-        self.0.help.as_deref()
+        Some(self.0.help.as_deref().unwrap_or_else(|| self.code().remedy()))
+    }
+
+    /// Whether this failure was given advice of its own.
+    #[must_use]
+    pub fn advised(&self) -> bool {
+        self.0.help.is_some()
     }
 
     /// The exit status that this failure ends the program with.
@@ -278,7 +318,7 @@ impl miette::Diagnostic for Error {
     }
 
     fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        self.0.help.as_ref().map(|h| Box::new(h) as Box<dyn fmt::Display>)
+        self.advice().map(|h| Box::new(h) as Box<dyn fmt::Display>)
     }
 }
 
@@ -326,6 +366,8 @@ mod tests {
         names.dedup();
         assert_eq!(names.len(), Code::ALL.len());
         assert!(Code::ALL.iter().all(|c| matches!(c.fault().exit_status(), 1 | 2)));
+        // Whoever forgets the advice gives that of the kind.
+        assert!(Code::ALL.iter().all(|c| Error::new(*c, "x").advice().is_some_and(|a| a.len() > 20)));
     }
 
     #[test]

@@ -43,7 +43,7 @@ fn loads<'py>(py: Python<'py>, text: &str) -> PyResult<Bound<'py, PyAny>> {
     PyModule::import(py, "json")?.call_method1("loads", (text,))
 }
 
-/// A muscle as its maker or a calliper describes it.
+/// A muscle as its maker or a calliper describes it: lengths in mm, the braid angle in degrees from the radial plane.
 #[pyclass(frozen, skip_from_py_object)]
 #[derive(Clone)]
 struct Muscle(MuscleDescription);
@@ -86,6 +86,7 @@ impl Muscle {
         MuscleDescription::read(path).map(Self).map_err(raised)
     }
 
+    /// What it is called.
     #[getter]
     fn name(&self) -> &str {
         &self.0.name
@@ -142,12 +143,13 @@ impl Recording {
         Ok(Self(recording))
     }
 
+    /// What it is called: its file's name, where it was read from one.
     #[getter]
     fn name(&self) -> &str {
         &self.0.name
     }
 
-    /// s.
+    /// Time, s.
     #[getter]
     fn time<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.0.time.clone().into_pyarray(py)
@@ -198,11 +200,13 @@ impl Campaign {
         Self(HostCampaign::new(recordings.iter().map(|r| r.0.clone()).collect()))
     }
 
+    /// The recordings, in order.
     #[getter]
     fn recordings(&self) -> Vec<Recording> {
         self.0.recordings.iter().cloned().map(Recording).collect()
     }
 
+    /// What was noticed while reading.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.0.warnings.clone()

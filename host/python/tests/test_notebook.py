@@ -6,6 +6,7 @@ BENCH_FOLDER is made by `virtual-bench record --muscle mini --protocol thesis -o
 PAM_BENCH names it for pytest.
 """
 
+import ast
 import os
 import pathlib
 import sys
@@ -85,6 +86,25 @@ def test_what_is_wrong_is_said():
         assert "rest_length_mm" in str(error)
     else:
         raise AssertionError("a negative length was taken")
+
+
+def test_stubs_and_help_name_what_there_is():
+    stubs = ast.parse((pathlib.Path(__file__).parent.parent / "pamtools.pyi").read_text())
+    public = lambda names: {n for n in names if not n.startswith("_")}
+    told = {}
+    for node in stubs.body:
+        if isinstance(node, ast.ClassDef):
+            told[node.name] = public(n.name for n in node.body if isinstance(n, ast.FunctionDef))
+        elif isinstance(node, ast.FunctionDef):
+            told[node.name] = set()
+    # Of a package, the extension itself lies one deeper under the same name.
+    assert public(vars(pam)) - {"pamtools"} == set(told)
+    for name, members in told.items():
+        thing = getattr(pam, name)
+        assert thing.__doc__, f"{name} has no docstring"
+        if name not in {"PamError"} and isinstance(thing, type):
+            assert public(vars(thing)) == members, name
+            assert all(getattr(thing, m).__doc__ for m in members), name
 
 
 def test_a_diagnosis_is_a_dict_and_a_report():

@@ -60,6 +60,9 @@ enum Action {
         /// How long, s [default: until Ctrl-C].
         #[arg(long, value_name = "S")]
         seconds: Option<f64>,
+        /// Print a line of JSON for each.
+        #[arg(long)]
+        json: bool,
     },
     /// Record variables of the control loop at every tick, in the device's own memory.
     #[command(after_help = "Examples:\n  \
@@ -92,6 +95,9 @@ enum Action {
         port: PortOption,
         #[command(flatten)]
         muscle: Muscle,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
     },
 }
 
@@ -156,13 +162,17 @@ impl Arguments {
         match self.action {
             Action::List { json } => list(json, console),
             Action::Info { port, json } => info(&port, json, console),
-            Action::Log { port, seconds } => log(&port, seconds, console),
+            Action::Log { port, seconds, json } => log(&port, seconds, json, console),
             Action::Trace(arguments) => trace(&arguments, console),
             Action::Settings(arguments) => settings(&arguments, console),
             Action::Faults { port, clear, json } => faults(&port, clear, json, console),
-            Action::Rollback { port, muscle } => {
+            Action::Rollback { port, muscle, json } => {
                 let info = port.connect(console)?.call_once::<RollBackTable>(&muscle.side())?;
-                console.result(format!("back to the table with check sum {:08x}", info.crc));
+                console.result(if json {
+                    json!({ "schema": "pam-rollback/1", "crc": format!("{:08x}", info.crc), "generation": info.generation }).to_string()
+                } else {
+                    format!("back to the table with check sum {:08x}", info.crc)
+                });
                 Ok(())
             }
         }
@@ -291,11 +301,23 @@ fn info(port: &PortOption, json: bool, console: &Console) -> Result<()> {
     Ok(())
 }
 
-fn log(port: &PortOption, seconds: Option<f64>, console: &Console) -> Result<()> {
+fn log(port: &PortOption, seconds: Option<f64>, json: bool, console: &Console) -> Result<()> {
     let stop = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&stop);
     ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))
         .map_err(|e| Error::new(Code::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
+    let say = |time_us: Option<u64>, event: &str, text: String, remedy: Option<&str>| {
+        let time = time_us.map(|t| t as f64 * 1e-6);
+        if json {
+            console.result(json!({ "time_s": time, "event": event, "text": text, "remedy": remedy }));
+            return;
+        }
+        let clock = time.map_or(String::new(), |t| format!("{t:12.3} s"));
+        console.result(format!("{clock:14}  {}{text}", if event == "fault" { "FAULT " } else { "" }));
+        if let Some(remedy) = remedy {
+            console.result(format!("{:15}what to do: {remedy}", ""));
+        }
+    };
     let mut client = port.connect(console)?;
     let begin = Instant::now();
     let mut last = None;
@@ -307,26 +329,18 @@ fn log(port: &PortOption, seconds: Option<f64>, console: &Console) -> Result<()>
             asked = Some(Instant::now());
             if last != Some((status.state, status.mode)) {
                 last = Some((status.state, status.mode));
-                console.result(format!(
-                    "{:12.3} s  {} in {} mode",
-                    status.time_us as f64 * 1e-6,
-                    words::state(status.state),
-                    words::mode(status.mode)
-                ));
+                let text = format!("{} in {} mode", words::state(status.state), words::mode(status.mode));
+                say(Some(status.time_us), "state", text, None);
             }
         }
         match client.topic(Duration::from_millis(100))? {
             Some(Topic::Event(Event::Fault(report))) => {
-                console.result(format!(
-                    "{:12.3} s  FAULT {}",
-                    report.time_us as f64 * 1e-6,
-                    words::report(&report)
-                ));
-                console.result(format!("{:15}what to do: {}", "", words::fault(report.fault).remedy));
+                let remedy = words::fault(report.fault).remedy;
+                say(Some(report.time_us), "fault", words::report(&report), Some(remedy));
             }
             Some(Topic::Event(Event::State(_))) => asked = None,
             Some(Topic::Event(Event::TraceFull)) => {
-                console.result("                trace full: host device trace --read")
+                say(None, "trace-full", "trace full: host device trace --read".to_owned(), None);
             }
             Some(Topic::Telemetry(_)) | None => {}
         }

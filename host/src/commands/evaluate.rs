@@ -31,7 +31,7 @@ pub struct Arguments {
     #[command(flatten)]
     recordings: Recordings,
     /// What is left out in turn.
-    #[arg(long, value_enum, default_value_t = LeaveOut::Both)]
+    #[arg(long, value_enum, value_name = "WHAT", default_value_t = LeaveOut::Both)]
     leave_out: LeaveOut,
     /// Order M of the elastic polynomial.
     #[arg(long, default_value_t = 4, value_name = "M", value_parser = clap::value_parser!(u8).range(1..=6))]

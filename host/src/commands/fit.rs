@@ -44,7 +44,7 @@ pub struct Arguments {
     #[arg(long)]
     tip_correction: bool,
     /// Weight of the penalty on curves over pressure that bend; chosen by leaving pressures out if not given.
-    #[arg(long, value_name = "WEIGHT")]
+    #[arg(long, value_name = "WEIGHT", allow_negative_numbers = true)]
     smoothing: Option<f64>,
     /// Find effective dimensions (braid angle, bladder diameter, wall) too, within bounds.
     #[arg(long)]

@@ -62,6 +62,15 @@ impl Arguments {
                 .file(&self.output)
                 .help("name another one with -o, or replace it with --force"));
         }
+        // What cannot be written is better known before seven questions than after.
+        let folder = self.output.parent().filter(|f| !f.as_os_str().is_empty());
+        if let Some(folder) = folder
+            && !folder.is_dir()
+        {
+            return Err(Error::new(Code::FileUnwritable, "the folder is not there")
+                .file(folder)
+                .help("make it first"));
+        }
         console.note(DRAWING);
         let text = ask(
             &mut std::io::stdin().lock(),

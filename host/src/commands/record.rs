@@ -10,7 +10,7 @@ use model_core::link::messages::TelemetryRate;
 use serde_json::json;
 
 use super::port::PortOption;
-use super::run::{begin, end, interrupts};
+use super::run::{begin, end, interrupts, positive};
 use crate::console::Console;
 use crate::device::recorder::{Recorder, about_losses, about_start, rescue};
 use crate::device::{Client, Topic, words};
@@ -37,7 +37,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FOLDER", default_value = ".", conflicts_with = "output")]
     folder: PathBuf,
     /// How long, s of device time [default: until Ctrl-C].
-    #[arg(short, long, value_name = "S")]
+    #[arg(short, long, value_name = "S", allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// Samples per second, at most the controller's own rate [default: its own rate].
     #[arg(long, value_name = "HZ")]
@@ -65,13 +65,7 @@ impl Arguments {
     /// # Errors
     /// A device that is silent or refuses, a file that cannot be written; what was recorded until then is kept.
     pub fn run(self, console: &Console) -> Result<()> {
-        for (option, value) in [("--seconds", self.seconds), ("--rate", self.rate)] {
-            if value.is_some_and(|v| !(v > 0.0 && v.is_finite())) {
-                return Err(Error::new(Code::CallInvalid, format!("{option} must be above zero"))
-                    .value(value.unwrap_or_default().to_string())
-                    .help("leave the option out to record at the controller's own rate until Ctrl-C"));
-            }
-        }
+        positive([("--seconds", self.seconds), ("--rate", self.rate)])?;
         let output = if self.output.is_empty() {
             std::fs::create_dir_all(&self.folder).map_err(|e| Error::unwritable(&self.folder, &e))?;
             vec![self.folder.join(format!("{}.csv", now_utc().replace(':', "-")))]
@@ -151,6 +145,8 @@ fn watch(
     let (mut first, mut last) = (None, 0);
     let mut heard = Instant::now();
     while !stop() {
+        // A controller that moves a muscle vents when its host falls silent; to record is to be there.
+        client.keep_alive()?;
         match client.topic(Duration::from_millis(50))? {
             Some(Topic::Telemetry(sample)) => {
                 heard = Instant::now();

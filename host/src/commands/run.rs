@@ -35,7 +35,7 @@ pub struct Arguments {
     #[command(flatten)]
     quantity: Asked,
     /// How long, s of device time [default: until Ctrl-C].
-    #[arg(short, long, value_name = "S")]
+    #[arg(short, long, value_name = "S", allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// The recording, as CSV or (by the ending .mcap) MCAP; may be given again for both. OUT.json says how it was made.
     #[arg(short, long, value_name = "OUT")]
@@ -94,13 +94,7 @@ impl Arguments {
     /// A wrong course, a device that is silent or refuses, the fault that stopped it, a recording that cannot be written.
     pub fn run(self, console: &Console) -> Result<()> {
         let (quantity, course) = self.quantity.parse()?;
-        let wrong = |cause: &str| Err(Error::new(Code::CallInvalid, cause));
-        if self.seconds.is_some_and(|s| !(s > 0.0 && s.is_finite())) {
-            return wrong("--seconds must be above zero");
-        }
-        if self.rate.is_some_and(|r| !(r > 0.0 && r.is_finite())) {
-            return wrong("--rate must be above zero");
-        }
+        positive([("--seconds", self.seconds), ("--rate", self.rate)])?;
         let interrupted = interrupts()?;
         let mut client = self.port.connect(console)?;
         if let Some(source) = self.feed_forward {
@@ -205,6 +199,20 @@ fn choose_feed_forward(client: &mut Client, source: Source) -> Result<()> {
     if kept != settings {
         return Err(Error::new(Code::DeviceVerify, "the device keeps other settings than it was sent")
             .help("see `host device settings`"));
+    }
+    Ok(())
+}
+
+/// Options that are times or rates.
+pub(super) fn positive<const N: usize>(options: [(&str, Option<f64>); N]) -> Result<()> {
+    for (option, value) in options {
+        if let Some(value) = value
+            && !(value > 0.0 && value.is_finite())
+        {
+            return Err(Error::new(Code::CallInvalid, format!("{option} must be above zero"))
+                .value(value.to_string())
+                .help("leave the option out to go on at the controller's own rate until Ctrl-C"));
+        }
     }
     Ok(())
 }

@@ -23,7 +23,7 @@ pub struct Arguments {
     /// Start an emulated controller with this muscle of the virtual bench: mini, contractile, push or random:SEED.
     #[arg(long, value_name = "MUSCLE")]
     emulate: Option<String>,
-    /// The page's own port [default: any that is free].
+    /// The page's own port; 0: any that is free.
     #[arg(long, value_name = "N", default_value_t = 0)]
     web_port: u16,
     /// The folder for recordings and tables.

@@ -102,7 +102,7 @@ pub(super) fn read(reader: &Reader<'_>, path: &Path, container: Container) -> Re
     let columns = catch_unwind(AssertUnwindSafe(|| container.columns(path)))
         .unwrap_or_else(|_| Err(damaged("the file is damaged beyond what its reader expects")))
         .map_err(|e| {
-            if e.code() == Code::RecordingContainer && e.advice().is_none() {
+            if e.code() == Code::RecordingContainer && !e.advised() {
                 let cause = format!("no usable {} file: {}", container.name(), e.cause());
                 Error::new(Code::RecordingContainer, cause).help("save it again, or export the data as CSV")
             } else {

@@ -1,0 +1,138 @@
+"""Fit, predict and diagnose pneumatic artificial muscles.
+
+Arrays are SI throughout: s, Pa (gauge), m, N, K. Whatever is wrong raises PamError.
+"""
+
+import os
+from collections.abc import Sequence
+from typing import Any, Literal, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Path = str | os.PathLike[str]
+_Array = NDArray[np.float64]
+
+__version__: str
+
+class PamError(ValueError):
+    """What is wrong: args[0] names cause, place and remedy, args[1] is the stable code, such as "recording::time-order"."""
+
+@final
+class Muscle:
+    """A muscle as its maker or a calliper describes it."""
+    def __new__(
+        cls,
+        name: str,
+        rest_length_mm: float,
+        braid_angle_deg: float,
+        bladder_outer_diameter_mm: float,
+        bladder_wall_mm: float,
+        kind: Literal["contractile", "push"] = "contractile",
+        max_pressure_kpa: float | None = None,
+        young_modulus_mpa: float | None = None,
+    ) -> Muscle: ...
+    @staticmethod
+    def read(path: _Path) -> Muscle:
+        """Reads a description (TOML)."""
+    @property
+    def name(self) -> str: ...
+    @property
+    def rest_length(self) -> float:
+        """L0, m."""
+    @property
+    def kind(self) -> Literal["contractile", "push"]: ...
+
+@final
+class Recording:
+    """One recording, columns in SI units. Time must rise; all columns are equally long."""
+    def __new__(
+        cls,
+        name: str,
+        time: _Array,
+        pressure: _Array,
+        stroke: _Array,
+        force: _Array | None = None,
+        temperature: _Array | None = None,
+    ) -> Recording: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def time(self) -> _Array:
+        """s."""
+    @property
+    def pressure(self) -> _Array:
+        """Gauge pressure, Pa."""
+    @property
+    def stroke(self) -> _Array:
+        """Contraction stroke, m: positive as the muscle shortens."""
+    @property
+    def force(self) -> _Array | None:
+        """N, where it was measured."""
+    @property
+    def temperature(self) -> _Array | None:
+        """K, where it was measured."""
+    def __len__(self) -> int: ...
+
+@final
+class Campaign:
+    """Recordings of one muscle in chronological order: the muscle remembers what earlier ones did to it."""
+    def __new__(cls, recordings: Sequence[Recording]) -> Campaign: ...
+    @property
+    def recordings(self) -> list[Recording]: ...
+    @property
+    def warnings(self) -> list[str]:
+        """What was noticed while reading."""
+    def __len__(self) -> int: ...
+
+@final
+class Table:
+    """What goes to the controller, and what predicts."""
+    @staticmethod
+    def read(path: _Path) -> Table:
+        """Reads a .pam file."""
+    def write(self, path: _Path) -> None:
+        """Writes a .pam file."""
+    @property
+    def deadband(self) -> float:
+        """P0, Pa."""
+    @property
+    def nodes(self) -> _Array:
+        """Pressures of the nodes, Pa."""
+    @property
+    def elastic(self) -> list[_Array]:
+        """The curves E_1, E_2, ... at the nodes, Pa."""
+    @property
+    def friction(self) -> _Array:
+        """k_F at the nodes."""
+    def force(self, pressure: _Array, stroke: _Array, direction: float = 0.0) -> _Array:
+        """Force (N) of the base model; direction is 1 shortening, -1 lengthening, 0 the mid-line."""
+    def predict(self, campaign: Campaign) -> list[_Array]:
+        """The force that the load cell would read, N: one array a recording, effects and their memory included."""
+
+@final
+class Fit:
+    """A finished fit."""
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The figures of the fit, as in the JSON of `host fit` (schema pam-fit/1)."""
+    @property
+    def table(self) -> Table: ...
+    def report(self, path: _Path) -> None:
+        """Writes the report, one HTML file."""
+
+def read(paths: Sequence[_Path], muscle: Muscle | None = None, import_description: _Path | None = None) -> Campaign:
+    """Reads files in chronological order; import_description is the TOML file for foreign formats."""
+
+def fit(
+    campaign: Campaign,
+    muscle: Muscle,
+    order: int = 4,
+    tip_correction: bool = False,
+    fit_geometry: bool = False,
+    fit_lengths: bool = False,
+) -> Fit:
+    """Fits a muscle's table to recordings."""
+
+def diagnose(campaign: Campaign, muscle: Muscle, report: _Path | None = None) -> dict[str, Any]:
+    """Finds out what the model leaves out: the JSON of `host diagnose` (schema pam-diagnose/1); report names an HTML file to write."""
