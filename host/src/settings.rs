@@ -41,6 +41,37 @@ pub struct Setting {
     pub file: PathBuf,
     /// The line, counted from 1.
     pub line: u64,
+    /// What the option takes: `--muscle` is a file for `host fit` and a number for `host flash`, and this is for one of them.
+    kind: Kind,
+}
+
+/// What an option takes, as far as one name may mean different things to different commands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Flag,
+    Path,
+    Other,
+}
+
+fn kind(arg: &Arg) -> Kind {
+    if matches!(arg.get_action(), ArgAction::SetTrue) {
+        Kind::Flag
+    } else if arg.get_value_parser().type_id() == TypeId::of::<PathBuf>() {
+        Kind::Path
+    } else {
+        Kind::Other
+    }
+}
+
+/// Whether an option takes a value, judged by its own parser alone: rules between options are for the command line.
+fn probe(arg: &Arg, value: &str) -> std::result::Result<(), String> {
+    let alone = Arg::new("value").long("value").num_args(1).value_parser(arg.get_value_parser().clone());
+    let probe = Command::new("host").no_binary_name(true).arg(alone);
+    let Err(reason) = probe.try_get_matches_from([format!("--value={value}")]) else { return Ok(()) };
+    let reason = reason.to_string();
+    let mut said = reason.lines().map(str::trim).filter(|l| !l.is_empty());
+    let first = said.next().and_then(|l| l.rsplit_once(": ")).map_or("see --help", |(_, why)| why);
+    Err(said.find(|l| l.starts_with("[possible")).map_or(first, |l| l.trim_matches(['[', ']'])).to_owned())
 }
 
 /// Files that count here, the one that yields first.
@@ -152,15 +183,15 @@ impl Reading<'_> {
             let texts = self.texts(at, key, value.get_ref())?;
             let fits: Vec<Result<Vec<String>>> =
                 found.iter().map(|arg| self.values(at, key, arg, &texts)).collect();
-            // An option of one name may mean different things to two commands; it must suit one of them.
-            let mut good = fits.iter().filter_map(|f| f.as_ref().ok());
-            match good.next() {
-                Some(values) => out.push(Setting {
+            // An option of one name may mean different things to two commands; the first that it suits is meant.
+            match fits.iter().zip(&found).find_map(|(fit, arg)| Some((fit.as_ref().ok()?, kind(arg)))) {
+                Some((values, kind)) => out.push(Setting {
                     command: path.to_owned(),
                     option,
                     values: values.clone(),
                     file: self.file.to_owned(),
                     line: self.line(at),
+                    kind,
                 }),
                 None => return fits.into_iter().next().map_or(Ok(()), |first| first.map(|_| ())),
             }
@@ -191,8 +222,7 @@ impl Reading<'_> {
 
     /// The values as the option takes them, or why it does not.
     fn values(&self, at: usize, key: &str, arg: &Arg, texts: &[String]) -> Result<Vec<String>> {
-        let flag = matches!(arg.get_action(), ArgAction::SetTrue);
-        if flag {
+        if kind(arg) == Kind::Flag {
             return match texts {
                 [one] if one == "true" || one == "false" => Ok(texts.to_vec()),
                 _ => Err(self
@@ -204,36 +234,18 @@ impl Reading<'_> {
         if texts.len() != 1 && !matches!(arg.get_action(), ArgAction::Append) {
             return Err(self.wrong(at, key, "this option takes one value").help("write one text or number"));
         }
-        let is_path = arg.get_value_parser().type_id() == TypeId::of::<PathBuf>();
         let folder = self.file.parent().unwrap_or(Path::new(""));
         let mut out = Vec::new();
         for text in texts {
-            let text = if is_path && text != "-" {
+            let text = if kind(arg) == Kind::Path && text != "-" {
                 folder.join(text).to_string_lossy().into_owned()
             } else {
                 text.clone()
             };
-            // The option's own parser judges, alone: rules between options are for the command line.
-            let alone =
-                Arg::new("value").long("value").num_args(1).value_parser(arg.get_value_parser().clone());
-            let probe = Command::new("host").no_binary_name(true).arg(alone);
-            if let Err(reason) = probe.try_get_matches_from([format!("--value={text}")]) {
-                let reason = reason.to_string();
-                let said: Vec<&str> = reason.lines().map(str::trim).filter(|l| !l.is_empty()).collect();
-                let help = said.iter().find(|l| l.starts_with("[possible")).map_or_else(
-                    || {
-                        said.first()
-                            .and_then(|l| l.split_once(": "))
-                            .map_or("see --help", |(_, why)| why)
-                            .to_owned()
-                    },
-                    |l| l.trim_matches(['[', ']']).to_owned(),
-                );
-                return Err(self
-                    .wrong(at, key, format!("--{} does not take this value", key.replace('_', "-")))
-                    .value(text)
-                    .help(help.replace(" for '--value <value>'", "")));
-            }
+            probe(arg, &text).map_err(|why| {
+                let cause = format!("--{} does not take this value", key.replace('_', "-"));
+                self.wrong(at, key, cause).value(&text).help(why)
+            })?;
             out.push(text);
         }
         Ok(out)
@@ -267,8 +279,8 @@ fn apply_one(mut command: Command, path: &[&str], setting: &Setting, everywhere:
     if everywhere || path.is_empty() {
         let suits = |arg: &&Arg| {
             arg.get_long() == Some(&setting.option)
-                && matches!(arg.get_action(), ArgAction::SetTrue)
-                    == setting.values.iter().all(|v| v == "true" || v == "false")
+                && kind(arg) == setting.kind
+                && (setting.kind == Kind::Flag || setting.values.iter().all(|v| probe(arg, v).is_ok()))
         };
         let id = command.get_arguments().find(suits).map(|a| a.get_id().clone());
         if let Some(id) = id {
@@ -349,6 +361,9 @@ mod tests {
         let (three, muscle) = order(&["host", "fit"]);
         assert!(three == 3 && muscle.is_absolute() && muscle.ends_with("m.toml"), "{muscle:?}");
         assert_eq!(order(&["host", "fit", "--order", "2", "--muscle", "x"]), (2, "x".into()));
+        // `--muscle` of another command is another thing.
+        let matches = apply(command(), &settings).try_get_matches_from(["host", "flash"]).unwrap();
+        assert_eq!(matches.subcommand_matches("flash").unwrap().get_one::<u8>("muscle"), None);
         let matches = apply(command(), &settings).try_get_matches_from(["host", "run"]).unwrap();
         assert_eq!(matches.subcommand_matches("run").unwrap().get_one::<String>("port").unwrap(), "COM3");
     }

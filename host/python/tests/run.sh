@@ -18,6 +18,6 @@ if ! "$work/env/bin/pip" --quiet download --no-deps --dest "$work/wheels" numpy;
 fi
 # The same folder as everything else is built in: crates that are built already serve again.
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$root/target}
-"$work/env/bin/pip" install --quiet --find-links "$work/wheels" --config-settings=build-args='--profile dev --locked' "$root/host/python"
+"$work/env/bin/pip" install --quiet --find-links "$work/wheels" --config-settings=build-args='--profile dev' "$root/host/python"
 cargo run --quiet --locked --manifest-path "$root/Cargo.toml" -p virtual-bench -- record --muscle mini --protocol thesis -o "$work/bench"
 "$work/env/bin/python" "$here/test_notebook.py" "$work/bench"

@@ -63,7 +63,12 @@ class Axes {
     for (const v of ys.values) { g.beginPath(); g.moveTo(left, Y(v)); g.lineTo(right, Y(v)); g.stroke(); g.fillText(v.toFixed(ys.digits), left - 5, Y(v)); }
     g.textAlign = "center"; g.textBaseline = "top";
     const xs = ticks(x0, x1, (right - left) / 80);
-    for (const v of xs.values) { g.beginPath(); g.moveTo(X(v), top); g.lineTo(X(v), bottom); g.stroke(); g.fillText(xText(v, xs.digits), X(v), bottom + 4); }
+    for (const v of xs.values) {
+      g.beginPath(); g.moveTo(X(v), top); g.lineTo(X(v), bottom); g.stroke();
+      // A label at the edge stays on the picture.
+      const text = xText(v, xs.digits), half = g.measureText(text).width / 2;
+      g.fillText(text, Math.min(X(v), w - half - 1), bottom + 4);
+    }
     g.save(); g.beginPath(); g.rect(left, top, right - left, bottom - top); g.clip();
     this.map = { X, Y, left, right };
     return this.map;
