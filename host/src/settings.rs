@@ -339,6 +339,10 @@ mod tests {
                     ),
             )
             .subcommand(
+                Command::new("flash")
+                    .arg(Arg::new("muscle").long("muscle").value_parser(clap::value_parser!(u8))),
+            )
+            .subcommand(
                 Command::new("run").arg(Arg::new("force").long("force")).arg(Arg::new("port").long("port")),
             )
     }

@@ -66,7 +66,7 @@ pub type Asked = (Order, oneshot::Sender<Result<Value>>);
 /// How long nobody may look at an armed controller.
 const UNWATCHED: Duration = Duration::from_millis(1_500);
 /// Time between two batches of telemetry to the page.
-const BATCH: Duration = Duration::from_millis(33);
+const BATCH: Duration = Duration::from_millis(16);
 /// Time between two reports of the state.
 const REPORT: Duration = Duration::from_millis(400);
 

@@ -35,7 +35,7 @@ const SCRIPT: &str = include_str!("studio.js");
 const PLOT: &str = include_str!("plot.js");
 
 /// Batches that a page may lag behind before it loses some: half a minute.
-const BACKLOG: usize = 1024;
+const BACKLOG: usize = 2048;
 /// Largest recording that the page may send.
 const UPLOAD: usize = 256 << 20;
 

@@ -1,6 +1,6 @@
 //! A file that grows piece by piece and is at every moment a whole number of pieces: `NAME.part` until it is finished.
 
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -26,6 +26,8 @@ impl Part {
         let file = File::create(&part).map_err(|e| {
             Error::unwritable(&part, &e).help("check that the folder exists and may be written to")
         })?;
+        // Whoever finds this file must be able to tell that it still grows.
+        let _ = file.try_lock();
         Ok((Self { path: path.to_owned(), part, file, whole: 0, last: 0 }, rescued))
     }
 
@@ -84,7 +86,7 @@ pub(super) fn part_of(path: &Path) -> PathBuf {
 /// that no other file has. Gives that name, or `None` when nothing was recorded yet (then the file is removed).
 ///
 /// # Errors
-/// [`Code::CallInvalid`] when it is no `.part`, [`Code::FileUnreadable`], [`Code::FileUnwritable`].
+/// [`Code::CallInvalid`] when it is no `.part`, [`Code::FileUnreadable`], [`Code::FileUnwritable`] also when it still grows.
 pub fn rescue(part: &Path) -> Result<Option<PathBuf>> {
     let text = part.to_string_lossy();
     let Some(path) = text.strip_suffix(".part").map(PathBuf::from) else {
@@ -95,6 +97,11 @@ pub fn rescue(part: &Path) -> Result<Option<PathBuf>> {
     let unreadable = |e| Error::unreadable(part, &e);
     let unwritable = |e| Error::unwritable(part, &e);
     let mut file = OpenOptions::new().read(true).write(true).open(part).map_err(unreadable)?;
+    if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+        return Err(Error::new(Code::FileUnwritable, "another program is recording to this file")
+            .file(part)
+            .help("end that one first, or give this recording another name with -o"));
+    }
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes).map_err(unreadable)?;
     let (whole, end): (usize, &[u8]) = if bytes.starts_with(mcap::MAGIC) {
@@ -149,6 +156,7 @@ mod tests {
         assert_eq!(rescued.file_name().unwrap(), "run.rescued-1.csv");
         assert_eq!(std::fs::read_to_string(&rescued).unwrap(), "a,b\n1,2\n");
         part.append(b"new\n").unwrap();
+        assert!(rescue(&part_of(&path)).unwrap_err().cause().contains("another program"));
         part.finish().unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "new\n");
         assert_eq!(rescue(&path).unwrap_err().exit_status(), 2);

@@ -1,0 +1,136 @@
+//! The command line as a whole: help with examples, manual pages, and where an option's value comes from.
+
+#![allow(clippy::unwrap_used)] // what fails here fails the test
+
+use std::path::Path;
+use std::process::Command;
+
+use clap::CommandFactory;
+
+fn host(folder: &Path, arguments: &[&str], port: Option<&str>) -> (i32, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_host"));
+    // Settings of whoever runs the tests do not count.
+    command.args(arguments).current_dir(folder).env("XDG_CONFIG_HOME", folder).env_remove("PAM_SETTINGS");
+    match port {
+        Some(port) => command.env("PAM_PORT", port),
+        None => command.env_remove("PAM_PORT"),
+    };
+    let output = command.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr) + String::from_utf8_lossy(&output.stdout);
+    (output.status.code().unwrap(), said.into_owned())
+}
+
+#[test]
+fn every_command_has_help_with_an_example() {
+    fn look(command: &clap::Command, path: &str, poor: &mut Vec<String>) {
+        let subs: Vec<_> = command.get_subcommands().collect();
+        if subs.is_empty() {
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            if !help.contains("Example") || !help.contains(path) || command.get_about().is_none() {
+                poor.push(path.to_owned());
+            }
+        }
+        for sub in subs {
+            look(sub, &format!("{path} {}", sub.get_name()), poor);
+        }
+    }
+    let mut poor = Vec::new();
+    look(&host::cli::Cli::command(), "host", &mut poor);
+    assert!(poor.is_empty(), "without an example of their own: {poor:?}");
+}
+
+#[test]
+fn there_is_a_manual_page_for_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let (status, said) = host(folder.path(), &["man", "-o", "man1"], None);
+    assert_eq!(status, 0, "{said}");
+    for (page, word) in [
+        ("host.1", "diagnose"),
+        ("host-fit.1", "tip\\-correction"),
+        ("host-record.1", "mcap"),
+        ("host-device-log.1", "seconds"),
+    ] {
+        let text = std::fs::read_to_string(folder.path().join("man1").join(page)).unwrap();
+        assert!(text.contains(".TH") && text.contains(word), "{page}: {text}");
+    }
+}
+
+#[test]
+fn the_command_line_goes_before_the_environment_and_that_before_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let deep = folder.path().join("a/b");
+    std::fs::create_dir_all(&deep).unwrap();
+    std::fs::write(folder.path().join("pam.toml"), "port = \"tcp:127.0.0.1:1\"\nmuscle = \"mini.toml\"\n")
+        .unwrap();
+    let tried = |arguments: &[&str], port| {
+        let (status, said) = host(&deep, arguments, port);
+        assert_eq!(status, 1, "nothing listens there: {said}");
+        said
+    };
+    assert!(tried(&["device", "info"], None).contains("tcp:127.0.0.1:1`"));
+    assert!(tried(&["device", "info"], Some("tcp:127.0.0.1:2")).contains("tcp:127.0.0.1:2`"));
+    let named = tried(&["device", "info", "--port", "tcp:127.0.0.1:3"], Some("tcp:127.0.0.1:2"));
+    assert!(named.contains("tcp:127.0.0.1:3`"), "{named}");
+    // A nearer file goes before one above it, and a path is one from its file's folder.
+    std::fs::write(deep.join("pam.toml"), "port = \"tcp:127.0.0.1:4\"\n").unwrap();
+    assert!(tried(&["device", "info"], None).contains("tcp:127.0.0.1:4`"));
+    std::fs::remove_file(deep.join("pam.toml")).unwrap();
+    let said = tried(&["fit", "x.csv"], None);
+    assert!(said.contains("mini.toml") && !said.contains("a/b"), "{said}");
+}
+
+#[test]
+fn a_wrong_settings_file_stops_everything_but_to_vent() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("pam.toml"), "\n\nprot = \"x\"\n").unwrap();
+    let (status, said) = host(folder.path(), &["effects"], None);
+    assert!(
+        status == 1 && said.contains("error[settings::invalid]") && said.contains("pam.toml:3"),
+        "{said}"
+    );
+    assert!(said.contains("did you mean port"), "{said}");
+    let (status, said) = host(folder.path(), &["vent", "--port", "tcp:127.0.0.1:1"], None);
+    assert!(status == 1 && said.contains("error[device::port]"), "{said}");
+}
+
+/// A line of a shell as words: quotes hold words together, a comment ends it.
+fn words(line: &str) -> Vec<String> {
+    let (mut words, mut quoted) = (vec![String::new()], false);
+    for c in line.chars() {
+        match c {
+            '\'' => quoted = !quoted,
+            '#' if !quoted && words.last().is_some_and(String::is_empty) => break,
+            c if c.is_whitespace() && !quoted => words.push(String::new()),
+            c => words.last_mut().unwrap().push(c),
+        }
+    }
+    words.retain(|w| !w.is_empty());
+    words
+}
+
+#[test]
+fn commands_that_the_readme_and_the_help_show_are_understood() {
+    let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md");
+    let mut lines: Vec<String> =
+        std::fs::read_to_string(readme).unwrap().lines().map(str::to_owned).collect();
+    fn helps(command: &clap::Command, lines: &mut Vec<String>) {
+        let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+        lines.extend(help.lines().map(|l| l.trim().to_owned()));
+        command.get_subcommands().for_each(|sub| helps(sub, lines));
+    }
+    helps(&host::cli::Cli::command(), &mut lines);
+    // Lines with pipes, redirections or continuations are a shell's business.
+    let plain = |l: &&String| {
+        l.starts_with("host ")
+            && !l.contains(['|', '>', '`'])
+            && !l.ends_with('\\')
+            && !l.contains("--port or")
+    };
+    let mut seen = 0;
+    for line in lines.iter().filter(plain) {
+        let outcome = host::cli::Cli::command().try_get_matches_from(words(line));
+        assert!(outcome.is_ok(), "`{line}`: {}", outcome.unwrap_err());
+        seen += 1;
+    }
+    assert!(seen > 40, "only {seen} commands were found");
+}
