@@ -229,7 +229,7 @@ proptest! {
                 let bytes = host::fit::hold_out::as_file(&fitted).to_bytes().expect("a file");
                 prop_assert!(host::table_file::TableFile::from_bytes(&bytes).is_ok());
             }
-            Err(e) => prop_assert!(e.advice().is_some() && !e.cause().is_empty(), "{e}"),
+            Err(e) => prop_assert!(e.advised() && !e.cause().is_empty(), "{e}"),
         }
     }
 }
