@@ -4,7 +4,7 @@
 //! pressure and stroke hardly change within. A piece ends where the direction turns, where stroke or pressure has moved on
 //! by a small share of their ranges, or where it holds enough rows. One pass, linear in rows; memory is that of the points.
 
-use crate::recording::Campaign;
+use crate::recording::{Campaign, Recording, white_noise};
 
 /// A mean over consecutive rows of one recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,18 +85,23 @@ const AIM: usize = 16_000;
 const STROKE_STEP: f64 = 1.0 / 500.0;
 /// A piece ends after this share of the range of pressure.
 const PRESSURE_STEP: f64 = 1.0 / 100.0;
+/// Or after so many standard deviations of a single reading, where these are more: noise must not cut pieces short, or there would be
+/// as many points as rows.
+const NOISE_STEP: f64 = 6.0;
 
 /// Cuts a campaign into points. `directions` has one value per row of every recording; recordings without a force
 /// are passed over.
 #[must_use]
 pub fn points(campaign: &Campaign, directions: &[Vec<i8>]) -> Points {
     let with_force = || campaign.recordings.iter().filter(|r| r.force.is_some());
-    let rows: usize = with_force().map(crate::recording::Recording::len).sum();
+    let rows: usize = with_force().map(Recording::len).sum();
     let pressure = Range::of(with_force().flat_map(|r| r.pressure.iter().copied()));
     let stroke = Range::of(with_force().flat_map(|r| r.stroke.iter().copied()));
     let force = Range::of(with_force().flat_map(|r| r.force.iter().flatten().copied()));
     let most_rows = (rows / AIM).max(1) as u32;
-    let (stroke_step, pressure_step) = (stroke.span() * STROKE_STEP, pressure.span() * PRESSURE_STEP);
+    let noise = |of: fn(&Recording) -> &[f64]| with_force().map(|r| white_noise(of(r))).fold(0.0, f64::max);
+    let stroke_step = (stroke.span() * STROKE_STEP).max(NOISE_STEP * noise(|r| &r.stroke));
+    let pressure_step = (pressure.span() * PRESSURE_STEP).max(NOISE_STEP * noise(|r| &r.pressure));
     let per_stroke = if stroke.span() > 0.0 { 1.0 / stroke.span() } else { 0.0 };
     let per_pressure = if pressure.span() > 0.0 { 1.0 / pressure.span() } else { 0.0 };
     let mut list: Vec<Point> = Vec::with_capacity(rows.min(2 * AIM));
@@ -179,7 +184,6 @@ pub fn median(values: &mut [f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::Recording;
 
     fn loops(rows: usize) -> (Campaign, Vec<Vec<i8>>) {
         let phase = |i: usize| (i as f64 / rows as f64 * 6.0).fract();
@@ -208,6 +212,20 @@ mod tests {
             assert!((p.force - (40.0 - 1e4 * p.stroke)).abs() < 1e-9, "means of a line lie on it");
         }
         assert!(points.row_noise < 1e-6);
+    }
+
+    #[test]
+    fn noise_of_the_stroke_makes_no_more_points() {
+        let (mut campaign, directions) = loops(400_000);
+        let quiet = points(&campaign, &directions).list.len();
+        let mut state = 1_u32;
+        for x in &mut campaign.recordings[0].stroke {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            // Uniform over a step of the stroke on either side.
+            *x += 6e-6 * (f64::from(state >> 8) / f64::from(1 << 23) - 1.0);
+        }
+        let noisy = points(&campaign, &directions).list.len();
+        assert!(noisy < quiet + quiet / 10, "{noisy} points instead of {quiet}");
     }
 
     #[test]

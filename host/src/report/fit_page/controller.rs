@@ -1,6 +1,6 @@
 //! What a controller with this table will produce, and how far that may be from what was wanted.
 
-use super::super::{Axis, Colour, Figure, Panel, Section, figures};
+use super::super::{Axis, Colour, Figure, Panel, Section, figures, fixed};
 use super::view::{Banded, View};
 
 /// Contractions at which the force is looked at, shares of the tested range.
@@ -54,7 +54,7 @@ impl Place {
             let readings = pulls.iter().map(|p| view.half_of_readings(*p, x, *direction)).collect();
             (*name, pulls.iter().map(|p| p / 1e3).collect(), force, readings)
         });
-        let title = format!("contraction {} %", figures(view.contraction(x), 2));
+        let title = format!("contraction {} %", fixed(view.contraction(x), 1));
         Self { title, branches: branches.collect() }
     }
 
