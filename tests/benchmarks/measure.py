@@ -73,8 +73,10 @@ def machine() -> str:
                 break
     except OSError:
         pass
+    # Whoever else works on the machine shows in wall times first.
+    load = f"load {os.getloadavg()[0]:.1f}"
     packages = ", ".join(f"{p} {version(p)}" for p in ("numpy", "scipy", "polars", "pandas"))
-    return f"{os.cpu_count()} cores, {model}; Python {platform.python_version()}, {packages}."
+    return f"{os.cpu_count()} cores, {model}, {load}; Python {platform.python_version()}, {packages}."
 
 
 def verdict(what: str, value: float, bound: float, at_least: bool) -> tuple[str, bool]:
