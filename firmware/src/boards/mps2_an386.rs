@@ -140,8 +140,8 @@ async fn telemetry(port: &'static Port, shared: &'static Shared) {
 }
 
 #[embassy_executor::task]
-async fn link(port: &'static Port, shared: &'static Shared, mut server: Server<FileFlash>) {
-    tasks::link(&mut Receiver(&LINK), port, &mut server, shared).await;
+async fn link(port: &'static Port, shared: &'static Shared, server: &'static mut Server<FileFlash>) {
+    tasks::link(&mut Receiver(&LINK), port, server, shared).await;
     // The answer is on its way out of the pipe.
     Timer::after_millis(20).await;
     watchdog::restart_on_request();
@@ -155,7 +155,10 @@ fn spawn(spawner: SendSpawner, shared: &'static Shared, port: &'static Port) -> 
         serial: *b"emulated\0\0\0\0",
         started_by: watchdog::started_by(),
     };
-    let server = Server::start(identity, flash, shared).map_err(|_| "the store cannot be opened")?;
+    // In a place of its own: a task would keep it twice, as its argument and as its variable.
+    static SERVER: StaticCell<Server<FileFlash>> = StaticCell::new();
+    let server =
+        SERVER.init(Server::start(identity, flash, shared).map_err(|_| "the store cannot be opened")?);
     let full = |_| "a task does not fit its place";
     spawner.spawn(control(shared).map_err(full)?);
     watchdog::start();

@@ -259,11 +259,11 @@ async fn link(
     mut receiver: BufferedUartRx<'static>,
     port: &'static Port,
     shared: &'static Shared,
-    mut server: Server<StoreFlash>,
+    server: &'static mut Server<StoreFlash>,
 ) {
     loop {
         // A receiver that was overrun by noise says so and goes on.
-        tasks::link(&mut receiver, port, &mut server, shared).await;
+        tasks::link(&mut receiver, port, server, shared).await;
         if server.wants_restart() {
             Timer::after_millis(20).await;
             dump();
@@ -321,7 +321,9 @@ fn spawn(spawner: Spawner, started_by: StartedBy) -> Option<()> {
     let port: &'static Port = PORT.init_with(|| Mutex::new(sender));
     let identity =
         Identity { board: Board::NucleoF446re, muscles: 1, serial: embassy_stm32::uid::uid(), started_by };
-    let server = Server::start(identity, StoreFlash(Flash::new_blocking(p.FLASH)), shared).ok()?;
+    // In a place of its own: a task would keep it twice, as its argument and as its variable.
+    static SERVER: StaticCell<Server<StoreFlash>> = StaticCell::new();
+    let server = SERVER.init(Server::start(identity, StoreFlash(Flash::new_blocking(p.FLASH)), shared).ok()?);
     let sensors = Sensors {
         adc: Adc::new(p.ADC1),
         pressure: p.PA0.degrade_adc(),

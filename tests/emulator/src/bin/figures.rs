@@ -1,11 +1,14 @@
-//! Writes `docs/figures/controller.md`: instructions per call on the emulated controller.
+//! Writes `docs/figures/controller.md`: instructions, memory and precision of the controller.
 
 use std::io;
 use std::path::Path;
 
+use emulator_tests::figures::{self, count, precisions, reference_error, sizes, stack};
+
 fn main() -> io::Result<()> {
-    let Ok(figures) = emulator_tests::figures::count() else { return Ok(()) };
-    let text = emulator_tests::figures::markdown(&figures);
+    let (Ok(counted), Ok(sizes), Ok(stack)) = (count(), sizes(), stack()) else { return Ok(()) };
+    let text = figures::markdown(&counted)
+        + &figures::more_markdown(&sizes, stack, &precisions(), reference_error());
     print!("{text}");
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/figures");
     std::fs::create_dir_all(&folder)?;
