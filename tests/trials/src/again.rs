@@ -196,7 +196,7 @@ pub fn run(
         return Err("the first round has not been answered".into());
     }
     let seed = begun(set).ok_or("the set's seed is missing")?;
-    let cases = ambiguous(set, &ledger, draw(seed, &ledger.set, ledger.truths.len()))?;
+    let cases = ambiguous(set, &ledger, draw(seed, &ledger.set, ledger.drawn.max(ledger.truths.len())))?;
     let progress = Progress::new("asked again", cases.len());
     let all: Vec<Second> = cases
         .par_iter()

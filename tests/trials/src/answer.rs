@@ -2,7 +2,7 @@
 
 use crate::ledger::{Ledger, name, read_ledger, sha256, write_ledger};
 use crate::progress::Progress;
-use rayon::prelude::*;
+use crate::queue::in_order;
 use serde::{Deserialize, Serialize};
 use std::error::Error;
 use std::io::Write as _;
@@ -222,7 +222,7 @@ pub fn ask(set: &Path, how: &Asking) -> Result<bool, Box<dyn Error>> {
         Ok(())
     };
     // One at a time per core: the tool is threaded itself, and the time of an answer should mean something.
-    open.par_iter().with_max_len(1).map(one).collect::<Result<(), String>>()?;
+    in_order(&open, one)?;
     let mut all = frozen_so_far(set);
     if all.len() < total {
         return Ok(false);

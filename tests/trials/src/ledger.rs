@@ -2,9 +2,9 @@
 
 use crate::generate::{Trial, TrialTruth, make};
 use crate::progress::Progress;
+use crate::queue::in_order;
 use crate::residuals::Residuals;
 use crate::spec::Spec;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::error::Error;
@@ -21,6 +21,9 @@ pub struct Ledger {
     pub seed_sha256: String,
     /// SHA-256 of each sealed truth file, in order of the trials.
     pub truths: Vec<String>,
+    /// How many trials were drawn; the truths are those of the first of them.
+    #[serde(default)]
+    pub drawn: usize,
     /// SHA-256 of each frozen answer, in order of the trials; empty before.
     pub answers: Vec<String>,
     /// Version and hash of the tool that answered.
@@ -121,6 +124,8 @@ pub struct Plan<'a> {
     pub set: &'a str,
     /// Its seed.
     pub seed: u64,
+    /// How many trials were drawn, of which the first are made.
+    pub drawn: usize,
     /// What noise is resampled from.
     pub residuals: &'a Residuals,
 }
@@ -144,23 +149,20 @@ pub fn write_set(output: &Path, plan: &Plan<'_>, specs: &[Spec]) -> Result<(), B
     directory(&output.join("sealed"))?;
     put(&output.join("sealed").join("seed.txt"), &plan.seed.to_string())?;
     let progress = Progress::new("made", specs.len());
-    let truths: Result<Vec<String>, String> = specs
-        .par_iter()
-        .with_max_len(1)
-        .map(|s| {
-            let truth = output.join("sealed").join(name(s.id)).join("truth.json");
-            let hash = match std::fs::read(&truth) {
-                Ok(bytes) => Ok(sha256(&bytes)),
-                Err(_) => put_trial(output, &make(s, plan.residuals)),
-            };
-            progress.one();
-            hash
-        })
-        .collect();
+    let truths = in_order(specs, |s| {
+        let truth = output.join("sealed").join(name(s.id)).join("truth.json");
+        let hash = match std::fs::read(&truth) {
+            Ok(bytes) => Ok(sha256(&bytes)),
+            Err(_) => put_trial(output, &make(s, plan.residuals)),
+        };
+        progress.one();
+        hash
+    });
     let ledger = Ledger {
         set: plan.set.into(),
         seed_sha256: sha256(plan.seed.to_string().as_bytes()),
         truths: truths?,
+        drawn: plan.drawn,
         answers: Vec::new(),
         tool: String::new(),
         seconds: Vec::new(),

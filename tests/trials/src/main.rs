@@ -12,6 +12,7 @@ mod limits;
 mod locate;
 mod names;
 mod progress;
+mod queue;
 mod report;
 mod residuals;
 mod score;
@@ -42,6 +43,9 @@ struct Set {
     /// How many trials; the mixture of the final set is kept.
     #[arg(long, default_value_t = 330)]
     n: usize,
+    /// Make and judge the first so many only: a stratified share, where time is short.
+    #[arg(long)]
+    take: Option<usize>,
     /// Seed instead of the set's own.
     #[arg(long)]
     seed: Option<u64>,
@@ -133,6 +137,9 @@ enum Command {
         /// The tool.
         #[arg(long, default_value = "target/release/host")]
         host: PathBuf,
+        /// Write the table as this page of the book, too.
+        #[arg(long)]
+        page: Option<PathBuf>,
     },
     /// Generate, answer and score in one go; each goes on where an earlier run was broken off.
     Prove {
@@ -168,7 +175,12 @@ fn main() -> ExitCode {
             let draw = |seed, set: &str, n| spec::draw(seed, set, composition(n));
             again::run(&set, &host, &residuals::Residuals::read(&data), draw)
         }
-        Command::Semi { data, output, host } => semi::run(&data, &output, &host),
+        Command::Semi { data, output, host, page } => {
+            semi::run(&data, &output, &host).and_then(|()| match &page {
+                Some(page) => Ok(std::fs::copy(output.join("semi.md"), page).map(|_| ())?),
+                None => Ok(()),
+            })
+        }
         Command::Prove { set, what, tool, check } => prove(&set, &what, &tool, check),
     };
     match done {
@@ -254,13 +266,15 @@ fn generate(set: &str, what: &Set) -> Result<(), Box<dyn Error>> {
         (None, "final") => ledger::begun(output).map_or_else(ledger::secret_seed, Ok)?,
         (None, other) => return Err(format!("no set \"{other}\": take dev or final").into()),
     };
-    let specs = spec::draw(seed, set, composition(what.n));
+    let mut specs = spec::draw(seed, set, composition(what.n));
+    let drawn = specs.len();
+    specs.truncate(what.take.unwrap_or(drawn).max(1));
     let residuals = residuals::Residuals::read(&what.data);
     if residuals.is_empty() {
         eprintln!("no real recordings in {}: all noise is synthetic", what.data.display());
     }
     let start = Instant::now();
-    ledger::write_set(output, &ledger::Plan { set, seed, residuals: &residuals }, &specs)?;
+    ledger::write_set(output, &ledger::Plan { set, seed, drawn, residuals: &residuals }, &specs)?;
     println!("{} trials in {} ({:.1} s)", specs.len(), output.display(), start.elapsed().as_secs_f64());
     Ok(())
 }
@@ -291,7 +305,7 @@ fn score(set: &Path, host: &Path, held_out: bool) -> Result<Vec<report::Scored>,
         }
     }
     let baselines = baselines::all(set, &truths, &scored)?;
-    let drawn = ledger.truths.len();
+    let drawn = ledger.drawn.max(ledger.truths.len());
     let share = if truths.len() < drawn { format!(" (the first of {drawn} drawn)") } else { String::new() };
     let title = format!(
         "Sealed trials: set \"{}\", {} trials{share}, tool {}",

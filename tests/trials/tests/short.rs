@@ -19,7 +19,7 @@ fn no_wrong_names_for_nulls_and_strangers_and_right_ones_for_what_is_plain() {
     let dir = std::env::temp_dir().join(format!("pam-trials-short-{}", std::process::id()));
     let _ = std::fs::remove_dir_all(&dir);
     let proof = Command::new(env!("CARGO_BIN_EXE_trials"))
-        .args(["prove", "--set", "dev", "--n", "10", "--check", "-o"])
+        .args(["prove", "--set", "dev", "--n", "48", "--take", "10", "--check", "-o"])
         .arg(&dir)
         .arg("--host")
         .arg(host())
