@@ -88,6 +88,21 @@ def test_what_is_wrong_is_said():
         raise AssertionError("a negative length was taken")
 
 
+def test_the_listing_of_the_book_runs():
+    page = pathlib.Path(__file__).resolve().parents[3] / "docs/src/python.md"
+    listing = page.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
+    folder, here = bench().resolve(), os.getcwd()
+    with tempfile.TemporaryDirectory() as work:
+        os.symlink(folder, os.path.join(work, "bench"))
+        os.chdir(work)
+        try:
+            names = {}
+            exec(compile(listing, str(page), "exec"), names)
+            assert names["force"].shape == (50,) and os.path.getsize("mini.pam") > 0 and os.path.getsize("fit.html") > 0
+        finally:
+            os.chdir(here)
+
+
 def test_stubs_and_help_name_what_there_is():
     stubs = ast.parse((pathlib.Path(__file__).parent.parent / "pamtools.pyi").read_text())
     public = lambda names: {n for n in names if not n.startswith("_")}
