@@ -82,7 +82,7 @@ fn the_command_line_goes_before_the_environment_and_that_before_the_file() {
 #[test]
 fn a_wrong_settings_file_stops_everything_but_to_vent() {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("pam.toml"), "\n\nprot = \"x\"\n").unwrap();
+    std::fs::write(folder.path().join("pam.toml"), "\n\nporr = \"x\"\n").unwrap();
     let (status, said) = host(folder.path(), &["effects"], None);
     assert!(
         status == 1 && said.contains("error[settings::invalid]") && said.contains("pam.toml:3"),
