@@ -9,8 +9,12 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 
-# A reader in a process of its own says how long the reading alone took: starting Python and importing is not held against it.
-PEER = "import {0} as m, sys, time; t = time.perf_counter(); m.read_csv(sys.argv[1]); print(time.perf_counter() - t)"
+# A reader in a process of its own says what the reading alone took: starting Python and importing is not held against it.
+PEER = """import {0} as m, sys, time
+wall, processor = time.perf_counter(), time.process_time()
+m.read_csv(sys.argv[1])
+print(time.perf_counter() - wall, time.process_time() - processor)
+"""
 
 
 @dataclass
@@ -28,7 +32,7 @@ class Cost:
 
 
 def run(command: list[str], says_seconds: bool = False) -> Cost:
-    """One run. Where the program prints the seconds of its own work, they count as its wall time."""
+    """One run. Where the program prints wall and processor seconds of its own work, they count."""
     start = time.perf_counter()
     process = subprocess.Popen([str(c) for c in command], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
     out = process.stdout.read()
@@ -36,9 +40,10 @@ def run(command: list[str], says_seconds: bool = False) -> Cost:
     wall = time.perf_counter() - start
     if status != 0:
         raise SystemExit(f"{command[0]} failed")
+    processor = usage.ru_utime + usage.ru_stime
     if says_seconds:
-        wall = float(out.split()[-1])
-    return Cost(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
+        wall, processor = map(float, out.split()[-2:])
+    return Cost(wall, processor, usage.ru_maxrss / 1024)
 
 
 def rounds(programs: dict[str, tuple[list[str], bool]], count: int) -> dict[str, Cost]:

@@ -48,6 +48,7 @@ def main() -> None:
     full, tenth = costs[most], costs[most // 10]
     bounds = [
         verdict("time of polars's reading", full["host"].wall / full["polars"].wall, 1, False),
+        verdict("the same in processor time", full["host"].processor / full["polars"].processor, 1, False),
         verdict(
             "processor time per row, against a tenth of the rows",
             full["host"].processor / tenth["host"].processor / 10,
