@@ -63,7 +63,8 @@ fn units_and_forms_change_nothing() {
     type Stroke<'a> = (&'a str, &'a dyn Fn(f64) -> f64);
     let (inch, length) = (|x: f64| x / 0.0254, |x: f64| (rest - x) * 1e3);
     let contraction = |x: f64| x / rest;
-    let forms: [(&str, f64, &str, f64, Stroke<'_>, &str, f64, char); 3] = [
+    type Form<'a> = (&'a str, f64, &'a str, f64, Stroke<'a>, &'a str, f64, char);
+    let forms: [Form<'_>; 3] = [
         (
             "time_ms",
             1e-3,
