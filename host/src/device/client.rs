@@ -212,7 +212,7 @@ impl Client {
         self.ask::<E>(request, self.patience.answer, self.patience.tries)
     }
 
-    /// Lets the device know that its host is alive, if nothing was sent for [a while](HEARTBEAT). Nothing is waited for:
+    /// Lets the device know that its host is alive, if nothing was sent for a while (a tenth of a second). Nothing is waited for:
     /// the answer is passed over when it comes.
     ///
     /// # Errors
