@@ -5,15 +5,15 @@ use crate::answer::{Answer, frozen, recordings, run_limited};
 use crate::generate::{TrialTruth, after};
 use crate::ledger::{Ledger, begun, name, open, read_ledger};
 use crate::progress::Progress;
+use crate::queue::in_order;
 use crate::report::Rate;
 use crate::residuals::Residuals;
 use crate::spec::{Spec, Stratum};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::Muscle;
 use virtual_bench::protocol::{Place, Protocol, Step};
@@ -162,6 +162,11 @@ fn ask(
 ) -> Vec<String> {
     let id = name(case.spec.id);
     let dir = set.join("again").join(&id).join(what);
+    let trial = set.join("trials").join(&id);
+    let json = dir.join("answer.json");
+    if json.exists() {
+        return said(&json);
+    }
     let files: Vec<PathBuf> = after(&case.spec, &case.truth.bench, residuals, next)
         .iter()
         .enumerate()
@@ -171,8 +176,6 @@ fn ask(
             std::fs::write(&path, f.csv(Columns::default())).ok().map(|()| path)
         })
         .collect();
-    let trial = set.join("trials").join(&id);
-    let json = dir.join("answer.json");
     let mut c = Command::new(host);
     c.arg("diagnose").arg("--quiet").arg("--muscle").arg(trial.join("muscle.toml"));
     c.args(recordings(&trial)).args(&files).arg("--json").arg(&json);
@@ -180,15 +183,21 @@ fn ask(
     if run_limited(&mut c, Duration::from_secs(120)).is_err() {
         return Vec::new();
     }
-    let answer = std::fs::read(&json).ok().and_then(|b| serde_json::from_slice::<Answer>(&b).ok());
+    said(&json)
+}
+
+fn said(json: &Path) -> Vec<String> {
+    let answer = std::fs::read(json).ok().and_then(|b| serde_json::from_slice::<Answer>(&b).ok());
     answer.map_or(Vec::new(), |a| set_of(&a))
 }
 
-/// Run the second round of an answered set and write again.json.
+/// Run the second round of an answered set and write again.json. What an earlier run was told is kept; trials that are not begun
+/// `until` then are left out.
 pub fn run(
     set: &Path,
     host: &Path,
     residuals: &Residuals,
+    until: Option<Instant>,
     draw: impl Fn(u64, &str, usize) -> Vec<Spec>,
 ) -> Result<(), Box<dyn Error>> {
     let ledger = read_ledger(set)?;
@@ -198,25 +207,34 @@ pub fn run(
     let seed = begun(set).ok_or("the set's seed is missing")?;
     let cases = ambiguous(set, &ledger, draw(seed, &ledger.set, ledger.drawn.max(ledger.truths.len())))?;
     let progress = Progress::new("asked again", cases.len());
-    let all: Vec<Second> = cases
-        .par_iter()
-        .with_max_len(1)
-        .map(|case| {
-            let mut r = Rng::stream(case.spec.seed, "menu");
-            let muscle = Muscle::new(case.truth.bench.muscle.clone());
-            let item = menu(&muscle, &mut r);
-            let second = Second {
-                id: case.spec.id,
-                protocol: case.spec.protocol.into(),
-                truth: case.truth.effects.iter().map(|e| e.name.clone()).collect(),
-                first: case.first.clone(),
-                proposed: ask(set, host, case, "proposed", &case.proposed, residuals),
-                random: ask(set, host, case, "random", &item, residuals),
-            };
-            progress.one();
-            second
-        })
-        .collect();
+    let done = in_order(&cases, |case| {
+        let dir = set.join("again").join(name(case.spec.id));
+        let known = ["proposed", "random"].iter().all(|w| dir.join(w).join("answer.json").exists());
+        if !known && until.is_some_and(|t| Instant::now() > t) {
+            return Ok(None);
+        }
+        let mut r = Rng::stream(case.spec.seed, "menu");
+        let muscle = Muscle::new(case.truth.bench.muscle.clone());
+        let item = menu(&muscle, &mut r);
+        let second = Second {
+            id: case.spec.id,
+            protocol: case.spec.protocol.into(),
+            truth: case.truth.effects.iter().map(|e| e.name.clone()).collect(),
+            first: case.first.clone(),
+            proposed: ask(set, host, case, "proposed", &case.proposed, residuals),
+            random: ask(set, host, case, "random", &item, residuals),
+        };
+        progress.one();
+        Ok(Some(second))
+    })?;
+    let all: Vec<Second> = done.into_iter().flatten().collect();
+    if all.len() < cases.len() {
+        println!(
+            "{} of {} ambiguous trials were asked again; the same command goes on",
+            all.len(),
+            cases.len()
+        );
+    }
     std::fs::write(set.join("again.json"), serde_json::to_string_pretty(&all)?)?;
     println!("{}", markdown(&all));
     Ok(())

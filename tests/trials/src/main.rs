@@ -125,6 +125,9 @@ enum Command {
         /// Real recordings whose residuals half of the trials have as noise.
         #[arg(long, default_value = "../shared/data")]
         data: PathBuf,
+        /// Begin no further trial after this many minutes; the same command goes on later.
+        #[arg(long)]
+        minutes: Option<f64>,
     },
     /// Put effects into the real recordings of the 10 mm fluidic muscle and ask what was put in.
     Semi {
@@ -171,9 +174,10 @@ fn main() -> ExitCode {
                 None => Ok(()),
             })
         }
-        Command::Again { set, host, data } => {
+        Command::Again { set, host, data, minutes } => {
             let draw = |seed, set: &str, n| spec::draw(seed, set, composition(n));
-            again::run(&set, &host, &residuals::Residuals::read(&data), draw)
+            let until = minutes.map(|m| Instant::now() + Duration::from_secs_f64(60.0 * m.max(0.0)));
+            again::run(&set, &host, &residuals::Residuals::read(&data), until, draw)
         }
         Command::Semi { data, output, host, page } => {
             semi::run(&data, &output, &host).and_then(|()| match &page {
