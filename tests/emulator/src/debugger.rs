@@ -18,6 +18,8 @@ impl Debugger {
     pub fn attach(port: u16) -> Self {
         let stream = TcpStream::connect(("127.0.0.1", port)).expect("QEMU's debugging port");
         stream.set_read_timeout(Some(Duration::from_secs(5))).expect("a stream");
+        // Many small packets, each of which waits for its answer.
+        stream.set_nodelay(true).expect("a stream");
         let mut debugger = Self(stream);
         debugger.ask("?");
         debugger
