@@ -13,6 +13,7 @@
 //! | answers to the host | [`server`] |
 //! | the tasks that a board starts | [`tasks`] |
 //! | what a board must give | [`board`] |
+//! | log lines on their way to the host | `log` (feature of that name) |
 //! | all of it in a host's own process | `native` (feature of that name) |
 //!
 //! Nothing here knows a board, and nothing but `main` knows which board it is.
@@ -21,6 +22,8 @@
 
 pub mod board;
 pub mod control;
+#[cfg(feature = "log")]
+pub mod log;
 pub mod modes;
 #[cfg(feature = "native")]
 pub mod native;

@@ -246,7 +246,8 @@ impl PairState {
     /// Wanted forces of both muscles, N.
     ///
     /// The joint's stiffness at held pressures is `r² Σ −∂F_i/∂x`; one Newton step a tick moves the common pressure to where
-    /// it is the wanted one. Around the forces that this pressure gives, the torque of the angle's loop is split evenly.
+    /// it is the wanted one. Around the forces that this pressure gives, a torque is split evenly: `K θ*`, which moves the
+    /// equilibrium of that stiffness from zero to the wanted angle, and the angle's loop for what is left.
     pub fn forces(&mut self, joint: &Joint, posed: &Posed, sides: [(&Model, f32); 2], cut: f32) -> [f32; 2] {
         let r = joint.radius_m;
         let probe_pa = 10e3;
@@ -275,7 +276,9 @@ impl PairState {
         }
         let error = posed.angle_rad - posed.measured_rad;
         self.integral.step(joint.integral_nm_per_rad_s * error, joint.torque_limit_nm, cut);
-        let torque = (joint.proportional_nm_per_rad * error + self.integral.value()
+        let torque = (posed.stiffness_nm_per_rad * posed.angle_rad
+            + joint.proportional_nm_per_rad * error
+            + self.integral.value()
             - joint.damping_nm_s_per_rad * posed.rate_rad_per_s)
             .clamp(-joint.torque_limit_nm, joint.torque_limit_nm);
         let share = torque / (2.0 * r);

@@ -11,6 +11,8 @@ use embassy_sync::mutex::Mutex as Gate;
 use embassy_sync::signal::Signal;
 use embedded_io_async::{Read, Write};
 use embedded_storage_async::nor_flash::NorFlash;
+#[cfg(feature = "log")]
+use model_core::link::endpoints::LOG;
 use model_core::link::endpoints::{EVENT, TELEMETRY};
 use model_core::link::frame::{self, Accumulator, Header, Kind, MAX_WIRE};
 use model_core::link::messages::{Event, Telemetry};
@@ -28,6 +30,8 @@ const WAITING: usize = 16;
 enum Spoken {
     Sample(u16, Telemetry),
     Event(Event),
+    #[cfg(feature = "log")]
+    Log(crate::log::Frame),
 }
 
 /// What the tasks share: the controller, entered for short and never across an await, and what waits to be sent.
@@ -65,11 +69,18 @@ impl Shared {
     pub fn step(&self, inputs: &crate::board::Inputs) -> Outputs {
         let Stepped { outputs, telemetry, event } = self.with(|controller| controller.step(inputs));
         #[cfg(feature = "log")]
+        crate::log::set_tick(self.with(|controller| controller.ticks()));
+        #[cfg(feature = "log")]
         match &event {
             Some(Event::Fault(report)) => {
-                defmt::warn!("fault {} at {} us", report.fault.code(), report.time_us);
+                defmt::warn!(
+                    "fault {=u8}, {=f32} against {=f32}",
+                    report.fault.code(),
+                    report.value,
+                    report.limit
+                );
             }
-            Some(Event::State(state)) => defmt::info!("state {}", *state as u8),
+            Some(Event::State(state)) => defmt::info!("state {=u8}", *state as u8),
             Some(Event::TraceFull) => defmt::info!("trace full"),
             None => {}
         }
@@ -109,6 +120,17 @@ impl Shared {
         self.spoken.free_capacity() >= 2
     }
 
+    /// What is to be said next, when there is something.
+    async fn next(&self) -> Spoken {
+        #[cfg(feature = "log")]
+        return match select(self.spoken.receive(), crate::log::next()).await {
+            Either::First(spoken) => spoken,
+            Either::Second(line) => Spoken::Log(line),
+        };
+        #[cfg(not(feature = "log"))]
+        self.spoken.receive().await
+    }
+
     /// The next frame to send without being asked, if there is one.
     pub fn next_spoken(&self, out: &mut [u8; MAX_WIRE]) -> Option<usize> {
         self.spoken.try_receive().ok().map(|spoken| encode(&spoken, out))
@@ -120,6 +142,8 @@ fn encode(spoken: &Spoken, out: &mut [u8; MAX_WIRE]) -> usize {
     let written = match spoken {
         Spoken::Sample(number, sample) => frame::encode(header(TELEMETRY, *number), sample, out),
         Spoken::Event(event) => frame::encode(header(EVENT, 0), event, out),
+        #[cfg(feature = "log")]
+        Spoken::Log(line) => frame::encode_bytes(header(LOG, 0), line, out),
     };
     // The largest of both fits, which `model_core::link::endpoints` tests.
     written.unwrap_or(0)
@@ -172,7 +196,7 @@ pub async fn link<R: Read, W: Write, F: NorFlash>(
 pub async fn telemetry<W: Write>(sender: &Gate<CriticalSectionRawMutex, W>, shared: &Shared) {
     let mut out = [0; MAX_WIRE];
     loop {
-        let spoken = shared.spoken.receive().await;
+        let spoken = shared.next().await;
         let length = encode(&spoken, &mut out);
         if sender.lock().await.write_all(&out[..length]).await.is_err() {
             return;

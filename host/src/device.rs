@@ -9,6 +9,7 @@
 //! | what is asked over time | [`course`] |
 //! | a run from start to vent | [`mod@run`] |
 //! | the pressure regulator, found from steps | [`regulator`] |
+//! | log lines of the firmware in words | [`log_table`] |
 //! | telemetry to a recording | [`recorder`] |
 //! | refusals and faults in words, with their remedy | [`words`] |
 
@@ -16,6 +17,7 @@ mod address;
 mod client;
 pub mod course;
 pub mod difference;
+pub mod log_table;
 mod port;
 #[cfg(feature = "probe")]
 pub mod probe;

@@ -11,8 +11,12 @@ use host::error::{Code, Error};
 use model_core::link::endpoints::{GetStatus, Restart};
 
 fn connect(address: &Address) -> Result<Client, Error> {
-    let patience =
-        Patience { answer: Duration::from_millis(250), slow_answer: Duration::from_secs(2), tries: 3 };
+    let patience = Patience {
+        answer: Duration::from_millis(250),
+        slow_answer: Duration::from_secs(2),
+        tries: 3,
+        ..Patience::default()
+    };
     Client::connect(Port::open(address)?, patience)
 }
 

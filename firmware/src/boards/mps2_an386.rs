@@ -5,7 +5,7 @@
 //! | 0 | link to the host |
 //! | 1, 2 | virtual benches of the first and second muscle, see [`bench`] |
 //!
-//! Logs, the store's file `pam-store.bin` and the end of the run go through semihosting. QEMU is started with
+//! The store's file `pam-store.bin` and the end of the run go through semihosting. QEMU is started with
 //! `-M mps2-an386 -semihosting-config enable=on,target=native` and a `-serial` for each UART.
 
 mod bench;
@@ -19,9 +19,6 @@ mod watchdog;
 use core::panic::PanicInfo;
 
 use cortex_m::peripheral::NVIC;
-#[cfg(feature = "log")]
-use defmt_semihosting as _;
-
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;

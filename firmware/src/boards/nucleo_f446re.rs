@@ -16,9 +16,6 @@
 
 use core::panic::PanicInfo;
 
-#[cfg(feature = "log")]
-use defmt_rtt as _;
-
 use cortex_m_rt::{entry, exception};
 use embassy_executor::{Executor, InterruptExecutor, Spawner};
 use embassy_stm32::adc::{Adc, AdcChannel, AnyAdcChannel, SampleTime};

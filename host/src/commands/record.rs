@@ -163,6 +163,7 @@ fn watch(
                 progress.set(elapsed / 1000);
             }
             Some(Topic::Event(event)) => recorder.event(&event)?,
+            Some(Topic::Log(_)) => {}
             None if heard.elapsed() > SILENCE => {
                 let status = client.call::<GetStatus>(&())?;
                 return Err(Error::new(

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Args, ValueEnum};
 use model_core::link::endpoints::{GetInfo, GetSettings, SetSettings};
-use model_core::link::settings::FeedForward;
+use model_core::link::settings::{FeedForward, Joint};
 use serde_json::{Value, json};
 
 use super::port::PortOption;
@@ -25,7 +25,8 @@ use crate::progress::Progress;
     host run --port /dev/ttyACM0 --force 'sine mean=60 amplitude=20 frequency=0.5' --seconds 10 -o run.csv\n  \
     host run --port tcp:127.0.0.1:4321 --force 'steps 40 60 80 hold=2' --seconds 12 -o steps.csv\n  \
     host run --port /dev/ttyACM0 --pressure 200 --seconds 5\n  \
-    host run --port /dev/ttyACM0 --stroke @course.csv --seconds 30 -o stroke.csv\n\n\
+    host run --port /dev/ttyACM0 --stroke @course.csv --seconds 30 -o stroke.csv\n  \
+    host run --port /dev/ttyACM0 --angle 'sine mean=0 amplitude=5 frequency=0.5' --stiffness 12 --seconds 10\n\n\
     Courses: VALUE | sine mean= amplitude= frequency= | steps V V … hold= | trapezoid low= high= ramp= hold= |\n  \
     chirp mean= amplitude= from= to= duration= | @FILE.csv (time in s, value); frequencies in Hz, times in s.\n\
     The recording is read back by `host fit` and `host predict`. At the end, on any error and on Ctrl-C the muscle is vented.")]
@@ -34,6 +35,9 @@ pub struct Arguments {
     port: PortOption,
     #[command(flatten)]
     quantity: Asked,
+    /// Stiffness of the joint, N·m/rad.
+    #[arg(long, value_name = "NM_PER_RAD", requires = "angle")]
+    stiffness: Option<f32>,
     /// How long, s of device time [default: until Ctrl-C].
     #[arg(short, long, value_name = "S", allow_negative_numbers = true)]
     seconds: Option<f64>,
@@ -63,16 +67,25 @@ struct Asked {
     /// Stroke to follow, mm.
     #[arg(long, value_name = "COURSE", allow_hyphen_values = true)]
     stroke: Option<String>,
+    /// Angle of a joint to follow, degrees: two muscles on one pulley (the settings' `joint`).
+    #[arg(long, value_name = "COURSE", allow_hyphen_values = true, requires = "stiffness")]
+    angle: Option<String>,
 }
 
 impl Asked {
-    fn parse(&self) -> Result<(Quantity, Course)> {
-        let (quantity, text) = match (&self.force, &self.pressure, &self.stroke) {
-            (Some(text), _, _) => (Quantity::Force, text),
-            (_, Some(text), _) => (Quantity::Pressure, text),
-            (_, _, Some(text)) => (Quantity::Stroke, text),
+    fn text(&self) -> Option<&str> {
+        [&self.force, &self.pressure, &self.stroke, &self.angle].into_iter().find_map(|text| text.as_deref())
+    }
+
+    fn parse(&self, stiffness: Option<f32>) -> Result<(Quantity, Course)> {
+        let quantity = match (&self.force, &self.pressure, &self.stroke, stiffness) {
+            (Some(_), ..) => Quantity::Force,
+            (_, Some(_), ..) => Quantity::Pressure,
+            (_, _, Some(_), _) => Quantity::Stroke,
+            (.., Some(stiffness_nm_per_rad)) => Quantity::Angle { stiffness_nm_per_rad },
             _ => return Err(Error::new(Code::CallInvalid, "nothing is asked for")),
         };
+        let text = self.text().unwrap_or_default();
         Ok((quantity, Course::parse(text, quantity)?))
     }
 }
@@ -93,8 +106,11 @@ impl Arguments {
     /// # Errors
     /// A wrong course, a device that is silent or refuses, the fault that stopped it, a recording that cannot be written.
     pub fn run(self, console: &Console) -> Result<()> {
-        let (quantity, course) = self.quantity.parse()?;
+        let (quantity, course) = self.quantity.parse(self.stiffness)?;
         positive([("--seconds", self.seconds), ("--rate", self.rate)])?;
+        if self.stiffness.is_some_and(|s| !(s >= 0.0 && s.is_finite())) {
+            return Err(Error::new(Code::CallInvalid, "--stiffness must be zero or more"));
+        }
         let interrupted = interrupts()?;
         let mut client = self.port.connect(console)?;
         if let Some(source) = self.feed_forward {
@@ -104,13 +120,12 @@ impl Arguments {
         let every_ticks = self.rate.map_or(1.0, |rate| (ticks / rate).round()).clamp(1.0, 60_000.0) as u16;
         let mut about = about_start("pam-run/1", &mut client)?;
         about["mode"] = json!(words::mode(quantity.mode()));
-        let asked = &self.quantity;
-        about["course"] =
-            json!(asked.force.as_deref().or(asked.pressure.as_deref()).or(asked.stroke.as_deref()));
+        about["course"] = json!(self.quantity.text());
+        about["stiffness_Nm_per_rad"] = json!(self.stiffness);
         about["unit"] = json!(quantity.unit());
         let mut recorder = begin(&self.output, &about, console)?;
         let plan = Plan { quantity, course, seconds: self.seconds, every_ticks };
-        let mut errors = Errors::default();
+        let mut errors = Errors::new(client.call::<GetSettings>(&())?.joint);
         let progress = Progress::new(console, "run");
         progress.total(self.seconds.map_or(0, |s| (s * 1e3) as u64));
         let mut start = None;
@@ -162,19 +177,28 @@ impl Arguments {
 }
 
 /// How far what was measured stayed from what was asked.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Errors {
+    joint: Joint,
     samples: u64,
     squares: f64,
 }
 
 impl Errors {
+    fn new(joint: Joint) -> Self {
+        Self { joint, samples: 0, squares: 0.0 }
+    }
+
     fn add(&mut self, quantity: Quantity, sample: &model_core::link::messages::Telemetry) {
         let Some(side) = sample.sides.first() else { return };
         let measured = match quantity {
             Quantity::Force => side.force_n,
             Quantity::Pressure => side.pressure_pa,
             Quantity::Stroke => side.stroke_m,
+            Quantity::Angle { .. } => match sample.sides.get(1) {
+                Some(other) => (side.stroke_m - other.stroke_m) / (2.0 * self.joint.radius_m),
+                None => return,
+            },
         };
         let error = f64::from(measured - sample.asked);
         if error.is_finite() {

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use model_core::link::endpoints::{EVENT, Endpoint, GetStatus, TELEMETRY};
+use model_core::link::endpoints::{EVENT, Endpoint, GetStatus, LOG, TELEMETRY};
 use model_core::link::frame::{Accumulator, Header, Kind, MAX_BODY, MAX_WIRE, encode, encode_bytes};
 use model_core::link::hello::{self, Board, Hello};
 use model_core::link::messages::{Event, Refusal, Telemetry};
@@ -26,13 +26,20 @@ pub struct Patience {
     pub answer: Duration,
     /// Time for an answer that waits for flash memory to be erased.
     pub slow_answer: Duration,
-    /// Times that a question is asked, when asking twice does no harm.
+    /// Times that a question is asked, when asking twice does no harm and the line is silent.
     pub tries: u32,
+    /// The same on a line that is not silent but noisy: frames arrive and fail their check.
+    pub noisy_tries: u32,
 }
 
 impl Default for Patience {
     fn default() -> Self {
-        Self { answer: Duration::from_millis(600), slow_answer: Duration::from_secs(6), tries: 3 }
+        Self {
+            answer: Duration::from_millis(600),
+            slow_answer: Duration::from_secs(6),
+            tries: 3,
+            noisy_tries: 60,
+        }
     }
 }
 
@@ -43,6 +50,8 @@ pub enum Topic {
     Telemetry(Telemetry),
     /// Something that happened.
     Event(Event),
+    /// A log line, for [`LogTable`](super::log_table::LogTable).
+    Log(Vec<u8>),
 }
 
 /// What did not arrive.
@@ -135,7 +144,9 @@ impl Client {
             spoke: Instant::now(),
         };
         let mut heard = Heard::default();
-        for _ in 0..patience.tries.max(1) {
+        let mut attempt = 0;
+        while attempt < patience.tries.max(1) || (heard.frames > 0 && attempt < patience.noisy_tries) {
+            attempt += 1;
             // A zero ends whatever half frame an earlier program left on the line.
             client.send(&[0])?;
             let sequence = client.next_sequence();
@@ -225,6 +236,14 @@ impl Client {
         self.transmit(header, &[])
     }
 
+    /// As [`Self::try_call`], asked once: for what is repeated only after looking what became of it.
+    ///
+    /// # Errors
+    /// As [`Self::try_call`].
+    pub fn try_once<E: Endpoint>(&mut self, request: &E::Request) -> Result<Result<E::Response, Refusal>> {
+        self.ask::<E>(request, self.patience.answer, 1)
+    }
+
     /// The next thing the device said by itself, waiting at most `patience` for one.
     ///
     /// # Errors
@@ -254,7 +273,9 @@ impl Client {
                 .help("the device said the same schema as this program, so this is a fault in one of them: please report it")
         };
         let mut wire = [0; MAX_WIRE];
-        for attempt in 0..tries.max(1) {
+        let bad = self.accumulator.counts().bad;
+        let mut attempt = 0;
+        while attempt < self.allowed(tries, bad) {
             self.losses.repeats += u64::from(attempt > 0);
             let sequence = self.next_sequence();
             let header = Header { kind: Kind::Request, id: E::ID, sequence };
@@ -262,6 +283,7 @@ impl Client {
                 Error::new(Code::CallInvalid, format!("the request `{}` cannot be sent: {e}", E::NAME))
             })?;
             self.send(&wire[..length])?;
+            attempt += 1;
             let Some(answer) = self.await_answer(E::ID, sequence, patience, &mut Heard::default())? else {
                 continue;
             };
@@ -275,6 +297,15 @@ impl Client {
             .help(
                 "look at cable and supply; when it answers again it is disarmed, or vented by its own watch",
             ))
+    }
+
+    /// How often a question may be asked, when so many frames were bad before it was asked first.
+    fn allowed(&self, tries: u32, bad_before: u32) -> u32 {
+        if tries > 1 && self.accumulator.counts().bad != bad_before {
+            self.patience.noisy_tries
+        } else {
+            tries.max(1)
+        }
     }
 
     fn next_sequence(&mut self) -> u16 {
@@ -350,6 +381,9 @@ impl Client {
                     if let Ok(event) = postcard::from_bytes::<Event>(frame.body) {
                         self.topics.push_back(Topic::Event(event));
                     }
+                }
+                Kind::Topic if frame.header.id == LOG => {
+                    self.topics.push_back(Topic::Log(frame.body.to_vec()));
                 }
                 // A controller never asks: what arrives as a request is our own, sent back.
                 Kind::Request => heard.echoes += 1,

@@ -16,7 +16,7 @@ use model_core::link::messages::{Mode, Reference, SetPoint};
 use crate::error::{Code, Error, Result, nearest};
 
 /// What is controlled, and the unit that people write it in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Quantity {
     /// Newtons.
     Force,
@@ -24,6 +24,11 @@ pub enum Quantity {
     Pressure,
     /// Millimetres.
     Stroke,
+    /// Degrees, of a joint that two muscles move.
+    Angle {
+        /// Stiffness of the joint, N·m/rad.
+        stiffness_nm_per_rad: f32,
+    },
 }
 
 impl Quantity {
@@ -34,6 +39,7 @@ impl Quantity {
             Self::Force => Mode::Force,
             Self::Pressure => Mode::Pressure,
             Self::Stroke => Mode::Stroke,
+            Self::Angle { .. } => Mode::Pair,
         }
     }
 
@@ -44,6 +50,7 @@ impl Quantity {
             Self::Force => "N",
             Self::Pressure => "kPa",
             Self::Stroke => "mm",
+            Self::Angle { .. } => "°",
         }
     }
 
@@ -54,6 +61,7 @@ impl Quantity {
             Self::Force => 1.0,
             Self::Pressure => 1e3,
             Self::Stroke => 1e-3,
+            Self::Angle { .. } => std::f64::consts::PI / 180.0,
         }
     }
 
@@ -64,6 +72,7 @@ impl Quantity {
             Self::Force => SetPoint::Force(value),
             Self::Pressure => SetPoint::Pressure(value),
             Self::Stroke => SetPoint::Stroke(value),
+            Self::Angle { stiffness_nm_per_rad } => SetPoint::Pair { angle_rad: value, stiffness_nm_per_rad },
         }
     }
 }
@@ -93,6 +102,8 @@ pub enum Course {
 
 /// Points of a table reference that are made from a file: as many as the firmware holds.
 const POINTS: usize = 256;
+/// A tick of every controller, s.
+const TICK_S: f64 = 1e-3;
 
 fn wrong(cause: impl Into<String>) -> Error {
     Error::new(Code::CallInvalid, cause).help(
@@ -257,10 +268,11 @@ impl Course {
         let [(begin, _), .., (end, _)] = points[..] else {
             return Err(at(0, "a course needs two points at least"));
         };
-        // The device joins points at equal times: the step is the shortest interval, or what the room allows.
+        // The device joins points at equal times, whole ticks apart: the shortest interval, or what the room allows.
         let shortest = points.windows(2).map(|w| w[1].0 - w[0].0).fold(f64::INFINITY, f64::min);
-        let step = shortest.max((end - begin) / (POINTS - 1) as f64);
-        let count = ((end - begin) / step).round() as usize + 1;
+        let least = shortest.max((end - begin) / (POINTS - 1) as f64);
+        let step = (least / TICK_S - 1e-6).ceil().max(1.0) * TICK_S;
+        let count = ((end - begin) / step - 1e-6).ceil() as usize + 1;
         let mut values = Vec::with_capacity(count);
         let mut behind = 1;
         for i in 0..count {
@@ -312,6 +324,21 @@ mod tests {
         std::fs::write(&path, "time_s,force_N\n0,10\n1,20\n# rest\n3,0\n").unwrap();
         let course = Course::parse(&format!("@{}", path.display()), Quantity::Force).unwrap();
         assert_eq!(course, Course::Points { step_s: 1.0, values: vec![10.0, 20.0, 10.0, 0.0] });
+        // Many points become fewer, whole ticks apart: else the device would play them too fast.
+        let many: String = (0..1_200).map(|n| format!("{},{n}\n", 0.0025 * f64::from(n))).collect();
+        std::fs::write(&path, many).unwrap();
+        let Course::Points { step_s, values } =
+            Course::parse(&format!("@{}", path.display()), Quantity::Force).unwrap()
+        else {
+            panic!("a file is points")
+        };
+        assert_eq!((step_s, values.len()), (0.012, 251));
+        assert!(
+            (values[100] - 480.0).abs() < 1e-3 && values[250] == 1_199.0,
+            "{} {}",
+            values[100],
+            values[250]
+        );
         std::fs::write(&path, "0,10\n1,20\n1,30\n").unwrap();
         let error = Course::parse(&format!("@{}", path.display()), Quantity::Force).unwrap_err();
         assert_eq!(error.place().line, Some(3));

@@ -121,7 +121,7 @@ fn follow(
                 steps.advance(client, plan.quantity, elapsed)?;
             }
             Some(Topic::Event(Event::Fault(report))) => return Err(words::stopped(&report)),
-            Some(Topic::Event(_)) => {}
+            Some(Topic::Event(_) | Topic::Log(_)) => {}
             None if heard.elapsed() > SILENCE => {
                 let status = client.call::<GetStatus>(&())?;
                 if status.state == State::Fault {
@@ -161,6 +161,21 @@ fn too_long() -> Error {
     Error::new(Code::CallInvalid, "the course has more points than a device holds").help("use fewer points")
 }
 
+/// The first value of a course that the device makes.
+fn begins_at(course: &Course) -> f32 {
+    match course {
+        Course::Constant(value) => *value,
+        Course::Steps { values, .. } | Course::Points { values, .. } => {
+            values.first().copied().unwrap_or(0.0)
+        }
+        Course::Wave(wave) => match *wave {
+            Reference::Sine { mean, .. } | Reference::Chirp { mean, .. } => mean,
+            Reference::Trapezoid { low, .. } => low,
+            Reference::SetPoint | Reference::Table { .. } => 0.0,
+        },
+    }
+}
+
 /// Steps that the host sends at their times.
 #[derive(Debug)]
 pub(crate) struct Steps {
@@ -171,6 +186,13 @@ pub(crate) struct Steps {
 
 impl Steps {
     pub(crate) fn begin(client: &mut Client, plan: &Plan) -> Result<Self> {
+        if let (Quantity::Angle { .. }, Course::Wave(_) | Course::Points { .. }) =
+            (plan.quantity, &plan.course)
+        {
+            // A wave has one value; the stiffness is the last set-point's.
+            let angle = begins_at(&plan.course);
+            client.call::<SetTo>(&plan.quantity.set_point(angle))?;
+        }
         let (values, hold_s) = match &plan.course {
             Course::Constant(value) => (vec![*value], f64::INFINITY),
             Course::Steps { values, hold_s } => (values.clone(), *hold_s),

@@ -1,6 +1,6 @@
 //! Tables on a device: read, sent in pieces, read back, compared.
 
-use model_core::link::endpoints::{BeginTable, CommitTable, GetInfo, ReadTable, SendTablePiece};
+use model_core::link::endpoints::{BeginTable, CommitTable, GetInfo, GetStatus, ReadTable, SendTablePiece};
 use model_core::link::frame::crc32;
 use model_core::link::messages::{
     PIECE, Refusal, Side, TableBegin, TableFault, TableInfo, TablePiece, TableRead,
@@ -8,6 +8,11 @@ use model_core::link::messages::{
 
 use super::{Client, words};
 use crate::error::{Code, Error, Result};
+
+/// Shortest piece that is tried on a noisy line, bytes.
+const SMALLEST: usize = 32;
+/// Times that a commit is asked for when its answers are lost.
+const COMMITS: u32 = 20;
 
 /// The image that a device keeps for a muscle; `None` when it has none.
 ///
@@ -42,6 +47,30 @@ pub fn read(client: &mut Client, side: Side) -> Result<Option<Vec<u8>>> {
     Ok(Some(image))
 }
 
+/// Has an upload committed. The answer may be lost while the device was busy with its flash, and asking twice would be refused;
+/// so the device is asked what it has instead.
+fn commit(client: &mut Client, side: Side, crc: u32, before: Option<TableInfo>) -> Result<TableInfo> {
+    let mut last = None;
+    for _ in 0..COMMITS {
+        match client.try_once::<CommitTable>(&()) {
+            Ok(Ok(kept)) => return Ok(kept),
+            Ok(Err(Refusal::Table(TableFault::NotBegun))) if last.is_some() => {}
+            Ok(Err(refusal)) => return Err(words::refused("table_commit", refusal)),
+            Err(silent) => last = Some(silent),
+        }
+        let mut info = client.call::<GetInfo>(&());
+        for _ in 0..2 {
+            // Erasing flash takes seconds, in which a device says nothing.
+            info = info.or_else(|_| client.call::<GetInfo>(&()));
+        }
+        match info?.tables[side.index()] {
+            Some(kept) if kept.crc == crc && Some(kept) != before => return Ok(kept),
+            _ => {}
+        }
+    }
+    Err(last.unwrap_or_else(|| words::refused("table_commit", Refusal::Table(TableFault::NotBegun))))
+}
+
 /// Sends an image, has it committed, reads it back and compares every byte. `progress` is told the bytes sent.
 ///
 /// A piece whose answer was lost is not sent twice: the device says how much it has.
@@ -60,15 +89,24 @@ pub fn write(
         return Err(words::refused("table_begin", Refusal::Table(TableFault::TooLong(capacity))));
     }
     let crc = crc32(image);
+    let before = client.call::<GetInfo>(&())?.tables[side.index()];
     client.call::<BeginTable>(&TableBegin { side, length, crc })?;
     let mut sent = 0;
+    let mut size = PIECE;
     while sent < image.len() {
-        let chunk = &image[sent..image.len().min(sent + PIECE)];
+        let chunk = &image[sent..image.len().min(sent + size)];
         let bytes = heapless::Vec::from_slice(chunk)
             .map_err(|_| Error::new(Code::CallInvalid, "a piece of the table does not fit its message"))?;
-        let there = match client.try_call::<SendTablePiece>(&TablePiece { offset: sent as u32, bytes })? {
-            Ok(there) | Err(Refusal::Table(TableFault::Gap(there))) => there as usize,
-            Err(refusal) => return Err(words::refused("table_piece", refusal)),
+        let there = match client.try_call::<SendTablePiece>(&TablePiece { offset: sent as u32, bytes }) {
+            Ok(Ok(there) | Err(Refusal::Table(TableFault::Gap(there)))) => there as usize,
+            Ok(Err(refusal)) => return Err(words::refused("table_piece", refusal)),
+            // A noisy line lets short frames pass where long ones break.
+            Err(silent) if size > SMALLEST => {
+                size /= 2;
+                client.call::<GetStatus>(&()).map_err(|_| silent)?;
+                continue;
+            }
+            Err(silent) => return Err(silent),
         };
         if there <= sent || there > image.len() {
             return Err(words::refused("table_piece", Refusal::Table(TableFault::Gap(there as u32))));
@@ -76,7 +114,7 @@ pub fn write(
         sent = there;
         progress(sent);
     }
-    let kept = client.call_once::<CommitTable>(&())?;
+    let kept = commit(client, side, crc, before)?;
     let back = read(client, side)?.unwrap_or_default();
     if back != image {
         let at = back.iter().zip(image).position(|(a, b)| a != b).unwrap_or(back.len().min(image.len()));

@@ -249,7 +249,7 @@ impl Connected {
                     self.note_fault()?;
                     report(Some(self), say);
                 }
-                Topic::Event(Event::TraceFull) => {}
+                Topic::Event(Event::TraceFull) | Topic::Log(_) => {}
             }
         }
         if self.sent.elapsed() >= BATCH && !self.batch.is_empty() {

@@ -173,6 +173,9 @@ pub const TELEMETRY: u8 = 128;
 /// Topic of [`Event`].
 pub const EVENT: u8 = 129;
 
+/// Topic of log lines: frames of `defmt`, which the host decodes with the device's image.
+pub const LOG: u8 = 130;
+
 /// Hash of the whole table, its messages and the topics: equal at both ends or they do not talk.
 pub const SCHEMA_HASH: u64 = {
     let mut hash = FNV_BASIS;

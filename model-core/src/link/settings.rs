@@ -199,9 +199,9 @@ impl Default for Settings {
             joint: Joint {
                 radius_m: 0.02,
                 rest_stroke_m: 0.002,
-                proportional_nm_per_rad: 2.0,
-                integral_nm_per_rad_s: 10.0,
-                damping_nm_s_per_rad: 0.05,
+                proportional_nm_per_rad: 12.0,
+                integral_nm_per_rad_s: 400.0,
+                damping_nm_s_per_rad: 0.2,
                 torque_limit_nm: 20.0,
             },
             regulator: Regulator {

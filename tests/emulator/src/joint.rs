@@ -44,15 +44,15 @@ impl Joint {
         self.angle
     }
 
-    /// Stiffness at held pressures, N·m/rad: `r² Σ −∂F/∂x` of the true muscles without friction.
-    pub fn stiffness(&self) -> f64 {
+    /// Stiffness at held pressures (Pa) and an angle (rad), N·m/rad: `r² Σ −∂F/∂x` of the true muscles without friction.
+    pub fn stiffness_at(&self, pressures: [f64; 2], angle: f64) -> f64 {
         let h = 1e-5;
-        let fall = |plant: &Plant| {
-            let now = plant.truth();
-            let force = |stroke: f64| plant.muscle().quasi_static(now.pressure, stroke);
-            (force(now.stroke - h) - force(now.stroke + h)) / (2.0 * h)
+        let strokes = [self.rest + self.radius * angle, self.rest - self.radius * angle];
+        let fall = |side: usize| {
+            let force = |stroke: f64| self.plants[side].muscle().quasi_static(pressures[side], stroke);
+            (force(strokes[side] - h) - force(strokes[side] + h)) / (2.0 * h)
         };
-        self.radius * self.radius * self.plants.iter().map(fall).sum::<f64>()
+        self.radius * self.radius * (fall(0) + fall(1))
     }
 
     fn stroke(&self, side: usize) -> f64 {

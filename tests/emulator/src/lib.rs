@@ -13,6 +13,7 @@ pub mod line;
 pub mod machine;
 pub mod program;
 pub mod stations;
+pub mod sweep;
 pub mod tracking;
 
 pub use machine::{Machine, Options, Skipped};

@@ -73,6 +73,19 @@ pub fn image() -> Result<PathBuf, Skipped> {
     Ok(built(&["mps2-an386"], "mps2-an386.elf", &ONCE))
 }
 
+/// The controller's image with its log.
+///
+/// # Errors
+/// [`Skipped`] when the emulator is left out.
+///
+/// # Panics
+/// With the reason when it cannot be built.
+pub fn log_image() -> Result<PathBuf, Skipped> {
+    static ONCE: OnceLock<Result<(), String>> = OnceLock::new();
+    available()?;
+    Ok(built(&["--log", "mps2-an386"], "mps2-an386-log.elf", &ONCE))
+}
+
 /// The image that counts instructions.
 ///
 /// # Errors
@@ -178,7 +191,21 @@ impl Machine {
     /// # Panics
     /// With the reason when the board cannot be started.
     pub fn start(folder: &Path, options: Options) -> Result<Self, Skipped> {
-        let image = image()?;
+        Ok(Self::start_image(&image()?, folder, options))
+    }
+
+    /// The same with the image that logs.
+    ///
+    /// # Errors
+    /// [`Skipped`] when the emulator is left out.
+    ///
+    /// # Panics
+    /// With the reason when the board cannot be started.
+    pub fn start_with_log(folder: &Path, options: Options) -> Result<Self, Skipped> {
+        Ok(Self::start_image(&log_image()?, folder, options))
+    }
+
+    fn start_image(image: &Path, folder: &Path, options: Options) -> Self {
         let (link, link_port) = listener();
         let mut command = Command::new("qemu-system-arm");
         command
@@ -228,7 +255,7 @@ impl Machine {
                 })
             })
             .collect();
-        Ok(Self { child, link, debugger, benches })
+        Self { child, link, debugger, benches }
     }
 
     /// The raw link. Every value is the same line: one reads what another did not.

@@ -2,29 +2,19 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
-use std::sync::OnceLock;
 
 use crate::line::Line;
 
-/// The program, built once a process.
+/// The program: this package's `emulated-host`, which cargo builds before any test of it.
 ///
 /// # Panics
-/// With the compiler's words when it cannot be built.
-pub fn path() -> &'static Path {
-    static PATH: OnceLock<PathBuf> = OnceLock::new();
-    PATH.get_or_init(|| {
-        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        let mut build = Command::new(cargo);
-        build.args(["build", "--quiet", "--locked", "--package", "host", "--bin", "host"]);
-        if !cfg!(debug_assertions) {
-            build.arg("--release");
-        }
-        let output = build.current_dir(env!("CARGO_MANIFEST_DIR")).output().expect("cargo runs");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        // Tests lie in `deps` beside the program.
-        let test = std::env::current_exe().expect("this test's path");
-        test.ancestors().nth(2).expect("the profile's folder").join("host")
-    })
+/// When it is not there.
+fn path() -> PathBuf {
+    // Tests lie in `deps` beside the program.
+    let test = std::env::current_exe().expect("this test's path");
+    let path = test.ancestors().nth(2).expect("the profile's folder").join("emulated-host");
+    assert!(path.exists(), "cargo builds {} before the tests", path.display());
+    path
 }
 
 fn command(line: &Line, folder: &Path, arguments: &[&str]) -> Command {
@@ -50,6 +40,18 @@ pub fn done(line: &Line, folder: &Path, arguments: &[&str]) -> String {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "host {arguments:?}: {said}");
     String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// Starts a command whose words are read when it ends.
+///
+/// # Panics
+/// When it cannot be started.
+pub fn start_piped(line: &Line, folder: &Path, arguments: &[&str]) -> Child {
+    command(line, folder, arguments)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts")
 }
 
 /// Starts a command and leaves it running.

@@ -167,3 +167,31 @@ fn the_highest_pressure_of_the_table_is_never_passed() {
     let settled = control.run(100).last().map_or(0.0, |tick| tick.force);
     assert!(settled < 1.15 * force.newtons(), "{settled} N");
 }
+
+/// The short form of `cargo run --release -p emulator-tests --bin tracking`, which writes the whole sweep.
+#[test]
+fn force_with_table_and_trim_follows_within_a_percent_and_a_stiffer_bladder_does_not_upset_it() {
+    use emulator_tests::sweep::{Course, Law, Load, Subject};
+    let subject = Subject::of(presets::miniature());
+    let cases = [
+        (Load::Held, Course::Sine(1.0)),
+        (Load::Moved, Course::Ramps),
+        (Load::Moved, Course::Sine(1.0)),
+        (Load::Spring, Course::Ramps),
+        (Load::Spring, Course::Sine(0.5)),
+    ];
+    for (load, course) in cases {
+        let [table, trimmed, gaylord] =
+            [Law::Table, Law::Trimmed, Law::Gaylord].map(|law| subject.error(Mode::Force, load, course, law));
+        let limit = subject.limit(Mode::Force, load, course);
+        eprintln!(
+            "{load:?} {course:?}: table {table:.2}, trimmed {trimmed:.2}, Gaylord {gaylord:.2}, limit {limit:.2} %"
+        );
+        assert!(trimmed < 1.0 && trimmed > 0.3 * limit && gaylord > 3.0 * table, "{load:?} {course:?}");
+    }
+    for factor in [0.8, 1.2] {
+        let other = subject.misjudged(factor);
+        let error = other.error(Mode::Force, Load::Moved, Course::Sine(1.0), Law::Trimmed);
+        assert!(error < 1.5, "{error} % with moduli by {factor}");
+    }
+}

@@ -1,0 +1,60 @@
+//! `host device faults`: the latched fault, counts, and past faults; in words, with the remedy.
+
+use model_core::link::endpoints::{ClearFault, GetFaults, GetPastFault};
+use model_core::link::messages::{FAULT_LOG, Fault, FaultReport, PastFault};
+use serde_json::json;
+
+use crate::commands::port::PortOption;
+use crate::console::Console;
+use crate::device::words;
+use crate::error::Result;
+
+pub(super) fn run(port: &PortOption, clear: bool, json: bool, console: &Console) -> Result<()> {
+    let mut client = port.connect(console)?;
+    let faults = client.call::<GetFaults>(&())?;
+    let mut past = Vec::new();
+    for back in 0..FAULT_LOG as u8 {
+        match client.call::<GetPastFault>(&PastFault { back })? {
+            Some(report) => past.push(report),
+            None => break,
+        }
+    }
+    if json {
+        let one = |r: &FaultReport| {
+            let w = words::fault(r.fault);
+            json!({ "fault": w.name, "cause": w.cause, "remedy": w.remedy, "time_s": r.time_us as f64 * 1e-6,
+                "value": r.value, "limit": r.limit, "muscle": words::side(r.side), "mode": words::mode(r.mode),
+                "last": { "pressure_Pa": r.last.pressure_pa, "stroke_m": r.last.stroke_m, "force_N": r.last.force_n } })
+        };
+        let counts: serde_json::Map<String, serde_json::Value> = Fault::ALL
+            .iter()
+            .zip(faults.counts)
+            .filter(|(_, n)| *n > 0)
+            .map(|(f, n)| (words::fault(*f).name.to_owned(), json!(n)))
+            .collect();
+        console.result(format!(
+            "{:#}",
+            json!({ "schema": "pam-faults/1", "latched": faults.latched.as_ref().map(one), "counts": counts,
+                "past": past.iter().map(one).collect::<Vec<_>>() })
+        ));
+    } else {
+        match &faults.latched {
+            Some(report) => {
+                console.result(format!("latched: {}", words::report(report)));
+                console.result(format!("what to do: {}", words::fault(report.fault).remedy));
+            }
+            None => console.result("no fault is latched"),
+        }
+        for (fault, count) in Fault::ALL.iter().zip(faults.counts).filter(|(_, n)| *n > 0) {
+            console.result(format!("since the start: {} × {}", count, words::fault(*fault).cause));
+        }
+        for report in &past {
+            console.result(format!("past: {}", words::report(report)));
+        }
+    }
+    if clear {
+        let status = client.call_once::<ClearFault>(&())?;
+        console.note(format!("cleared; the device is {}", words::state(status.state)));
+    }
+    Ok(())
+}

@@ -1,0 +1,72 @@
+//! `host device identify`: the pressure regulator, found by steps and kept in the settings.
+
+use std::sync::atomic::Ordering;
+
+use clap::Args;
+use serde_json::json;
+
+use crate::commands::port::PortOption;
+use crate::commands::run::interrupts;
+use crate::console::Console;
+use crate::device::regulator;
+use crate::error::{Code, Error, Result};
+
+/// Arguments of `host device identify`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    port: PortOption,
+    /// The lower pressure of the steps, kPa.
+    #[arg(long, value_name = "KPA", default_value_t = 100.0)]
+    low: f64,
+    /// The upper pressure of the steps, kPa.
+    #[arg(long, value_name = "KPA", default_value_t = 250.0)]
+    high: f64,
+    /// Show what was found and leave the settings as they are.
+    #[arg(long)]
+    dry_run: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
+    let (low, high) = (arguments.low, arguments.high);
+    if !(low >= 20.0 && high - low >= 30.0 && high.is_finite()) {
+        return Err(Error::new(Code::CallInvalid, "these pressures show no regulator")
+            .value(format!("--low {low} --high {high}"))
+            .help("the lower one must be 20 kPa at least, and the upper one 30 kPa above it"));
+    }
+    let interrupted = interrupts()?;
+    let mut client = arguments.port.connect(console)?;
+    console.note("the muscle is pressurised for half a minute of the device's time, then vented");
+    let stop = || interrupted.load(Ordering::Relaxed);
+    let found = regulator::identify_whole(&mut client, low * 1e3, high * 1e3, &stop)?;
+    if !arguments.dry_run {
+        found.keep(&mut client)?;
+        console.note("kept in the settings; the lag is inverted from here on");
+    }
+    if arguments.json {
+        console.result(format!(
+            "{:#}",
+            json!({ "schema": "pam-regulator/1", "gain": found.gain, "offset_Pa": found.offset_pa,
+                "lag_s": found.lag_s, "rate_Pa_per_s": found.rate_pa_per_s, "rate_limited": found.rate_limited,
+                "deadband_Pa": found.deadband_pa, "misfit_rms_Pa": found.misfit_pa, "kept": !arguments.dry_run })
+        ));
+        return Ok(());
+    }
+    console.result(format!("gain      {:8.4}", found.gain));
+    console.result(format!("offset    {:8.2} kPa", found.offset_pa * 1e-3));
+    console.result(format!("lag       {:8.1} ms", found.lag_s * 1e3));
+    console.result(format!(
+        "rate      {:8.2} MPa/s{}",
+        found.rate_pa_per_s * 1e-6,
+        if found.rate_limited { ", the regulator's limit" } else { " seen; the limit lies above" }
+    ));
+    console.result(match found.deadband_pa {
+        Some(half) => format!("deadband  {half:8.0} Pa to either side"),
+        None => "deadband  not seen: not even the largest square of pressure was answered".to_owned(),
+    });
+    console.result(format!("misfit    {:8.0} Pa rms between the steps and this model", found.misfit_pa));
+    Ok(())
+}

@@ -1,0 +1,88 @@
+//! `host device info`: every version, what it is doing, its tables.
+
+use model_core::link::endpoints::{GetInfo, GetSettings, GetStatus};
+use model_core::link::hello::Board;
+use model_core::link::{LINK_VERSION, SCHEMA_HASH};
+use serde_json::json;
+
+use crate::commands::port::PortOption;
+use crate::console::Console;
+use crate::device::{Client, Patience, Port, recorder, words};
+use crate::error::Result;
+
+pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()> {
+    // The versions are told even when they do not fit, and then the refusal.
+    let greeted = Client::greet(Port::open(&port.address()?)?, Patience::default())?;
+    let hello = *greeted.hello();
+    drop(greeted);
+    let (major, minor, patch) = hello.release;
+    let board = Board::from_code(hello.board).map_or("unknown board", Board::name);
+    if !json {
+        console.result(format!(
+            "{board}, release {major}.{minor}.{patch}, serial {}, {} starts\n\
+             link version {} (this program {LINK_VERSION}), schema {:016x} (this program {SCHEMA_HASH:016x})\n\
+             table format {}, store format {}, {} muscle{}",
+            recorder::serial(&hello),
+            hello.starts,
+            hello.link_version,
+            hello.schema_hash,
+            hello.table_format,
+            hello.store_format,
+            hello.muscles,
+            if hello.muscles == 1 { "" } else { "s" },
+        ));
+    }
+    let mut client = port.connect(console)?;
+    let info = client.call::<GetInfo>(&())?;
+    let status = client.call::<GetStatus>(&())?;
+    if json {
+        let settings = client.call::<GetSettings>(&())?;
+        let mut all = recorder::about_device(&hello, &info, &settings);
+        all["schema"] = json!("pam-device/1");
+        all["link_schema"] = json!(format!("{:016x}", hello.schema_hash));
+        all["muscles"] = json!(info.muscles);
+        all["table_capacity"] = json!(info.table_capacity);
+        all["trace_capacity"] = json!(info.trace_capacity);
+        all["reference_capacity"] = json!(info.reference_capacity);
+        all["started_by"] = json!(words::started_by(info.started_by));
+        all["status"] = json!({
+            "state": words::state(status.state),
+            "mode": words::mode(status.mode),
+            "fault": status.fault.map(|f| words::fault(f).name),
+            "time_s": status.time_us as f64 * 1e-6,
+            "ticks": status.ticks,
+            "overruns": status.overruns,
+            "frames_good": status.frames_good,
+            "frames_bad": status.frames_bad,
+            "telemetry_dropped": status.telemetry_dropped,
+            "saturated_ticks": status.saturated_ticks,
+        });
+        console.result(format!("{all:#}"));
+        return Ok(());
+    }
+    console.result(format!(
+        "{}{} in {} mode, {:.1} s and {} ticks at {} Hz since its start ({}), {} overruns",
+        words::state(status.state),
+        status.fault.map(|f| format!(" ({})", words::fault(f).cause)).unwrap_or_default(),
+        words::mode(status.mode),
+        status.time_us as f64 * 1e-6,
+        status.ticks,
+        info.ticks_per_s,
+        words::started_by(info.started_by),
+        status.overruns,
+    ));
+    for (number, table) in info.tables.iter().take(usize::from(info.muscles)).enumerate() {
+        console.result(match table {
+            Some(t) => format!(
+                "muscle {}: table {:08x}, {} bytes, generation {}{}",
+                number + 1,
+                t.crc,
+                t.length,
+                t.generation,
+                if t.has_previous { ", the one before is kept" } else { "" }
+            ),
+            None => format!("muscle {}: no table", number + 1),
+        });
+    }
+    Ok(())
+}

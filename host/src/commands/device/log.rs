@@ -1,0 +1,110 @@
+//! `host device log`: what the device reports by itself, as it happens.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use model_core::link::endpoints::GetStatus;
+use model_core::link::messages::Event;
+use serde_json::{Value, json};
+
+use crate::commands::port::PortOption;
+use crate::console::Console;
+use crate::device::{Topic, log_table::LogTable, words};
+use crate::error::{Code, Error, Result};
+
+/// Arguments of `host device log`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    port: PortOption,
+    /// How long, s [default: until Ctrl-C].
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+    /// The image that runs on the device, built with logs (firmware/build --log): its log lines are decoded.
+    #[arg(long, value_name = "ELF")]
+    elf: Option<PathBuf>,
+    /// Print JSON, one object a line.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A line: device time where it is known, what kind, text, and what else a program wants to know.
+fn say(console: &Console, as_json: bool, time_s: Option<f64>, kind: &str, text: &str, more: Value) {
+    if as_json {
+        let mut line = json!({ "time_s": time_s, "event": kind, "text": text });
+        if let (Some(line), Value::Object(more)) = (line.as_object_mut(), more) {
+            line.extend(more);
+        }
+        console.result(line);
+        return;
+    }
+    let time = time_s.map_or_else(|| " ".repeat(14), |t| format!("{t:12.3} s"));
+    console.result(format!("{time}  {text}"));
+}
+
+pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
+    let table = arguments.elf.as_deref().map(LogTable::read).transpose()?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let seen = Arc::clone(&stop);
+    ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))
+        .map_err(|e| Error::new(Code::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
+    let mut client = arguments.port.connect(console)?;
+    let tell = |time_s, kind, text: &str, more| say(console, arguments.json, time_s, kind, text, more);
+    let begin = Instant::now();
+    let mut last = None;
+    let mut asked = None::<Instant>;
+    let mut untold = 0_u64;
+    while !stop.load(Ordering::Relaxed) && arguments.seconds.is_none_or(|s| begin.elapsed().as_secs_f64() < s)
+    {
+        // Events tell at once; the question every second also notices a device that is gone.
+        if asked.is_none_or(|at| at.elapsed() >= Duration::from_secs(1)) {
+            let status = client.call::<GetStatus>(&())?;
+            asked = Some(Instant::now());
+            if last != Some((status.state, status.mode)) {
+                last = Some((status.state, status.mode));
+                let (state, mode) = (words::state(status.state), words::mode(status.mode));
+                let text = format!("{state} in {mode} mode");
+                let more = json!({ "state": state, "mode": mode });
+                tell(Some(status.time_us as f64 * 1e-6), "state", &text, more);
+            }
+        }
+        match client.topic(Duration::from_millis(100))? {
+            Some(Topic::Event(Event::Fault(report))) => {
+                let fault = words::fault(report.fault);
+                let time = Some(report.time_us as f64 * 1e-6);
+                let more = json!({ "fault": fault.name, "remedy": fault.remedy });
+                let mark = if arguments.json { "" } else { "FAULT " };
+                tell(time, "fault", &format!("{mark}{}", words::report(&report)), more);
+                if !arguments.json {
+                    tell(None, "remedy", &format!("what to do: {}", fault.remedy), Value::Null);
+                }
+            }
+            Some(Topic::Event(Event::State(_))) => asked = None,
+            Some(Topic::Event(Event::TraceFull)) => {
+                tell(None, "trace-full", "trace full: host device trace --read", Value::Null);
+            }
+            Some(Topic::Log(frame)) => match &table {
+                Some(table) => {
+                    let line = table.decode(&frame)?;
+                    tell(
+                        line.time_s,
+                        "log",
+                        &format!("{} {}", line.level, line.text),
+                        json!({ "level": line.level }),
+                    );
+                }
+                None => untold += 1,
+            },
+            Some(Topic::Telemetry(_)) | None => {}
+        }
+    }
+    if untold > 0 {
+        console.note(format!(
+            "the device also sent {untold} log lines; give its image with --elf to have them decoded"
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,368 @@
+//! The commands of `host`, as a user types them, on the real image: modes, waves from a file, the trace, the log, the
+//! regulator, and what a muscle remembers.
+
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use emulator_tests::joint::{self, Joint};
+use emulator_tests::line::{self, Line};
+use emulator_tests::machine::{self, Folder};
+use emulator_tests::{Machine, Options, Watched, fitting, program, tracking, upload};
+use host::table_file::{About, TableFile};
+use model_core::effects::{EffectName, FittedEffect};
+use model_core::link::endpoints::{Disarm, SetTelemetry, SetTo, Stop};
+use model_core::link::messages::{Fault, Mode, SetPoint, Side, TelemetryRate};
+use model_core::muscle::Muscle;
+use model_core::table::{self, MuscleTable};
+use model_core::units::{Length, Pressure};
+use serde_json::Value;
+use virtual_bench::bench::BenchSpec;
+use virtual_bench::lockstep::Answer;
+use virtual_bench::plant::{Motion, PlantStation};
+use virtual_bench::pneumatics::Pneumatics;
+use virtual_bench::presets;
+
+fn write(folder: &Folder, name: &str, table: MuscleTable) {
+    let about = About { muscle: "mini".into(), ..About::default() };
+    TableFile { table, about }.write(folder.path().join(name)).expect("a file");
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or(f64::NAN)
+}
+
+/// A column of a file of comma-separated values.
+fn column(path: &Path, name: &str) -> Vec<f64> {
+    let text = std::fs::read_to_string(path).expect("a file");
+    let mut lines = text.lines();
+    let at = lines.next().expect("a header").split(',').position(|head| head == name).expect(name);
+    lines.map(|line| line.split(',').nth(at).expect("a cell").parse().unwrap_or(f64::NAN)).collect()
+}
+
+/// Whether a test of some minutes is run: with `PAM_LONG=1`.
+fn long(what: &str) -> bool {
+    let long = std::env::var_os("PAM_LONG").is_some();
+    if !long {
+        eprintln!("skipped: {what} takes minutes in the emulator; PAM_LONG=1 runs it");
+    }
+    long
+}
+
+struct Stand {
+    folder: Folder,
+    line: Line,
+    machine: Machine,
+}
+
+impl Stand {
+    fn start(
+        options: Options,
+        image: fn(&Path, Options) -> Result<Machine, emulator_tests::Skipped>,
+    ) -> Option<Self> {
+        let folder = Folder::new();
+        let machine = image(folder.path(), options).ok()?;
+        let line = Line::tcp(&machine, line::clean(), line::clean());
+        Some(Self { folder, line, machine })
+    }
+
+    fn with_muscle(motion: Motion) -> Option<Self> {
+        let bench = BenchSpec::laboratory(presets::miniature(), 7);
+        let station = PlantStation::new(bench, vec![motion], 1e-3);
+        Self::start(Options { first: Some(Box::new(station)), ..Options::default() }, Machine::start)
+    }
+
+    fn host(&self, arguments: &[&str]) -> String {
+        program::done(&self.line, self.folder.path(), arguments)
+    }
+}
+
+#[test]
+fn a_pair_of_muscles_follows_an_angle_at_the_stiffness_asked_for() {
+    if !long("a pair of muscles") {
+        return;
+    }
+    let spec = presets::miniature();
+    let bench = BenchSpec::laboratory(spec.clone(), 5);
+    let joint = Arc::new(Mutex::new(Joint::new(&bench, 0.02, 0.002)));
+    let [first, second] = joint::Side::both(&joint);
+    let options =
+        Options { first: Some(Box::new(first)), second: Some(Box::new(second)), ..Options::default() };
+    let Some(stand) = Stand::start(options, Machine::start) else { return };
+    write(&stand.folder, "mini.pam", fitting::fitted(&spec));
+    for muscle in ["1", "2"] {
+        stand.host(&["flash", "mini.pam", "--muscle", muscle]);
+    }
+    let mut stiffness = Vec::new();
+    for wanted in ["12", "20"] {
+        let wave = ["run", "--angle", "sine mean=0 amplitude=2 frequency=0.25", "--stiffness", wanted];
+        let more = ["--seconds", "5", "-o", "pair.csv", "--json"];
+        let about = json(&stand.host(&[&wave[..], &more[..]].concat()));
+        assert_eq!(about["mode"], "pair");
+        let rms = number(&about["tracking_rms"]);
+        // Both muscles' pressures are recorded, and the antagonist pulls too.
+        let path = stand.folder.path().join("pair.csv");
+        let pressures = column(&path, "second_pressure_Pa");
+        let mean = pressures[pressures.len() / 2..].iter().sum::<f64>() / (pressures.len() / 2) as f64;
+        assert!(mean > 50e3, "{mean} Pa in the antagonist");
+        // Angle zero held: what the true muscles resist there.
+        let held = ["run", "--angle", "0", "--stiffness", wanted, "--seconds", "3", "-o", "held.csv"];
+        stand.host(&held);
+        let path = stand.folder.path().join("held.csv");
+        let settled = |name: &str| {
+            let all = column(&path, name);
+            let last = &all[all.len() - 500..];
+            last.iter().sum::<f64>() / last.len() as f64
+        };
+        let now = joint.lock().unwrap_or_else(PoisonError::into_inner);
+        let true_stiffness = now.stiffness_at([settled("pressure_Pa"), settled("second_pressure_Pa")], 0.0);
+        eprintln!(
+            "pair at {wanted} N·m/rad: {rms:.3}° rms of 2°, true stiffness {true_stiffness:.1} N·m/rad"
+        );
+        // A joint that stands still is 1.41° off. Both muscles' friction holds it at each turn until the loop has built up
+        // what frees it, and the softer joint has less to free it with.
+        assert!(rms < if wanted == "12" { 1.45 } else { 1.2 }, "{rms}° rms");
+        stiffness.push((wanted.parse::<f64>().expect("a number"), true_stiffness));
+    }
+    for (wanted, found) in &stiffness {
+        assert!((found / wanted - 1.0).abs() < 0.25, "{stiffness:?}");
+    }
+    assert!(stiffness[1].1 > 1.25 * stiffness[0].1, "{stiffness:?}");
+}
+
+#[test]
+fn a_stroke_against_a_spring_and_a_force_from_a_file_are_followed_and_a_table_rolled_back() {
+    let load = Motion::Load { mass: 0.5, spring: 10.0, preload: 5.0, damper: 0.05 };
+    let Some(stand) = Stand::with_muscle(load) else { return };
+    let fitted = fitting::fitted(&presets::miniature());
+    write(&stand.folder, "first.pam", table::example());
+    write(&stand.folder, "mini.pam", fitted);
+    stand.host(&["flash", "first.pam"]);
+    stand.host(&["flash", "mini.pam"]);
+    let steps = ["run", "--stroke", "steps 0.8 1.6 hold=2", "--seconds", "4", "-o", "stroke.csv", "--json"];
+    stand.host(&steps);
+    let path = stand.folder.path().join("stroke.csv");
+    let (asked, stroke) = (column(&path, "asked"), column(&path, "displacement_m"));
+    for end in [1_950, 3_950] {
+        let late = &stroke[end - 300..end];
+        let error = late.iter().map(|x| (x - asked[end - 1]).powi(2)).sum::<f64>() / late.len() as f64;
+        // 3 % of the free stroke: friction lets the last tenths of a millimetre go in small slips.
+        assert!(error.sqrt() < 0.1e-3, "{} mm rms before {end} ms", error.sqrt() * 1e3);
+    }
+    // A course of 1,200 points is more than the device holds: the program joins it by fewer.
+    let course: String = (0..1_200)
+        .map(|n| format!("{},{}\n", 0.0025 * f64::from(n), 20.0 + 10.0 * (0.01 * f64::from(n)).sin()))
+        .collect();
+    std::fs::write(stand.folder.path().join("course.csv"), format!("time_s,force_N\n{course}"))
+        .expect("a file");
+    let run = ["run", "--force", "@course.csv", "--seconds", "3", "-o", "force.csv", "--json"];
+    let about = json(&stand.host(&run));
+    assert_eq!(about["losses"]["samples"], 0);
+    let path = stand.folder.path().join("force.csv");
+    let (asked, force) = (column(&path, "asked"), column(&path, "force_N"));
+    let wanted = |n: usize| 20.0 + 10.0 * (0.01 * (n as f64 / 2.5).floor()).sin();
+    // The points of the file come out of the device at their times, joined anew within a hundredth of a newton.
+    let far = |shift: usize| (0..2_000).map(|n| (asked[shift + n] - wanted(n)).abs()).fold(0.0, f64::max);
+    let worst = (0..800.min(asked.len() - 2_000)).map(far).fold(f64::INFINITY, f64::min);
+    assert!(worst < 0.15, "{worst} N from the file");
+    let late = asked.iter().zip(&force).skip(1_000).map(|(asked, force)| (asked - force).powi(2));
+    let rms = (late.sum::<f64>() / (asked.len() - 1_000) as f64).sqrt();
+    eprintln!("force from a file against a mass and a spring: {rms:.2} N rms after the first second");
+    // 5 % of the blocked force.
+    assert!(rms < 6.5, "{rms} N rms");
+    let info = || json(&stand.host(&["device", "info", "--json"]))["tables"][0]["generation"].clone();
+    let second = info();
+    let back = json(&stand.host(&["device", "rollback", "--json"]));
+    assert_eq!(back["schema"], "pam-rollback/1");
+    assert_ne!(info(), second);
+    assert_eq!(info(), back["generation"]);
+    stand.host(&["device", "rollback"]);
+    assert_eq!(info(), second, "going back again returns");
+}
+
+#[test]
+fn a_trace_is_armed_filled_inside_the_loop_and_read_out_over_a_serial_device() {
+    let Some(mut stand) = Stand::with_muscle(Motion::Held { stroke_mm: 0.5 }) else { return };
+    stand.line = Line::serial(&stand.machine, line::clean(), line::clean());
+    assert!(stand.line.address().starts_with("/dev/"));
+    write(&stand.folder, "mini.pam", table::example());
+    stand.host(&["flash", "mini.pam"]);
+    stand.host(&[
+        "device",
+        "trace",
+        "--trigger",
+        "until-fault",
+        "--variables",
+        "pressure,command,asked,force",
+    ]);
+    // A limit that the run must cross: the trace shows what led to the fault.
+    stand.host(&["device", "settings", "--set", "limits.force_n=20"]);
+    let wave = ["run", "--pressure", "sine mean=350 amplitude=60 frequency=1", "--seconds", "3"];
+    let output = program::run(&stand.line, stand.folder.path(), &wave);
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("more force than allowed"), "{said}");
+    let trace = json(&stand.host(&["device", "trace", "--read", "--json"]));
+    // 256 records fit; a machine that is busy may have had time for fewer ticks.
+    let records = trace["records"].as_u64().unwrap_or(0) as usize;
+    assert!(trace["schema"] == "pam-trace/1" && (50..=256).contains(&records), "{records} records");
+    let last =
+        |name: &str| trace["columns"][name].as_array().and_then(|all| all.last()).map_or(f64::NAN, number);
+    assert!(last("force_N") > 20.0, "{}", last("force_N"));
+    let csv = stand.host(&["device", "trace", "--read"]);
+    assert_eq!(csv.lines().count(), records + 1);
+    assert_eq!(csv.lines().next(), Some("time_s,pressure_Pa,command_Pa,asked,force_N"));
+    let vented = json(&stand.host(&["vent", "--json"]));
+    assert_eq!(vented["state"], "fault");
+}
+
+#[test]
+fn the_regulator_is_identified_kept_and_shown() {
+    if !long("identifying a regulator") {
+        return;
+    }
+    let mut bench = BenchSpec::laboratory(presets::miniature(), 7);
+    bench.pneumatics = Pneumatics { lag: 0.045, rate: 1.5e6, deadband: 500.0, ..bench.pneumatics };
+    let station = PlantStation::new(bench, vec![Motion::Held { stroke_mm: 0.5 }], 1e-3);
+    let options = Options { first: Some(Box::new(station)), ..Options::default() };
+    let Some(stand) = Stand::start(options, Machine::start) else { return };
+    let settings = || json(&stand.host(&["device", "settings", "--json"]))["regulator"].clone();
+    let before = settings();
+    let identify = ["device", "identify", "--low", "100", "--high", "300", "--json"];
+    let dry = json(&stand.host(&[&identify[..], &["--dry-run"]].concat()));
+    assert_eq!(settings(), before, "a dry run leaves the settings");
+    let found = json(&stand.host(&identify));
+    eprintln!("{found}");
+    assert_eq!((dry["kept"].as_bool(), found["kept"].as_bool()), (Some(false), Some(true)));
+    // The line adds 4 ms to the regulator's own lag.
+    let lag = number(&found["lag_s"]);
+    assert!((0.042..0.055).contains(&lag), "{found}");
+    assert!(
+        (number(&found["gain"]) - 1.0).abs() < 0.01 && number(&found["offset_Pa"]).abs() < 1.5e3,
+        "{found}"
+    );
+    assert_eq!(found["rate_limited"], true);
+    assert!((number(&found["rate_Pa_per_s"]) / 1.5e6 - 1.0).abs() < 0.1, "{found}");
+    assert!((300.0..800.0).contains(&number(&found["deadband_Pa"])), "{found}");
+    let now = settings();
+    assert!((number(&now["lag_s"]) / lag - 1.0).abs() < 1e-3, "{now}");
+    assert!((number(&now["deadband_pa"]) / number(&found["deadband_Pa"]) - 1.0).abs() < 1e-3, "{now}");
+}
+
+#[test]
+fn the_log_of_the_image_is_decoded_beside_events() {
+    let bench = BenchSpec::laboratory(presets::miniature(), 7);
+    let station = Watched::new(PlantStation::new(bench, vec![Motion::Held { stroke_mm: 0.5 }], 1e-3));
+    let options = Options { first: Some(Box::new(station.clone())), ..Options::default() };
+    let Some(stand) = Stand::start(options, Machine::start_with_log) else { return };
+    let Ok(elf) = machine::log_image() else { return };
+    let elf = elf.to_string_lossy().into_owned();
+    let mut client =
+        host::device::Client::open(&stand.line.address().parse().expect("an address")).expect("hello");
+    tracking::start(&mut client, Mode::Pressure);
+    client.call::<Stop>(&()).expect("it stops, and stays armed");
+    client.call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 }).expect("quiet");
+    drop(client);
+    let arguments = ["device", "log", "--seconds", "4", "--json", "--elf", &elf];
+    let log = program::start_piped(&stand.line, stand.folder.path(), &arguments);
+    std::thread::sleep(Duration::from_millis(1_500));
+    station.disturb(|_, answer| answer.status |= Answer::SUPPLY_LOW);
+    let output = log.wait_with_output().expect("it ends");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let lines: Vec<Value> = text.lines().map(json).collect();
+    let of = |kind: &str| lines.iter().filter(|line| line["event"] == kind).collect::<Vec<_>>();
+    assert!(of("state").iter().any(|line| line["state"] == "armed"), "{text}");
+    assert!(of("fault").iter().any(|line| line["fault"] == "brown-out"), "{text}");
+    let logged = of("log");
+    let fault = format!("fault {}", Fault::BrownOut.code());
+    assert!(
+        logged.iter().any(|line| line["level"] == "warn"
+            && line["text"].as_str().is_some_and(|words| words.contains(&fault))
+            && line["time_s"].as_f64().is_some_and(|time| time > 0.1)),
+        "{text}"
+    );
+    // An image without log lines is refused in words.
+    let Ok(silent) = machine::image() else { return };
+    let silent = silent.to_string_lossy().into_owned();
+    let refused = program::run(&stand.line, stand.folder.path(), &["device", "log", "--elf", &silent]);
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(refused.status.code() == Some(1) && said.contains("built without logs"), "{said}");
+}
+
+/// Rest length and a stretch to 3 mm and back, of which the muscle's bladder remembers.
+fn stretched() -> Motion {
+    Motion::Path { points: vec![(0.0, 0.4), (2.5, 0.4), (3.0, 3.0), (3.5, 0.4)] }
+}
+
+/// How much stronger the device thinks the muscle than its table without memory, N, in the last of so many samples.
+fn softening(client: &mut host::device::Client, muscle: &Muscle<f32>, samples: usize) -> f32 {
+    let (mut sum, mut count) = (0.0, 0);
+    for n in 0..samples {
+        let sample = tracking::sample(client).expect("no fault");
+        if n + 200 < samples {
+            continue;
+        }
+        let side = sample.sides[0];
+        let force =
+            muscle.force(Pressure::from_pascals(side.pressure_pa), Length::from_metres(side.stroke_m), 0.0);
+        sum += side.model_n - force.newtons();
+        count += 1;
+    }
+    sum / count.max(1) as f32
+}
+
+#[test]
+fn what_a_muscle_remembers_is_there_after_the_plug_was_pulled_and_can_be_forgotten() {
+    let station = || {
+        let bench = BenchSpec::laboratory(presets::miniature(), 7);
+        let station = PlantStation::new(bench, vec![stretched()], 1e-3);
+        Options { first: Some(Box::new(Watched::new(station))), ..Options::default() }
+    };
+    let folder = Folder::new();
+    let Ok(machine) = Machine::start(folder.path(), station()) else { return };
+    let mut table = table::example();
+    table.effects.clear();
+    table.friction.iter_mut().for_each(|share| *share = 0.0);
+    let plain = table.clone();
+    let mullins = FittedEffect::new(EffectName::MullinsSoftening, &[0.4, 0.02, 0.1]);
+    table.effects.push(mullins).expect("room for one");
+    let muscle = Muscle::<f32>::build(&plain).expect("a valid table");
+    let mut client = machine.client();
+    upload(&mut client, Side::Agonist, &table);
+    let run = |client: &mut host::device::Client, samples: usize| {
+        tracking::start(client, Mode::Pressure);
+        client.call::<SetTo>(&SetPoint::Pressure(300e3)).expect("a set-point");
+        let soft = softening(client, &muscle, samples);
+        client.call::<Stop>(&()).expect("it stops");
+        client.call::<Disarm>(&()).expect("it disarms");
+        // What is to be kept is written some ticks after the run ended.
+        for _ in 0..100 {
+            tracking::sample(client).expect("no fault");
+        }
+        soft
+    };
+    let new = run(&mut client, 1_000);
+    let worked = run(&mut client, 5_000);
+    eprintln!("stronger than without memory by {new:.3} N as new, by {worked:.3} N after the stretch");
+    // A softer bladder resists the braid less, so the muscle pulls harder.
+    assert!(worked > 1.0 && new.abs() < 0.05 * worked, "{new} N, {worked} N");
+    drop(client);
+    machine.kill();
+    let Ok(machine) = Machine::start(folder.path(), station()) else { return };
+    let mut client = machine.client();
+    let again = run(&mut client, 1_000);
+    eprintln!("by {again:.3} N after the power cut");
+    assert!((again - worked).abs() < 0.1 * worked.abs(), "{worked} N, after the power cut {again} N");
+    drop(client);
+    let line = Line::tcp(&machine, line::clean(), line::clean());
+    program::done(&line, folder.path(), &["device", "forget", "--json"]);
+    drop(line);
+    let mut client = machine.client();
+    let forgotten = run(&mut client, 400);
+    assert!(forgotten.abs() < 0.05 * worked, "{forgotten} N after it was forgotten");
+}
