@@ -6,11 +6,14 @@
 //! | file | what |
 //! | --- | --- |
 //! | `kinematics`, `rows` | block averages that keep turns, with the motion in each |
-//! | `baselines` | tables free over pressure, and one bladder for all pressures |
+//! | `baselines` | tables free over pressure, one bladder for all pressures, and one that may differ a little |
+//! | `rest` | what friction does while the length is held |
 //! | `noise` | what repeats tell; tests by whole blocks |
-//! | `locate` | where the misfit sits |
+//! | `locate`, `frequency` | where the misfit sits; whether it beats in time |
+//! | `evidence` | how strongly the recordings speak for an effect |
 //! | `candidates` | the library of effects as columns |
 //! | `select` | which effects, and when to abstain |
+//! | `named`, `calibration` | names with their parameters and probabilities; what could be hidden |
 //! | `held_out` | the improvement on rows that the fit had not seen |
 //! | [`model`] | the table refitted beside the named effects |
 //! | [`advise`], [`planned`] | the recording that would tell; what a planned protocol can tell |
@@ -22,14 +25,19 @@
 pub mod advise;
 mod answer;
 mod baselines;
+mod calibration;
 mod candidates;
+mod evidence;
+mod frequency;
 mod held_out;
 mod kinematics;
 mod linear;
 mod locate;
 pub mod model;
+mod named;
 mod noise;
 pub mod planned;
+mod rest;
 mod rows;
 mod select;
 pub mod summary;

@@ -325,6 +325,12 @@ impl<T: Scalar> Context<T> {
         self.quasi * (T::ONE - self.friction * self.direction)
     }
 
+    /// `∂F/∂x = ∂F_quasi/∂x (1 − s k_F)`, N/m: how much less the muscle pulls per metre of shortening, its friction with it.
+    #[inline]
+    pub fn slope(&self) -> T {
+        self.stiffness * (T::ONE - self.friction * self.direction)
+    }
+
     /// `g (1 − s k_F)`, m²: how much harder the muscle pulls per pascal at its gas. Not the slope of the table: `E_k` that change
     /// from one test pressure to the next say how a fit took up other errors, not what a change of pressure does.
     #[inline]

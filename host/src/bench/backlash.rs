@@ -1,11 +1,12 @@
 //! Play between the stroke sensor and the muscle: after a turn the sensor moves and the muscle does not.
 //!
 //! ```text
-//! F_add = κ · ∂F/∂x · (play_{b/2}(x) − x)
+//! F_add = κ · [∂F/∂x · (play_{b/2}(x) − x) + k_F F_quasi (s − s_play)]
 //! ```
 //! `b`, m, is the width of the play, `play` its output: it stands still until the stroke has gone back by `b`. `κ` (dimensionless) is 1 for a joint
 //! that is free over all of `b`, less if it is tight at times. A preloaded joint has none. The side on which the play begins is
-//! unknown until the first turn.
+//! unknown until the first turn. While the joint is
+//! loose the muscle rests, and its friction keeps the direction `s_play` of its own last motion.
 
 use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
 use model_core::scalar::Scalar;
@@ -26,21 +27,28 @@ impl Effect for Backlash {
         alternatives: false,
         start: Start::Branch,
         fading: &[],
-        equation: "F = κ·∂F/∂x·(play_b(x) − x)",
+        equation: "F = κ·[∂F/∂x·(play_b(x) − x) + k_F·F_quasi·(s − s_play)]",
         summary: "A loose joint lets the sensor move before the muscle does, after every turn.",
         source: "play operator; sensitivity of the base model",
     };
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
-        // memory: [play(x) − x, last stroke, seen]
+        // memory: [play(x) − x, last stroke, seen, direction of the muscle behind the play]
         let half = (parameters[1] * T::from_f32(0.5)).max(T::ZERO);
         let moved = if memory[2] == T::ZERO { T::ZERO } else { context.stroke - memory[1] };
-        memory[0] = (memory[0] - moved).clamp(-half, half);
+        let behind = memory[0] - moved;
+        memory[0] = behind.clamp(-half, half);
+        if behind != memory[0] {
+            memory[3] = if memory[0] < T::ZERO { T::ONE } else { -T::ONE };
+        } else if memory[3] == T::ZERO {
+            memory[3] = context.direction;
+        }
         memory[1] = context.stroke;
         memory[2] = T::ONE;
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
-        parameters[0] * context.stiffness * memory[0]
+        let late = if memory[3] == T::ZERO { T::ZERO } else { context.direction - memory[3] };
+        parameters[0] * (context.slope() * memory[0] + context.friction * context.quasi * late)
     }
 }

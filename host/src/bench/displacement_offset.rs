@@ -24,6 +24,6 @@ impl Effect for DisplacementOffset {
     };
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
-        parameters[0] * context.stiffness
+        parameters[0] * context.slope()
     }
 }

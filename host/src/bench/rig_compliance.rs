@@ -1,10 +1,12 @@
 //! The frame gives under load: the muscle is shorter than the stroke says by `F/K`.
 //!
 //! ```text
-//! F_add = ∂F/∂x · F · (1/K)
+//! F_add = (1/K) · [∂F/∂x · F + k_F F_quasi (s − z)/c]        dz = dx/(c k_F F_quasi), within ±1
 //! ```
 //! `x` is the contraction stroke, `∂F/∂x` negative, `F` the base model's force, N; `1/K`, m/N. First order: while `|∂F/∂x|/K` is well below
-//! one. A stretching braid looks the same in free tables: measure with a rigid bar in the muscle's place.
+//! one. At a turn the friction has to change by `2 k_F F` before the strands slide back; a frame that gives takes that change as travel,
+//! so that the jump becomes a ramp: `c`, m/N, is the give by which it does, the same `1/K` where nothing else gives. A stretching braid
+//! looks the same in free tables but for the turns: measure with a rigid bar in the muscle's place.
 
 use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
 use model_core::scalar::Scalar;
@@ -16,18 +18,46 @@ impl Effect for RigCompliance {
     const INFO: Info = Info {
         name: "rig-compliance",
         link: Link::LoadPath,
-        parameters: &[Parameter::amplitude("compliance", "m/N", 1.0e-8, 2.0e-4)],
+        parameters: &[
+            Parameter::amplitude("compliance", "m/N", 1.0e-8, 2.0e-4),
+            Parameter::shape("compliance_at_turns", "m/N", 1.0e-8, 2.0e-4),
+        ],
         depends_on_pressure: true,
         persistent: false,
         alternatives: false,
-        start: Start::Known,
+        start: Start::Branch,
         fading: &[],
-        equation: "F = ∂F/∂x·F/K",
+        equation: "F = (1/K)·[∂F/∂x·F + k_F·F_quasi·(s − z)/c], dz = dx/(c·k_F·F_quasi) within ±1",
         summary: "The test frame bends, so the muscle is a little shorter than the stroke sensor says.",
         source: "first-order sensitivity of the base model; frames of 0.5 to 50 N/µm",
     };
 
-    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
-        context.stiffness * context.force() * parameters[0]
+    fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
+        // memory: [z, last stroke, seen]
+        let moved = if memory[2] == T::ZERO { T::ZERO } else { context.stroke - memory[1] };
+        if memory[2] == T::ZERO {
+            memory[0] = context.direction;
+        }
+        if context.speed == T::ZERO {
+            // At rest the strands' friction is not the turn's.
+            memory[1] = context.stroke;
+            memory[2] = T::ONE;
+            return;
+        }
+        let needed = give(parameters) * (context.friction * context.quasi).abs();
+        memory[0] = (memory[0] + moved / needed.max(T::from_f32(1.0e-9))).clamp(-T::ONE, T::ONE);
+        memory[1] = context.stroke;
+        memory[2] = T::ONE;
     }
+
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
+        let turning = if context.speed == T::ZERO { T::ZERO } else { context.direction - memory[0] };
+        let late = context.friction * context.quasi * turning / give(parameters);
+        parameters[0] * (context.slope() * context.force() + late)
+    }
+}
+
+/// `c`, guarded against a table's zero.
+fn give<T: Scalar>(parameters: &[T]) -> T {
+    parameters[1].max(T::from_f32(1.0e-10))
 }

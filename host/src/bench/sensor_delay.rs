@@ -40,7 +40,7 @@ impl Effect for SensorDelay {
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
-        let rate = context.stiffness * context.speed + context.pull_per_pressure() * context.pressure_rate;
+        let rate = context.slope() * context.speed + context.pull_per_pressure() * context.pressure_rate;
         -parameters[0] * rate - parameters[1] * Filter::value(memory, 0, context.force())
     }
 }

@@ -173,6 +173,49 @@ fn bench_block(names: &[String]) -> Option<&'static str> {
     }
 }
 
+/// What to do so that an effect would show which recordings like these conceal.
+pub(crate) fn what_would_show(effect: &str) -> &'static str {
+    match effect {
+        "force-offset" | "force-drift" => "record the vented load cell before, between and after",
+        "gravity" => "weigh the muscle and its fittings, or turn the bench by a right angle",
+        "gauge-offset" | "gauge-gain" | "leak" => {
+            "compare the gauge with a reference, vented and at three pressures"
+        }
+        "force-gain" | "cross-talk" | "misalignment" => {
+            "hang dead weights on the load cell, with and without pressure in the line"
+        }
+        "rig-compliance" | "backlash" => "put a rigid bar in the muscle's place and load it once",
+        "displacement-offset" | "permanent-set" | "end-slip" => {
+            "measure the vented length with a calliper before and after"
+        }
+        "tip-effect" | "braid-elasticity" => {
+            "photograph the ends and measure the diameter at three pressures, or test two lengths of the same stock"
+        }
+        "contact-loss" | "pressure-sensor-lag" => {
+            "record slow ramps of pressure from zero at three held lengths"
+        }
+        "breakaway-friction" => "record rests of 1, 10 and 100 s at one place, sampled at 100 Hz or faster",
+        "presliding-hysteresis" | "minor-loop-memory" => "record nested small loops at two speeds",
+        "viscous-damping" | "rate-power" | "stribeck-friction" | "sensor-delay" | "pressure-lag"
+        | "inertia" => "record loops at four speeds over two decades",
+        "coulomb-friction" | "pressure-friction" | "seal-friction" => {
+            "record loops at four pressures and slow ramps of pressure at held lengths"
+        }
+        "friction-asymmetry" => {
+            "rest at one place reached from both sides: the gap closes to the true middle"
+        }
+        "stress-relaxation" | "log-creep" => {
+            "hold the length for 100 s at two pressures, reached from both sides"
+        }
+        "mullins-softening" => "record a new specimen's first strokes, and the same again after a day",
+        "cyclic-softening" | "thermal-softening" => {
+            "repeat the first loops at the end, and again after half an hour of vented rest"
+        }
+        "strand-jamming" => "go to the very end of the free stroke",
+        _ => "record at several speeds, with rests, and the first pressure once more at the end",
+    }
+}
+
 /// The recording of the menu in which the named effect and those it is confused with differ most for its cost.
 ///
 /// # Errors

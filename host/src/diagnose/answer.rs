@@ -3,15 +3,16 @@
 use model_core::braid::Geometry;
 
 use super::baselines::{self, Kind};
-use super::candidates::{self, library, place_in_words};
+use super::candidates::{self, library};
+use super::frequency;
 use super::held_out::held_out;
 use super::linear::energy;
-use super::locate::locate;
+use super::locate::{block_ranges, locate};
+use super::named::{considered, missing};
+use super::rest;
 use super::rows::{self, Rows};
-use super::select::{self, Found, STATIC_INEXACTNESS, search};
-use super::verdict::{
-    Considered, Diagnosis, HeldOut, Missing, ParameterValue, PathStep, Trace, Unexplained, Verdict,
-};
+use super::select::{Found, search};
+use super::verdict::{Considered, Diagnosis, HeldOut, PathStep, Region, Trace, Unexplained, Verdict};
 use crate::error::{Code, Error, Result};
 use crate::recording::Campaign;
 
@@ -21,6 +22,10 @@ pub struct Options {
     /// The muscle's name, for the answer.
     pub muscle: String,
 }
+
+/// Lack of fit that the model admits beside the pure error of repeats, rms as a share of the blocked force: friction by its sign
+/// alone where contacts give a little before they slide, and what a bladder of four orders leaves.
+const INEXACTNESS: f64 = 1.5e-3;
 
 /// Fewest rows and half-strokes from which anything is judged.
 const FEWEST_ROWS: usize = 60;
@@ -58,18 +63,16 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     if let Some(reason) = cannot_be_judged(&rows, blocked) {
         return Ok(no_judgement(&rows, options, remarks, reason, blocked));
     }
-    if let Some(time) = baselines::settle_friction(&mut rows) {
-        remarks.push(format!(
-            "while the length is held the gap between the branches closes within about {time:.1} s (the air's ripple shakes \
-             friction out); the model holds it, so rows at rest are compared with a friction that settles"
-        ));
+    if let Some(law) = rest::settle_friction(&mut rows) {
+        remarks.push(law.words());
     }
     // The model as it was: four orders, tables free over pressure.
     let production = baselines::fit(&rows, Kind::Flexible(4), &[]);
     let misfit = production.rms(&rows);
     remarks.extend(tables_as_evidence(&production, &rows));
     let library = library(&rows);
-    let found = search(&mut rows, &library, blocked, step);
+    let mut found = search(&mut rows, &library, blocked, step);
+    let held = keep_what_helps(&mut found, &mut rows, &library);
     remarks.extend(found.remarks.iter().cloned());
     let sigma = found.noise.sigma;
     if !found.noise.from_repeats {
@@ -84,9 +87,13 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     };
     let weight = energy(&rows.root_weight).max(1e-12);
     let left = (energy(&found.full.residual) / weight - sigma * sigma).max(0.0).sqrt();
-    let own = (select::OWN_INEXACTNESS * 2.0 * blocked).max(0.5 * sigma);
+    let own = (INEXACTNESS * blocked).max(0.6 * sigma);
+    let beat = frequency::line(&rows, &found.full.residual, &block_ranges(&rows), step, 9)
+        .filter(|l| l.p <= 0.02 && l.share >= 0.15);
     let verdict = if missing.is_empty() {
-        if left <= own.max(STATIC_INEXACTNESS * blocked) { Verdict::Consistent } else { Verdict::Unexplained }
+        // What beats in time is no noise, however well repeats seem to explain it.
+        let steady = beat.is_none_or(|l| l.share < 0.3);
+        if left <= own && steady { Verdict::Consistent } else { Verdict::Unexplained }
     } else if explained >= 0.8 || left <= own {
         Verdict::Explained
     } else if explained >= 0.25 {
@@ -94,15 +101,27 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     } else {
         Verdict::Unexplained
     };
-    let (regions, profiles) = locate(&rows, &found.bare.residual, &found.full.residual, sigma, 7);
+    let (mut regions, profiles) = locate(&rows, &found.bare.residual, &found.full.residual, sigma, 7);
     let (left_regions, _) = locate(&rows, &found.full.residual, &found.full.residual, sigma, 8);
     let share = if verdict == Verdict::Consistent { 0.0 } else { 1.0 - explained };
-    let pattern = match left_regions.first() {
-        Some(r) if left > own => r.words.clone(),
+    let pattern = match (&beat, left_regions.first()) {
+        (Some(l), _) => format!("periodic in time, {:.2} Hz", l.hertz),
+        (None, Some(r)) if left > own => r.words.clone(),
         _ => "none".to_owned(),
     };
-    let held = held_out(&rows, found.full.kind, &found.traces, sigma);
-    let considered = considered(&found, &library, &missing, sigma);
+    if let Some(l) = beat {
+        regions.push(Region {
+            coordinate: "frequency".into(),
+            from: l.hertz - l.half,
+            to: l.hertz + l.half,
+            share: l.share,
+            rows: 1.0,
+            p: l.p,
+            unit: "Hz".into(),
+            words: format!("{:.0} % of the misfit repeats in time with {:.2} Hz", 100.0 * l.share, l.hertz),
+        });
+    }
+    let considered = considered(&found, &library, &missing, sigma, blocked);
     let path = found
         .taken
         .iter()
@@ -289,108 +308,29 @@ fn no_judgement(
     }
 }
 
-/// How sure a name may be, by how much of the misfit it explains: little explained means that something else may be at work.
-/// The two numbers were read off the named singles of `trials generate --set dev --n 66`: nearly all names that explain nine tenths
-/// were of the right class, half of those that explain six tenths.
-fn in_the_library(share: f64) -> f64 {
-    1.0 / (1.0 + (-(10.0 * (share - 0.62))).exp())
-}
-
-fn missing(found: &Found, library: &[candidates::Candidate], rows: &Rows) -> Vec<Missing> {
-    let deviations = select::deviations(found, library, rows);
-    let explained =
-        ((energy(&found.bare.residual) - energy(&found.full.residual)) / found.above).clamp(0.0, 1.0);
-    let total: f64 = found.taken.iter().map(|t| t.share.max(0.0)).sum::<f64>().max(1e-12);
-    found
-        .taken
-        .iter()
-        .zip(&deviations)
-        .map(|(t, d)| {
-            let candidate = &library[t.trial.candidate];
-            let info = candidate.info;
-            let values = t.trial.amplitudes.iter().chain(&t.trial.shapes);
-            let parameters = info
-                .parameters
-                .iter()
-                .zip(values)
-                .zip(d)
-                .map(|((p, v), std)| ParameterValue {
-                    name: p.name.into(),
-                    value: *v,
-                    std: *std,
-                    unit: p.unit.into(),
-                    outside_known_range: *v != 0.0 && (v.abs() > p.high.abs().max(p.low.abs()) || v.abs() < p.low.abs().min(p.high.abs()) && p.low * p.high > 0.0),
-                })
-                .collect();
-            let sum: f64 = 1.0 + t.rivals.iter().map(|r| r.1).sum::<f64>();
-            let confusable: Vec<String> = t
-                .rivals
-                .iter()
-                .filter(|r| r.1 > select::CONFUSABLE || (r.2.abs() > 0.9 && r.1 > 0.02))
-                .take(8)
-                .map(|r| library[r.0].name().to_owned())
-                .collect();
-            let share = (explained * t.share / total).clamp(0.0, 1.0);
-            let why = format!(
-                "it takes {:.0} % of the misfit above noise with the base refitted; by chance over all {} effects and their \
-                 shapes this would happen with p = {:.4}",
-                share * 100.0,
-                library.len(),
-                t.p
-            );
-            Missing {
-                effect: info.name.into(),
-                probability: (in_the_library(explained) / sum).clamp(0.0, 1.0),
-                share_explained: share,
-                parameters,
-                confusable_with: confusable,
-                place: place_in_words(info.link).into(),
-                correction: candidate.of_the_bench(),
-                summary: info.summary.into(),
-                source: info.source.into(),
-                peak_N: t.trial.peak,
-                p: t.p,
-                why,
-            }
-        })
-        .collect()
-}
-
-fn considered(
-    found: &Found,
-    library: &[candidates::Candidate],
-    missing: &[Missing],
-    sigma: f64,
-) -> Vec<Considered> {
-    let named: Vec<&str> = missing.iter().map(|m| m.effect.as_str()).collect();
-    let confusable: Vec<&String> = missing.iter().flat_map(|m| &m.confusable_with).collect();
-    found
-        .first_look
-        .iter()
-        .zip(&found.first_p)
-        .filter(|(t, _)| !named.contains(&library[t.candidate].name()))
-        .map(|(t, p)| {
-            let name = library[t.candidate].name();
-            let gain = (t.gain / found.above).clamp(0.0, 1.0);
-            // The trace that three standard deviations of noise could hide, given how much of it the base leaves.
-            let hidden = (t.visible > candidates::INVISIBLE && t.size > 0.0).then(|| {
-                let detectable = 3.5 * sigma / (found.noise.independent.max(4.0)).sqrt() / t.visible.sqrt();
-                detectable * t.peak / t.size
-            });
-            let why_not = if t.visible < candidates::INVISIBLE {
-                "these recordings do not excite it, or the tables imitate it completely: it could be present unseen".to_owned()
-            } else if confusable.iter().any(|c| c.as_str() == name) {
-                "cannot be told from what is named".to_owned()
-            } else if *p > select::FAMILY_ALPHA {
-                format!("no more than chance gives over all effects looked at (p = {p:.2})")
-            } else if missing.is_empty() {
-                "takes too little of the misfit to be named".to_owned()
-            } else {
-                "explains less than what is named, and little besides it".to_owned()
-            };
-            Considered { effect: name.into(), gain, why_not, hidden_up_to_N: hidden.filter(|h| h.is_finite()), visible: t.visible }
-        })
-        .collect()
+/// Drops effects, the last taken first, that do not improve rows which the fit had not seen; gives the error on these rows.
+fn keep_what_helps(found: &mut Found, rows: &mut Rows, library: &[candidates::Candidate]) -> HeldOut {
+    let sigma = found.noise.sigma;
+    loop {
+        let with = held_out(rows, found.full.kind, &found.traces, sigma);
+        let Some(fewer) = found.traces.len().checked_sub(1) else { return with };
+        let before = if fewer == 0 {
+            with.rms_before_N
+        } else {
+            held_out(rows, found.full.kind, &found.traces[..fewer], sigma).rms_after_N
+        };
+        // An effect that takes a third of what is above the noise lowers the whole by more than this.
+        if with.rms_after_N < 0.985 * before {
+            return with;
+        }
+        let name = found.taken.last().map_or("", |t| library[t.trial.candidate].name());
+        found.remarks.push(format!(
+            "{name} fits these recordings but does not improve rows that the fit had not seen ({before:.3} N without it, {:.3} N with \
+             it): it is not named",
+            with.rms_after_N
+        ));
+        found.drop_last(rows, library);
+    }
 }
 
 fn trace(rows: &Rows, found: &Found) -> Trace {

@@ -9,18 +9,94 @@
 //! is three or four orthogonal least-squares solutions.
 
 use model_core::spline;
+
 use rayon::prelude::*;
 
-use super::linear::{Basis, dot, energy, weighted};
+use super::linear::{Basis, add_scaled, dot, energy, weighted};
 use super::rows::{ORDERS, Rows, YEOH};
 
+/// How much one bladder may differ between pressures, and how unsure a row is: what a soft baseline takes for granted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Give {
+    /// Rms that the elastic surface may differ by from one pressure to the next, N.
+    pub elastic: f64,
+    /// The same of the friction, N.
+    pub friction: f64,
+    /// Standard deviation of a row by which a sum over rows is judged, N: noise times the root of how many rows are worth one.
+    pub row: f64,
+}
+
 /// Which baseline.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Kind {
     /// `E_1…E_M` and `k_F` free at each pressure level.
     Flexible(usize),
     /// One bladder for all pressures: `E_1…E_6` and a Yeoh wall without pressure in them, `k_F` quadratic in pressure.
     Stiff,
+    /// One bladder that may differ a little between pressures: the stiff baseline, and beyond it the flexible one's columns with
+    /// a prior of zero mean on each.
+    Soft(Give),
+}
+
+impl Kind {
+    /// Whether pressures are tied together.
+    pub(crate) fn reaches_over_pressures(self) -> bool {
+        !matches!(self, Self::Flexible(_))
+    }
+}
+
+/// What a baseline can express: fully (hard), within a prior (soft), and by effects fitted beside it.
+///
+/// In the soft directions a misfit is partly the bladder's own: the whitened space shrinks them by `keep`, so that inner products
+/// there are those of generalised least squares with the prior integrated out.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Reach {
+    /// Columns with free coefficients, weighted.
+    pub hard: Basis,
+    /// Unit directions of the flexible tables beyond, orthogonal to the hard ones.
+    pub soft: Vec<Vec<f64>>,
+    /// Whether a soft direction is friction's.
+    pub of_friction: Vec<bool>,
+    /// What remains of each soft direction.
+    pub keep: Vec<f64>,
+    /// The effects beside it, whitened.
+    pub chosen: Basis,
+    /// The effects beside it, freed of the hard columns only.
+    pub chosen_core: Vec<Vec<f64>>,
+}
+
+impl Reach {
+    /// Takes out of a weighted column what the baseline can express.
+    pub(crate) fn project_out(&self, v: &mut [f64]) {
+        self.whiten(v);
+        self.chosen.project_out(v);
+    }
+
+    /// The same without the effects.
+    fn whiten(&self, v: &mut [f64]) {
+        self.hard.project_out(v);
+        for (q, keep) in self.soft.iter().zip(&self.keep) {
+            let c = dot(q, v);
+            add_scaled(v, -(1.0 - keep) * c, q);
+        }
+    }
+
+    /// A column's components along the soft directions.
+    pub(crate) fn components(&self, v: &[f64]) -> Vec<f64> {
+        self.soft.iter().map(|q| dot(q, v)).collect()
+    }
+}
+
+/// Every column weighted and freed of what a baseline expresses.
+pub(crate) fn projected(columns: &[Vec<f64>], root_weight: &[f64], span: &Reach) -> Vec<Vec<f64>> {
+    columns
+        .par_iter()
+        .map(|c| {
+            let mut v = weighted(c, root_weight);
+            span.project_out(&mut v);
+            v
+        })
+        .collect()
 }
 
 /// A fitted baseline, with effects that were fitted beside it.
@@ -28,9 +104,11 @@ pub(crate) enum Kind {
 pub(crate) struct Baseline {
     /// Which.
     pub kind: Kind,
-    /// Basis of the baseline's own columns (and of the effects fitted beside it), weighted.
-    pub basis: Basis,
-    /// Measured less fitted, times the square root of the weight, N.
+    /// What the baseline and the effects beside it express.
+    pub span: Reach,
+    /// What is to be explained, weighted and freed of the hard columns only.
+    pub core: Vec<f64>,
+    /// Measured less fitted, times the square root of the weight, whitened, N.
     pub residual: Vec<f64>,
     /// Measured less fitted on every row, N, whatever its weight.
     pub raw_residual: Vec<f64>,
@@ -77,171 +155,279 @@ fn cardinal_cubics(levels: &[f64]) -> Vec<[spline::Cubic<f64>; spline::MAX_PIECE
         .collect()
 }
 
-/// Pressure functions for the elastic and for the friction part, row by row.
-struct OverPressure {
-    elastic: Vec<Vec<f64>>,
-    friction: Vec<Vec<f64>>,
+/// One column of a baseline.
+#[derive(Clone, Copy, Debug)]
+enum Part {
+    Deadband,
+    /// `E_k` over a function of pressure: order (from 0), function.
+    Elastic(usize, usize),
+    Yeoh(usize),
+    /// `k_F` over a function of pressure.
+    Friction(usize),
+    /// A scale of the effective area, and of its slope.
+    Area,
+    AreaSlope,
+    /// A settling of friction that is not quite exponential.
+    Settling,
 }
 
-fn over_pressure(rows: &Rows, kind: Kind) -> OverPressure {
-    let n = rows.len();
-    match kind {
-        Kind::Flexible(_) => {
+/// The columns of a baseline: those with free coefficients, those with a prior, and the functions of pressure in them.
+struct Plan {
+    hard: Vec<Part>,
+    soft: Vec<Part>,
+    functions: Vec<Vec<f64>>,
+}
+
+impl Plan {
+    fn new(rows: &Rows, kind: Kind) -> Self {
+        let n = rows.len();
+        let mut functions = Vec::new();
+        let cardinals = |functions: &mut Vec<Vec<f64>>| {
             let levels = &rows.levels;
             let cubics = cardinal_cubics(levels);
-            let mut functions = vec![vec![0.0; n]; levels.len()];
+            let first = functions.len();
+            functions.extend(vec![vec![0.0; n]; levels.len()]);
             let mut at = vec![0.0; levels.len()];
             for i in 0..n {
                 cardinal(levels, &cubics, rows.contexts[i].pressure, &mut at);
-                for (f, a) in functions.iter_mut().zip(&at) {
+                for (f, a) in functions[first..].iter_mut().zip(&at) {
                     f[i] = *a;
                 }
             }
-            OverPressure { elastic: functions.clone(), friction: functions }
-        }
-        Kind::Stiff => {
+            first..first + levels.len()
+        };
+        let tables = |order: usize, over: std::ops::Range<usize>| {
+            let elastic = over.clone();
+            (0..order)
+                .flat_map(move |k| elastic.clone().map(move |f| Part::Elastic(k, f)))
+                .chain(over.map(Part::Friction))
+                .collect::<Vec<Part>>()
+        };
+        let mut hard = vec![Part::Deadband];
+        let mut soft = Vec::new();
+        if let Kind::Flexible(order) = kind {
+            let over = cardinals(&mut functions);
+            hard.extend(tables(order.clamp(1, ORDERS), over));
+        } else {
             let (lo, hi) =
                 (rows.levels.first().copied().unwrap_or(0.0), rows.levels.last().copied().unwrap_or(1.0));
             let u = |p: f64| if hi > lo { (2.0 * (p - lo) / (hi - lo) - 1.0).clamp(-1.2, 1.2) } else { 0.0 };
-            let degree = rows.levels.len().clamp(1, 3);
-            let friction = (0..degree)
-                .map(|d| rows.contexts.iter().map(|c| u(c.pressure).powi(d as i32)).collect())
-                .collect();
-            OverPressure { elastic: vec![vec![1.0; n]], friction }
+            for degree in 0..rows.levels.len().clamp(1, 3) {
+                functions.push(rows.contexts.iter().map(|c| u(c.pressure).powi(degree as i32)).collect());
+            }
+            hard.extend((0..ORDERS).map(|k| Part::Elastic(k, 0)));
+            hard.extend((0..YEOH).map(Part::Yeoh));
+            hard.extend((0..functions.len()).map(Part::Friction));
+            if matches!(kind, Kind::Soft(_)) && rows.levels.len() > 1 {
+                let over = cardinals(&mut functions);
+                soft = tables(4, over);
+            }
         }
+        // At a few held lengths a tenth of a degree in the braid's angle, or a millimetre in the mounting, cannot be told from a
+        // scale of the effective area; where the muscle moves it shows in the shape and is held against the geometry.
+        if rows.isometric {
+            hard.extend([Part::Area, Part::AreaSlope]);
+        }
+        if rows.settling.iter().any(|s| *s != 0.0) {
+            hard.push(Part::Settling);
+        }
+        Self { hard, soft, functions }
     }
 }
 
-/// Where the friction's coefficients begin in a solution: behind `P0`, the elastic and the Yeoh ones.
-fn first_friction_of(order: usize, per_order: usize, yeoh: usize) -> usize {
-    1 + order * per_order + yeoh
-}
+/// A soft direction must stand out from the others by this share of itself.
+const DISTINCT: f64 = 1e-3;
 
 /// Fits a baseline together with given effect columns (N per unit amplitude, unweighted).
 pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
     let n = rows.len();
-    let functions = over_pressure(rows, kind);
-    let order = match kind {
-        Kind::Flexible(m) => m.clamp(1, ORDERS),
-        Kind::Stiff => ORDERS,
-    };
-    let yeoh = if kind == Kind::Stiff { YEOH } else { 0 };
-    let per_order = functions.elastic.len();
+    let plan = Plan::new(rows, kind);
     let live: Vec<f64> = rows.vented.iter().map(|v| if *v { 0.0 } else { 1.0 }).collect();
-
-    let mut friction = vec![0.0; n];
-    let mut friction_coefficients = vec![0.0; functions.friction.len()];
-    let mut quasi: Vec<f64> = rows.contexts.iter().map(|c| c.pressure * c.area).collect();
+    // From what was fitted before, where there is anything.
+    let begun = rows.contexts.iter().any(|c| c.quasi != 0.0);
+    let mut friction: Vec<f64> = rows.contexts.iter().map(|c| c.friction).collect();
+    let mut quasi: Vec<f64> =
+        rows.contexts.iter().map(|c| if begun { c.quasi } else { c.pressure * c.area }).collect();
     let mut out: Option<Baseline> = None;
-    for _ in 0..4 {
+    for _ in 0..if begun { 3 } else { 4 } {
         let factor: Vec<f64> =
             (0..n).map(|i| live[i] * (1.0 - friction[i] * rows.contexts[i].direction)).collect();
-        let mut columns: Vec<Vec<f64>> = Vec::with_capacity(2 + order * per_order + yeoh + effects.len());
-        columns.push((0..n).map(|i| -factor[i] * rows.shapes[i].area).collect());
-        for k in 0..order {
-            for f in &functions.elastic {
-                columns.push((0..n).map(|i| factor[i] * rows.shapes[i].elastic[k] * f[i]).collect());
+        let column = |part: &Part| -> Vec<f64> {
+            let (shapes, contexts, w) = (&rows.shapes, &rows.contexts, &rows.root_weight);
+            let of = |value: &dyn Fn(usize) -> f64| (0..n).map(|i| value(i) * w[i]).collect::<Vec<f64>>();
+            match *part {
+                Part::Deadband => of(&|i| -factor[i] * shapes[i].area),
+                Part::Elastic(k, f) => of(&|i| factor[i] * shapes[i].elastic[k] * plan.functions[f][i]),
+                Part::Yeoh(k) => of(&|i| factor[i] * shapes[i].yeoh[k]),
+                Part::Friction(f) => {
+                    of(&|i| -live[i] * contexts[i].direction * quasi[i] * plan.functions[f][i])
+                }
+                Part::Area => of(&|i| factor[i] * shapes[i].area * contexts[i].pressure),
+                Part::AreaSlope => of(&|i| factor[i] * shapes[i].area_slope * contexts[i].pressure),
+                Part::Settling => of(&|i| -live[i] * rows.sign[i] * quasi[i] * rows.settling[i]),
             }
+        };
+        let mut joint = Basis::default();
+        for part in &plan.hard {
+            joint.push(column(part));
         }
-        for k in 0..yeoh {
-            columns.push((0..n).map(|i| factor[i] * rows.shapes[i].yeoh[k]).collect());
+        let hard = joint.clone();
+        for part in &plan.soft {
+            joint.push_beyond(column(part), DISTINCT);
         }
-        for f in &functions.friction {
-            columns.push((0..n).map(|i| -live[i] * rows.contexts[i].direction * quasi[i] * f[i]).collect());
-        }
-        // At a few held lengths a tenth of a degree in the braid's angle, or a millimetre in the mounting, cannot be told from a
-        // scale of the effective area; where the muscle moves it shows in the shape and is held against the geometry.
-        let scaled = rows.isometric;
-        if scaled {
-            columns
-                .push((0..n).map(|i| factor[i] * rows.shapes[i].area * rows.contexts[i].pressure).collect());
-            columns.push(
-                (0..n).map(|i| factor[i] * rows.shapes[i].area_slope * rows.contexts[i].pressure).collect(),
-            );
-        }
-        // A settling that is not quite exponential.
-        let settles = rows.settling.iter().any(|s| *s != 0.0);
-        if settles {
-            columns.push((0..n).map(|i| -live[i] * rows.sign[i] * quasi[i] * rows.settling[i]).collect());
-        }
-        let own = columns.len();
-        columns.extend(effects.iter().cloned());
+        let soft: Vec<Vec<f64>> = joint.columns()[hard.columns().len()..].to_vec();
+        let of_friction: Vec<bool> = joint.kept()[hard.columns().len()..]
+            .iter()
+            .map(|j| matches!(plan.soft[j - plan.hard.len()], Part::Friction(_)))
+            .collect();
+        let keep = match kind {
+            Kind::Soft(give) => keeps(give, &of_friction, energy(&rows.root_weight)),
+            _ => Vec::new(),
+        };
+        // With friction's coefficients counted from zero, not from the last round, so that a prior holds for the whole.
         let y: Vec<f64> = (0..n)
             .map(|i| {
-                (rows.force[i] - factor[i] * rows.shapes[i].area * rows.contexts[i].pressure)
-                    * rows.root_weight[i]
+                let pressed = factor[i] * rows.shapes[i].area * rows.contexts[i].pressure;
+                let rubbed = live[i] * rows.contexts[i].direction * quasi[i] * friction[i];
+                (rows.force[i] - pressed - rubbed) * rows.root_weight[i]
             })
             .collect();
-        let basis = Basis::new(&columns, &rows.root_weight);
-        let solution = basis.solve(&y);
-        let deadband = solution[0];
-        // The model itself, not its linearisation, is what the residual is taken from.
-        let first_friction = first_friction_of(order, per_order, yeoh);
-        let settling_share = if settles { solution[own - 1] } else { 0.0 };
-        let first_scale = first_friction_of(order, per_order, yeoh) + functions.friction.len();
-        let scale = if scaled { [solution[first_scale], solution[first_scale + 1]] } else { [0.0; 2] };
-        for (c, d) in friction_coefficients
-            .iter_mut()
-            .zip(&solution[first_friction..first_friction + functions.friction.len()])
-        {
-            *c += d;
+        let mut span = Reach { hard, soft, of_friction, keep, ..Reach::default() };
+        let mut white = y.clone();
+        span.whiten(&mut white);
+        for effect in effects {
+            let mut core = weighted(effect, &rows.root_weight);
+            span.hard.project_out(&mut core);
+            let mut z = core.clone();
+            span.whiten(&mut z);
+            span.chosen.push(z);
+            span.chosen_core.push(core);
         }
-        let mut gaylord = vec![0.0; n];
-        let mut stiffness = vec![0.0; n];
-        for i in 0..n {
-            let (shape, p) = (&rows.shapes[i], rows.contexts[i].pressure);
-            gaylord[i] = (p - deadband + scale[0] * p) * shape.area + scale[1] * p * shape.area_slope;
-            stiffness[i] = (p - deadband + scale[0] * p) * shape.area_slope;
-            let mut elastic = 0.0;
-            for k in 0..order {
-                let e: f64 = functions
-                    .elastic
-                    .iter()
-                    .enumerate()
-                    .map(|(j, f)| solution[1 + k * per_order + j] * f[i])
-                    .sum();
-                elastic += e * shape.elastic[k];
-                stiffness[i] += e * shape.elastic_slope[k];
+        let amplitudes = span.chosen.solve(&white);
+        let mut freed = y.clone();
+        for (effect, a) in effects.iter().zip(&amplitudes) {
+            for i in 0..n {
+                freed[i] -= a * effect[i] * rows.root_weight[i];
             }
-            for k in 0..yeoh {
-                let c = solution[1 + order * per_order + k];
-                elastic += c * shape.yeoh[k];
-                stiffness[i] += c * shape.yeoh_slope[k];
-            }
-            quasi[i] = gaylord[i] + elastic;
-            let k_f: f64 = functions.friction.iter().zip(&friction_coefficients).map(|(f, c)| f[i] * c).sum();
-            friction[i] = k_f.clamp(-0.4, 0.8);
         }
-        let amplitudes = solution[own..].to_vec();
+        let mut core = y;
+        span.hard.project_out(&mut core);
+        let mut coefficients: Vec<f64> = joint.columns().iter().map(|q| dot(q, &freed)).collect();
+        for (c, keep) in coefficients[span.hard.columns().len()..].iter_mut().zip(&span.keep) {
+            *c *= 1.0 - keep * keep;
+        }
+        let solution = joint.unravel(&coefficients);
+        let fitted = values(rows, &plan, &solution, &live);
+        quasi.clone_from(&fitted.quasi);
+        friction.clone_from(&fitted.friction);
         let raw_residual: Vec<f64> = (0..n)
             .map(|i| {
-                let settling = if settles { settling_share * rows.sign[i] * rows.settling[i] } else { 0.0 };
-                let model = live[i] * quasi[i] * (1.0 - friction[i] * rows.contexts[i].direction - settling);
                 let added: f64 = effects.iter().zip(&amplitudes).map(|(e, a)| a * e[i]).sum();
-                rows.force[i] - model - added
+                rows.force[i] - fitted.force[i] - added
             })
             .collect();
+        let nodes = |order: usize| -> Vec<f64> {
+            let parts = plan.hard.iter().zip(&solution);
+            parts.filter(|(p, _)| matches!(p, Part::Elastic(k, _) if *k == order)).map(|(_, v)| *v).collect()
+        };
         out = Some(Baseline {
             kind,
-            basis,
-            residual: weighted(&raw_residual, &rows.root_weight),
+            residual: white,
+            core,
             raw_residual,
             amplitudes,
-            deadband,
-            quasi: quasi.clone(),
-            gaylord,
-            friction: friction.clone(),
-            stiffness,
-            elastic_nodes: (0..order)
-                .map(|k| solution[1 + k * per_order..1 + (k + 1) * per_order].to_vec())
+            deadband: solution[0],
+            quasi: fitted.quasi,
+            gaylord: fitted.gaylord,
+            friction: fitted.friction,
+            stiffness: fitted.stiffness,
+            elastic_nodes: (0..ORDERS).map(nodes).collect(),
+            friction_nodes: plan
+                .hard
+                .iter()
+                .zip(&solution)
+                .filter(|(p, _)| matches!(p, Part::Friction(_)))
+                .map(|(_, v)| *v)
                 .collect(),
-            friction_nodes: friction_coefficients.clone(),
+            span,
         });
     }
     let mut fitted = out.unwrap_or_else(|| unreachable!("the loop above runs"));
-    // What little the linearisation left in the span of the base is no misfit.
-    fitted.basis.project_out(&mut fitted.residual);
+    fitted.span.chosen.project_out(&mut fitted.residual);
     fitted
+}
+
+/// What remains of each soft direction, when the bladder may differ as much as `give` says.
+pub(crate) fn keeps(give: Give, of_friction: &[bool], weight: f64) -> Vec<f64> {
+    let friction = of_friction.iter().filter(|f| **f).count().max(1) as f64;
+    let elastic = of_friction.iter().filter(|f| !**f).count().max(1) as f64;
+    let noise = give.row * give.row;
+    of_friction
+        .iter()
+        .map(|f| {
+            let own =
+                weight * if *f { give.friction.powi(2) / friction } else { give.elastic.powi(2) / elastic };
+            (noise / (noise + own).max(1e-300)).sqrt()
+        })
+        .collect()
+}
+
+/// A baseline's forces at every row.
+struct Values {
+    force: Vec<f64>,
+    quasi: Vec<f64>,
+    gaylord: Vec<f64>,
+    friction: Vec<f64>,
+    stiffness: Vec<f64>,
+}
+
+fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
+    let n = rows.len();
+    let mut v = Values {
+        force: vec![0.0; n],
+        quasi: vec![0.0; n],
+        gaylord: vec![0.0; n],
+        friction: vec![0.0; n],
+        stiffness: vec![0.0; n],
+    };
+    let mut settling = 0.0;
+    let mut elastic = vec![0.0; n];
+    for (part, c) in plan.hard.iter().chain(&plan.soft).zip(solution).filter(|(_, c)| **c != 0.0) {
+        for i in 0..n {
+            let (shape, context) = (&rows.shapes[i], &rows.contexts[i]);
+            match *part {
+                Part::Deadband => {
+                    v.gaylord[i] -= c * shape.area;
+                    v.stiffness[i] -= c * shape.area_slope;
+                }
+                Part::Elastic(k, f) => {
+                    elastic[i] += c * plan.functions[f][i] * shape.elastic[k];
+                    v.stiffness[i] += c * plan.functions[f][i] * shape.elastic_slope[k];
+                }
+                Part::Yeoh(k) => {
+                    elastic[i] += c * shape.yeoh[k];
+                    v.stiffness[i] += c * shape.yeoh_slope[k];
+                }
+                Part::Friction(f) => v.friction[i] += c * plan.functions[f][i],
+                Part::Area => {
+                    v.gaylord[i] += c * context.pressure * shape.area;
+                    v.stiffness[i] += c * context.pressure * shape.area_slope;
+                }
+                Part::AreaSlope => v.gaylord[i] += c * context.pressure * shape.area_slope,
+                Part::Settling => settling = *c,
+            }
+        }
+    }
+    for i in 0..n {
+        let (shape, context) = (&rows.shapes[i], &rows.contexts[i]);
+        v.gaylord[i] += context.pressure * shape.area;
+        v.stiffness[i] += context.pressure * shape.area_slope;
+        v.quasi[i] = v.gaylord[i] + elastic[i];
+        v.friction[i] = v.friction[i].clamp(-0.4, 0.8);
+        let late = settling * rows.sign[i] * rows.settling[i];
+        v.force[i] = live[i] * v.quasi[i] * (1.0 - v.friction[i] * context.direction - late);
+    }
+    v
 }
 
 /// Rows at which the muscle hangs slack (no force although the pressure would give some) lose their weight; returns how
@@ -257,45 +443,6 @@ pub(crate) fn mask_slack(rows: &mut Rows, fitted: &Baseline) -> usize {
         }
     }
     masked
-}
-
-/// Settling times of friction at rest that are tried, s.
-const SETTLING: [f64; 8] = [0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 30.0, 100.0];
-
-/// Lets friction fade at rest as the recordings say: `s → s e^(−t/τ)`, `t` since the braid last moved.
-fn fade(rows: &mut Rows, time: f64) {
-    for i in 0..rows.len() {
-        let left = if rows.still[i] > 0.0 { (-rows.still[i] / time).exp() } else { 1.0 };
-        rows.contexts[i].direction = rows.sign[i] * left;
-        rows.settling[i] = if rows.still[i] > 0.0 { (-3.0 * rows.still[i] / time).exp() - left } else { 0.0 };
-    }
-}
-
-/// Finds out whether, and how fast, the gap between the branches closes while the muscle rests. A regulator's ripple shakes the
-/// braid, so that friction ends near the middle although the model holds it: that is no missing physics, but
-/// without it every effect that fades at rest would be mistaken for it.
-pub(crate) fn settle_friction(rows: &mut Rows) -> Option<f64> {
-    rows.settling = vec![0.0; rows.len()];
-    let resting = rows.still.iter().zip(&rows.root_weight).filter(|(s, w)| **s > 1.0 && **w > 0.0).count();
-    if rows.isometric || resting * 50 < rows.effective() {
-        return None;
-    }
-    let kind = Kind::Flexible(4);
-    let held = energy(&fit(rows, kind, &[]).residual);
-    let tried: Vec<(f64, f64)> = SETTLING
-        .par_iter()
-        .map(|time| {
-            let mut faded = rows.clone();
-            fade(&mut faded, *time);
-            (*time, energy(&fit(&faded, kind, &[]).residual))
-        })
-        .collect();
-    let (time, left) = tried.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
-    if left < 0.8 * held {
-        fade(rows, time);
-        return Some(time);
-    }
-    None
 }
 
 /// Writes the baseline's forces and slopes into the rows' contexts, where effects look for them.

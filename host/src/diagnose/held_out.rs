@@ -10,6 +10,14 @@ use super::verdict::HeldOut;
 /// Rows at most: held-out error needs no more.
 const ROWS: usize = 6_000;
 
+/// Where the bladder differs between pressures by more than this share of the largest force, rms, no pressure is predicted from the
+/// others.
+const ONE_BLADDER: f64 = 5e-3;
+
+fn strongest(rows: &Rows) -> f64 {
+    rows.force.iter().copied().fold(0.0, f64::max)
+}
+
 /// How rows are put into groups that are left out one at a time.
 struct Split {
     words: &'static str,
@@ -112,7 +120,13 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> [f64
 
 /// Held-out error with and without the effects, by the strictest split that the recordings allow.
 pub(crate) fn held_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], noise: f64) -> HeldOut {
-    let kind = if let Kind::Flexible(m) = kind { Kind::Flexible(m.min(4)) } else { kind };
+    // Directions with a prior are made for the pressures they were fitted to; a pressure left out asks for one bladder, where
+    // there is one.
+    let kind = match kind {
+        Kind::Flexible(m) => Kind::Flexible(m.min(4)),
+        Kind::Soft(give) if give.elastic > ONE_BLADDER * strongest(rows) => Kind::Flexible(4),
+        Kind::Soft(_) | Kind::Stiff => Kind::Stiff,
+    };
     let (thin, traces) = thin(rows, traces);
     let by_pressure = split("each pressure predicted from the others", &thin, &|i| thin.level[i]);
     let by_stroke =
@@ -126,7 +140,7 @@ pub(crate) fn held_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], noise: f64)
     // A pressure left out needs a baseline that reaches over pressures.
     let chosen = if rows.isometric && rows.names.len() >= 4 {
         by_run
-    } else if matches!(kind, Kind::Stiff) && by_pressure.groups.len() >= 3 {
+    } else if kind.reaches_over_pressures() && by_pressure.groups.len() >= 3 {
         by_pressure
     } else if thin.blocks >= 16 {
         by_stroke

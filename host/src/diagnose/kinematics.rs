@@ -294,6 +294,7 @@ pub(crate) fn kinematics(
         k.since_reversal[row] = time[row] - time[turn_row];
         k.travel[row] = (stroke[row] - stroke[turn_row]).abs();
     }
+    mark_ramps_from_their_start(&mut k, pressure, 4.0 * white_noise(pressure), half + 2);
     for (row, _, doubt) in &starts {
         let at = time[*row];
         let mut j = *row;
@@ -326,6 +327,30 @@ pub(crate) fn kinematics(
     k.acceleration = slopes(time, &raw_speed, half, |_| (0, n));
     k.pressure_rate = slopes(time, pressure, half, |_| (0, n));
     k
+}
+
+/// A ramp begins before it has passed the threshold by which it is found: back to where the pressure left the hold's own. And a
+/// hold begins and ends within `margin` rows of where the motion's slope says.
+fn mark_ramps_from_their_start(k: &mut Kinematics, pressure: &[f64], noise: f64, margin: usize) {
+    let n = pressure.len();
+    let mut from = 0;
+    while from < n {
+        let mut to = from;
+        while to < n && k.held[to] == k.held[from] {
+            to += 1;
+        }
+        if k.held[from]
+            && let Some(first) = (from..to).find(|i| k.ramped[*i])
+        {
+            let begun = (from..first)
+                .rev()
+                .find(|i| (pressure[*i] - pressure[from]).abs() <= noise)
+                .map_or(from, |i| i + 1);
+            let begun = if begun == from { from.saturating_sub(margin) } else { begun };
+            k.ramped[begun..(to + margin).min(n)].fill(true);
+        }
+        from = to;
+    }
 }
 
 #[cfg(test)]

@@ -3,8 +3,6 @@
 //! Columns are long (one entry per row of a recording) and few. Everything is computed column by column in a fixed
 //! order, so a result does not depend on how many threads share the columns among them.
 
-use rayon::prelude::*;
-
 /// Sum of products.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Four partial sums: the compiler vectorises, and the order of summation stays fixed.
@@ -56,7 +54,12 @@ impl Basis {
     }
 
     /// Adds a column that is already weighted; `false` when it lies in the basis and is left out.
-    pub(crate) fn push(&mut self, mut column: Vec<f64>) -> bool {
+    pub(crate) fn push(&mut self, column: Vec<f64>) -> bool {
+        self.push_beyond(column, DEPENDENT)
+    }
+
+    /// The same for a column that has to stand out by more than a share of itself.
+    pub(crate) fn push_beyond(&mut self, mut column: Vec<f64>, dependent: f64) -> bool {
         let index = self.offered;
         self.offered += 1;
         let before = energy(&column).sqrt();
@@ -69,7 +72,7 @@ impl Basis {
             *a += b;
         }
         let norm = energy(&column).sqrt();
-        if norm <= DEPENDENT * before {
+        if norm <= dependent * before {
             return false;
         }
         column.iter_mut().for_each(|v| *v /= norm);
@@ -97,6 +100,16 @@ impl Basis {
             .collect()
     }
 
+    /// The orthonormal columns.
+    pub(crate) fn columns(&self) -> &[Vec<f64>] {
+        &self.q
+    }
+
+    /// Which of the columns offered were kept.
+    pub(crate) fn kept(&self) -> &[usize] {
+        &self.kept
+    }
+
     /// Takes out of `v` (weighted) what the basis can express.
     pub(crate) fn project_out(&self, v: &mut [f64]) {
         self.coefficients_out(v);
@@ -105,7 +118,11 @@ impl Basis {
     /// Least-squares coefficients of `y` (weighted) on the columns offered; those left out get zero.
     pub(crate) fn solve(&self, y: &[f64]) -> Vec<f64> {
         let mut rest = y.to_vec();
-        let c = self.coefficients_out(&mut rest);
+        self.unravel(&self.coefficients_out(&mut rest))
+    }
+
+    /// Coefficients on the columns offered, from those on the orthonormal ones.
+    pub(crate) fn unravel(&self, c: &[f64]) -> Vec<f64> {
         let mut solution = vec![0.0; self.offered];
         let mut x = vec![0.0; c.len()];
         for i in (0..c.len()).rev() {
@@ -123,18 +140,6 @@ impl Basis {
 /// A column times the square roots of the weights.
 pub(crate) fn weighted(column: &[f64], root_weight: &[f64]) -> Vec<f64> {
     column.iter().zip(root_weight).map(|(c, w)| c * w).collect()
-}
-
-/// Every column weighted and freed of what the basis expresses.
-pub(crate) fn projected(columns: &[Vec<f64>], root_weight: &[f64], basis: &Basis) -> Vec<Vec<f64>> {
-    columns
-        .par_iter()
-        .map(|c| {
-            let mut v = weighted(c, root_weight);
-            basis.project_out(&mut v);
-            v
-        })
-        .collect()
 }
 
 /// Which signs an amplitude may have.

@@ -255,7 +255,8 @@ fn distinct_between(values: &[f64], weight: &[f64], from: f64, to: f64, last: bo
     inside
 }
 
-fn block_ranges(rows: &Rows) -> Vec<(usize, usize)> {
+/// First row and the one behind the last of every block.
+pub(crate) fn block_ranges(rows: &Rows) -> Vec<(usize, usize)> {
     let mut ranges = Vec::new();
     let mut from = 0;
     for i in 1..=rows.len() {

@@ -2,9 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::baselines::{self, Baseline, Kind, cosine};
-use super::candidates::{self, Candidate, Trial, attempt, refine, scan};
-use super::linear::{add_scaled, dot, energy};
+use super::baselines::{self, Baseline, Give, Kind, cosine};
+use super::candidates::{self, Candidate, Ground, Trial};
+use super::evidence::Scale;
+use super::linear::{Sign, add_scaled, dot, energy};
 use super::noise::{self, Noise, family_p};
 use super::rows::Rows;
 
@@ -12,17 +13,16 @@ use super::rows::Rows;
 pub(crate) const FAMILY_ALPHA: f64 = 0.01;
 /// Misfit below this share of the blocked force is the model's own: `M = 4` leaves 0.03 to 0.06 % on a hyperelastic wall, and
 /// friction by its sign alone about as much again where contacts give a little before they slide.
-pub(crate) const OWN_INEXACTNESS: f64 = 1e-3;
-/// What the stiff baseline is allowed to miss of a real bladder as a smooth surface before that is called a misfit, rms as a
-/// share of the blocked force.
-pub(crate) const STATIC_INEXACTNESS: f64 = 4e-3;
+pub(crate) const OWN_INEXACTNESS: f64 = 4e-4;
+/// A trace as high as this share of the blocked force counts although few rows have it.
+const NARROW_PEAK: f64 = 0.01;
 /// A static effect is named from this peak on, as a share of the blocked force: below, an error of a tenth of a degree in the braid
 /// angle makes the same surface.
-pub(crate) const STATIC_PEAK: f64 = 0.025;
+pub(crate) const STATIC_PEAK: f64 = 0.015;
 /// Below this share of its energy outside the flexible tables an effect counts as concealed by them.
-const CONCEALED: f64 = 0.04;
+pub(crate) const CONCEALED: f64 = 0.04;
 /// And it must move the fit by this much, rms as a share of the blocked force.
-const STATIC_MOVED: f64 = 3.5e-3;
+const STATIC_MOVED: f64 = 1e-3;
 /// A trace that must be larger than this share of the blocked force to explain a small misfit is no explanation: nearly all of it
 /// would have to be cancelled by the tables.
 const LARGEST_PEAK: f64 = 0.25;
@@ -34,12 +34,19 @@ const FURTHER_OF_ALL: f64 = 0.06;
 const FURTHER_OF_REST: f64 = 0.4;
 /// The first must take this share of the misfit above noise.
 const FIRST_OF_ALL: f64 = 0.4;
+/// How much the deviance must fall for an effect, beyond what its free numbers cost.
+pub(crate) const LEAST_SCORE: f64 = 12.0;
+/// The same where no test by whole blocks can support it: chance in four hundred looks gives 2 ln 400 = 12 at most once in e, and
+/// each 2 ln 10 = 4.6 more once in ten times as many.
+const LEAST_ALONE: f64 = 25.0;
+/// Laws that are little more than a slow course of time, which a reading that wanders imitates best.
+const SLOW: [&str; 5] = ["force-drift", "thermal-softening", "cyclic-softening", "permanent-set", "end-slip"];
+/// However long the noise's memory is, half-strokes over several pressures and two directions say more than one number.
+const FEWEST_INDEPENDENT: f64 = 8.0;
 /// Throws of the coin behind a family-wise p.
 const THROWS: usize = 1999;
 /// How many candidates are refined in their shapes at every step.
 const REFINED: usize = 12;
-/// Rows that count at most when evidence between candidates is weighed: model error, not noise, limits it beyond.
-const EVIDENCE_ROWS: f64 = 60.0;
 
 /// An effect taken, with its standing among its rivals at that step.
 #[derive(Clone, Debug)]
@@ -50,8 +57,8 @@ pub(crate) struct Taken {
     pub p: f64,
     /// Share of all misfit above noise.
     pub share: f64,
-    /// Rivals with their relative weight (winner = 1).
-    pub rivals: Vec<(usize, f64, f64)>, // candidate, weight, cosine
+    /// Rivals: candidate, weight against the winner (1), cosine with it.
+    pub rivals: Vec<(usize, f64, f64)>,
     /// Rms after it, N.
     pub rms: f64,
 }
@@ -59,7 +66,7 @@ pub(crate) struct Taken {
 /// What the search found.
 #[derive(Clone, Debug)]
 pub(crate) struct Found {
-    /// The baseline without effects, on which the search ran.
+    /// The baseline without effects, in the metric of the last one.
     pub bare: Baseline,
     /// The baseline with the effects fitted beside it.
     pub full: Baseline,
@@ -79,25 +86,30 @@ pub(crate) struct Found {
     pub remarks: Vec<String>,
 }
 
+impl Found {
+    /// Takes back the last effect.
+    pub(crate) fn drop_last(&mut self, rows: &mut Rows, library: &[Candidate]) {
+        self.taken.pop();
+        let mut left: Vec<Trial> = self.taken.iter().map(|t| t.trial.clone()).collect();
+        let kind = left.last().map_or(self.bare.kind, |t| Kind::Soft(t.give));
+        (self.full, self.traces) = refit(rows, kind, &mut left, library);
+        self.bare = baselines::fit(rows, kind, &[]);
+        for (t, l) in self.taken.iter_mut().zip(&left) {
+            t.trial.amplitudes.clone_from(&l.amplitudes);
+        }
+    }
+}
+
 /// Best trial of each candidate out of a scan.
 fn best_of_each(trials: &[Trial], library: &[Candidate]) -> Vec<Trial> {
     let mut best: Vec<Option<&Trial>> = vec![None; library.len()];
     for t in trials {
         let b = &mut best[t.candidate];
-        if b.is_none_or(|x| t.gain > x.gain) {
+        if b.is_none_or(|x| (t.score, t.visible) > (x.score, x.visible)) {
             *b = Some(t);
         }
     }
     best.into_iter().flatten().cloned().collect::<Vec<_>>()
-}
-
-/// Penalised evidence of a trial: how much the logarithm of the misfit falls, in units of independent rows, less what its
-/// free numbers cost.
-fn evidence(trial: &Trial, candidate: &Candidate, left: f64, independent: f64) -> f64 {
-    let free = trial.amplitudes.iter().filter(|a| **a != 0.0).count() + trial.shapes.len();
-    let ratio = ((left - trial.gain) / left).clamp(1e-9, 1.0);
-    let _ = candidate;
-    -independent * ratio.ln() - free as f64 * independent.max(2.0).ln()
 }
 
 /// Family-wise p of the best trials, given everything that was looked at.
@@ -112,15 +124,19 @@ fn p_values(best: &[Trial], all: &[Trial]) -> Vec<f64> {
 }
 
 /// One step: every candidate beside the present baseline, the best refined.
-fn look(library: &[Candidate], rows: &Rows, base: &Baseline, blocked: f64) -> (Vec<Trial>, Vec<f64>) {
-    let mut all = scan(library, rows, &base.basis, &base.residual);
+fn look(library: &[Candidate], rows: &Rows, ground: &Ground<'_>, blocked: f64) -> (Vec<Trial>, Vec<f64>) {
+    let mut all = ground.scan(library, rows);
     forbid_cancelling(&mut all, blocked);
     let mut best = best_of_each(&all, library);
     let mut order: Vec<usize> = (0..best.len()).collect();
-    order.sort_by(|a, b| best[*b].gain.total_cmp(&best[*a].gain));
-    for i in order.into_iter().take(REFINED) {
+    order.sort_by(|a, b| best[*b].score.total_cmp(&best[*a].score));
+    for (rank, i) in order.into_iter().enumerate() {
         if best[i].gain > 0.0 {
-            best[i] = refine(&best[i], library, rows, &base.basis, &base.residual);
+            best[i] = if rank < REFINED {
+                ground.refine(&best[i], library, rows)
+            } else {
+                ground.attempt(best[i].candidate, &library[best[i].candidate], &best[i].shapes, rows, true)
+            };
         }
     }
     forbid_cancelling(&mut best, blocked);
@@ -132,7 +148,7 @@ fn look(library: &[Candidate], rows: &Rows, base: &Baseline, blocked: f64) -> (V
 fn forbid_cancelling(trials: &mut [Trial], blocked: f64) {
     for t in trials {
         if t.gain > 0.0 && t.peak > LARGEST_PEAK * blocked {
-            t.gain = 0.0;
+            (t.gain, t.score) = (0.0, 0.0);
         }
     }
 }
@@ -144,7 +160,7 @@ pub(crate) fn refit(
     trials: &mut [Trial],
     library: &[Candidate],
 ) -> (Baseline, Vec<Vec<f64>>) {
-    let mut fitted = baselines::fit(rows, kind, &[]);
+    let mut fitted = None;
     let mut traces = Vec::new();
     for _ in 0..2 {
         let mut columns = Vec::new();
@@ -157,164 +173,152 @@ pub(crate) fn refit(
                 }
             }
         }
-        fitted = baselines::fit(rows, kind, &columns);
+        let with = baselines::fit(rows, kind, &columns);
         traces = vec![vec![0.0; rows.len()]; trials.len()];
         for (j, (t, k)) in owner.iter().enumerate() {
-            // An amplitude that changed its sign beside the others keeps a whisper, so that it stays in the table.
             let sign = library[trials[*t].candidate].signs()[*k];
-            let a = fitted.amplitudes[j];
+            let a = with.amplitudes[j];
             let allowed = match sign {
-                super::linear::Sign::Free => a,
-                super::linear::Sign::Positive => a.max(0.0),
-                super::linear::Sign::Negative => a.min(0.0),
+                Sign::Free => a,
+                Sign::Positive => a.max(0.0),
+                Sign::Negative => a.min(0.0),
             };
             trials[*t].amplitudes[*k] = allowed;
             add_scaled(&mut traces[*t], allowed, &columns[j]);
         }
-        baselines::into_contexts(rows, &fitted);
+        baselines::into_contexts(rows, &with);
+        fitted = Some(with);
     }
-    (fitted, traces)
+    (fitted.unwrap_or_else(|| unreachable!("two rounds run")), traces)
 }
 
 /// A rival of at least this weight against the winner is confusable with it.
 pub(crate) const CONFUSABLE: f64 = 0.1;
+/// A rival whose trace is as parallel as this to the winner's, once the base is refitted, is confusable whatever its weight.
+pub(crate) const PARALLEL: f64 = 0.95;
 /// With more rivals than this a name says nothing.
-const MOST_RIVALS: usize = 8;
-/// How much of the misfit two laws may differ by and still be equally believed, where the better one explains all …
-const TIE: f64 = 0.015;
-/// … and how that widens with what the better one leaves: a law that misses a third of the misfit is itself not exact, and small
-/// differences between inexact laws tell little.
-const TIE_WIDENS: f64 = 0.25;
+const MOST_RIVALS: usize = 10;
+/// How inexact a right law is, as a share of the misfit that it explains …
+const INEXACT: f64 = 0.05;
+/// … and how fast belief falls with the logarithm of what a law leaves beyond that.
+const SHARPNESS: f64 = 7.0;
+/// What each further free number costs in the logarithm of belief.
+const PER_NUMBER: f64 = 0.3;
 
-/// The weight of each rival against the winner, from the share of the misfit above noise that each leaves.
+/// The weight of each rival against the winner, from what each leaves of the misfit above noise where the bladder differs between
+/// pressures as much as it does beside the winner.
 fn rivals(
     winner: &Trial,
     best: &[Trial],
     library: &[Candidate],
     rows: &Rows,
-    base: &Baseline,
-    rest: f64,
+    ground: &Ground<'_>,
+    span: &baselines::Reach,
 ) -> Vec<(usize, f64, f64)> {
-    let share = |t: &Trial| (t.gain / rest).clamp(0.0, 1.0);
-    let top = share(winner);
-    let scale = TIE + TIE_WIDENS * (1.0 - top);
-    let mine = candidates::projected_trace(winner, library, rows, &base.basis);
+    let mine = candidates::projected_trace(winner, library, rows, span);
+    let numbers = |t: &Trial| (t.amplitudes.iter().filter(|a| **a != 0.0).count() + t.shapes.len()) as f64;
+    let scale = &ground.scale;
+    let noise_energy = scale.sigma * scale.sigma * scale.weight;
+    let excess = |e: f64| (e - noise_energy).max(0.0);
+    let (own_left, before) = ground.left_under(winner, library, rows, winner.give);
+    let floor = INEXACT * excess(before) + noise_energy * (2.0 / scale.independent.max(2.0)).sqrt();
     let mut rivals: Vec<(usize, f64, f64)> = best
         .par_iter()
         .filter(|t| t.candidate != winner.candidate && t.gain > 0.0)
         .map(|t| {
-            let weight = ((share(t) - top) / scale).min(0.0).exp();
-            let c = if weight > 1e-3 {
-                cosine(&mine, &candidates::projected_trace(t, library, rows, &base.basis))
-            } else {
-                0.0
-            };
+            let (left, _) = ground.left_under(t, library, rows, winner.give);
+            let worse = ((excess(left) + floor) / (excess(own_left) + floor)).ln();
+            let weight = (-SHARPNESS * worse - PER_NUMBER * (numbers(t) - numbers(winner))).min(0.0).exp();
+            let c = cosine(&mine, &candidates::projected_trace(t, library, rows, span));
             (t.candidate, weight, c)
         })
         .collect();
     rivals.sort_by(|a, b| b.1.total_cmp(&a.1));
-    rivals.retain(|r| r.1 > 0.02);
+    rivals.retain(|r| r.1 > 0.01 || r.2.abs() > PARALLEL);
     rivals
 }
 
 /// Searches for what is missing.
 pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step: f64) -> Found {
     let mut remarks = Vec::new();
-    let stiff = baselines::fit(rows, Kind::Stiff, &[]);
     let order = if rows.isometric { 4 } else { 6 };
     let flexible = baselines::fit(rows, Kind::Flexible(order), &[]);
     let weight = energy(&rows.root_weight).max(1e-12);
-    let deficit = (energy(&stiff.residual) - energy(&flexible.residual)).max(0.0);
-    let surface = (deficit / weight).sqrt();
-    // The stiff baseline serves where it misses no more of the static surface than it is allowed to.
-    let mut kind = if surface <= STATIC_INEXACTNESS * blocked { Kind::Stiff } else { Kind::Flexible(order) };
+    let mut noise = noise::estimate(rows, &flexible.residual, step);
+    let scale = Scale {
+        weight,
+        independent: noise.independent.max(rows.blocks as f64),
+        sigma: noise.sigma.max(1e-6 * blocked),
+        blocked,
+    };
+    let row = scale.sigma * (weight / scale.independent).sqrt();
+    let first = Give { elastic: 1e-3 * blocked, friction: 5e-4 * blocked, row };
+    let begun = baselines::fit(rows, Kind::Soft(first), &[]);
+    baselines::into_contexts(rows, &begun);
+    let give = Ground::new(&begun, scale).give;
+    let mut kind = Kind::Soft(give);
+    let mut full = baselines::fit(rows, kind, &[]);
+    baselines::into_contexts(rows, &full);
+    let mut bare = full.clone();
+    let noise_energy = noise.sigma * noise.sigma * weight;
+    let above_noise = |e: f64| (e - noise_energy).max(0.02 * e).max(1e-12);
+    let mut above = above_noise(energy(&bare.residual));
     let mut chosen: Vec<Trial> = Vec::new();
     let mut taken: Vec<Taken> = Vec::new();
-
-    if kind != Kind::Stiff && rows.levels.len() >= 3 && !rows.isometric {
-        baselines::into_contexts(rows, &stiff);
-        if let Some(t) = repair(rows, library, &stiff, &flexible, deficit, blocked) {
-            kind = Kind::Stiff;
-            chosen.push(t.trial.clone());
-            taken.push(t);
-        } else {
-            remarks.push(format!(
-                "one bladder for all pressures leaves {:.2} N ({:.2} % of blocked force) that the flexible tables absorb; no \
-                 single effect accounts for it, so static effects are not judged",
-                surface,
-                100.0 * surface / blocked
-            ));
-        }
-    }
-    let bare = baselines::fit(rows, kind, &[]);
-    baselines::into_contexts(rows, &bare);
-    let mut noise = noise::estimate(rows, &flexible.residual, step);
-    let total_weight = weight;
-    let noise_energy = noise.sigma * noise.sigma * total_weight;
-    let above = (energy(&bare.residual) - noise_energy).max(0.02 * energy(&bare.residual)).max(1e-12);
-    let (first_look, first_p) = look(library, rows, &bare, blocked);
-
-    // What the flexible tables imitate almost wholly is judged against the stiff baseline's own errors.
-    let concealed: Vec<bool> = first_look
-        .par_iter()
-        .map(|t| {
-            let c = &library[t.candidate];
-            attempt(t.candidate, c, &t.shapes, rows, &flexible.basis, &flexible.residual).visible < CONCEALED
-        })
-        .collect();
+    let mut traces: Vec<Vec<f64>> = Vec::new();
+    let mut first_look: Option<(Vec<Trial>, Vec<f64>)> = None;
     let worth_naming = |t: &Trial| {
-        let moved = (t.gain / total_weight).sqrt();
-        !concealed[t.candidate] || (t.peak >= STATIC_PEAK * blocked && moved >= STATIC_MOVED * blocked)
+        let moved = (t.gain.max(t.relief) / weight).sqrt();
+        t.beyond_tables >= CONCEALED || (t.peak >= STATIC_PEAK * blocked && moved >= STATIC_MOVED * blocked)
     };
-    let (mut full, mut traces) =
-        if chosen.is_empty() { (bare.clone(), Vec::new()) } else { refit(rows, kind, &mut chosen, library) };
-    while chosen.len() < MAX_NAMED {
-        let (best, p) = if chosen.is_empty() {
-            (first_look.clone(), first_p.clone())
-        } else {
-            look(library, rows, &full, blocked)
-        };
-        let left = energy(&full.residual);
-        let rest = (left - noise_energy).max(0.02 * left);
-        let independent = noise.independent.max(rows.blocks as f64);
+    let mut barred: Vec<usize> = Vec::new();
+    while chosen.len() < MAX_NAMED && barred.len() < 4 {
+        let ground = Ground::new(&full, scale);
+        let (best, p) = look(library, rows, &ground, blocked);
+        if first_look.is_none() {
+            first_look = Some((best.clone(), p.clone()));
+        }
         let Some((at, winner)) = best
             .iter()
             .enumerate()
             .filter(|(_, t)| {
                 !chosen.iter().any(|c| c.candidate == t.candidate)
+                    && !barred.contains(&t.candidate)
                     && t.gain > 0.0
                     && worth_naming(t)
-                    && !taken.iter().any(|k| k.rivals.iter().any(|r| r.0 == t.candidate))
+                    && !taken.iter().any(|k| k.rivals.iter().any(|r| r.0 == t.candidate && r.1 > CONFUSABLE))
             })
-            .max_by(|a, b| {
-                let score = |t: &Trial| evidence(t, &library[t.candidate], left, independent);
-                score(a.1).total_cmp(&score(b.1))
-            })
+            .max_by(|a, b| a.1.score.total_cmp(&b.1.score))
         else {
             break;
         };
+        if chosen.is_empty() {
+            above = above_noise(winner.before);
+        }
         let share = winner.gain / above;
-        let of_rest = winner.gain / rest;
-        let moved = (winner.gain / total_weight).sqrt();
-        let big = evidence(winner, &library[winner.candidate], left, independent.min(EVIDENCE_ROWS));
+        // Of what the bladder's own differences leave; or, for an effect that spares the bladder these differences, of what one
+        // bladder leaves.
+        let spared = winner.relief / above_noise(winner.unrelieved);
+        let of_rest = (winner.gain / above_noise(winner.before)).max(spared);
+        let moved = (winner.gain.max(winner.relief) / weight).sqrt();
         // What lives in a few strokes can never give a large sum over blocks in units of its scatter: six strokes that all agree
-        // happen by chance once in 64. There a gain that nothing else comes near counts instead.
-        let next = best
-            .iter()
-            .filter(|t| t.candidate != winner.candidate && worth_naming(t))
-            .map(|t| t.gain)
-            .fold(0.0, f64::max);
-        let alone = of_rest > 0.55 && big > 30.0 && next < 0.75 * winner.gain;
-        let significant = p[at] <= FAMILY_ALPHA || (alone && p[at] <= 0.5);
+        // happen by chance once in 64. There the likelihood counts, whose independent rows are those that the residual's own
+        // correlation leaves.
+        let significant = winner.score >= if p[at] <= FAMILY_ALPHA { LEAST_SCORE } else { LEAST_ALONE };
         let worth = if chosen.is_empty() {
-            share >= FIRST_OF_ALL
+            of_rest >= FIRST_OF_ALL
         } else {
             share >= FURTHER_OF_ALL && of_rest >= FURTHER_OF_REST
         };
-        if !(significant && worth && moved >= OWN_INEXACTNESS * blocked) {
+        // A wall at the end of the stroke is high and narrow.
+        let narrow = winner.peak >= NARROW_PEAK * blocked && winner.score >= 2.0 * LEAST_ALONE;
+        let enough = moved >= if narrow { 0.4 } else { 1.0 } * OWN_INEXACTNESS * blocked;
+        if !(significant && worth && enough) {
             break;
         }
-        let rivals = rivals(winner, &best, library, rows, &full, rest);
+        let beside = Kind::Soft(winner.give);
+        let metric = baselines::fit(rows, beside, &[]);
+        let rivals = rivals(winner, &best, library, rows, &ground, &metric.span);
         let open = rivals.iter().filter(|r| r.1 > CONFUSABLE).count();
         if open > MOST_RIVALS {
             let named: Vec<&str> = rivals.iter().take(open).map(|r| library[r.0].name()).collect();
@@ -330,11 +334,39 @@ pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step:
         let winner = winner.clone();
         let p = p[at];
         chosen.push(winner.clone());
-        (full, traces) = refit(rows, kind, &mut chosen, library);
+        let seen = rows.contexts.clone();
+        let (with, added) = refit(rows, beside, &mut chosen, library);
+        // One step of a linear problem promised this; the whole refit has to keep a good part of it.
+        let kept = energy(&with.residual) <= winner.before - 0.6 * winner.gain;
+        // What the effect leaves tells anew how many rows are independent: a wandering zero that flexible tables had followed from
+        // pressure to pressure shows itself only now.
+        let again = noise::estimate(rows, &with.residual, step).independent.max(FEWEST_INDEPENDENT);
+        let score = winner.score * (again / scale.independent).min(1.0);
+        let least = if SLOW.contains(&library[winner.candidate].name()) { LEAST_ALONE } else { LEAST_SCORE };
+        if !kept || score < least {
+            chosen.pop();
+            rows.contexts = seen;
+            barred.push(winner.candidate);
+            remarks.push(format!(
+                "{} would take much of the misfit, but {}: not named",
+                library[winner.candidate].name(),
+                if kept {
+                    "so would a reading that wanders by itself as slowly as what it leaves"
+                } else {
+                    "keeps little of it when everything is fitted together"
+                }
+            ));
+            continue;
+        }
+        kind = beside;
+        bare = metric;
+        (full, traces) = (with, added);
         noise = Noise { sigma: noise.sigma, ..noise::estimate(rows, &full.residual, step) };
         taken.push(Taken { trial: winner, p, share, rivals, rms: full.rms(rows) });
         if chosen.len() > 1 {
-            exchange(&mut chosen, &mut taken, rows, library, kind, &mut full, &mut traces);
+            let mut fitted = (full, traces);
+            exchange(&mut chosen, &mut taken, rows, library, kind, scale, &mut fitted);
+            (full, traces) = fitted;
         }
     }
     // What the joint fit brought to nothing was not there.
@@ -350,57 +382,8 @@ pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step:
         t.trial.amplitudes.clone_from(&c.amplitudes);
         t.trial.shapes.clone_from(&c.shapes);
     }
+    let (first_look, first_p) = first_look.unwrap_or_default();
     Found { bare, full, taken, first_look, first_p, above, traces, noise, remarks }
-}
-
-/// A static effect that lets one bladder serve all pressures: it must close most of the gap between the stiff and the
-/// flexible baseline, and be larger than what the stiff one may miss anyway.
-fn repair(
-    rows: &Rows,
-    library: &[Candidate],
-    stiff: &Baseline,
-    flexible: &Baseline,
-    deficit: f64,
-    blocked: f64,
-) -> Option<Taken> {
-    let weight = energy(&rows.root_weight).max(1e-12);
-    let mut all = scan(library, rows, &stiff.basis, &stiff.residual);
-    forbid_cancelling(&mut all, blocked);
-    let on_stiff = best_of_each(&all, library);
-    let mut tried: Vec<(Trial, f64)> = on_stiff
-        .par_iter()
-        .filter(|t| t.gain > 0.3 * deficit)
-        .map(|t| {
-            let t = refine(t, library, rows, &stiff.basis, &stiff.residual);
-            let same = attempt(
-                t.candidate,
-                &library[t.candidate],
-                &t.shapes,
-                rows,
-                &flexible.basis,
-                &flexible.residual,
-            );
-            let gap = deficit - t.gain + same.gain;
-            (t, gap)
-        })
-        .collect();
-    tried.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let (winner, gap) = tried.first()?.clone();
-    let left = (gap.max(0.0) / weight).sqrt();
-    if gap > 0.1 * deficit || left > STATIC_INEXACTNESS * blocked || winner.peak < STATIC_PEAK * blocked {
-        return None;
-    }
-    let floor = (0.5 * STATIC_INEXACTNESS * blocked).powi(2) * weight;
-    let rivals = tried[1..]
-        .iter()
-        .map(|(t, g)| {
-            let ratio = (gap.max(0.0) + floor) / (g.max(0.0) + floor);
-            (t.candidate, ratio.powf(4.0), 0.0)
-        })
-        .filter(|r| r.1 > 0.02)
-        .collect();
-    let share = winner.gain / energy(&stiff.residual);
-    Some(Taken { p: FAMILY_ALPHA, share, rivals, rms: left, trial: winner })
 }
 
 /// Tries to replace each effect taken by another beside the rest; a better one takes its place.
@@ -410,34 +393,35 @@ fn exchange(
     rows: &mut Rows,
     library: &[Candidate],
     kind: Kind,
-    full: &mut Baseline,
-    traces: &mut Vec<Vec<f64>>,
+    scale: Scale,
+    fitted: &mut (Baseline, Vec<Vec<f64>>),
 ) {
     for position in 0..chosen.len().saturating_sub(1) {
         let mut others: Vec<Trial> = chosen.to_vec();
         others.remove(position);
         let (without, _) = refit(rows, kind, &mut others, library);
-        let best = best_of_each(&scan(library, rows, &without.basis, &without.residual), library);
-        let own = best.iter().find(|t| t.candidate == chosen[position].candidate).map_or(0.0, |t| t.gain);
-        let left = energy(&without.residual);
+        let ground = Ground::new(&without, scale);
+        let best = best_of_each(&ground.scan(library, rows), library);
+        let own = best.iter().find(|t| t.candidate == chosen[position].candidate).map_or(0.0, |t| t.score);
         let challenger = best
             .iter()
             .filter(|t| !chosen.iter().any(|c| c.candidate == t.candidate))
-            .max_by(|a, b| a.gain.total_cmp(&b.gain));
+            .max_by(|a, b| a.score.total_cmp(&b.score));
         if let Some(c) = challenger {
-            let refined = refine(c, library, rows, &without.basis, &without.residual);
+            let refined = ground.refine(c, library, rows);
+            let (mine, _) = ground.left_under(&chosen[position], library, rows, refined.give);
             // It must leave clearly less than the present one does.
-            if left - refined.gain < 0.8 * (left - own) {
+            if refined.score > own + LEAST_SCORE && refined.before - refined.gain < 0.8 * mine {
                 taken[position].rivals.retain(|r| r.0 != refined.candidate);
                 taken[position].rivals.insert(0, (chosen[position].candidate, 0.1, 0.0));
                 taken[position].trial = refined.clone();
                 chosen[position] = refined;
             }
         }
-        (*full, *traces) = refit(rows, kind, chosen, library);
+        *fitted = refit(rows, kind, chosen, library);
     }
     for t in taken.iter_mut() {
-        t.rms = full.rms(rows);
+        t.rms = fitted.0.rms(rows);
     }
 }
 
@@ -473,7 +457,7 @@ pub(crate) fn deviations(found: &Found, library: &[Candidate], rows: &Rows) -> V
         found.taken.iter().map(|t| vec![None; t.trial.amplitudes.len() + t.trial.shapes.len()]).collect();
     // The bare baseline's span, not the full one's, which holds the amplitudes themselves.
     let base = baselines::fit(rows, found.full.kind, &[]);
-    let z: Vec<Vec<f64>> = super::linear::projected(&tangents, &rows.root_weight, &base.basis);
+    let z: Vec<Vec<f64>> = baselines::projected(&tangents, &rows.root_weight, &base.span);
     let n = z.len();
     let gram: Vec<Vec<f64>> = z.iter().map(|a| z.iter().map(|b| dot(a, b)).collect()).collect();
     let all: Vec<usize> = (0..n).collect();

@@ -22,6 +22,8 @@ pub fn summary(d: &Diagnosis) -> String {
         s,
         "\n{}",
         match d.verdict {
+            Verdict::Consistent if d.nothing_judged() =>
+                "NOT JUDGED: these recordings say nothing about the model; why is said below.",
             Verdict::Consistent =>
                 "CONSISTENT: nothing stands above the noise and the model's own inexactness.",
             Verdict::Explained => "EXPLAINED: what the model leaves out has a name.",

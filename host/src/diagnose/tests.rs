@@ -8,6 +8,7 @@ use model_core::table;
 
 use super::linear::Random;
 use super::planned::{Place, Protocol, Step};
+use super::summary::summary;
 use super::verdict::Verdict;
 use super::{Diagnosis, Options, diagnose};
 use crate::recording::{Campaign, Recording};
@@ -173,6 +174,27 @@ fn bad_input_is_answered_in_words() {
         let d = ask(&campaign);
         assert!(d.missing.is_empty(), "{what}: {:?}", names(&d));
         assert!(!d.remarks.is_empty(), "{what}");
+        assert!(d.nothing_judged() == summary(&d).contains("NOT JUDGED"), "{what}");
         assert!(!d.to_json().contains("null,\n  \"missing\""), "{what}");
     }
+}
+
+#[test]
+fn what_cannot_be_judged_is_said() {
+    let whole = recorded(loops(&[0.2]), 7, coloured(0.1, 2.0), |_, _, _| 0.0);
+    let one_pressure = Campaign::new(vec![whole.recordings[2].clone()]);
+    let mut short = one_pressure.clone();
+    let r = &mut short.recordings[0];
+    for column in [&mut r.time, &mut r.stroke, &mut r.pressure] {
+        column.truncate(50);
+    }
+    if let Some(force) = &mut r.force {
+        force.truncate(50);
+    }
+    let no_gap = recorded(loops(&[0.2]), 8, coloured(0.02, 2.0), |_, sign, quasi| 0.08 * sign * quasi);
+    let said = |c: &Campaign| ask(c).remarks.join("\n");
+    assert!(said(&whole).contains("no temperature was recorded"));
+    assert!(said(&one_pressure).contains("one pressure only"));
+    assert!(said(&short).contains("nothing can be judged"));
+    assert!(ask(&no_gap).missing.is_empty(), "a muscle without hysteresis lacks nothing");
 }

@@ -60,8 +60,10 @@ pub struct ParameterValue {
 pub struct Missing {
     /// Its name in the catalogue.
     pub effect: String,
-    /// How probable this very name is.
+    /// How probable this very name is: its belief, calibrated where truths are known.
     pub probability: f64,
+    /// Its belief among its rivals, before calibration.
+    pub belief: f64,
     /// Share of the misfit's energy above noise that it explains.
     pub share_explained: f64,
     /// Its parameters.
@@ -223,6 +225,12 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// Whether the recordings were too few or too dull for any judgement: then nothing was fitted.
+    #[must_use]
+    pub fn nothing_judged(&self) -> bool {
+        self.profiles.is_empty() && self.path.is_empty() && self.misfit_rms_N == 0.0
+    }
+
     /// As JSON text.
     ///
     /// Every number is finite: what could not be computed is absent or zero before it comes here.

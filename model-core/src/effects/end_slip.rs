@@ -37,6 +37,6 @@ impl Effect for EndSlip {
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
-        -parameters[0] * memory[0] * context.stiffness
+        -parameters[0] * memory[0] * context.slope()
     }
 }

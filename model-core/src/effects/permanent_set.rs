@@ -44,6 +44,6 @@ impl Effect for PermanentSet {
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
         let worked = T::ONE - decay(memory[PATH] / parameters[2].max(T::from_f32(1.0e-3)));
         let loaded = T::ONE - decay(memory[IMPULSE] / parameters[3].max(T::from_f32(1.0e-3)));
-        context.stiffness * (parameters[0] * worked + parameters[1] * loaded)
+        context.slope() * (parameters[0] * worked + parameters[1] * loaded)
     }
 }

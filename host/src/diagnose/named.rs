@@ -1,0 +1,127 @@
+//! The names: what was taken and how sure that is; what was looked at and why it was not taken.
+
+use super::advise::what_would_show;
+use super::calibration;
+use super::candidates::{self, place_in_words};
+use super::linear::energy;
+use super::rows::Rows;
+use super::select::{self, Found};
+use super::verdict::{Considered, Missing, ParameterValue};
+
+/// The effects that were taken, with parameters and intervals, what they cannot be told from, and how probable they are.
+pub(crate) fn missing(found: &Found, library: &[candidates::Candidate], rows: &Rows) -> Vec<Missing> {
+    let deviations = select::deviations(found, library, rows);
+    let explained =
+        ((energy(&found.bare.residual) - energy(&found.full.residual)) / found.above).clamp(0.0, 1.0);
+    let total: f64 = found.taken.iter().map(|t| t.share.max(0.0)).sum::<f64>().max(1e-12);
+    found
+        .taken
+        .iter()
+        .zip(&deviations)
+        .map(|(t, d)| {
+            let candidate = &library[t.trial.candidate];
+            let info = candidate.info;
+            let values = t.trial.amplitudes.iter().chain(&t.trial.shapes);
+            let parameters = info
+                .parameters
+                .iter()
+                .zip(values)
+                .zip(d)
+                .map(|((p, v), std)| ParameterValue {
+                    name: p.name.into(),
+                    value: *v,
+                    std: *std,
+                    unit: p.unit.into(),
+                    outside_known_range: *v != 0.0 && (v.abs() > p.high.abs().max(p.low.abs()) || v.abs() < p.low.abs().min(p.high.abs()) && p.low * p.high > 0.0),
+                })
+                .collect();
+            let sum: f64 = 1.0 + t.rivals.iter().map(|r| r.1).sum::<f64>();
+            let belief = 1.0 / sum;
+            let confusable: Vec<String> = t
+                .rivals
+                .iter()
+                .filter(|r| r.1 > select::CONFUSABLE || r.2.abs() > select::PARALLEL)
+                .take(8)
+                .map(|r| library[r.0].name().to_owned())
+                .collect();
+            let share = (explained * t.share / total).clamp(0.0, 1.0);
+            let why = format!(
+                "it takes {:.0} % of the misfit above noise with the base refitted; by chance over all {} effects and their \
+                 shapes this would happen with p = {:.4}",
+                share * 100.0,
+                library.len(),
+                t.p
+            );
+            Missing {
+                effect: info.name.into(),
+                probability: calibration::probability(belief, explained),
+                belief,
+                share_explained: share,
+                parameters,
+                confusable_with: confusable,
+                place: place_in_words(info.link).into(),
+                correction: candidate.of_the_bench(),
+                summary: info.summary.into(),
+                source: info.source.into(),
+                peak_N: t.trial.peak,
+                p: t.p,
+                why,
+            }
+        })
+        .collect()
+}
+
+/// A trace as large as this share of the blocked force would not go unnoticed by whoever knows the muscle's size.
+const ABSURD: f64 = 0.5;
+
+/// The effects that were looked at and not named: what they would take, how large they could be unseen, and what would show them.
+pub(crate) fn considered(
+    found: &Found,
+    library: &[candidates::Candidate],
+    missing: &[Missing],
+    sigma: f64,
+    blocked: f64,
+) -> Vec<Considered> {
+    let named: Vec<&str> = missing.iter().map(|m| m.effect.as_str()).collect();
+    let confusable: Vec<&String> = missing.iter().flat_map(|m| &m.confusable_with).collect();
+    found
+        .first_look
+        .iter()
+        .zip(&found.first_p)
+        .filter(|(t, _)| !named.contains(&library[t.candidate].name()))
+        .map(|(t, p)| {
+            let name = library[t.candidate].name();
+            let gain = (t.gain / found.above).clamp(0.0, 1.0);
+            // The trace that noise could hide, given how much of it the base leaves; and below the size from which an effect that
+            // tables imitate is named at all it could be there anyway.
+            let hidden = (t.size > 0.0 && t.peak > 0.0).then(|| {
+                let detectable =
+                    3.5 * sigma / (found.noise.independent.max(4.0)).sqrt() / t.visible.max(1e-12).sqrt();
+                let by_noise = detectable * t.peak / t.size;
+                let least =
+                    if t.beyond_tables < select::CONCEALED { select::STATIC_PEAK * blocked } else { 0.0 };
+                by_noise.max(least)
+            });
+            let hidden = hidden.filter(|h| h.is_finite() && *h < ABSURD * blocked);
+            let could_be = match hidden {
+                Some(h) => format!("it could be hidden in this recording up to {h:.2} N"),
+                None => "it could be hidden in this recording at any size".to_owned(),
+            };
+            let unseen = hidden.is_none_or(|h| h > 0.01 * blocked);
+            let why_not = if confusable.iter().any(|c| c.as_str() == name) {
+                "cannot be told from what is named".to_owned()
+            } else if t.size <= 0.0 {
+                format!("these recordings do not excite it: {could_be}; {}", what_would_show(name))
+            } else if unseen && t.score < select::LEAST_SCORE {
+                format!("{could_be}; {}", what_would_show(name))
+            } else if *p > select::FAMILY_ALPHA && t.score < select::LEAST_SCORE {
+                format!("no more than chance gives over all effects looked at (p = {p:.2}); {could_be}")
+            } else if missing.is_empty() {
+                format!("takes too little of the misfit to be named; {could_be}")
+            } else {
+                "explains less than what is named, and little besides it".to_owned()
+            };
+            Considered { effect: name.into(), gain, why_not, hidden_up_to_N: hidden, visible: t.visible }
+        })
+        .collect()
+}

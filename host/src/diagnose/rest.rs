@@ -1,0 +1,229 @@
+//! What friction does while the length is held: it stays, fades, or follows the wandering of the pressure.
+//!
+//! The model holds the sign of the last motion. On a real bench the air's ripple shakes the braid, so that friction ends near
+//! the middle of the gap between the branches, and a regulator that wanders by a few kilopascals turns it round: static friction
+//! carries small changes of pressure (a play of half-width `h`), what goes beyond lets the strands slip, and over a change `b`
+//! the friction follows to the other branch. That is no missing physics of the model in motion; but left out, every effect that
+//! lives in rests would be mistaken for it. Which of the three it is, and how fast, is what the rows at rest say.
+
+use rayon::prelude::*;
+
+use super::baselines::{self, Baseline, Kind};
+use super::rows::Rows;
+
+/// Settling times that are tried, s.
+const SETTLING: [f64; 8] = [0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 30.0, 100.0];
+/// Changes of pressure that static friction carries, half-widths that are tried first, Pa.
+const CARRIED: [f64; 8] = [0.0, 500.0, 1.0e3, 1.5e3, 2.0e3, 2.6e3, 4.0e3, 7.0e3];
+/// Changes of pressure over which friction follows, Pa.
+const FOLLOWS: [f64; 7] = [100.0, 300.0, 1.0e3, 3.0e3, 1.0e4, 3.0e4, 1.0e5];
+/// Rows each way over which the pressure's noise is smoothed.
+const SMOOTHING: [usize; 3] = [0, 1, 3];
+/// Factors by which the best law is varied, coarse and fine.
+const NEARBY: [[f64; 4]; 2] = [[0.7, 0.87, 1.15, 1.4], [0.9, 0.95, 1.05, 1.1]];
+/// Another law than the model's must leave less than this share of what the rows at rest leave.
+const CLEARLY: f64 = 0.7;
+
+/// What friction does at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum AtRest {
+    /// It fades: `s → s e^(−t/τ)`, `t` since the braid last moved, s.
+    Fades(f64),
+    /// It follows the pressure.
+    Follows {
+        /// Half-width of the play that static friction carries, Pa.
+        carries: f64,
+        /// Change beyond it over which friction comes to the other branch, Pa.
+        over: f64,
+        /// Which smoothing of the pressure.
+        smoothing: usize,
+    },
+}
+
+impl AtRest {
+    /// In words.
+    pub(crate) fn words(self) -> String {
+        match self {
+            Self::Fades(time) => format!(
+                "while the length is held the gap between the branches closes within about {time:.1} s (the air's ripple shakes \
+                 friction out); the model holds it, so rows at rest are compared with a friction that settles"
+            ),
+            Self::Follows { carries, over, .. } => format!(
+                "while the length is held the pressure wanders and takes the friction with it (changes beyond ±{:.1} kPa, over about \
+                 {:.1} kPa); the model holds it, so rows at rest are compared with a friction that follows",
+                carries * 1e-3,
+                over * 1e-3
+            ),
+        }
+    }
+}
+
+/// Rows of each stay at one length.
+fn holds(rows: &Rows) -> Vec<(usize, usize)> {
+    let n = rows.len();
+    let held = |i: usize| rows.contexts[i].speed == 0.0 && !rows.vented[i];
+    let mut found = Vec::new();
+    let mut from = 0;
+    while from < n {
+        let mut to = from + 1;
+        while to < n && held(to) == held(from) && rows.recording[to] == rows.recording[from] {
+            to += 1;
+        }
+        if held(from) && to - from > 4 {
+            found.push((from, to));
+        }
+        from = to;
+    }
+    found
+}
+
+/// The pressure with its noise smoothed over `half` rows each way, within recordings.
+fn smoothed(rows: &Rows, half: usize) -> Vec<f64> {
+    let n = rows.len();
+    (0..n)
+        .map(|i| {
+            let (a, b) = (i.saturating_sub(half), (i + half + 1).min(n));
+            let same = (a..b).filter(|j| rows.recording[*j] == rows.recording[i]);
+            let (sum, count) = same.fold((0.0, 0.0), |(s, c), j| (s + rows.contexts[j].pressure, c + 1.0));
+            sum / count
+        })
+        .collect()
+}
+
+/// How far every change of pressure goes beyond what static friction carries: what a play of half-width `carries` lets through.
+/// The play has its memory: it follows the pressure through motion and over pauses too.
+fn let_through(pressure: &[f64], carries: f64) -> Vec<f64> {
+    let mut carried = 0.0;
+    let mut last = pressure.first().copied().unwrap_or(0.0);
+    pressure
+        .iter()
+        .map(|p| {
+            let reached: f64 = carried + p - last;
+            last = *p;
+            carried = reached.clamp(-carries, carries);
+            reached - carried
+        })
+        .collect()
+}
+
+/// The friction's direction in every hold under a law.
+fn directions(rows: &Rows, holds: &[(usize, usize)], pressures: &[Vec<f64>], law: AtRest) -> Vec<Vec<f64>> {
+    match law {
+        AtRest::Fades(time) => holds
+            .iter()
+            .map(|(from, to)| {
+                (*from..*to).map(|i| rows.sign[i] * (-rows.still[i].max(0.0) / time).exp()).collect()
+            })
+            .collect(),
+        AtRest::Follows { carries, over, smoothing } => {
+            let slips = let_through(&pressures[smoothing], carries);
+            holds
+                .iter()
+                .map(|(from, to)| {
+                    let mut z = rows.sign[*from];
+                    slips[*from..*to]
+                        .iter()
+                        .map(|slipped| {
+                            let way = if *slipped > 0.0 { 1.0 } else { -1.0 };
+                            z = way + (z - way) * (-slipped.abs() / over).exp();
+                            z
+                        })
+                        .collect()
+                })
+                .collect()
+        }
+    }
+}
+
+/// What a law leaves of the rows at rest: the friction is that of the moving rows, and the part of the force that stays the same
+/// through a hold is not held against it.
+fn left(rows: &Rows, fitted: &Baseline, holds: &[(usize, usize)], directions: &[Vec<f64>]) -> f64 {
+    let mut sum = 0.0;
+    for ((from, to), way) in holds.iter().zip(directions) {
+        for i in *from..*to {
+            let w = rows.root_weight[i];
+            let friction = fitted.quasi[i] * fitted.friction[i];
+            let r = fitted.raw_residual[i] + friction * (way[i - from] - rows.contexts[i].direction);
+            sum += (w * r).powi(2);
+        }
+    }
+    sum
+}
+
+/// Finds out what friction does at rest and lets the rows' directions say so; `None` where it stays as the model holds it.
+pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
+    rows.settling = vec![0.0; rows.len()];
+    let resting = rows.still.iter().zip(&rows.root_weight).filter(|(s, w)| **s > 1.0 && **w > 0.0).count();
+    if !rows.isometric && resting * 50 < rows.effective() {
+        return None;
+    }
+    let holds = holds(rows);
+    if holds.is_empty() {
+        return None;
+    }
+    // Friction and bladder as the moving rows have them; of a muscle that was held throughout, as all rows have them.
+    let mut moving = rows.clone();
+    if !rows.isometric {
+        for (from, to) in &holds {
+            moving.root_weight[*from..*to].fill(0.0);
+        }
+        if moving.effective() * 4 < rows.effective() {
+            return None;
+        }
+    }
+    let fitted = baselines::fit(&moving, Kind::Flexible(4), &[]);
+    let pressures: Vec<Vec<f64>> = SMOOTHING.iter().map(|h| smoothed(rows, *h)).collect();
+    let stays: Vec<Vec<f64>> =
+        holds.iter().map(|(a, b)| rows.contexts[*a..*b].iter().map(|c| c.direction).collect()).collect();
+    let held = left(rows, &fitted, &holds, &stays);
+    let best_of = |laws: Vec<AtRest>| {
+        let tried: Vec<f64> = laws
+            .par_iter()
+            .map(|l| left(rows, &fitted, &holds, &directions(rows, &holds, &pressures, *l)))
+            .collect();
+        laws.into_iter().zip(tried).min_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let follows = |smoothing: usize| {
+        CARRIED.iter().flat_map(move |h| {
+            FOLLOWS.iter().map(move |b| AtRest::Follows { carries: *h, over: *b, smoothing })
+        })
+    };
+    // Of a muscle that was held throughout the direction comes from the pressure: there it is followed or not.
+    let first = SETTLING.iter().filter(|_| !rows.isometric).map(|t| AtRest::Fades(*t));
+    let (mut best, mut energy) = best_of(first.chain((0..SMOOTHING.len()).flat_map(follows)).collect())?;
+    for factors in NEARBY {
+        let near = match best {
+            AtRest::Fades(time) => factors.iter().map(|f| AtRest::Fades(time * f)).collect(),
+            AtRest::Follows { carries, over, smoothing } => factors
+                .iter()
+                .chain(&[1.0])
+                .flat_map(|f| {
+                    factors.iter().chain(&[1.0]).map(move |g| AtRest::Follows {
+                        carries: carries * f,
+                        over: over * g,
+                        smoothing,
+                    })
+                })
+                .collect(),
+        };
+        if let Some((b, e)) = best_of(near).filter(|(_, e)| *e < energy) {
+            (best, energy) = (b, e);
+        }
+    }
+    if !(energy < CLEARLY * held) {
+        return None;
+    }
+    let chosen = directions(rows, &holds, &pressures, best);
+    for ((from, to), way) in holds.iter().zip(&chosen) {
+        for i in *from..*to {
+            rows.contexts[i].direction = way[i - from];
+            if let AtRest::Fades(time) = best
+                && rows.still[i] > 0.0
+            {
+                // How a settling departs from an exponential is fitted beside it.
+                rows.settling[i] = (-3.0 * rows.still[i] / time).exp() - (-rows.still[i] / time).exp();
+            }
+        }
+    }
+    Some(best)
+}
