@@ -48,7 +48,8 @@ impl Effect for Backlash {
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
-        let late = if memory[3] == T::ZERO { T::ZERO } else { context.direction - memory[3] };
+        let known = memory[3] != T::ZERO && context.direction != T::ZERO;
+        let late = if known { context.direction - memory[3] } else { T::ZERO };
         parameters[0] * (context.slope() * memory[0] + context.friction * context.quasi * late)
     }
 }
