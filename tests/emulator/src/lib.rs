@@ -6,6 +6,7 @@
 
 pub mod closed_loop;
 pub mod debugger;
+pub mod diagnosed;
 pub mod figures;
 pub mod fitting;
 pub mod joint;
