@@ -21,9 +21,9 @@
 use embassy_futures::block_on;
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
+use model_core::check;
 use model_core::effects::{MAX_EFFECTS, Memory};
 use model_core::image;
-use model_core::link::frame::crc32;
 use model_core::link::messages::{FAULT_LOG, FaultReport, Side, StoreFault, TableInfo};
 use model_core::link::settings::Settings;
 use sequential_storage::Error;
@@ -183,7 +183,7 @@ impl<F: NorFlash> Store<F> {
         let slot = old.map_or(0, |old| 1 - (old.slot & 1));
         let table = Described {
             length: u16::try_from(image.len()).map_err(|_| StoreFault::Full)?,
-            crc: crc32(image),
+            crc: check::of_image(image),
             generation: old.map_or(1, |old| old.table.generation.wrapping_add(1)),
         };
         let key = image_key(side, slot);
@@ -295,7 +295,7 @@ impl<F: NorFlash> Store<F> {
 }
 
 fn fits(image: &[u8], described: &Described) -> bool {
-    image.len() == usize::from(described.length) && crc32(image) == described.crc
+    image.len() == usize::from(described.length) && check::of_image(image) == described.crc
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use model_core::check;
 use model_core::image;
 use model_core::table::MuscleTable;
 use serde::{Deserialize, Serialize};
@@ -137,7 +138,7 @@ impl TableFile {
         bytes.extend_from_slice(&[0, 0]);
         bytes.extend_from_slice(&length.to_le_bytes());
         bytes.extend_from_slice(&body);
-        let crc = image::CRC32.checksum(&bytes);
+        let crc = check::crc32(&bytes);
         bytes.extend_from_slice(&crc.to_le_bytes());
         Ok(bytes)
     }
@@ -171,7 +172,7 @@ impl TableFile {
         }
         let (content, tail) = bytes.split_at(HEADER + length);
         let stored = u32::from_le_bytes([tail[0], tail[1], tail[2], tail[3]]);
-        if image::CRC32.checksum(content) != stored {
+        if check::crc32(content) != stored {
             return Err(wrong("the file's checksum does not fit".into()).help(damaged));
         }
         let (body, rest): (Body, &[u8]) = postcard::take_from_bytes(&content[HEADER..])
@@ -359,7 +360,7 @@ mod tests {
                 let length = (bytes.len() - HEADER - CHECKSUM) as u32;
                 bytes[8..12].copy_from_slice(&length.to_le_bytes());
                 let end = bytes.len() - CHECKSUM;
-                let crc = image::CRC32.checksum(&bytes[..end]);
+                let crc = check::crc32(&bytes[..end]);
                 bytes[end..].copy_from_slice(&crc.to_le_bytes());
             }
             prop_assert!(TableFile::from_bytes(&bytes).is_err());

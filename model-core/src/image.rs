@@ -5,8 +5,8 @@
 //! ```
 //! The layout of the first eight bytes never changes. A reader refuses another [`VERSION`] and says both.
 
+use crate::check::crc32;
 use crate::table::{MuscleTable, TableError};
-use crc::{CRC_32_ISO_HDLC, Crc};
 use serde::{Deserialize, Serialize};
 
 /// First four bytes.
@@ -17,9 +17,6 @@ pub const VERSION: u16 = 1;
 pub const MAX_LEN: usize = 1024;
 const HEADER: usize = 8;
 const CHECKSUM: usize = 4;
-
-/// The checksum of images, files and the link: CRC-32 as in Ethernet and zip.
-pub const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Why bytes are not a usable table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -81,7 +78,7 @@ pub fn write<'a>(table: &MuscleTable, buffer: &'a mut [u8]) -> Result<&'a [u8], 
     // MAX_LEN fits a u16.
     buffer[6..8].copy_from_slice(&(body as u16).to_le_bytes());
     let end = HEADER + body;
-    let crc = CRC32.checksum(&buffer[..end]);
+    let crc = crc32(&buffer[..end]);
     buffer[end..end + CHECKSUM].copy_from_slice(&crc.to_le_bytes());
     Ok(&buffer[..end + CHECKSUM])
 }
@@ -110,7 +107,7 @@ pub fn read(bytes: &[u8]) -> Result<MuscleTable, ImageError> {
     }
     let whole = bytes.get(..len).ok_or(ImageError::Truncated)?;
     let (content, crc) = whole.split_at(len - CHECKSUM);
-    if CRC32.checksum(content).to_le_bytes() != crc {
+    if crc32(content).to_le_bytes() != crc {
         return Err(ImageError::Checksum);
     }
     let table: MuscleTable = postcard::from_bytes(&content[HEADER..]).map_err(|_| ImageError::Body)?;

@@ -7,7 +7,7 @@
 //! | --- | --- |
 //! | length to radius, wall and strains | [`braid`] |
 //! | curves over pressure | [`spline`] |
-//! | what a fit finds and a file keeps | [`table`], [`image`] |
+//! | what a fit finds and a file keeps | [`table`], [`image`], [`check`] |
 //! | force and its slope | [`muscle`] |
 //! | pressure for a wanted force | [`inverse`] |
 //! | which way friction points | [`motion`] |
@@ -21,6 +21,7 @@
 #![deny(missing_docs)]
 
 pub mod braid;
+pub mod check;
 pub mod effects;
 pub mod image;
 pub mod inverse;

@@ -1,8 +1,8 @@
 //! A table on its way in: gathered piece by piece, checked as a whole before anything is kept.
 
 use heapless::Vec;
+use model_core::check;
 use model_core::image::{self, ImageError};
-use model_core::link::frame::crc32;
 use model_core::link::messages::{Refusal, Side, TableBegin, TableFault, TablePiece};
 
 use super::table_fault;
@@ -53,7 +53,7 @@ impl Upload {
         if bytes.len() < begun.length as usize {
             return Err(Refusal::Table(TableFault::Incomplete(bytes.len() as u32)));
         }
-        if crc32(bytes) != begun.crc {
+        if check::of_image(bytes) != begun.crc {
             return Err(Refusal::Table(TableFault::Check));
         }
         let refused = |error| Refusal::Table(table_fault(error));

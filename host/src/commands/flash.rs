@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use model_core::check;
 use model_core::image;
 use model_core::link::endpoints::{GetInfo, Restart};
-use model_core::link::frame::crc32;
 use model_core::link::messages::Side;
 use serde_json::{Value, json};
 
@@ -76,8 +76,7 @@ impl Arguments {
         let side = self.muscle.side();
         let mut client = self.port.connect(console)?;
         let before = tables::read(&mut client, side)?;
-        let mut done =
-            json!({ "schema": "pam-flash/1", "port": client.port(), "crc": format!("{:08x}", crc32(image)) });
+        let mut done = json!({ "schema": "pam-flash/1", "port": client.port(), "crc": format!("{:08x}", check::of_image(image)) });
         let difference = self.compare(before.as_deref(), &file, console);
         done["difference"] = difference;
         if before.as_deref() == Some(image) {
@@ -145,7 +144,7 @@ impl Arguments {
                 let to = self
                     .backup
                     .clone()
-                    .unwrap_or_else(|| path.with_extension(format!("{:08x}.image", crc32(before))));
+                    .unwrap_or_else(|| path.with_extension(format!("{:08x}.image", check::of_image(before))));
                 crate::output::write_whole(&to, before)?;
                 return Ok(json!(to.display().to_string()));
             }
@@ -156,8 +155,10 @@ impl Arguments {
             tool: format!("host {}, from {}", env!("CARGO_PKG_VERSION"), recorder::serial(client.hello())),
             ..About::default()
         };
-        let to =
-            self.backup.clone().unwrap_or_else(|| path.with_extension(format!("{:08x}.pam", crc32(before))));
+        let to = self
+            .backup
+            .clone()
+            .unwrap_or_else(|| path.with_extension(format!("{:08x}.pam", check::of_image(before))));
         TableFile { table, about }.write(&to)?;
         console.note(format!("the device's table is kept in {}", to.display()));
         Ok(json!(to.display().to_string()))
@@ -180,7 +181,7 @@ impl Arguments {
                 Ok(mut again) if again.hello().starts != starts => {
                     let info = again.call::<GetInfo>(&())?;
                     let crc = info.tables[side.index()].map(|t| t.crc);
-                    if crc != Some(crc32(image)) {
+                    if crc != Some(check::of_image(image)) {
                         return Err(Error::new(
                             Code::DeviceVerify,
                             "after its restart the device has another table",

@@ -1,7 +1,7 @@
 //! Tables on a device: read, sent in pieces, read back, compared.
 
+use model_core::check;
 use model_core::link::endpoints::{BeginTable, CommitTable, GetInfo, GetStatus, ReadTable, SendTablePiece};
-use model_core::link::frame::crc32;
 use model_core::link::messages::{
     PIECE, Refusal, Side, TableBegin, TableFault, TableInfo, TablePiece, TableRead,
 };
@@ -31,14 +31,14 @@ pub fn read(client: &mut Client, side: Side) -> Result<Option<Vec<u8>>> {
         image.extend_from_slice(&piece.bytes);
     }
     image.truncate(kept.length as usize);
-    if image.len() != kept.length as usize || crc32(&image) != kept.crc {
+    if image.len() != kept.length as usize || check::of_image(&image) != kept.crc {
         return Err(Error::new(
             Code::DeviceVerify,
             format!(
                 "the device's table cannot be read back whole: {} of {} bytes, check sum {:08x} instead of {:08x}",
                 image.len(),
                 kept.length,
-                crc32(&image),
+                check::of_image(&image),
                 kept.crc
             ),
         )
@@ -88,7 +88,7 @@ pub fn write(
     if length > capacity {
         return Err(words::refused("table_begin", Refusal::Table(TableFault::TooLong(capacity))));
     }
-    let crc = crc32(image);
+    let crc = check::of_image(image);
     let before = client.call::<GetInfo>(&())?.tables[side.index()];
     client.call::<BeginTable>(&TableBegin { side, length, crc })?;
     let mut sent = 0;

@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
+use model_core::check;
 use model_core::image;
 use model_core::link::endpoints::{
     Arm, ClearFault, GetFaults, GetSettings, GetStatus, SetSettings, SetTelemetry, StartMode, Stop,
 };
-use model_core::link::frame::crc32;
 use model_core::link::hello::Board;
 use model_core::link::messages::{Event, Side, Start, State, Status, Telemetry, TelemetryRate};
 use serde_json::{Value, json};
@@ -379,7 +379,7 @@ impl Connected {
             && before != image
         {
             crate::output::write_whole(
-                &path.with_extension(format!("{:08x}.image", crc32(&before))),
+                &path.with_extension(format!("{:08x}.image", check::of_image(&before))),
                 &before,
             )?;
         }

@@ -6,10 +6,11 @@ use std::net::{TcpListener, TcpStream};
 use std::thread;
 
 use host::device::Address;
+use model_core::check;
 use model_core::link::endpoints::{
     BeginTable, CommitTable, Endpoint, GetInfo, GetStatus, ReadTable, SendTablePiece, TELEMETRY,
 };
-use model_core::link::frame::{Accumulator, Header, Kind, MAX_WIRE, crc32, encode, encode_bytes};
+use model_core::link::frame::{Accumulator, Header, Kind, MAX_WIRE, encode, encode_bytes};
 use model_core::link::hello::{self, Hello};
 use model_core::link::messages::{
     DeviceInfo, Mode, Refusal, Side, SideSample, StartedBy, State, Status, TableBegin, TableFault, TableInfo,
@@ -132,7 +133,7 @@ impl Peer {
             }
             CommitTable::ID => {
                 let begun = self.begun.take().unwrap();
-                if crc32(&self.pieces) != begun.crc || self.pieces.len() != begun.length as usize {
+                if check::of_image(&self.pieces) != begun.crc || self.pieces.len() != begun.length as usize {
                     return refuse(Refusal::Table(TableFault::Check));
                 }
                 self.kept = Some(std::mem::take(&mut self.pieces));
@@ -173,7 +174,7 @@ impl Peer {
     fn info(&self) -> DeviceInfo {
         let table = self.kept.as_ref().map(|image| TableInfo {
             length: image.len() as u32,
-            crc: crc32(image),
+            crc: check::of_image(image),
             generation: 1,
             has_previous: false,
         });

@@ -11,7 +11,7 @@
 //! Consistent overhead byte stuffing (Cheshire and Baker, 1999, doi:10.1109/90.769765) leaves no zero byte inside, so
 //! a receiver that lost its place waits for the next zero and is in step again, whatever came before.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
+use crate::check::crc32;
 
 /// Largest body that a frame carries.
 pub const MAX_BODY: usize = 512;
@@ -23,19 +23,6 @@ pub const CHECK: usize = 4;
 pub const MAX_RAW: usize = HEADER + MAX_BODY + CHECK;
 /// Largest frame on the wire, its closing zero included: COBS adds one byte for each 254 begun.
 pub const MAX_WIRE: usize = MAX_RAW + MAX_RAW.div_ceil(254) + 1;
-
-/// The CRC of frames and of table uploads, with a look-up table of 1 KiB: telemetry needs it a thousand times a second.
-static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
-
-/// CRC-32 (ISO-HDLC) of some bytes, as used in frames and for whole tables.
-///
-/// ```
-/// // The check value of the catalogue of parametrised CRC algorithms.
-/// assert_eq!(model_core::link::frame::crc32(b"123456789"), 0xCBF4_3926);
-/// ```
-pub fn crc32(bytes: &[u8]) -> u32 {
-    CRC.checksum(bytes)
-}
 
 /// What a frame is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,8 +6,9 @@ use std::time::Duration;
 use emulator_tests::machine::Folder;
 use emulator_tests::{Machine, Options, image_of, upload};
 use host::device::tables;
+use model_core::check;
 use model_core::link::endpoints::{BeginTable, CommitTable, Endpoint, SendTablePiece};
-use model_core::link::frame::{Header, Kind, MAX_WIRE, crc32, encode};
+use model_core::link::frame::{Header, Kind, MAX_WIRE, encode};
 use model_core::link::messages::{PIECE, Side, TableBegin, TablePiece};
 use model_core::table::{self, MuscleTable};
 use model_core::units::Pressure;
@@ -28,7 +29,7 @@ fn frame<E: Endpoint>(request: &E::Request, wire: &mut Vec<u8>) {
 /// A whole upload as the bytes of its requests, none of which waits for an answer.
 fn requests(image: &[u8]) -> Vec<u8> {
     let mut wire = vec![0];
-    let begin = TableBegin { side: Side::Agonist, length: image.len() as u32, crc: crc32(image) };
+    let begin = TableBegin { side: Side::Agonist, length: image.len() as u32, crc: check::of_image(image) };
     frame::<BeginTable>(&begin, &mut wire);
     for (n, piece) in image.chunks(PIECE).enumerate() {
         let bytes = heapless::Vec::from_slice(piece).expect("it fits");

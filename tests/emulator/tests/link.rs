@@ -6,11 +6,11 @@ use std::time::Duration;
 use emulator_tests::machine::Folder;
 use emulator_tests::{Machine, Options, image_of, upload};
 use host::device::{Client, Patience, Port, tables};
+use model_core::check;
 use model_core::link::endpoints::BeginTable;
 use model_core::link::endpoints::{
     CommitTable, EvaluateTable, GetInfo, GetStatus, Restart, RollBackTable, SendTablePiece,
 };
-use model_core::link::frame::crc32;
 use model_core::link::hello::Board;
 use model_core::link::messages::{
     Evaluate, Mode, PIECE, Point, Refusal, Side, State, TableBegin, TableFault, TablePiece,
@@ -81,7 +81,7 @@ fn a_table_that_is_wrong_is_refused_and_the_old_one_stays() {
         }
         client.try_call::<CommitTable>(&()).expect("an answer").map(|_| ())
     };
-    let whole = |bytes: &[u8]| (bytes.len() as u32, crc32(bytes));
+    let whole = |bytes: &[u8]| (bytes.len() as u32, check::of_image(bytes));
     let (length, crc) = whole(&good);
     assert_eq!(send(&good, length, crc ^ 1), Err(Refusal::Table(TableFault::Check)));
     assert_eq!(

@@ -17,7 +17,7 @@ pub const POINTS: usize = 16;
 pub struct TableInfo {
     /// Length of the image in bytes.
     pub length: u32,
-    /// CRC-32 of the image.
+    /// Check sum of the image, [`check::of_image`](crate::check::of_image).
     pub crc: u32,
     /// Counts commits of this muscle; a roll-back goes back by one.
     pub generation: u32,
@@ -32,7 +32,7 @@ pub struct TableBegin {
     pub side: Side,
     /// Length of the image in bytes.
     pub length: u32,
-    /// CRC-32 of the image.
+    /// Check sum of the image, [`check::of_image`](crate::check::of_image).
     pub crc: u32,
 }
 
