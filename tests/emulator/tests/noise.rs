@@ -95,7 +95,8 @@ fn flipped_bits_cost_repeats_and_nothing_else() {
             losses.repeats,
             losses.bad_frames
         );
-        if rate >= 1e-4 {
+        // Some ten thousand bits go each way: below, a run may well meet none that is flipped.
+        if rate >= 1e-3 {
             assert!(losses.bad_frames > 0 && frames_bad > 0, "the line was noisy at {rate}");
         }
         patient(&mut client, &|client| {
