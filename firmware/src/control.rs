@@ -17,6 +17,7 @@ use crate::board::{Command, Inputs, Outputs, Readings};
 use crate::modes::{Model, PairState};
 use crate::reference::Generator;
 use crate::safety::{self, Cause, Machine};
+use crate::tick::{TICK_S, TICK_US};
 use crate::trace::Trace;
 use crate::watch::{Finding, SideWatch};
 
@@ -29,13 +30,6 @@ mod record;
 pub use check::check_settings;
 
 use actuator::Actuator;
-
-/// Control ticks in a second.
-pub const TICKS_PER_S: u32 = 1000;
-/// Length of a tick, s.
-pub const TICK_S: f32 = 1.0e-3;
-/// Length of a tick, µs.
-pub const TICK_US: u64 = 1000;
 
 fn motion_settings(settings: &Settings) -> MotionSettings<f32> {
     MotionSettings {

@@ -11,7 +11,9 @@
 //! | the record of every loop variable | [`trace`] |
 //! | tables and settings in flash | [`store`] |
 //! | answers to the host | [`server`] |
+//! | what the tasks share | [`shared`] |
 //! | the tasks that a board starts | [`tasks`] |
+//! | the length of a tick | [`tick`] |
 //! | what a board must give | [`board`] |
 //! | log lines on their way to the host | `log` (feature of that name) |
 //! | all of it in a host's own process | `native` (feature of that name) |
@@ -31,7 +33,9 @@ pub mod reference;
 pub mod regulator;
 pub mod safety;
 pub mod server;
+pub mod shared;
 pub mod store;
 pub mod tasks;
+pub mod tick;
 pub mod trace;
 pub mod watch;

@@ -8,7 +8,7 @@ use model_core::muscle::{Held, Moment, Muscle};
 use model_core::table::{MuscleTable, TableError};
 use model_core::units::{Force, Length, Pressure};
 
-use crate::control::TICK_S;
+use crate::tick::TICK_S;
 
 /// A muscle's table in use: the form that is evaluated, its effects with what they remember, and the present tick.
 #[derive(Clone, Debug)]

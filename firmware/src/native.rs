@@ -42,9 +42,10 @@ use model_core::link::messages::StartedBy;
 use model_core::link::settings::Settings;
 
 use crate::board::{Identity, Inputs, Outputs};
-use crate::control::{Controller, TICKS_PER_S};
+use crate::control::Controller;
 use crate::server::Server;
-use crate::tasks::Shared;
+use crate::shared::Shared;
+use crate::tick::TICKS_PER_S;
 
 /// How a native device runs.
 #[derive(Clone, Debug, PartialEq)]

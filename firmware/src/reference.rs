@@ -8,7 +8,7 @@ use heapless::Vec;
 use micromath::F32Ext;
 use model_core::link::messages::{Field, REFERENCE_PIECE, Reference, ReferencePoints, Refusal};
 
-use crate::control::{TICK_S, TICKS_PER_S};
+use crate::tick::{TICK_S, TICKS_PER_S};
 
 /// Points that a reference table holds.
 pub const CAPACITY: usize = 256;

@@ -11,7 +11,7 @@
 
 use model_core::link::settings::{Limits, Regulator};
 
-use crate::control::TICK_S;
+use crate::tick::TICK_S;
 
 /// Time constant of the observer of what the regulator's model leaves out, s: slower than its lag, quicker than its drift.
 const OBSERVER_S: f32 = 0.15;

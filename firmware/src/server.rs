@@ -16,8 +16,8 @@ use model_core::table::TableError;
 use crate::board::Identity;
 use crate::control::{self, Controller};
 use crate::modes::Model;
+use crate::shared::Shared;
 use crate::store::{self, Memories, Store};
-use crate::tasks::Shared;
 use crate::watch::Finding;
 
 use self::session::Session;

@@ -1,153 +1,15 @@
 //! What runs side by side: the control loop, the link, telemetry. A board wraps each in a task of its executor.
 
-use core::cell::RefCell;
-use core::sync::atomic::{AtomicU32, Ordering};
-
 use embassy_futures::select::{Either, select};
-use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::channel::Channel;
 use embassy_sync::mutex::Mutex as Gate;
-use embassy_sync::signal::Signal;
 use embedded_io_async::{Read, Write};
 use embedded_storage_async::nor_flash::NorFlash;
-#[cfg(feature = "log")]
-use model_core::link::endpoints::LOG;
-use model_core::link::endpoints::{EVENT, TELEMETRY};
-use model_core::link::frame::{self, Accumulator, Header, Kind, MAX_WIRE};
-use model_core::link::messages::{Event, Telemetry};
-use model_core::link::settings::Settings;
+use model_core::link::frame::{Accumulator, MAX_WIRE};
 
 use crate::board::{Outputs, Plant};
-use crate::control::{Controller, Stepped};
 use crate::server::Server;
-
-/// Samples that wait for the link.
-const WAITING: usize = 16;
-
-/// What the device says by itself.
-#[derive(Clone, Debug)]
-enum Spoken {
-    Sample(u16, Telemetry),
-    Event(Event),
-    #[cfg(feature = "log")]
-    Log(crate::log::Frame),
-}
-
-/// What the tasks share: the controller, entered for short and never across an await, and what waits to be sent.
-pub struct Shared {
-    controller: Mutex<CriticalSectionRawMutex, RefCell<Controller>>,
-    spoken: Channel<CriticalSectionRawMutex, Spoken, WAITING>,
-    dropped: AtomicU32,
-    /// The state changed: there may be something to keep.
-    changed: Signal<CriticalSectionRawMutex, ()>,
-}
-
-impl Shared {
-    /// A controller as after power-up.
-    pub fn new(settings: Settings) -> Self {
-        Self {
-            controller: Mutex::new(RefCell::new(Controller::new(settings))),
-            spoken: Channel::new(),
-            dropped: AtomicU32::new(0),
-            changed: Signal::new(),
-        }
-    }
-
-    /// Enters the controller.
-    pub fn with<R>(&self, act: impl FnOnce(&mut Controller) -> R) -> R {
-        self.controller.lock(|controller| act(&mut controller.borrow_mut()))
-    }
-
-    /// Samples that found no room, since the start.
-    pub fn telemetry_dropped(&self) -> u32 {
-        self.dropped.load(Ordering::Relaxed)
-    }
-
-    /// One control step; what it says is put where the telemetry task finds it. A sample without room is dropped and
-    /// counted: the loop never waits for the link.
-    pub fn step(&self, inputs: &crate::board::Inputs) -> Outputs {
-        let Stepped { outputs, telemetry, event } = self.with(|controller| controller.step(inputs));
-        #[cfg(feature = "log")]
-        crate::log::set_tick(self.with(|controller| controller.ticks()));
-        #[cfg(feature = "log")]
-        match &event {
-            Some(Event::Fault(report)) => {
-                defmt::warn!(
-                    "fault {=u8}, {=f32} against {=f32}",
-                    report.fault.code(),
-                    report.value,
-                    report.limit
-                );
-            }
-            Some(Event::State(state)) => defmt::info!("state {=u8}", *state as u8),
-            Some(Event::TraceFull) => defmt::info!("trace full"),
-            None => {}
-        }
-        if event.is_some() {
-            self.changed.signal(());
-        }
-        if let Some(event) = event {
-            // The host must hear of it, whatever else waits: the oldest sample makes room.
-            if self.spoken.is_full() && self.spoken.try_receive().is_ok() {
-                self.drop_one();
-            }
-            self.say(Spoken::Event(event));
-        }
-        if let Some((number, sample)) = telemetry {
-            self.say(Spoken::Sample(number, sample));
-        }
-        outputs
-    }
-
-    fn say(&self, spoken: Spoken) {
-        if self.spoken.try_send(spoken).is_err() {
-            self.drop_one();
-        }
-    }
-
-    fn drop_one(&self) {
-        self.dropped.fetch_add(1, Ordering::Relaxed);
-    }
-
-    /// Whether the state has changed since this was last asked.
-    pub fn has_changed(&self) -> bool {
-        self.changed.try_take().is_some()
-    }
-
-    /// Room for what the next step may say.
-    pub fn has_room(&self) -> bool {
-        self.spoken.free_capacity() >= 2
-    }
-
-    /// What is to be said next, when there is something.
-    async fn next(&self) -> Spoken {
-        #[cfg(feature = "log")]
-        return match select(self.spoken.receive(), crate::log::next()).await {
-            Either::First(spoken) => spoken,
-            Either::Second(line) => Spoken::Log(line),
-        };
-        #[cfg(not(feature = "log"))]
-        self.spoken.receive().await
-    }
-
-    /// The next frame to send without being asked, if there is one.
-    pub fn next_spoken(&self, out: &mut [u8; MAX_WIRE]) -> Option<usize> {
-        self.spoken.try_receive().ok().map(|spoken| encode(&spoken, out))
-    }
-}
-
-fn encode(spoken: &Spoken, out: &mut [u8; MAX_WIRE]) -> usize {
-    let header = |id, sequence| Header { kind: Kind::Topic, id, sequence };
-    let written = match spoken {
-        Spoken::Sample(number, sample) => frame::encode(header(TELEMETRY, *number), sample, out),
-        Spoken::Event(event) => frame::encode(header(EVENT, 0), event, out),
-        #[cfg(feature = "log")]
-        Spoken::Log(line) => frame::encode_bytes(header(LOG, 0), line, out),
-    };
-    // The largest of both fits, which `model_core::link::endpoints` tests.
-    written.unwrap_or(0)
-}
+use crate::shared::{self, Shared};
 
 /// The control loop, for ever, in the plant's time.
 pub async fn control(plant: &mut impl Plant, shared: &Shared) -> ! {
@@ -173,7 +35,7 @@ pub async fn link<R: Read, W: Write, F: NorFlash>(
     let mut bytes = [0; 64];
     let mut out = [0; MAX_WIRE];
     loop {
-        let count = match select(receiver.read(&mut bytes), shared.changed.wait()).await {
+        let count = match select(receiver.read(&mut bytes), shared.change()).await {
             Either::First(Ok(count)) => count,
             Either::First(Err(_)) => return,
             Either::Second(()) => {
@@ -197,48 +59,9 @@ pub async fn telemetry<W: Write>(sender: &Gate<CriticalSectionRawMutex, W>, shar
     let mut out = [0; MAX_WIRE];
     loop {
         let spoken = shared.next().await;
-        let length = encode(&spoken, &mut out);
+        let length = shared::encode(&spoken, &mut out);
         if sender.lock().await.write_all(&out[..length]).await.is_err() {
             return;
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::board::{Inputs, Readings};
-
-    #[test]
-    fn a_change_of_state_wakes_the_link_to_keep_what_must_not_be_lost() {
-        let shared = Shared::new(Settings::default());
-        let inputs = Inputs { sides: [Some(Readings::default()), None], ..Inputs::default() };
-        shared.step(&inputs);
-        assert!(!shared.has_changed());
-        assert_eq!(shared.with(Controller::arm), Ok(()));
-        shared.step(&inputs);
-        assert!(shared.has_changed());
-        assert!(!shared.has_changed(), "once for each change");
-    }
-
-    #[test]
-    fn samples_without_room_are_dropped_counted_and_leave_a_gap_in_their_numbers() {
-        let shared = Shared::new(Settings::default());
-        shared.with(|controller| controller.set_telemetry(1));
-        for _ in 0..WAITING + 5 {
-            shared.step(&Inputs::default());
-        }
-        assert_eq!(shared.telemetry_dropped(), 5);
-        let mut out = [0; MAX_WIRE];
-        let mut accumulator = Accumulator::new();
-        let mut number = |shared: &Shared| {
-            let length = shared.next_spoken(&mut out)?;
-            out[..length].iter().find_map(|&byte| Some(accumulator.push(byte)?.ok()?.header.sequence))
-        };
-        assert_eq!(number(&shared), Some(0));
-        shared.step(&Inputs::default());
-        let rest: std::vec::Vec<_> = core::iter::from_fn(|| number(&shared)).collect();
-        assert_eq!(rest.last().copied(), Some(WAITING as u16 + 5));
-        assert_eq!(rest.len(), WAITING);
     }
 }

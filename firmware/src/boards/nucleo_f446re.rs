@@ -36,9 +36,10 @@ use embedded_storage_async::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
 use firmware::board::{Identity, Inputs, Outputs, Plant, Readings};
-use firmware::control::TICK_US;
 use firmware::server::Server;
-use firmware::tasks::{self, Shared};
+use firmware::shared::Shared;
+use firmware::tasks;
+use firmware::tick::TICK_US;
 use model_core::link::hello::Board;
 use model_core::link::messages::StartedBy;
 use model_core::link::settings::Settings;

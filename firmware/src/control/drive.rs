@@ -3,9 +3,10 @@
 use model_core::link::messages::{Fault, Mode, Side, State};
 use model_core::link::settings::FeedForward;
 
-use super::{Controller, TICK_S};
+use super::Controller;
 use crate::board::Command;
 use crate::modes::{self, Posed};
+use crate::tick::TICK_S;
 use crate::watch::Finding;
 
 impl Controller {

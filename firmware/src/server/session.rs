@@ -13,11 +13,12 @@ use model_core::link::settings::Settings;
 use model_core::units::{Length, Pressure};
 
 use super::Server;
-use crate::control::{self, Controller, TICKS_PER_S};
+use crate::control::{self, Controller};
 use crate::modes;
 use crate::reference;
+use crate::shared::Shared;
 use crate::store::Memories;
-use crate::tasks::Shared;
+use crate::tick::TICKS_PER_S;
 use crate::trace;
 
 /// A server and the controller it asks.

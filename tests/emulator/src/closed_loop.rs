@@ -2,8 +2,9 @@
 //! many cases, and for long runs.
 
 use firmware::board::{Inputs, Outputs, Readings};
-use firmware::control::{Controller, Stepped, TICK_S};
+use firmware::control::{Controller, Stepped};
 use firmware::modes::Model;
+use firmware::tick::TICK_S;
 use model_core::link::messages::{Mode, Reference, SetPoint, Side, State};
 use model_core::link::settings::{FeedForward, Settings};
 use model_core::table::MuscleTable;

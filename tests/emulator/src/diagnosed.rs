@@ -92,7 +92,8 @@ pub fn cases() -> Vec<Case> {
             .map(|(t, part)| (t, 1e3 * part * x))
             .to_vec(),
     };
-    let all: [(&'static str, u64, Conceal, &dyn Fn(f64) -> Motion); 4] = [
+    type Course<'a> = &'a dyn Fn(f64) -> Motion;
+    let all: [(&'static str, u64, Conceal, Course<'_>); 4] = [
         ("coulomb-friction", 101, seal, &swing(0.2)),
         ("viscous-damping", 102, viscous, &swing(0.5)),
         ("stress-relaxation", 103, relaxation, &path),

@@ -4,7 +4,7 @@
 //! The controller is the firmware's own library on the bench's plant, a tick after the other and as fast as this machine goes.
 //! [`in_qemu`] runs a case through the real image and the real link, to show that it makes no difference.
 
-use firmware::control::TICK_S;
+use firmware::tick::TICK_S;
 use model_core::link::messages::{Mode, Reference, SetPoint, Side};
 use model_core::link::settings::{FeedForward, Settings};
 use model_core::muscle::Muscle;
