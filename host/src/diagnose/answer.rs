@@ -71,8 +71,7 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     let misfit = production.rms(&rows);
     remarks.extend(tables_as_evidence(&production, &rows));
     let library = library(&rows);
-    let mut found = search(&mut rows, &library, blocked, step);
-    let held = keep_what_helps(&mut found, &mut rows, &library);
+    let (found, held) = confirmed(&mut rows, &library, blocked, step);
     remarks.extend(found.remarks.iter().cloned());
     let sigma = found.noise.sigma;
     if !found.noise.from_repeats {
@@ -305,6 +304,37 @@ fn no_judgement(
         remarks,
         profiles: Vec::new(),
         trace: Trace { time: Vec::new(), before: Vec::new(), after: Vec::new(), effects: Vec::new() },
+    }
+}
+
+/// So many first names may fail on unseen rows before none is named: where several laws fit the rows at hand alike, the one that
+/// fits them best need not be the one that holds on others.
+const MOST_REFUSED: usize = 3;
+
+/// What the search finds and unseen rows confirm, with the error on these rows.
+fn confirmed(
+    rows: &mut Rows,
+    library: &[candidates::Candidate],
+    blocked: f64,
+    step: f64,
+) -> (Found, HeldOut) {
+    let mut refused = Vec::new();
+    let mut remarks = Vec::new();
+    loop {
+        let mut found = search(rows, library, blocked, step, &refused);
+        let first = found.taken.first().map(|t| t.trial.candidate);
+        let held = keep_what_helps(&mut found, rows, library);
+        match first {
+            Some(candidate) if found.taken.is_empty() && refused.len() < MOST_REFUSED => {
+                refused.push(candidate);
+                remarks.append(&mut found.remarks);
+            }
+            _ => {
+                remarks.append(&mut found.remarks);
+                found.remarks = remarks;
+                return (found, held);
+            }
+        }
     }
 }
 

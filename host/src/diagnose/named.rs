@@ -116,6 +116,8 @@ pub(crate) fn considered(
                 format!("{could_be}; {}", what_would_show(name))
             } else if *p > select::FAMILY_ALPHA && t.score < select::LEAST_SCORE {
                 format!("no more than chance gives over all effects looked at (p = {p:.2}); {could_be}")
+            } else if missing.is_empty() && gain >= select::FIRST_OF_ALL {
+                format!("would take much of the misfit, but was not confirmed (see the remarks); {could_be}")
             } else if missing.is_empty() {
                 format!("takes too little of the misfit to be named; {could_be}")
             } else {

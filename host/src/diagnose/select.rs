@@ -33,7 +33,7 @@ const FURTHER_OF_ALL: f64 = 0.06;
 /// … and this share of what its predecessors left.
 const FURTHER_OF_REST: f64 = 0.4;
 /// The first must take this share of the misfit above noise.
-const FIRST_OF_ALL: f64 = 0.4;
+pub(crate) const FIRST_OF_ALL: f64 = 0.4;
 /// How much the deviance must fall for an effect, beyond what its free numbers cost.
 pub(crate) const LEAST_SCORE: f64 = 12.0;
 /// The same where no test by whole blocks can support it: chance in four hundred looks gives 2 ln 400 = 12 at most once in e, and
@@ -196,6 +196,8 @@ pub(crate) fn refit(
 pub(crate) const CONFUSABLE: f64 = 0.1;
 /// A rival whose trace is as parallel as this to the winner's, once the base is refitted, is confusable whatever its weight.
 pub(crate) const PARALLEL: f64 = 0.95;
+/// So many candidates may fail when everything is fitted together before the search ends.
+const MOST_BARRED: usize = 4;
 /// With more rivals than this a name says nothing.
 const MOST_RIVALS: usize = 10;
 /// How inexact a right law is, as a share of the misfit that it explains …
@@ -238,8 +240,14 @@ fn rivals(
     rivals
 }
 
-/// Searches for what is missing.
-pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step: f64) -> Found {
+/// Searches for what is missing. Candidates in `refused` are looked at and may be rivals, but are not taken.
+pub(crate) fn search(
+    rows: &mut Rows,
+    library: &[Candidate],
+    blocked: f64,
+    step: f64,
+    refused: &[usize],
+) -> Found {
     let mut remarks = Vec::new();
     let order = if rows.isometric { 4 } else { 6 };
     let flexible = baselines::fit(rows, Kind::Flexible(order), &[]);
@@ -271,8 +279,8 @@ pub(crate) fn search(rows: &mut Rows, library: &[Candidate], blocked: f64, step:
         let moved = (t.gain.max(t.relief) / weight).sqrt();
         t.beyond_tables >= CONCEALED || (t.peak >= STATIC_PEAK * blocked && moved >= STATIC_MOVED * blocked)
     };
-    let mut barred: Vec<usize> = Vec::new();
-    while chosen.len() < MAX_NAMED && barred.len() < 4 {
+    let mut barred: Vec<usize> = refused.to_vec();
+    while chosen.len() < MAX_NAMED && barred.len() < refused.len() + MOST_BARRED {
         let ground = Ground::new(&full, scale);
         let (best, p) = look(library, rows, &ground, blocked);
         if first_look.is_none() {

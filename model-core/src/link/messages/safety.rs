@@ -22,7 +22,7 @@ pub enum State {
     Fault,
 }
 
-/// What went wrong. The number on the wire is the bit in [`Settings::hold_on`](super::settings::Settings::hold_on).
+/// What went wrong. The number on the wire is the bit in [`Settings::hold_on`](crate::link::settings::Settings::hold_on).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Fault {
     /// A reading is outside what the sensor can give: broken wire, short circuit.

@@ -21,7 +21,7 @@ pub struct TableInfo {
     pub crc: u32,
     /// Counts commits of this muscle; a roll-back goes back by one.
     pub generation: u32,
-    /// Whether an older table is kept that [`rollback`](super::endpoints) would restore.
+    /// Whether an older table is kept that [`rollback`](crate::link::endpoints) would restore.
     pub has_previous: bool,
 }
 
