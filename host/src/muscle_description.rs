@@ -12,6 +12,8 @@
 
 use std::path::Path;
 
+use model_core::braid::Geometry;
+use model_core::units::{Angle, Length};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Code, Error, Result};
@@ -130,6 +132,18 @@ impl MuscleDescription {
             return wrong("bladder_wall_mm", self.bladder_wall_mm, "the wall fills the whole bladder", help);
         }
         Ok(())
+    }
+
+    /// The geometry as described, without tip correction.
+    #[must_use]
+    pub fn geometry(&self) -> Geometry {
+        Geometry {
+            rest_length: Length::from_metres(self.rest_length()),
+            braid_angle: Angle::from_degrees(self.braid_angle_deg),
+            outer_diameter: Length::from_millimetres(self.bladder_outer_diameter_mm),
+            wall: Length::from_millimetres(self.bladder_wall_mm),
+            tip_correction: false,
+        }
     }
 
     /// L0 in metres.

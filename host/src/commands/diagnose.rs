@@ -4,9 +4,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use model_core::braid::Geometry;
 use model_core::muscle::Muscle;
-use model_core::units::{Angle, Length};
 
 use super::recordings::Recordings;
 use super::reports::Reports;
@@ -60,13 +58,7 @@ impl Arguments {
             console.warning(warning);
         }
         let given = self.table.as_ref().map(TableFile::read).transpose()?;
-        let geometry = Geometry {
-            rest_length: Length::from_millimetres(muscle.rest_length_mm),
-            braid_angle: Angle::from_degrees(muscle.braid_angle_deg),
-            outer_diameter: Length::from_millimetres(muscle.bladder_outer_diameter_mm),
-            wall: Length::from_millimetres(muscle.bladder_wall_mm),
-            tip_correction: false,
-        };
+        let geometry = muscle.geometry();
         let options = Options { muscle: muscle.name.clone() };
         let mut answer = diagnose::diagnose(&campaign, &geometry, &options)?;
         console.detail(format!("diagnosed in {:.3} s", start.elapsed().as_secs_f64()));

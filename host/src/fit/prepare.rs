@@ -2,7 +2,6 @@
 
 use model_core::braid::{Braid, Geometry};
 use model_core::table::MAX_ORDER;
-use model_core::units::{Angle, Length};
 
 use crate::error::{Code, Error, Result};
 use crate::muscle_description::MuscleDescription;
@@ -97,13 +96,7 @@ impl Prepared {
             return Err(Error::new(Code::FitUnderdetermined, "the force is the same in every row")
                 .help("look at the force sensor: it may be disconnected, or at the end of its range"));
         }
-        let geometry = Geometry {
-            rest_length: Length::from_metres(muscle.rest_length()),
-            braid_angle: Angle::from_degrees(muscle.braid_angle_deg),
-            outer_diameter: Length::from_millimetres(muscle.bladder_outer_diameter_mm),
-            wall: Length::from_millimetres(muscle.bladder_wall_mm),
-            tip_correction: options.tip_correction,
-        };
+        let geometry = Geometry { tip_correction: options.tip_correction, ..muscle.geometry() };
         let braid = geometry.build().map_err(|e| Error::new(Code::MuscleInvalid, e.to_string()))?;
         check_strokes(&points, &braid)?;
         let max_pressure = muscle.max_pressure_kPa.map_or(points.pressure.high, |kpa| kpa * 1e3);

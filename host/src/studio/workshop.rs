@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use model_core::braid::Geometry;
 use model_core::muscle::Muscle;
-use model_core::units::{Angle, Length, Pressure};
+use model_core::units::{Length, Pressure};
 use serde_json::{Value, json};
 
 use crate::compare::compare;
@@ -201,13 +200,7 @@ impl Workshop {
     /// As [`diagnose::diagnose`].
     pub fn diagnose(&mut self, muscle: &str) -> Result<Value> {
         let (muscle, campaign) = self.read(muscle)?;
-        let geometry = Geometry {
-            rest_length: Length::from_metres(muscle.rest_length()),
-            braid_angle: Angle::from_degrees(muscle.braid_angle_deg),
-            outer_diameter: Length::from_millimetres(muscle.bladder_outer_diameter_mm),
-            wall: Length::from_millimetres(muscle.bladder_wall_mm),
-            tip_correction: false,
-        };
+        let geometry = muscle.geometry();
         let answer =
             diagnose::diagnose(&campaign, &geometry, &diagnose::Options { muscle: muscle.name.clone() })?;
         self.reports.insert("diagnosis", diagnose_page::page(&answer, &geometry).html());

@@ -5,11 +5,9 @@ use host::diagnose::{self, model};
 use host::fit::{self, Options};
 use host::muscle_description::MuscleDescription;
 use host::recording::{Campaign, Reader};
-use model_core::braid::Geometry;
 use model_core::link::messages::{Mode, Reference, SetPoint, Side};
 use model_core::link::settings::{FeedForward, Settings};
 use model_core::table::MuscleTable;
-use model_core::units::{Angle, Length};
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::{Muscle, MuscleSpec};
@@ -150,13 +148,7 @@ fn record(spec: &MuscleSpec) -> (MuscleDescription, Campaign) {
 pub fn tables(case: &Case) -> Tables {
     let (muscle, campaign) = record(&case.spec);
     let plain = fit::fit(&campaign, &muscle, &Options::default()).expect("a fit").table;
-    let geometry = Geometry {
-        rest_length: Length::from_millimetres(muscle.rest_length_mm),
-        braid_angle: Angle::from_degrees(muscle.braid_angle_deg),
-        outer_diameter: Length::from_millimetres(muscle.bladder_outer_diameter_mm),
-        wall: Length::from_millimetres(muscle.bladder_wall_mm),
-        tip_correction: false,
-    };
+    let geometry = muscle.geometry();
     let options = diagnose::Options { muscle: muscle.name.clone() };
     let answer = diagnose::diagnose(&campaign, &geometry, &options).expect("a diagnosis");
     let refitted = model::refit(&campaign, &muscle, &answer).expect("a table");
