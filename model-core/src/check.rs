@@ -1,6 +1,6 @@
 //! The check sum of frames, images and files: CRC-32 (ISO-HDLC), as in Ethernet and zip.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
+use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 
 /// With a look-up table of 1 KiB: telemetry needs it a thousand times a second.
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
@@ -14,6 +14,11 @@ static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 #[must_use]
 pub fn crc32(bytes: &[u8]) -> u32 {
     CRC.checksum(bytes)
+}
+
+/// A CRC-32 that is taken piece by piece.
+pub(crate) fn begin() -> Digest<'static, u32> {
+    CRC.digest()
 }
 
 /// The check sum by which host and controller know a whole image: of its last four bytes, followed by all before them.
@@ -30,7 +35,7 @@ pub fn crc32(bytes: &[u8]) -> u32 {
 #[must_use]
 pub fn of_image(image: &[u8]) -> u32 {
     let (content, end) = image.split_at(image.len().saturating_sub(4));
-    let mut digest = CRC.digest();
+    let mut digest = begin();
     digest.update(end);
     digest.update(content);
     digest.finalize()

@@ -319,6 +319,44 @@ pub struct Context<T> {
 }
 
 impl<T: Scalar> Context<T> {
+    /// All zeros.
+    pub const NONE: Self = Self {
+        dt: T::ZERO,
+        time: T::ZERO,
+        pressure: T::ZERO,
+        corrected_pressure: T::ZERO,
+        pressure_rate: T::ZERO,
+        stroke: T::ZERO,
+        contraction: T::ZERO,
+        length: T::ZERO,
+        speed: T::ZERO,
+        acceleration: T::ZERO,
+        direction: T::ZERO,
+        travel: T::ZERO,
+        since_reversal: T::ZERO,
+        hold_time: T::ZERO,
+        resting: T::ZERO,
+        cycles: T::ZERO,
+        temperature: T::ZERO,
+        rest_length: T::ZERO,
+        fibre_length: T::ZERO,
+        turns: T::ZERO,
+        radius: T::ZERO,
+        rest_radius: T::ZERO,
+        radial_strain: T::ZERO,
+        axial_strain: T::ZERO,
+        axial_area: T::ZERO,
+        hoop_area: T::ZERO,
+        area: T::ZERO,
+        gaylord: T::ZERO,
+        elastic: T::ZERO,
+        quasi: T::ZERO,
+        friction: T::ZERO,
+        order: T::ZERO,
+        stiffness: T::ZERO,
+        pressure_slope: T::ZERO,
+    };
+
     /// Force of the base model with its friction, N.
     #[inline]
     pub fn force(&self) -> T {
@@ -467,25 +505,41 @@ struct Running<T> {
 impl<T: Scalar> Chain<T> {
     /// The effects of a table on a muscle as new and at rest: for running through recordings from their beginning.
     pub fn new(fitted: &[FittedEffect]) -> Self {
-        let mut effects = heapless::Vec::new();
+        let mut chain = Self::none();
+        chain.begin(fitted);
+        chain
+    }
+
+    /// No effect.
+    pub const fn none() -> Self {
+        Self { effects: heapless::Vec::new(), depends_on_pressure: false }
+    }
+
+    fn begin(&mut self, fitted: &[FittedEffect]) {
+        self.effects.clear();
         for one in fitted.iter().take(MAX_EFFECTS) {
             let parameters = one.parameters.iter().map(|p| T::from_f32(*p)).collect();
             // The iterator is no longer than the vector.
-            let _ = effects.push(Running { effect: one.effect, parameters, memory: [T::ZERO; MEMORY] });
+            let _ = self.effects.push(Running { effect: one.effect, parameters, memory: [T::ZERO; MEMORY] });
         }
-        let depends_on_pressure = fitted.iter().any(|e| e.effect.depends_on_pressure());
-        Self { effects, depends_on_pressure }
+        self.depends_on_pressure = fitted.iter().any(|e| e.effect.depends_on_pressure());
     }
 
     /// The effects of a table on the muscle as its recordings left it: for a controller.
     pub fn resumed(fitted: &[FittedEffect]) -> Self {
-        let mut chain = Self::new(fitted);
-        for (running, one) in chain.effects.iter_mut().zip(fitted) {
+        let mut chain = Self::none();
+        chain.resume(fitted);
+        chain
+    }
+
+    /// The same in a place that is there already.
+    pub fn resume(&mut self, fitted: &[FittedEffect]) {
+        self.begin(fitted);
+        for (running, one) in self.effects.iter_mut().zip(fitted) {
             for (to, from) in running.memory.iter_mut().zip(&one.remembered) {
                 *to = T::from_f32(*from);
             }
         }
-        chain
     }
 
     /// Whether the table carries no effect.
@@ -520,9 +574,9 @@ impl<T: Scalar> Chain<T> {
     }
 
     /// Puts a memory back; a position that the table does not have is ignored.
-    pub fn restore(&mut self, position: usize, memory: Memory<T>) {
+    pub fn restore(&mut self, position: usize, memory: &Memory<T>) {
         if let Some(e) = self.effects.get_mut(position) {
-            e.memory = memory;
+            e.memory = *memory;
         }
     }
 }

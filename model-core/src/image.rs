@@ -7,7 +7,12 @@
 
 use crate::check::crc32;
 use crate::table::{MuscleTable, TableError};
+use serde::de::DeserializeSeed;
 use serde::{Deserialize, Serialize};
+
+mod place;
+
+use place::Place;
 
 /// First four bytes.
 pub const MAGIC: [u8; 4] = *b"PAMT";
@@ -100,6 +105,33 @@ pub fn announced_len(bytes: &[u8]) -> Result<usize, ImageError> {
 /// # Errors
 /// What is wrong with the bytes, or with a number in the table.
 pub fn read(bytes: &[u8]) -> Result<MuscleTable, ImageError> {
+    read_with(bytes, |table| Ok(table.clone()))
+}
+
+/// As [`read`], for whoever only looks at the table: it is a kilobyte, and is not moved about.
+///
+/// # Errors
+/// As [`read`], and what `look` gives.
+#[inline(always)]
+pub fn read_with<R>(
+    bytes: &[u8],
+    look: impl FnOnce(&MuscleTable) -> Result<R, ImageError>,
+) -> Result<R, ImageError> {
+    let mut table = MuscleTable::empty();
+    read_into(bytes, &mut table)?;
+    look(&table)
+}
+
+#[inline]
+fn read_into(bytes: &[u8], table: &mut MuscleTable) -> Result<(), ImageError> {
+    let mut body = postcard::Deserializer::from_bytes(body(bytes)?);
+    Place(table).deserialize(&mut body).map_err(|_| ImageError::Body)?;
+    table.check().map_err(ImageError::Table)
+}
+
+/// The postcard body of a whole image.
+#[inline]
+fn body(bytes: &[u8]) -> Result<&[u8], ImageError> {
     let len = announced_len(bytes)?;
     let found = u16::from_le_bytes([bytes[4], bytes[5]]);
     if found != VERSION {
@@ -110,9 +142,7 @@ pub fn read(bytes: &[u8]) -> Result<MuscleTable, ImageError> {
     if crc32(content).to_le_bytes() != crc {
         return Err(ImageError::Checksum);
     }
-    let table: MuscleTable = postcard::from_bytes(&content[HEADER..]).map_err(|_| ImageError::Body)?;
-    table.check().map_err(ImageError::Table)?;
-    Ok(table)
+    Ok(&content[HEADER..])
 }
 
 /// The checksum that stands at an image's end, as a short name for a table.

@@ -287,11 +287,24 @@ impl<T: Scalar> Muscle<T> {
         guess: Pressure<T>,
         search: &Search<T>,
     ) -> Solution<T> {
-        let Moment { held, slopes, context } = moment;
-        if !chain.depends_on_pressure() {
-            let rest = Force::from_newtons(force.si() - chain.force(context));
-            return self.pressure_for(rest, held, context.direction, guess, search);
+        if chain.depends_on_pressure() {
+            return self.pressure_by_search(force, chain, moment, guess, search);
         }
+        let rest = Force::from_newtons(force.si() - chain.force(&moment.context));
+        self.pressure_for(rest, &moment.held, moment.context.direction, guess, search)
+    }
+
+    /// The same where an effect's force depends on the pressure.
+    #[inline(always)]
+    pub(crate) fn pressure_by_search(
+        &self,
+        force: Force<T>,
+        chain: &Chain<T>,
+        moment: &Moment<T>,
+        guess: Pressure<T>,
+        search: &Search<T>,
+    ) -> Solution<T> {
+        let Moment { held, slopes, context } = moment;
         let context = *context;
         let mut whole =
             Whole { muscle: self, held, slopes, chain, context, last: None, effect_slope: T::ZERO };

@@ -12,6 +12,7 @@
 //! | pressure for a wanted force | [`inverse`] |
 //! | which way friction points | [`motion`] |
 //! | physics beyond the base model | [`effects`] |
+//! | all of it as a controller calls it | [`single`] |
 //! | what host and controller say to each other | [`link`] |
 //!
 //! Source of the model: E. G. Hocking, thesis on miniature and push-type pneumatic artificial muscles, University of
@@ -29,6 +30,7 @@ pub mod link;
 pub mod motion;
 pub mod muscle;
 pub mod scalar;
+pub mod single;
 pub mod spline;
 pub mod table;
 pub mod units;

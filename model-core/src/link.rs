@@ -16,8 +16,8 @@ pub mod hello;
 pub mod messages;
 pub mod settings;
 
-pub use endpoints::{Call, Endpoint, SCHEMA_HASH, Service};
-pub use frame::{Accumulator, Frame, FrameError, Header, Kind};
+pub use endpoints::{Endpoint, SCHEMA_HASH, Service};
+pub use frame::{Accumulator, Exchange, Frame, FrameError, Header, Kind};
 pub use hello::Hello;
 
 /// Number of the message set. It moves when the meaning of a message changes; the hash beside it moves with any change.

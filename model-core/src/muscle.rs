@@ -75,6 +75,24 @@ pub struct Moment<T> {
     pub context: Context<T>,
 }
 
+impl<T: Scalar> Piece<T> {
+    const NONE: Self = Self { origin: T::ZERO, elastic: [[T::ZERO; 4]; MAX_ORDER], friction: [T::ZERO; 4] };
+}
+
+impl<T: Scalar> Held<T> {
+    /// All zeros, for a place that is not filled yet.
+    pub const NONE: Self = Self { posture: Posture::NONE, columns: [T::ZERO; MAX_ORDER] };
+}
+
+impl<T: Scalar> Moment<T> {
+    /// All zeros, for a place that is not filled yet.
+    pub const NONE: Self = Self {
+        held: Held::NONE,
+        slopes: HeldSlopes { area: T::ZERO, columns: [T::ZERO; MAX_ORDER] },
+        context: Context::NONE,
+    };
+}
+
 /// The parts of the base model's force at one moment, N and N/Pa.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Parts<T> {
@@ -115,43 +133,67 @@ impl<T: Scalar> Muscle<T> {
     /// # Errors
     /// The first number of the table that cannot be used.
     pub fn build(table: &MuscleTable) -> Result<Self, TableError> {
-        table.check()?;
-        let braid64 = table.geometry.cast::<f64>().build().map_err(TableError::Geometry)?;
-        let count = table.nodes.len();
-        let mut nodes = [0.0_f64; MAX_NODES];
-        for (to, from) in nodes.iter_mut().zip(&table.nodes) {
-            *to = f64::from(*from);
+        let mut muscle = Self::blank();
+        muscle.rebuild(table)?;
+        Ok(muscle)
+    }
+
+    /// A place for [`Muscle::rebuild`]: no table yet, and no force.
+    pub const fn blank() -> Self {
+        Self {
+            braid: Braid::NONE,
+            nodes: Nodes::NONE,
+            order: 0,
+            order_scalar: T::ZERO,
+            pieces: [Piece::NONE; MAX_PIECES],
+            deadband: T::ZERO,
+            max_pressure: T::ZERO,
+            least_force: T::ZERO,
+            goes_slack: false,
+            kind: Kind::Contractile,
         }
-        let nodes = &nodes[..count];
-        let mut muscle = Self {
-            braid: braid64.cast(),
-            nodes: Nodes::new(nodes),
-            order: table.order(),
-            order_scalar: T::from_f32(table.order() as f32),
-            pieces: [Piece::default(); MAX_PIECES],
-            deadband: T::from_f32(table.deadband.pascals()),
-            max_pressure: T::from_f32(table.max_pressure.pascals()),
-            least_force: if table.goes_slack { T::ZERO } else { T::from_f32(f32::MIN) },
-            goes_slack: table.goes_slack,
-            kind: table.kind,
-        };
-        let pieces_of = |values: &[f32]| {
-            let mut value = [0.0_f64; MAX_NODES];
-            for (to, from) in value.iter_mut().zip(values) {
+    }
+
+    /// As [`Muscle::build`], in a place that is there already: some 2 KiB that a controller keeps once and never moves. What
+    /// was in it is lost when the table cannot be used.
+    ///
+    /// # Errors
+    /// As [`Muscle::build`].
+    #[inline(never)]
+    pub fn rebuild(&mut self, table: &MuscleTable) -> Result<(), TableError> {
+        table.check()?;
+        self.braid = table.geometry.cast::<T>().build().map_err(TableError::Geometry)?;
+        let in_double = |values: &[f32]| {
+            let mut double = [0.0_f64; MAX_NODES];
+            for (to, from) in double.iter_mut().zip(values) {
                 *to = f64::from(*from);
             }
-            Nodes::<T>::pieces(nodes, &value[..count])
+            double
         };
-        for (k, values) in table.elastic.iter().enumerate() {
-            for (to, from) in muscle.pieces.iter_mut().zip(pieces_of(values)) {
-                to.elastic[k] = from.map(T::from_f64);
-            }
+        let count = table.nodes.len();
+        let nodes = in_double(&table.nodes);
+        let nodes = &nodes[..count];
+        self.nodes = Nodes::new(nodes);
+        self.order = table.order();
+        self.order_scalar = T::from_f32(table.order() as f32);
+        self.deadband = T::from_f32(table.deadband.pascals());
+        self.max_pressure = T::from_f32(table.max_pressure.pascals());
+        self.least_force = if table.goes_slack { T::ZERO } else { T::from_f32(f32::MIN) };
+        self.goes_slack = table.goes_slack;
+        self.kind = table.kind;
+        for (n, piece) in self.pieces.iter_mut().enumerate() {
+            *piece = Piece { origin: self.nodes.origin(n), ..Piece::NONE };
         }
-        for (n, (to, from)) in muscle.pieces.iter_mut().zip(pieces_of(&table.friction)).enumerate() {
-            to.friction = from.map(T::from_f64);
-            to.origin = muscle.nodes.origin(n);
+        let friction = table.elastic.len();
+        for (k, values) in table.elastic.iter().chain([&table.friction]).enumerate() {
+            let pieces = &mut self.pieces;
+            spline::each_piece(nodes, &in_double(values)[..count], &mut |n, cubic| {
+                let piece = &mut pieces[n];
+                let to = if k == friction { &mut piece.friction } else { &mut piece.elastic[k] };
+                *to = cubic.map(T::from_f64);
+            });
         }
-        Ok(muscle)
+        Ok(())
     }
 
     /// The muscle at one contraction stroke.
@@ -216,6 +258,11 @@ impl<T: Scalar> Muscle<T> {
         let (friction, friction_slope) = spline::value_and_slope(&piece.friction, u);
         let gaylord = corrected * area;
         (Parts { gaylord, elastic, friction, pressure_slope, friction_slope }, stiffness)
+    }
+
+    /// `∂F_quasi/∂x` at a held stroke and a pressure, N/m; below zero, since a muscle pulls less the shorter it is.
+    pub fn stroke_slope(&self, held: &Held<T>, slopes: &HeldSlopes<T>, pressure: Pressure<T>) -> T {
+        self.parts_and_stiffness(held, slopes, pressure).1
     }
 
     /// The force of the base model, without effects. `direction` is +1 while shortening, −1 while lengthening, 0 for the
@@ -285,7 +332,7 @@ impl<T: Scalar> Muscle<T> {
     }
 
     /// Brings a moment to a motion and a pressure.
-    #[inline(never)]
+    #[inline]
     pub fn update(&self, moment: &mut Moment<T>, motion: &Motion<T>, pressure: Pressure<T>) {
         let Moment { held, slopes, context } = moment;
         *held = self.held(Length::from_metres(motion.stroke));

@@ -54,6 +54,9 @@ pub trait Scalar:
     /// Absolute value.
     fn abs(self) -> Self;
 
+    // `clamp`, `max` and `min` of `f32` are calls in an image that is built for size, and the core has no instruction for them:
+    // the next three are a comparison each, which a tick can afford.
+
     /// This, or `bound` where it is less or NaN: one comparison, for bounds that are numbers.
     #[inline(always)]
     fn at_least(self, bound: Self) -> Self {
@@ -63,6 +66,17 @@ pub trait Scalar:
     #[inline(always)]
     fn at_most(self, bound: Self) -> Self {
         if self < bound { self } else { bound }
+    }
+    /// This, or the bound that it is beyond; NaN stays so. For bounds that are numbers.
+    #[inline(always)]
+    fn within(self, low: Self, high: Self) -> Self {
+        if self < low {
+            low
+        } else if self > high {
+            high
+        } else {
+            self
+        }
     }
     /// The larger of two; the other one where one is NaN.
     #[inline]
@@ -186,6 +200,19 @@ mod tests {
         assert_eq!(Scalar::min(f32::NAN, 2.0), 2.0);
         assert_eq!(Scalar::min(2.0, f32::NAN), 2.0);
         assert_eq!(Scalar::clamp(5.0_f64, 0.0, 1.0), 1.0);
+    }
+
+    #[test]
+    fn they_bound_and_treat_what_is_no_number_as_they_say() {
+        for (value, low, high) in
+            [(-2.0_f32, -1.0, 1.0), (0.5, -1.0, 1.0), (3.0, -1.0, 1.0), (-0.0, 0.0, 0.0)]
+        {
+            assert_eq!(value.within(low, high), f32::clamp(value, low, high));
+            assert_eq!(value.at_least(low), f32::max(value, low));
+            assert_eq!(value.at_most(high), f32::min(value, high));
+        }
+        assert!(f32::NAN.within(0.0, 1.0).is_nan());
+        assert_eq!((f32::NAN.at_least(2.0), f32::NAN.at_most(2.0)), (2.0, 2.0));
     }
 
     #[test]

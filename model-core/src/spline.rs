@@ -12,12 +12,14 @@ pub const MAX_NODES: usize = 16;
 /// `a + u (b + u (c + u d))` with `u` the distance from the segment's lower node.
 pub type Cubic<T> = [T; 4];
 
-/// The cubics of the natural spline through `values` at increasing `nodes`, one per segment, into `segments`.
+/// The cubics of the natural spline through `values` at increasing `nodes`, one per segment, handed to `segment` with its
+/// number.
 ///
 /// One node gives no segment; two give a straight line. The second derivative is continuous, and zero at both ends
 /// (C. de Boor, *A Practical Guide to Splines*, chapter IV). `values` and `nodes` are of one length, at most
-/// [`MAX_NODES`]; `segments` holds at least one less. Computed in double precision.
-pub fn natural_cubic(nodes: &[f64], values: &[f64], segments: &mut [Cubic<f64>]) {
+/// [`MAX_NODES`]. Computed in double precision.
+#[inline]
+pub fn natural_cubic(nodes: &[f64], values: &[f64], segment: &mut dyn FnMut(usize, Cubic<f64>)) {
     let n = nodes.len().min(values.len()).min(MAX_NODES);
     if n < 2 {
         return;
@@ -37,14 +39,15 @@ pub fn natural_cubic(nodes: &[f64], values: &[f64], segments: &mut [Cubic<f64>])
     for i in (1..n - 1).rev() {
         second[i] -= upper[i] * second[i + 1];
     }
-    for i in 0..(n - 1).min(segments.len()) {
+    for i in 0..n - 1 {
         let h = nodes[i + 1] - nodes[i];
-        segments[i] = [
+        let cubic = [
             values[i],
             (values[i + 1] - values[i]) / h - h * (2.0 * second[i] + second[i + 1]) / 6.0,
             second[i] / 2.0,
             (second[i + 1] - second[i]) / (6.0 * h),
         ];
+        segment(i, cubic);
     }
 }
 
@@ -86,6 +89,9 @@ pub struct Nodes<T> {
 }
 
 impl<T: Scalar> Nodes<T> {
+    /// None, for a place that is not filled yet.
+    pub const NONE: Self = Self { edges: [T::ZERO; MAX_PIECES + 1], count: 0 };
+
     /// From increasing numbers; more than [`MAX_NODES`] are cut off.
     pub fn new(nodes: &[f64]) -> Self {
         let count = nodes.len().min(MAX_NODES);
@@ -115,19 +121,25 @@ impl<T: Scalar> Nodes<T> {
 
     /// The piece that `p` lies in: how many nodes lie at or below it. A pressure that is no number lies below the first.
     ///
-    /// Written out, so that every index is a constant and needs no check.
+    /// Written out by fours, so that every index is a constant and needs no check.
     #[inline(always)]
     pub fn place(&self, p: T) -> usize {
         macro_rules! first_above {
-            ($($next:literal)+) => {
+            ($($next:literal)+; $last:literal) => {{
                 $(if !(p >= self.edges[$next]) {
                     return $next - 1;
                 })+
-            };
+                $last
+            }};
         }
         const { assert!(MAX_NODES == 16) };
-        first_above!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16);
-        MAX_NODES
+        if !(p >= self.edges[8]) {
+            if !(p >= self.edges[4]) { first_above!(1 2 3; 3) } else { first_above!(5 6 7; 7) }
+        } else if !(p >= self.edges[12]) {
+            first_above!(9 10 11; 11)
+        } else {
+            first_above!(13 14 15 16; 16)
+        }
     }
 
     /// The same, where the code should not grow by it.
@@ -139,15 +151,22 @@ impl<T: Scalar> Nodes<T> {
     /// The cubics of all pieces of a curve that [`natural_cubic`] runs through `values` at these nodes.
     pub fn pieces(nodes: &[f64], values: &[f64]) -> [Cubic<f64>; MAX_PIECES] {
         let mut pieces = [[0.0; 4]; MAX_PIECES];
-        let count = nodes.len().min(values.len()).min(MAX_NODES);
-        if count == 0 {
-            return pieces;
-        }
-        pieces[0][0] = values[0];
-        natural_cubic(nodes, values, &mut pieces[1..]);
-        pieces[count] = [values[count - 1], 0.0, 0.0, 0.0];
+        each_piece(nodes, values, &mut |n, cubic| pieces[n] = cubic);
         pieces
     }
+}
+
+/// Hands each piece of a curve to `piece` with its number, as [`Nodes::pieces`] gives them; pieces behind the last node's are
+/// left out.
+#[inline]
+pub fn each_piece(nodes: &[f64], values: &[f64], piece: &mut dyn FnMut(usize, Cubic<f64>)) {
+    let count = nodes.len().min(values.len()).min(MAX_NODES);
+    if count == 0 {
+        return;
+    }
+    piece(0, [values[0], 0.0, 0.0, 0.0]);
+    natural_cubic(nodes, values, &mut |n, cubic| piece(n + 1, cubic));
+    piece(count, [values[count - 1], 0.0, 0.0, 0.0]);
 }
 
 #[cfg(test)]
@@ -165,7 +184,7 @@ mod tests {
         let nodes = [1.0, 2.5, 3.0, 5.0, 8.0];
         let values = [0.3, -1.0, 2.0, 0.5, 4.0];
         let mut s = [[0.0; 4]; 4];
-        natural_cubic(&nodes, &values, &mut s);
+        natural_cubic(&nodes, &values, &mut |n, cubic| s[n] = cubic);
         for (n, v) in nodes.iter().zip(values) {
             assert!((at(&nodes, &values, *n) - v).abs() < 1e-12);
         }

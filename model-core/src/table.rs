@@ -22,7 +22,7 @@ pub enum Kind {
 }
 
 /// The range that the recordings behind a table covered. Beyond it the table is an extrapolation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Tested {
     /// Lowest pressure.
     pub pressure_low: Pressure<f32>,
@@ -113,6 +113,23 @@ impl core::fmt::Display for TableError {
 impl core::error::Error for TableError {}
 
 impl MuscleTable {
+    /// Nothing in it yet; it does not pass [`MuscleTable::check`].
+    pub fn empty() -> Self {
+        Self {
+            kind: Kind::Contractile,
+            geometry: Geometry::default(),
+            deadband: Pressure::ZERO,
+            goes_slack: false,
+            nodes: heapless::Vec::new(),
+            elastic: heapless::Vec::new(),
+            friction: heapless::Vec::new(),
+            tested: Tested::default(),
+            max_pressure: Pressure::ZERO,
+            blocked_force: Force::ZERO,
+            effects: heapless::Vec::new(),
+        }
+    }
+
     /// `M`, the order of the elastic polynomial.
     pub fn order(&self) -> usize {
         self.elastic.len()
@@ -122,6 +139,7 @@ impl MuscleTable {
     ///
     /// # Errors
     /// The first number at fault.
+    #[inline]
     pub fn check(&self) -> Result<(), TableError> {
         self.geometry.build().map_err(TableError::Geometry)?;
         let deadband = self.deadband.pascals();
@@ -214,6 +232,7 @@ mod tests {
             t.check()
         };
         assert_eq!(example().check(), Ok(()));
+        assert!(MuscleTable::empty().check().is_err());
         assert_eq!(
             wrong(&|t| t.geometry.wall = Length::ZERO),
             Err(TableError::Geometry(GeometryError::Wall))

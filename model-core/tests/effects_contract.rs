@@ -270,7 +270,7 @@ fn a_chain_adds_its_effects_and_gives_its_memories_back() {
     }
     let mut woken = Chain::<f64>::new(&list);
     let kept: Vec<Memory<f64>> = chain.memories().map(|(_, m)| *m).collect();
-    for (position, memory) in kept.into_iter().enumerate() {
+    for (position, memory) in kept.iter().enumerate() {
         woken.restore(position, memory);
     }
     assert_eq!(woken, chain);

@@ -252,6 +252,20 @@ fn after_a_rest_it_sticks_the_longer_the_rest_and_lets_go_over_its_distance() {
     close(stuck(1e4, 0.2e-3), -5.0 * (-1.0_f64).exp(), 2e-3);
     assert!(stuck(1.0, 0.0).abs() < stuck(10.0, 0.0).abs());
     assert!(stuck(100.0, 5e-3).abs() < 1e-6);
+    // Back where it stood, but after a turn without a rest, nothing holds it.
+    let mut alone = Alone::new("breakaway-friction", &[5.0, 0.0, 0.0, 0.2e-3, 10.0]);
+    let moving = |stroke: f64, hold_time: f64, direction: f64| Context {
+        stroke,
+        hold_time,
+        direction,
+        speed: 1e-3,
+        ..moment()
+    };
+    alone.at(Context { hold_time: 50.0, resting: 1.0, direction: 1.0, ..moment() });
+    assert!(alone.at(moving(1e-5, 50.0, 1.0)) < -4.0);
+    assert!(alone.at(moving(5e-3, 50.0, 1.0)).abs() < 1e-6);
+    close(alone.at(moving(4.9e-3, 0.0, -1.0)), 0.0, 1e-12);
+    close(alone.at(moving(1e-5, 0.0, -1.0)), 0.0, 1e-12);
 }
 
 #[test]
@@ -400,6 +414,33 @@ fn stretching_fibres_change_gaylords_force_by_their_first_order() {
 }
 
 #[test]
+fn what_the_wall_carries_does_not_stretch_the_fibres() {
+    let muscle = Muscle::<f64>::build(&table::example()).expect("a valid table");
+    let braid = muscle.braid();
+    let (b, n, compliance) = (braid.fibre_length(), braid.turns(), 1e-6);
+    for (stroke, kilopascals) in [(0.2e-3, 300.0), (1e-3, 400.0), (2e-3, 600.0)] {
+        let at = Motion { stroke, ..Motion::default() };
+        let c = muscle.context(&at, Pressure::from_kilopascals(kilopascals));
+        let modulus = c.elastic / c.unit_elastic();
+        // The fibres' energy at a length, with the wall's own thickness there.
+        let given_way = |stroke: f64| {
+            let p = braid.posture(Length::from_metres(stroke));
+            let carried = modulus * p.wall * p.radial_strain / p.radius;
+            let tension =
+                (c.corrected_pressure - carried) * p.length * b / (2.0 * core::f64::consts::PI * n * n);
+            0.5 * compliance * b * tension * tension
+        };
+        let h = 1e-6;
+        // F = −dW/dL of what they give way by; L falls as the stroke grows.
+        let force = (given_way(stroke + h) - given_way(stroke - h)) / (2.0 * h);
+        let law = Alone::new("braid-elasticity", &[compliance]).at(c);
+        close(law, force, 0.05 * force.abs());
+        let without = Alone::new("braid-elasticity", &[compliance]).at(Context { elastic: 0.0, ..c });
+        assert!((law - without).abs() > 0.03 * without.abs(), "the wall matters: {law} {without}");
+    }
+}
+
+#[test]
 fn a_slip_gives_the_force_of_a_longer_muscle_from_its_moment_on() {
     let muscle = Muscle::<f64>::build(&table::example()).expect("a valid table");
     let pressure = Pressure::from_kilopascals(400.0);
@@ -435,7 +476,25 @@ fn a_table_of_lower_order_is_completed_by_the_next_terms() {
 fn shapes_of_the_ends_the_wall_and_the_leak() {
     let c = Context { contraction: 0.1, corrected_pressure: 3e5, pressure: 3e5, ..moment() };
     let area = core::f64::consts::PI * 25e-6;
-    close(Alone::new("tip-effect", &[1.0]).at(c), -3e5 * area * 0.05 * 0.1, 1e-12);
+    close(Alone::new("tip-effect", &[1.0, 0.0]).at(c), -3e5 * area * 0.05 * 0.1, 1e-12);
+    // The slope of the air that tapers do not hold, π R (R − R0)².
+    let braid = miniature().build().expect("a valid geometry");
+    let at = |stroke: f64| braid.posture(Length::from_metres(stroke));
+    let lost = |stroke: f64| {
+        let r = at(stroke).radius;
+        core::f64::consts::PI * r * (r - braid.rest_radius()).powi(2)
+    };
+    let (stroke, h) = (3e-3, 1e-6);
+    let tapered = Context {
+        radius: at(stroke).radius,
+        rest_radius: braid.rest_radius(),
+        length: at(stroke).length,
+        turns: braid.turns(),
+        corrected_pressure: 3e5,
+        ..moment()
+    };
+    let slope = (lost(stroke + h) - lost(stroke - h)) / (2.0 * h);
+    close(Alone::new("tip-effect", &[0.0, 1.0]).at(tapered), -3e5 * slope, 1e-4 * 3e5 * slope);
     assert_eq!(Alone::new("strand-jamming", &[1e4, 0.1]).at(c), 0.0);
     close(Alone::new("strand-jamming", &[1e4, 0.08]).at(c), -4.0, 1e-9);
     close(Alone::new("leak", &[0.02]).at(c), -0.02 * 30.0, 1e-12);

@@ -1,12 +1,15 @@
-//! The braid's fibres stretch under the pressure they carry.
+//! The braid's fibres stretch under what they carry.
 //!
 //! ```text
-//! T_b = P′ L B/(2πN²)        δB = B T_b c        F_add = ∂F_G/∂B δB = −c P′² L B³/(4π²N⁴)
+//! T = (P′ − h) L B/(2πN²)        F_add = −c T · B dT/dL = −c (B³/4π²N⁴) L (P′ − h) (P′ − h − L h′)
+//! h = E t ε_x/R                   E = F_el/c_1        L h′ = E (t/R) (L R′/R0 + ε_x L (t′/t − R′/R))       R′ = −L/(4π²N²R)
 //! ```
-//! `T_b` is the tension of all fibres taken as one, from the balance of hoop forces over a length `L` (`2 N` crossings that carry
-//! `2 P′ R L`), N; `c = 1/(EA)` their compliance, 1/N. A longer fibre at the same length means a wider, flatter muscle that
-//! pulls less. First order in the stretch and without the bladder's own extra stretch; soft braids with tens of per cent of loss
-//! are beyond it.
+//! `T` is the tension of all fibres taken as one, from the balance of hoop forces over a length `L` (`2 N` crossings that carry what
+//! the wall leaves to the braid), N; `c = 1/(EA)` their compliance, 1/N. `h`, Pa, is the pressure that the wall's own hoop stress
+//! carries, with the modulus `E` that the base model's elastic force has there: about rest length the radius changes many times
+//! faster than the length, so that `L h′` is the largest of the three. A longer fibre at the same length means a wider, flatter muscle
+//! that pulls less. To first order in `c` this is the derivative of the energy `−T² B c/2` that the fibres give way by; soft braids with
+//! tens of per cent of loss are beyond it.
 
 use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
 use crate::scalar::Scalar;
@@ -24,7 +27,7 @@ impl Effect for BraidElasticity {
         alternatives: false,
         start: Start::Known,
         fading: &[],
-        equation: "F = −c·P′²·L·B³/(4π²·N⁴)",
+        equation: "F = −c·(B³/4π²N⁴)·L·(P′ − h)·(P′ − h − L·h′), h = E·t·ε_x/R",
         summary: "The fibres of the braid stretch under load, so the muscle swells more and pulls less at high pressure.",
         source: "J. Chambers and N. Wereley, Actuators 11(8) (2022) 219, doi 10.3390/act11080219; the hoop balance is that of M. Gaylord, US patent 2,844,126",
     };
@@ -33,7 +36,29 @@ impl Effect for BraidElasticity {
         let b = context.fibre_length;
         let n = context.turns;
         let per_turns = b / (n * n * T::from_f64(2.0 * core::f64::consts::PI));
-        let p = context.corrected_pressure.max(T::ZERO);
-        -parameters[0] * p * p * context.length * b * per_turns * per_turns
+        let (carried, its_slope) = carried_by_the_wall(context);
+        let left = (context.corrected_pressure - carried).max(T::ZERO);
+        -parameters[0] * left * (left - its_slope) * context.length * b * per_turns * per_turns
     }
+}
+
+/// `h` and `L dh/dL`, Pa.
+fn carried_by_the_wall<T: Scalar>(context: &Context<T>) -> (T, T) {
+    let (length, radius) = (context.length, context.radius.max(T::from_f32(1.0e-6)));
+    let around = context.turns * T::from_f64(2.0 * core::f64::consts::PI);
+    // L²/(4π²N²)
+    let squared = (length / around) * (length / around);
+    // A = t L²/(2πN²R), so that t/R = A/(2 L²/(4π²N²) π).
+    let thin = context.hoop_area / (squared * T::from_f64(2.0 * core::f64::consts::PI));
+    // At rest length both are zero; next to it their ratio is the first modulus.
+    let unit = context.unit_elastic();
+    let least = context.axial_area * T::from_f32(1.0e-6);
+    let modulus = context.elastic * unit / (unit * unit + least * least).max(T::from_f32(1.0e-30));
+    let strain = context.radial_strain;
+    // L R′/R = −L²/(4π²N²R²), and as the wall keeps its volume L t′/t = −(L R′/R + 1 − t/2R)/(1 − t/R).
+    let widening = -squared / (radius * radius);
+    let thinning = (widening + T::ONE - T::from_f32(0.5) * thin) / (T::ONE - thin).max(T::from_f32(0.1));
+    let slope =
+        widening * radius / context.rest_radius.max(T::from_f32(1.0e-6)) - strain * (thinning + widening);
+    (modulus * thin * strain, modulus * thin * slope)
 }

@@ -39,15 +39,14 @@ impl Effect for BreakawayFriction {
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [where it rested, for how long, last hold time, whether it moves, seen]
         let resting = memory[4] == T::ZERO || context.resting != T::ZERO || context.hold_time > memory[2];
+        let turned = context.hold_time < memory[2];
         memory[4] = T::ONE;
         memory[2] = context.hold_time;
-        if resting {
+        if resting || turned {
             memory[0] = context.stroke;
             memory[1] = context.hold_time;
-            memory[3] = T::ZERO;
-        } else {
-            memory[3] = T::ONE;
         }
+        memory[3] = if resting { T::ZERO } else { T::ONE };
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {

@@ -11,7 +11,11 @@
 //! Consistent overhead byte stuffing (Cheshire and Baker, 1999, doi:10.1109/90.769765) leaves no zero byte inside, so
 //! a receiver that lost its place waits for the next zero and is in step again, whatever came before.
 
-use crate::check::crc32;
+use cobs::CobsEncoder;
+use crc::Digest;
+use postcard::ser_flavors::Flavor;
+
+use crate::check::{self, crc32};
 
 /// Largest body that a frame carries.
 pub const MAX_BODY: usize = 512;
@@ -23,6 +27,9 @@ pub const CHECK: usize = 4;
 pub const MAX_RAW: usize = HEADER + MAX_BODY + CHECK;
 /// Largest frame on the wire, its closing zero included: COBS adds one byte for each 254 begun.
 pub const MAX_WIRE: usize = MAX_RAW + MAX_RAW.div_ceil(254) + 1;
+
+/// Largest frame on the wire of what the device says by itself: it is short, so that its sender needs little room.
+pub const MAX_TOPIC: usize = 112;
 
 /// What a frame is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,41 +119,73 @@ pub fn encode<M: serde::Serialize + ?Sized>(
     message: &M,
     out: &mut [u8],
 ) -> Result<usize, FrameError> {
-    let mut raw = [0u8; MAX_RAW];
-    let body = postcard::to_slice(message, &mut raw[HEADER..HEADER + MAX_BODY])
-        .map_err(|_| FrameError::Space)?
-        .len();
-    seal(header, &mut raw, body, out)
+    let length = postcard::serialize_with_flavor(message, Writer::new(header, out)?);
+    close(length.map_err(|_| FrameError::Space)?, out)
 }
 
 /// As [`encode`], for a body that is already bytes.
 pub fn encode_bytes(header: Header, body: &[u8], out: &mut [u8]) -> Result<usize, FrameError> {
-    let mut raw = [0u8; MAX_RAW];
-    raw.get_mut(HEADER..HEADER + MAX_BODY)
-        .and_then(|space| space.get_mut(..body.len()))
-        .ok_or(FrameError::Space)?
-        .copy_from_slice(body);
-    seal(header, &mut raw, body.len(), out)
+    let mut writer = Writer::new(header, out)?;
+    let length = writer.try_extend(body).and_then(|()| writer.finalize());
+    close(length.map_err(|_| FrameError::Space)?, out)
 }
 
-fn seal(header: Header, raw: &mut [u8; MAX_RAW], body: usize, out: &mut [u8]) -> Result<usize, FrameError> {
-    raw[0] = header.kind as u8;
-    raw[1] = header.id;
-    raw[2..4].copy_from_slice(&header.sequence.to_le_bytes());
-    let end = HEADER + body;
-    let check = crc32(&raw[..end]);
-    raw[end..end + CHECK].copy_from_slice(&check.to_le_bytes());
-    let raw = &raw[..end + CHECK];
-    if out.len() <= cobs::max_encoding_length(raw.len()) {
-        return Err(FrameError::Space);
+/// A frame on its way out. Each byte is checked and stuffed as it comes, so that a message is never held a second time.
+struct Writer<'a> {
+    wire: CobsEncoder<'a>,
+    check: Digest<'static, u32>,
+    /// Bytes that there is still room for.
+    room: usize,
+}
+
+impl<'a> Writer<'a> {
+    fn new(header: Header, out: &'a mut [u8]) -> Result<Self, FrameError> {
+        let mut writer = Self { wire: CobsEncoder::new(out), check: check::begin(), room: HEADER + MAX_BODY };
+        let [low, high] = header.sequence.to_le_bytes();
+        writer.try_extend(&[header.kind as u8, header.id, low, high]).map_err(|_| FrameError::Space)?;
+        Ok(writer)
     }
-    let length = cobs::encode(raw, out);
-    out[length] = 0;
+}
+
+// Neither function is grown into the code of each message: that would be most of what messages take of a small flash.
+impl Flavor for Writer<'_> {
+    /// The length without the closing zero.
+    type Output = usize;
+
+    #[inline(never)]
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        self.try_extend(&[byte])
+    }
+
+    #[inline(never)]
+    fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
+        self.room = self.room.checked_sub(bytes.len()).ok_or(postcard::Error::SerializeBufferFull)?;
+        self.check.update(bytes);
+        self.wire.push(bytes).map_err(|_| postcard::Error::SerializeBufferFull)
+    }
+
+    #[inline(never)]
+    fn finalize(mut self) -> postcard::Result<usize> {
+        let check = self.check.finalize().to_le_bytes();
+        self.wire.push(&check).map_err(|_| postcard::Error::SerializeBufferFull)?;
+        Ok(self.wire.finalize())
+    }
+}
+
+/// Puts the zero behind a frame.
+fn close(length: usize, out: &mut [u8]) -> Result<usize, FrameError> {
+    *out.get_mut(length).ok_or(FrameError::Space)? = 0;
     Ok(length + 1)
 }
 
 /// Decodes one frame in place: the stuffed bytes, without the closing zero.
 pub fn decode(stuffed: &mut [u8]) -> Result<Frame<'_>, FrameError> {
+    let (header, body) = unstuff(stuffed)?;
+    Ok(Frame { header, body: &stuffed[HEADER..HEADER + body] })
+}
+
+/// The head of a frame and the length of its body, which is left behind where the head was.
+fn unstuff(stuffed: &mut [u8]) -> Result<(Header, usize), FrameError> {
     let length = cobs::decode_in_place(stuffed).map_err(|_| FrameError::Stuffing)?;
     let raw = &stuffed[..length];
     if raw.len() < HEADER + CHECK {
@@ -158,7 +197,38 @@ pub fn decode(stuffed: &mut [u8]) -> Result<Frame<'_>, FrameError> {
     }
     let kind = Kind::from_code(checked[0]).ok_or(FrameError::Kind)?;
     let sequence = u16::from_le_bytes([checked[2], checked[3]]);
-    Ok(Frame { header: Header { kind, id: checked[1], sequence }, body: &checked[HEADER..] })
+    Ok((Header { kind, id: checked[1], sequence }, checked.len() - HEADER))
+}
+
+/// A frame that has come, and the room for its answer: the same bytes, one after the other, so that a small device needs them
+/// once.
+#[derive(Debug)]
+pub struct Exchange<'a> {
+    header: Header,
+    body: usize,
+    bytes: &'a mut [u8; MAX_WIRE],
+}
+
+impl<'a> Exchange<'a> {
+    /// The head of what has come.
+    pub fn header(&self) -> Header {
+        self.header
+    }
+
+    /// Its body.
+    pub fn body(&self) -> &[u8] {
+        &self.bytes[HEADER..HEADER + self.body]
+    }
+
+    /// Room for an answer; what has come is overwritten.
+    pub fn room(&mut self) -> &mut [u8; MAX_WIRE] {
+        self.bytes
+    }
+
+    /// The first bytes, when an answer is in them.
+    pub fn written(self, length: usize) -> &'a [u8] {
+        &self.bytes[..length]
+    }
 }
 
 /// Counts of what an [`Accumulator`] has seen.
@@ -216,6 +286,17 @@ impl Accumulator {
     ///
     /// Zeros in a row are no frames and no errors: a sender may flush the line with them.
     pub fn push(&mut self, byte: u8) -> Option<Result<Frame<'_>, FrameError>> {
+        let frame = self.take(byte)?;
+        Some(frame.map(|(header, body)| Frame { header, body: &self.buffer[HEADER..HEADER + body] }))
+    }
+
+    /// The same for whoever answers in the place of what has come.
+    pub fn push_to_answer(&mut self, byte: u8) -> Option<Result<Exchange<'_>, FrameError>> {
+        let frame = self.take(byte)?;
+        Some(frame.map(|(header, body)| Exchange { header, body, bytes: &mut self.buffer }))
+    }
+
+    fn take(&mut self, byte: u8) -> Option<Result<(Header, usize), FrameError>> {
         if byte != 0 {
             if self.length < self.buffer.len() {
                 self.buffer[self.length] = byte;
@@ -233,7 +314,7 @@ impl Accumulator {
         if length == 0 {
             return None;
         }
-        let frame = decode(&mut self.buffer[..length]);
+        let frame = unstuff(&mut self.buffer[..length]);
         match frame {
             Ok(_) => self.counts.good = self.counts.good.wrapping_add(1),
             Err(_) => self.counts.bad = self.counts.bad.wrapping_add(1),
@@ -316,7 +397,42 @@ mod tests {
         assert_eq!(frames(&mut accumulator, &wire[..n]), (1, 0));
     }
 
+    #[test]
+    fn an_answer_is_written_over_what_it_answers() {
+        let asked = Header { kind: Kind::Request, id: 9, sequence: 300 };
+        let mut wire = [0u8; MAX_WIRE];
+        let n = encode(asked, &[7u8, 0, 0, 200, 13], &mut wire).expect("fits");
+        let mut device = Accumulator::new();
+        for &byte in &wire[..n - 1] {
+            assert!(device.push(byte).is_none());
+        }
+        let mut exchange = device.push_to_answer(0).expect("a frame").expect("whole");
+        assert_eq!((exchange.header(), exchange.body()), (asked, &[7u8, 0, 0, 200, 13][..]));
+        let answered = Header { kind: Kind::Response, ..asked };
+        let length = encode_bytes(answered, &[5; MAX_BODY], exchange.room()).expect("the longest body fits");
+        let mut host = Accumulator::new();
+        assert_eq!(frames(&mut host, exchange.written(length)), (1, 0));
+        assert_eq!(
+            frames(&mut device, &wire[..n]),
+            (1, 0),
+            "the next is read as if nothing had been answered"
+        );
+    }
+
     proptest::proptest! {
+        #[test]
+        fn a_frame_is_the_stuffing_of_its_head_body_and_check(body in proptest::collection::vec(0u8..3, 0..MAX_BODY)) {
+            let header = Header { kind: Kind::Topic, id: 2, sequence: 256 };
+            let mut wire = [0u8; MAX_WIRE];
+            let n = encode_bytes(header, &body, &mut wire).expect("fits");
+            let mut raw = vec![3, 2, 0, 1];
+            raw.extend_from_slice(&body);
+            raw.extend_from_slice(&crc32(&raw).to_le_bytes());
+            let mut stuffed = [0u8; MAX_WIRE];
+            let length = cobs::encode(&raw, &mut stuffed);
+            proptest::prop_assert_eq!(&wire[..n], &stuffed[..=length]);
+        }
+
         #[test]
         fn bytes_of_any_kind_never_stop_the_next_frame(noise in proptest::collection::vec(0u8.., 0..2000)) {
             let header = Header { kind: Kind::Response, id: 2, sequence: 1 };

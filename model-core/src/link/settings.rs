@@ -80,13 +80,15 @@ pub struct Regulator {
     pub offset_pa: f32,
     /// Time constant of the lag, s.
     pub lag_s: f32,
+    /// Time in which the line fills the muscle at its rest length, s; it takes longer as the muscle widens.
+    pub line_s: f32,
     /// Largest rate of pressure, Pa/s.
     pub rate_pa_per_s: f32,
     /// Half width of the band within which the regulator does not answer, Pa.
     pub deadband_pa: f32,
     /// Largest command, Pa.
     pub command_max_pa: f32,
-    /// How much of the lag is inverted by lead: 0 none, 1 all.
+    /// How much of lag and line is inverted by lead: 1 all, 0 none, nor is anything added for what the pressure lacks.
     pub lead: f32,
 }
 
@@ -208,6 +210,7 @@ impl Default for Settings {
                 gain: 1.0,
                 offset_pa: 0.0,
                 lag_s: 0.03,
+                line_s: 0.0,
                 rate_pa_per_s: 20e6,
                 deadband_pa: 0.0,
                 command_max_pa: 650e3,

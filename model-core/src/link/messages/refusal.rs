@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{Fault, Mode, Side, State};
 
 /// Why a device refuses a request.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Refusal {
     /// The number is no endpoint of this schema.
     UnknownEndpoint,
@@ -32,6 +32,20 @@ pub enum Refusal {
     Range,
     /// This board cannot do that.
     NotSupported,
+    /// A joint at this angle has no such stiffness with both muscles taut and neither above its highest pressure.
+    Stiffness {
+        /// The least that it has, N·m/rad.
+        low_nm_per_rad: f32,
+        /// The greatest, N·m/rad.
+        high_nm_per_rad: f32,
+    },
+    /// At this angle no pressures keep both muscles of a joint taut.
+    Angle {
+        /// The least angle at which some do, rad.
+        low_rad: f32,
+        /// The greatest, rad.
+        high_rad: f32,
+    },
 }
 
 /// The setting or value that a refusal is about.

@@ -1,0 +1,119 @@
+//! The model in single precision as a controller runs it: each function once in a program, and compiled with this crate.
+//!
+//! Everything else here is generic, or marked to be compiled with whichever crate calls it. A controller's image is built for
+//! size; what it does a thousand times a second is built here, for speed (`profile.firmware` in the workspace's manifest).
+
+use crate::effects::{Chain, Context};
+use crate::inverse::{Search, Solution};
+use crate::motion::{Motion, MotionTracker};
+use crate::muscle::{Held, Moment, Muscle, Parts};
+use crate::units::{Force, Length, Pressure};
+
+/// [`Muscle::force`].
+#[inline(never)]
+pub fn force(
+    muscle: &Muscle<f32>,
+    pressure: Pressure<f32>,
+    stroke: Length<f32>,
+    direction: f32,
+) -> Force<f32> {
+    muscle.force(pressure, stroke, direction)
+}
+
+/// [`Muscle::held`], into its place.
+#[inline(never)]
+pub fn hold(muscle: &Muscle<f32>, held: &mut Held<f32>, stroke: Length<f32>) {
+    *held = muscle.held(stroke);
+}
+
+/// Both for one tick: the shape into its place, and the force there.
+#[inline(never)]
+pub fn pose(
+    muscle: &Muscle<f32>,
+    held: &mut Held<f32>,
+    stroke: Length<f32>,
+    pressure: Pressure<f32>,
+    direction: f32,
+) -> Force<f32> {
+    *held = muscle.held(stroke);
+    muscle.pull(muscle.force_posed(&held.posture, pressure, direction))
+}
+
+/// [`Muscle::parts`].
+#[inline(never)]
+pub fn parts(muscle: &Muscle<f32>, held: &Held<f32>, pressure: Pressure<f32>) -> Parts<f32> {
+    muscle.parts(held, pressure)
+}
+
+/// [`Muscle::stroke_slope`].
+#[inline(never)]
+pub fn stroke_slope(muscle: &Muscle<f32>, held: &Held<f32>, pressure: Pressure<f32>) -> f32 {
+    muscle.stroke_slope(held, &muscle.slopes(held), pressure)
+}
+
+/// [`Muscle::pressure_for`].
+#[inline(never)]
+pub fn pressure_for(
+    muscle: &Muscle<f32>,
+    held: &Held<f32>,
+    direction: f32,
+    force: Force<f32>,
+    guess: Pressure<f32>,
+    search: &Search<f32>,
+) -> Solution<f32> {
+    muscle.pressure_for(force, held, direction, guess, search)
+}
+
+/// The same for a stroke that nothing else is asked about.
+#[inline(never)]
+pub fn pressure_at(
+    muscle: &Muscle<f32>,
+    stroke: Length<f32>,
+    direction: f32,
+    force: Force<f32>,
+    guess: Pressure<f32>,
+    search: &Search<f32>,
+) -> Solution<f32> {
+    muscle.pressure_for(force, &muscle.held(stroke), direction, guess, search)
+}
+
+/// [`Muscle::pressure_with`].
+#[inline(never)]
+pub fn pressure_with(
+    muscle: &Muscle<f32>,
+    chain: &Chain<f32>,
+    moment: &Moment<f32>,
+    force: Force<f32>,
+    guess: Pressure<f32>,
+    search: &Search<f32>,
+) -> Solution<f32> {
+    if chain.depends_on_pressure() {
+        return muscle.pressure_by_search(force, chain, moment, guess, search);
+    }
+    let rest = Force::from_newtons(force.newtons() - effects(chain, &moment.context));
+    pressure_for(muscle, &moment.held, moment.context.direction, rest, guess, search)
+}
+
+/// [`Muscle::update`].
+#[inline(never)]
+pub fn update(muscle: &Muscle<f32>, moment: &mut Moment<f32>, motion: &Motion<f32>, pressure: Pressure<f32>) {
+    muscle.update(moment, motion, pressure);
+}
+
+/// [`Chain::step`].
+#[inline(never)]
+pub fn step(chain: &mut Chain<f32>, context: &Context<f32>) {
+    chain.step(context);
+}
+
+/// [`Chain::force`].
+#[inline(never)]
+pub fn effects(chain: &Chain<f32>, context: &Context<f32>) -> f32 {
+    chain.force(context)
+}
+
+/// [`MotionTracker::step`].
+#[inline(never)]
+pub fn follow(tracker: &mut MotionTracker<f32>, dt: f32, stroke: f32, pressure: f32) -> &Motion<f32> {
+    tracker.step(dt, stroke, pressure)
+}
