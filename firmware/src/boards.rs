@@ -5,6 +5,8 @@ mod mps2_an386;
 #[cfg(feature = "nucleo-f446re")]
 mod nucleo_f446re;
 
+mod memory;
+
 /// A line of the log, where logs are built in.
 #[allow(unused_macros, reason = "not every board logs")]
 macro_rules! log {

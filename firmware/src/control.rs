@@ -12,10 +12,14 @@ use model_core::link::messages::{
 };
 use model_core::link::settings::{FeedForward, Reaction, Settings};
 use model_core::motion::{MotionSettings, MotionTracker};
+use model_core::single;
+use model_core::table::{MuscleTable, TableError};
 
 use crate::board::{Command, Inputs, Outputs, Readings};
-use crate::modes::{Model, PairState};
+use crate::modes::{Model, Seat};
+use crate::pair::{self, Arm, PairState};
 use crate::reference::Generator;
+use crate::regulator;
 use crate::safety::{self, Cause, Machine};
 use crate::tick::{TICK_S, TICK_US};
 use crate::trace::Trace;
@@ -40,7 +44,7 @@ fn motion_settings(settings: &Settings) -> MotionSettings<f32> {
 }
 
 /// The whole controller but for its board, its link and its store.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Controller {
     settings: Settings,
     machine: Machine,
@@ -48,6 +52,9 @@ pub struct Controller {
     generator: Generator,
     asked: f32,
     asked_second: f32,
+    /// What will be asked when a command of this tick has come to act, as far as it is known, and how it came there in this tick.
+    coming: f32,
+    coming_step: f32,
     asked_age: u32,
     /// Ticks since a host's last frame.
     host_age: u32,
@@ -79,17 +86,24 @@ pub struct Stepped {
 }
 
 impl Controller {
-    /// As after power-up: disarmed, vented, without tables.
+    /// As after power-up: disarmed, vented, without tables; for two muscles.
     pub fn new(settings: Settings) -> Self {
+        Self::seated(settings, Seat::pair())
+    }
+
+    /// The same with places for the tables of the muscles that a board drives.
+    pub fn seated(settings: Settings, seats: [Seat; 2]) -> Self {
         Self {
             machine: Machine::default(),
             mode: Mode::Vent,
             generator: Generator::default(),
             asked: 0.0,
             asked_second: 0.0,
+            coming: 0.0,
+            coming_step: 0.0,
             asked_age: 0,
             host_age: 0,
-            sides: [Actuator::new(&settings), Actuator::new(&settings)],
+            sides: seats.map(|seat| Actuator::new(&settings, seat)),
             settings,
             pair: PairState::default(),
             tick: 0,
@@ -180,9 +194,17 @@ impl Controller {
         self.sides[side.index()].model.as_mut()
     }
 
-    /// Uses another table, or none.
-    pub fn use_model(&mut self, side: Side, model: Option<Model>) {
-        self.sides[side.index()].model = model;
+    /// Uses another table from now on.
+    ///
+    /// # Errors
+    /// The number of the table that cannot be used; there is none in use then.
+    pub fn use_table(&mut self, side: Side, table: &MuscleTable) -> Result<(), TableError> {
+        self.sides[side.index()].model.fill(table)
+    }
+
+    /// Uses no table.
+    pub fn forget_table(&mut self, side: Side) {
+        self.sides[side.index()].model.clear();
     }
 
     /// A whole frame of a host has come.
@@ -264,7 +286,13 @@ impl Controller {
             side.cut = 0.0;
             side.watch = SideWatch::default();
         }
-        self.pair.begin(first.pressure_pa.min(self.sides[1].sample.pressure_pa));
+        if mode == Mode::Pair
+            && let Some(arms) = self.arms()
+        {
+            let mut pair = self.pair;
+            pair.begin(arms);
+            self.pair = pair;
+        }
         self.trace.on_start();
         Ok(())
     }
@@ -311,7 +339,8 @@ impl Controller {
     /// A new set-point; ends a reference.
     ///
     /// # Errors
-    /// [`Refusal::WrongMode`] where it is not the running mode's, [`Refusal::Value`] where it is no finite number.
+    /// [`Refusal::WrongMode`] where it is not the running mode's, [`Refusal::Value`] where it is no finite number,
+    /// [`Refusal::Angle`] or [`Refusal::Stiffness`] where a joint cannot have it.
     pub fn set_point(&mut self, set_point: SetPoint) -> Result<(), Refusal> {
         let (mode, asked, second) = match set_point {
             SetPoint::Pressure(pascals) => (Mode::Pressure, pascals, 0.0),
@@ -328,22 +357,53 @@ impl Controller {
         if !(asked.is_finite() && second.is_finite()) || second < 0.0 {
             return Err(Refusal::Value(Field::SetPoint));
         }
+        if mode == Mode::Pair {
+            self.can_pose(asked, second)?;
+        }
         self.generator.begin(Reference::SetPoint)?;
         (self.asked, self.asked_second) = (asked, second);
         self.asked_age = 0;
         Ok(())
     }
 
+    /// Both muscles of a joint, if both have tables.
+    fn arms(&self) -> Option<[Arm<'_>; 2]> {
+        let [first, second] = &self.sides;
+        Some([self.arm_of(first)?, self.arm_of(second)?])
+    }
+
+    fn arm_of<'a>(&self, side: &'a Actuator) -> Option<Arm<'a>> {
+        let model = side.model.as_ref()?;
+        let Settings { regulator, limits, .. } = &self.settings;
+        let reached_pa = regulator.gain * (regulator.command_max_pa + regulator.offset_pa);
+        let high_pa = model.muscle.max_pressure().pascals().min(limits.pressure_pa).min(reached_pa);
+        Some(Arm { model, pressure_pa: side.guess_pa, high_pa })
+    }
+
+    /// Whether a joint can have an angle and a stiffness.
+    fn can_pose(&self, angle_rad: f32, stiffness_nm_per_rad: f32) -> Result<(), Refusal> {
+        let arms = self.arms().ok_or(Refusal::WrongMode(self.mode))?;
+        pair::check(&self.settings.joint, arms, angle_rad, stiffness_nm_per_rad)
+    }
+
     /// A wave of the device's own.
     ///
     /// # Errors
-    /// As [`Generator::begin`]; [`Refusal::WrongMode`] while venting.
+    /// As [`Generator::begin`]; [`Refusal::WrongMode`] while venting; [`Refusal::Angle`] or [`Refusal::Stiffness`] where a joint
+    /// cannot have an end of the wave.
     pub fn reference(&mut self, reference: Reference) -> Result<(), Refusal> {
         self.running()?;
         if self.mode == Mode::Vent {
             return Err(Refusal::WrongMode(Mode::Vent));
         }
+        if self.mode == Mode::Pair {
+            let (low, high) = self.generator.range(reference);
+            self.can_pose(low, self.asked_second)?;
+            self.can_pose(high, self.asked_second)?;
+        }
         self.generator.begin(reference)?;
+        // Here, so that no tick has all of it to do.
+        self.generator.look_ahead(regulator::ahead(&self.settings.regulator));
         self.asked_age = 0;
         self.trace.on_start();
         Ok(())
@@ -406,14 +466,24 @@ impl Controller {
             }
         }
         if self.machine.state() == State::Running {
-            if let Some(value) = self.generator.step() {
-                self.asked = value;
-            }
+            self.ask();
             self.drive();
         } else {
             self.rest();
         }
         self.record()
+    }
+
+    /// Brings what is asked to this tick. A wave of the device's own is known ahead of its time, a host's set-points are not.
+    fn ask(&mut self) {
+        match self.generator.step_ahead(regulator::ahead(&self.settings.regulator)) {
+            Some((now, coming)) => {
+                self.asked = now;
+                self.coming_step = coming - self.coming;
+                self.coming = coming;
+            }
+            None => (self.coming, self.coming_step) = (self.asked, 0.0),
+        }
     }
 
     /// Takes one muscle's readings; the force that its table gives at them.
@@ -428,7 +498,7 @@ impl Controller {
         if !(pressure_pa.is_finite() && stroke_m.is_finite()) {
             return None;
         }
-        let motion = actuator.motion.step(TICK_S, stroke_m, pressure_pa);
+        let motion = single::follow(&mut actuator.motion, TICK_S, stroke_m, pressure_pa);
         let model_n = actuator.model.as_mut()?.tick(motion, pressure_pa);
         actuator.sample.model_n = model_n;
         Some(model_n)

@@ -8,6 +8,8 @@
 #![no_std]
 #![no_main]
 
+#[path = "boards/memory.rs"]
+mod memory;
 #[path = "boards/mps2_an386/semihosting.rs"]
 #[allow(dead_code, reason = "this image needs no files")]
 mod semihosting;
@@ -23,13 +25,13 @@ use firmware::control::Controller;
 use firmware::modes::Model;
 use model_core::effects::{EffectName, FittedEffect, MAX_PARAMETERS};
 use model_core::image;
-use model_core::inverse::Search;
 use model_core::link::messages::{Mode, Reference, Side};
 use model_core::link::settings::Settings;
 use model_core::motion::Motion;
 use model_core::muscle::Muscle;
+use model_core::single;
 use model_core::table::{self, MuscleTable};
-use model_core::units::{Force, Length, Pressure};
+use model_core::units::{Length, Pressure};
 use static_cell::StaticCell;
 
 /// This image serves no interrupts.
@@ -146,24 +148,6 @@ fn sweep(mut at: impl FnMut(f32, f32, f32)) {
     }
 }
 
-/// As a program calls it: not grown into the loop that counts.
-#[inline(never)]
-fn force_of(muscle: &Muscle<f32>, pressure: Pressure<f32>, stroke: Length<f32>, s: f32) -> f32 {
-    muscle.force(pressure, stroke, s).newtons()
-}
-
-#[inline(never)]
-fn pressure_of(
-    muscle: &Muscle<f32>,
-    wanted: Force<f32>,
-    stroke: Length<f32>,
-    s: f32,
-    guess: Pressure<f32>,
-    search: &Search<f32>,
-) -> f32 {
-    muscle.pressure_for(wanted, &muscle.held(stroke), s, guess, search).pressure.pascals()
-}
-
 #[inline(never)]
 fn direct_force_of(port: &Direct, table: &MuscleTable, p: f32, x: f32, s: f32) -> f32 {
     port.force(table, p, x, s)
@@ -178,12 +162,12 @@ fn functions(table: &MuscleTable, muscle: &Muscle<f32>) {
     sweep(|p, x, s| {
         let (pressure, stroke) = (Pressure::from_pascals(p), Length::from_metres(x));
         force.add(instructions(64, (pressure, stroke, s), |(pressure, stroke, s)| {
-            force_of(muscle, pressure, stroke, s)
+            single::force(muscle, pressure, stroke, s)
         }));
-        let wanted = muscle.force(pressure, stroke, s);
+        let wanted = single::force(muscle, pressure, stroke, s);
         let guess = Pressure::from_pascals(p + 5e3);
         inverse.add(instructions(64, (wanted, stroke, s, guess), |(wanted, stroke, s, guess)| {
-            pressure_of(muscle, wanted, stroke, s, guess, &search)
+            single::pressure_at(muscle, stroke, s, wanted, guess, &search)
         }));
         if let Some(port) = &port {
             direct.add(instructions(16, (p, x, s), |(p, x, s)| direct_force_of(port, table, p, x, s)));
@@ -197,9 +181,10 @@ fn functions(table: &MuscleTable, muscle: &Muscle<f32>) {
 /// The whole 1 kHz step in force control: muscle moving, wave of force, telemetry at every tenth tick.
 fn whole_step(table: &MuscleTable) {
     static CONTROLLER: StaticCell<Controller> = StaticCell::new();
-    let Ok(model) = Model::build(table) else { return };
     let controller = CONTROLLER.init_with(|| Controller::new(Settings::default()));
-    controller.use_model(Side::Agonist, Some(model));
+    if controller.use_table(Side::Agonist, table).is_err() {
+        return;
+    }
     let inputs = |pressure_pa, stroke_m, force_n| Inputs {
         sides: [Some(Readings { pressure_pa, stroke_m, force_n }), None],
         ..Inputs::default()

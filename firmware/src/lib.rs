@@ -3,7 +3,8 @@
 //! | where is … | |
 //! | --- | --- |
 //! | the control step, one pure function | [`control`] |
-//! | pressure for force, stroke, a pair of muscles | [`modes`] |
+//! | pressure for force and stroke | [`modes`] |
+//! | a joint of two muscles: angle, stiffness, what can be had | [`pair`] |
 //! | states and faults, each in one table | [`safety`] |
 //! | how faults are noticed | [`watch`] |
 //! | sine, trapezoid, chirp, table | [`mod@reference`] |
@@ -12,6 +13,7 @@
 //! | tables and settings in flash | [`store`] |
 //! | answers to the host | [`server`] |
 //! | what the tasks share | [`shared`] |
+//! | places for what is large | [`room`] |
 //! | the tasks that a board starts | [`tasks`] |
 //! | the length of a tick | [`tick`] |
 //! | what a board must give | [`board`] |
@@ -29,8 +31,10 @@ pub mod log;
 pub mod modes;
 #[cfg(feature = "native")]
 pub mod native;
+pub mod pair;
 pub mod reference;
 pub mod regulator;
+pub mod room;
 pub mod safety;
 pub mod server;
 pub mod shared;

@@ -1,13 +1,17 @@
 //! Which pressure a mode wants: the mathematics between a set-point and the regulator.
 
 use model_core::effects::{Chain, EffectName};
-use model_core::inverse::{Reach, Search, Solution};
-use model_core::link::settings::{FeedForward, ForceLoop, Joint, Settings, StrokeLoop};
+use model_core::inverse::{Reach, Search};
+use model_core::link::settings::{FeedForward, ForceLoop, Settings, StrokeLoop};
 use model_core::motion::{Motion, Slide};
 use model_core::muscle::{Held, Moment, Muscle};
+use model_core::scalar::Scalar;
+use model_core::single;
 use model_core::table::{MuscleTable, TableError};
 use model_core::units::{Force, Length, Pressure};
 
+use crate::regulator::Air;
+use crate::room::{Room, room};
 use crate::tick::TICK_S;
 
 /// A muscle's table in use: the form that is evaluated, its effects with what they remember, and the present tick.
@@ -25,8 +29,17 @@ pub struct Model {
     per_metre: f32,
     per_pascal: f32,
     last: Option<(f32, f32)>,
+    /// Travel that has not left the play, in distances.
+    held_back: f32,
+    /// Time since another force was wanted, s, and that force.
+    calm_s: f32,
+    wanted_n: f32,
     /// `∂F/∂P` where the last search ended, N/Pa.
     slope: f32,
+    /// Least force at which the muscle surely pulls, N.
+    taut_n: f32,
+    /// `1/V₀`, 1/m³.
+    inv_rest_volume: f32,
 }
 
 /// Travel over which friction goes over, as a part of the tested contraction: some micrometres of a small muscle, some tens of a
@@ -35,6 +48,13 @@ const SLIDE: f32 = 2.0e-3;
 /// The part of the free motion that strands slip at held length. Half of what [`model_core::effects::BraidTravel`] takes: friction
 /// that goes over with the pressure asks for more pressure, and must not ask for more than what turned it.
 const SLIP: f32 = 0.025;
+/// Play of the travel that turns friction, in distances: noise of the stroke sensor stays within. While the same force is wanted
+/// for some time, in s, it is wide: a compensation of friction that followed every wiggle would feed the wiggle.
+const PLAY: f32 = 0.05;
+const PLAY_CALM: f32 = 20.0;
+const CALM_S: f32 = 0.2;
+/// Part of blocked force at which a muscle surely pulls, whatever its table leaves out.
+const TAUT: f32 = 0.02;
 
 impl Model {
     /// Builds it from a table.
@@ -42,24 +62,56 @@ impl Model {
     /// # Errors
     /// The number of the table that cannot be used.
     pub fn build(table: &MuscleTable) -> Result<Self, TableError> {
-        let muscle = Muscle::<f32>::build(table)?;
-        let now = muscle.moment();
-        let reach_m = table.tested.contraction_high.max(1.0e-2) * muscle.braid().rest_length();
-        let distance_m = SLIDE * reach_m;
-        // Free, the muscle would go all its way for the pressure that holds its blocked force.
-        let blocked_pa = table.blocked_force.newtons().abs().max(1.0e-3) / now.held.posture.area;
-        let slip = SLIP * reach_m / blocked_pa.abs().max(1.0);
-        let knows = table.effects.iter().any(|e| e.effect == EffectName::PreslidingHysteresis);
-        Ok(Self {
-            chain: Chain::resumed(&table.effects),
-            slide: (!knows).then(Slide::default),
-            per_metre: 1.0 / distance_m,
-            per_pascal: slip / distance_m,
+        let mut model = Self::blank();
+        model.rebuild(table)?;
+        Ok(model)
+    }
+
+    /// A place for [`Model::rebuild`].
+    pub const fn blank() -> Self {
+        Self {
+            chain: Chain::none(),
+            slide: None,
+            per_metre: 0.0,
+            per_pascal: 0.0,
             last: None,
-            slope: now.held.posture.area,
-            now,
-            muscle,
-        })
+            held_back: 0.0,
+            calm_s: 0.0,
+            wanted_n: 0.0,
+            slope: 0.0,
+            inv_rest_volume: 0.0,
+            taut_n: 0.0,
+            now: Moment::NONE,
+            muscle: Muscle::blank(),
+        }
+    }
+
+    /// As [`Model::build`], in a place that is there already: it is kept once and never moved.
+    ///
+    /// # Errors
+    /// As [`Model::build`]; what was in the place is lost then.
+    pub fn rebuild(&mut self, table: &MuscleTable) -> Result<(), TableError> {
+        self.muscle.rebuild(table)?;
+        self.chain.resume(&table.effects);
+        self.now = self.muscle.moment();
+        let reach_m = table.tested.contraction_high.at_least(1.0e-2) * self.muscle.braid().rest_length();
+        let distance_m = SLIDE * reach_m;
+        let area = self.now.held.posture.area;
+        // Free, the muscle would go all its way for the pressure that holds its blocked force.
+        let blocked_pa = table.blocked_force.newtons().abs().at_least(1.0e-3) / area;
+        let slip = SLIP * reach_m / blocked_pa.abs().at_least(1.0);
+        let knows = table.effects.iter().any(|e| e.effect == EffectName::PreslidingHysteresis);
+        self.slide = (!knows).then(Slide::default);
+        self.per_metre = 1.0 / distance_m;
+        self.per_pascal = slip / distance_m;
+        self.last = None;
+        self.held_back = 0.0;
+        self.calm_s = 0.0;
+        self.wanted_n = 0.0;
+        self.slope = area;
+        self.inv_rest_volume = 1.0 / self.muscle.braid().gas_volume(&self.now.held.posture).at_least(1.0e-12);
+        self.taut_n = TAUT * table.blocked_force.newtons().abs();
+        Ok(())
     }
 
     /// Direction of friction at these readings.
@@ -67,6 +119,12 @@ impl Model {
         let now = (motion.stroke, pressure_pa);
         let (stroke, pressure) = self.last.replace(now).unwrap_or(now);
         let travel = (motion.stroke - stroke) * self.per_metre + (pressure_pa - pressure) * self.per_pascal;
+        let play = if self.calm_s < CALM_S { PLAY } else { PLAY_CALM };
+        self.calm_s += motion.dt;
+        // What a change of the play leaves over is forgotten, not travelled.
+        let back = self.held_back.within(-play, play) + travel;
+        self.held_back = back.within(-play, play);
+        let travel = back - self.held_back;
         self.slide.as_mut().map_or(motion.direction, |slide| slide.step(travel))
     }
 
@@ -76,16 +134,15 @@ impl Model {
         let Self { muscle, chain, now, .. } = self;
         let pressure = Pressure::from_pascals(pressure_pa);
         let newtons = if chain.is_empty() {
-            now.held = muscle.held(Length::from_metres(motion.stroke));
             now.context.direction = direction;
-            muscle.force_posed(&now.held.posture, pressure, direction)
+            single::pose(muscle, &mut now.held, Length::from_metres(motion.stroke), pressure, direction)
         } else {
-            muscle.update(now, motion, pressure);
+            single::update(muscle, now, motion, pressure);
             now.context.direction = direction;
-            chain.step(&now.context);
-            now.context.force() + chain.force(&now.context)
+            single::step(chain, &now.context);
+            muscle.pull(now.context.force() + single::effects(chain, &now.context))
         };
-        muscle.pull(newtons).newtons()
+        newtons.newtons()
     }
 
     /// Direction of friction in this tick.
@@ -98,15 +155,32 @@ impl Model {
         &self.now.held
     }
 
+    /// The air in it at this tick's stroke and a speed of contraction, m/s: its volume grows by the braid's area times the
+    /// stroke.
+    pub fn air(&self, speed_m_per_s: f32) -> Air {
+        let Self { muscle, now, inv_rest_volume, .. } = self;
+        let posture = &now.held.posture;
+        let volume = muscle.braid().gas_volume(posture).at_least(0.1 / inv_rest_volume);
+        Air { fill: volume * inv_rest_volume, widening_per_s: posture.area * speed_m_per_s / volume }
+    }
+
+    /// Least force at which the muscle surely pulls, N.
+    pub fn taut_n(&self) -> f32 {
+        self.taut_n
+    }
+
     /// The pressure for a wanted force in this tick, and whether it can be had.
     pub fn pressure_for(&mut self, force_n: f32, guess_pa: f32) -> (f32, bool) {
+        if force_n != self.wanted_n {
+            (self.wanted_n, self.calm_s) = (force_n, 0.0);
+        }
         let search = Search { tolerance: Pressure::from_pascals(20.0), ..self.muscle.search() };
         let force = Force::from_newtons(force_n);
         let guess = Pressure::from_pascals(guess_pa);
         let found = if self.chain.is_empty() {
-            base_pressure(&self.muscle, &self.now.held, self.direction(), force, guess, &search)
+            single::pressure_for(&self.muscle, &self.now.held, self.direction(), force, guess, &search)
         } else {
-            self.muscle.pressure_with(force, &self.chain, &self.now, guess, &search)
+            single::pressure_with(&self.muscle, &self.chain, &self.now, force, guess, &search)
         };
         self.slope = found.slope;
         (found.pressure.pascals(), found.reach == Reach::Reached)
@@ -125,22 +199,66 @@ impl Model {
             return (high, false);
         }
         let free = force_n / area;
-        let limited = free.clamp(0.0, high);
+        let limited = free.within(0.0, high);
         (limited, limited == free)
     }
 }
 
-/// [`Muscle::pressure_for`], once in the image for all who ask.
-#[inline(never)]
-pub fn base_pressure(
-    muscle: &Muscle<f32>,
-    held: &Held<f32>,
-    direction: f32,
-    force: Force<f32>,
-    guess: Pressure<f32>,
-    search: &Search<f32>,
-) -> Solution<f32> {
-    muscle.pressure_for(force, held, direction, guess, search)
+/// The place of one muscle's table.
+#[derive(Debug)]
+pub struct Seat {
+    model: Option<Room<Model>>,
+    taken: bool,
+}
+
+impl Seat {
+    /// Empty ones of a board that drives two muscles.
+    pub fn pair() -> [Self; 2] {
+        [room!(Model, Model::blank()), room!(Model, Model::blank())]
+            .map(|model| Self { model: Some(model), taken: false })
+    }
+
+    /// The same where there is no second muscle, and no memory for its table.
+    pub fn single() -> [Self; 2] {
+        let first = room!(Model, Model::blank());
+        [Some(first), None].map(|model| Self { model, taken: false })
+    }
+
+    /// The table in use.
+    #[inline(always)]
+    pub fn as_ref(&self) -> Option<&Model> {
+        match &self.model {
+            Some(model) if self.taken => Some(model),
+            _ => None,
+        }
+    }
+
+    /// The same, to bring it to a tick.
+    #[inline(always)]
+    pub fn as_mut(&mut self) -> Option<&mut Model> {
+        match &mut self.model {
+            Some(model) if self.taken => Some(model),
+            _ => None,
+        }
+    }
+
+    /// Puts a table here; a muscle that the board does not have gets none.
+    ///
+    /// # Errors
+    /// The number of the table that cannot be used; the place is empty then.
+    pub fn fill(&mut self, table: &MuscleTable) -> Result<(), TableError> {
+        self.taken = false;
+        if let Some(model) = &mut self.model {
+            model.rebuild(table)?;
+            self.taken = true;
+        }
+        Ok(())
+    }
+
+    /// Uses no table.
+    pub fn clear(&mut self) {
+        self.taken = false;
+    }
 }
 
 /// The feed-forward pressure of a wanted force, Pa; without a table there is none.
@@ -174,9 +292,9 @@ impl Integral {
 
     /// One tick of `rate`, unless `cut` (last tick's command was limited) and the error points the way of the limit
     /// (`toward`: the sign of what was cut off).
-    fn step(&mut self, rate: f32, limit: f32, cut: f32) {
+    pub(crate) fn step(&mut self, rate: f32, limit: f32, cut: f32) {
         if cut * rate <= 0.0 {
-            self.0 = (self.0 + rate * TICK_S).clamp(-limit, limit);
+            self.0 = (self.0 + rate * TICK_S).within(-limit, limit);
         }
     }
 }
@@ -194,14 +312,14 @@ pub fn trim(force_loop: &ForceLoop, integral: &mut Integral, error_n: f32, cut: 
         return 0.0;
     }
     integral.step(force_loop.integral_pa_per_n_s * error_n, limit, cut);
-    (force_loop.proportional_pa_per_n * error_n + integral.value()).clamp(-limit, limit)
+    (force_loop.proportional_pa_per_n * error_n + integral.value()).within(-limit, limit)
 }
 
-/// Wanted force of the stroke loop, N.
+/// Wanted force of the stroke loop, N, for the stroke wanted now and the one that will be when a command acts.
 pub fn stroke_force(
     stroke_loop: &StrokeLoop,
     integral: &mut Integral,
-    wanted_m: f32,
+    [wanted_m, coming_m]: [f32; 2],
     stroke_m: f32,
     speed_m_per_s: f32,
     cut: f32,
@@ -209,79 +327,9 @@ pub fn stroke_force(
     let error = wanted_m - stroke_m;
     integral.step(stroke_loop.integral_n_per_m_s * error, stroke_loop.force_limit_n, cut);
     let force = stroke_loop.load_n
-        + stroke_loop.load_stiffness_n_per_m * wanted_m
+        + stroke_loop.load_stiffness_n_per_m * coming_m
         + stroke_loop.proportional_n_per_m * error
         + integral.value()
         - stroke_loop.damping_n_s_per_m * speed_m_per_s;
-    force.clamp(0.0, stroke_loop.force_limit_n)
-}
-
-/// What the pair's loop keeps.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PairState {
-    integral: Integral,
-    /// The common pressure that gives the wanted stiffness, Pa.
-    common_pa: f32,
-}
-
-/// What the joint is doing.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Posed {
-    /// Wanted angle, rad.
-    pub angle_rad: f32,
-    /// Wanted stiffness, N·m/rad.
-    pub stiffness_nm_per_rad: f32,
-    /// Measured angle, rad.
-    pub measured_rad: f32,
-    /// Its rate, rad/s.
-    pub rate_rad_per_s: f32,
-}
-
-impl PairState {
-    /// Begins anew at a common pressure.
-    pub fn begin(&mut self, common_pa: f32) {
-        *self = Self { integral: Integral::default(), common_pa: common_pa.max(0.0) };
-    }
-
-    /// Wanted forces of both muscles, N.
-    ///
-    /// The joint's stiffness at held pressures is `r² Σ −∂F_i/∂x`; one Newton step a tick moves the common pressure to where
-    /// it is the wanted one. Around the forces that this pressure gives, a torque is split evenly: `K θ*`, which moves the
-    /// equilibrium of that stiffness from zero to the wanted angle, and the angle's loop for what is left.
-    pub fn forces(&mut self, joint: &Joint, posed: &Posed, sides: [(&Model, f32); 2], cut: f32) -> [f32; 2] {
-        let r = joint.radius_m;
-        let probe_pa = 10e3;
-        let mut stiffness = [0.0; 2];
-        let mut common_n = [0.0; 2];
-        for ((model, stroke_m), common) in sides.into_iter().zip(&mut common_n) {
-            let h = model.muscle.braid().rest_length() * 1.0e-3;
-            let nearer = model.muscle.held(Length::from_metres(stroke_m - h));
-            let farther = model.muscle.held(Length::from_metres(stroke_m + h));
-            for (n, sum) in stiffness.iter_mut().enumerate() {
-                let p = Pressure::from_pascals(self.common_pa + n as f32 * probe_pa);
-                let fall = model.muscle.parts(&nearer, p).quasi() - model.muscle.parts(&farther, p).quasi();
-                *sum += r * r * fall / (2.0 * h);
-            }
-            *common = model
-                .muscle
-                .parts(model.held(), Pressure::from_pascals(self.common_pa))
-                .force(model.direction());
-        }
-        let high = sides[0].0.muscle.max_pressure().min(sides[1].0.muscle.max_pressure()).pascals();
-        let slope = (stiffness[1] - stiffness[0]) / probe_pa;
-        if slope > 0.0 {
-            // At most 1 kPa a tick, so that the forces never jump.
-            let step = ((posed.stiffness_nm_per_rad - stiffness[0]) / slope).clamp(-1e3, 1e3);
-            self.common_pa = (self.common_pa + step).clamp(0.0, high);
-        }
-        let error = posed.angle_rad - posed.measured_rad;
-        self.integral.step(joint.integral_nm_per_rad_s * error, joint.torque_limit_nm, cut);
-        let torque = (posed.stiffness_nm_per_rad * posed.angle_rad
-            + joint.proportional_nm_per_rad * error
-            + self.integral.value()
-            - joint.damping_nm_s_per_rad * posed.rate_rad_per_s)
-            .clamp(-joint.torque_limit_nm, joint.torque_limit_nm);
-        let share = torque / (2.0 * r);
-        [(common_n[0] + share).max(0.0), (common_n[1] - share).max(0.0)]
-    }
+    force.within(0.0, stroke_loop.force_limit_n)
 }

@@ -36,7 +36,7 @@ use std::time::{Duration, Instant};
 use embedded_storage_async::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
-use model_core::link::frame::{Accumulator, MAX_WIRE};
+use model_core::link::frame::{Accumulator, MAX_TOPIC};
 use model_core::link::hello::Board;
 use model_core::link::messages::StartedBy;
 use model_core::link::settings::Settings;
@@ -280,7 +280,7 @@ fn serve(
     stop: &AtomicBool,
     connected: &AtomicBool,
 ) {
-    let mut spoken = [0; MAX_WIRE];
+    let mut spoken = [0; MAX_TOPIC];
     while !stop.load(Ordering::Relaxed) {
         match listener.accept() {
             Ok((stream, _)) => {
@@ -316,7 +316,7 @@ fn talk(
     stream.set_write_timeout(Some(Duration::from_secs(2)))?;
     let mut accumulator = Accumulator::new();
     let mut bytes = [0; 1024];
-    let mut out = [0; MAX_WIRE];
+    let mut out = [0; MAX_TOPIC];
     while !stop.load(Ordering::Relaxed) {
         while let Some(length) = shared.next_spoken(&mut out) {
             stream.write_all(&out[..length])?;
@@ -335,9 +335,8 @@ fn talk(
         };
         for &byte in &bytes[..count] {
             server.note_counts(accumulator.counts());
-            let Some(Ok(request)) = accumulator.push(byte) else { continue };
-            let length = server.handle(&request, shared, &mut out);
-            stream.write_all(&out[..length])?;
+            let Some(Ok(request)) = accumulator.push_to_answer(byte) else { continue };
+            stream.write_all(server.handle(request, shared))?;
             if server.wants_restart() {
                 return Ok(());
             }

@@ -8,27 +8,44 @@ use heapless::Vec;
 use micromath::F32Ext;
 use model_core::link::messages::{Field, REFERENCE_PIECE, Reference, ReferencePoints, Refusal};
 
+use crate::room::{Room, room};
 use crate::tick::{TICK_S, TICKS_PER_S};
 
 /// Points that a reference table holds.
 pub const CAPACITY: usize = 256;
 
+/// Ticks that a wave can be looked at ahead of its time.
+const AHEAD: usize = 16;
+
 const TURN: f32 = 4_294_967_296.0;
 
 /// A generator at work.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Generator {
     reference: Reference,
     /// Ticks since it began.
     ticks: u32,
     phase: u32,
-    points: Vec<f32, CAPACITY>,
+    points: Room<Vec<f32, CAPACITY>>,
     last: f32,
+    /// The last values made, at their number; how many were made, and how many of these have had their time.
+    coming: [f32; AHEAD],
+    made: u32,
+    given: u32,
 }
 
 impl Default for Generator {
     fn default() -> Self {
-        Self { reference: Reference::SetPoint, ticks: 0, phase: 0, points: Vec::new(), last: 0.0 }
+        Self {
+            reference: Reference::SetPoint,
+            ticks: 0,
+            phase: 0,
+            points: room!(Vec<f32, CAPACITY>, Vec::new()),
+            last: 0.0,
+            coming: [0.0; AHEAD],
+            made: 0,
+            given: 0,
+        }
     }
 }
 
@@ -90,9 +107,25 @@ impl Generator {
             return Err(Refusal::Value(Field::Reference));
         }
         self.reference = reference;
+        self.given = self.made;
         self.ticks = 0;
         self.phase = 0;
         Ok(())
+    }
+
+    /// The least and the greatest value of a wave.
+    pub fn range(&self, reference: Reference) -> (f32, f32) {
+        match reference {
+            Reference::SetPoint => (self.last, self.last),
+            Reference::Sine { mean, amplitude, .. } | Reference::Chirp { mean, amplitude, .. } => {
+                (mean - amplitude.abs(), mean + amplitude.abs())
+            }
+            Reference::Trapezoid { low, high, .. } => (low.min(high), low.max(high)),
+            Reference::Table { .. } => {
+                let least = self.points.iter().copied().fold(f32::MAX, f32::min);
+                (least, self.points.iter().copied().fold(least, f32::max))
+            }
+        }
     }
 
     /// Takes points for the table; `offset` 0 begins a new one. Returns how many there are.
@@ -117,8 +150,29 @@ impl Generator {
         Ok(self.points.len() as u16)
     }
 
+    /// Makes the values of this tick and so many later ones, as far as they are not there yet: one each tick, and the first of them
+    /// when a wave begins. `None` when set-points come from the host.
+    pub fn look_ahead(&mut self, ticks: usize) -> Option<()> {
+        let ticks = ticks.min(AHEAD - 1) as u32;
+        while self.made.wrapping_sub(self.given) <= ticks {
+            let value = self.step()?;
+            self.coming[self.made as usize % AHEAD] = value;
+            self.made = self.made.wrapping_add(1);
+        }
+        Some(())
+    }
+
+    /// The value of this tick and that of so many ticks later (at most 15); `None` when set-points come from the host. Moves on
+    /// by one tick.
+    pub fn step_ahead(&mut self, ticks: usize) -> Option<(f32, f32)> {
+        self.look_ahead(ticks)?;
+        let now = self.coming[self.given as usize % AHEAD];
+        self.given = self.given.wrapping_add(1);
+        Some((now, self.last))
+    }
+
     /// The value of this tick; `None` when set-points come from the host. Moves on by one tick.
-    pub fn step(&mut self) -> Option<f32> {
+    fn step(&mut self) -> Option<f32> {
         let value = match self.reference {
             Reference::SetPoint => return None,
             Reference::Sine { mean, amplitude, frequency_hz } => {

@@ -1,15 +1,20 @@
-//! The pressure regulator: what it will do with a command, and which command makes it do what is wanted.
+//! The pressure regulator: what it and its line will do with a command, and which command makes the muscle have what is wanted.
 //!
 //! ```text
-//! target = gain · (command + offset)
-//! dp/dt  = clamp((target − p) / lag, ±rate), 0 while |target − p| < deadband
+//! target  = gain · (command + offset)
+//! dp₁/dt  = clamp((target − p₁) / lag, ±rate), 0 while |target − p₁| < deadband         at the regulator
+//! dp/dt   = (p₁ − p) / (line · V/V₀) − (p + p_atm) · V̇/V                                in the muscle
 //! ```
-//! Gain and offset are inverted exactly, the lag by lead as far as the settings ask: `target = p* + lead · (lag + 1.5 ticks) ·
-//! dp*/dt`, the rate smoothed over a tenth of the lag so that a sensor's noise is not made ten times as large or more.
-//! A rate limit and a deadband cannot be inverted; they are only predicted, so that the watch on pressure knows what to
-//! expect. What the measured pressure lacks of the predicted is added slowly ([`RegulatorState::observe`]).
+//! The line fills a muscle of volume `V`, which the braid gives at every stroke: a muscle that is wide takes longer, and one
+//! that widens draws air through the line. Gain and offset are inverted exactly; line and lag by lead as far as the settings
+//! ask, each by a rate that is smoothed over a seventh of the lag, so that a sensor's noise is not made ten times as large or
+//! more. What that smoothing and the loop itself are late by is led too, or wished for ahead of time where what comes is known
+//! ([`Wish::foreseen_pa`]). A rate limit and a deadband cannot be inverted; they are only predicted, so that the watch on
+//! pressure knows what to expect. What the measured pressure lacks of the predicted is added slowly
+//! ([`RegulatorState::observe`]).
 
 use model_core::link::settings::{Limits, Regulator};
+use model_core::scalar::Scalar;
 
 use crate::tick::TICK_S;
 
@@ -17,16 +22,53 @@ use crate::tick::TICK_S;
 const OBSERVER_S: f32 = 0.15;
 /// The most that the observer adds, as a part of the largest command.
 const BIAS: f32 = 0.02;
-/// What the loop itself is late by: readings are a tick old when they are answered, and a command holds for a tick.
-const LOOP_S: f32 = 1.5 * TICK_S;
-/// Share of the lag over which the lead's rate is smoothed.
-const SMOOTHING: f32 = 0.1;
+/// What the loop itself is late by: a command holds for a tick.
+const LOOP_S: f32 = 0.5 * TICK_S;
+/// Share of the lag over which the lead's rates are smoothed.
+pub const SMOOTHING: f32 = 0.15;
+/// Pressure of the air around, Pa.
+const ATMOSPHERE_PA: f32 = 101_325.0;
+
+/// The air in the muscle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Air {
+    /// `V/V₀`: the volume as a part of that at rest length.
+    pub fill: f32,
+    /// `V̇/V`, 1/s.
+    pub widening_per_s: f32,
+}
+
+impl Default for Air {
+    /// A muscle that nothing is known of.
+    fn default() -> Self {
+        Self { fill: 1.0, widening_per_s: 0.0 }
+    }
+}
+
+/// What is wanted of the regulator in a tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wish {
+    /// Pressure in the muscle, Pa.
+    pub pressure_pa: f32,
+    /// What of the last change of that was known ahead of time, Pa; it is wished for [`ahead`] ticks before its time.
+    pub foreseen_pa: f32,
+}
+
+/// Ticks before its time that what is known should be wished for.
+pub fn ahead(regulator: &Regulator) -> usize {
+    if regulator.lead > 0.0 { ((LOOP_S + SMOOTHING * regulator.lag_s) / TICK_S) as usize } else { 0 }
+}
 
 /// Keeps the regulator's model and the last wanted pressure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RegulatorState {
     wanted_pa: f32,
     rate_pa_per_s: f32,
+    /// What the regulator's outlet should have, smoothed, and what of its rate was known.
+    outlet_pa: f32,
+    foreseen_pa_per_s: f32,
+    /// The model: pressure at the regulator and in the muscle.
+    supplied_pa: f32,
     model_pa: f32,
     command_pa: f32,
     /// What the regulator's own model leaves out, added to what is commanded.
@@ -47,24 +89,28 @@ pub struct Driven {
 impl RegulatorState {
     /// Starts where the muscle is.
     pub fn begin(&mut self, pressure_pa: f32) {
-        let pressure_pa = if pressure_pa.is_finite() { pressure_pa.max(0.0) } else { 0.0 };
-        self.wanted_pa = pressure_pa;
-        self.rate_pa_per_s = 0.0;
-        self.model_pa = pressure_pa;
-        self.bias_pa = 0.0;
+        let pressure_pa = if pressure_pa.is_finite() { pressure_pa.at_least(0.0) } else { 0.0 };
+        *self = Self {
+            wanted_pa: pressure_pa,
+            outlet_pa: pressure_pa,
+            supplied_pa: pressure_pa,
+            model_pa: pressure_pa,
+            command_pa: self.command_pa,
+            ..Self::default()
+        };
     }
 
     /// Takes a tick's measured pressure: what it lacks of the model's is given slowly to the command. Zero and gain of a
-    /// regulator drift, and it ripples; its lag is in the model and stirs nothing.
+    /// regulator drift, and it ripples; its lag and its line are in the model and stir nothing.
     pub fn observe(&mut self, dt: f32, measured_pa: f32, regulator: &Regulator) {
         let lack = self.model_pa - measured_pa;
         if lack.is_finite() {
             let most = BIAS * regulator.command_max_pa;
-            self.bias_pa = (self.bias_pa + lack * dt / OBSERVER_S).clamp(-most, most);
+            self.bias_pa = (self.bias_pa + lack * dt / OBSERVER_S).within(-most, most);
         }
     }
 
-    /// Pressure that the regulator should have brought about by now, Pa.
+    /// Pressure that the regulator should have brought about in the muscle by now, Pa.
     pub fn model_pa(&self) -> f32 {
         self.model_pa
     }
@@ -78,54 +124,72 @@ impl RegulatorState {
     pub fn step(
         &mut self,
         dt: f32,
-        wish_pa: f32,
+        wish: Wish,
         high_pa: f32,
+        air: &Air,
         regulator: &Regulator,
         limits: &Limits,
     ) -> Driven {
         let slew = limits.slew_pa_per_s * dt;
-        let wanted = wish_pa.clamp(0.0, high_pa.max(0.0)).clamp(self.wanted_pa - slew, self.wanted_pa + slew);
-        let rate = (wanted - self.wanted_pa) / dt;
-        self.rate_pa_per_s += (rate - self.rate_pa_per_s) * dt / (dt + SMOOTHING * regulator.lag_s);
+        let high = high_pa.at_least(0.0);
+        let wanted = wish.pressure_pa.within(0.0, high).within(self.wanted_pa - slew, self.wanted_pa + slew);
+        let smoothing = SMOOTHING * regulator.lag_s;
+        let share = dt / (dt + smoothing);
+        self.rate_pa_per_s += ((wanted - self.wanted_pa) / dt - self.rate_pa_per_s) * share;
+        let foreseen = wish.foreseen_pa.within(-slew, slew) / dt;
+        self.foreseen_pa_per_s += (foreseen - self.foreseen_pa_per_s) * share;
         self.wanted_pa = wanted;
+        let line = regulator.line_s * air.fill;
+        let draught = (wanted + ATMOSPHERE_PA) * air.widening_per_s;
+        let outlet_rate =
+            (wanted + line * (self.rate_pa_per_s + draught) - self.outlet_pa) / (dt + smoothing);
+        self.outlet_pa += outlet_rate * dt;
+        let late = LOOP_S + smoothing;
+        let led = self.outlet_pa + (regulator.lag_s + late) * outlet_rate
+            - ahead(regulator) as f32 * TICK_S * self.foreseen_pa_per_s;
         // Lead never commands more than the muscle may bear, not even for a moment: a regulator may be faster than its model.
-        let target = (wanted + regulator.lead * (regulator.lag_s + LOOP_S) * self.rate_pa_per_s)
-            .clamp(0.0, high_pa.max(0.0));
-        let modelled = (target / regulator.gain - regulator.offset_pa).clamp(0.0, regulator.command_max_pa);
+        let target = (wanted + regulator.lead * (led - wanted)).within(0.0, high);
+        let modelled = (target / regulator.gain - regulator.offset_pa).within(0.0, regulator.command_max_pa);
         let free = (target + self.bias_pa) / regulator.gain - regulator.offset_pa;
-        let command = free.clamp(
-            0.0,
-            regulator.command_max_pa.min(high_pa.max(0.0) / regulator.gain - regulator.offset_pa),
-        );
-        self.predict(dt, modelled, regulator);
+        let command =
+            free.within(0.0, regulator.command_max_pa.at_most(high / regulator.gain - regulator.offset_pa));
+        self.predict(dt, modelled, air, regulator);
         self.command_pa = command;
-        Driven { wanted_pa: wanted, command_pa: command, saturated: wanted != wish_pa || command != free }
+        Driven {
+            wanted_pa: wanted,
+            command_pa: command,
+            saturated: wanted != wish.pressure_pa || command != free,
+        }
     }
 
     /// Zero pressure at once.
-    pub fn vent(&mut self, dt: f32, regulator: &Regulator) {
+    pub fn vent(&mut self, dt: f32, air: &Air, regulator: &Regulator) {
         self.wanted_pa = 0.0;
         self.rate_pa_per_s = 0.0;
-        self.predict(dt, 0.0, regulator);
+        self.predict(dt, 0.0, air, regulator);
     }
 
     /// The last command again.
-    pub fn hold(&mut self, dt: f32, regulator: &Regulator) -> f32 {
+    pub fn hold(&mut self, dt: f32, air: &Air, regulator: &Regulator) -> f32 {
         let command = self.command_pa;
-        self.predict(dt, command, regulator);
+        self.predict(dt, command, air, regulator);
         command
     }
 
-    fn predict(&mut self, dt: f32, command_pa: f32, regulator: &Regulator) {
+    fn predict(&mut self, dt: f32, command_pa: f32, air: &Air, regulator: &Regulator) {
         self.command_pa = command_pa;
-        let target = (regulator.gain * (command_pa + regulator.offset_pa)).max(0.0);
-        let gap = target - self.model_pa;
+        let target = (regulator.gain * (command_pa + regulator.offset_pa)).at_least(0.0);
+        let gap = target - self.supplied_pa;
         if gap.abs() >= regulator.deadband_pa {
-            // Exact for a step of the first-order lag would be 1 − e^(−dt/lag); the implicit form never overshoots.
-            let step = gap * dt / (dt + regulator.lag_s);
+            // The exact step of the lag is 1 − e^(−dt/lag); this form is late by a thousandth of it and never overshoots.
+            let step = gap * dt / (0.5 * dt + regulator.lag_s).at_least(dt);
             let most = regulator.rate_pa_per_s * dt;
-            self.model_pa += step.clamp(-most, most);
+            self.supplied_pa += step.within(-most, most);
         }
+        let flow = dt / (regulator.line_s * air.fill).at_least(1.0e-6);
+        let widening = (air.widening_per_s * dt).within(-0.5, 0.5);
+        let filled = self.model_pa + flow * self.supplied_pa - ATMOSPHERE_PA * widening;
+        self.model_pa = (filled / (1.0 + flow + widening)).at_least(0.0);
     }
 }
 
@@ -134,6 +198,10 @@ mod tests {
     use super::*;
     use model_core::link::settings::Settings;
 
+    fn plain(pressure_pa: f32) -> Wish {
+        Wish { pressure_pa, foreseen_pa: 0.0 }
+    }
+
     #[test]
     fn gain_and_offset_are_inverted_exactly() {
         let settings = Settings::default();
@@ -141,9 +209,9 @@ mod tests {
         let mut state = RegulatorState::default();
         let mut driven = Driven::default();
         for _ in 0..1000 {
-            driven = state.step(1e-3, 300e3, 600e3, &regulator, &settings.limits);
+            driven = state.step(1e-3, plain(300e3), 600e3, &Air::default(), &regulator, &settings.limits);
         }
-        assert!((driven.command_pa - (300e3 / 1.25 + 4_000.0)).abs() < 0.1);
+        assert!((driven.command_pa - (300e3 / 1.25 + 4_000.0)).abs() < 1.0);
         assert!((state.model_pa() - 300e3).abs() < 10.0, "{}", state.model_pa());
         assert!(!driven.saturated);
     }
@@ -152,7 +220,8 @@ mod tests {
     fn a_wish_beyond_the_limit_is_cut_and_said() {
         let settings = Settings::default();
         let mut state = RegulatorState::default();
-        let driven = state.step(1e-3, 900e3, 500e3, &settings.regulator, &settings.limits);
+        let driven =
+            state.step(1e-3, plain(900e3), 500e3, &Air::default(), &settings.regulator, &settings.limits);
         assert!(driven.saturated && driven.command_pa <= 500e3);
     }
 
@@ -163,7 +232,14 @@ mod tests {
             let mut state = RegulatorState::default();
             let mut pressure = 0.0_f32;
             for _ in 0..3000 {
-                let driven = state.step(1e-3, 300e3, 600e3, &settings.regulator, &settings.limits);
+                let driven = state.step(
+                    1e-3,
+                    plain(300e3),
+                    600e3,
+                    &Air::default(),
+                    &settings.regulator,
+                    &settings.limits,
+                );
                 pressure += (driven.command_pa + drift - pressure) / 31.0;
                 state.observe(1e-3, pressure, &settings.regulator);
             }
@@ -183,7 +259,7 @@ mod tests {
             let mut miss = 0.0_f32;
             for tick in 0..1000 {
                 let wanted = 300.0 * tick as f32;
-                state.step(1e-3, wanted, 600e3, &regulator, &settings.limits);
+                state.step(1e-3, plain(wanted), 600e3, &Air::default(), &regulator, &settings.limits);
                 if tick > 500 {
                     miss = miss.max((state.model_pa() - wanted).abs());
                 }

@@ -7,7 +7,7 @@ mod wear;
 use embedded_storage_async::nor_flash::NorFlash;
 use model_core::image::{self, ImageError};
 use model_core::link::endpoints;
-use model_core::link::frame::{self, Frame, Header, Kind, MAX_BODY, MAX_WIRE};
+use model_core::link::frame::{self, Exchange, Header, Kind};
 use model_core::link::hello::{self, Hello};
 use model_core::link::messages::{Fault, Refusal, Side, StartedBy, State, StoreFault, TableFault, TableInfo};
 use model_core::link::{LINK_VERSION, SCHEMA_HASH};
@@ -83,10 +83,7 @@ impl<F: NorFlash> Server<F> {
             restart: false,
         };
         for side in Side::ALL {
-            match server.model(side) {
-                Ok(model) => shared.with(|controller| controller.use_model(side, model)),
-                Err(_) => damaged = true,
-            }
+            damaged |= server.use_kept(side, shared).is_err();
         }
         let latch = match identity.started_by {
             StartedBy::Watchdog => Some(Fault::Watchdog),
@@ -100,21 +97,33 @@ impl<F: NorFlash> Server<F> {
         Ok(server)
     }
 
-    /// The kept table of a muscle in the form that is evaluated, its effects with what they remembered.
-    fn model(&mut self, side: Side) -> Result<Option<Model>, Refusal> {
-        let Some(bytes) = self.store.table(side).map_err(Refusal::Store)? else { return Ok(None) };
-        let table = image::read(bytes).map_err(|error| Refusal::Table(table_fault(error)))?;
-        let mut model =
-            Model::build(&table).map_err(|error| Refusal::Table(table_fault(ImageError::Table(error))))?;
-        if let Ok(Some(memories)) = self.store.memories(side) {
-            for (position, memory) in memories.iter().enumerate() {
-                let persists = table.effects.get(position).is_some_and(|one| one.effect.is_persistent());
+    /// Has the controller use the kept table of a muscle, its effects with what they remembered.
+    fn use_kept(&mut self, side: Side, shared: &Shared) -> Result<(), Refusal> {
+        let Some(bytes) = self.store.table(side).map_err(Refusal::Store)? else {
+            shared.with(|controller| controller.forget_table(side));
+            return Ok(());
+        };
+        image::read_with(bytes, |table| {
+            shared.with(|controller| controller.use_table(side, table)).map_err(ImageError::Table)
+        })
+        .map_err(|error| Refusal::Table(table_fault(error)))?;
+        self.remember(side, shared);
+        Ok(())
+    }
+
+    /// Gives a table's effects the memories that were kept.
+    fn remember(&mut self, side: Side, shared: &Shared) {
+        // What cannot be read is as if it had not been kept.
+        let _ = self.store.each_memory(side, &mut |position, memory| {
+            shared.with(|controller| {
+                let Some(model) = controller.model_mut(side) else { return };
+                let effect = model.chain.memories().nth(position);
+                let persists = effect.is_some_and(|(effect, _)| effect.is_persistent());
                 if persists && memory.iter().all(|value| value.is_finite()) {
-                    model.chain.restore(position, *memory);
+                    model.chain.restore(position, memory);
                 }
-            }
-        }
-        Ok(Some(model))
+            });
+        });
     }
 
     /// Keeps what must not be lost and is not asked for: new faults, memories of effects. Called now and then by the link's
@@ -141,17 +150,34 @@ impl<F: NorFlash> Server<F> {
 
     fn keep_memories(&mut self, shared: &Shared, always: bool) {
         for side in Side::ALL {
-            let (tick, memories) = shared.with(|c| (c.ticks(), c.model(side).map(persistent_memories)));
-            let memories = memories.unwrap_or_default();
-            if memories.is_empty() {
-                continue;
-            }
-            let kept = self.store.memories(side).ok().flatten();
-            if wear::is_worth_writing(kept.as_ref(), &memories) && (self.wear.allows(tick) || always) {
-                // What cannot be written now is tried again with the next change of state.
-                let _ = self.store.put_memories(side, &memories);
-            }
+            self.keep_memory(side, shared, always);
         }
+    }
+
+    #[inline(never)]
+    fn keep_memory(&mut self, side: Side, shared: &Shared, always: bool) {
+        let mut memories = Memories::new();
+        let tick = shared.with(|c| {
+            if let Some(model) = c.model(side) {
+                persistent_memories(model, &mut memories);
+            }
+            c.ticks()
+        });
+        if memories.is_empty() || !self.is_worth_keeping(side, &memories) {
+            return;
+        }
+        if self.wear.allows(tick) || always {
+            // What cannot be written now is tried again with the next change of state.
+            let _ = self.store.put_memories(side, &memories);
+        }
+    }
+
+    fn is_worth_keeping(&mut self, side: Side, memories: &Memories) -> bool {
+        let mut moved = false;
+        let count = self.store.each_memory(side, &mut |position, kept| {
+            moved |= memories.get(position).is_none_or(|now| wear::has_moved(kept, now));
+        });
+        moved || count != Ok(memories.len())
     }
 
     /// Starts again on the same flash, as after a restart that was asked for.
@@ -173,26 +199,24 @@ impl<F: NorFlash> Server<F> {
         self.counts = counts;
     }
 
-    /// Answers one frame; gives the length of the answer in `out`, 0 where there is none to give.
-    pub fn handle(&mut self, request: &Frame<'_>, shared: &Shared, out: &mut [u8; MAX_WIRE]) -> usize {
-        if request.header.kind != Kind::Request {
-            return 0;
+    /// Answers one frame in its own place; gives the answer, empty where there is none to give.
+    #[inline(never)]
+    pub fn handle<'a>(&mut self, mut exchange: Exchange<'a>, shared: &Shared) -> &'a [u8] {
+        let header = exchange.header();
+        if header.kind != Kind::Request {
+            return &[];
         }
         shared.with(Controller::heard);
-        let answered = Header { kind: Kind::Response, ..request.header };
-        let written = if request.header.id == hello::ID {
-            frame::encode_bytes(answered, &self.hello().to_bytes(), out)
+        let answered = if header.id == hello::ID {
+            let hello = self.hello().to_bytes();
+            frame::encode_bytes(Header { kind: Kind::Response, ..header }, &hello, exchange.room())
         } else {
-            let mut body = [0; MAX_BODY];
             let mut session = Session { server: self, shared };
-            match endpoints::answer(&mut session, request.header.id, request.body, &mut body) {
-                Ok(length) => frame::encode_bytes(answered, &body[..length], out),
-                Err(refusal) => {
-                    frame::encode(Header { kind: Kind::Refusal, ..request.header }, &refusal, out)
-                }
-            }
+            endpoints::answer(&mut session, &mut exchange).or_else(|refusal| {
+                frame::encode(Header { kind: Kind::Refusal, ..header }, &refusal, exchange.room())
+            })
         };
-        written.unwrap_or(0)
+        exchange.written(answered.unwrap_or(0))
     }
 
     fn hello(&self) -> Hello {
@@ -219,16 +243,12 @@ impl<F: NorFlash> Server<F> {
     }
 }
 
-fn persistent_memories(model: &Model) -> Memories {
-    let mut memories = Memories::new();
-    let mut any = false;
-    for (effect, memory) in model.chain.memories() {
-        any |= effect.is_persistent();
-        // The chain is no longer than the vector.
-        let _ = memories.push(*memory);
+/// What all effects of a table remember, if any of them must; nothing otherwise.
+fn persistent_memories(model: &Model, memories: &mut Memories) {
+    if model.chain.memories().any(|(effect, _)| effect.is_persistent()) {
+        for (_, memory) in model.chain.memories() {
+            // The chain is no longer than the vector.
+            let _ = memories.push(*memory);
+        }
     }
-    if !any {
-        memories.clear();
-    }
-    memories
 }

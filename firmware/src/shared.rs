@@ -12,14 +12,17 @@ use embassy_sync::signal::Signal;
 #[cfg(feature = "log")]
 use model_core::link::endpoints::LOG;
 use model_core::link::endpoints::{EVENT, TELEMETRY};
-use model_core::link::frame::{self, Header, Kind, MAX_WIRE};
+use model_core::link::frame::{self, Header, Kind, MAX_TOPIC};
 use model_core::link::messages::{Event, Telemetry};
 use model_core::link::settings::Settings;
 
 use crate::board::Outputs;
 use crate::control::{Controller, Stepped};
+#[cfg(feature = "board")]
+use crate::modes::Seat;
+use crate::room::{Room, room};
 
-/// Samples that wait for the link.
+/// Samples that wait for the link: a longest answer takes 5 ms at 1 Mbaud.
 const WAITING: usize = 16;
 
 /// What the device says by itself.
@@ -31,24 +34,38 @@ pub(crate) enum Spoken {
     Log(crate::log::Frame),
 }
 
+type Waiting = Channel<CriticalSectionRawMutex, Spoken, WAITING>;
+
 /// What the tasks share: the controller, entered for short and never across an await, and what waits to be sent.
 pub struct Shared {
     controller: Mutex<CriticalSectionRawMutex, RefCell<Controller>>,
-    spoken: Channel<CriticalSectionRawMutex, Spoken, WAITING>,
+    spoken: Room<Waiting>,
     dropped: AtomicU32,
     /// The state changed: there may be something to keep.
     changed: Signal<CriticalSectionRawMutex, ()>,
 }
 
 impl Shared {
-    /// A controller as after power-up.
+    /// A controller as after power-up, for two muscles.
     pub fn new(settings: Settings) -> Self {
+        Self::around(Controller::new(settings))
+    }
+
+    fn around(controller: Controller) -> Self {
         Self {
-            controller: Mutex::new(RefCell::new(Controller::new(settings))),
-            spoken: Channel::new(),
+            controller: Mutex::new(RefCell::new(controller)),
+            spoken: room!(Waiting, Channel::new()),
             dropped: AtomicU32::new(0),
             changed: Signal::new(),
         }
+    }
+
+    /// The one of a board: a static of its own, made apart from what goes on to use it.
+    #[cfg(feature = "board")]
+    #[inline(never)]
+    pub fn take(settings: Settings, seats: [Seat; 2]) -> &'static Self {
+        static SHARED: static_cell::StaticCell<Shared> = static_cell::StaticCell::new();
+        SHARED.init_with(|| Self::around(Controller::seated(settings, seats)))
     }
 
     /// Enters the controller.
@@ -134,12 +151,12 @@ impl Shared {
     }
 
     /// The next frame to send without being asked, if there is one.
-    pub fn next_spoken(&self, out: &mut [u8; MAX_WIRE]) -> Option<usize> {
+    pub fn next_spoken(&self, out: &mut [u8; MAX_TOPIC]) -> Option<usize> {
         self.spoken.try_receive().ok().map(|spoken| encode(&spoken, out))
     }
 }
 
-pub(crate) fn encode(spoken: &Spoken, out: &mut [u8; MAX_WIRE]) -> usize {
+pub(crate) fn encode(spoken: &Spoken, out: &mut [u8; MAX_TOPIC]) -> usize {
     let header = |id, sequence| Header { kind: Kind::Topic, id, sequence };
     let written = match spoken {
         Spoken::Sample(number, sample) => frame::encode(header(TELEMETRY, *number), sample, out),
@@ -177,7 +194,7 @@ mod tests {
             shared.step(&Inputs::default());
         }
         assert_eq!(shared.telemetry_dropped(), 5);
-        let mut out = [0; MAX_WIRE];
+        let mut out = [0; MAX_TOPIC];
         let mut accumulator = Accumulator::new();
         let mut number = |shared: &Shared| {
             let length = shared.next_spoken(&mut out)?;

@@ -10,7 +10,7 @@
 //! | 0x10 + side | which slot holds the table in use: [`Selected`], postcard |
 //! | 0x20 + 2·side + slot | image of a table |
 //! | 0x31 | [`Settings`], postcard (0x30 held those of layout 1, which are not read) |
-//! | 0x40 + side | `Remembered`: memories of effects that survive a power cycle, postcard |
+//! | 0x40 + side | generation of a table, and what its effects remember if it must survive a power cycle: a new table brings its own; postcard |
 //! | 0x50 + n | past fault n of a ring, postcard; 0x5F its next place |
 //! | 0x60 | starts of the device, `u32` |
 //!
@@ -18,6 +18,7 @@
 //! item, so it is there whole or not at all. Whenever power fails, the old table or the new one is in use. [`FORMAT`] moves
 //! when this layout does.
 
+use crate::room::{Room, room};
 use embassy_futures::block_on;
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
@@ -71,13 +72,6 @@ impl Selected {
     }
 }
 
-/// What effects remember, and the generation of the table that they belong to: a new table brings its own.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Remembered {
-    generation: u32,
-    memories: Memories,
-}
-
 /// What effects remember of one muscle.
 pub type Memories = Vec<Memory<f32>, MAX_EFFECTS>;
 
@@ -107,7 +101,7 @@ fn fault_of<E>(error: Error<E>) -> StoreFault {
 /// The store over a flash. Its flash is one that answers at once (it blocks, or it is a file), so that no task waits on it.
 pub struct Store<F: NorFlash> {
     map: MapStorage<u8, F, NoCache>,
-    buffer: [u8; BUFFER],
+    buffer: Room<[u8; BUFFER]>,
 }
 
 impl<F: NorFlash> Store<F> {
@@ -118,7 +112,10 @@ impl<F: NorFlash> Store<F> {
     pub fn open(flash: F) -> Result<Self, StoreFault> {
         let end = u32::try_from(flash.capacity()).map_err(|_| StoreFault::Full)?;
         let config = MapConfig::try_new(0..end).map_err(|_| StoreFault::Full)?;
-        Ok(Self { map: MapStorage::new(flash, config, Cache::new_uncached()), buffer: [0; BUFFER] })
+        Ok(Self {
+            map: MapStorage::new(flash, config, Cache::new_uncached()),
+            buffer: room!([u8; BUFFER], [0; BUFFER]),
+        })
     }
 
     /// Gives the flash back.
@@ -135,11 +132,11 @@ impl<F: NorFlash> Store<F> {
     }
 
     fn bytes(&mut self, key: u8) -> Result<Option<&[u8]>, StoreFault> {
-        block_on(self.map.fetch_item::<&[u8]>(&mut self.buffer, &key)).map_err(fault_of)
+        block_on(self.map.fetch_item::<&[u8]>(&mut self.buffer[..], &key)).map_err(fault_of)
     }
 
     fn put_bytes(&mut self, key: u8, bytes: &[u8]) -> Result<(), StoreFault> {
-        block_on(self.map.store_item(&mut self.buffer, &key, &bytes)).map_err(fault_of)
+        block_on(self.map.store_item(&mut self.buffer[..], &key, &bytes)).map_err(fault_of)
     }
 
     /// A small value; one that cannot be read counts as absent.
@@ -233,27 +230,46 @@ impl<F: NorFlash> Store<F> {
         self.put_value(SETTINGS, settings)
     }
 
-    /// What effects remembered of a muscle since its table was committed.
+    /// Hands what each effect remembered of a muscle since its table was committed to `act`, by its place in the table; gives how
+    /// many there are. They are read one at a time: all of them are half a kilobyte.
     ///
     /// # Errors
     /// [`StoreFault::Medium`].
-    pub fn memories(&mut self, side: Side) -> Result<Option<Memories>, StoreFault> {
+    pub fn each_memory(
+        &mut self,
+        side: Side,
+        act: &mut dyn FnMut(usize, &Memory<f32>),
+    ) -> Result<usize, StoreFault> {
         let generation = self.generation(side)?;
-        let kept: Option<Remembered> = self.value(MEMORIES + side.index() as u8)?;
-        Ok(kept.filter(|kept| kept.generation == generation).map(|kept| kept.memories))
+        let Some(bytes) = self.bytes(MEMORIES + side.index() as u8)? else { return Ok(0) };
+        let Ok(((kept, count), mut rest)) = postcard::take_from_bytes::<(u32, u32)>(bytes) else {
+            return Ok(0);
+        };
+        if kept != generation {
+            return Ok(0);
+        }
+        let mut read = 0;
+        while read < (count as usize).min(MAX_EFFECTS) {
+            let Some((bytes, after)) = rest.split_at_checked(size_of::<Memory<f32>>()) else { break };
+            let mut memory = Memory::default();
+            for (value, bytes) in memory.iter_mut().zip(bytes.as_chunks().0) {
+                *value = f32::from_le_bytes(*bytes);
+            }
+            act(read, &memory);
+            rest = after;
+            read += 1;
+        }
+        Ok(read)
     }
 
-    /// Keeps what effects remember, unless the same is kept already. An empty list forgets.
+    /// Keeps what effects remember. An empty list forgets.
     ///
     /// # Errors
     /// As the medium fails.
     pub fn put_memories(&mut self, side: Side, memories: &Memories) -> Result<(), StoreFault> {
         let generation = self.generation(side)?;
-        let new = Remembered { generation, memories: memories.clone() };
-        if self.value(MEMORIES + side.index() as u8)?.as_ref() == Some(&new) {
-            return Ok(());
-        }
-        self.put_value(MEMORIES + side.index() as u8, &new)
+        // A list is its length and its elements.
+        self.put_value(MEMORIES + side.index() as u8, &(generation, memories))
     }
 
     fn generation(&mut self, side: Side) -> Result<u32, StoreFault> {

@@ -5,7 +5,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::mutex::Mutex as Gate;
 use embedded_io_async::{Read, Write};
 use embedded_storage_async::nor_flash::NorFlash;
-use model_core::link::frame::{Accumulator, MAX_WIRE};
+use model_core::link::frame::{Accumulator, MAX_TOPIC};
 
 use crate::board::{Outputs, Plant};
 use crate::server::Server;
@@ -33,7 +33,6 @@ pub async fn link<R: Read, W: Write, F: NorFlash>(
 ) {
     let mut accumulator = Accumulator::new();
     let mut bytes = [0; 64];
-    let mut out = [0; MAX_WIRE];
     loop {
         let count = match select(receiver.read(&mut bytes), shared.change()).await {
             Either::First(Ok(count)) => count,
@@ -45,9 +44,9 @@ pub async fn link<R: Read, W: Write, F: NorFlash>(
         };
         for &byte in &bytes[..count] {
             server.note_counts(accumulator.counts());
-            let Some(Ok(request)) = accumulator.push(byte) else { continue };
-            let length = server.handle(&request, shared, &mut out);
-            if sender.lock().await.write_all(&out[..length]).await.is_err() || server.wants_restart() {
+            let Some(Ok(request)) = accumulator.push_to_answer(byte) else { continue };
+            let answer = server.handle(request, shared);
+            if sender.lock().await.write_all(answer).await.is_err() || server.wants_restart() {
                 return;
             }
         }
@@ -56,7 +55,7 @@ pub async fn link<R: Read, W: Write, F: NorFlash>(
 
 /// Telemetry and events, for ever; returns when the port is gone.
 pub async fn telemetry<W: Write>(sender: &Gate<CriticalSectionRawMutex, W>, shared: &Shared) {
-    let mut out = [0; MAX_WIRE];
+    let mut out = [0; MAX_TOPIC];
     loop {
         let spoken = shared.next().await;
         let length = shared::encode(&spoken, &mut out);

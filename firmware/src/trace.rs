@@ -5,7 +5,10 @@ use model_core::link::messages::{
     Field, Refusal, TRACE_PIECE, TRACE_VARIABLES, TraceArm, TraceInfo, TracePiece, Trigger, Variable,
 };
 
-/// Values that a trace holds: 4 KiB.
+use crate::room::{Room, room};
+
+/// Values that a trace holds, four bytes each: the largest single part of the controller's memory, and a free choice. It may be
+/// as large as the chip allows; a host asks the device how many there are.
 pub const CAPACITY: usize = 1024;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,14 +20,14 @@ enum Phase {
 }
 
 /// One trace.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Trace {
     phase: Phase,
     variables: Vec<Variable, TRACE_VARIABLES>,
     every_ticks: u16,
     trigger: Trigger,
     countdown: u16,
-    values: [f32; CAPACITY],
+    values: Room<[f32; CAPACITY]>,
     /// Records that fit.
     room: usize,
     records: usize,
@@ -41,7 +44,7 @@ impl Default for Trace {
             every_ticks: 1,
             trigger: Trigger::Now,
             countdown: 0,
-            values: [0.0; CAPACITY],
+            values: room!([f32; CAPACITY], [0.0; CAPACITY]),
             room: 0,
             records: 0,
             next: 0,

@@ -25,6 +25,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::mutex::Mutex;
 use embassy_time::Timer;
 use firmware::board::Identity;
+use firmware::modes::Seat;
 use firmware::server::Server;
 use firmware::shared::Shared;
 use firmware::tasks;
@@ -36,6 +37,7 @@ use self::bench::{Bench, BenchUart, Benches};
 use self::flash::FileFlash;
 use self::uart::{Receiver, Sender, Uart};
 
+/// A host that cannot be held back sends a burst of requests at once.
 const LINK_RX: usize = 1024;
 const LINK_TX: usize = 512;
 type LinkUart = Uart<LINK_RX, LINK_TX>;
@@ -166,9 +168,9 @@ fn spawn(spawner: SendSpawner, shared: &'static Shared, port: &'static Port) -> 
     Ok(())
 }
 
-#[entry]
-fn main() -> ! {
-    static SHARED: StaticCell<Shared> = StaticCell::new();
+/// Apart from `main`, which never returns: what this takes of the stack is given back.
+#[inline(never)]
+fn start() -> Result<(), &'static str> {
     static PORT: StaticCell<Port> = StaticCell::new();
     time::start();
     for uart in [&BENCH, &SECOND_BENCH] {
@@ -176,9 +178,14 @@ fn main() -> ! {
     }
     LINK.start();
     start_interrupts();
-    let shared: &'static Shared = SHARED.init_with(|| Shared::new(Settings::default()));
+    let shared = Shared::take(Settings::default(), Seat::pair());
     let port: &'static Port = PORT.init_with(|| Mutex::new(Sender(&LINK)));
-    if let Err(why) = spawn(EXECUTOR.start(EXECUTOR_LINE), shared, port) {
+    spawn(EXECUTOR.start(EXECUTOR_LINE), shared, port)
+}
+
+#[entry]
+fn main() -> ! {
+    if let Err(why) = start() {
         semihosting::print("firmware: ");
         semihosting::print(why);
         semihosting::print("\n");

@@ -36,6 +36,7 @@ use embedded_storage_async::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
 use firmware::board::{Identity, Inputs, Outputs, Plant, Readings};
+use firmware::modes::Seat;
 use firmware::server::Server;
 use firmware::shared::Shared;
 use firmware::tasks;
@@ -301,21 +302,21 @@ fn clocks() -> Config {
     config
 }
 
+#[inline(never)]
 fn spawn(spawner: Spawner, started_by: StartedBy) -> Option<()> {
-    static SHARED: StaticCell<Shared> = StaticCell::new();
     static PORT: StaticCell<Port> = StaticCell::new();
-    static SENDING: StaticCell<[u8; 512]> = StaticCell::new();
-    static RECEIVED: StaticCell<[u8; 1024]> = StaticCell::new();
+    static SENDING: StaticCell<[u8; 256]> = StaticCell::new();
+    static RECEIVED: StaticCell<[u8; 512]> = StaticCell::new();
     let p = embassy_stm32::init(clocks());
     supply::watch();
     // Low from the first moment: vented.
     let valve = Output::new(p.PB5, Level::Low, Speed::Low);
     let mut line = usart::Config::default();
     line.baudrate = 1_000_000;
-    let (sending, received) = (SENDING.init([0; 512]), RECEIVED.init([0; 1024]));
+    let (sending, received) = (SENDING.init([0; 256]), RECEIVED.init([0; 512]));
     let uart = BufferedUart::new(p.USART2, p.PA3, p.PA2, sending, received, Interrupts, line).ok()?;
     let (sender, receiver) = uart.split();
-    let shared: &'static Shared = SHARED.init_with(|| Shared::new(Settings::default()));
+    let shared = Shared::take(Settings::default(), Seat::single());
     let port: &'static Port = PORT.init_with(|| Mutex::new(sender));
     let identity =
         Identity { board: Board::NucleoF446re, muscles: 1, serial: embassy_stm32::uid::uid(), started_by };

@@ -6,14 +6,14 @@ use model_core::motion::MotionTracker;
 
 use super::motion_settings;
 use crate::board::Command;
-use crate::modes::{Integral, Model};
-use crate::regulator::RegulatorState;
+use crate::modes::{Integral, Model, Seat};
+use crate::regulator::{Air, RegulatorState};
 use crate::watch::SideWatch;
 
 /// One muscle at work.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Actuator {
-    pub(super) model: Option<Model>,
+    pub(super) model: Seat,
     pub(super) motion: MotionTracker<f32>,
     pub(super) watch: SideWatch,
     pub(super) regulator: RegulatorState,
@@ -32,9 +32,9 @@ pub(super) struct Actuator {
 }
 
 impl Actuator {
-    pub(super) fn new(settings: &Settings) -> Self {
+    pub(super) fn new(settings: &Settings, model: Seat) -> Self {
         Self {
-            model: None,
+            model,
             motion: MotionTracker::new(motion_settings(settings)),
             watch: SideWatch::default(),
             regulator: RegulatorState::default(),
@@ -51,8 +51,13 @@ impl Actuator {
         }
     }
 
+    /// The air in the muscle, as far as a table tells.
+    pub(super) fn air(&self) -> Air {
+        self.present().map_or_else(Air::default, |model| model.air(self.motion.motion().speed))
+    }
+
     /// The table, if it has been brought to this tick.
     pub(super) fn present(&self) -> Option<&Model> {
-        self.model.as_ref().filter(|_| self.model_n.is_some())
+        if self.model_n.is_some() { self.model.as_ref() } else { None }
     }
 }

@@ -44,6 +44,7 @@ pub fn check_settings(settings: &Settings) -> Result<(), Refusal> {
             positive(r.gain)
                 && r.offset_pa.is_finite()
                 && not_negative(r.lag_s)
+                && not_negative(r.line_s)
                 && positive(r.rate_pa_per_s)
                 && not_negative(r.deadband_pa)
                 && positive(r.command_max_pa)

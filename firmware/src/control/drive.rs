@@ -2,38 +2,46 @@
 
 use model_core::link::messages::{Fault, Mode, Side, State};
 use model_core::link::settings::FeedForward;
+use model_core::scalar::Scalar;
 
 use super::Controller;
 use crate::board::Command;
-use crate::modes::{self, Posed};
+use crate::modes;
+use crate::pair::{Posed, Pull};
+use crate::regulator::Wish;
 use crate::tick::TICK_S;
 use crate::watch::Finding;
 
 impl Controller {
     /// Makes the commands of the running mode.
     pub(super) fn drive(&mut self) {
-        let mut wishes = [(0.0, true); 2];
+        let mut wishes = [(Wish::default(), true); 2];
         match self.mode {
             Mode::Vent => {}
-            Mode::Pressure => wishes[0] = (self.asked, true),
-            Mode::Force => wishes[0] = self.force_wish(0, self.asked),
+            Mode::Pressure => {
+                wishes[0] = (Wish { pressure_pa: self.coming, foreseen_pa: self.coming_step }, true);
+            }
+            Mode::Force => wishes[0] = self.force_wish(0, [self.asked, self.coming], self.coming_step),
             Mode::Stroke => {
                 let side = &mut self.sides[0];
                 let speed = side.motion.motion().speed;
                 let force = modes::stroke_force(
                     &self.settings.stroke_loop,
                     &mut side.stroke_loop,
-                    self.asked,
+                    [self.asked, self.coming],
                     side.sample.stroke_m,
                     speed,
                     side.cut,
                 );
-                wishes[0] = self.force_wish(0, force);
+                let step = self.settings.stroke_loop.load_stiffness_n_per_m * self.coming_step;
+                wishes[0] = self.force_wish(0, [force; 2], step);
             }
             Mode::Pair => {
-                let forces = self.pair_forces();
-                wishes[0] = self.force_wish(0, forces[0]);
-                wishes[1] = self.force_wish(1, forces[1]);
+                let Pull { forces_n, reached } = self.pair_forces();
+                for (at, wish) in wishes.iter_mut().enumerate() {
+                    let (pressure, force_reached) = self.force_wish(at, [forces_n[at]; 2], 0.0);
+                    *wish = (pressure, force_reached && reached);
+                }
             }
         }
         let mut bad = None;
@@ -43,22 +51,24 @@ impl Controller {
             let actuator = &mut sides[side.index()];
             let (wish, reached) = wishes[side.index()];
             if !used {
-                actuator.regulator.vent(TICK_S, &settings.regulator);
                 actuator.command = Command { pressure_pa: 0.0, vent: true };
                 continue;
             }
-            if !wish.is_finite() {
-                bad = Some((side, wish));
+            if !wish.pressure_pa.is_finite() {
+                bad = Some((side, wish.pressure_pa));
                 continue;
             }
             let most =
                 actuator.model.as_ref().map_or(f32::MAX, |model| model.muscle.max_pressure().pascals());
-            let high = most.min(settings.limits.pressure_pa);
-            if settings.pressure.fitted {
+            let high = most.at_most(settings.limits.pressure_pa);
+            // Without lead a command is what was asked for, as whoever measures the regulator itself wants it.
+            if settings.pressure.fitted && settings.regulator.lead > 0.0 {
                 actuator.regulator.observe(TICK_S, actuator.sample.pressure_pa, &settings.regulator);
             }
-            let driven = actuator.regulator.step(TICK_S, wish, high, &settings.regulator, &settings.limits);
-            actuator.cut = if driven.saturated { wish - driven.wanted_pa } else { 0.0 };
+            let air = actuator.air();
+            let driven =
+                actuator.regulator.step(TICK_S, wish, high, &air, &settings.regulator, &settings.limits);
+            actuator.cut = if driven.saturated { wish.pressure_pa - driven.wanted_pa } else { 0.0 };
             if !reached || driven.saturated {
                 self.saturated_ticks = self.saturated_ticks.saturating_add(1);
             }
@@ -70,19 +80,20 @@ impl Controller {
         }
     }
 
-    /// Feed-forward and trim for a wanted force.
-    fn force_wish(&mut self, at: usize, force_n: f32) -> (f32, bool) {
+    /// Feed-forward for the force that will be wanted when a command acts, and trim for the one that is wanted now. `foreseen_n` of
+    /// the last change of the former was known ahead of time.
+    fn force_wish(&mut self, at: usize, [force_n, coming_n]: [f32; 2], foreseen_n: f32) -> (Wish, bool) {
         let settings = &self.settings;
         let actuator = &mut self.sides[at];
         actuator.wanted_n = force_n;
         let model_n = actuator.model_n;
         let model = actuator.model.as_mut().filter(|_| model_n.is_some());
-        let (forward, reached) = modes::feed_forward(settings, model, force_n, actuator.guess_pa);
+        let (forward, reached) = modes::feed_forward(settings, model, coming_n, actuator.guess_pa);
         actuator.guess_pa = forward;
         actuator.forward_pa = forward;
         let measures = settings.force.fitted && actuator.sample.force_n.is_finite();
         actuator.trim_pa = if measures {
-            let expected_n = match (settings.feed_forward, model_n, &actuator.model) {
+            let expected_n = match (settings.feed_forward, model_n, actuator.model.as_ref()) {
                 (FeedForward::Table, Some(model_n), Some(model)) => {
                     model_n - model.slope() * actuator.trim_pa
                 }
@@ -93,14 +104,21 @@ impl Controller {
         } else {
             0.0
         };
-        (forward + actuator.trim_pa, reached)
+        let slope = match (settings.feed_forward, actuator.model.as_ref()) {
+            (FeedForward::Table, Some(model)) => model.slope(),
+            (FeedForward::Gaylord, Some(model)) => model.held().posture.area,
+            _ => 0.0,
+        };
+        let foreseen_pa = if slope > 0.0 { foreseen_n / slope } else { 0.0 };
+        (Wish { pressure_pa: forward + actuator.trim_pa, foreseen_pa }, reached)
     }
 
-    fn pair_forces(&mut self) -> [f32; 2] {
+    fn pair_forces(&mut self) -> Pull {
         let joint = self.settings.joint;
         let [first, second] = &self.sides;
-        let (Some(a), Some(b)) = (first.present(), second.present()) else {
-            return [0.0; 2];
+        let present = first.present().is_some() && second.present().is_some();
+        let Some(arms) = self.arms().filter(|_| present) else {
+            return Pull { forces_n: [0.0; 2], reached: false };
         };
         let speeds = first.motion.motion().speed - second.motion.motion().speed;
         let posed = Posed {
@@ -109,18 +127,21 @@ impl Controller {
             measured_rad: (first.sample.stroke_m - second.sample.stroke_m) / (2.0 * joint.radius_m),
             rate_rad_per_s: speeds / (2.0 * joint.radius_m),
         };
-        let sides = [(a, first.sample.stroke_m), (b, second.sample.stroke_m)];
-        self.pair.forces(&joint, &posed, sides, first.cut - second.cut)
+        let mut pair = self.pair;
+        let pull = pair.forces(&joint, &posed, arms, first.cut - second.cut);
+        self.pair = pair;
+        pull
     }
 
     /// Keeps the commands of a state that does not control: vented, or held by a fault.
     pub(super) fn rest(&mut self) {
         let regulator = self.settings.regulator;
         for side in &mut self.sides {
+            let air = side.air();
             if self.machine.state() == State::Fault && !side.command.vent {
-                side.regulator.hold(TICK_S, &regulator);
+                side.regulator.hold(TICK_S, &air, &regulator);
             } else {
-                side.regulator.vent(TICK_S, &regulator);
+                side.regulator.vent(TICK_S, &air, &regulator);
                 side.command = Command { pressure_pa: 0.0, vent: true };
                 side.sample.wanted_pa = 0.0;
             }

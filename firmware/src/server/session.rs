@@ -10,11 +10,11 @@ use model_core::link::messages::{
     TableRead, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead, Value,
 };
 use model_core::link::settings::Settings;
+use model_core::single;
 use model_core::units::{Length, Pressure};
 
 use super::Server;
 use crate::control::{self, Controller};
-use crate::modes;
 use crate::reference;
 use crate::shared::Shared;
 use crate::store::Memories;
@@ -28,18 +28,11 @@ pub(super) struct Session<'a, F: NorFlash> {
 }
 
 impl<F: NorFlash> Session<'_, F> {
-    fn status_after(
-        &self,
-        act: impl FnOnce(&mut Controller) -> Result<(), Refusal>,
-    ) -> Result<Status, Refusal> {
-        self.shared.with(|controller| {
-            act(controller)?;
-            Ok(self.status_of(controller))
-        })
-    }
-
-    fn status_of(&self, controller: &Controller) -> Status {
-        Status {
+    /// The status, if what was asked for could be done.
+    #[inline(never)]
+    fn status_after(&self, done: Result<(), Refusal>) -> Result<Status, Refusal> {
+        done?;
+        Ok(self.shared.with(|controller| Status {
             state: controller.state(),
             mode: controller.mode(),
             fault: controller.faults().latched.map(|report| report.fault),
@@ -50,7 +43,7 @@ impl<F: NorFlash> Session<'_, F> {
             frames_bad: self.server.counts.bad,
             telemetry_dropped: self.shared.telemetry_dropped(),
             saturated_ticks: controller.saturated_ticks(),
-        }
+        }))
     }
 
     /// The store may only be written while nothing is controlled.
@@ -68,12 +61,6 @@ impl<F: NorFlash> Session<'_, F> {
             Err(Refusal::NotSupported)
         }
     }
-
-    fn use_kept(&mut self, side: Side) -> Result<(), Refusal> {
-        let model = self.server.model(side)?;
-        self.shared.with(|controller| controller.use_model(side, model));
-        Ok(())
-    }
 }
 
 impl<F: NorFlash> Service for Session<'_, F> {
@@ -90,31 +77,31 @@ impl<F: NorFlash> Service for Session<'_, F> {
     }
 
     fn status(&mut self, (): ()) -> Result<Status, Refusal> {
-        self.status_after(|_| Ok(()))
+        self.status_after(Ok(()))
     }
 
     fn arm(&mut self, (): ()) -> Result<Status, Refusal> {
-        self.status_after(Controller::arm)
+        self.status_after(self.shared.with(Controller::arm))
     }
 
     fn start(&mut self, request: Start) -> Result<Status, Refusal> {
-        self.status_after(|controller| controller.start(request.mode))
+        self.status_after(self.shared.with(|controller| controller.start(request.mode)))
     }
 
     fn stop(&mut self, (): ()) -> Result<Status, Refusal> {
-        self.status_after(Controller::stop)
+        self.status_after(self.shared.with(Controller::stop))
     }
 
     fn disarm(&mut self, (): ()) -> Result<Status, Refusal> {
-        self.status_after(Controller::disarm)
+        self.status_after(self.shared.with(Controller::disarm))
     }
 
     fn set_point(&mut self, request: SetPoint) -> Result<Status, Refusal> {
-        self.status_after(|controller| controller.set_point(request))
+        self.status_after(self.shared.with(|controller| controller.set_point(request)))
     }
 
     fn reference(&mut self, request: Reference) -> Result<Status, Refusal> {
-        self.status_after(|controller| controller.reference(request))
+        self.status_after(self.shared.with(|controller| controller.reference(request)))
     }
 
     fn reference_points(&mut self, request: ReferencePoints) -> Result<u16, Refusal> {
@@ -138,7 +125,7 @@ impl<F: NorFlash> Service for Session<'_, F> {
     fn clear_fault(&mut self, (): ()) -> Result<Status, Refusal> {
         // The report goes to the log before it is forgotten.
         self.server.keep(self.shared);
-        self.status_after(Controller::clear)
+        self.status_after(self.shared.with(Controller::clear))
     }
 
     fn settings(&mut self, (): ()) -> Result<Settings, Refusal> {
@@ -167,7 +154,7 @@ impl<F: NorFlash> Service for Session<'_, F> {
         let (side, bytes) = self.server.upload.whole()?;
         let selected = self.server.store.commit(side, bytes).map_err(Refusal::Store)?;
         self.server.upload.forget();
-        self.use_kept(side)?;
+        self.server.use_kept(side, self.shared)?;
         Ok(selected.info())
     }
 
@@ -183,7 +170,7 @@ impl<F: NorFlash> Service for Session<'_, F> {
     fn table_rollback(&mut self, request: Side) -> Result<TableInfo, Refusal> {
         self.at_rest()?;
         let selected = self.server.store.roll_back(request).map_err(Refusal::Store)?;
-        self.use_kept(request)?;
+        self.server.use_kept(request, self.shared)?;
         Ok(selected.info())
     }
 
@@ -191,19 +178,12 @@ impl<F: NorFlash> Service for Session<'_, F> {
         let direction = f32::from(request.direction.signum());
         let mut values = Vec::new();
         for point in &request.points {
+            let stroke = Length::from_metres(point.stroke_m);
+            let pressure = Pressure::from_pascals(point.pressure_pa);
             let value = self.shared.with(|controller| {
-                let model = controller.model(request.side)?;
-                let held = model.muscle.held(Length::from_metres(point.stroke_m));
-                let pressure = Pressure::from_pascals(point.pressure_pa);
-                let force = model.muscle.force(pressure, Length::from_metres(point.stroke_m), direction);
-                let found = modes::base_pressure(
-                    &model.muscle,
-                    &held,
-                    direction,
-                    force,
-                    pressure,
-                    &model.muscle.search(),
-                );
+                let muscle = &controller.model(request.side)?.muscle;
+                let force = single::force(muscle, pressure, stroke, direction);
+                let found = single::pressure_at(muscle, stroke, direction, force, pressure, &muscle.search());
                 Some(Value { force_n: force.newtons(), pressure_pa: found.pressure.pascals() })
             });
             values.push(value.ok_or(Refusal::NoTable(request.side))?).map_err(|_| Refusal::Range)?;
@@ -229,7 +209,7 @@ impl<F: NorFlash> Service for Session<'_, F> {
     fn forget_memory(&mut self, request: ForgetMemory) -> Result<(), Refusal> {
         self.at_rest()?;
         self.server.store.put_memories(request.side, &Memories::new()).map_err(Refusal::Store)?;
-        self.use_kept(request.side)
+        self.server.use_kept(request.side, self.shared)
     }
 
     fn restart(&mut self, (): ()) -> Result<(), Refusal> {

@@ -2,17 +2,24 @@
 
 use heapless::Vec;
 use model_core::check;
-use model_core::image::{self, ImageError};
+use model_core::image;
 use model_core::link::messages::{Refusal, Side, TableBegin, TableFault, TablePiece};
 
 use super::table_fault;
-use crate::modes::Model;
+use crate::room::{Room, room};
 
 /// What an upload has gathered.
-#[derive(Default)]
 pub(super) struct Upload {
     begun: Option<TableBegin>,
-    bytes: Vec<u8, { image::MAX_LEN }>,
+    bytes: Room<Bytes>,
+}
+
+type Bytes = Vec<u8, { image::MAX_LEN }>;
+
+impl Default for Upload {
+    fn default() -> Self {
+        Self { begun: None, bytes: room!(Bytes, Vec::new()) }
+    }
 }
 
 impl Upload {
@@ -61,8 +68,7 @@ impl Upload {
         if image::announced_len(bytes).map_err(refused)? != bytes.len() {
             return Err(Refusal::Table(TableFault::Malformed));
         }
-        let table = image::read(bytes).map_err(refused)?;
-        Model::build(&table).map_err(|error| refused(ImageError::Table(error)))?;
+        image::read_with(bytes, |_| Ok(())).map_err(refused)?;
         Ok((begun.side, bytes))
     }
 }

@@ -5,7 +5,7 @@
 //! [`REFILL_TICKS`] on the long run, the memory outlasts years of operation on either. Within that, a few writes in a row are
 //! free, so that what was learnt by the runs before a power cut is there after it.
 
-use crate::store::Memories;
+use model_core::effects::Memory;
 
 /// Writes that may follow each other at once.
 const BURST: u8 = 16;
@@ -43,10 +43,8 @@ impl Wear {
 }
 
 /// Whether a memory has moved enough to be written again.
-pub(super) fn is_worth_writing(kept: Option<&Memories>, now: &Memories) -> bool {
-    let Some(kept) = kept.filter(|kept| kept.len() == now.len()) else { return true };
-    let pairs = kept.iter().flatten().zip(now.iter().flatten());
-    pairs.into_iter().any(|(kept, now)| !((now - kept).abs() <= WORTH * kept.abs()))
+pub(super) fn has_moved(kept: &Memory<f32>, now: &Memory<f32>) -> bool {
+    kept.iter().zip(now).any(|(kept, now)| !((now - kept).abs() <= WORTH * kept.abs()))
 }
 
 #[cfg(test)]
@@ -68,14 +66,14 @@ mod tests {
 
     #[test]
     fn only_what_moved_is_written() {
-        let memories = |value: f32| {
-            let mut one = model_core::effects::Memory::default();
+        let memory = |value: f32| {
+            let mut one = Memory::default();
             one[0] = value;
-            [one].into_iter().collect::<Memories>()
+            one
         };
-        assert!(is_worth_writing(None, &memories(0.0)));
-        assert!(!is_worth_writing(Some(&memories(1.0)), &memories(1.0005)));
-        assert!(is_worth_writing(Some(&memories(1.0)), &memories(1.01)));
-        assert!(is_worth_writing(Some(&memories(0.0)), &memories(1e-9)), "the first stroke of a new muscle");
+        assert!(!has_moved(&memory(1.0), &memory(1.0005)));
+        assert!(has_moved(&memory(1.0), &memory(1.01)));
+        assert!(has_moved(&memory(0.0), &memory(1e-9)), "the first stroke of a new muscle");
+        assert!(!has_moved(&memory(0.0), &memory(0.0)));
     }
 }

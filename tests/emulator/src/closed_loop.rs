@@ -3,11 +3,13 @@
 
 use firmware::board::{Inputs, Outputs, Readings};
 use firmware::control::{Controller, Stepped};
-use firmware::modes::Model;
+use firmware::regulator::SMOOTHING;
 use firmware::tick::TICK_S;
+use host::device::regulator::{self, Found};
 use model_core::link::messages::{Mode, Reference, SetPoint, Side, State};
 use model_core::link::settings::{FeedForward, Settings};
 use model_core::table::MuscleTable;
+use model_core::units::Length;
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::plant::{Motion, Plant};
 
@@ -49,7 +51,7 @@ impl Loop {
         // There is no link here, and so no host to hear from.
         settings.watch.autonomous = true;
         let mut controller = Controller::new(settings);
-        controller.use_model(Side::Agonist, Some(Model::build(table).expect("a valid table")));
+        controller.use_table(Side::Agonist, table).expect("a valid table");
         let mut this = Self { controller, plant: Plant::new(bench, motion), outputs: Outputs::default() };
         for side in &mut this.outputs.sides {
             side.vent = true;
@@ -96,6 +98,11 @@ impl Loop {
             .collect()
     }
 
+    /// What is true on the bench now.
+    pub fn truth(&self) -> virtual_bench::plant::Readings {
+        self.plant.truth()
+    }
+
     /// Asks for a wave.
     ///
     /// # Panics
@@ -119,20 +126,71 @@ pub fn rms(ticks: &[Tick], value: impl Fn(&Tick) -> f64) -> f64 {
     (sum / ticks.len().max(1) as f64).sqrt()
 }
 
-/// The feed-forward alone: from the table or from the ideal braid.
-pub fn forward(feed_forward: FeedForward) -> Settings {
-    Settings { feed_forward, ..Settings::default() }
+/// The regulator of a bench as `host device identify` finds it, from steps of pressure on a muscle held at a stroke.
+///
+/// # Panics
+/// When nothing follows its command.
+pub fn identified(bench: &BenchSpec, table: &MuscleTable, stroke_mm: f64) -> Found {
+    let mut settings = Settings::default();
+    settings.regulator.lead = 0.0;
+    let mut control = Loop::start(bench, &Motion::Held { stroke_mm }, table, settings, Mode::Pressure);
+    control.controller.set_telemetry(1);
+    let mut samples = Vec::new();
+    for pascals in [100e3, 300e3, 100e3, 300e3] {
+        control.point(SetPoint::Pressure(pascals));
+        for _ in 0..500 {
+            if let Some((_, sample)) = control.tick().telemetry {
+                let side = sample.sides[0];
+                samples.push((
+                    sample.time_us as f64 * 1e-6,
+                    f64::from(side.command_pa),
+                    f64::from(side.pressure_pa),
+                ));
+            }
+        }
+    }
+    // The first step starts from a vented muscle.
+    let found = regulator::from_samples(&samples[500..]).expect("a regulator");
+    Found { line_s: found.line_s / f64::from(fill(table, stroke_mm * 1e-3)), ..found }
 }
 
-/// PI on the load cell alone, for a muscle whose force rises by `slope` N/Pa: its zero cancels the regulator's lag `T`, and
-/// the line's delay of 4 ms and one and a half ticks leave a phase margin of 60° at a crossover of
-/// `ω_c = 90 rad/s`: `K_i = ω_c / g`, `K_p = K_i T`.
-pub fn pi_alone(slope: f32) -> Settings {
-    let mut settings = forward(FeedForward::Off);
-    let integral = 90.0 / slope;
+/// `V/V₀` of a table's muscle at a stroke, m.
+pub fn fill(table: &MuscleTable, stroke_m: f64) -> f32 {
+    let braid = table.geometry.cast::<f64>().build().expect("a valid table");
+    let volume = |stroke_m: f64| braid.gas_volume(&braid.posture(Length::from_metres(stroke_m)));
+    (volume(stroke_m) / volume(0.0)) as f32
+}
+
+/// The feed-forward alone: from the table or from the ideal braid.
+pub fn forward(base: Settings, feed_forward: FeedForward) -> Settings {
+    Settings { feed_forward, ..base }
+}
+
+/// What a phase margin of 60° leaves to delay at the crossover of an integrating loop, rad.
+const MARGIN: f32 = std::f32::consts::FRAC_PI_6;
+/// Delay of the loop itself, s: half a tick until a command acts, half a tick for which it holds.
+const LOOP_S: f32 = TICK_S;
+
+/// PI on the load cell alone, for a muscle whose force rises by `slope` N/Pa and whose volume is `fill` of that at rest: its
+/// zero cancels the regulator's lag `T`, and crossover leaves a phase margin of 60° to line and loop:
+/// `ω_c = 30° / (line V/V₀ + loop)`, `K_i = ω_c / g`, `K_p = K_i T`.
+pub fn pi_alone(base: Settings, slope: f32, fill: f32) -> Settings {
+    let mut settings = forward(base, FeedForward::Off);
+    let crossover = MARGIN / (base.regulator.line_s * fill + LOOP_S);
+    let integral = crossover / slope;
     settings.force_loop.integral_pa_per_n_s = integral;
     settings.force_loop.proportional_pa_per_n = integral * settings.regulator.lag_s;
     settings.force_loop.trim_limit_pa = 1e6;
     settings.regulator.lead = 0.0;
+    settings
+}
+
+/// The table with a trim that has the same phase margin: lag and line are inverted, so that only the smoothing of both and the
+/// loop are left.
+pub fn trimmed(base: Settings, slope: f32) -> Settings {
+    let mut settings = forward(base, FeedForward::Table);
+    let crossover = MARGIN / (2.0 * SMOOTHING * base.regulator.lag_s + LOOP_S);
+    settings.force_loop.integral_pa_per_n_s = crossover / slope;
+    settings.force_loop.trim_limit_pa = 150e3;
     settings
 }

@@ -149,7 +149,7 @@ pub fn tables(case: &Case) -> Tables {
     let (muscle, campaign) = record(&case.spec);
     let plain = fit::fit(&campaign, &muscle, &Options::default()).expect("a fit").table;
     let geometry = muscle.geometry();
-    let options = diagnose::Options { muscle: muscle.name.clone() };
+    let options = diagnose::Options { muscle: muscle.name.clone(), ..Default::default() };
     let answer = diagnose::diagnose(&campaign, &geometry, &options).expect("a diagnosis");
     let refitted = model::refit(&campaign, &muscle, &answer).expect("a table");
     Tables {
@@ -179,7 +179,10 @@ fn wanted(blocked: f64) -> (Reference, [f32; 2]) {
 /// Ticks of the sine, of each step, and at the beginning of each that are not judged.
 const TICKS: (u64, u64, u64) = (2_600, 1_000, 300);
 
-fn settings(mut settings: Settings, blocked: f64) -> Settings {
+/// What a user would have set: the regulator as it is identified on this bench.
+fn settings(bench: &BenchSpec, table: &MuscleTable, blocked: f64) -> Settings {
+    let reach_mm = f64::from(table.tested.contraction_high) * bench.muscle.geometry.rest_length * 1e3;
+    let mut settings = closed_loop::identified(bench, table, 0.1 * reach_mm).settings(Settings::default());
     settings.limits.force_n = 2.0 * blocked as f32;
     settings
 }
@@ -187,7 +190,7 @@ fn settings(mut settings: Settings, blocked: f64) -> Settings {
 /// Force tracking error, rms in % of blocked force, of the controller's step in this process.
 pub fn here(spec: &MuscleSpec, case: &Case, table: &MuscleTable) -> f64 {
     let bench = BenchSpec::laboratory(spec.clone(), 11);
-    let with = settings(closed_loop::forward(FeedForward::Table), case.blocked);
+    let with = closed_loop::forward(settings(&bench, table, case.blocked), FeedForward::Table);
     let mut control = Loop::start(&bench, &case.motion, table, with, Mode::Force);
     let (wave, steps) = wanted(case.blocked);
     let mut judged = Vec::new();
@@ -223,6 +226,7 @@ pub fn in_emulator(spec: &MuscleSpec, case: &Case, tables: &[&MuscleTable]) -> R
             // A board and a bench of its own: the muscle must not remember the run before.
             let folder = Folder::new();
             let bench = BenchSpec::laboratory(spec.clone(), 11);
+            let with = settings(&bench, table, case.blocked);
             let station = Watched::new(PlantStation::new(bench, vec![case.motion.clone()], 1e-3));
             let options = crate::Options { first: Some(Box::new(station)), ..crate::Options::default() };
             let machine = Machine::start(folder.path(), options)?;
@@ -230,7 +234,7 @@ pub fn in_emulator(spec: &MuscleSpec, case: &Case, tables: &[&MuscleTable]) -> R
             upload(&mut client, Side::Agonist, table);
             tracking::set(&mut client, |s| {
                 tracking::compare(FeedForward::Table, 0.0, 0.0)(s);
-                *s = settings(*s, case.blocked);
+                (s.regulator, s.limits) = (with.regulator, with.limits);
             });
             let samples = tracking::run(&mut client, Mode::Force, &stretches);
             Ok(100.0 * tracking::rms(&samples, tracking::force) / case.blocked)

@@ -39,9 +39,20 @@ impl Joint {
         Self { plants, radius, rest, inertia: 2e-3, damping: 0.05, load: 0.0, angle: 0.0, rate: 0.0 }
     }
 
+    /// The same with another moment of inertia (kg·m²) and damping (N·m·s/rad).
+    pub fn moving(mut self, inertia: f64, damping: f64) -> Self {
+        (self.inertia, self.damping) = (inertia, damping);
+        self
+    }
+
     /// Angle, rad.
     pub fn angle(&self) -> f64 {
         self.angle
+    }
+
+    /// Pressures in the muscles, Pa.
+    pub fn pressures(&self) -> [f64; 2] {
+        [0, 1].map(|side: usize| self.plants[side].truth().pressure)
     }
 
     /// Stiffness at held pressures (Pa) and an angle (rad), N·m/rad: `r² Σ −∂F/∂x` of the true muscles without friction.
@@ -60,7 +71,7 @@ impl Joint {
         self.rest + if side == 0 { turn } else { -turn }
     }
 
-    fn step(&mut self, side: usize, command: f64) {
+    pub(crate) fn step(&mut self, side: usize, command: f64) {
         let stroke = self.stroke(side);
         self.plants[side].drive_to(stroke, TICK);
         self.plants[side].step(TICK, command);
@@ -73,7 +84,7 @@ impl Joint {
         }
     }
 
-    fn answer(&self, side: usize) -> Answer {
+    pub(crate) fn answer(&self, side: usize) -> Answer {
         let readings = self.plants[side].readings();
         Answer {
             pressure: readings.pressure as f32,

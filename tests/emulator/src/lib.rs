@@ -12,6 +12,7 @@ pub mod fitting;
 pub mod joint;
 pub mod line;
 pub mod machine;
+pub mod pair;
 pub mod program;
 pub mod stations;
 pub mod sweep;

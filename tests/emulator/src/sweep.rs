@@ -5,6 +5,7 @@
 //! [`in_qemu`] runs a case through the real image and the real link, to show that it makes no difference.
 
 use firmware::tick::TICK_S;
+use host::device::regulator::Found;
 use model_core::link::messages::{Mode, Reference, SetPoint, Side};
 use model_core::link::settings::{FeedForward, Settings};
 use model_core::muscle::Muscle;
@@ -112,10 +113,6 @@ impl Course {
     }
 }
 
-/// Crossover of the trim behind an inverted lag, rad/s. What is left of delay is the line's 4 ms, one and a half ticks and a
-/// tenth of the lag of 30 ms: 8.5 ms leave a phase margin of 60° there, the same as [`closed_loop::pi_alone`] keeps.
-const TRIM_CROSSOVER: f32 = 61.0;
-
 /// A muscle with the table fitted to it.
 #[derive(Clone, Debug)]
 pub struct Subject {
@@ -123,13 +120,19 @@ pub struct Subject {
     pub spec: MuscleSpec,
     /// What a user would have fitted.
     pub table: MuscleTable,
+    /// The regulator as a user would have identified it.
+    pub regulator: Found,
 }
 
 impl Subject {
     /// Fits a muscle of the bench as a user would.
     pub fn of(spec: MuscleSpec) -> Self {
         let table = fitting::fitted(&spec);
-        Self { spec, table }
+        let bench = BenchSpec::laboratory(spec.clone(), 12);
+        let stroke_mm =
+            0.1 * f64::from(table.tested.contraction_high * table.geometry.rest_length.si()) * 1e3;
+        let regulator = closed_loop::identified(&bench, &table, stroke_mm);
+        Self { spec, table, regulator }
     }
 
     /// The same with a table whose bladder is stiffer or softer by a factor than the muscle's.
@@ -169,21 +172,26 @@ impl Subject {
         }
     }
 
-    /// Newtons for each pascal at rest length, by the ideal braid.
-    fn slope(&self) -> f32 {
-        Muscle::<f32>::build(&self.table).expect("a valid table").braid().posture(Length::ZERO).area
+    /// Stroke about which a load is worked, m.
+    fn middle(&self, load: Load) -> f64 {
+        self.free_stroke() * if load == Load::Moved { 0.22 } else { 0.2 }
+    }
+
+    /// Newtons for each pascal there, by the ideal braid.
+    fn slope(&self, load: Load) -> f32 {
+        let muscle = Muscle::<f32>::build(&self.table).expect("a valid table");
+        muscle.braid().posture(Length::from_metres(self.middle(load) as f32)).area
     }
 
     fn settings(&self, law: Law, load: Load) -> Settings {
+        let base = self.regulator.settings(Settings::default());
+        let fill = closed_loop::fill(&self.table, self.middle(load));
         let mut settings = match law {
-            Law::Table | Law::Trimmed => closed_loop::forward(FeedForward::Table),
-            Law::Gaylord => closed_loop::forward(FeedForward::Gaylord),
-            Law::Feedback => closed_loop::pi_alone(self.slope()),
+            Law::Table => closed_loop::forward(base, FeedForward::Table),
+            Law::Trimmed => closed_loop::trimmed(base, self.slope(load)),
+            Law::Gaylord => closed_loop::forward(base, FeedForward::Gaylord),
+            Law::Feedback => closed_loop::pi_alone(base, self.slope(load), fill),
         };
-        if law == Law::Trimmed {
-            settings.force_loop.integral_pa_per_n_s = TRIM_CROSSOVER / self.slope();
-            settings.force_loop.trim_limit_pa = 150e3;
-        }
         settings.limits.force_n = 3.0 * self.table.blocked_force.newtons();
         settings.limits.stroke_max_m = 0.5;
         settings.stroke.high = 0.6;
@@ -201,6 +209,11 @@ impl Subject {
             stroke.damping_n_s_per_m = 0.0;
         }
         settings
+    }
+
+    /// Crossover of PI alone on a load, rad/s.
+    pub fn crossover(&self, load: Load) -> f32 {
+        self.settings(Law::Feedback, load).force_loop.integral_pa_per_n_s * self.slope(load)
     }
 
     /// Mean and amplitude of what is asked for, N or m.
@@ -234,26 +247,53 @@ impl Subject {
         control.run(course.ticks())
     }
 
-    /// What the regulator would leave to a controller that knew everything but the future: its dead time of 5.5 ms (the
-    /// line's lag of 4 ms and one and a half ticks), and its fastest change of pressure. Rms in %.
+    /// The same where a host sends each tick's set-point and the device knows nothing of the next.
+    pub fn streamed_error(&self, load: Load, hz: f32, law: Law) -> f64 {
+        let bench = BenchSpec::laboratory(self.spec.clone(), 11);
+        let settings = self.settings(law, load);
+        let mut control = Loop::start(&bench, &self.motion(load), &self.table, settings, Mode::Force);
+        let (mean, amplitude) = self.wish(Mode::Force);
+        control.point(SetPoint::Force(mean));
+        control.run(1_500);
+        let mut ticks = Vec::new();
+        for tick in 0..5_000_u32 {
+            let turn = std::f32::consts::TAU * hz * tick as f32 * TICK_S;
+            control.point(SetPoint::Force(mean + amplitude * turn.sin()));
+            ticks.extend(control.run(1));
+        }
+        100.0 * closed_loop::rms(&ticks[1_000..], |tick| tick.force) / self.blocked()
+    }
+
+    /// What the regulator itself leaves, rms in %: its fastest change of pressure, for a controller that begins when it is asked and
+    /// inverts lag and line, and its ripple and wander at a command that stands still.
     pub fn limit(&self, mode: Mode, load: Load, course: Course) -> f64 {
         let ticks = self.run(mode, load, course, Law::Table);
-        let rate = BenchSpec::laboratory(self.spec.clone(), 11).pneumatics.rate;
+        let bench = BenchSpec::laboratory(self.spec.clone(), 11);
+        let slope = f64::from(self.slope(load));
         // The fastest change of force is the fastest of pressure times the braid's area; of stroke, that against the spring.
-        let mut most = rate * f64::from(self.slope()) * f64::from(TICK_S);
+        let mut per_pascal = slope;
         if let (Mode::Stroke, Motion::Load { spring, .. }) = (mode, self.motion(load)) {
-            most /= 2.0 * spring * 1e3;
+            per_pascal /= 2.0 * spring * 1e3;
         }
-        const DELAY: [usize; 2] = [5, 6];
+        let most = bench.pneumatics.rate * per_pascal * f64::from(TICK_S);
         let mut reached = ticks[0].asked;
-        let (mut sum, mut count) = (0.0, 0);
-        for at in DELAY[1]..ticks.len() {
-            let late = DELAY.map(|delay| ticks[at - delay].asked).iter().sum::<f64>() / 2.0;
-            reached += (late - reached).clamp(-most, most);
-            sum += (ticks[at].asked - reached).powi(2);
-            count += 1;
+        let mut squares = 0.0;
+        for tick in &ticks {
+            reached += (tick.asked - reached).clamp(-most, most);
+            squares += (tick.asked - reached).powi(2);
         }
-        100.0 * (sum / f64::from(count.max(1))).sqrt() / self.scale(mode)
+        let late = squares / ticks.len() as f64;
+        let held = Motion::Held { stroke_mm: self.middle(load) * 1e3 };
+        let mut settings = self.settings(Law::Table, load);
+        settings.regulator.lead = 0.0;
+        let mut control = Loop::start(&bench, &held, &self.table, settings, Mode::Pressure);
+        control.point(SetPoint::Pressure(0.5 * self.table.max_pressure.pascals()));
+        control.run(1_000);
+        let still = control.run(4_000);
+        let mean = still.iter().map(|tick| tick.pressure).sum::<f64>() / still.len() as f64;
+        let ripple =
+            still.iter().map(|tick| (tick.pressure - mean).powi(2)).sum::<f64>() / still.len() as f64;
+        100.0 * (late + ripple * per_pascal.powi(2)).sqrt() / self.scale(mode)
     }
 }
 
@@ -265,14 +305,15 @@ fn point(mode: Mode, value: f32) -> SetPoint {
     if mode == Mode::Stroke { SetPoint::Stroke(value) } else { SetPoint::Force(value) }
 }
 
-/// The same case of force through QEMU and the link, judged by the load cell; rms in % of blocked force.
+/// The same case through QEMU and the link, judged by the device's own sensors over two periods at most; rms in % of blocked force
+/// or of free stroke.
 ///
 /// # Errors
 /// [`Skipped`] when the emulator is left out.
 ///
 /// # Panics
 /// When the board refuses.
-pub fn in_qemu(subject: &Subject, load: Load, course: Course, law: Law) -> Result<f64, Skipped> {
+pub fn in_qemu(subject: &Subject, mode: Mode, load: Load, course: Course, law: Law) -> Result<f64, Skipped> {
     let bench = BenchSpec::laboratory(subject.spec.clone(), 11);
     let station = PlantStation::new(bench, vec![subject.motion(load)], 1e-3);
     let folder = Folder::new();
@@ -281,16 +322,17 @@ pub fn in_qemu(subject: &Subject, load: Load, course: Course, law: Law) -> Resul
     let mut client = machine.client();
     upload(&mut client, Side::Agonist, &subject.table);
     tracking::set(&mut client, |settings| *settings = subject.settings(law, load));
-    let (mean, amplitude) = subject.wish(Mode::Force);
-    let ticks = u64::from(course.ticks());
+    let (mean, amplitude) = subject.wish(mode);
+    let ticks = u64::from(course.ticks()) / 2;
     let stretches = [
-        Stretch { wanted: Wanted::Point(point(Mode::Force, mean)), ticks: 1_500, unjudged: 1_500 },
+        Stretch { wanted: Wanted::Point(point(mode, mean)), ticks: 1_000, unjudged: 1_000 },
         Stretch {
             wanted: Wanted::Wave(course.reference(mean, amplitude)),
-            ticks: 1_000 + ticks,
-            unjudged: 1_000,
+            ticks: 500 + ticks,
+            unjudged: 500,
         },
     ];
-    let samples = tracking::run(&mut client, Mode::Force, &stretches);
-    Ok(100.0 * tracking::rms(&samples, tracking::force) / subject.blocked())
+    let samples = tracking::run(&mut client, mode, &stretches);
+    let value = if mode == Mode::Stroke { tracking::stroke } else { tracking::force };
+    Ok(100.0 * tracking::rms(&samples, value) / subject.scale(mode))
 }

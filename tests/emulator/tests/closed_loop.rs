@@ -17,6 +17,8 @@ struct Task {
     spec: MuscleSpec,
     table: MuscleTable,
     motion: Motion,
+    /// What a user would have set: the regulator as it was identified.
+    base: Settings,
 }
 
 impl Task {
@@ -29,15 +31,24 @@ impl Task {
             amplitude_mm: 0.12 * reach * rest_mm,
             frequency_hz: 0.3,
         };
-        Self { spec, table, motion }
+        let bench = BenchSpec::laboratory(spec.clone(), 12);
+        let base =
+            closed_loop::identified(&bench, &table, 0.1 * reach * rest_mm).settings(Settings::default());
+        Self { spec, table, motion, base }
     }
 
     fn blocked(&self) -> f64 {
         f64::from(self.table.blocked_force.newtons())
     }
 
+    /// Stroke about which the muscle is moved, m.
+    fn middle(&self) -> f64 {
+        0.22 * f64::from(self.table.tested.contraction_high) * f64::from(self.table.geometry.rest_length.si())
+    }
+
     fn slope(&self) -> f32 {
-        Muscle::<f32>::build(&self.table).expect("valid").braid().posture(Length::ZERO).area
+        let muscle = Muscle::<f32>::build(&self.table).expect("valid");
+        muscle.braid().posture(Length::from_metres(self.middle() as f32)).area
     }
 
     fn settings(&self, mut settings: Settings) -> Settings {
@@ -58,26 +69,25 @@ impl Task {
 }
 
 #[test]
-fn the_table_beats_the_ideal_braid_and_with_a_trim_at_1_hz_pi_too() {
+fn the_table_beats_the_ideal_braid_and_with_a_trim_pi_of_the_same_margin_by_far() {
     let mut failures = Vec::new();
     for spec in [presets::miniature(), presets::contractile(), presets::push()] {
         let name = spec.name.clone();
         let task = Task::of(spec);
         for hz in [0.5, 1.0] {
-            let table = task.sine(closed_loop::forward(FeedForward::Table), hz);
-            let gaylord = task.sine(closed_loop::forward(FeedForward::Gaylord), hz);
-            let pi = task.sine(closed_loop::pi_alone(task.slope()), hz);
-            let mut both = closed_loop::forward(FeedForward::Table);
-            both.force_loop.integral_pa_per_n_s = 25.0 / task.slope();
-            both.force_loop.trim_limit_pa = 100e3;
-            let trimmed = task.sine(both, hz);
+            let table = task.sine(closed_loop::forward(task.base, FeedForward::Table), hz);
+            let gaylord = task.sine(closed_loop::forward(task.base, FeedForward::Gaylord), hz);
+            let pi = task.sine(
+                closed_loop::pi_alone(task.base, task.slope(), closed_loop::fill(&task.table, task.middle())),
+                hz,
+            );
+            let trimmed = task.sine(closed_loop::trimmed(task.base, task.slope()), hz);
             eprintln!(
                 "{name} at {hz} Hz: table {table:.2} %, with trim {trimmed:.2} %, Gaylord {gaylord:.2} %, PI {pi:.2} %"
             );
-            // A fast PI on a good load cell is as good as the table alone, and better at slow waves; with a trim the table
-            // is ahead from 1 Hz on.
-            let ahead = hz < 1.0 || trimmed < pi;
-            if !(table < 2.0 && trimmed < 1.5 && ahead && gaylord > 3.0 * table) {
+            // PI has the same phase margin, and does not know what comes. At the largest stroke and force the larger muscles need more
+            // than the regulator's highest command for a moment, whatever the law.
+            if !(table < 1.0 && trimmed < 0.8 && pi > 2.5 * trimmed && gaylord > 10.0 * table) {
                 failures.push((name.clone(), hz, table, trimmed, gaylord, pi));
             }
         }
@@ -94,14 +104,11 @@ fn a_trim_on_the_load_cell_takes_away_what_a_wrong_table_leaves() {
             *modulus *= 0.8;
         }
     }
-    let wrong = Task { table: softer, spec: task.spec.clone(), motion: task.motion.clone() };
-    let alone = wrong.sine(closed_loop::forward(FeedForward::Table), 0.5);
-    let mut trimmed = closed_loop::forward(FeedForward::Table);
-    trimmed.force_loop.integral_pa_per_n_s = 25.0 / task.slope();
-    trimmed.force_loop.trim_limit_pa = 100e3;
-    let with_trim = wrong.sine(trimmed, 0.5);
+    let wrong = Task { table: softer, ..task };
+    let alone = wrong.sine(closed_loop::forward(wrong.base, FeedForward::Table), 0.5);
+    let with_trim = wrong.sine(closed_loop::trimmed(wrong.base, wrong.slope()), 0.5);
     eprintln!("bladder 20 % stiffer than its table: {alone:.2} % alone, {with_trim:.2} % with trim");
-    assert!(with_trim < 0.7 * alone && with_trim < 2.0);
+    assert!(with_trim < 0.2 * alone && with_trim < 0.6);
 }
 
 #[test]
@@ -124,7 +131,7 @@ fn stroke_is_reached_against_a_spring_without_a_lasting_error() {
 fn a_minute_without_a_missed_tick_a_drift_or_a_leak() {
     let task = Task::of(presets::miniature());
     let bench = BenchSpec::laboratory(task.spec.clone(), 9);
-    let settings = task.settings(closed_loop::forward(FeedForward::Table));
+    let settings = task.settings(closed_loop::forward(task.base, FeedForward::Table));
     let mut control = Loop::start(&bench, &task.motion, &task.table, settings, Mode::Force);
     let blocked = task.table.blocked_force.newtons();
     control.wave(Reference::Sine { mean: 0.4 * blocked, amplitude: 0.15 * blocked, frequency_hz: 0.5 });
@@ -187,11 +194,11 @@ fn force_with_table_and_trim_follows_within_a_percent_and_a_stiffer_bladder_does
         eprintln!(
             "{load:?} {course:?}: table {table:.2}, trimmed {trimmed:.2}, Gaylord {gaylord:.2}, limit {limit:.2} %"
         );
-        assert!(trimmed < 1.0 && trimmed > 0.3 * limit && gaylord > 3.0 * table, "{load:?} {course:?}");
+        assert!(trimmed < 0.5 && trimmed > 0.5 * limit && gaylord > 10.0 * table, "{load:?} {course:?}");
     }
     for factor in [0.8, 1.2] {
         let other = subject.misjudged(factor);
         let error = other.error(Mode::Force, Load::Moved, Course::Sine(1.0), Law::Trimmed);
-        assert!(error < 1.5, "{error} % with moduli by {factor}");
+        assert!(error < 0.5, "{error} % with moduli by {factor}");
     }
 }

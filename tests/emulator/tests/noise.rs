@@ -44,7 +44,7 @@ fn flipped_bits_cost_repeats_and_nothing_else() {
     let station = station();
     let options = Options { first: Some(Box::new(station.clone())), ..Options::default() };
     let Ok(machine) = Machine::start(folder.path(), options) else { return };
-    // Without lead a command is what was asked for, on its way from what was asked for before.
+    // Without lead a command is what was asked for.
     tracking::set(&mut machine.client(), |settings| settings.regulator.lead = 0.0);
     let mut sent = Vec::new();
     eprintln!("| bit error rate | upload, s | repeats | bad frames at the host | at the device |");
@@ -108,11 +108,12 @@ fn flipped_bits_cost_repeats_and_nothing_else() {
         let mut clean = machine.client();
         assert_eq!(tables::read(&mut clean, Side::Agonist).expect("it reads"), Some(image));
     }
-    // No command reached the plant that nobody sent; a start begins at what is measured, which may lie somewhat above.
+    // No command reached the plant that nobody sent; a start begins at what is measured, which lies above what was asked by ripple,
+    // wander and noise: 250 Pa, three times 300 Pa and three times 220 Pa at most, of some 150 kPa.
     let commands: Vec<f32> = station.since(0).iter().map(|exchange| exchange.command).collect();
     let highest = commands.iter().copied().fold(0.0, f32::max);
     let most = sent.iter().copied().fold(0.0, f32::max);
-    assert!(highest < 1.2 * most, "{highest} Pa were commanded, {most} Pa asked for");
+    assert!(highest < 1.015 * most, "{highest} Pa were commanded, {most} Pa asked for");
 }
 
 fn frame<E: Endpoint>(request: &E::Request, sequence: u16) -> Vec<u8> {
@@ -208,7 +209,7 @@ fn telemetry_of_two_muscles_at_1_khz_and_commands_beside_it_fit_a_line_of_1_mbau
                 if sample.tick % 20 == 0 {
                     let angle_rad = 0.03 * (samples as f32 * 1e-3).sin();
                     client
-                        .call::<SetTo>(&SetPoint::Pair { angle_rad, stiffness_nm_per_rad: 12.0 })
+                        .call::<SetTo>(&SetPoint::Pair { angle_rad, stiffness_nm_per_rad: 4.0 })
                         .expect("set");
                     commands += 1;
                 }

@@ -47,9 +47,12 @@ fn main() -> io::Result<()> {
     let mut text = String::from(
         "# How well force and stroke follow\n\nWritten by `cargo run --release -p emulator-tests --bin tracking`. True errors, rms, in % \
          of blocked force (force) or of free stroke (stroke), around 40 % of blocked force or 20 % of free stroke by 10 %; tables are \
-         fitted by `host` to recordings of the bench, whose physics are others than the model's. The trim and PI alone have the same \
-         phase margin, 60°. The limit is what dead time and fastest change of the regulator leave to a controller that knows \
-         everything but the future.\n\n![Errors over frequency](tracking.svg)\n",
+         fitted by `host` to recordings of the bench, whose physics are others than the model's. Lag, line and rate of the regulator are \
+         those that `host device identify` finds in steps of the same bench; all laws get them. The trim and PI alone have the same \
+         phase margin, 60°, at the stroke of the case: PI with its zero on the regulator's lag, so that line and tick are left to it; the \
+         trim with lag and line inverted, so that smoothing and tick are left. Waves are the device's own, which it knows ahead. The \
+         limit is what ripple, wander and fastest change of the regulator leave to a controller that begins when it is asked.\n\n\
+         ![Errors over frequency](tracking.svg)\n",
     );
     let mut panels = Vec::new();
     let subjects = [presets::miniature(), presets::contractile(), presets::push()].map(Subject::of);
@@ -76,18 +79,57 @@ fn main() -> io::Result<()> {
             let _ = writeln!(text, "| {} | {factor} | {table:.2} | {trimmed:.2} |", subject.spec.name);
         }
     }
+    text.push_str(
+        "\n## The regulator as it was identified\n\n| muscle | lag, ms | line at rest length, ms | rate, MPa/s | PI's crossover, rad/s |\n\
+         | --- | --- | --- | --- | --- |\n",
+    );
+    for subject in &subjects {
+        let found = &subject.regulator;
+        let _ = writeln!(
+            text,
+            "| {} | {:.1} | {:.1} | {:.2} | {:.0} |",
+            subject.spec.name,
+            found.lag_s * 1e3,
+            found.line_s * 1e3,
+            found.rate_pa_per_s * 1e-6,
+            subject.crossover(Load::Moved)
+        );
+    }
+    text.push_str(
+        "\n## Set-points of a host\n\nForce, moved, sine of 1 Hz, sent tick by tick: the device does not know what comes.\n\n\
+         | muscle | table | table + trim | PI alone | PI : table + trim |\n| --- | --- | --- | --- | --- |\n",
+    );
+    for subject in &subjects {
+        let [table, trimmed, feedback] = [Law::Table, Law::Trimmed, Law::Feedback]
+            .map(|law| subject.streamed_error(Load::Moved, 1.0, law));
+        let ratio = feedback / trimmed;
+        let _ = writeln!(
+            text,
+            "| {} | {table:.2} | {trimmed:.2} | {feedback:.2} | {ratio:.1} |",
+            subject.spec.name
+        );
+    }
     let mut emulated = String::new();
     for subject in &subjects {
-        for law in LAWS {
-            let here = subject.error(Mode::Force, Load::Moved, Course::Sine(1.0), law);
-            let Ok(there) = in_qemu(subject, Load::Moved, Course::Sine(1.0), law) else { continue };
-            let _ = writeln!(emulated, "| {} | {law:?} | {here:.2} | {there:.2} |", subject.spec.name);
+        for (mode, load) in [(Mode::Force, Load::Moved), (Mode::Stroke, Load::Spring)] {
+            for course in [Course::Steps, Course::Ramps, Course::Sine(1.0)] {
+                let here = subject.error(mode, load, course, Law::Trimmed);
+                let Ok(there) = in_qemu(subject, mode, load, course, Law::Trimmed) else { continue };
+                let what = if mode == Mode::Stroke { "stroke" } else { "force" };
+                let _ = writeln!(
+                    emulated,
+                    "| {} | {what} | {} | {} | {here:.2} | {there:.2} |",
+                    subject.spec.name,
+                    load.name(),
+                    course.name()
+                );
+            }
         }
     }
     if !emulated.is_empty() {
         text.push_str(
-            "\n## The same through the image in QEMU and the link\n\nForce, moved, sine of 1 Hz, judged by the load cell with its \
-             noise.\n\n| muscle | law | here | in QEMU |\n| --- | --- | --- | --- |\n",
+            "\n## The same through the image in QEMU and the link\n\nTable and trim, over half as many periods, judged by the device's own \
+             sensors with their noise.\n\n| muscle | what | load | asked | here | in QEMU |\n| --- | --- | --- | --- | --- | --- |\n",
         );
         text.push_str(&emulated);
     }
