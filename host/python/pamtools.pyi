@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any, Literal, final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 _Path = str | os.PathLike[str]
 _Array = NDArray[np.float64]
@@ -16,7 +16,14 @@ _Array = NDArray[np.float64]
 __version__: str
 
 class PamError(ValueError):
-    """What is wrong: args[0] names cause, place and remedy, args[1] is the stable code, such as "recording::time-order"."""
+    """What is wrong: the text names cause, place and remedy, the attributes give them one by one."""
+    code: str
+    """The stable name of the failure, such as "recording::time-order"."""
+    cause: str
+    file: str | None
+    line: int | None
+    column: str | None
+    help: str
 
 @final
 class Muscle:
@@ -49,11 +56,11 @@ class Recording:
     def __new__(
         cls,
         name: str,
-        time: _Array,
-        pressure: _Array,
-        stroke: _Array,
-        force: _Array | None = None,
-        temperature: _Array | None = None,
+        time: ArrayLike,
+        pressure: ArrayLike,
+        stroke: ArrayLike,
+        force: ArrayLike | None = None,
+        temperature: ArrayLike | None = None,
     ) -> Recording: ...
     @property
     def name(self) -> str: ...
@@ -86,6 +93,23 @@ class Campaign:
     def __len__(self) -> int: ...
 
 @final
+class Prediction:
+    """What a table says of one recording."""
+    @property
+    def force(self) -> _Array:
+        """N."""
+    @property
+    def band(self) -> _Array | None:
+        """Half the width of the 95 % interval of the table's own force, N; None where the table holds no uncertainty."""
+    @property
+    def rms(self) -> float | None:
+        """Root mean square of measured minus predicted force, N; None without a force column."""
+    @property
+    def inside(self) -> float | None:
+        """The share of readings within the 95 % interval of single readings, 0 to 1."""
+    def __len__(self) -> int: ...
+
+@final
 class Table:
     """What goes to the controller, and what predicts."""
     @staticmethod
@@ -105,10 +129,15 @@ class Table:
     @property
     def friction(self) -> _Array:
         """k_F at the nodes."""
-    def force(self, pressure: _Array, stroke: _Array, direction: float = 0.0) -> _Array:
-        """Force (N) of the base model; direction is 1 shortening, -1 lengthening, 0 the mid-line."""
+    def force(self, pressure: ArrayLike, stroke: ArrayLike, direction: ArrayLike | None = None) -> Any:
+        """Force (N) of the base model; direction is 1 shortening, -1 lengthening, 0 (or None) the mid-line. Arrays as numpy
+        broadcasts them; numbers give a number."""
+    def force_band(self, pressure: ArrayLike, stroke: ArrayLike, direction: ArrayLike | None = None) -> Any:
+        """Half the width of that force's 95 % interval, N; None where the table holds no uncertainty."""
     def predict(self, campaign: Campaign) -> list[_Array]:
         """The force that the load cell would read, N: one array a recording, effects and their memory included."""
+    def predict_with_bands(self, campaign: Campaign) -> list[Prediction]:
+        """The same with how sure it is and how well it fits, as `host predict` tells it."""
 
 @final
 class Fit:
@@ -121,16 +150,18 @@ class Fit:
     def report(self, path: _Path) -> None:
         """Writes the report, one HTML file."""
 
-def read(paths: Sequence[_Path], muscle: Muscle | None = None, import_description: _Path | None = None) -> Campaign:
-    """Reads files in chronological order; import_description is the TOML file for foreign formats."""
+def read(paths: _Path | Sequence[_Path], muscle: Muscle | None = None, import_description: _Path | None = None) -> Campaign:
+    """Reads a file, or several in chronological order; import_description is the TOML file for foreign formats."""
 
 def fit(
     campaign: Campaign,
     muscle: Muscle,
     order: int = 4,
     tip_correction: bool = False,
+    smoothing: float | None = None,
     fit_geometry: bool = False,
     fit_lengths: bool = False,
+    physical: bool = False,
 ) -> Fit:
     """Fits a muscle's table to recordings."""
 

@@ -84,6 +84,8 @@ enum Command {
     Recover(commands::record::RecoverArguments),
     /// Vent the muscle and disarm the controller.
     Vent(commands::run::VentArguments),
+    /// A controller without hardware, for all commands that talk to one.
+    Emulate(commands::emulate::Arguments),
     /// The live view in the browser: connect, run, fit, flash, compare.
     Studio(commands::studio::Arguments),
     /// Two recordings, in numbers and in a picture.
@@ -116,6 +118,7 @@ impl Command {
             Self::Record(a) => a.run(console),
             Self::Recover(a) => a.run(console),
             Self::Vent(a) => a.run(console),
+            Self::Emulate(a) => a.run(console),
             Self::Studio(a) => a.run(console),
             Self::Compare(a) => a.run(console),
             Self::Device(a) => a.run(console),

@@ -6,6 +6,7 @@ pub mod demo;
 pub mod device;
 pub mod diagnose;
 pub mod effects;
+pub mod emulate;
 pub mod evaluate;
 pub mod fit;
 pub mod flash;

@@ -9,6 +9,7 @@
 //! | `baselines` | tables free over pressure, one bladder for all pressures, and one that may differ a little |
 //! | `rest` | what friction does while the length is held |
 //! | `noise` | what repeats tell; tests by whole blocks |
+//! | `known` | what checks of the bench measured is taken out first |
 //! | `locate`, `frequency` | where the misfit sits; whether it beats in time |
 //! | `evidence` | how strongly the recordings speak for an effect |
 //! | `candidates` | the library of effects as columns |
@@ -31,6 +32,7 @@ mod evidence;
 mod frequency;
 mod held_out;
 mod kinematics;
+mod known;
 mod linear;
 mod locate;
 pub mod model;

@@ -13,6 +13,7 @@ use firmware::board::{Inputs, Outputs, Readings};
 use firmware::native::{Device, Options};
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::lockstep::{self, Answer, Station};
+use virtual_bench::muscle::{Muscle, MuscleSpec};
 use virtual_bench::plant::{Motion, Plant};
 
 use crate::device::Address;
@@ -73,6 +74,14 @@ impl Stand {
     pub fn new(spec: BenchSpec, motion: Motion) -> Self {
         let plant = Plant::new(&spec, &motion);
         Self { spec, motion, plant, mishap: Arc::default(), stuck: None }
+    }
+
+    /// A muscle that swings slowly around a fifth of its free stroke at nine tenths of its largest pressure.
+    #[must_use]
+    pub fn swinging(muscle: MuscleSpec) -> Self {
+        let free_mm = Muscle::new(muscle.clone()).free_stroke(0.9 * muscle.max_pressure) * 1e3;
+        let motion = Motion::Sine { mean_mm: 0.2 * free_mm, amplitude_mm: 0.1 * free_mm, frequency_hz: 0.4 };
+        Self::new(BenchSpec::laboratory(muscle, 1), motion)
     }
 
     /// The switch for mishaps; a [`Mishap`] as a number.

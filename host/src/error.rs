@@ -101,7 +101,7 @@ codes! {
     /// Too few rows to be of use.
     RecordingTooShort = "recording::too-short", Input,
         "record longer, or name another file";
-    /// The file's container (compression, MATLAB, Parquet) is damaged or not supported.
+    /// The file's container (compression, MATLAB, HDF5, Parquet) is damaged or not supported.
     RecordingContainer = "recording::container", Input,
         "save the file again, or export it as CSV";
     /// Lengths are given, but not the muscle's rest length that turns them into a stroke.
@@ -110,6 +110,12 @@ codes! {
     /// An import description is not valid, or does not fit the file.
     ImportInvalid = "import::invalid", Input,
         "compare with the descriptions in examples/imports";
+    /// A check of the bench is not valid, or tells nothing.
+    CheckInvalid = "check::invalid", Input,
+        "compare with the tables in the book's chapter on checking the bench";
+    /// A protocol is not valid, or cannot be carried out.
+    ProtocolInvalid = "protocol::invalid", Input,
+        "`virtual-bench record` writes a protocol beside its recordings, `host diagnose --next` one that would tell more";
     /// A muscle description is not valid.
     MuscleInvalid = "muscle::invalid", Input,
         "compare with the descriptions in examples/muscles, or make one with `host new`";
@@ -219,12 +225,21 @@ impl Error {
 
     /// The file could not be read; the operating system's reason becomes part of the cause.
     pub fn unreadable(file: impl AsRef<Path>, reason: &std::io::Error) -> Self {
-        Self::new(Code::FileUnreadable, format!("cannot be read: {reason}")).file(file)
+        let file = file.as_ref();
+        let error =
+            Self::new(Code::FileUnreadable, format!("cannot be read: {}", in_words(reason))).file(file);
+        match reason.kind() {
+            std::io::ErrorKind::NotFound if file.to_string_lossy().contains(['*', '?']) => {
+                error.help("no file here matches this pattern")
+            }
+            std::io::ErrorKind::IsADirectory => error.help("name the files in it"),
+            _ => error,
+        }
     }
 
     /// The file could not be written; the operating system's reason becomes part of the cause.
     pub fn unwritable(file: impl AsRef<Path>, reason: &std::io::Error) -> Self {
-        Self::new(Code::FileUnwritable, format!("cannot be written: {reason}")).file(file)
+        Self::new(Code::FileUnwritable, format!("cannot be written: {}", in_words(reason))).file(file)
     }
 
     /// Names the file. A file already named stays: the innermost place is the exact one.
@@ -312,6 +327,15 @@ impl Error {
     }
 }
 
+/// The operating system's reason without its number, which says nothing that the words do not.
+fn in_words(reason: &std::io::Error) -> String {
+    let text = reason.to_string();
+    match text.rfind(" (os error ") {
+        Some(at) => text[..at].to_owned(),
+        None => text,
+    }
+}
+
 impl miette::Diagnostic for Error {
     fn code<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
         Some(Box::new(self.0.code.name()))
@@ -327,32 +351,19 @@ impl miette::Diagnostic for Error {
 /// ```
 /// assert_eq!(host::error::nearest("pressure_kpa", ["time_s", "pressure_kPa"]), Some("pressure_kPa"));
 /// assert_eq!(host::error::nearest("voltage", ["time_s", "pressure_kPa"]), None);
+/// // Two letters that changed places are one mistake.
+/// assert_eq!(host::error::nearest("fti", ["run", "fit"]), Some("fit"));
 /// ```
 pub fn nearest<'a>(wanted: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let wanted = wanted.to_lowercase();
+    // Names are short; anything longer is no misspelling of one of ours.
+    let wanted = wanted.chars().take(64).collect::<String>().to_lowercase();
     candidates
         .into_iter()
-        .map(|c| (edit_distance(&wanted, &c.to_lowercase()), c))
+        // Swapped neighbours are one mistake of the fingers, not two.
+        .map(|c| (strsim::osa_distance(&wanted, &c.to_lowercase()), c))
         .filter(|(d, c)| *d <= 1 + wanted.chars().count().max(c.chars().count()) / 4)
         .min_by_key(|(d, _)| *d)
         .map(|(_, c)| c)
-}
-
-fn edit_distance(a: &str, b: &str) -> usize {
-    // Names are short; anything longer is no misspelling of one of ours.
-    let a: Vec<char> = a.chars().take(64).collect();
-    let b: Vec<char> = b.chars().take(64).collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.iter().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, cb) in b.iter().enumerate() {
-            let substitution = diagonal + usize::from(ca != cb);
-            diagonal = row[j + 1];
-            row[j + 1] = substitution.min(row[j] + 1).min(row[j + 1] + 1);
-        }
-    }
-    row[b.len()]
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 pub mod band;
 pub mod bench;
+pub mod checks;
 pub mod cli;
 pub mod commands;
 pub mod compare;
@@ -11,6 +12,7 @@ pub mod device;
 pub mod diagnose;
 pub mod emulated;
 pub mod error;
+pub mod file_kind;
 pub mod fit;
 pub mod muscle_description;
 pub mod output;
@@ -22,3 +24,4 @@ pub mod settings;
 pub mod studio;
 pub mod table_export;
 pub mod table_file;
+mod toml_words;

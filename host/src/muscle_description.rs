@@ -17,6 +17,8 @@ use model_core::units::{Angle, Length};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Code, Error, Result};
+use crate::file_kind::FileKind;
+use crate::toml_words::toml_error;
 
 /// Whether the muscle pulls, or pushes by a rod fixed to one end fitting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -65,11 +67,8 @@ impl MuscleDescription {
     /// [`Code::FileUnreadable`], or [`Code::MuscleInvalid`] with line, key and what is expected.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|e| {
-            Error::unreadable(path, &e)
-                .help("a muscle description is a small TOML text file; see examples/muscles")
-        })?;
-        Self::parse(&text).map_err(|e| e.file(path))
+        let text = FileKind::Muscle.read_text(path)?;
+        Self::parse(&text).map_err(|e| FileKind::Muscle.wanted(path, e))
     }
 
     /// Parses and checks the text of a description.
@@ -181,16 +180,6 @@ impl MuscleDescription {
     pub fn max_pressure(&self) -> Option<f64> {
         self.max_pressure_kPa.map(|p| p * 1e3)
     }
-}
-
-/// Turns a TOML error into ours: line, and the parser's own words as the cause.
-pub(crate) fn toml_error(code: Code, text: &str, error: &toml::de::Error) -> Error {
-    let mut ours = Error::new(code, error.message().trim().replace('\n', "; "));
-    if let Some(span) = error.span() {
-        let before = text.get(..span.start).unwrap_or(text);
-        ours = ours.line(before.matches('\n').count() as u64 + 1);
-    }
-    ours.help("see the annotated files in examples/muscles and examples/imports")
 }
 
 #[cfg(test)]

@@ -15,9 +15,8 @@ use rayon::prelude::*;
 use crate::band::{ForceBand, HALF_95};
 use crate::bench::Candidate;
 use crate::error::{Code, Error, Result};
-use crate::fit::direction::Follower;
 use crate::recording::segment::Motion;
-use crate::recording::{Campaign, Recording};
+use crate::recording::{Campaign, Follower, Recording};
 use crate::table_file::TableFile;
 
 /// What a table says of a campaign.

@@ -2,6 +2,7 @@
 
 use std::io::Write;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::console::Console;
@@ -12,6 +13,13 @@ const REDRAW: Duration = Duration::from_millis(100);
 const PATIENCE: Duration = Duration::from_millis(400);
 /// Width of the bar, characters.
 const BAR: u64 = 24;
+
+/// What is being done now, and since when.
+#[derive(Debug)]
+struct Stage {
+    what: String,
+    begun: Instant,
+}
 
 /// The line of one piece of work. Steps may be counted from several threads; the line goes when this is dropped.
 ///
@@ -24,7 +32,7 @@ const BAR: u64 = 24;
 /// ```
 #[derive(Debug)]
 pub struct Progress {
-    what: String,
+    stage: Mutex<Stage>,
     live: bool,
     begun: Instant,
     done: AtomicU64,
@@ -47,10 +55,11 @@ impl Progress {
     }
 
     fn begin(what: String, live: bool) -> Self {
+        let begun = Instant::now();
         Self {
-            what,
+            stage: Mutex::new(Stage { what, begun }),
             live,
-            begun: Instant::now(),
+            begun,
             done: AtomicU64::new(0),
             total: AtomicU64::new(0),
             drawn: AtomicU64::new(0),
@@ -60,6 +69,21 @@ impl Progress {
     /// States how many steps there are altogether; may be said again when more is known. 0: not known.
     pub fn total(&self, steps: u64) {
         self.total.store(steps, Ordering::Relaxed);
+    }
+
+    /// Begins another part of the work, of so many steps: they and the remaining time are counted anew. For work whose later
+    /// parts depend on what the earlier find.
+    pub fn stage(&self, what: impl Into<String>, steps: u64) {
+        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) =
+            Stage { what: what.into(), begun: Instant::now() };
+        self.done.store(0, Ordering::Relaxed);
+        self.total.store(steps, Ordering::Relaxed);
+        // A part that cannot be counted must at least be named, however soon it comes after the last picture.
+        self.drawn.fetch_min(
+            self.drawn.load(Ordering::Relaxed).saturating_sub(REDRAW.as_millis() as u64),
+            Ordering::Relaxed,
+        );
+        self.draw(0);
     }
 
     /// One step is done.
@@ -89,7 +113,8 @@ impl Progress {
         let due = now >= PATIENCE.as_millis() as u64 && now.saturating_sub(last) >= REDRAW.as_millis() as u64;
         // Of several threads that find the line due, one draws it.
         if due && self.drawn.compare_exchange(last, now, Ordering::Relaxed, Ordering::Relaxed).is_ok() {
-            let text = line(&self.what, done, self.total.load(Ordering::Relaxed), elapsed);
+            let stage = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
+            let text = line(&stage.what, done, self.total.load(Ordering::Relaxed), stage.begun.elapsed());
             let _ = write!(std::io::stderr().lock(), "\r\u{1b}[2K{text}");
         }
     }
@@ -98,6 +123,12 @@ impl Progress {
     #[must_use]
     pub fn done(&self) -> u64 {
         self.done.load(Ordering::Relaxed)
+    }
+}
+
+impl Default for Progress {
+    fn default() -> Self {
+        Self::silent()
     }
 }
 
@@ -111,6 +142,9 @@ impl Drop for Progress {
 
 /// The line: what, a bar, the share, and the time that is left if the rest goes as fast as what is done.
 fn line(what: &str, done: u64, total: u64, elapsed: Duration) -> String {
+    if total == 0 && done == 0 {
+        return format!("{what} …");
+    }
     if total == 0 {
         return format!("{what}  {done}  {}", span(elapsed));
     }
@@ -146,7 +180,19 @@ mod tests {
         // More steps than were said is a wrong total, not a share above one.
         assert!(line("fit", 300, 100, Duration::from_secs(9)).ends_with("100 %  0 s left"));
         assert_eq!(line("record", 1234, 0, Duration::from_secs(5)), "record  1234  5 s");
+        assert_eq!(line("weighing", 0, 0, Duration::from_secs(5)), "weighing …");
         assert_eq!(span(Duration::from_secs(7_260)), "2 h 01 min");
+    }
+
+    #[test]
+    fn a_new_stage_counts_anew() {
+        let progress = Progress::silent();
+        progress.stage("first", 3);
+        progress.add(3);
+        progress.stage("second", 5);
+        progress.step();
+        assert_eq!((progress.done(), progress.total.load(Ordering::Relaxed)), (1, 5));
+        assert_eq!(progress.stage.lock().unwrap_or_else(PoisonError::into_inner).what, "second");
     }
 
     #[test]

@@ -10,8 +10,10 @@ mod cells;
 mod columns;
 mod container;
 mod decimal;
+mod follow;
 #[cfg(feature = "hdf5")]
 mod hdf5;
+mod head;
 pub mod import;
 mod matlab;
 mod mcap;
@@ -22,10 +24,12 @@ mod plan;
 mod quantity;
 mod read;
 pub mod segment;
+mod sheet;
 mod source;
 
 pub use campaign::{Campaign, Clock};
 pub use columns::Recording;
+pub use follow::{Follower, UNKNOWN_PAUSE};
 pub use import::Import;
 pub use noise::white_noise;
 pub use quantity::{Named, Quantity, Unit, named};

@@ -20,7 +20,7 @@ use clap::{Arg, ArgAction, Command};
 use toml::de::{DeTable, DeValue};
 
 use crate::error::{Code, Error, Result, nearest};
-use crate::muscle_description::toml_error;
+use crate::toml_words::toml_error;
 
 /// The name of the file.
 pub const NAME: &str = "pam.toml";

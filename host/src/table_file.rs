@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::error::{Code, Error, Result};
+use crate::file_kind::FileKind;
 use crate::output::write_whole;
 use crate::recording::Campaign;
 
@@ -193,15 +194,12 @@ impl TableFile {
         let path = path.as_ref();
         let size = fs::metadata(path).map_err(|e| Error::unreadable(path, &e))?.len();
         if size > (MAX_BODY + HEADER + CHECKSUM) as u64 {
-            return Err(Error::new(
-                Code::TableInvalid,
-                format!("{size} bytes are too many for a table file"),
-            )
-            .file(path)
-            .help("tables end in .pam and are written by `host fit` or `host diagnose`"));
+            let error = Error::new(Code::TableInvalid, format!("{size} bytes are too many for a table file"))
+                .help("tables end in .pam and are written by `host fit` or `host diagnose`");
+            return Err(FileKind::Table.wanted(path, error));
         }
         let bytes = fs::read(path).map_err(|e| Error::unreadable(path, &e))?;
-        Self::from_bytes(&bytes).map_err(|e| e.file(path))
+        Self::from_bytes(&bytes).map_err(|e| FileKind::Table.wanted(path, e))
     }
 
     /// Writes the file, whole or not at all.

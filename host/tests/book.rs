@@ -251,6 +251,15 @@ fn the_contents_list_every_page_and_no_other() {
             "{path} is not in SUMMARY.md"
         );
     }
+    // The book calls a folder's page index.html; links that name the README must find it all the same.
+    let settings = fs::read_to_string(book().join("../book.toml")).expect("book.toml");
+    for page in pages().iter().filter(|p| p.ends_with("README.md")) {
+        let folder = page.parent().and_then(|f| f.strip_prefix(book()).ok()).expect("a folder").display();
+        assert!(
+            settings.contains(&format!("\"/{folder}/README.html\" = ")),
+            "book.toml redirects no {folder}/README.html"
+        );
+    }
     for link in contents.split("](").skip(1).filter_map(|l| l.split(')').next()) {
         assert!(book().join(link).is_file(), "SUMMARY.md names {link}, which is not there");
     }

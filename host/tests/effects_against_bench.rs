@@ -3,13 +3,15 @@
 //! namesake there leaves in the force once a base model has taken its part. Laws that only describe themselves would pass every
 //! other test.
 
+mod bench_campaign;
+
 use std::collections::BTreeMap;
 
 use host::bench::{Candidate, Span};
-use host::fit::{self, direction::Follower};
+use host::fit;
 use host::muscle_description::MuscleDescription;
 use host::recording::segment::Motion;
-use host::recording::{Campaign, Recording};
+use host::recording::{Campaign, Follower, Recording};
 use model_core::effects::{Context, MEMORY};
 use model_core::muscle::Muscle as Model;
 use model_core::units::{Length, Pressure};
@@ -17,7 +19,8 @@ use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::Muscle;
 use virtual_bench::physics::{
-    Activated, Ageing, Heat, Mullins, Relaxation, Relays, Seal, Set, Slow, StrandContact, Viscous, Wear,
+    Activated, Ageing, Heat, Jam, Mullins, Relaxation, Relays, Seal, Set, Slip, Slow, StrandContact, Viscous,
+    Wear,
 };
 use virtual_bench::pneumatics::Pneumatics;
 use virtual_bench::presets;
@@ -25,7 +28,7 @@ use virtual_bench::protocol::{Protocol, Step};
 use virtual_bench::sensors::Sensor;
 
 /// What of an effect's trace, beyond the base model's reach, its namesake must at least explain.
-const BOUNDS: [(&str, f64); 20] = [
+const BOUNDS: [(&str, f64); 28] = [
     ("coulomb-friction", 0.98),
     ("seal-friction", 0.97),
     ("pressure-friction", 0.95),
@@ -46,6 +49,14 @@ const BOUNDS: [(&str, f64); 20] = [
     ("force-gain", 0.97),
     ("cross-talk", 0.97),
     ("sensor-delay", 0.95),
+    ("log-creep", 0.85),
+    ("tip-effect", 0.80),
+    ("braid-elasticity", 0.92),
+    ("strand-jamming", 0.80),
+    ("friction-asymmetry", 0.75),
+    ("displacement-offset", 0.95),
+    ("end-slip", 0.93),
+    ("force-drift", 0.98),
 ];
 
 /// Puts the bench's version of an effect on it, at about one per cent of the blocked force.
@@ -125,6 +136,18 @@ fn inject(
         "force-gain" => bench.instruments.force.gain = 0.012,
         "cross-talk" => bench.rig.hose = 0.01 * force / pressure,
         "sensor-delay" => (bench.instruments.force.delay, bench.instruments.force.lag) = (0.05, 0.02),
+        "log-creep" => {
+            physics.creep = Some(Relaxation { strength: 0.004, fastest: 0.5, branches: 9, exponent: 0.0 });
+        }
+        "tip-effect" => bench.muscle.shape.ends = 0.4,
+        "braid-elasticity" => bench.muscle.shape.fibre_stiffness = Some(400.0 * force),
+        "strand-jamming" => {
+            physics.jam = Some(Jam { force: 0.004 * force, stroke: 0.85 * stroke, width: 0.07 * stroke });
+        }
+        "friction-asymmetry" => bench.muscle.friction.asymmetry = 0.1,
+        "displacement-offset" => bench.rig.offset = 0.006 * stroke,
+        "end-slip" => physics.slip = Some(Slip { time: 200.0, travel: 0.015 * stroke }),
+        "force-drift" => bench.rig.warm_up = (0.01 * force, 600.0),
         other => panic!("nothing is known of {other}"),
     }
 }
@@ -142,17 +165,7 @@ fn silent(bench: &BenchSpec) -> BenchSpec {
 
 fn run(bench: &BenchSpec, protocol: &Protocol) -> Vec<Recording> {
     let files = Bench::new(bench).run(protocol).expect("a protocol for this muscle");
-    files
-        .into_iter()
-        .map(|f| Recording {
-            name: f.name,
-            time: f.rows.iter().map(|r| r.time).collect(),
-            pressure: f.rows.iter().map(|r| r.pressure).collect(),
-            stroke: f.rows.iter().map(|r| r.stroke).collect(),
-            force: Some(f.rows.iter().map(|r| r.force).collect()),
-            ..Recording::default()
-        })
-        .collect()
+    bench_campaign::recordings(&files)
 }
 
 fn force(recording: &Recording) -> &[f64] {
@@ -258,7 +271,7 @@ fn each_law_describes_the_bench_s_own_version_of_its_effect() {
         let candidate = Candidate::from_name(name).expect("in the catalogue");
         let span = Span::of(&contexts).expect("readings");
         let explained = candidate
-            .grid(if candidate.shapes().len() > 1 { 6 } else { 12 }, &span)
+            .grid(if candidate.shapes().len() > 1 { 6 } else { 40 }, &span)
             .iter()
             .map(|shape| {
                 let mut own = base.clone();

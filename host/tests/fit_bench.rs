@@ -1,6 +1,7 @@
 //! The fit on muscles of other physics than its own: the virtual bench's, which store energy in a hyperelastic tube.
 
 use host::band::ForceBand;
+use host::fit::other_length::unseen_length;
 use host::fit::{Options, fit, result::Fit};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::Muscle;
@@ -215,4 +216,35 @@ fn stress_rises_with_strain_where_it_is_asked_for() {
         }
     }
     assert!(fitted.summary.mean_error_pct < 2.0);
+}
+
+/// A muscle's length that was not recorded, from three others of its stock. The bench has no ends that pull less: the end effect
+/// found is small, and the prediction is no worse than what the nearest length's table alone gives.
+#[test]
+fn a_length_that_was_not_recorded_comes_from_the_others() {
+    let lengths = [0.6, 1.0, 1.6, 2.5].map(|times| {
+        let mut spec = presets::contractile();
+        spec.geometry.rest_length *= times;
+        let campaign = thesis(&spec, &presets::large_pressures(), 3, 10.0);
+        let fitted = fit(&campaign, &description(&spec), &Options::default()).expect("a fit");
+        (spec, campaign, fitted)
+    });
+    for left_out in 0..lengths.len() {
+        let (spec, campaign, own) = &lengths[left_out];
+        let others: Vec<&Fit> =
+            lengths.iter().enumerate().filter(|(i, _)| *i != left_out).map(|(_, l)| &l.2).collect();
+        let clip = own.prepared.clips.0.map(|c| c.force);
+        let percent = |from: &[&Fit]| {
+            let carried = unseen_length(from, campaign, &description(spec), clip).expect("a prediction");
+            (100.0 * carried.score.mean() / own.summary.blocked_force_N, carried.end_effect)
+        };
+        let (all, end_effect) = percent(&others);
+        let nearest = others.iter().map(|o| percent(&[o]).0).fold(f64::INFINITY, f64::min);
+        println!(
+            "{left_out}: {all:.3} % from all, {nearest:.3} % from the best one, end effect {:.2} mm",
+            1e3 * end_effect
+        );
+        assert!(all < 1.0 && all < nearest + 0.2, "{all} % from all, {nearest} % from the best");
+        assert!(end_effect.abs() < 0.1 * 15.9e-3, "{end_effect} m");
+    }
 }

@@ -5,6 +5,8 @@
 
 use std::path::{Path, PathBuf};
 
+use host::fit::other_length::unseen_length;
+use host::fit::{Options, fit};
 use host::muscle_description::MuscleDescription;
 use host::recording::segment::{Motion, PressureLevels};
 use host::recording::{Campaign, Clock, Import, Reader};
@@ -152,4 +154,38 @@ fn the_thesis_raw_form_comes_in_with_its_units() {
     close(recording.force.as_ref().unwrap()[50], 20.0, 1e-3);
     close(recording.stroke[0], 0.0, 0.15e-3);
     assert_eq!(Motion::of(recording).turns.len(), 2);
+}
+
+/// Muscles of one stock predict each other's lengths: percent of blocked force, mean over the muscles, with bounds on both sides.
+#[test]
+fn a_length_that_was_not_recorded_is_predicted_from_the_others() {
+    let options = Options { fit_geometry: true, fit_lengths: true, ..Options::default() };
+    for (year, muscles, bounds) in [
+        ("2022", &["83mm", "132mm", "182mm", "233mm", "281mm", "382mm"][..], 2.7..3.2),
+        ("2021", &["13cm", "23cm", "27cm", "29cm", "30cm"][..], 3.0..3.5),
+    ] {
+        let mut cases = Vec::new();
+        for name in muscles {
+            let description = format!("festo10-{year}-{name}.toml");
+            let import = format!("festo-{year}-settled.toml");
+            let folder = format!("aarl-festo-10mm-{year}");
+            let Some(campaign) = read(&folder, "settled_points.csv", &import, &description) else { return };
+            let path = project().join("examples/muscles").join(&description);
+            let muscle = MuscleDescription::read(path).unwrap();
+            let fitted = fit(&campaign, &muscle, &options).unwrap();
+            cases.push((muscle, campaign, fitted));
+        }
+        let percent = |i: usize| {
+            let (muscle, campaign, own) = &cases[i];
+            let others: Vec<_> =
+                cases.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, c)| &c.2).collect();
+            let clip = own.prepared.clips.0.map(|c| c.force);
+            let carried = unseen_length(&others, campaign, muscle, clip).unwrap();
+            println!("{}: end effect {:.1} mm by the others", muscle.name, carried.end_effect * 1e3);
+            100.0 * carried.score.mean() / own.summary.blocked_force_N
+        };
+        let mean = (0..cases.len()).map(percent).sum::<f64>() / cases.len() as f64;
+        println!("{year}: {mean:.2} %");
+        assert!(bounds.contains(&mean), "{year}: {mean} %");
+    }
 }

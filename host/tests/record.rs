@@ -3,10 +3,15 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)] // what fails here fails the test
 
+#[path = "common/line.rs"]
+mod line;
+
+use std::net::{Shutdown, TcpStream};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use host::device::Address;
 use host::device::recorder::side_file;
 use host::emulated::{Emulated, Kind, Stand};
 use host::recording::{Reader, Recording};
@@ -124,6 +129,79 @@ fn a_device_that_is_gone_ends_the_recording_and_keeps_it() {
     assert!(a.len() > 100 && a.len() == b.len(), "{} and {}", a.len(), b.len());
     let about = std::fs::read_to_string(side_file(&folder.path().join("run.csv"))).unwrap();
     assert!(about.contains("connection"), "{about}");
+}
+
+/// A serial cable to a controller: a real pseudo-terminal, and what pulls it.
+fn cable(controller: &Emulated) -> (std::path::PathBuf, TcpStream, std::fs::File) {
+    let Address::Tcp { host, port } = controller.address() else {
+        panic!("an emulated controller has a TCP port")
+    };
+    let far = TcpStream::connect((host.as_str(), *port)).unwrap();
+    let (master, path) = line::open_pty();
+    // Until the host has opened the far end, reads of the near one would fail.
+    let keep = std::fs::OpenOptions::new().read(true).write(true).open(&path).unwrap();
+    let (mut from_host, mut to_host) = (master.try_clone().unwrap(), master);
+    let (mut to_controller, mut from_controller) = (far.try_clone().unwrap(), far.try_clone().unwrap());
+    // Both ends of the line close when both threads have ended, as when a cable is pulled.
+    std::thread::spawn(move || std::io::copy(&mut from_host, &mut to_controller));
+    std::thread::spawn(move || std::io::copy(&mut from_controller, &mut to_host));
+    (path, far, keep)
+}
+
+#[test]
+fn a_cable_that_is_pulled_ends_the_recording_at_a_whole_row() {
+    let folder = tempfile::tempdir().unwrap();
+    let controller = controller();
+    let (path, line, _keep) = cable(&controller);
+    let child = start(folder.path(), path.to_str().unwrap(), &[]);
+    grown(&folder.path().join("run.csv.part"), 40_000);
+    line.shutdown(Shutdown::Both).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let told = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("error[device::") && told.contains("samples until then are in run.csv"), "{told}");
+    let (a, b) = (read(&folder.path().join("run.csv")), read(&folder.path().join("run.mcap")));
+    assert!(a.len() > 100 && a.len() == b.len(), "{} and {}", a.len(), b.len());
+    let text = std::fs::read_to_string(folder.path().join("run.csv")).unwrap();
+    assert!(text.ends_with('\n'), "the last row is whole");
+    assert!(!folder.path().join("run.csv.part").exists());
+}
+
+/// A file system of one megabyte, whose end no limit of the system imitates: then even the side file has no room.
+#[test]
+fn a_disk_without_room_keeps_every_row_that_fitted() {
+    let folder = tempfile::tempdir().unwrap();
+    let controller = controller();
+    let script = format!(
+        "mkdir small && mount -t tmpfs -o size=1m none small || exit 77
+         cd small && '{}' record --port {} -o run.csv -o run.mcap; ended=$?
+         cd .. && cp -a small kept && exit $ended",
+        env!("CARGO_BIN_EXE_host"),
+        controller.address()
+    );
+    // A mount of one's own needs no rights where namespaces are allowed.
+    let output = Command::new("unshare")
+        .args(["--map-root-user", "--mount", "sh", "-c", &script])
+        .current_dir(folder.path())
+        .env("PAM_SETTINGS", "")
+        .output()
+        .unwrap();
+    let told = said(&output);
+    if output.status.code() == Some(77) || told.starts_with("unshare:") {
+        eprintln!("skipped: no file system can be mounted here: {told}");
+        return;
+    }
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("error[file::unwritable]") && told.contains("No space left"), "{told}");
+    let kept = folder.path().join("kept");
+    let (a, b) = (read(&kept.join("run.csv")), read(&kept.join("run.mcap")));
+    // One megabyte holds some thousand samples in both forms; both end within a few pieces of one another.
+    assert!(a.len() > 1000 && a.len().abs_diff(b.len()) <= 600, "{} and {}", a.len(), b.len());
+    let text = std::fs::read_to_string(kept.join("run.csv")).unwrap();
+    assert!(text.ends_with('\n') && !kept.join("run.csv.part").exists());
+    // What was known at the start stands beside it.
+    let about = std::fs::read_to_string(side_file(&kept.join("run.csv"))).unwrap();
+    assert!(about.contains("link_version"), "{about}");
 }
 
 #[test]

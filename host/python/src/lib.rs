@@ -4,38 +4,77 @@
 
 use std::path::PathBuf;
 
+use host::band::{ForceBand, HALF_95};
 use host::diagnose as diagnosis;
-use host::error::Error;
+use host::error::{Code, Error};
 use host::fit::Options;
 use host::fit::result::Fit as HostFit;
 use host::muscle_description::{Kind, MuscleDescription};
-use host::predict::predict as host_predict;
+use host::predict::{Predicted, predict as host_predict, predict_with_bands};
 use host::recording::{Campaign as HostCampaign, Import, Reader, Recording as HostRecording};
 use host::report::{Page, diagnose_page, fit_page};
 use host::table_file::{self, About, TableFile};
-use model_core::braid::Geometry;
 use model_core::muscle::Muscle as Model;
-use model_core::units::{Angle, Length, Pressure};
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use model_core::units::{Length, Pressure};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyModule;
+use pyo3::types::{PyModule, PyTuple};
 
 create_exception!(
     pamtools,
     PamError,
     PyValueError,
-    "What is wrong with the input: the text names cause, place and remedy; `args[1]` is the stable code."
+    "What is wrong: the text names cause, place and remedy; code, cause, file, line, column and help give them one by one."
 );
 
+/// The error as an exception: its text names cause, place and remedy, its attributes give them one by one.
 fn raised(error: Error) -> PyErr {
     let help = error.advice().map_or(String::new(), |a| format!("; {a}"));
-    PamError::new_err((format!("{error}{help}"), error.code().name()))
+    let exception = PamError::new_err(format!("{error}{help}"));
+    let place = error.place();
+    let file = place.file.as_ref().map(|f| f.display().to_string());
+    let told = Python::attach(|py| {
+        let value = exception.value(py);
+        value.setattr("code", error.code().name())?;
+        value.setattr("cause", error.cause())?;
+        value.setattr("file", file)?;
+        value.setattr("line", place.line)?;
+        value.setattr("column", place.column.as_deref())?;
+        value.setattr("help", error.advice())
+    });
+    told.err().unwrap_or(exception)
 }
 
 fn wrong(text: impl Into<String>) -> PyErr {
-    PamError::new_err((text.into(), "call::invalid"))
+    raised(Error::new(Code::CallInvalid, text))
+}
+
+/// Anything that numpy takes for a column of numbers.
+fn column(name: &str, values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let array = numbers(name, values)?;
+    let shape: Vec<usize> = array.getattr("shape")?.extract()?;
+    if shape.len() != 1 {
+        return Err(raised(
+            Error::new(Code::CallInvalid, format!("`{name}` has {} dimensions", shape.len()))
+                .help("give a one-dimensional array, one number a row"),
+        ));
+    }
+    let array: PyReadonlyArrayDyn<'_, f64> = array.extract()?;
+    Ok(array.as_array().iter().copied().collect())
+}
+
+/// Anything that numpy can turn into an array of numbers.
+fn numbers<'py>(name: &str, values: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let py = values.py();
+    PyModule::import(py, "numpy")?.call_method1("asarray", (values, "float64")).map_err(|e| {
+        raised(
+            Error::new(Code::CallInvalid, format!("`{name}` is no array of numbers: {}", e.value(py))).help(
+                "give a numpy array, a list or a column of a data frame; missing values are not filled in",
+            ),
+        )
+    })
 }
 
 /// JSON text as Python values.
@@ -44,7 +83,7 @@ fn loads<'py>(py: Python<'py>, text: &str) -> PyResult<Bound<'py, PyAny>> {
 }
 
 /// A muscle as its maker or a calliper describes it: lengths in mm, the braid angle in degrees from the radial plane.
-#[pyclass(frozen, skip_from_py_object)]
+#[pyclass(frozen)]
 #[derive(Clone)]
 struct Muscle(MuscleDescription);
 
@@ -113,7 +152,7 @@ impl Muscle {
 }
 
 /// One recording, columns in SI units.
-#[pyclass(frozen, skip_from_py_object)]
+#[pyclass(frozen)]
 #[derive(Clone)]
 struct Recording(HostRecording);
 
@@ -123,20 +162,19 @@ impl Recording {
     #[pyo3(signature = (name, time, pressure, stroke, force = None, temperature = None))]
     fn new(
         name: String,
-        time: PyReadonlyArray1<'_, f64>,
-        pressure: PyReadonlyArray1<'_, f64>,
-        stroke: PyReadonlyArray1<'_, f64>,
-        force: Option<PyReadonlyArray1<'_, f64>>,
-        temperature: Option<PyReadonlyArray1<'_, f64>>,
+        time: &Bound<'_, PyAny>,
+        pressure: &Bound<'_, PyAny>,
+        stroke: &Bound<'_, PyAny>,
+        force: Option<&Bound<'_, PyAny>>,
+        temperature: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let column = |a: &PyReadonlyArray1<'_, f64>| a.as_array().to_vec();
         let recording = HostRecording {
             name,
-            time: column(&time),
-            pressure: column(&pressure),
-            stroke: column(&stroke),
-            force: force.as_ref().map(column),
-            temperature: temperature.as_ref().map(column),
+            time: column("time", time)?,
+            pressure: column("pressure", pressure)?,
+            stroke: column("stroke", stroke)?,
+            force: force.map(|f| column("force", f)).transpose()?,
+            temperature: temperature.map(|t| column("temperature", t)).transpose()?,
             ..HostRecording::default()
         };
         recording.check().map_err(raised)?;
@@ -189,7 +227,7 @@ impl Recording {
 }
 
 /// Recordings of one muscle in chronological order.
-#[pyclass(frozen, skip_from_py_object)]
+#[pyclass(frozen)]
 #[derive(Clone)]
 struct Campaign(HostCampaign);
 
@@ -221,16 +259,27 @@ impl Campaign {
     }
 }
 
-/// Reads files in chronological order; `import_description` is the TOML file for foreign formats.
+/// One file, or several.
+#[derive(FromPyObject)]
+enum Paths {
+    One(PathBuf),
+    Several(Vec<PathBuf>),
+}
+
+/// Reads a file, or several in chronological order; `import_description` is the TOML file for foreign formats.
 #[pyfunction]
 #[pyo3(signature = (paths, muscle = None, import_description = None))]
 fn read(
     py: Python<'_>,
-    paths: Vec<PathBuf>,
+    paths: Paths,
     muscle: Option<PyRef<'_, Muscle>>,
     import_description: Option<PathBuf>,
 ) -> PyResult<Campaign> {
     let muscle = muscle.map(|m| m.0.clone());
+    let paths = match paths {
+        Paths::One(path) => vec![path],
+        Paths::Several(paths) => paths,
+    };
     py.detach(|| {
         let import = import_description.as_ref().map(Import::read).transpose()?;
         let reader = muscle.as_ref().map_or_else(Reader::new, Reader::of);
@@ -244,8 +293,49 @@ fn write_report(page: &Page, path: &PathBuf) -> PyResult<()> {
     host::output::write_whole(path, page.html().as_bytes()).map_err(raised)
 }
 
+/// What a table says of one recording.
+#[pyclass(frozen)]
+struct Prediction(Predicted);
+
+#[pymethods]
+impl Prediction {
+    /// The force that the load cell would read, N.
+    #[getter]
+    fn force<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.0.force.clone().into_pyarray(py)
+    }
+
+    /// Half the width of the 95 % interval of the table's own force, N, per row; None where the table holds no uncertainty.
+    #[getter]
+    fn band<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.0.bands.as_ref().map(|b| b.half.clone().into_pyarray(py))
+    }
+
+    /// Root mean square of measured minus predicted force, N; None without a force column.
+    #[getter]
+    fn rms(&self) -> Option<f64> {
+        self.0.rms
+    }
+
+    /// The share of readings within the 95 % interval of single readings, 0 to 1; None where either is not known.
+    #[getter]
+    fn inside(&self) -> Option<f64> {
+        self.0.bands.as_ref().and_then(|b| b.inside)
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.force.len()
+    }
+
+    fn __repr__(&self) -> String {
+        let rms = self.0.rms.map_or(String::new(), |r| format!(", rms {r:.3} N"));
+        let band = self.0.bands.as_ref().map_or(String::new(), |b| format!(", ± {:.3} N", b.mean));
+        format!("Prediction({} rows{rms}{band})", self.0.force.len())
+    }
+}
+
 /// A fitted table.
-#[pyclass(frozen, skip_from_py_object)]
+#[pyclass(frozen)]
 #[derive(Clone)]
 struct Table(TableFile);
 
@@ -288,25 +378,31 @@ impl Table {
     }
 
     /// Force (N) of the base model at pressures (Pa) and strokes (m); `direction` is 1 shortening, -1 lengthening, 0 the mid-line.
-    #[pyo3(signature = (pressure, stroke, direction = 0.0))]
+    /// Numbers and arrays of any shape, as numpy broadcasts them.
+    #[pyo3(signature = (pressure, stroke, direction = None))]
     fn force<'py>(
         &self,
-        py: Python<'py>,
-        pressure: PyReadonlyArray1<'py, f64>,
-        stroke: PyReadonlyArray1<'py, f64>,
-        direction: f64,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        pressure: &Bound<'py, PyAny>,
+        stroke: &Bound<'py, PyAny>,
+        direction: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
         let model = Model::<f64>::build(&self.0.table).map_err(|e| wrong(e.to_string()))?;
-        let (p, x) = (pressure.as_array(), stroke.as_array());
-        if p.len() != x.len() {
-            return Err(wrong(format!("{} pressures beside {} strokes", p.len(), x.len())));
-        }
-        let force: Vec<f64> = p
-            .iter()
-            .zip(x.iter())
-            .map(|(p, x)| model.force(Pressure::from_pascals(*p), Length::from_metres(*x), direction).newtons())
-            .collect();
-        Ok(force.into_pyarray(py))
+        over(pressure, stroke, direction, |p, x, s| {
+            model.force(Pressure::from_pascals(p), Length::from_metres(x), s).newtons()
+        })
+    }
+
+    /// Half the width of the 95 % interval of that force (N), at the same places: what the table's numbers leave open. None where
+    /// the table holds no uncertainty.
+    #[pyo3(signature = (pressure, stroke, direction = None))]
+    fn force_band<'py>(
+        &self,
+        pressure: &Bound<'py, PyAny>,
+        stroke: &Bound<'py, PyAny>,
+        direction: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let Some(band) = ForceBand::of(&self.0) else { return Ok(None) };
+        over(pressure, stroke, direction, |p, x, s| HALF_95 * band.std(p, x, s)).map(Some)
     }
 
     /// The force that the load cell would read, N: one array a recording. Effects and their memory run through the campaign.
@@ -320,9 +416,52 @@ impl Table {
         Ok(prediction.recordings.into_iter().map(|r| r.force.into_pyarray(py)).collect())
     }
 
-    fn __repr__(&self) -> String {
-        format!("Table({:?}, P0={:.1} kPa, {} nodes)", self.0.about.muscle, self.deadband() / 1e3, self.0.table.nodes.len())
+    /// The same with how sure it is and how well it fits: one prediction a recording, with force, band, rms and inside.
+    fn predict_with_bands(&self, py: Python<'_>, campaign: PyRef<'_, Campaign>) -> PyResult<Vec<Prediction>> {
+        let (table, campaign) = (self.0.clone(), campaign.0.clone());
+        let prediction = py.detach(move || predict_with_bands(&table, &campaign)).map_err(raised)?;
+        Ok(prediction.recordings.into_iter().map(Prediction).collect())
     }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Table({:?}, P0={:.1} kPa, {} nodes)",
+            self.0.about.muscle,
+            self.deadband() / 1e3,
+            self.0.table.nodes.len()
+        )
+    }
+}
+
+/// A function of pressure, stroke and direction over arrays, as numpy broadcasts them.
+fn over<'py>(
+    pressure: &Bound<'py, PyAny>,
+    stroke: &Bound<'py, PyAny>,
+    direction: Option<&Bound<'py, PyAny>>,
+    of: impl Fn(f64, f64, f64) -> f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = pressure.py();
+    let numpy = PyModule::import(py, "numpy")?;
+    let pressure = numbers("pressure", pressure)?;
+    let stroke = numbers("stroke", stroke)?;
+    let direction = match direction {
+        Some(given) => numbers("direction", given)?,
+        None => numpy.call_method1("zeros", ((),))?,
+    };
+    let same = numpy.call_method1("broadcast_arrays", (pressure, stroke, direction)).map_err(|e| {
+        raised(
+            Error::new(Code::CallInvalid, format!("the arrays do not fit each other: {}", e.value(py)))
+                .help("pressure, stroke and direction are numbers or arrays of one shape"),
+        )
+    })?;
+    let part = |i: usize| -> PyResult<PyReadonlyArrayDyn<'py, f64>> { Ok(same.get_item(i)?.extract()?) };
+    let (p, x, s) = (part(0)?, part(1)?, part(2)?);
+    let values: Vec<f64> =
+        p.as_array().iter().zip(x.as_array()).zip(s.as_array()).map(|((p, x), s)| of(*p, *x, *s)).collect();
+    let shape = p.as_array().shape().to_vec();
+    let array = values.into_pyarray(py).call_method1("reshape", (shape,))?;
+    // One number for one place.
+    array.get_item(PyTuple::empty(py)).or(Ok(array))
 }
 
 /// A finished fit.
@@ -370,17 +509,35 @@ impl Fit {
 
 /// Fits a muscle's table to recordings.
 #[pyfunction]
-#[pyo3(signature = (campaign, muscle, order = 4, tip_correction = false, fit_geometry = false, fit_lengths = false))]
+#[pyo3(signature = (campaign, muscle, order = 4, tip_correction = false, smoothing = None, fit_geometry = false, fit_lengths = false,
+    physical = false))]
+#[allow(clippy::too_many_arguments)] // They are the options of `host fit`.
 fn fit(
     py: Python<'_>,
     campaign: PyRef<'_, Campaign>,
     muscle: PyRef<'_, Muscle>,
     order: usize,
     tip_correction: bool,
+    smoothing: Option<f64>,
     fit_geometry: bool,
     fit_lengths: bool,
+    physical: bool,
 ) -> PyResult<Fit> {
-    let options = Options { order, tip_correction, fit_geometry, fit_lengths, ..Options::default() };
+    if !(1..=6).contains(&order) {
+        return Err(wrong(format!("`order` is {order}; it must lie between 1 and 6")));
+    }
+    if smoothing.is_some_and(|w| !(w.is_finite() && w >= 0.0)) {
+        return Err(wrong("`smoothing` must be a number from 0 up, or None to have it chosen"));
+    }
+    let options = Options {
+        order,
+        tip_correction,
+        smoothing,
+        fit_geometry,
+        fit_lengths,
+        physical,
+        ..Options::default()
+    };
     let (campaign, muscle) = (campaign.0.clone(), muscle.0.clone());
     let fit = py.detach(|| host::fit::fit(&campaign, &muscle, &options)).map_err(raised)?;
     Ok(Fit { fit, campaign, options })
@@ -396,13 +553,7 @@ fn diagnose<'py>(
     report: Option<PathBuf>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (campaign, muscle) = (campaign.0.clone(), muscle.0.clone());
-    let geometry = Geometry {
-        rest_length: Length::from_metres(muscle.rest_length()),
-        braid_angle: Angle::from_radians(muscle.braid_angle()),
-        outer_diameter: Length::from_metres(muscle.bladder_outer_diameter()),
-        wall: Length::from_metres(muscle.bladder_wall()),
-        tip_correction: false,
-    };
+    let geometry = muscle.geometry();
     let options = diagnosis::Options { muscle: muscle.name.clone(), ..Default::default() };
     let answer = py.detach(|| diagnosis::diagnose(&campaign, &geometry, &options)).map_err(raised)?;
     if let Some(path) = &report {
@@ -419,6 +570,7 @@ fn pamtools(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Muscle>()?;
     module.add_class::<Recording>()?;
     module.add_class::<Campaign>()?;
+    module.add_class::<Prediction>()?;
     module.add_class::<Table>()?;
     module.add_class::<Fit>()?;
     module.add_function(wrap_pyfunction!(read, module)?)?;

@@ -50,6 +50,39 @@ def test_a_fit_predicts_a_pressure_it_has_not_seen():
     assert fit.summary["schema"] == "pam-fit/1"
 
 
+def test_a_prediction_says_how_sure_it_is():
+    muscle, campaign = everything()
+    table = pam.fit(campaign, muscle).table
+    plain, told = table.predict(campaign), table.predict_with_bands(campaign)
+    for recording, force, one in zip(campaign.recordings, plain, told):
+        np.testing.assert_array_equal(one.force, force)
+        assert one.band.shape == force.shape and np.all(one.band > 0) and np.all(one.band < 2)
+        assert abs(one.rms - np.sqrt(np.mean((recording.force - force) ** 2))) < 1e-9
+        assert 0.8 < one.inside <= 1, "most readings lie inside their band"
+    # Without force there is nothing to compare with, and the bands stay.
+    blind = campaign.recordings[0]
+    blind = pam.Recording("blind", blind.time, blind.pressure, blind.stroke)
+    (one,) = table.predict_with_bands(pam.Campaign([blind]))
+    assert one.rms is None and one.inside is None and len(one.band) == len(blind)
+    # About the mid-line the band is that of the numbers, without readings.
+    assert table.force_band(300e3, 1e-4) > 0
+
+
+def test_arrays_are_taken_as_numpy_takes_them():
+    muscle, campaign = everything()
+    table = pam.fit(campaign, muscle).table
+    assert len(pam.read(bench() / "01_205kPa.csv", muscle)) == 1, "one path is as good as a list of one"
+    one = table.force(300e3, 1e-3)
+    assert isinstance(one, float) and one > 0
+    pressures = np.array([[200_000], [300_000]])  # whole numbers, and two dimensions
+    grid = table.force(pressures, np.linspace(0, 1e-3, 7, dtype=np.float32), direction=[1] * 7)
+    assert grid.shape == (2, 7) and grid.dtype == np.float64
+    np.testing.assert_allclose(table.force(300e3, np.linspace(0, 1e-3, 7)[::2])[0], table.force(300e3, 0.0))
+    r = campaign.recordings[0]
+    listed = pam.Recording("listed", list(r.time), r.pressure.astype(np.float32), r.stroke[:], r.force)
+    assert len(listed) == len(r) and listed.pressure.dtype == np.float64
+
+
 def test_the_table_is_evaluated_kept_and_read_back():
     muscle, campaign = everything()
     table = pam.fit(campaign, muscle).table
@@ -77,7 +110,8 @@ def test_what_is_wrong_is_said():
     try:
         pam.Recording("back", time[::-1].copy(), time, time)
     except pam.PamError as error:
-        assert error.args[1] == "recording::time-order"
+        assert error.code == "recording::time-order"
+        assert error.cause in str(error) and error.help in str(error)
     else:
         raise AssertionError("time that goes backwards was taken")
     try:
@@ -86,6 +120,31 @@ def test_what_is_wrong_is_said():
         assert "rest_length_mm" in str(error)
     else:
         raise AssertionError("a negative length was taken")
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "bad.csv")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write("time_s,pressure_kPa,displacement_mm,force_N\n0,300,0,50\n1,300,0,5o\n")
+        told = refused(lambda: pam.read([path]))
+        assert (told.code, told.file, told.line, told.column) == ("recording::not-a-number", path, 3, "force_N")
+        assert refused(lambda: pam.read([folder + "/none.csv"])).code == "file::unreadable"
+        assert "a recording, not a table" in str(refused(lambda: pam.Table.read(path)))
+    two = np.zeros((20, 2))
+    assert "2 dimensions" in str(refused(lambda: pam.Recording("two", two, time, time)))
+    assert "no array of numbers" in str(refused(lambda: pam.Recording("text", ["a", "b"], time, time)))
+    muscle, campaign = everything()
+    table = pam.fit(campaign, muscle).table
+    assert "do not fit each other" in str(refused(lambda: table.force(np.zeros(3), np.zeros(4))))
+    assert "between 1 and 6" in str(refused(lambda: pam.fit(campaign, muscle, order=9)))
+
+
+def refused(act):
+    """What is raised, which must be the package's own."""
+    try:
+        act()
+    except pam.PamError as error:
+        assert error.help and error.cause
+        return error
+    raise AssertionError("it was taken")
 
 
 def test_the_listing_of_the_book_runs():

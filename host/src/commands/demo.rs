@@ -1,6 +1,5 @@
 //! `host demo`: the whole story on this machine, no hardware.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -23,6 +22,7 @@ use crate::fit::{Options, fit};
 use crate::muscle_description::MuscleDescription;
 use crate::output::write_whole;
 use crate::predict::predict;
+use crate::progress::Progress;
 use crate::recording::{Campaign, Reader};
 use crate::table_file::{self, About, TableFile};
 
@@ -48,35 +48,6 @@ pub struct Arguments {
     /// Print the figures as JSON.
     #[arg(long)]
     json: bool,
-}
-
-/// A line on a terminal that is written over, with the time that remains.
-struct Progress<'a> {
-    console: &'a Console,
-    began: Instant,
-    shown: f64,
-}
-
-impl<'a> Progress<'a> {
-    fn new(console: &'a Console) -> Self {
-        Self { console, began: Instant::now(), shown: -1.0 }
-    }
-
-    fn at(&mut self, what: &str, share: f64) {
-        if !self.console.live() || (share - self.shown).abs() < 0.02 {
-            return;
-        }
-        self.shown = share;
-        let left = self.began.elapsed().as_secs_f64() * (1.0 - share) / share.max(0.02);
-        let _ = write!(std::io::stderr(), "\r\u{1b}[2K  {what}: {:.0} %, {left:.0} s left", 100.0 * share);
-    }
-
-    fn done(&mut self) {
-        if self.console.live() && self.shown >= 0.0 {
-            let _ = write!(std::io::stderr(), "\r\u{1b}[2K");
-        }
-        self.shown = -1.0;
-    }
 }
 
 impl Arguments {
@@ -193,9 +164,10 @@ impl Arguments {
         )?;
         found.keep(&mut client)?;
         console.note(format!(
-            "              found the regulator: gain {:.3}, lag {:.0} ms, at most {:.1} MPa/s; its lag is inverted from here on",
+            "              found the regulator: gain {:.3}, lag {:.0} ms, line {:.1} ms, at most {:.1} MPa/s; both are inverted from here on",
             found.gain,
             found.lag_s * 1e3,
+            found.line_s * 1e3,
             found.rate_pa_per_s * 1e-6
         ));
 
@@ -206,20 +178,20 @@ impl Arguments {
         let gain = made.blocked_force / span.max(1.0);
         let mut tracks = Vec::new();
         let mut recordings = Vec::new();
-        let mut progress = Progress::new(console);
-        let total = (Law::ALL.len() * Task::ALL.len()) as f64;
+        let progress = Progress::new(console, "tracking");
+        progress.total(1000 * (Law::ALL.len() * Task::ALL.len()) as u64);
         for law in Law::ALL {
             choose(&mut client, law, gain)?;
             for task in Task::ALL {
                 let before = tracks.len() as f64;
                 let tracked = track(&mut client, law, task, mean, |share| {
-                    progress.at("tracking", (before + share) / total)
+                    progress.set((1000.0 * (before + share)) as u64)
                 })?;
                 recordings.push(self.keep(&mut client, &tracked)?);
                 tracks.push(tracked);
             }
         }
-        progress.done();
+        drop(progress);
         let losses = client.losses();
         step(
             5,

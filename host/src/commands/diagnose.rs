@@ -1,6 +1,7 @@
 //! `host diagnose`: what the model leaves out of recordings, where, and how sure that is.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Args;
@@ -8,12 +9,14 @@ use model_core::muscle::Muscle;
 
 use super::recordings::Recordings;
 use super::reports::Reports;
+use crate::checks::Checks;
 use crate::console::Console;
 use crate::diagnose::{self, Options, advise, model, summary::summary};
 use crate::error::Result;
 use crate::muscle_description::MuscleDescription;
 use crate::output::write_whole;
 use crate::predict::predict;
+use crate::progress::Progress;
 use crate::recording::Reader;
 use crate::report::diagnose_page;
 use crate::table_file::{self, TableFile};
@@ -32,6 +35,10 @@ pub struct Arguments {
     /// The table whose misfit is asked about; without it one is fitted to the recordings.
     #[arg(long, value_name = "T.pam")]
     table: Option<PathBuf>,
+    /// A check of the bench (dead weights, rigid bar, reference gauge): what it measures is known before anything is fitted. May be
+    /// given more than once.
+    #[arg(long, value_name = "CHECK.csv")]
+    check: Vec<PathBuf>,
     /// Write the table refitted beside the named effects; corrections of the bench stay apart in it.
     #[arg(short, long, value_name = "T2.pam")]
     output: Option<PathBuf>,
@@ -53,15 +60,19 @@ impl Arguments {
     pub fn run(self, console: &Console) -> Result<()> {
         let start = Instant::now();
         let muscle = MuscleDescription::read(&self.muscle)?;
-        let campaign = self.recordings.read(Reader::of(&muscle))?;
+        // Whoever asks for JSON is a program, or will look at that.
+        let watched = if self.json.is_some() { Console::silent() } else { console.clone() };
+        let campaign = self.recordings.read_watched(Reader::of(&muscle), &watched)?;
         for warning in &campaign.warnings {
             console.warning(warning);
         }
         let given = self.table.as_ref().map(TableFile::read).transpose()?;
         let geometry = muscle.geometry();
-        let options = Options { muscle: muscle.name.clone() };
+        let progress = Arc::new(Progress::new(&watched, "diagnosing"));
+        let checks = Checks::read(&self.check)?;
+        let options = Options { muscle: muscle.name.clone(), checks, progress };
         let mut answer = diagnose::diagnose(&campaign, &geometry, &options)?;
-        console.detail(format!("diagnosed in {:.3} s", start.elapsed().as_secs_f64()));
+        let diagnosed = start.elapsed();
         if let Some(table) = &given {
             let predicted = predict(table, &campaign)?;
             if let Some(rms) = predicted.rms {
@@ -69,13 +80,19 @@ impl Arguments {
             }
         }
         let confusable = answer.missing.iter().any(|m| !m.confusable_with.is_empty());
-        if self.output.is_some() || confusable {
-            match model::refit(&campaign, &muscle, &answer) {
-                Ok(refitted) => self.with_model(console, &campaign, refitted, &mut answer)?,
-                // A table was asked for: then its absence is a failure. For advice alone it is not.
-                Err(e) if self.output.is_some() => return Err(e),
-                Err(e) => answer.remarks.push(format!("no advice on the next recording: {e}")),
-            }
+        let refitted = (self.output.is_some() || confusable).then(|| {
+            options.progress.stage("fitting the table beside what was found", 0);
+            model::refit(&campaign, &muscle, &answer)
+        });
+        // The line of progress goes before anything else is said.
+        drop(options);
+        console.detail(format!("diagnosed in {:.3} s", diagnosed.as_secs_f64()));
+        match refitted {
+            Some(Ok(refitted)) => self.with_model(console, &campaign, refitted, &mut answer)?,
+            // A table was asked for: then its absence is a failure. For advice alone it is not.
+            Some(Err(e)) if self.output.is_some() => return Err(e),
+            Some(Err(e)) => answer.remarks.push(format!("no advice on the next recording: {e}")),
+            None => {}
         }
         if let Some(path) = &self.json {
             write_whole(path, (answer.to_json() + "\n").as_bytes())?;

@@ -9,8 +9,10 @@ use super::recordings::Recordings;
 use crate::console::Console;
 use crate::error::{Code, Error, Result};
 use crate::fit::Options;
-use crate::fit::hold_out::{HeldOut, Score, Split, hold_out, unseen_length};
+use crate::fit::hold_out::{HeldOut, Score, Split, Spot, hold_out};
+use crate::fit::other_length::{Carried, unseen_length};
 use crate::fit::published::Published;
+use crate::fit::result::Fit;
 use crate::muscle_description::MuscleDescription;
 use crate::output::write_whole;
 use crate::progress::Progress;
@@ -23,7 +25,7 @@ use crate::recording::{Campaign, Reader};
     host evaluate --muscle short.toml --muscle long.toml --import festo.toml --fit-geometry --fit-lengths \\\n      \
         --published bolen-10mm settled_points.csv\n\n\
     Each run (or contraction) is left out in turn, the rest is fitted, and what was left out is scored. With several\n\
-    muscles of one stock each is also predicted by the table of the one next in length.")]
+    muscles of one stock each is also predicted from the tables of the others, with an end effect that all lengths share.")]
 pub struct Arguments {
     /// A muscle's description; several, where the import description selects each muscle's rows.
     #[arg(long, required = true, value_name = "MUSCLE.toml")]
@@ -114,7 +116,7 @@ impl Arguments {
         {
             return Err(e);
         }
-        let lengths = (0..cases.len()).map(|i| by_neighbour(&cases, i)).collect::<Result<Vec<_>>>()?;
+        let lengths = (0..cases.len()).map(|i| by_others(&cases, i)).collect::<Result<Vec<_>>>()?;
         if let Some(path) = &self.json {
             let all: Vec<Value> = cases.iter().zip(&lengths).map(|(c, l)| to_json(c, l.as_ref())).collect();
             let text = serde_json::to_string_pretty(&json!({ "schema": "pam-evaluate/1", "muscles": all }))
@@ -129,26 +131,30 @@ impl Arguments {
     }
 }
 
-/// The muscle predicted by the table of the one next in length.
-fn by_neighbour(cases: &[Case], index: usize) -> Result<Option<(String, Score)>> {
-    let case = &cases[index];
-    let whole = |c: &Case| c.runs.as_ref().or(c.contractions.as_ref()).map(|h| h.whole.clone());
-    let apart = |c: &Case| (c.muscle.rest_length_mm / case.muscle.rest_length_mm).ln().abs();
-    let near = (0..cases.len())
-        .filter(|i| *i != index)
-        .min_by(|a, b| apart(&cases[*a]).total_cmp(&apart(&cases[*b])));
-    let (Some(near), Some(own)) = (near, whole(case)) else { return Ok(None) };
-    let Some(donor) = whole(&cases[near]) else { return Ok(None) };
+impl Case {
+    /// The fit to all of it.
+    fn whole(&self) -> Option<&Fit> {
+        self.runs.as_ref().or(self.contractions.as_ref()).map(|h| &h.whole)
+    }
+}
+
+/// The muscle predicted from the tables of all others.
+fn by_others(cases: &[Case], index: usize) -> Result<Option<Carried>> {
+    let Some(own) = cases[index].whole() else { return Ok(None) };
+    let others: Vec<_> =
+        cases.iter().enumerate().filter(|(i, _)| *i != index).filter_map(|(_, c)| c.whole()).collect();
+    if others.is_empty() {
+        return Ok(None);
+    }
     let clip = own.prepared.clips.0.map(|c| c.force);
-    let score = unseen_length(&donor, &case.campaign, &case.muscle, clip)?;
-    Ok(Some((cases[near].muscle.name.clone(), score)))
+    unseen_length(&others, &cases[index].campaign, &cases[index].muscle, clip).map(Some)
 }
 
 fn percent(score: &Score, blocked: f64) -> (f64, f64) {
     (100.0 * score.mean() / blocked, 100.0 * score.rms() / blocked)
 }
 
-fn to_text(cases: &[Case], lengths: &[Option<(String, Score)>], published: Option<&str>) -> String {
+fn to_text(cases: &[Case], lengths: &[Option<Carried>], published: Option<&str>) -> String {
     let mut text = format!(
         "Errors on what the fit did not see: mean |F − F_model| in N, and in percent of the blocked force at the highest pressure.\n\
          {:<22} {:>8} {:>17} {:>17} {:>17} {:>17}\n",
@@ -165,7 +171,7 @@ fn to_text(cases: &[Case], lengths: &[Option<(String, Score)>], published: Optio
             case.runs.as_ref().map(|h| h.table),
             any.published,
             case.contractions.as_ref().map(|h| h.table),
-            length.as_ref().map(|(_, s)| *s),
+            length.as_ref().map(|l| l.score),
         ];
         for (sum, c) in sums.iter_mut().zip(&columns) {
             if let Some(c) = c {
@@ -190,45 +196,73 @@ fn to_text(cases: &[Case], lengths: &[Option<(String, Score)>], published: Optio
     if let Some(name) = published {
         text += &format!("published: {name}, on the rows of the first column\n");
     }
-    text += "\nWhere it sits: mean error with its sign on unseen runs, N (filling or shortening / emptying or lengthening)\n";
-    for case in cases {
-        let Some(held) = &case.runs else { continue };
-        let mut contractions: Vec<i64> = held.spots.iter().map(|s| s.contraction).collect();
-        contractions.sort_unstable();
-        contractions.dedup();
-        // A moving muscle has no few contractions to list.
-        if contractions.len() > 8 {
-            continue;
-        }
-        let mut runs: Vec<&String> = held.spots.iter().map(|s| &s.left_out).collect();
-        runs.sort_by_key(|r| (r.len(), *r));
-        runs.dedup();
-        text += &format!("{}\n", case.muscle.name);
-        for run in runs {
-            text += &format!("  run {run:>4}:");
-            for c in &contractions {
-                let at = |d: i8| {
-                    held.spots
-                        .iter()
-                        .find(|s| s.left_out == *run && s.contraction == *c && s.direction == d)
-                        .map_or("–".to_owned(), |s| format!("{:+.1}", s.score.bias()))
-                };
-                text += &format!("  {:.3}: {:>6} / {:>6}", *c as f64 * 1e-3, at(1), at(-1));
+    if lengths.iter().any(Option::is_some) {
+        text += "unseen length: the mean of the other muscles' tables, with an end effect of\n";
+        for (case, length) in cases.iter().zip(lengths) {
+            if let Some(l) = length {
+                text += &format!("  {:<22} {:5.1} mm by the others\n", case.muscle.name, l.end_effect * 1e3);
             }
-            text += "\n";
+        }
+    }
+    text += "\nWhere it sits: mean error F − F_model, N, at contractions (filling or shortening / emptying or lengthening)\n";
+    for (case, length) in cases.iter().zip(lengths) {
+        text += &format!("{}\n", case.muscle.name);
+        if let Some(held) = &case.runs {
+            text += &places("run", &held.spots);
+        }
+        if let Some(held) = &case.contractions {
+            text += &places("left out", &held.spots);
+        }
+        if let Some(length) = length {
+            text += &places("length of", &length.spots);
         }
     }
     text
 }
 
-fn to_json(case: &Case, length: Option<&(String, Score)>) -> Value {
+/// A line for everything that was left out: the mean error with its sign at each contraction.
+fn places(what: &str, spots: &[Spot]) -> String {
+    let sorted = |of: &dyn Fn(&Spot) -> String| {
+        let mut names: Vec<String> = spots.iter().map(of).collect();
+        names.sort_by(|a, b| (a.len(), a).cmp(&(b.len(), b)));
+        names.dedup();
+        names
+    };
+    let mut contractions: Vec<i64> = spots.iter().map(|s| s.contraction).collect();
+    contractions.sort_unstable();
+    contractions.dedup();
+    // A moving muscle has no few contractions to list.
+    if contractions.len() > 8 {
+        return String::new();
+    }
+    let mut text = String::new();
+    for left_out in sorted(&|s| s.left_out.clone()) {
+        text += &format!("  {what} {left_out:>4}:");
+        for c in &contractions {
+            let at = |d: i8| {
+                spots
+                    .iter()
+                    .find(|s| s.left_out == left_out && s.contraction == *c && s.direction == d)
+                    .map(|s| format!("{:+.1}", s.score.bias()))
+            };
+            let or_none = |cell: Option<String>| cell.unwrap_or_else(|| "–".to_owned());
+            if at(1).is_some() || at(-1).is_some() {
+                text += &format!("  {:.3}: {:>6} / {:>6}", *c as f64 * 1e-3, or_none(at(1)), or_none(at(-1)));
+            }
+        }
+        text += "\n";
+    }
+    text
+}
+
+fn to_json(case: &Case, length: Option<&Carried>) -> Value {
     let blocked = case.runs.as_ref().or(case.contractions.as_ref()).map_or(f64::NAN, |h| h.blocked);
     let score = |s: &Score| {
         let (mean, rms) = percent(s, blocked);
         json!({ "rows": s.rows, "mean_N": s.mean(), "rms_N": s.rms(), "mean_pct": mean, "rms_pct": rms, "bias_N": s.bias() })
     };
-    let spots = |h: &HeldOut| -> Vec<Value> {
-        h.spots
+    let spots = |spots: &[Spot]| -> Vec<Value> {
+        spots
             .iter()
             .map(|s| {
                 json!({ "left_out": s.left_out, "contraction": s.contraction as f64 * 1e-3, "direction": s.direction,
@@ -238,7 +272,7 @@ fn to_json(case: &Case, length: Option<&(String, Score)>) -> Value {
     };
     let held = |h: &Option<HeldOut>| {
         h.as_ref().map(|h| {
-            json!({ "table": score(&h.table), "published": h.published.as_ref().map(score), "where": spots(h),
+            json!({ "table": score(&h.table), "published": h.published.as_ref().map(score), "where": spots(&h.spots),
                     "adjusted": h.whole.summary.adjusted })
         })
     };
@@ -247,6 +281,8 @@ fn to_json(case: &Case, length: Option<&(String, Score)>) -> Value {
         "blocked_force_N": blocked,
         "unseen_runs": held(&case.runs),
         "unseen_contractions": held(&case.contractions),
-        "unseen_length": length.map(|(name, s)| json!({ "table_of": name, "table": score(s) })),
+        "unseen_length": length.map(|l| {
+            json!({ "end_effect_mm": l.end_effect * 1e3, "table": score(&l.score), "where": spots(&l.spots) })
+        }),
     })
 }

@@ -80,7 +80,12 @@ impl Arguments {
                 }
             },
             |error| console.warning(error),
-        )?;
+        );
+        if text.is_err() && !console.quiet() {
+            // The error begins on a line of its own, not behind the question.
+            let _ = writeln!(std::io::stderr());
+        }
+        let text = text?;
         write_whole(&self.output, text.as_bytes())?;
         console.note(format!(
             "written to {}; next: host fit --muscle {} RECORDINGS",

@@ -37,10 +37,8 @@ impl Arguments {
         let file = TableFile::read(&self.table)?;
         let muscle =
             Muscle::<f64>::build(&file.table).map_err(|e| Error::new(Code::TableInvalid, e.to_string()))?;
-        let text =
-            std::fs::read_to_string(&self.protocol).map_err(|e| Error::unreadable(&self.protocol, &e))?;
-        let protocol = Protocol::parse(&text).map_err(|e| e.file(&self.protocol))?;
-        let rows = isolability(&protocol, &muscle)?;
+        let protocol = Protocol::read(&self.protocol)?;
+        let rows = isolability(&protocol, &muscle).map_err(|e| e.file(&self.protocol))?;
         if let Some(path) = &self.json {
             let json =
                 serde_json::to_string_pretty(&serde_json::json!({ "schema": "pam-plan/1", "effects": rows }))

@@ -153,12 +153,11 @@ fn force_figure(tracks: &[Track], task: Task) -> Figure {
     let panels = tracks
         .iter()
         .filter(|t| t.task == task)
-        .enumerate()
-        .map(|(i, track)| {
+        .map(|track| {
             let (time, asked, measured) = curves(track);
             Panel::new(Axis::new("time", "s"), Axis::new("force F", "N"))
                 .titled(track.law.name())
-                .line("measured", Colour::Series(i), &time, &measured)
+                .line("measured", Colour::Series(0), &time, &measured)
                 .dashes("asked", Colour::Ink, &time, &asked)
         })
         .collect();

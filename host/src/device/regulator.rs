@@ -1,19 +1,28 @@
 //! The pressure regulator as a controller models it, found from steps of pressure.
 //!
 //! ```text
-//! dp/dt = clamp((gain · (command + offset) − p) / lag, ±rate)
+//! dp₁/dt = clamp((gain · (command + offset) − p₁) / lag, ±rate)        at the regulator
+//! dp/dt  = (p₁ − p) / (line · V/V₀)                                    in the muscle
 //! ```
-//! Gain and offset come from where the steps settle, lag and rate from the shape of the steps between: those whose simulated
-//! pressure lies nearest to the measured one. The deadband is what small squares of command show: a regulator that overlooks
-//! them does not answer in step with them.
+//! Gain and offset come from where the steps settle; lag, line and rate from the shape of the steps between: those whose simulated
+//! pressure lies nearest to the measured one. The muscle's volume at the stroke that it had, `V/V₀`, is that of the device's table;
+//! without a table the muscle counts as at rest length. The deadband is what small squares of command show: a regulator that
+//! overlooks them does not answer in step with them.
 
+mod squares;
+
+use std::cell::RefCell;
+
+use model_core::image;
 use model_core::link::endpoints::{GetSettings, SetSettings};
-use model_core::link::messages::Telemetry;
+use model_core::link::messages::{Side, Telemetry};
 use model_core::link::settings::{Regulator, Settings};
+use model_core::units::Length;
 
-use super::Client;
+use self::squares::Search;
 use super::course::{Course, Quantity};
-use super::run::{Ending, Plan, run};
+use super::run::{Ending, Plan, run, run_asking};
+use super::{Client, tables};
 use crate::error::{Code, Error, Result};
 
 /// What the steps showed.
@@ -23,8 +32,10 @@ pub struct Found {
     pub gain: f64,
     /// Added to the command, Pa.
     pub offset_pa: f64,
-    /// Time constant, s.
+    /// Time constant of the regulator, s.
     pub lag_s: f64,
+    /// Time in which the line fills the muscle at its rest length, s; zero where the steps show none.
+    pub line_s: f64,
     /// Fastest change, Pa/s: the regulator's limit, or the steepest seen where the steps did not reach a limit.
     pub rate_pa_per_s: f64,
     /// Whether the steps reached the limit.
@@ -35,13 +46,10 @@ pub struct Found {
     pub misfit_pa: f64,
 }
 
-/// Squares of command by which the deadband is looked for, Pa from top to bottom; the first that is answered tells.
-const SQUARES: [f64; 9] = [200.0, 400.0, 500.0, 630.0, 800.0, 1_000.0, 1_400.0, 2_000.0, 4_000.0];
-/// Seconds at each level of a square, and squares of each size.
-const SQUARE: (f64, usize) = (0.2, 6);
-
 /// Seconds at each step.
-const HOLD: f64 = 0.6;
+const HOLD: f64 = 0.5;
+/// A line counts where the misfit with it is at most this share of that without.
+const LINE_EXPLAINS: f64 = 0.97;
 /// Share of a step, at its end, that counts as settled.
 const SETTLED: f64 = 0.3;
 
@@ -67,7 +75,7 @@ pub fn identify_whole(
     let before = client.call::<GetSettings>(&())?;
     let mut plain = before;
     plain.regulator =
-        Regulator { gain: 1.0, offset_pa: 0.0, lead: 0.0, deadband_pa: 0.0, ..before.regulator };
+        Regulator { gain: 1.0, offset_pa: 0.0, line_s: 0.0, lead: 0.0, deadband_pa: 0.0, ..before.regulator };
     client.call_once::<SetSettings>(&plain)?;
     let found = steps(client, low_pa, high_pa, stop).and_then(|found| {
         let deadband_pa = deadband(client, 0.5 * (low_pa + high_pa), &found, stop)?;
@@ -82,6 +90,7 @@ pub fn identify_whole(
 
 fn steps(client: &mut Client, low_pa: f64, high_pa: f64, stop: &dyn Fn() -> bool) -> Result<Found> {
     let mut samples: Vec<(f64, f64, f64)> = Vec::new();
+    let mut stroke_m = 0.0;
     let plan = Plan {
         quantity: Quantity::Pressure,
         course: Course::Steps { values: vec![low_pa as f32, high_pa as f32], hold_s: HOLD },
@@ -91,6 +100,7 @@ fn steps(client: &mut Client, low_pa: f64, high_pa: f64, stop: &dyn Fn() -> bool
     let take = |s: &Telemetry| {
         if let Some(side) = s.sides.first() {
             samples.push((s.time_us as f64 * 1e-6, f64::from(side.command_pa), f64::from(side.pressure_pa)));
+            stroke_m += (f64::from(side.stroke_m) - stroke_m) / samples.len() as f64;
         }
         Ok(())
     };
@@ -100,22 +110,45 @@ fn steps(client: &mut Client, low_pa: f64, high_pa: f64, stop: &dyn Fn() -> bool
     // The first step starts from a vented muscle.
     let start = samples.first().map_or(0.0, |s| s.0) + HOLD;
     samples.retain(|s| s.0 >= start);
-    from_samples(&samples).ok_or_else(|| {
+    let found = from_samples(&samples).ok_or_else(|| {
         Error::new(
             Code::DeviceVerify,
             "the pressure does not follow its command, so no regulator can be found",
         )
         .help("is the supply air open, and is the pressure sensor where the muscle is?")
-    })
+    })?;
+    Ok(Found { line_s: found.line_s / fill(client, stroke_m)?, ..found })
+}
+
+/// `V/V₀` of the muscle at a stroke, m, by the device's table; 1 without one.
+fn fill(client: &mut Client, stroke_m: f64) -> Result<f64> {
+    let table = tables::read(client, Side::Agonist)?.and_then(|bytes| image::read(&bytes).ok());
+    let Some(braid) = table.and_then(|table| table.geometry.cast::<f64>().build().ok()) else {
+        return Ok(1.0);
+    };
+    let volume = |stroke_m: f64| braid.gas_volume(&braid.posture(Length::from_metres(stroke_m)));
+    Ok((volume(stroke_m) / volume(0.0)).clamp(0.1, 100.0))
 }
 
 /// Finds a regulator from samples of time (s), command (Pa) and measured pressure (Pa).
 #[must_use]
 pub fn from_samples(samples: &[(f64, f64, f64)]) -> Option<Found> {
     let (gain, offset) = settled(samples)?;
-    // One valley each in the logarithms of the lag, between a millisecond and a second, and of the rate.
-    let lag_with = |rate: f64| golden(1e-3, 1.0, |lag| simulate(samples, &[gain, offset, lag, rate]));
-    let (free_lag, free_misfit) = lag_with(f64::INFINITY);
+    // One valley each in the logarithms of the lag, between a millisecond and a second, of the line and of the rate.
+    let lag_with =
+        |line: f64, rate: f64| golden(1e-3, 1.0, |lag| simulate(samples, &[gain, offset, lag, line, rate]));
+    let lags_with = |rate: f64| {
+        let (line, with_line) = golden(3e-4, 0.1, |line| lag_with(line, rate).1);
+        let (lag, without) = lag_with(0.0, rate);
+        // A line is believed where it explains what the lag alone does not; the slower of both is the regulator.
+        if with_line < LINE_EXPLAINS * without {
+            let (lag, misfit) = lag_with(line, rate);
+            (lag.max(line), lag.min(line), misfit)
+        } else {
+            (lag, 0.0, without)
+        }
+    };
+    let (free_lag, free_line, free_misfit) = lags_with(f64::INFINITY);
     // Slopes over 5 ms, so that noise of the sensor does not pass for speed.
     let steepest = samples
         .windows(6)
@@ -126,14 +159,16 @@ pub fn from_samples(samples: &[(f64, f64, f64)]) -> Option<Found> {
         return None;
     }
     // No limit lies above what was seen, but for the sensor's noise; above that all fits are the same.
-    let (limit, limited_misfit) = golden(0.2 * steepest, 1.1 * steepest, |rate| lag_with(rate).1);
+    let (limit, limited_misfit) = golden(0.2 * steepest, 1.1 * steepest, |rate| lags_with(rate).2);
     // A limit is believed where it explains what the lag alone does not.
     let rate_limited = limited_misfit < 0.95 * free_misfit;
-    let (lag, misfit_pa) = if rate_limited { lag_with(limit) } else { (free_lag, free_misfit) };
+    let (lag, line, misfit_pa) =
+        if rate_limited { lags_with(limit) } else { (free_lag, free_line, free_misfit) };
     let found = Found {
         gain,
         offset_pa: offset,
         lag_s: lag,
+        line_s: line,
         rate_pa_per_s: if rate_limited { limit } else { steepest },
         rate_limited,
         deadband_pa: None,
@@ -164,7 +199,7 @@ fn golden(low: f64, high: f64, value: impl Fn(f64) -> f64) -> (f64, f64) {
     (place, value(place))
 }
 
-/// Looks for a device's deadband around a pressure (Pa) by squares of rising size; the muscle stays pressurised throughout.
+/// Looks for a device's deadband around a pressure (Pa) by squares; the muscle stays pressurised throughout.
 ///
 /// # Errors
 /// As [`run`].
@@ -174,75 +209,26 @@ fn deadband(
     found: &Found,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<f64>> {
-    let (level, count) = SQUARE;
-    let mut values = vec![middle_pa as f32; 4];
-    for size in SQUARES {
-        for _ in 0..count {
-            values.extend([(middle_pa + 0.5 * size) as f32, (middle_pa - 0.5 * size) as f32]);
-        }
-    }
-    let seconds = level * values.len() as f64;
-    let mut samples: Vec<(f64, f64)> = Vec::new();
+    let search = RefCell::new(Search::new(middle_pa, found.gain));
     let plan = Plan {
         quantity: Quantity::Pressure,
-        course: Course::Steps { values, hold_s: level },
-        seconds: Some(seconds),
-        every_ticks: 1,
+        course: Course::Constant(middle_pa as f32),
+        seconds: None,
+        every_ticks: 4,
     };
     let take = |s: &Telemetry| {
         if let Some(side) = s.sides.first() {
-            samples.push((f64::from(side.command_pa), f64::from(side.pressure_pa)));
+            search.borrow_mut().take(f64::from(side.command_pa), f64::from(side.pressure_pa));
         }
         Ok(())
     };
-    if run(client, &plan, take, stop)? == Ending::Stopped {
-        return Err(interrupted());
-    }
-    Ok(deadband_from(&samples, middle_pa, found))
+    let over = || stop() || search.borrow().found().is_some();
+    run_asking(client, &plan, take, over, |elapsed| search.borrow_mut().next(elapsed).map(|pa| pa as f32))?;
+    search.into_inner().found().ok_or_else(interrupted)
 }
 
 fn interrupted() -> Error {
     Error::new(Code::CallInvalid, "interrupted; the muscle is vented and the settings are as they were")
-}
-
-/// The deadband in samples of command and pressure (Pa) of squares around a command: the first size whose response is more
-/// than half of what gain and lag would make of it.
-///
-/// Slow wander of the supply is taken out of each square by the one before and the one after.
-fn deadband_from(samples: &[(f64, f64)], middle_pa: f64, found: &Found) -> Option<f64> {
-    // Levels as they were commanded, each by its second half: mean pressure.
-    let mut levels: Vec<(f64, f64)> = Vec::new();
-    let mut begin = 0;
-    for i in 1..=samples.len() {
-        if i < samples.len() && (samples[i].0 - samples[begin].0).abs() < 1.0 {
-            continue;
-        }
-        let tail = &samples[begin + (i - begin) / 2..i];
-        if tail.len() >= 30 {
-            let mean = tail.iter().map(|s| s.1).sum::<f64>() / tail.len() as f64;
-            levels.push((samples[begin].0 - middle_pa, mean));
-        }
-        begin = i;
-    }
-    let mut below = 0.0;
-    for size in SQUARES {
-        let answers: Vec<f64> = levels
-            .windows(3)
-            .filter(|w| w.iter().all(|level| (level.0.abs() - 0.5 * size).abs() < 0.1 * size))
-            .map(|w| (w[1].1 - 0.5 * (w[0].1 + w[2].1)) * w[1].0.signum())
-            .collect();
-        if answers.len() < 3 {
-            return None;
-        }
-        let answer = answers.iter().sum::<f64>() / answers.len() as f64;
-        if answer > 0.5 * found.gain * size {
-            // Somewhere between a square that is overlooked and one that is answered: halfway, by ratio.
-            let edge = if below > 0.0 { (below * size).sqrt() } else { 0.0 };
-            return Some(0.5 * edge);
-        }
-        below = size;
-    }
-    None
 }
 
 /// Gain and offset by least squares over the ends of the steps.
@@ -276,13 +262,20 @@ fn settled(samples: &[(f64, f64, f64)]) -> Option<(f64, f64)> {
     (gain > 0.0).then(|| (gain, y / gain - x))
 }
 
-/// Root mean square of measured less simulated pressure for gain, offset, lag and rate.
-fn simulate(samples: &[(f64, f64, f64)], &[gain, offset, lag, rate]: &[f64; 4]) -> f64 {
+/// Root mean square of measured less simulated pressure for gain, offset, lag, line and rate.
+fn simulate(samples: &[(f64, f64, f64)], &[gain, offset, lag, line, rate]: &[f64; 5]) -> f64 {
     let Some(first) = samples.first() else { return f64::NAN };
-    let (mut p, mut squares) = (first.2, 0.0);
+    let (mut supplied, mut p, mut squares) = (first.2, first.2, 0.0);
     for pair in samples.windows(2) {
         let dt = pair[1].0 - pair[0].0;
-        p += ((gain * (pair[0].1 + offset) - p) * (1.0 - (-dt / lag).exp())).clamp(-rate * dt, rate * dt);
+        let before = supplied;
+        supplied += ((gain * (pair[0].1 + offset) - supplied) * (1.0 - (-dt / lag).exp()))
+            .clamp(-rate * dt, rate * dt);
+        p = if line > 0.0 {
+            p + (0.5 * (before + supplied) - p) * (1.0 - (-dt / line).exp())
+        } else {
+            supplied
+        };
         squares += (p - pair[1].2).powi(2);
     }
     (squares / samples.len().max(1) as f64).sqrt()
@@ -297,6 +290,7 @@ impl Found {
             gain: self.gain as f32,
             offset_pa: self.offset_pa as f32,
             lag_s: self.lag_s as f32,
+            line_s: self.line_s as f32,
             rate_pa_per_s: self.rate_pa_per_s as f32,
             deadband_pa: self.deadband_pa.map_or(base.regulator.deadband_pa, |half| half as f32),
             lead: 1.0,
@@ -349,8 +343,8 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_of_rate_and_a_deadband_are_told_from_a_lag() {
-        let (gain, lag, rate, band) = (1.02, 0.03, 1.5e6, 300.0);
+    fn a_limit_of_rate_is_told_from_a_lag() {
+        let (gain, lag, rate) = (1.02, 0.03, 1.5e6);
         let mut seed = 7_u32;
         let mut noise = || {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -369,24 +363,5 @@ mod tests {
         let found = from_samples(&steps).unwrap();
         assert!(found.rate_limited && (found.rate_pa_per_s / rate - 1.0).abs() < 0.05, "{found:?}");
         assert!((found.lag_s / lag - 1.0).abs() < 0.1 && (found.gain - gain).abs() < 2e-3, "{found:?}");
-
-        let (mut held, mut p) = (175e3_f64, gain * 175e3);
-        let mut squares = Vec::new();
-        for size in SQUARES {
-            for n in 0..2 * SQUARE.1 {
-                let command = 175e3 + if n % 2 == 0 { 0.5 } else { -0.5 } * size;
-                for _ in 0..200 {
-                    if (command - held).abs() > band {
-                        held = command;
-                    }
-                    p += (gain * held - p) * (1.0 - (-1e-3_f64 / lag).exp());
-                    squares.push((command, p + noise()));
-                }
-            }
-        }
-        // Squares of ±250 Pa are overlooked, those of ±315 Pa answered.
-        let half = deadband_from(&squares, 175e3, &found).unwrap();
-        assert!((250.0..315.0).contains(&half), "{half}");
-        assert_eq!(deadband_from(&squares[..1000], 175e3, &found), None);
     }
 }

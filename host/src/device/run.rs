@@ -64,7 +64,22 @@ pub fn run(
     sample: impl FnMut(&Telemetry) -> Result<()>,
     stop: impl Fn() -> bool,
 ) -> Result<Ending> {
-    let outcome = follow(client, plan, sample, stop);
+    run_asking(client, plan, sample, stop, |_| None)
+}
+
+/// The same; besides, `next` is asked after each sample, with the time since the start in s, whether another value is wanted from
+/// now on.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_asking(
+    client: &mut Client,
+    plan: &Plan,
+    sample: impl FnMut(&Telemetry) -> Result<()>,
+    stop: impl Fn() -> bool,
+    next: impl FnMut(f64) -> Option<f32>,
+) -> Result<Ending> {
+    let outcome = follow(client, plan, sample, stop, next);
     let quiet = client.try_call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 });
     let vented = vent(client);
     let ending = outcome?;
@@ -78,6 +93,7 @@ fn follow(
     plan: &Plan,
     mut sample: impl FnMut(&Telemetry) -> Result<()>,
     stop: impl Fn() -> bool,
+    mut next: impl FnMut(f64) -> Option<f32>,
 ) -> Result<Ending> {
     let status = client.call::<GetStatus>(&())?;
     if status.state == State::Fault {
@@ -119,6 +135,9 @@ fn follow(
                     return Err(fault(client)?);
                 }
                 steps.advance(client, plan.quantity, elapsed)?;
+                if let Some(value) = next(elapsed) {
+                    client.call::<SetTo>(&plan.quantity.set_point(value))?;
+                }
             }
             Some(Topic::Event(Event::Fault(report))) => return Err(words::stopped(&report)),
             Some(Topic::Event(_) | Topic::Log(_)) => {}

@@ -294,6 +294,22 @@ pub fn refused(request: &str, refusal: Refusal) -> Error {
         Refusal::NotSupported => {
             ("this board cannot do that".to_owned(), "`host device info` shows what it can".to_owned())
         }
+        Refusal::Stiffness { low_nm_per_rad: low, high_nm_per_rad: high } => (
+            format!(
+                "with both muscles taut the joint has a stiffness of {low:.1} to {high:.1} N·m/rad at this angle"
+            ),
+            "ask for one of these; another radius or rest stroke of the joint moves them (the settings' `joint`)"
+                .to_owned(),
+        ),
+        Refusal::Angle { low_rad, high_rad } => (
+            format!(
+                "both muscles of the joint are taut from {:.1}° to {:.1}° only",
+                low_rad.to_degrees(),
+                high_rad.to_degrees()
+            ),
+            "ask for one of these; a smaller radius or another rest stroke of the joint moves them (the settings' `joint`)"
+                .to_owned(),
+        ),
     };
     Error::new(Code::DeviceRefused, format!("the device refuses `{request}`: {why}")).help(help)
 }
@@ -365,5 +381,10 @@ mod tests {
         assert_eq!(error.to_string(), "the device refuses `start`: the agonist has no table");
         assert_eq!(error.advice(), Some("send one: host flash TABLE.pam --port PORT"));
         assert_eq!(error.exit_status(), 1);
+        let error =
+            refused("set_point", Refusal::Stiffness { low_nm_per_rad: 25.04, high_nm_per_rad: 29.96 });
+        assert!(error.to_string().ends_with("a stiffness of 25.0 to 30.0 N·m/rad at this angle"), "{error}");
+        let error = refused("set_point", Refusal::Angle { low_rad: -0.1, high_rad: 0.1 });
+        assert!(error.to_string().ends_with("taut from -5.7° to 5.7° only"), "{error}");
     }
 }

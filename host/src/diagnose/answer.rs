@@ -1,19 +1,24 @@
 //! From a campaign to the answer.
 
-use model_core::braid::Geometry;
+use std::sync::Arc;
+
+use model_core::braid::{Braid, Geometry};
 
 use super::baselines::{self, Kind};
 use super::candidates::{self, library};
 use super::frequency;
 use super::held_out::held_out;
+use super::known::Known;
 use super::linear::energy;
 use super::locate::{block_ranges, locate};
 use super::named::{considered, missing};
 use super::rest;
 use super::rows::{self, Rows};
-use super::select::{Found, search};
+use super::select::{self, Found, search};
 use super::verdict::{Considered, Diagnosis, HeldOut, PathStep, Region, Trace, Unexplained, Verdict};
+use crate::checks::Checks;
 use crate::error::{Code, Error, Result};
+use crate::progress::Progress;
 use crate::recording::Campaign;
 
 /// What the caller may choose.
@@ -21,6 +26,16 @@ use crate::recording::Campaign;
 pub struct Options {
     /// The muscle's name, for the answer.
     pub muscle: String,
+    /// Checks of the bench on which the recordings were made.
+    pub checks: Checks,
+    /// Who watches how far it has come; nobody by default.
+    pub progress: Arc<Progress>,
+}
+
+/// An answer, and the baseline that it was given with.
+pub(super) struct Asked {
+    pub diagnosis: Diagnosis,
+    pub kind: Kind,
 }
 
 /// Lack of fit that the model admits beside the pure error of repeats, rms as a share of the blocked force: friction by its sign
@@ -40,12 +55,22 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     if campaign.samples() == 0 {
         return Err(Error::new(Code::RecordingEmpty, "the recordings hold no rows"));
     }
-    let mut rows = rows::prepare(campaign, &braid)?;
+    let known = Known::of(&options.checks, campaign, &braid)?;
+    let freed = known.free(campaign);
+    let asked = ask(&freed, &braid, options, &known)?;
+    known.enter(asked, &freed, &braid)
+}
+
+/// What the recordings themselves say, freed of what checks of the bench have measured.
+fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known) -> Result<Asked> {
+    let unjudged = |diagnosis| Ok(Asked { diagnosis, kind: Kind::Stiff });
+    let mut rows = rows::prepare(campaign, braid)?;
+    rows.progress = Arc::clone(&options.progress);
     let mut remarks = std::mem::take(&mut rows.remarks);
     let blocked = blocked_force(&rows);
     remarks.extend(what_can_be_judged(&rows));
     if let Some(reason) = cannot_be_judged(&rows, blocked) {
-        return Ok(no_judgement(&rows, options, remarks, reason, blocked));
+        return unjudged(no_judgement(&rows, options, remarks, reason, blocked));
     }
     let step = rows::typical_step(&rows);
     let mut slack = 0;
@@ -61,7 +86,7 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
         ));
     }
     if let Some(reason) = cannot_be_judged(&rows, blocked) {
-        return Ok(no_judgement(&rows, options, remarks, reason, blocked));
+        return unjudged(no_judgement(&rows, options, remarks, reason, blocked));
     }
     if let Some(law) = rest::settle_friction(&mut rows) {
         remarks.push(law.words());
@@ -70,7 +95,7 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     let production = baselines::fit(&rows, Kind::Flexible(4), &[]);
     let misfit = production.rms(&rows);
     remarks.extend(tables_as_evidence(&production, &rows));
-    let library = library(&rows);
+    let library: Vec<_> = library(&rows).into_iter().filter(|c| !known.settles(c)).collect();
     let (found, held) = confirmed(&mut rows, &library, blocked, step);
     remarks.extend(found.remarks.iter().cloned());
     let sigma = found.noise.sigma;
@@ -89,10 +114,20 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     let own = (INEXACTNESS * blocked).max(0.6 * sigma);
     let beat = frequency::line(&rows, &found.full.residual, &block_ranges(&rows), step, 9)
         .filter(|l| l.p <= 0.02 && l.share >= 0.15);
+    // What free tables take up where one bladder should serve all pressures.
+    let taken_up = energy(&found.bare.core) - energy(&found.bare.residual);
+    let concealed = (taken_up / weight).max(0.0).sqrt();
+    if missing.is_empty() && concealed > INEXACTNESS * blocked {
+        remarks.push(in_the_tables(&found, &library, concealed, blocked));
+    }
     let verdict = if missing.is_empty() {
         // What beats in time is no noise, however well repeats seem to explain it.
         let steady = beat.is_none_or(|l| l.share < 0.3);
-        if left <= own && steady { Verdict::Consistent } else { Verdict::Unexplained }
+        if left <= own && steady && concealed <= INEXACTNESS * blocked {
+            Verdict::Consistent
+        } else {
+            Verdict::Unexplained
+        }
     } else if explained >= 0.8 || left <= own {
         Verdict::Explained
     } else if explained >= 0.25 {
@@ -106,6 +141,9 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     let pattern = match (&beat, left_regions.first()) {
         (Some(l), _) => format!("periodic in time, {:.2} Hz", l.hertz),
         (None, Some(r)) if left > own => r.words.clone(),
+        (None, _) if verdict == Verdict::Unexplained && concealed > INEXACTNESS * blocked => {
+            "a surface that changes from pressure to pressure and lies in the tables".to_owned()
+        }
         _ => "none".to_owned(),
     };
     if let Some(l) = beat {
@@ -131,7 +169,7 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
             runners_up: t.rivals.iter().map(|r| (library[r.0].name().to_owned(), r.1)).collect(),
         })
         .collect();
-    Ok(Diagnosis {
+    let diagnosis = Diagnosis {
         schema: "pam-diagnose/1".into(),
         muscle: options.muscle.clone(),
         samples: rows.samples,
@@ -150,7 +188,29 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
         remarks,
         profiles,
         trace: trace(&rows, &found),
-    })
+    };
+    Ok(Asked { diagnosis, kind: found.full.kind })
+}
+
+/// What to say where the tables differ between pressures more than a bladder does, and nothing can be named for it.
+fn in_the_tables(found: &Found, library: &[candidates::Candidate], concealed: f64, blocked: f64) -> String {
+    let mut able: Vec<&candidates::Trial> =
+        found.first_look.iter().filter(|t| t.score >= select::LEAST_SCORE).collect();
+    able.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let names: Vec<&str> = able.iter().take(6).map(|t| library[t.candidate].name()).collect();
+    let which = if names.is_empty() {
+        "no effect of the library makes such a surface".to_owned()
+    } else {
+        format!(
+            "each of these would make such a surface: {}; none of them stands out enough to be named",
+            names.join(", ")
+        )
+    };
+    format!(
+        "one bladder does not serve all pressures: the tables take up {concealed:.2} N rms ({:.2} % of blocked force) that changes \
+         from pressure to pressure; {which}. Tested pressures are described well; between them and beyond, trust the tables less",
+        100.0 * concealed / blocked
+    )
 }
 
 /// What the fitted tables themselves betray: flexible tables swallow physics, and keep its pattern over pressure.

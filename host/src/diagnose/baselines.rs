@@ -26,6 +26,13 @@ pub(crate) struct Give {
     pub row: f64,
 }
 
+impl Give {
+    /// Tables that are free at every pressure.
+    pub(crate) fn free(blocked: f64) -> Self {
+        Self { elastic: 1e3 * blocked, friction: 1e3 * blocked, row: 1e-3 * blocked }
+    }
+}
+
 /// Which baseline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Kind {

@@ -8,7 +8,8 @@
 //! logit p = A + B logit(belief) + C logit(explained)
 //! ```
 
-/// `A`, `B`, `C`: belief as it is. Sets answered so far are too small to learn from; the command needs hundreds of names.
+/// `A`, `B`, `C`: belief as it is. Of 183 names of two development sets it was off by 0.085 (calibration error); constants learned
+/// from them did worse on trials left out.
 const CALIBRATION: [f64; 3] = [0.0, 1.0, 0.0];
 /// Belief and share are kept this far from certainty.
 const EDGE: f64 = 0.01;

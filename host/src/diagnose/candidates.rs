@@ -472,7 +472,13 @@ impl<'a> Ground<'a> {
     pub(crate) fn scan(&self, library: &[Candidate], rows: &Rows) -> Vec<Trial> {
         let work: Vec<(usize, Vec<f64>)> =
             library.iter().enumerate().flat_map(|(i, c)| c.grid().into_iter().map(move |g| (i, g))).collect();
-        work.par_iter().map(|(i, shapes)| self.attempt(*i, &library[*i], shapes, rows, false)).collect()
+        rows.progress.stage("trying every effect", work.len() as u64);
+        let attempt = |(i, shapes): &(usize, Vec<f64>)| {
+            let trial = self.attempt(*i, &library[*i], shapes, rows, false);
+            rows.progress.step();
+            trial
+        };
+        work.par_iter().map(attempt).collect()
     }
 
     /// Walks uphill in the shapes from a trial, halving the step, until the steps are small against the range; with scores

@@ -1,6 +1,8 @@
 //! The improvement on rows that the fit had not seen: whole pressures, recordings, cycles or stretches of time, never random
 //! rows of the same stroke.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use super::baselines::{self, Kind};
@@ -41,6 +43,7 @@ fn thin(rows: &Rows, traces: &[Vec<f64>]) -> (Rows, Vec<Vec<f64>>) {
     let pick = |v: &Vec<f64>| keep.iter().map(|i| v[*i]).collect::<Vec<f64>>();
     let pick_u = |v: &Vec<u32>| keep.iter().map(|i| v[*i]).collect::<Vec<u32>>();
     let thinned = Rows {
+        progress: Arc::clone(&rows.progress),
         contexts: keep.iter().map(|i| rows.contexts[*i]).collect(),
         shapes: keep.iter().map(|i| rows.shapes[*i]).collect(),
         force: pick(&rows.force),
@@ -83,10 +86,12 @@ fn claimed(rows: &Rows) -> Vec<bool> {
 /// Sums of squares on rows that the fit did not see: on the sure rows, and with those about the turns.
 fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> [f64; 2] {
     let claimed = claimed(rows);
+    rows.progress.stage("predicting what was left out", split.groups.len() as u64);
     let parts: Vec<([f64; 2], [f64; 2])> = split
         .groups
         .par_iter()
         .map(|g| {
+            rows.progress.step();
             let mut blind = rows.clone();
             for (w, group) in blind.root_weight.iter_mut().zip(&split.group) {
                 if group == g {

@@ -127,12 +127,14 @@ fn slopes(time: &[f64], series: &[f64], half: usize, limits: impl Fn(usize) -> (
         .collect()
 }
 
-/// Follows one recording. `given` is the bench's own word on the direction, used where the length is held.
+/// Follows one recording. `given` is the bench's own word on the direction, used where the length is held; `rested` is how long the
+/// muscle stood before it, s.
 pub(crate) fn kinematics(
     time: &[f64],
     stroke: &[f64],
     pressure: &[f64],
     given: Option<&[i8]>,
+    rested: f64,
     thresholds: Thresholds,
 ) -> Kinematics {
     let n = time.len();
@@ -225,7 +227,9 @@ pub(crate) fn kinematics(
     let mut turn_row = 0;
     let mut turns = 0_u32;
     let mut piece = 0_u32;
-    let mut rested = 0.0;
+    let mut rested = rested;
+    // A stand at the beginning goes on from the one before the recording.
+    let mut stood = rested;
     let mut hold_start: Option<usize> = None;
     let mut pressure_extreme = pressure[0];
     let mut still_from = 0;
@@ -234,6 +238,7 @@ pub(crate) fn kinematics(
     let mut still_pressure = pressure[0];
     for row in 0..n {
         let mut turned = false;
+        let direction_before = direction;
         if next < starts.len() && row >= starts[next].0 {
             if starts[next].1 != direction {
                 turned = true;
@@ -278,11 +283,13 @@ pub(crate) fn kinematics(
         }
         if k.held[row] {
             let start = *hold_start.get_or_insert(row);
-            rested = time[row] - time[start];
-        } else if hold_start.take().is_some() {
-            // The rest before this motion stays on record until the next hold.
-        } else if turned {
-            rested = 0.0;
+            rested = stood + time[row] - time[start];
+        } else {
+            // The rest before a motion stays on record until it turns, or until the next hold.
+            if hold_start.take().is_none() && turned && direction_before != 0.0 {
+                rested = 0.0;
+            }
+            stood = 0.0;
         }
         if row > 0 && (turned || k.held[row] != k.held[row - 1]) {
             piece += 1;
@@ -381,7 +388,7 @@ mod tests {
             x += v * 0.1;
         }
         let pressure = vec![300e3; time.len()];
-        let k = kinematics(&time, &stroke, &pressure, None, Thresholds { stroke: 1e-4, pressure: 5e3 });
+        let k = kinematics(&time, &stroke, &pressure, None, 0.0, Thresholds { stroke: 1e-4, pressure: 5e3 });
         let wrong = k.direction.iter().zip(&truth).zip(&k.sure).filter(|((d, t), s)| **s && d != t).count();
         assert_eq!(wrong, 0, "rows with a wrong sign that count as sure");
         let unsure = k.sure.iter().filter(|s| !**s).count();
@@ -392,13 +399,30 @@ mod tests {
     }
 
     #[test]
+    fn the_first_motion_of_a_recording_comes_after_the_rest_before_it() {
+        // 1 mm/s up and down, twice; it stood for 7 s before.
+        let time: Vec<f64> = (0..800).map(|i| f64::from(i) * 0.1).collect();
+        let stroke: Vec<f64> =
+            (0..800).map(|i| 1e-4 * (200.0 - (f64::from(i % 400) - 200.0).abs())).collect();
+        let thresholds = Thresholds { stroke: 2e-4, pressure: 5e3 };
+        let k = kinematics(&time, &stroke, &[3e5; 800], None, 7.0, thresholds);
+        assert!(k.hold_time[..190].iter().all(|h| *h == 7.0));
+        assert!(k.hold_time[220..].iter().all(|h| *h == 0.0));
+        // Where it still stands at first, that time comes on top.
+        let mut later = vec![0.0; 100];
+        later.extend(&stroke[..700]);
+        let k = kinematics(&time, &later, &[3e5; 800], None, 7.0, thresholds);
+        assert!((k.hold_time[250] - 17.0).abs() < 1.0, "{}", k.hold_time[250]);
+    }
+
+    #[test]
     fn at_held_length_the_pressure_decides_and_before_it_moves_nothing_is_known() {
         let time: Vec<f64> = (0..900).map(|i| f64::from(i) * 0.1).collect();
         let stroke = vec![0.01; 900];
         let pressure: Vec<f64> = (0..900)
             .map(|i| if i < 100 { 1e5 } else { 1e5 + 1e3 * (400.0 - (f64::from(i) - 500.0).abs()) })
             .collect();
-        let k = kinematics(&time, &stroke, &pressure, None, Thresholds { stroke: 1e-4, pressure: 5e3 });
+        let k = kinematics(&time, &stroke, &pressure, None, 0.0, Thresholds { stroke: 1e-4, pressure: 5e3 });
         assert_eq!((k.direction[50], k.direction[300], k.direction[700]), (0.0, 1.0, -1.0));
         assert!(k.held.iter().all(|h| *h));
     }

@@ -292,7 +292,7 @@ fn words(name: &str, from: f64, to: f64, share: f64, part: f64) -> String {
             }
         }
         "speed" => format!("at speeds of {}", range(1e3, " mm/s", 2)),
-        "acceleration" => format!("at accelerations of {}", range(1.0, " m/s²", 4)),
+        "acceleration" => format!("at accelerations of {}", range(1e3, " mm/s²", 1)),
         "force" => format!("where the muscle pulls {}", range(1.0, " N", 1)),
         "pressure-rate" => format!("where the pressure changes by {}", range(1e-3, " kPa/s", 2)),
         "since-reversal" => format!("{} after a turn", range(1.0, " s", 2)),

@@ -28,6 +28,8 @@ pub struct Refitted {
 
 /// Rounds of fitting the table to the force without the effects.
 const ROUNDS: usize = 3;
+/// A measured fault of the bench that tables had swallowed may cost them this factor on the same recordings.
+const SWALLOWED: f64 = 1.1;
 
 /// Fits the table anew beside the named effects. An effect is kept only where the recordings are then
 /// predicted better: a table must not get worse by a diagnosis.
@@ -73,7 +75,10 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
         with.about = about(&again, corrections.clone());
     }
     let after = predict(&with, campaign)?.rms.unwrap_or(f64::INFINITY);
-    if with.table.check().is_err() || !(after < before) {
+    // What a check has measured is there, even where tables would swallow it.
+    let measured = diagnosis.missing.iter().all(|m| m.checked);
+    let better = if measured { after <= SWALLOWED * before } else { after < before };
+    if with.table.check().is_err() || !better {
         warnings.push(format!(
             "with the named effects the recordings are predicted no better ({after:.3} N against {before:.3} N): the table was \
              written without them"

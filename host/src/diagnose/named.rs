@@ -32,7 +32,7 @@ pub(crate) fn missing(found: &Found, library: &[candidates::Candidate], rows: &R
                     value: *v,
                     std: *std,
                     unit: p.unit.into(),
-                    outside_known_range: *v != 0.0 && (v.abs() > p.high.abs().max(p.low.abs()) || v.abs() < p.low.abs().min(p.high.abs()) && p.low * p.high > 0.0),
+                    outside_known_range: ParameterValue::is_outside(*v, p),
                 })
                 .collect();
             let sum: f64 = 1.0 + t.rivals.iter().map(|r| r.1).sum::<f64>();
@@ -45,12 +45,22 @@ pub(crate) fn missing(found: &Found, library: &[candidates::Candidate], rows: &R
                 .map(|r| library[r.0].name().to_owned())
                 .collect();
             let share = (explained * t.share / total).clamp(0.0, 1.0);
+            let chance = if t.p <= select::FAMILY_ALPHA {
+                format!(
+                    "by chance over all {} effects and their shapes this would happen with p = {:.4}",
+                    library.len(),
+                    t.p
+                )
+            } else {
+                format!(
+                    "it lives in too few half-strokes for a test by whole blocks (p = {:.2}), but is e^{:.0} times as likely as chance",
+                    t.p,
+                    t.trial.score / 2.0
+                )
+            };
             let why = format!(
-                "it takes {:.0} % of the misfit above noise with the base refitted; by chance over all {} effects and their \
-                 shapes this would happen with p = {:.4}",
-                share * 100.0,
-                library.len(),
-                t.p
+                "it takes {:.0} % of the misfit above noise with the base refitted; {chance}",
+                share * 100.0
             );
             Missing {
                 effect: info.name.into(),
@@ -61,6 +71,7 @@ pub(crate) fn missing(found: &Found, library: &[candidates::Candidate], rows: &R
                 confusable_with: confusable,
                 place: place_in_words(info.link).into(),
                 correction: candidate.of_the_bench(),
+                checked: false,
                 summary: info.summary.into(),
                 source: info.source.into(),
                 peak_N: t.trial.peak,

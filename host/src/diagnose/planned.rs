@@ -3,15 +3,18 @@
 //! The file is the virtual bench's: `name`, `sample_Hz` and `[[step]]` tables with `do = "pressure" | "move" | "cycles" | "hold" |
 //! "tare" | "rest" | "sine" | "file" | "end-file"`; a place is `to_mm`, `to_contraction` or `to_free` (part of the free stroke).
 
+use std::path::Path;
+
 use model_core::effects::Context;
 use model_core::muscle::Muscle;
 use model_core::units::{Length, Pressure};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Code, Error, Result};
-use crate::fit::direction::Follower;
+use crate::file_kind::FileKind;
 use crate::recording::segment::Motion;
-use crate::recording::{Campaign, Recording};
+use crate::recording::{Campaign, Follower, Recording};
+use crate::toml_words::toml_error;
 
 /// A list of steps at a sampling rate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -111,15 +114,23 @@ pub enum Step {
 const MOST: usize = 400_000;
 
 impl Protocol {
+    /// Reads a protocol file.
+    ///
+    /// # Errors
+    /// [`Code::FileUnreadable`], or [`Code::ProtocolInvalid`] with the line, or with what the file is instead.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = FileKind::Protocol.read_text(path)?;
+        Self::parse(&text).map_err(|e| FileKind::Protocol.wanted(path, e))
+    }
+
     /// From the text of a protocol file.
     ///
     /// # Errors
-    /// [`Code::CallInvalid`] with the parser's words.
+    /// [`Code::ProtocolInvalid`] with the line.
     pub fn parse(text: &str) -> Result<Self> {
-        let protocol: Self = toml::from_str(text)
-            .map_err(|e| Error::new(Code::CallInvalid, format!("not a protocol: {}", e.message())))?;
+        let protocol: Self = toml::from_str(text).map_err(|e| toml_error(Code::ProtocolInvalid, text, &e))?;
         if !(protocol.sample_hz > 0.0 && protocol.sample_hz <= 1e5) {
-            return Err(Error::new(Code::CallInvalid, "sample_Hz must be positive"));
+            return Err(Error::new(Code::ProtocolInvalid, "sample_Hz must lie between 0 and 100000"));
         }
         Ok(protocol)
     }
@@ -135,7 +146,7 @@ impl Protocol {
     /// The recordings that it would make of a muscle, without noise and with the model's force.
     ///
     /// # Errors
-    /// [`Code::CallInvalid`] for speeds and times that cannot be.
+    /// [`Code::ProtocolInvalid`] for speeds and times that cannot be.
     pub fn play(&self, muscle: &Muscle<f64>) -> Result<Campaign> {
         let dt = 1.0 / self.sample_hz.min(10.0);
         let mut player = Player {
@@ -154,14 +165,14 @@ impl Protocol {
         }
         for (i, step) in self.step.iter().enumerate() {
             player.step(step).map_err(|what| {
-                Error::new(Code::CallInvalid, format!("step {} of the protocol: {what}", i + 1))
+                Error::new(Code::ProtocolInvalid, format!("step {} of the protocol: {what}", i + 1))
             })?;
         }
         player.end();
         let mut recordings = player.done;
         recordings.retain(|r| r.len() >= 3);
         if recordings.is_empty() {
-            return Err(Error::new(Code::CallInvalid, "the protocol records nothing"));
+            return Err(Error::new(Code::ProtocolInvalid, "the protocol records nothing"));
         }
         for r in &mut recordings {
             let force = (0..r.len())

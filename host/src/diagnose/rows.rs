@@ -1,5 +1,7 @@
 //! The rows that everything else works on: block averages of the recordings that keep turns, with the motion in each.
 
+use std::sync::Arc;
+
 use model_core::braid::Braid;
 use model_core::effects::Context;
 use model_core::units::Length;
@@ -7,12 +9,11 @@ use model_core::units::Length;
 use super::kinematics::{Thresholds, kinematics, white_noise};
 use super::linear::{median, quantile};
 use crate::error::Result;
-use crate::recording::Campaign;
+use crate::progress::Progress;
+use crate::recording::{Campaign, UNKNOWN_PAUSE};
 
 /// Rows aimed at: enough for every reversal, few enough for seconds.
 pub(crate) const TARGET_ROWS: usize = 24_000;
-/// A pause that nobody recorded counts as this long, s.
-const UNKNOWN_PAUSE: f64 = 60.0;
 /// The highest elastic order that is ever offered.
 pub(crate) const ORDERS: usize = 6;
 /// Columns of a hyperelastic (Yeoh) wall.
@@ -38,6 +39,8 @@ pub(crate) struct Shape {
 /// All recordings of a campaign as one sequence of rows.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rows {
+    /// Who watches how far the work on them has come.
+    pub progress: Arc<Progress>,
     /// Motion and geometry of each row; the base model's parts are filled in by a fitted baseline.
     pub contexts: Vec<Context<f64>>,
     /// The sleeve at each row.
@@ -190,15 +193,17 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
             continue;
         }
         rows.has_temperature &= recording.temperature.is_some();
+        let before = campaign.pause_before(index).unwrap_or(UNKNOWN_PAUSE);
         let k = kinematics(
             &recording.time,
             &recording.stroke,
             &recording.pressure,
             recording.direction.as_deref(),
+            before,
             thresholds,
         );
         let spike = spikes(force);
-        let pause = if index == 0 { 0.0 } else { campaign.pause_before(index).unwrap_or(UNKNOWN_PAUSE) };
+        let pause = if index == 0 { 0.0 } else { before };
         clock += pause;
         let start = recording.time[0];
         let mut previous_time: Option<f64> = None;
@@ -280,6 +285,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
                 travel,
                 since_reversal: since,
                 hold_time: hold,
+                resting: if k.held[i] || i == 0 { 1.0 } else { 0.0 },
                 cycles: f64::from(turns_before + k.turns[i]) * 0.5,
                 temperature,
                 rest_length: braid.rest_length(),

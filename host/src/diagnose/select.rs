@@ -29,7 +29,7 @@ const LARGEST_PEAK: f64 = 0.25;
 /// At most so many effects are named.
 pub(crate) const MAX_NAMED: usize = 3;
 /// A further effect must take this share of all misfit above noise …
-const FURTHER_OF_ALL: f64 = 0.06;
+const FURTHER_OF_ALL: f64 = 0.1;
 /// … and this share of what its predecessors left.
 const FURTHER_OF_REST: f64 = 0.4;
 /// The first must take this share of the misfit above noise.
@@ -39,6 +39,8 @@ pub(crate) const LEAST_SCORE: f64 = 12.0;
 /// The same where no test by whole blocks can support it: chance in four hundred looks gives 2 ln 400 = 12 at most once in e, and
 /// each 2 ln 10 = 4.6 more once in ten times as many.
 const LEAST_ALONE: f64 = 25.0;
+/// A name of less than this part of what something else would score is the shadow of that.
+const SHADOW: f64 = 2.0;
 /// Laws that are little more than a slow course of time, which a reading that wanders imitates best.
 const SLOW: [&str; 5] = ["force-drift", "thermal-softening", "cyclic-softening", "permanent-set", "end-slip"];
 /// However long the noise's memory is, half-strokes over several pressures and two directions say more than one number.
@@ -130,7 +132,9 @@ fn look(library: &[Candidate], rows: &Rows, ground: &Ground<'_>, blocked: f64) -
     let mut best = best_of_each(&all, library);
     let mut order: Vec<usize> = (0..best.len()).collect();
     order.sort_by(|a, b| best[*b].score.total_cmp(&best[*a].score));
+    rows.progress.stage("refining the best", order.len() as u64);
     for (rank, i) in order.into_iter().enumerate() {
+        rows.progress.step();
         if best[i].gain > 0.0 {
             best[i] = if rank < REFINED {
                 ground.refine(&best[i], library, rows)
@@ -140,6 +144,7 @@ fn look(library: &[Candidate], rows: &Rows, ground: &Ground<'_>, blocked: f64) -
         }
     }
     forbid_cancelling(&mut best, blocked);
+    rows.progress.stage("weighing them against chance and each other", 0);
     let p = p_values(&best, &all);
     (best, p)
 }
@@ -190,6 +195,24 @@ pub(crate) fn refit(
         fitted = Some(with);
     }
     (fitted.unwrap_or_else(|| unreachable!("two rounds run")), traces)
+}
+
+/// Whether an effect may be named at all: what tables imitate has to be large, or to show beyond them.
+fn worth_naming(t: &Trial, library: &[Candidate], rows: &Rows, ground: &Ground<'_>) -> bool {
+    let Scale { weight, blocked, .. } = ground.scale;
+    let moved = (t.gain.max(t.relief) / weight).sqrt();
+    t.beyond_tables >= CONCEALED
+        || (t.peak >= STATIC_PEAK * blocked && moved >= STATIC_MOVED * blocked)
+        || seen_past_tables(t, library, rows, ground)
+}
+
+/// Whether what the freest tables leave of the recordings is of an effect's making, however little of its trace that is.
+fn seen_past_tables(trial: &Trial, library: &[Candidate], rows: &Rows, ground: &Ground<'_>) -> bool {
+    let Scale { sigma, weight, blocked, .. } = ground.scale;
+    let (left, before) = ground.left_under(trial, library, rows, Give::free(blocked));
+    let above = before - sigma * sigma * weight;
+    let taken = before - left;
+    taken >= FIRST_OF_ALL * above && taken >= weight * (OWN_INEXACTNESS * blocked).powi(2)
 }
 
 /// A rival of at least this weight against the winner is confusable with it.
@@ -275,10 +298,6 @@ pub(crate) fn search(
     let mut taken: Vec<Taken> = Vec::new();
     let mut traces: Vec<Vec<f64>> = Vec::new();
     let mut first_look: Option<(Vec<Trial>, Vec<f64>)> = None;
-    let worth_naming = |t: &Trial| {
-        let moved = (t.gain.max(t.relief) / weight).sqrt();
-        t.beyond_tables >= CONCEALED || (t.peak >= STATIC_PEAK * blocked && moved >= STATIC_MOVED * blocked)
-    };
     let mut barred: Vec<usize> = refused.to_vec();
     while chosen.len() < MAX_NAMED && barred.len() < refused.len() + MOST_BARRED {
         let ground = Ground::new(&full, scale);
@@ -293,13 +312,18 @@ pub(crate) fn search(
                 !chosen.iter().any(|c| c.candidate == t.candidate)
                     && !barred.contains(&t.candidate)
                     && t.gain > 0.0
-                    && worth_naming(t)
                     && !taken.iter().any(|k| k.rivals.iter().any(|r| r.0 == t.candidate && r.1 > CONFUSABLE))
+                    && worth_naming(t, library, rows, &ground)
             })
             .max_by(|a, b| a.1.score.total_cmp(&b.1.score))
         else {
             break;
         };
+        // Where something that tables imitate explains far more, naming the next best would be naming a shadow of it.
+        let best_of_all = best.iter().map(|t| t.score).fold(0.0, f64::max);
+        if chosen.is_empty() && best_of_all > (winner.score + LEAST_ALONE).max(SHADOW * winner.score) {
+            break;
+        }
         if chosen.is_empty() {
             above = above_noise(winner.before);
         }

@@ -48,11 +48,11 @@ pub fn summary(d: &Diagnosis) -> String {
         );
         let _ = writeln!(s, "  {}", m.summary);
         let _ = writeln!(s, "  why: {}; up to {:.2} N", m.why, m.peak_N);
-        for p in &m.parameters {
-            let std = p.std.map_or_else(|| "not determined".to_owned(), |v| format!("± {v:.3e}"));
+        // Of laws to choose from, those that were not chosen are zero.
+        for p in m.parameters.iter().filter(|p| p.value != 0.0) {
             let odd =
                 if p.outside_known_range { "   outside the range known from the literature" } else { "" };
-            let _ = writeln!(s, "  {} = {:.4e} {} {std}{odd}", p.name, p.value, p.unit);
+            let _ = writeln!(s, "  {} = {}{odd}", p.name, with_interval(p.value, p.std, &p.unit));
         }
         if !m.confusable_with.is_empty() {
             let _ = writeln!(
@@ -107,4 +107,37 @@ pub fn summary(d: &Diagnosis) -> String {
         }
     }
     s
+}
+
+/// A value with its standard deviation to two digits: `0.924 ± 0.012 N`, `(4.59 ± 0.14)·10^-4 m`.
+fn with_interval(value: f64, std: Option<f64>, unit: &str) -> String {
+    let exponent = if (1e-2..1e5).contains(&value.abs()) { 0 } else { value.abs().log10().floor() as i32 };
+    let scale = 10.0_f64.powi(exponent);
+    let body = match std.filter(|s| *s > 0.0) {
+        Some(std) => {
+            let digits = (1.0 - (std / scale).log10().floor()).clamp(0.0, 5.0) as usize;
+            format!("{:.digits$} ± {:.digits$}", value / scale, std / scale)
+        }
+        None => format!("{:.3}", value / scale),
+    };
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    let doubt = if std.is_none() { " (not determined)" } else { "" };
+    match exponent {
+        0 => format!("{body}{unit}{doubt}"),
+        _ => format!("({body})·10^{exponent}{unit}{doubt}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_interval;
+
+    #[test]
+    fn a_value_has_as_many_places_as_its_interval() {
+        assert_eq!(with_interval(0.92421, Some(0.01247), "N"), "0.924 ± 0.012 N");
+        assert_eq!(with_interval(4.5924e-4, Some(1.419e-5), "m"), "(4.59 ± 0.14)·10^-4 m");
+        assert_eq!(with_interval(-810.2, Some(31.0), ""), "-810 ± 31");
+        assert_eq!(with_interval(2.5, None, "s"), "2.500 s (not determined)");
+        assert_eq!(with_interval(1e300, Some(f64::MIN_POSITIVE), "s"), "(1.00000 ± 0.00000)·10^300 s");
+    }
 }

@@ -71,7 +71,8 @@ fn recorded(
 }
 
 fn ask(campaign: &Campaign) -> Diagnosis {
-    diagnose(campaign, &geometry(), &Options { muscle: "test".into() }).expect("an answer")
+    diagnose(campaign, &geometry(), &Options { muscle: "test".into(), ..Options::default() })
+        .expect("an answer")
 }
 
 fn names(d: &Diagnosis) -> Vec<&str> {

@@ -3,6 +3,7 @@
 // Field names carry their unit as the JSON does: N is not n.
 #![allow(non_snake_case)]
 
+use model_core::effects::Parameter;
 use serde::Serialize;
 
 /// The judgement in one word.
@@ -55,6 +56,16 @@ pub struct ParameterValue {
     pub outside_known_range: bool,
 }
 
+impl ParameterValue {
+    /// Whether a value lies outside what the literature knows; one that is not used does not.
+    #[must_use]
+    pub fn is_outside(value: f64, parameter: &Parameter) -> bool {
+        let (low, high) = (parameter.low, parameter.high);
+        let too_small = value.abs() < low.abs().min(high.abs()) && low * high > 0.0;
+        value != 0.0 && (value.abs() > high.abs().max(low.abs()) || too_small)
+    }
+}
+
 /// An effect that is missing from the model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Missing {
@@ -74,6 +85,8 @@ pub struct Missing {
     pub place: String,
     /// Whether it is the bench's: it corrects the data and never goes to a controller.
     pub correction: bool,
+    /// Whether a check of the bench measured it, apart from the recordings.
+    pub checked: bool,
     /// What it is, for someone who has never heard of it.
     pub summary: String,
     /// Its equation and where it comes from.

@@ -4,7 +4,7 @@ use model_core::table::MAX_ORDER;
 
 use super::Options;
 use super::design::Layout;
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 use super::smoothing::{self, Smoothing};
 use super::uncertainty::jackknife;
 

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 use super::uncertainty::{self, Root};
 
 /// How the numbers of a table at one pressure depend on each other.

@@ -25,6 +25,8 @@
 
 use std::collections::BTreeMap;
 
+use super::prepared::Prepared;
+
 /// Chunks per unit of contraction.
 pub const CHUNKS: f64 = 500.0;
 
@@ -101,6 +103,28 @@ pub fn by_chunk(samples: impl IntoIterator<Item = Sample>) -> Vec<ChunkError> {
             })
         })
         .collect()
+}
+
+/// Errors by eq. 24 of points that took part and that `take` accepts.
+pub fn chunks(prepared: &Prepared, residuals: &[f64], take: impl Fn(u32) -> bool) -> Vec<ChunkError> {
+    let l0 = prepared.braid.rest_length();
+    let pressure = prepared.points.pressure;
+    let least = 0.05 * prepared.blocked(pressure.high).abs();
+    let samples = (0..prepared.points.list.len()).filter_map(|i| {
+        let p = &prepared.points.list[i];
+        let group = prepared.design.bins[prepared.design.rows[i].bin as usize].group;
+        (prepared.counts(i) && take(group)).then(|| Sample {
+            group,
+            fine: prepared.fine_pressure(p.pressure),
+            contraction: (p.stroke + prepared.shift[i]) / l0,
+            direction: p.direction,
+            rows: f64::from(p.rows),
+            residual: residuals[i],
+            // Below the deadband there is no blocked force to compare with.
+            blocked: prepared.blocked(p.pressure).max(least),
+        })
+    });
+    by_chunk(samples)
 }
 
 /// Mean and largest error of chunks that `take` accepts.

@@ -3,85 +3,16 @@
 //! Each such unknown enters as one more column of the joint problem, `∂F/∂p` at the present solution, with a prior as wide as
 //! the measurement it stands for; the columns are computed anew until nothing moves (Gauss–Newton). Values stay within stated
 //! bounds, and each is reported with how much of the prior's uncertainty the recordings removed.
-//!
-//! | unknown | prior (one standard deviation) | bounds |
-//! | --- | --- | --- |
-//! | braid angle | 2° | ± 8° |
-//! | bladder diameter | 5 % | ± 25 % |
-//! | bladder wall | 15 % | ± 50 % |
-//! | length of a mounting (a stroke held through whole recordings) | 0.5 mm | ± 1 mm |
-//!
-//! The diameter scales the force and the angle bends it over contraction, so blocked forces at several lengths determine
-//! both. The wall only scales the elastic part, which the `E_k` scale too: it stays where its prior has it, and says so.
 
-use model_core::units::{Angle, Length};
-use serde::Serialize;
+use model_core::braid::Geometry;
 
 use super::Options;
 use super::basis::columns;
-use super::prepare::Prepared;
+use super::dimensions::{Mounting, Unknown, describe, moved};
+use super::linear::dot;
+use super::prepared::Prepared;
 use super::smoothing::Smoothing;
 use super::uncertainty;
-
-/// A dimension or a length that was found together with the table.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Adjusted {
-    /// What it is.
-    pub name: String,
-    /// Its unit.
-    pub unit: &'static str,
-    /// As described.
-    pub nominal: f64,
-    /// As found.
-    pub value: f64,
-    /// Standard deviation of what was found.
-    pub std: f64,
-    /// It was kept at or above this …
-    pub low: f64,
-    /// … and at or below this.
-    pub high: f64,
-    /// Share of the prior's variance that the recordings removed: near 1 they determine it, near 0 they say nothing.
-    pub determined: f64,
-    /// Whether it stopped at a bound.
-    pub at_bound: bool,
-}
-
-/// A stroke that whole recordings were held at, and by how much it was off.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mounting {
-    /// The stroke as recorded, m.
-    pub stroke: f64,
-    /// What is to be added to it, m.
-    pub offset: f64,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Unknown {
-    Angle,
-    Diameter,
-    Wall,
-    Offset(usize),
-}
-
-impl Unknown {
-    /// Prior standard deviation and bound, in the unknown's own scale (rad, logarithm, m).
-    fn prior(self) -> (f64, f64) {
-        match self {
-            Self::Angle => (2.0_f64.to_radians(), 8.0_f64.to_radians()),
-            Self::Diameter => (0.05, 0.25),
-            Self::Wall => (0.15, 0.5),
-            Self::Offset(_) => (0.5e-3, 1.0e-3),
-        }
-    }
-
-    /// Step of numerical differences.
-    fn step(self) -> f64 {
-        match self {
-            Self::Offset(_) => 1e-6,
-            _ => 1e-5,
-        }
-    }
-}
 
 /// The strokes that recordings were held at, and for each point which of them it belongs to.
 fn mountings(prepared: &Prepared) -> (Vec<f64>, Vec<Option<usize>>) {
@@ -145,7 +76,7 @@ impl Prepared {
             for (i, row) in self.design.rows.iter_mut().enumerate() {
                 let z = &self.design.extra[i * at.len()..(i + 1) * at.len()];
                 // Linear about `at`: F(p) ≈ F(at) + z (p − at).
-                row.force = forces[i] + super::linear::dot(z, &at);
+                row.force = forces[i] + dot(z, &at);
             }
             self.parameters[size..].copy_from_slice(&at);
             let misfit = self.solve(Smoothing::START, 6);
@@ -204,13 +135,7 @@ impl Prepared {
     }
 
     /// Puts the dimensions at `at` into geometry, braid and rows. `T` stays as it is, so that the `ẽ_k` keep their meaning.
-    fn apply(
-        &mut self,
-        nominal: &model_core::braid::Geometry,
-        unknowns: &[Unknown],
-        at: &[f64],
-        mounting: &[Option<usize>],
-    ) {
+    fn apply(&mut self, nominal: &Geometry, unknowns: &[Unknown], at: &[f64], mounting: &[Option<usize>]) {
         self.geometry = moved(nominal, unknowns, at);
         if let Ok(braid) = self.geometry.build() {
             self.braid = braid;
@@ -226,7 +151,7 @@ impl Prepared {
     /// `∂F/∂p` of every point, by central differences of the columns at the present parameters.
     fn sensitivities(
         &mut self,
-        nominal: &model_core::braid::Geometry,
+        nominal: &Geometry,
         unknowns: &[Unknown],
         at: &[f64],
         mounting: &[Option<usize>],
@@ -266,73 +191,4 @@ impl Prepared {
         }
         self.design.extra = extra;
     }
-}
-
-fn moved(
-    nominal: &model_core::braid::Geometry,
-    unknowns: &[Unknown],
-    at: &[f64],
-) -> model_core::braid::Geometry {
-    let mut g = *nominal;
-    for (u, v) in unknowns.iter().zip(at) {
-        match u {
-            Unknown::Angle => {
-                let angle = (g.braid_angle.radians() + v).clamp(0.62, 1.55);
-                g.braid_angle = Angle::from_radians(angle);
-            }
-            Unknown::Diameter => g.outer_diameter = g.outer_diameter * v.exp(),
-            Unknown::Wall => g.wall = g.wall * v.exp(),
-            Unknown::Offset(_) => {}
-        }
-    }
-    // A wall that fills the bore cannot be built.
-    let most = g.outer_diameter * 0.49;
-    g.wall = g.wall.min(Length::from_metres(most.metres()));
-    g
-}
-
-fn describe(
-    nominal: &model_core::braid::Geometry,
-    unknown: Unknown,
-    value: f64,
-    std: f64,
-    strokes: &[f64],
-) -> Adjusted {
-    let (sigma, bound) = unknown.prior();
-    let scaled = |name: &str, unit, nominal: f64| Adjusted {
-        name: name.into(),
-        unit,
-        nominal,
-        value: nominal * value.exp(),
-        std: nominal * value.exp() * std,
-        low: nominal * (-bound).exp(),
-        high: nominal * bound.exp(),
-        determined: 0.0,
-        at_bound: false,
-    };
-    let shifted = |name: String, unit, nominal: f64, per: f64| Adjusted {
-        name,
-        unit,
-        nominal,
-        value: nominal + value * per,
-        std: std * per,
-        low: nominal - bound * per,
-        high: nominal + bound * per,
-        determined: 0.0,
-        at_bound: false,
-    };
-    let mut a = match unknown {
-        Unknown::Angle => {
-            shifted("braid_angle".into(), "deg", nominal.braid_angle.degrees(), 1.0_f64.to_degrees())
-        }
-        Unknown::Diameter => scaled("bladder_outer_diameter", "mm", nominal.outer_diameter.millimetres()),
-        Unknown::Wall => scaled("bladder_wall", "mm", nominal.wall.millimetres()),
-        Unknown::Offset(m) => {
-            let name = format!("stroke_of_mounting_{}", m + 1);
-            shifted(name, "mm", strokes[m] * 1e3, 1e3)
-        }
-    };
-    a.determined = (1.0 - (std / sigma).powi(2)).clamp(0.0, 1.0);
-    a.at_bound = value.abs() > 0.999 * bound;
-    a
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::error::{Code, Error, Result};
 use crate::muscle_description::MuscleDescription;
 use crate::predict::predict;
+use crate::recording::segment::Motion;
 use crate::recording::{Campaign, Recording};
 use crate::table_file::{About, TableFile};
 
@@ -74,6 +75,28 @@ pub struct Spot {
     pub score: Score,
 }
 
+/// Errors, together and by where they sit.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Tally {
+    /// Of all rows.
+    pub score: Score,
+    spots: BTreeMap<(String, i64, i8), Score>,
+}
+
+impl Tally {
+    pub(super) fn add(&mut self, left_out: &str, contraction: f64, direction: i8, residual: f64) {
+        self.score.add(residual);
+        let place = (left_out.to_owned(), (contraction * 1e3).round() as i64, direction);
+        self.spots.entry(place).or_default().add(residual);
+    }
+
+    pub(super) fn spots(self) -> Vec<Spot> {
+        let spot =
+            |((left_out, contraction, direction), score)| Spot { left_out, contraction, direction, score };
+        self.spots.into_iter().map(spot).collect()
+    }
+}
+
 /// Errors on what was left out.
 #[derive(Debug, Clone)]
 pub struct HeldOut {
@@ -136,7 +159,7 @@ pub fn hold_out(
     let blocked = f64::from(whole.table.blocked_force.newtons());
     let mut out = HeldOut { table: Score::default(), published: None, spots: Vec::new(), blocked, whole };
     let mut reference = Score::default();
-    let mut spots: BTreeMap<(String, i64, i8), Score> = BTreeMap::new();
+    let mut tally = Tally::default();
     for value in &values {
         let part = |inside: bool| Campaign {
             recordings: campaign
@@ -152,9 +175,9 @@ pub fn hold_out(
         let fitted = fit(&part(false), muscle, options)?;
         let test = part(true);
         let prediction = predict(&as_file(&fitted), &test)?;
-        let directions = super::direction::directions(&test);
-        for ((recording, predicted), direction) in
-            test.recordings.iter().zip(&prediction.recordings).zip(&directions)
+        let motions = Motion::of_campaign(&test);
+        for ((recording, predicted), motion) in
+            test.recordings.iter().zip(&prediction.recordings).zip(&motions)
         {
             let measured = recording.require_force()?;
             for (i, force) in measured.iter().enumerate() {
@@ -163,10 +186,8 @@ pub fn hold_out(
                     continue;
                 }
                 let residual = force - predicted.force[i];
-                out.table.add(residual);
                 let contraction = recording.stroke[i] / muscle.rest_length();
-                let place = (value.clone(), (contraction * 1e3).round() as i64, direction[i]);
-                spots.entry(place).or_default().add(residual);
+                tally.add(value, contraction, motion.direction[i], residual);
                 if let Some(p) = published {
                     reference.add(force - p.force(muscle, recording.pressure[i], contraction));
                 }
@@ -174,34 +195,7 @@ pub fn hold_out(
         }
     }
     out.published = published.map(|_| reference);
-    out.spots = spots
-        .into_iter()
-        .map(|((left_out, contraction, direction), score)| Spot { left_out, contraction, direction, score })
-        .collect();
+    out.table = tally.score;
+    out.spots = tally.spots();
     Ok(out)
-}
-
-/// Scores the table of another muscle of the same stock, carried over to this muscle's rest length.
-///
-/// # Errors
-/// A table that cannot be used at this length.
-pub fn unseen_length(
-    donor: &Fit,
-    campaign: &Campaign,
-    muscle: &MuscleDescription,
-    clip: Option<f64>,
-) -> Result<Score> {
-    let mut table = donor.table.clone();
-    table.geometry.rest_length = model_core::units::Length::from_metres(muscle.rest_length() as f32);
-    let file = TableFile { table, about: About::default() };
-    let prediction = predict(&file, campaign)?;
-    let mut score = Score::default();
-    for (recording, predicted) in campaign.recordings.iter().zip(&prediction.recordings) {
-        for (force, model) in recording.require_force()?.iter().zip(&predicted.force) {
-            if clip.is_none_or(|c| *force > c) {
-                score.add(force - model);
-            }
-        }
-    }
-    Ok(score)
 }

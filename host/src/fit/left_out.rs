@@ -3,9 +3,8 @@
 use rayon::prelude::*;
 
 use super::Options;
-use super::errors::errors;
-use super::prepare::Prepared;
-use super::result::chunks;
+use super::errors::{chunks, errors};
+use super::prepared::Prepared;
 use super::smoothing;
 
 /// Each tested pressure predicted from the others by refitting without it, its smoothing chosen anew. Per group, the mean

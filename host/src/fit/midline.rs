@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use super::errors::CHUNKS;
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 
 /// One chunk of a mid-line.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -30,7 +30,7 @@ use nalgebra::DMatrix;
 use super::basis::columns;
 use super::design::Measured;
 use super::midline::MidPoint;
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 
 /// Young's modulus of the thesis's silicone, Pa: stands in where the description names none.
 pub const THESIS_MODULUS: f64 = 1.75e6;

@@ -114,6 +114,7 @@ fn guarded(tested: &[f64], max_pressure: f64) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::fit::points::points;
+    use crate::recording::segment::Motion;
     use crate::recording::{Campaign, Recording};
 
     fn at(pressures: Vec<f64>) -> Points {
@@ -125,7 +126,7 @@ mod tests {
             pressure: pressures,
             ..Recording::default()
         };
-        points(&Campaign::new(vec![recording]), &[vec![1; n]])
+        points(&Campaign::new(vec![recording]), &[Motion { direction: vec![1; n], ..Motion::default() }])
     }
 
     #[test]

@@ -3,23 +3,8 @@
 use crate::recording::Campaign;
 
 use super::points::{Points, median};
-use super::prepare::Prepared;
-use super::screen::Use;
-
-/// A reading that does not belong to the rest.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Outlier {
-    /// The recording, counted as in the campaign.
-    pub recording: u32,
-    /// Row in that recording, from 0.
-    pub row: u32,
-    /// s.
-    pub time: f64,
-    /// What was read, N.
-    pub force: f64,
-    /// How far it lies off, N.
-    pub off: f64,
-}
+use super::prepared::Prepared;
+use super::screen::{Outlier, Use};
 
 /// Finds single rows that jump out of their piece and takes them out of its mean.
 ///

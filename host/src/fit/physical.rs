@@ -4,7 +4,7 @@ use model_core::units::Length;
 
 use super::linear::{Symmetric, dot};
 use super::points::Range;
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 use super::screen::Use;
 
 impl Prepared {

@@ -4,6 +4,7 @@
 //! pressure and stroke hardly change within. A piece ends where the direction turns, where stroke or pressure has moved on
 //! by a small share of their ranges, or where it holds enough rows. One pass, linear in rows; memory is that of the points.
 
+use crate::recording::segment::Motion;
 use crate::recording::{Campaign, Recording, white_noise};
 
 /// A mean over consecutive rows of one recording.
@@ -89,10 +90,9 @@ const PRESSURE_STEP: f64 = 1.0 / 100.0;
 /// as many points as rows.
 const NOISE_STEP: f64 = 6.0;
 
-/// Cuts a campaign into points. `directions` has one value per row of every recording; recordings without a force
-/// are passed over.
+/// Cuts a campaign into points. `motions` are those of its recordings; recordings without a force are passed over.
 #[must_use]
-pub fn points(campaign: &Campaign, directions: &[Vec<i8>]) -> Points {
+pub fn points(campaign: &Campaign, motions: &[Motion]) -> Points {
     let with_force = || campaign.recordings.iter().filter(|r| r.force.is_some());
     let rows: usize = with_force().map(Recording::len).sum();
     let pressure = Range::of(with_force().flat_map(|r| r.pressure.iter().copied()));
@@ -107,7 +107,8 @@ pub fn points(campaign: &Campaign, directions: &[Vec<i8>]) -> Points {
     let mut list: Vec<Point> = Vec::with_capacity(rows.min(2 * AIM));
     let mut block = 0_u32;
     for (index, recording) in campaign.recordings.iter().enumerate() {
-        let (Some(f), Some(directions)) = (&recording.force, directions.get(index)) else { continue };
+        let (Some(f), Some(motion)) = (&recording.force, motions.get(index)) else { continue };
+        let directions = &motion.direction;
         let (p, x, t) = (&recording.pressure, &recording.stroke, &recording.time);
         let n = recording.len().min(directions.len());
         // What the muscle did before is not recorded: a beginning is as good as a turn, and may be one.
@@ -185,10 +186,10 @@ pub fn median(values: &mut [f64]) -> f64 {
 mod tests {
     use super::*;
 
-    fn loops(rows: usize) -> (Campaign, Vec<Vec<i8>>) {
+    fn loops(rows: usize) -> (Campaign, Vec<Motion>) {
         let phase = |i: usize| (i as f64 / rows as f64 * 6.0).fract();
         let stroke: Vec<f64> = (0..rows).map(|i| 3e-3 * (1.0 - (1.0 - 2.0 * phase(i)).abs())).collect();
-        let directions = (0..rows).map(|i| if phase(i) < 0.5 { 1 } else { -1 }).collect();
+        let direction = (0..rows).map(|i| if phase(i) < 0.5 { 1 } else { -1 }).collect();
         let recording = Recording {
             time: (0..rows).map(|i| i as f64 * 1e-3).collect(),
             pressure: vec![3e5; rows],
@@ -196,13 +197,13 @@ mod tests {
             stroke,
             ..Recording::default()
         };
-        (Campaign::new(vec![recording]), vec![directions])
+        (Campaign::new(vec![recording]), vec![Motion { direction, ..Motion::default() }])
     }
 
     #[test]
     fn many_rows_become_few_points_with_the_same_content() {
-        let (campaign, directions) = loops(400_000);
-        let points = points(&campaign, &directions);
+        let (campaign, motions) = loops(400_000);
+        let points = points(&campaign, &motions);
         assert!(points.list.len() < 30_000, "{}", points.list.len());
         assert_eq!(points.list.iter().map(|p| p.rows as usize).sum::<usize>(), 400_000);
         assert_eq!(points.blocks, 12);
@@ -216,22 +217,22 @@ mod tests {
 
     #[test]
     fn noise_of_the_stroke_makes_no_more_points() {
-        let (mut campaign, directions) = loops(400_000);
-        let quiet = points(&campaign, &directions).list.len();
+        let (mut campaign, motions) = loops(400_000);
+        let quiet = points(&campaign, &motions).list.len();
         let mut state = 1_u32;
         for x in &mut campaign.recordings[0].stroke {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             // Uniform over a step of the stroke on either side.
             *x += 6e-6 * (f64::from(state >> 8) / f64::from(1 << 23) - 1.0);
         }
-        let noisy = points(&campaign, &directions).list.len();
+        let noisy = points(&campaign, &motions).list.len();
         assert!(noisy < quiet + quiet / 10, "{noisy} points instead of {quiet}");
     }
 
     #[test]
     fn distance_from_a_turn_starts_at_the_turn() {
-        let (campaign, directions) = loops(6000);
-        let points = points(&campaign, &directions);
+        let (campaign, motions) = loops(6000);
+        let points = points(&campaign, &motions);
         let first = points.list.iter().position(|p| p.direction < 0.0).expect("a way back");
         assert!((points.list[first - 1].since_turn - 1.0).abs() < 0.01);
         assert!(points.list[first].since_turn < 0.01);

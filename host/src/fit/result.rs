@@ -10,11 +10,11 @@ use crate::recording::Campaign;
 use crate::table_file::Uncertainty;
 
 use super::Options;
-use super::errors::{ChunkError, Sample, by_chunk};
+use super::errors::{ChunkError, chunks};
 use super::left_out::left_out;
 use super::midline::{MidPoint, midline};
 use super::models::{self, Model};
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 use super::summary::{ModelError, Summary, summarise};
 use super::uncertainty::{self, Root, Uncertain};
 
@@ -146,26 +146,4 @@ fn table_residuals(prepared: &Prepared, table: &MuscleTable) -> Result<Vec<f64>>
             p.force - model.newtons()
         })
         .collect())
-}
-
-/// Errors by eq. 24 of points that took part and that `take` accepts.
-pub fn chunks(prepared: &Prepared, residuals: &[f64], take: impl Fn(u32) -> bool) -> Vec<ChunkError> {
-    let l0 = prepared.braid.rest_length();
-    let pressure = prepared.points.pressure;
-    let least = 0.05 * prepared.blocked(pressure.high).abs();
-    let samples = (0..prepared.points.list.len()).filter_map(|i| {
-        let p = &prepared.points.list[i];
-        let group = prepared.design.bins[prepared.design.rows[i].bin as usize].group;
-        (prepared.counts(i) && take(group)).then(|| Sample {
-            group,
-            fine: prepared.fine_pressure(p.pressure),
-            contraction: (p.stroke + prepared.shift[i]) / l0,
-            direction: p.direction,
-            rows: f64::from(p.rows),
-            residual: residuals[i],
-            // Below the deadband there is no blocked force to compare with.
-            blocked: prepared.blocked(p.pressure).max(least),
-        })
-    });
-    by_chunk(samples)
 }

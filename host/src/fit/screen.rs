@@ -21,6 +21,21 @@ pub enum Use {
     Outlier,
 }
 
+/// A reading that does not belong to the rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outlier {
+    /// The recording, counted as in the campaign.
+    pub recording: u32,
+    /// Row in that recording, from 0.
+    pub row: u32,
+    /// s.
+    pub time: f64,
+    /// What was read, N.
+    pub force: f64,
+    /// How far it lies off, N.
+    pub off: f64,
+}
+
 /// A force at which the sensor's readings end: many rows stand at exactly the smallest (or largest) value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clip {

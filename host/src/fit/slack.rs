@@ -1,6 +1,6 @@
 //! Where the muscle is slack: the force stays at zero, and the model must not pull there.
 
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 use super::screen::Use;
 use super::smoothing::Smoothing;
 

@@ -8,9 +8,9 @@ use crate::table_file::FitQuality;
 use model_core::table::MuscleTable;
 
 use super::determined::{Correlations, NotDetermined, not_determined};
+use super::dimensions::Adjusted;
 use super::errors::{ChunkError, errors};
-use super::geometry::Adjusted;
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 use super::screen::Use;
 use super::uncertainty::{self, Uncertain};
 
@@ -163,15 +163,13 @@ impl Summary {
 
 impl std::fmt::Display for Summary {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        // An interval of no width would claim that nothing is left open.
+        let half = 1.96 * self.deadband_std_kPa;
+        let places = (1..4).find(|p| half >= 0.5 * 10.0_f64.powi(-p)).unwrap_or(4) as usize;
         writeln!(
             f,
-            "{}: {} rows, P0 {:.1} ± {:.1} kPa, blocked force {:.1} N, rms {:.3} N",
-            self.muscle,
-            self.samples,
-            self.deadband_kPa,
-            1.96 * self.deadband_std_kPa,
-            self.blocked_force_N,
-            self.rms_N
+            "{}: {} rows, P0 {:.places$} ± {half:.places$} kPa, blocked force {:.1} N, rms {:.3} N",
+            self.muscle, self.samples, self.deadband_kPa, self.blocked_force_N, self.rms_N
         )?;
         write!(
             f,

@@ -1,6 +1,6 @@
 //! How far from a turn of the motion friction has turned round: points before that are set aside.
 
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 use super::screen::Use;
 
 impl Prepared {

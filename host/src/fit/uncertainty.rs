@@ -17,7 +17,7 @@ use nalgebra::DMatrix;
 
 use super::design::{Design, Layout};
 use super::linear::{Symmetric, dot};
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 
 /// A square root of a covariance, `C = S Sᵀ`, row after row.
 ///

@@ -1,6 +1,6 @@
 //! What a user should know about a fit, in words: what was seen, what it means, what to do.
 
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 use super::screen::Use;
 
 /// Everything worth saying. `left_out` is the error of each pressure predicted from the others, percent.

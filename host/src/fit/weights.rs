@@ -10,7 +10,7 @@
 use std::collections::HashMap;
 
 use super::points::{Point, Range, median};
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 use super::screen::Use;
 
 /// Of the blocked force: what the model may miss although it is the right one for the purpose; more rows do not help below it.

@@ -10,7 +10,6 @@ use super::decimal;
 use super::import::{FoundZero, Import, Value, Zero};
 use super::plan::{Plan, Role};
 use super::quantity::Quantity;
-use super::read::Reader;
 use crate::error::{Code, Error, Result};
 
 /// A lookup table as text.
@@ -29,7 +28,11 @@ struct Table {
 
 pub(super) struct Job<'a> {
     pub path: &'a Path,
-    pub reader: &'a Reader<'a>,
+    /// Fewer rows are no recording.
+    pub min_rows: usize,
+    /// L0 of the muscle that made it, m, where it is known.
+    pub rest_length: Option<f64>,
+    pub muscle_name: Option<&'a str>,
     pub import: &'a Import,
     pub filters: &'a [(String, Value)],
     pub plan: &'a Plan,
@@ -42,14 +45,14 @@ pub(super) struct Job<'a> {
 
 /// Makes recordings of the rows of a file.
 pub(super) fn assemble(job: &Job<'_>, mut rows: Rows) -> Result<Vec<Recording>> {
-    if rows.rows < job.reader.min_rows {
+    if rows.rows < job.min_rows {
         let cause = match rows.rows {
             0 => "there is no row below the header".to_owned(),
             1 => "there is one row only".to_owned(),
             n => format!("there are {n} rows only"),
         };
         return Err(Error::new(Code::RecordingTooShort, cause)
-            .help(format!("a recording has at least {} rows", job.reader.min_rows)));
+            .help(format!("a recording has at least {} rows", job.min_rows)));
     }
     let mut table = sort_columns(job, &mut rows)?;
     let map = |row: usize| job.first_line + rows.map.line(row);
@@ -305,13 +308,11 @@ fn keep(job: &Job<'_>, table: &Table, rows: usize) -> Result<Option<Vec<bool>>> 
                     number(word.trim()).is_some_and(|w| (w - n).abs() <= 1e-9 * n.abs().max(1e-3))
                 }
                 Value::Text(t) if t == "{rest_length_mm}" => {
-                    let rest = job.reader.rest_length.ok_or_else(|| needs_rest_length(name))? * 1e3;
+                    let rest = job.rest_length.ok_or_else(|| needs_rest_length(name))? * 1e3;
                     // A tape measure is good to half a per cent at best; muscles of one shelf differ by more.
                     number(word.trim()).is_some_and(|w| (w - rest).abs() <= 5e-3 * rest)
                 }
-                Value::Text(t) if t == "{name}" => {
-                    job.reader.muscle_name.is_some_and(|n| is_called(n, word.trim()))
-                }
+                Value::Text(t) if t == "{name}" => job.muscle_name.is_some_and(|n| is_called(n, word.trim())),
                 Value::Text(t) => same(t, word),
             })
         };
@@ -328,7 +329,7 @@ fn keep(job: &Job<'_>, table: &Table, rows: usize) -> Result<Option<Vec<bool>>> 
         format!("{name} is one of {}", some.join(", "))
     };
     let has: Vec<String> = table.filters.iter().zip(job.filters).map(list).collect();
-    let muscle = match (rest_length, job.reader.rest_length) {
+    let muscle = match (rest_length, job.rest_length) {
         (true, Some(rest)) => format!(" for a muscle of {} mm", (rest * 1e6).round() / 1e3),
         _ => String::new(),
     };
@@ -380,7 +381,7 @@ fn take(job: &Job<'_>, table: &mut Table, rows: Option<Vec<u32>>, labels: &[Stri
     let mut stroke: Vec<f64> = column(stroke_source).unwrap_or_default();
     let own_rest: Option<Vec<f64>> = column(Quantity::RestLength);
     let own_rest = own_rest.as_ref().and_then(|c| c.first().copied());
-    if let (Some(own), Some(muscle)) = (own_rest, job.reader.rest_length)
+    if let (Some(own), Some(muscle)) = (own_rest, job.rest_length)
         && (own - muscle).abs() > 0.02 * muscle
     {
         let cause = format!(
@@ -391,7 +392,7 @@ fn take(job: &Job<'_>, table: &mut Table, rows: Option<Vec<u32>>, labels: &[Stri
         return Err(Error::new(Code::RecordingOutOfRange, cause)
             .help("keep the rows of this muscle by [where] in the import description"));
     }
-    let rest_length = job.reader.rest_length.or(own_rest);
+    let rest_length = job.rest_length.or(own_rest);
     let needed = || rest_length.ok_or_else(|| needs_rest_length(stroke_source.name()));
     match stroke_source {
         Quantity::Length => {

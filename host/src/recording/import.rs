@@ -44,7 +44,8 @@ use serde::Deserialize;
 
 use super::quantity::{Quantity, Unit};
 use crate::error::{Code, Error, Result, nearest};
-use crate::muscle_description::toml_error;
+use crate::file_kind::FileKind;
+use crate::toml_words::toml_error;
 
 /// A column by name or by number, counted from 1.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
@@ -202,11 +203,8 @@ impl Import {
     /// [`Code::FileUnreadable`] or [`Code::ImportInvalid`] with the line.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|e| {
-            Error::unreadable(path, &e)
-                .help("an import description is a small TOML file; see examples/imports")
-        })?;
-        Self::parse(&text).map_err(|e| e.file(path))
+        let text = FileKind::Import.read_text(path)?;
+        Self::parse(&text).map_err(|e| FileKind::Import.wanted(path, e))
     }
 
     /// Parses and checks the text of a description.

@@ -5,7 +5,7 @@
 
 use std::io::Read;
 
-use super::container::{Cells, Columns, damaged};
+use super::sheet::{Sheet, damaged, matrix, without_common_prefix};
 use crate::error::Result;
 
 const COMPRESSED: u32 = 15;
@@ -17,7 +17,7 @@ const DEEPEST: usize = 4;
 
 /// The vectors of a file. A matrix gives its columns as `name(:,k)`, a struct its fields as `name.field`, or as `field` alone
 /// when the file holds nothing else.
-pub(super) fn columns(bytes: &[u8]) -> Result<Columns> {
+pub(super) fn columns(bytes: &[u8]) -> Result<Sheet> {
     let header = bytes.get(..128).ok_or_else(|| damaged("it ends within its header"))?;
     let big = match &header[126..128] {
         b"IM" => false,
@@ -27,10 +27,7 @@ pub(super) fn columns(bytes: &[u8]) -> Result<Columns> {
     let mut columns = Vec::new();
     let mut budget = LARGEST;
     let mut top = Elements { bytes: &bytes[128..], big };
-    let mut arrays = 0;
-    let mut single = None;
     while let Some((kind, data)) = top.next()? {
-        let before = columns.len();
         match kind {
             COMPRESSED => {
                 let mut unpacked = Vec::new();
@@ -50,19 +47,10 @@ pub(super) fn columns(bytes: &[u8]) -> Result<Columns> {
                 }
             }
             MATRIX => array(data, big, None, 0, &mut columns)?,
-            _ => continue,
-        }
-        arrays += 1;
-        single = Some(before);
-    }
-    if arrays == 1 && single == Some(0) {
-        for (name, _) in &mut columns {
-            if let Some((_, field)) = name.split_once('.') {
-                *name = field.to_owned();
-            }
+            _ => {}
         }
     }
-    Ok(columns)
+    Ok(without_common_prefix(columns))
 }
 
 /// Elements one after the other.
@@ -104,7 +92,7 @@ impl<'a> Elements<'a> {
     }
 }
 
-fn array(bytes: &[u8], big: bool, name: Option<&str>, depth: usize, columns: &mut Columns) -> Result<()> {
+fn array(bytes: &[u8], big: bool, name: Option<&str>, depth: usize, columns: &mut Sheet) -> Result<()> {
     if bytes.is_empty() {
         return Ok(());
     }
@@ -119,15 +107,8 @@ fn array(bytes: &[u8], big: bool, name: Option<&str>, depth: usize, columns: &mu
             let values = numbers(parts.need()?, big)?;
             let rows = dimensions.first().map_or(0, |d| *d as usize);
             let wide = dimensions.get(1).map_or(0, |d| *d as usize);
-            if dimensions.len() != 2 || rows.checked_mul(wide) != Some(values.len()) || values.is_empty() {
-                return Ok(());
-            }
-            if rows == 1 || wide == 1 {
-                columns.push((name.to_owned(), Cells::Numbers(values)));
-            } else {
-                let named =
-                    |(k, c): (usize, &[f64])| (format!("{name}(:,{})", k + 1), Cells::Numbers(c.to_vec()));
-                columns.extend(values.chunks_exact(rows).take(1000).enumerate().map(named));
+            if dimensions.len() == 2 {
+                matrix(name, rows, wide, values, columns);
             }
         }
         2 if depth < DEEPEST => {

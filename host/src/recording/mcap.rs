@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::container::{Cells, Columns};
+use super::sheet::{Column, Sheet};
 use crate::error::{Code, Error, Result};
 
 /// The first eight bytes of such a file.
@@ -12,7 +12,7 @@ pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 const TOPIC: &str = "/telemetry";
 
 /// Every field of the samples that is a number in all of them.
-pub(super) fn columns(bytes: &[u8]) -> Result<Columns> {
+pub(super) fn columns(bytes: &[u8]) -> Result<Sheet> {
     let damaged = |e: mcap::McapError| {
         Error::new(Code::RecordingContainer, format!("the MCAP file cannot be read: {e}"))
             .help("a file that was cut off (NAME.part) is mended by `host recover`; else copy it again")
@@ -47,5 +47,5 @@ pub(super) fn columns(bytes: &[u8]) -> Result<Columns> {
     }
     // A column that is null throughout was not measured.
     let kept = names.into_iter().zip(values).filter(|(_, v)| v.iter().any(|x| x.is_finite()));
-    Ok(kept.map(|(name, v)| (name, Cells::Numbers(v))).collect())
+    Ok(kept.map(|(name, v)| (name, Column::Numbers(v))).collect())
 }

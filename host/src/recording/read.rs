@@ -9,9 +9,11 @@ use super::blocks::{BlockError, Blocks, Rows, RowsError, read_rows};
 use super::campaign::Campaign;
 use super::cells::{Cells, Dialect, Fault, LineError};
 use super::columns::Recording;
-use super::container::Container;
+use super::container::{self, Container};
+use super::head::Head;
 use super::import::{Decimal, Import, Value, pattern as pattern_of};
 use super::plan::{Context, Plan, plan};
+use super::sheet::select;
 use super::source;
 use crate::error::{Code, Error, Result};
 use crate::muscle_description::MuscleDescription;
@@ -109,7 +111,7 @@ impl<'a> Reader<'a> {
             return Err(Error::new(Code::RecordingEmpty, "the file is empty"));
         }
         match Container::of(&source.magic) {
-            Some(container) => super::container::read(self, path, container),
+            Some(container) => self.container(path, container),
             None => self.text(path, source),
         }
     }
@@ -142,18 +144,23 @@ impl<'a> Reader<'a> {
         self.finish(path, &description, &head.names, &layout, head.lines + 1, rows)
     }
 
-    pub(super) fn description(&self) -> Cow<'a, Import> {
+    /// A container gives recordings by the same rules as text.
+    fn container(&self, path: &Path, container: Container) -> Result<Vec<Recording>> {
+        let description = self.description();
+        let sheet = container::columns(path, container)?;
+        let names: Vec<String> = sheet.iter().map(|(n, _)| n.clone()).collect();
+        let layout = self.layout(path, &names, &description, "")?;
+        let rows = select(&sheet, &layout.plan.wanted)?;
+        drop(sheet);
+        self.finish(path, &description, &names, &layout, 1, rows)
+    }
+
+    fn description(&self) -> Cow<'a, Import> {
         self.import.map_or_else(|| Cow::Owned(Import::default()), Cow::Borrowed)
     }
 
     /// Decides what to read of columns with these names.
-    pub(super) fn layout(
-        &self,
-        path: &Path,
-        names: &[String],
-        import: &Import,
-        preamble: &str,
-    ) -> Result<Layout> {
+    fn layout(&self, path: &Path, names: &[String], import: &Import, preamble: &str) -> Result<Layout> {
         let mut constants = Constants::default();
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         constants.catch("the file's name is", "file_name", import.file_name.as_deref(), &name)?;
@@ -176,7 +183,7 @@ impl<'a> Reader<'a> {
         Ok(Layout { plan: plan(names, &context)?, filters, lookup, labels: constants.labels })
     }
 
-    pub(super) fn finish(
+    fn finish(
         &self,
         path: &Path,
         import: &Import,
@@ -187,7 +194,9 @@ impl<'a> Reader<'a> {
     ) -> Result<Vec<Recording>> {
         let job = Job {
             path,
-            reader: self,
+            min_rows: self.min_rows,
+            rest_length: self.rest_length,
+            muscle_name: self.muscle_name,
             import,
             filters: &layout.filters,
             plan: &layout.plan,
@@ -201,93 +210,11 @@ impl<'a> Reader<'a> {
 }
 
 /// What is read of one file.
-pub(super) struct Layout {
-    pub plan: Plan,
+struct Layout {
+    plan: Plan,
     filters: Vec<(String, Value)>,
     lookup: Option<LookupTable>,
     labels: Vec<(String, String)>,
-}
-
-/// The beginning of a text file: how it is cut, and what its columns are called.
-struct Head {
-    dialect: Dialect,
-    names: Vec<String>,
-    /// Bytes above the header or the first row.
-    preamble: usize,
-    /// Bytes and lines that the head takes.
-    bytes: usize,
-    lines: u64,
-}
-
-impl Head {
-    fn read(text: &[u8], import: &Import) -> Result<Self> {
-        let comment = import.comment.and_then(|c| u8::try_from(c).ok());
-        let mut bytes = 0;
-        let mut lines = 0;
-        let mut skipped = 0;
-        loop {
-            let rest = &text[bytes..];
-            if rest.is_empty() {
-                let cause = format!("the file ends within its first {lines} lines");
-                return Err(Error::new(Code::RecordingTooShort, cause)
-                    .help("see skip_lines in the import description"));
-            }
-            let end = memchr::memchr(b'\n', rest).map_or(rest.len(), |e| e + 1);
-            let line = rest[..end].trim_ascii_end();
-            let idle = line.is_empty() || line.first() == comment.as_ref();
-            if skipped < import.skip_lines || idle {
-                skipped += 1;
-                bytes += end;
-                lines += 1;
-                continue;
-            }
-            let dialect = Dialect {
-                delimiter: import.delimiter()?.unwrap_or_else(|| guess_delimiter(line, import)),
-                comment,
-                decimal_comma: import.decimal == Decimal::Comma,
-            };
-            let line = if line.contains(&b'\r') { Err(mac_lines()) } else { Ok(line) }?;
-            let cells = Cells::split(line, dialect).map_err(|()| {
-                Error::new(Code::RecordingWrongWidth, "a quotation mark is not closed").line(lines + 1)
-            })?;
-            if import.header == Some(false) {
-                let names = (1..=cells.len()).map(|n| n.to_string()).collect();
-                return Ok(Self { dialect, names, preamble: bytes, bytes, lines });
-            }
-            let numbers = cells.iter().filter(|c| c.parse::<f64>().is_ok()).count();
-            if numbers > 0 && numbers == cells.len() {
-                return Err(Error::new(Code::RecordingMissingColumn, "the file has no header line")
-                    .line(lines + 1)
-                    .value(String::from_utf8_lossy(&line[..line.len().min(100)]))
-                    .help(
-                        "put names with units above the numbers, such as `time_s,pressure_kPa,displacement_mm,force_N`, \
-                         or describe the columns by number in an import description (--import)",
-                    ));
-            }
-            return Ok(Self { dialect, names: cells, preamble: bytes, bytes: bytes + end, lines: lines + 1 });
-        }
-    }
-
-    /// For streams of unknown size: none; the estimate is only for reserving memory.
-    fn average_line(&self, rest: &[u8]) -> Option<u64> {
-        (rest.len() < 65_536).then_some(rest.len() as u64)
-    }
-}
-
-fn mac_lines() -> Error {
-    Error::new(Code::RecordingNotText, "lines end in carriage returns only")
-        .help("save the file with usual line ends")
-}
-
-/// A tab in the header decides, then a comma; with decimal commas, the semicolon that goes with them.
-fn guess_delimiter(line: &[u8], import: &Import) -> u8 {
-    if line.contains(&b'\t') {
-        b'\t'
-    } else if import.decimal == Decimal::Comma {
-        b';'
-    } else {
-        b','
-    }
 }
 
 fn block_error(error: BlockError) -> Error {

@@ -50,6 +50,15 @@ impl Table {
     pub fn row(&mut self, cells: impl IntoIterator<Item = impl Into<String>>) {
         self.rows.push(cells.into_iter().map(Into::into).collect());
     }
+
+    fn drop_empty_columns(&mut self) {
+        for column in (1..self.head.len()).rev() {
+            if self.rows.iter().all(|r| r.get(column).is_none_or(String::is_empty)) {
+                self.head.remove(column);
+                self.rows.iter_mut().filter(|r| column < r.len()).for_each(|r| drop(r.remove(column)));
+            }
+        }
+    }
 }
 
 /// A part of a section. Texts may carry the mark-up of [`super::rich`].
@@ -116,9 +125,10 @@ impl Section {
         self.blocks.push(Block::Figure(Box::new(figure)));
     }
 
-    /// Adds a table; nothing where it has no row.
-    pub fn table(&mut self, table: Table) {
+    /// Adds a table; nothing where it has no row. Columns in which no row says anything are left out.
+    pub fn table(&mut self, mut table: Table) {
         if !table.rows.is_empty() {
+            table.drop_empty_columns();
             self.blocks.push(Block::Table(table));
         }
     }
@@ -211,5 +221,22 @@ impl Page {
             Block::Figure(figure) => Some(figure.as_ref()),
             _ => None,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_column_in_which_nothing_stands_is_not_shown() {
+        let mut table = Table::new("", &["name", "remark", "value", "more"]);
+        table.row(["a", "", "1", ""]);
+        table.row(["b", "", "", ""]);
+        let mut section = Section::new("x");
+        section.table(table);
+        let Block::Table(kept) = &section.blocks[0] else { panic!("a table") };
+        assert_eq!(kept.head, ["name", "value"]);
+        assert_eq!(kept.rows, [["a", "1"], ["b", ""]]);
     }
 }

@@ -273,7 +273,10 @@ fn axes(out: &mut String, panel: &Panel, frame: &Frame, y_ticks: &[Tick]) -> f64
     let mut below = if slanted { 20.0 + 0.58 * widest } else { 24.0 };
     let title = panel.x.title();
     if !title.is_empty() {
-        text(out, frame.left + frame.width / 2.0, bottom + below + 13.0, "middle", Colour::Ink, "", &title);
+        // A title that is wider than its frame grows to the left: on the right the paper ends.
+        let half = 0.5 * rich::width(&title) * LETTER;
+        let middle = (frame.left + frame.width / 2.0).min(right + 8.0 - half).max(half);
+        text(out, middle, bottom + below + 13.0, "middle", Colour::Ink, "", &title);
         below += 20.0;
     }
     below

@@ -15,8 +15,6 @@ use model_core::link::hello::Board;
 use model_core::link::messages::{Event, Side, Start, State, Status, Telemetry, TelemetryRate};
 use serde_json::{Value, json};
 use tokio::sync::{broadcast, oneshot};
-use virtual_bench::bench::BenchSpec;
-use virtual_bench::plant::Motion;
 
 use crate::demo::campaign::muscle;
 use crate::device::course::{Course, Quantity};
@@ -160,11 +158,7 @@ fn obey(order: Order, connected: &mut Option<Connected>) -> Result<Value> {
         Order::Emulate(name) => {
             // The old one ends before a new one begins.
             *connected = None;
-            let spec = muscle(&name)?;
-            let free =
-                virtual_bench::muscle::Muscle::new(spec.clone()).free_stroke(0.9 * spec.max_pressure) * 1e3;
-            let motion = Motion::Sine { mean_mm: 0.2 * free, amplitude_mm: 0.1 * free, frequency_hz: 0.4 };
-            let stand = Stand::new(BenchSpec::laboratory(spec, 1), motion);
+            let stand = Stand::swinging(muscle(&name)?);
             let mishap = stand.mishap();
             let emulated = Emulated::start(stand, None, 1.0)?;
             let client = Client::open(emulated.address())?;

@@ -1,6 +1,6 @@
 "use strict";
 // Curves on a canvas: a ring of samples, drawn as one vertical stroke from least to greatest in each column of pixels, so that the
-// work of a frame depends on its width and not on the rate of samples.
+// work of a picture depends on its width and on what is new, not on the window and the rate of samples.
 
 // Colours of the page, asked once: asking makes the browser compute styles, sixty times a second and curve.
 const ink = new Map();
@@ -12,18 +12,18 @@ function colour(name) {
 
 class Ring {
   constructor(size, names) {
-    this.size = size; this.length = 0; this.at = 0;
+    this.size = size; this.length = 0; this.at = 0; this.pushed = 0; this.cleared = 0;
     this.columns = Object.fromEntries(names.map((n) => [n, new Float64Array(size)]));
     this.names = names;
   }
   push(batch, count) {
-    for (let i = 0; i < count; i++) {
-      for (const n of this.names) this.columns[n][this.at] = batch[n][i];
-      this.at = (this.at + 1) % this.size;
-      if (this.length < this.size) this.length++;
+    for (const n of this.names) {
+      const column = this.columns[n], values = batch[n];
+      for (let i = 0, at = this.at; i < count; i++) { column[at] = values[i]; if (++at === this.size) at = 0; }
     }
+    this.at = (this.at + count) % this.size; this.length = Math.min(this.size, this.length + count); this.pushed += count;
   }
-  clear() { this.length = 0; this.at = 0; }
+  clear() { this.length = 0; this.at = 0; this.cleared++; }
   index(i) { return (this.at - this.length + i + this.size) % this.size; }
   get(name, i) { return this.columns[name][this.index(i)]; }
   last(name) { return this.length ? this.get(name, this.length - 1) : 0; }
@@ -32,6 +32,42 @@ class Ring {
     let low = 0, high = this.length;
     while (low < high) { const mid = (low + high) >> 1; if (this.get("t", mid) < time) low = mid + 1; else high = mid; }
     return low;
+  }
+}
+
+// A ring's samples drawn together in stretches of time as long as one column of pixels: of each curve the least, the greatest, the
+// first and the last. Only samples that are new are looked at, so that a picture costs its width, not its window times the rate.
+class Stretches {
+  constructor(ring) { this.ring = ring; this.step = 0; this.room = 0; }
+  // Takes in what came since the last time; begins anew where the window, the width or the recording is another.
+  follow(seconds, width) {
+    const r = this.ring, step = seconds / width, room = width + 2;
+    if (step !== this.step || room !== this.room || r.cleared !== this.cleared) {
+      this.step = step; this.room = room; this.cleared = r.cleared; this.seen = r.pushed - r.length; this.newest = -1;
+      this.number = new Float64Array(room).fill(-1);
+      const parts = () => ({ least: new Float64Array(room), most: new Float64Array(room), first: new Float64Array(room), last: new Float64Array(room) });
+      this.curves = Object.fromEntries(r.names.filter((n) => n !== "t").map((n) => [n, parts()]));
+    }
+    const fresh = Math.min(r.pushed - this.seen, r.length), start = r.index(r.length - fresh), size = r.size, times = r.columns.t;
+    for (let k = 0, i = start; k < fresh; k++) {
+      const number = Math.floor(times[i] / step), slot = number % room, begins = this.number[slot] !== number;
+      this.number[slot] = number; this.newest = number;
+      for (const name in this.curves) {
+        const c = this.curves[name], v = r.columns[name][i];
+        if (begins) c.least[slot] = c.most[slot] = c.first[slot] = v;
+        else { if (v < c.least[slot]) c.least[slot] = v; if (v > c.most[slot]) c.most[slot] = v; }
+        c.last[slot] = v;
+      }
+      if (++i === size) i = 0;
+    }
+    this.seen = r.pushed;
+  }
+  // Calls with every stretch's slot and number from the oldest that is shown.
+  each(call) {
+    for (let number = Math.max(0, this.newest - this.room + 2); number <= this.newest; number++) {
+      const slot = number % this.room;
+      if (this.number[slot] === number) call(slot, number);
+    }
   }
 }
 
@@ -55,16 +91,19 @@ class Axes {
     if (!(x1 > x0)) x1 = x0 + 1;
     if (!(y1 > y0)) { y0 -= 0.5; y1 = y0 + 1; }
     const pad = (y1 - y0) * 0.06; y0 -= pad; y1 += pad;
-    const left = 46, right = w - 8, top = 6, bottom = h - 20;
+    const left = LEFT, right = w - RIGHT, top = 6, bottom = h - 20;
     const X = (v) => left + ((v - x0) / (x1 - x0)) * (right - left), Y = (v) => bottom - ((v - y0) / (y1 - y0)) * (bottom - top);
     g.font = "11px system-ui, sans-serif"; g.lineWidth = 1; g.strokeStyle = colour("--grid"); g.fillStyle = colour("--quiet");
     g.textAlign = "right"; g.textBaseline = "middle";
     const ys = ticks(y0, y1, (bottom - top) / 40);
-    for (const v of ys.values) { g.beginPath(); g.moveTo(left, Y(v)); g.lineTo(right, Y(v)); g.stroke(); g.fillText(v.toFixed(ys.digits), left - 5, Y(v)); }
-    g.textAlign = "center"; g.textBaseline = "top";
     const xs = ticks(x0, x1, (right - left) / 80);
+    g.beginPath();
+    for (const v of ys.values) { g.moveTo(left, Y(v)); g.lineTo(right, Y(v)); }
+    for (const v of xs.values) { g.moveTo(X(v), top); g.lineTo(X(v), bottom); }
+    g.stroke();
+    for (const v of ys.values) g.fillText(v.toFixed(ys.digits), left - 5, Y(v));
+    g.textAlign = "center"; g.textBaseline = "top";
     for (const v of xs.values) {
-      g.beginPath(); g.moveTo(X(v), top); g.lineTo(X(v), bottom); g.stroke();
       // A label at the edge stays on the picture.
       const text = xText(v, xs.digits), half = g.measureText(text).width / 2;
       g.fillText(text, Math.min(X(v), w - half - 1), bottom + 4);
@@ -92,40 +131,58 @@ function extent(...lists) {
   return low <= high ? [low, high] : [0, 1];
 }
 
+// Where a picture's data begin and end, beside its labels.
+const LEFT = 46, RIGHT = 8;
+
 // Curves of a ring over the last seconds.
 class Scope {
-  constructor(canvas, ring, curves) { this.axes = new Axes(canvas); this.ring = ring; this.curves = curves; }
+  constructor(canvas, ring, curves) { this.axes = new Axes(canvas); this.ring = ring; this.curves = curves; this.stretches = new Stretches(ring); }
   draw(seconds) {
-    const r = this.ring, size = r.size, end = r.last("t"), from = r.since(end - seconds), count = r.length - from, start = r.index(from);
-    // Plain loops over the ring's own arrays: this runs over every sample of the window in every picture.
+    const s = this.stretches, end = this.ring.last("t"), x0 = Math.max(0, end - seconds), x1 = Math.max(end, seconds);
+    s.follow(seconds, Math.max(1, this.axes.canvas.clientWidth - LEFT - RIGHT));
     let low = Infinity, high = -Infinity;
     for (const [name] of this.curves) {
-      const values = r.columns[name];
-      for (let k = 0, i = start; k < count; k++) { const v = values[i]; if (v < low) low = v; if (v > high) high = v; if (++i === size) i = 0; }
+      const { least, most } = s.curves[name];
+      s.each((slot) => { if (least[slot] < low) low = least[slot]; if (most[slot] > high) high = most[slot]; });
     }
     if (low > high) { low = 0; high = 1; }
-    const x0 = Math.max(0, end - seconds), x1 = Math.max(end, seconds);
-    const { Y, left, right } = this.axes.begin(x0, x1, low, high, (v, d) => v.toFixed(d) + " s");
-    const g = this.axes.g, width = Math.max(1, Math.round(right - left)), scale = (right - left) / (x1 - x0), times = r.columns.t;
+    const { X, Y } = this.axes.begin(x0, x1, low, high, (v, d) => v.toFixed(d) + " s"), g = this.axes.g;
     for (const [name, shade] of this.curves) {
-      const values = r.columns[name];
+      const { least, most, first, last } = s.curves[name];
+      let begun = false;
       g.strokeStyle = colour(shade); g.lineWidth = 1.5; g.beginPath();
-      let column = -1, least = 0, most = 0, first = 0, last = 0, begun = false;
-      const flush = () => {
-        if (column < 0) return;
-        const x = left + column;
-        if (begun) g.lineTo(x, Y(first)); else { g.moveTo(x, Y(first)); begun = true; }
-        if (most > least) { g.lineTo(x, Y(most)); g.lineTo(x, Y(least)); }
-        g.lineTo(x, Y(last));
-      };
-      for (let k = 0, i = start; k < count; k++) {
-        const v = values[i], c = Math.min(width, ((times[i] - x0) * scale) | 0);
-        if (c !== column) { flush(); column = c; least = most = first = v; } else { if (v < least) least = v; if (v > most) most = v; }
-        last = v;
-        if (++i === size) i = 0;
-      }
-      flush(); g.stroke();
+      s.each((slot, number) => {
+        const x = X(number * s.step);
+        if (begun) g.lineTo(x, Y(first[slot])); else { g.moveTo(x, Y(first[slot])); begun = true; }
+        if (most[slot] > least[slot]) { g.lineTo(x, Y(most[slot])); g.lineTo(x, Y(least[slot])); g.lineTo(x, Y(last[slot])); }
+      });
+      g.stroke();
     }
     this.axes.end();
+  }
+}
+
+// One quantity of a ring against another over the last seconds. Points are picked by their number since the beginning, not since the
+// window's edge: else every picture would show others, and the curve would shimmer.
+class Loop {
+  constructor(canvas, ring, x, y, shade) { this.axes = new Axes(canvas); this.ring = ring; this.x = x; this.y = y; this.shade = shade; this.most = 2000; }
+  draw(seconds) {
+    const r = this.ring, xs = r.columns[this.x], ys = r.columns[this.y], from = r.since(r.last("t") - seconds);
+    const every = Math.max(1, Math.ceil((r.length - from) / this.most)), oldest = r.pushed - r.length;
+    const begin = Math.ceil((oldest + from) / every) * every - oldest, start = r.index(begin);
+    let x0 = Infinity, x1 = -Infinity, y0 = Infinity, y1 = -Infinity;
+    for (let k = begin, i = start; k < r.length; k += every) {
+      const x = xs[i], y = ys[i];
+      if (x < x0) x0 = x; if (x > x1) x1 = x; if (y < y0) y0 = y; if (y > y1) y1 = y;
+      i += every; if (i >= r.size) i -= r.size;
+    }
+    if (x0 > x1) { x0 = y0 = 0; x1 = y1 = 1; }
+    const { X, Y } = this.axes.begin(x0, x1, y0, y1), g = this.axes.g;
+    g.strokeStyle = colour(this.shade); g.lineWidth = 1.2; g.beginPath();
+    for (let k = begin, i = start; k < r.length; k += every) {
+      if (k === begin) g.moveTo(X(xs[i]), Y(ys[i])); else g.lineTo(X(xs[i]), Y(ys[i]));
+      i += every; if (i >= r.size) i -= r.size;
+    }
+    g.stroke(); this.axes.end();
   }
 }

@@ -31,7 +31,7 @@ const scopes = [
   new Scope($("p-pressure"), ring, [["c", "--s1"], ["P", "--s0"]]),
   new Scope($("p-stroke"), ring, [["x", "--s0"]]),
 ];
-const loop = new Axes($("p-loop"));
+const loop = new Loop($("p-loop"), ring, "x", "F", "--s0");
 let held = false, fresh = false, mode = "", samples = 0, state = {};
 
 // How long the last pictures took to draw and how far apart they were, in ms: rings again, so that they cannot grow.
@@ -53,9 +53,7 @@ function draw() {
   scopes[1].curves = mode === "pressure" ? [["a", "--s2"], ["c", "--s1"], ["P", "--s0"]] : [["c", "--s1"], ["P", "--s0"]];
   scopes[2].curves = mode === "stroke" ? [["a", "--s1"], ["x", "--s0"]] : [["x", "--s0"]];
   for (const s of scopes) s.draw(seconds);
-  const from = ring.since(ring.last("t") - seconds), every = Math.max(1, Math.floor((ring.length - from) / 2000)), xs = [], ys = [];
-  for (let i = from; i < ring.length; i += every) { xs.push(ring.get("x", i)); ys.push(ring.get("F", i)); }
-  loop.begin(...extent(xs), ...extent(ys)); loop.line(xs, ys, "--s0", 1.2); loop.end();
+  loop.draw(seconds);
 }
 requestAnimationFrame(frame);
 
@@ -184,8 +182,9 @@ click("fit", async () => {
   const r = await order("fit", { muscle: $("muscle").value });
   if (!r) return;
   $("message").hidden = true; text("fit-text", r.text); report("fit-report", "fit"); $("lines-figure").hidden = false;
-  const n = r.lines.length, shade = (i) => `hsl(${220 - 190 * i / Math.max(1, n - 1)} 70% 52%)`;
-  $("lines-key").replaceChildren(...r.lines.map((l, i) => { const k = key("", l.kPa.toFixed(0) + " kPa"); k.style.color = shade(i); return k; }));
+  // From blue over red to orange: yellow and green would be too pale on white.
+  const n = r.lines.length, hue = (i) => (220 + 170 * i / Math.max(1, n - 1)) % 360, shade = (i) => `hsl(${hue(i)} 70% ${colour("--depth")})`;
+  $("lines-key").replaceChildren(...r.lines.map((l, i) => { const k = key("", l.kPa.toFixed(0) + " kPa"); k.style.color = `hsl(${hue(i)} 70% var(--depth))`; return k; }));
   picture("p-lines", (axes) => {
     axes.begin(...extent(...r.lines.map((l) => l.x)), ...extent(...r.lines.map((l) => l.F)));
     r.lines.forEach((l, i) => axes.dots(l.x, l.F, shade(i))); r.lines.forEach((l, i) => axes.line(l.mx, l.mF, shade(i), 1.6));

@@ -201,8 +201,11 @@ impl Workshop {
     pub fn diagnose(&mut self, muscle: &str) -> Result<Value> {
         let (muscle, campaign) = self.read(muscle)?;
         let geometry = muscle.geometry();
-        let answer =
-            diagnose::diagnose(&campaign, &geometry, &diagnose::Options { muscle: muscle.name.clone() })?;
+        let answer = diagnose::diagnose(
+            &campaign,
+            &geometry,
+            &diagnose::Options { muscle: muscle.name.clone(), ..Default::default() },
+        )?;
         self.reports.insert("diagnosis", diagnose_page::page(&answer, &geometry).html());
         Ok(json!({ "text": diagnose::summary::summary(&answer) }))
     }

@@ -31,10 +31,15 @@ pub fn files(
 
 /// The same, as a campaign.
 pub fn thesis(spec: &MuscleSpec, levels: &[f64], seed: u64, hz: f64) -> Campaign {
+    Campaign::new(recordings(&files(spec, levels, seed, hz)))
+}
+
+/// What the bench wrote, as the recordings that come of it.
+pub fn recordings(files: &[virtual_bench::recording::Recording]) -> Vec<Recording> {
     let column = |f: &virtual_bench::recording::Recording, of: fn(&virtual_bench::recording::Row) -> f64| {
         f.rows.iter().map(of).collect::<Vec<f64>>()
     };
-    let recordings = files(spec, levels, seed, hz)
+    files
         .iter()
         .map(|f| Recording {
             name: f.name.clone(),
@@ -44,6 +49,5 @@ pub fn thesis(spec: &MuscleSpec, levels: &[f64], seed: u64, hz: f64) -> Campaign
             force: Some(column(f, |r| r.force)),
             ..Recording::default()
         })
-        .collect();
-    Campaign::new(recordings)
+        .collect()
 }

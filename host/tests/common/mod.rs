@@ -1,6 +1,9 @@
 //! A peer for tests of the link, byte by byte, that can misbehave in one way at a time.
 #![allow(clippy::unwrap_used, reason = "a helper of tests: a failure here is a failure of the test")]
 
+#[cfg(unix)]
+mod line;
+
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::thread;
@@ -235,26 +238,12 @@ pub fn tcp(vice: Vice) -> Address {
 #[cfg(unix)]
 pub fn pty(vice: Vice) -> (Address, std::fs::File) {
     use std::os::fd::AsRawFd;
-    let (master, path) = open_pty();
+    let (master, path) = line::open_pty();
     // The far end stays open while the test runs, or reads of the near end fail until the host has opened it.
     let keep = std::fs::OpenOptions::new().read(true).write(true).open(&path).unwrap();
     assert!(keep.as_raw_fd() >= 0);
     thread::spawn(move || Peer::new(vice).serve(master));
     (Address::Serial(path), keep)
-}
-
-/// A pseudo-terminal without echo or line editing: its near end, and the path of its far end.
-#[cfg(unix)]
-pub fn open_pty() -> (std::fs::File, std::path::PathBuf) {
-    use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-    let near = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
-    grantpt(&near).unwrap();
-    unlockpt(&near).unwrap();
-    let path = ptsname(&near, Vec::new()).unwrap().into_string().unwrap();
-    let mut raw = rustix::termios::tcgetattr(&near).unwrap();
-    raw.make_raw();
-    rustix::termios::tcsetattr(&near, rustix::termios::OptionalActions::Now, &raw).unwrap();
-    (std::fs::File::from(near), path.into())
 }
 
 /// Something that is always a table side.

@@ -39,18 +39,18 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     }
     let interrupted = interrupts()?;
     let mut client = arguments.port.connect(console)?;
-    console.note("the muscle is pressurised for half a minute of the device's time, then vented");
+    console.note("the muscle is pressurised for some ten seconds of the device's time, then vented");
     let stop = || interrupted.load(Ordering::Relaxed);
     let found = regulator::identify_whole(&mut client, low * 1e3, high * 1e3, &stop)?;
     if !arguments.dry_run {
         found.keep(&mut client)?;
-        console.note("kept in the settings; the lag is inverted from here on");
+        console.note("kept in the settings; lag and line are inverted from here on");
     }
     if arguments.json {
         console.result(format!(
             "{:#}",
             json!({ "schema": "pam-regulator/1", "gain": found.gain, "offset_Pa": found.offset_pa,
-                "lag_s": found.lag_s, "rate_Pa_per_s": found.rate_pa_per_s, "rate_limited": found.rate_limited,
+                "lag_s": found.lag_s, "line_s": found.line_s, "rate_Pa_per_s": found.rate_pa_per_s, "rate_limited": found.rate_limited,
                 "deadband_Pa": found.deadband_pa, "misfit_rms_Pa": found.misfit_pa, "kept": !arguments.dry_run })
         ));
         return Ok(());
@@ -58,6 +58,11 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     console.result(format!("gain      {:8.4}", found.gain));
     console.result(format!("offset    {:8.2} kPa", found.offset_pa * 1e-3));
     console.result(format!("lag       {:8.1} ms", found.lag_s * 1e3));
+    console.result(if found.line_s > 0.0 {
+        format!("line      {:8.1} ms to fill the muscle at rest length", found.line_s * 1e3)
+    } else {
+        "line      none seen beside the lag".to_owned()
+    });
     console.result(format!(
         "rate      {:8.2} MPa/s{}",
         found.rate_pa_per_s * 1e-6,

@@ -35,7 +35,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         Some(path) => {
             let text = std::fs::read_to_string(path).map_err(|e| Error::unreadable(path, &e))?;
             Some(toml::from_str::<Settings>(&text).map_err(|e| {
-                crate::muscle_description::toml_error(Code::CallInvalid, &text, &e)
+                crate::toml_words::toml_error(Code::CallInvalid, &text, &e)
                     .file(path)
                     .help("the file must hold all settings, as `host device settings` prints them")
             })?)

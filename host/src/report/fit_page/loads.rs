@@ -40,7 +40,7 @@ fn load_lines(view: &View<'_>) -> Figure {
     }
     Figure::new(
         "load-lines",
-        "Load lines",
+        "Loops and their mid-lines",
         "Force against contraction as measured, one colour a pressure. The upper branch of a loop is lengthening, the lower one \
          shortening; half their distance is friction, the dashed mid-line is what the elastic model has to meet.",
         panel,

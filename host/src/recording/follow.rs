@@ -1,18 +1,12 @@
-//! Which way friction points in every row of a campaign, and the motion that effects look at.
+//! The motion that effects look at, row by row, followed through the recordings of a campaign.
 
 use model_core::motion::Motion;
 
-use crate::recording::segment::{self, Rates};
-use crate::recording::{Campaign, Recording};
+use super::Recording;
+use super::segment::{self, Rates};
 
-/// A pause that nobody recorded counts as this long, s: the same as where effects are identified.
+/// A pause that nobody recorded counts as this long, s.
 pub const UNKNOWN_PAUSE: f64 = 60.0;
-
-/// +1 shortening or filling, −1 lengthening or emptying, 0 unknown; per recording, per row.
-#[must_use]
-pub fn directions(campaign: &Campaign) -> Vec<Vec<i8>> {
-    segment::Motion::of_campaign(campaign).into_iter().map(|m| m.direction).collect()
-}
 
 /// Follows the motion through a campaign's recordings, one after another.
 #[derive(Debug, Clone, Default)]
@@ -32,7 +26,8 @@ impl Follower {
     ) -> Vec<Motion<f64>> {
         let columns = motion.columns(recording);
         let rates = Rates::of(recording, motion);
-        let pause = if self.started { pause.unwrap_or(UNKNOWN_PAUSE).max(0.0) } else { 0.0 };
+        let stood = pause.unwrap_or(UNKNOWN_PAUSE).max(0.0);
+        let pause = if self.started { stood } else { 0.0 };
         self.started = true;
         self.clock += pause;
         let start = recording.time.first().copied().unwrap_or(0.0);
@@ -44,6 +39,11 @@ impl Follower {
                 part.fill(1.0);
             }
         }
+        // Between two recordings the muscle stands, and its first motion is one after a rest.
+        if let Some(first) = resting.first_mut() {
+            *first = 1.0;
+        }
+        let first_motion = first_motion(motion);
         let out = (0..recording.len())
             .map(|i| {
                 while turn.next_if(|t| *t <= i).is_some() {
@@ -60,7 +60,7 @@ impl Follower {
                     travel: columns.travel[i],
                     since_reversal: columns.since_reversal[i],
                     resting: resting[i],
-                    hold_time: columns.hold_time[i],
+                    hold_time: columns.hold_time[i] + if i < first_motion { stood } else { 0.0 },
                     cycles: turns as f64 * 0.5,
                     temperature: recording.temperature.as_ref().map_or(0.0, |t| t[i]),
                 }
@@ -70,4 +70,13 @@ impl Follower {
         self.clock += recording.duration();
         out
     }
+}
+
+/// Where the first motion of a recording ends: at its first turn or rest.
+fn first_motion(motion: &segment::Motion) -> usize {
+    let n = motion.direction.len();
+    let begun = motion.direction.iter().position(|d| *d != 0).unwrap_or(n);
+    let turned = (begun..n).find(|i| motion.direction[*i] != motion.direction[begun]).unwrap_or(n);
+    let rested = motion.holds.iter().map(|h| h.start).find(|s| *s > begun).unwrap_or(n);
+    turned.min(rested)
 }

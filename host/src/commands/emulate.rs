@@ -1,0 +1,56 @@
+//! `host emulate`: a controller without hardware, for every other command to talk to.
+
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+
+use super::run::{interrupts, positive};
+use crate::console::Console;
+use crate::demo::campaign::muscle;
+use crate::emulated::{Emulated, Kind, Stand};
+use crate::error::Result;
+
+/// Arguments of `host emulate`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  host emulate\n  host emulate contractile --on native\n\n\
+    The firmware runs in QEMU where that and its image are there (`firmware/build mps2-an386`), else in this process, on a\n\
+    muscle of the virtual bench that is moved to and fro. The first line says at which port: give it to the other commands\n\
+    by --port, or write it into the variable PAM_PORT. One program may connect at a time.")]
+pub struct Arguments {
+    /// The muscle of the bench: mini, contractile, push or random:SEED.
+    #[arg(value_name = "MUSCLE", default_value = "mini")]
+    muscle: String,
+    /// Run the firmware in this process, or insist on QEMU.
+    #[arg(long, value_name = "WHERE", value_parser = ["native", "qemu"])]
+    on: Option<String>,
+    /// How long, s [default: until Ctrl-C].
+    #[arg(short, long, value_name = "S", allow_negative_numbers = true)]
+    seconds: Option<f64>,
+}
+
+impl Arguments {
+    /// Runs the controller until Ctrl-C, or until the time is over.
+    ///
+    /// # Errors
+    /// A muscle that the bench does not have, a controller that cannot be started.
+    pub fn run(self, console: &Console) -> Result<()> {
+        positive([("--seconds", self.seconds)])?;
+        let only = match self.on.as_deref() {
+            Some("native") => Some(Kind::Native),
+            Some("qemu") => Some(Kind::Qemu),
+            _ => None,
+        };
+        let interrupted = interrupts()?;
+        let emulated = Emulated::start(Stand::swinging(muscle(&self.muscle)?), only, 1.0)?;
+        console.result(emulated.address());
+        console.note(format!("{}; Ctrl-C ends it", emulated.words()));
+        console.note(format!("next: host device info --port {}", emulated.address()));
+        let begun = Instant::now();
+        let over = || self.seconds.is_some_and(|s| begun.elapsed().as_secs_f64() >= s);
+        while !interrupted.load(Ordering::Relaxed) && !over() {
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,139 @@
+//! The deadband of a regulator, by squares of command around a pressure: halving between sizes that are overlooked and sizes
+//! that are answered.
+
+/// Sizes of squares, Pa from top to bottom.
+const SIZES: [f64; 9] = [200.0, 400.0, 500.0, 630.0, 800.0, 1_000.0, 1_400.0, 2_000.0, 4_000.0];
+/// Seconds at each level of a square, and squares of each size.
+const LEVEL: f64 = 0.2;
+const COUNT: usize = 4;
+/// Each size begins from the middle, come to from so far below that no regulator overlooks it, Pa: one that holds what it last
+/// answered to would take part of the square before.
+const FROM: f64 = 20e3;
+/// Levels of a size with the two before.
+const LEVELS: usize = 2 + 2 * COUNT;
+
+/// A search at work.
+#[derive(Debug, Clone)]
+pub(super) struct Search {
+    middle: f64,
+    gain: f64,
+    /// Sizes below this are overlooked, from `high` on they are answered.
+    low: usize,
+    high: usize,
+    /// When this size began, s, and how many of its levels were asked for.
+    begun: Option<f64>,
+    asked: usize,
+    /// Command and pressure, Pa, since then.
+    samples: Vec<(f64, f64)>,
+}
+
+impl Search {
+    /// Around a command (Pa), for a regulator of a gain.
+    pub(super) fn new(middle: f64, gain: f64) -> Self {
+        Self { middle, gain, low: 0, high: SIZES.len(), begun: None, asked: 0, samples: Vec::new() }
+    }
+
+    /// The half width of the deadband, Pa, once it is known; `Some(None)` where not even the largest square was answered.
+    pub(super) fn found(&self) -> Option<Option<f64>> {
+        (self.low == self.high).then(|| match self.high {
+            0 => Some(0.0),
+            // Between a square that is overlooked and one that is answered: halfway, by ratio.
+            high => SIZES.get(high).map(|size| 0.5 * (SIZES[high - 1] * size).sqrt()),
+        })
+    }
+
+    /// Takes a sample of command and pressure, Pa.
+    pub(super) fn take(&mut self, command: f64, pressure: f64) {
+        self.samples.push((command, pressure));
+    }
+
+    /// The command that is wanted from a time (s) on, when it changes, Pa.
+    pub(super) fn next(&mut self, time: f64) -> Option<f64> {
+        if self.found().is_some() {
+            return None;
+        }
+        let begun = *self.begun.get_or_insert(time);
+        let mut level = ((time - begun) / LEVEL) as usize;
+        if level >= LEVELS {
+            let middle = (self.low + self.high) / 2;
+            if self.answer(SIZES[middle]) > 0.5 * self.gain * SIZES[middle] {
+                self.high = middle;
+            } else {
+                self.low = middle + 1;
+            }
+            (self.begun, self.asked, level) = (Some(time), 0, 0);
+            self.samples.clear();
+            if self.found().is_some() {
+                return None;
+            }
+        }
+        (level >= self.asked).then(|| {
+            self.asked = level + 1;
+            let size = SIZES[(self.low + self.high) / 2];
+            match level {
+                0 => self.middle - FROM,
+                1 => self.middle,
+                n if n % 2 == 0 => self.middle + 0.5 * size,
+                _ => self.middle - 0.5 * size,
+            }
+        })
+    }
+
+    /// How far the pressure goes with squares of a size, Pa from top to bottom. Slow wander of the supply is taken out of each
+    /// level by the one before and the one after.
+    fn answer(&self, size: f64) -> f64 {
+        // Levels as they were commanded, each by its second half: mean pressure.
+        let mut levels: Vec<(f64, f64)> = Vec::new();
+        for level in self.samples.chunk_by(|a, b| (a.0 - b.0).abs() < 1.0) {
+            let tail = &level[level.len() / 2..];
+            let mean = tail.iter().map(|s| s.1).sum::<f64>() / tail.len() as f64;
+            levels.push((level[0].0 - self.middle, mean));
+        }
+        let answers: Vec<f64> = levels
+            .windows(3)
+            .filter(|w| w.iter().all(|level| (level.0.abs() - 0.5 * size).abs() < 0.1 * size))
+            .map(|w| (w[1].1 - 0.5 * (w[0].1 + w[2].1)) * w[1].0.signum())
+            .collect();
+        answers.iter().sum::<f64>() / answers.len().max(1) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A regulator of a deadband, its noise and its ripple, until the search has found something.
+    fn searched(band: f64) -> (Option<f64>, f64) {
+        let (gain, lag) = (1.02, 0.03);
+        let mut seed = 7_u32;
+        let mut noise = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            200.0 * (f64::from(seed >> 16) / 32_768.0 - 1.0)
+        };
+        let mut search = Search::new(175e3, gain);
+        let (mut command, mut held, mut p, mut time) = (175e3_f64, 175e3, gain * 175e3, 0.0);
+        while search.found().is_none() && time < 60.0 {
+            if (command - held).abs() > band {
+                held = command;
+            }
+            let ripple = 250.0 * (23.0_f64 * time).sin();
+            p += (gain * held + ripple - p) * (1.0 - (-1e-3_f64 / lag).exp());
+            search.take(command, p + noise());
+            command = search.next(time).unwrap_or(command);
+            time += 1e-3;
+        }
+        (search.found().expect("within a minute"), time)
+    }
+
+    #[test]
+    fn a_deadband_is_found_between_two_sizes_within_ten_seconds() {
+        for (band, low, high) in [(300.0, 250.0, 315.0), (450.0, 400.0, 500.0), (900.0, 700.0, 1_000.0)] {
+            let (half, seconds) = searched(band);
+            let half = half.expect("one was answered");
+            assert!((low..=high).contains(&half), "{half} Pa for {band} Pa");
+            assert!(seconds < 10.0, "{seconds} s");
+        }
+        assert_eq!(searched(0.0).0, Some(0.0));
+        assert_eq!(searched(5e3).0, None);
+    }
+}

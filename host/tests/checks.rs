@@ -1,0 +1,132 @@
+//! Checks of the bench: what dead weights, a rigid bar and a reference gauge tell, and what a diagnosis makes of it.
+
+mod bench_campaign;
+
+use std::path::PathBuf;
+
+use host::bench::BenchName;
+use host::checks::Checks;
+use host::diagnose::{Diagnosis, Options, diagnose};
+use host::muscle_description::MuscleDescription;
+use host::recording::Campaign;
+use virtual_bench::bench::{Bench, BenchSpec};
+use virtual_bench::checks::all;
+use virtual_bench::muscle::Muscle;
+use virtual_bench::{campaigns, presets};
+
+fn bench() -> BenchSpec {
+    BenchSpec::laboratory(presets::by_name("mini").expect("a preset"), 5)
+}
+
+/// The checks of a bench as files.
+fn files(bench: &BenchSpec, folder: &tempfile::TempDir) -> Vec<PathBuf> {
+    let written = all(bench, 120.0, 600e3, 0.0).into_iter().map(|check| {
+        let path = folder.path().join(format!("{}.csv", check.name));
+        std::fs::write(&path, check.csv).expect("room for a file");
+        path
+    });
+    written.collect()
+}
+
+fn read(bench: &BenchSpec) -> Checks {
+    let folder = tempfile::tempdir().expect("a folder");
+    Checks::read(&files(bench, &folder)).expect("valid checks")
+}
+
+fn refused(text: &str) -> String {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("check.csv");
+    std::fs::write(&path, text).expect("room for a file");
+    Checks::read(&[path]).expect_err("a bad check").to_string()
+}
+
+#[test]
+fn every_fault_is_measured_within_its_interval_and_none_where_there_is_none() {
+    let sound = read(&bench());
+    assert_eq!(sound.measured().len(), 6);
+    for m in sound.measured().iter().filter(|m| m.fault != BenchName::RigCompliance) {
+        let size = match m.fault {
+            BenchName::Backlash => m.parameters[1] / 1e-5,
+            BenchName::DisplacementOffset => m.parameters[0] / 1e-5,
+            BenchName::CrossTalk => m.parameters[0] / 1e-6,
+            _ => m.parameters[0] / 2e-3,
+        };
+        assert!(size.abs() < 1.0, "{}: {}", m.fault.info().name, m.words);
+    }
+    let mut faulty = bench();
+    faulty.instruments.force.gain = 0.03;
+    faulty.instruments.pressure.gain = -0.02;
+    faulty.rig.stiffness = 3e5;
+    faulty.rig.hose = 4e-6;
+    faulty.rig.offset = 2e-4;
+    faulty.rig.play = 1e-4;
+    let checks = read(&faulty);
+    for (fault, at, truth) in [
+        (BenchName::ForceGain, 0, 0.03),
+        (BenchName::CrossTalk, 0, 4e-6),
+        (BenchName::GaugeGain, 0, 1.0 / 0.98 - 1.0),
+        // The cell that reads the pull is itself three per cent off.
+        (BenchName::RigCompliance, 0, 1.0 / 3e5 / 1.03),
+        (BenchName::DisplacementOffset, 0, 2e-4),
+        (BenchName::Backlash, 1, 1e-4),
+    ] {
+        let m = checks.measured().iter().find(|m| m.fault == fault).expect("measured");
+        let std = m.deviations[at].expect("varied");
+        let off = (m.parameters[at] - truth).abs();
+        assert!(m.is_sure(), "{}", m.words);
+        assert!(off < 3.0 * std + 0.01 * truth.abs(), "{}: {} for {truth}", m.words, m.parameters[at]);
+        assert!(std < 0.1 * truth.abs(), "{}: {std} of {truth}", m.words);
+    }
+}
+
+#[test]
+fn bad_checks_are_refused_with_the_place_and_what_to_do() {
+    let rows = |row: &str| row.repeat(30);
+    for (text, says) in [
+        (format!("time_s,force_N\n{}", rows("0,1\n")), "no column of what is known"),
+        ("time_s,force_N,reference_force_N\n0,1,1\n".to_owned(), "1 rows"),
+        (
+            format!("time_s,force_N,reference_force_N\n{}0,x,1\n", rows("0,1,1\n")),
+            "line 32: `x` is no number for `force_N`",
+        ),
+        (format!("time_s,force_N,reference_force_stone\n{}", rows("0,1,1\n")), "in no unit that is known"),
+        (format!("time_s,force_N,reference_force_N\n{}0,1\n", rows("0,1,1\n")), "line 32"),
+        (format!("time_s,force_N,reference_force_N\n{}", rows("0,1,1\n")), "at least three different"),
+        (format!("time_s,pressure_kPa,reference_force_N\n{}", rows("0,1,1\n")), "no column `force_`"),
+    ] {
+        let error = refused(&text);
+        assert!(error.contains(says), "{error}");
+    }
+}
+
+fn campaign(bench: &BenchSpec) -> Campaign {
+    let muscle = Muscle::new(bench.muscle.clone());
+    let protocol = campaigns::classic(&muscle, &campaigns::levels(&muscle));
+    let files = Bench::new(bench).run(&protocol).expect("a protocol for this muscle");
+    Campaign::new(bench_campaign::recordings(&files))
+}
+
+fn asked(bench: &BenchSpec, checks: Checks) -> Diagnosis {
+    let description = MuscleDescription::parse(&bench.muscle.description()).expect("a description");
+    let options = Options { muscle: "mini".into(), checks, ..Options::default() };
+    diagnose(&campaign(bench), &description.geometry(), &options).expect("a diagnosis")
+}
+
+#[test]
+fn what_a_check_measured_is_named_and_nothing_else_has_to_explain_it() {
+    let mut faulty = bench();
+    faulty.instruments.force.gain = 0.04;
+    let answer = asked(&faulty, read(&faulty));
+    let named: Vec<&str> = answer.missing.iter().map(|m| m.effect.as_str()).collect();
+    assert_eq!(named, ["force-gain"]);
+    let gain = &answer.missing[0];
+    assert!(gain.checked && gain.correction && gain.confusable_with.is_empty());
+    assert!((gain.parameters[0].value - 0.04).abs() < 2e-3, "{}", gain.why);
+    // What the checks cleared is said to be clear, with a bound.
+    let cleared = answer.considered.iter().find(|c| c.effect == "gauge-gain").expect("looked at");
+    assert!(cleared.why_not.contains("a reference gauge"), "{}", cleared.why_not);
+    assert!(cleared.hidden_up_to_N.is_some_and(|h| h < 0.01 * answer.blocked_force_N));
+    // A bench that is sound leaves the muscle's diagnosis as it was.
+    let sound = bench();
+    assert!(asked(&sound, read(&sound)).missing.is_empty());
+}
