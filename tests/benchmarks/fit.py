@@ -26,7 +26,7 @@ import numpy as np  # noqa: E402
 from scipy.optimize import minimize  # noqa: E402
 
 import muscle  # noqa: E402
-from measure import HERE, machine, make, peer, rounds, verdict  # noqa: E402
+from measure import Bound, finish, linear, peer, table  # noqa: E402
 
 
 def points(path: Path):
@@ -80,7 +80,7 @@ def best(call, count):
     return least, out
 
 
-def small(folder: Path, program: Path) -> tuple[list[str], list[tuple[str, bool]]]:
+def small(folder: Path, program: Path) -> tuple[list[str], list[Bound]]:
     data = points(folder / "points.csv")
     rows = []
 
@@ -116,42 +116,27 @@ def small(folder: Path, program: Path) -> tuple[list[str], list[tuple[str, bool]
         "",
     ]
     bounds = [
-        verdict("the same problem, times as fast as SLSQP as it comes", slsqp / separate, 100, True),
-        verdict("joint fit, times as fast as SLSQP to the least", exact / joint, 100, True),
+        Bound("the same problem, times as fast as SLSQP as it comes", slsqp / separate, 100, True),
+        Bound("joint fit, times as fast as SLSQP to the least", exact / joint, 100, True),
     ]
     return lines, bounds
 
 
-def large(folder: Path, program: Path, most: int) -> tuple[list[str], list[tuple[str, bool]]]:
+def large(folder: Path, program: Path, most: int) -> tuple[list[str], list[Bound]]:
     (folder / "muscle.toml").write_text(muscle.DESCRIPTION)
-    lines = [
-        "## From file to table",
-        "",
-        "| rows | file | program | wall | processor | memory |",
-        "| ---: | ---: | --- | ---: | ---: | ---: |",
-    ]
-    costs = {}
-    for rows in (most // 100, most // 10, most):
-        path = folder / "loops.csv"
-        size = make(path, rows)
+
+    def programs(path):
         fit = [program, "fit", "--quiet", "--muscle", folder / "muscle.toml", path, "-o", folder / "mini.pam"]
-        programs = {"host fit, whole": (fit, False), "polars, reading only": peer("polars", path)}
-        costs[rows] = rounds(programs, 5)
-        for name, c in costs[rows].items():
-            lines.append(
-                f"| {rows:,} | {size:.0f} MB | {name} | {c.wall:.3f} s | {c.processor:.2f} s | {c.memory:.0f} MB |"
-            )
-            print(lines[-1], flush=True)
-        path.unlink()
-    lines.append("")
-    polars = costs[most]["polars, reading only"]
-    fit, tenth = costs[most]["host fit, whole"], costs[most // 10]["host fit, whole"]
+        return {"host fit, whole": (fit, False), "polars, reading only": peer("polars", path)}
+
+    costs = {}
+    lines = ["## From file to table", "", *table(programs, most, costs)]
+    fit, polars = costs[most]["host fit, whole"], costs[most]["polars, reading only"]
     bounds = [
-        verdict("whole fit, times polars's reading", fit.wall / polars.wall, 2.5, False),
-        verdict("the same in processor time", fit.processor / polars.processor, 2.5, False),
-        verdict("memory of the whole fit, MB", fit.memory, 1000, False),
-        verdict("processor time per row, against a tenth", fit.processor / tenth.processor / 10, 1.2, False),
-        verdict("memory per row, against a tenth", fit.memory / tenth.memory / 10, 1.2, False),
+        Bound("whole fit, times polars's reading", fit.wall / polars.wall, 2.5),
+        Bound("the same in processor time", fit.processor / polars.processor, 2.5),
+        Bound("memory of the whole fit, MB", fit.memory, 1000),
+        *linear(costs, "host fit, whole"),
     ]
     return lines, bounds
 
@@ -164,14 +149,7 @@ def main() -> None:
         first, bounds = small(folder, release / "examples" / "fit_speed")
         print("\n".join(first), flush=True)
         second, more = large(folder, release / "host", most)
-    bounds += more
-    lines = ["# Speed of the fit", "", *first, *second]
-    lines += ["## Bounds", "", "| | bound | measured | met |", "| --- | --- | ---: | --- |"]
-    lines += [line for line, _ in bounds]
-    lines += ["", f"{machine()} Written by tests/benchmarks/fit.py."]
-    (HERE / "fit.md").write_text("\n".join(lines) + "\n")
-    print("\n".join(line for line, _ in bounds))
-    sys.exit(0 if all(met for _, met in bounds) else 1)
+    finish(__file__, "Speed of the fit", [*first, *second], [*bounds, *more])
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 import os
 import subprocess
 import sys
-import time
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +14,17 @@ PEER = """import {0} as m, sys, time
 wall, processor = time.perf_counter(), time.process_time()
 m.read_csv(sys.argv[1])
 print(time.perf_counter() - wall, time.process_time() - processor)
+"""
+
+# Linux counts what a process held before it became another program as that program's memory, so that a small program started by
+# a large one seems as large. This one is small; it starts the program to be measured, and tells what that took.
+LAUNCHER = """import os, sys, time
+start = time.perf_counter()
+child = os.posix_spawnp(sys.argv[1], sys.argv[1:], os.environ)
+_, status, usage = os.wait4(child, 0)
+wall = time.perf_counter() - start
+print(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
+sys.exit(os.waitstatus_to_exitcode(status) != 0)
 """
 
 
@@ -32,18 +43,16 @@ class Cost:
 
 
 def run(command: list[str], says_seconds: bool = False) -> Cost:
-    """One run. Where the program prints wall and processor seconds of its own work, they count."""
-    start = time.perf_counter()
-    process = subprocess.Popen([str(c) for c in command], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
-    out = process.stdout.read()
-    _, status, usage = os.wait4(process.pid, 0)
-    wall = time.perf_counter() - start
-    if status != 0:
-        raise SystemExit(f"{command[0]} failed")
-    processor = usage.ru_utime + usage.ru_stime
+    """One run, in a process of its own. Where the program prints wall and processor seconds of its own work, they count."""
+    launcher = [sys.executable, "-I", "-S", "-c", LAUNCHER, *map(str, command)]
+    done = subprocess.run(launcher, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise SystemExit(f"{command[0]} failed: {done.stderr.strip()}")
+    *_, said = done.stdout.splitlines()
+    wall, processor, memory = map(float, said.split())
     if says_seconds:
-        wall, processor = map(float, out.split()[-2:])
-    return Cost(wall, processor, usage.ru_maxrss / 1024)
+        wall, processor = map(float, done.stdout.split()[-5:-3])
+    return Cost(wall, processor, memory)
 
 
 def rounds(programs: dict[str, tuple[list[str], bool]], count: int) -> dict[str, Cost]:
@@ -61,7 +70,7 @@ def peer(module: str, path: Path) -> tuple[list[str], bool]:
 
 
 def make(path: Path, rows: int) -> float:
-    """A recording, made in a process of its own (a child's largest memory counts that of its parent); its size in MB."""
+    """A recording; its size in MB."""
     subprocess.run([sys.executable, HERE / "muscle.py", path, str(rows)], check=True)
     return path.stat().st_size / 1e6
 
@@ -84,7 +93,57 @@ def machine() -> str:
     return f"{os.cpu_count()} cores, {model}, {load}; Python {platform.python_version()}, {packages}."
 
 
-def verdict(what: str, value: float, bound: float, at_least: bool) -> tuple[str, bool]:
-    met = value >= bound if at_least else value <= bound
-    sign = "at least" if at_least else "at most"
-    return f"| {what} | {sign} {bound:g} | {value:.2f} | {'yes' if met else '**no**'} |", met
+@dataclass
+class Bound:
+    what: str
+    value: float
+    bound: float
+    at_least: bool = False
+
+    @property
+    def met(self) -> bool:
+        return self.value >= self.bound if self.at_least else self.value <= self.bound
+
+    def __str__(self) -> str:
+        sign = "at least" if self.at_least else "at most"
+        met = "yes" if self.met else "**no**"
+        return f"| {self.what} | {sign} {self.bound:g} | {self.value:.2f} | {met} |"
+
+
+COSTS = ["| rows | file | program | wall | processor | memory |", "| ---: | ---: | --- | ---: | ---: | ---: |"]
+
+
+def table(programs, most: int, costs: dict[int, dict[str, Cost]]):
+    """Programs on recordings of a hundredth, a tenth and all of `most` rows: a line of the page for each, and its cost in `costs`.
+
+    `programs` makes them for a file."""
+    yield from COSTS
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "loops.csv"
+        for rows in (most // 100, most // 10, most):
+            size = make(path, rows)
+            costs[rows] = rounds(programs(path), 5)
+            for name, c in costs[rows].items():
+                line = f"| {rows:,} | {size:.0f} MB | {name} | {c.wall:.3f} s | {c.processor:.2f} s | {c.memory:.0f} MB |"
+                print(line, flush=True)
+                yield line
+
+
+def linear(costs: dict[int, dict[str, Cost]], name: str) -> list[Bound]:
+    """Time and memory grow no faster than the rows do."""
+    most = max(costs)
+    full, tenth = costs[most][name], costs[most // 10][name]
+    return [
+        Bound("processor time per row, against a tenth of the rows", full.processor / tenth.processor / 10, 1.2),
+        Bound("memory per row, against a tenth of the rows", full.memory / tenth.memory / 10, 1.2),
+    ]
+
+
+def finish(script: str, title: str, lines: list[str], bounds: list[Bound]) -> None:
+    """Writes the page beside the script, and ends with 1 where a bound is missed."""
+    script = Path(script).name
+    page = [f"# {title}", "", *lines, "", "## Bounds", "", "| | bound | measured | met |", "| --- | --- | ---: | --- |"]
+    page += [*map(str, bounds), "", f"{machine()} Written by tests/benchmarks/{script}."]
+    (HERE / script).with_suffix(".md").write_text("\n".join(page) + "\n")
+    print("\n".join(map(str, bounds)))
+    sys.exit(0 if all(b.met for b in bounds) else 1)

@@ -11,7 +11,7 @@ use virtual_bench::muscle::Muscle;
 use virtual_bench::plant::{Motion, PlantStation, Scripts};
 use virtual_bench::protocol::Protocol;
 use virtual_bench::recording::Columns;
-use virtual_bench::{campaigns, lockstep, presets};
+use virtual_bench::{campaigns, checks, lockstep, presets};
 
 /// A virtual test bench for pneumatic artificial muscles.
 #[derive(Parser)]
@@ -49,9 +49,27 @@ enum Command {
         /// Perfect instruments.
         #[arg(long)]
         ideal: bool,
+        /// By which part the load cell reads too much.
+        #[arg(long, default_value_t = 0.0)]
+        cell_gain: f64,
         /// Also write pressure_command_kPa, temperature_C and cycle.
         #[arg(long)]
         all_columns: bool,
+    },
+    /// Check the bench without its muscle: dead weights, a rigid bar, a reference gauge.
+    Check {
+        /// The muscle whose forces and pressures the checks go up to: mini, contractile, push or random:SEED.
+        #[arg(long)]
+        muscle: String,
+        /// Directory for the files.
+        #[arg(short, long)]
+        output: PathBuf,
+        /// Seed of the noise.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// By which part the load cell reads too much.
+        #[arg(long, default_value_t = 0.0)]
+        cell_gain: f64,
     },
     /// Be the plant of a controller, one exchange per control tick (see the documentation of `lockstep`).
     Plant {
@@ -111,12 +129,14 @@ impl Command {
                 sample_hz,
                 format,
                 ideal,
+                cell_gain,
                 all_columns,
             } => {
                 let mut spec = BenchSpec::laboratory(muscle(&name)?, seed);
                 if ideal {
                     spec.instruments = virtual_bench::sensors::Instruments::ideal();
                 }
+                spec.instruments.force.gain += cell_gain;
                 let built = Muscle::new(spec.muscle.clone());
                 let levels: Vec<f64> = match name.as_str() {
                     _ if !levels.is_empty() => levels.iter().map(|l| l * 1e3).collect(),
@@ -157,6 +177,19 @@ impl Command {
                 write(&output, "truth.json", &serde_json::to_string_pretty(&built.truth(&levels))?)?;
                 let rows: usize = files.iter().map(|f| f.rows.len()).sum();
                 println!("{} files, {rows} rows in {}", files.len(), output.display());
+                Ok(())
+            }
+            Self::Check { muscle: name, output, seed, cell_gain } => {
+                let mut spec = BenchSpec::laboratory(muscle(&name)?, seed);
+                spec.instruments.force.gain = cell_gain;
+                let built = Muscle::new(spec.muscle.clone());
+                let pressure = spec.muscle.max_pressure;
+                let checks = checks::all(&spec, built.quasi_static(pressure, 0.0), pressure, 0.0);
+                std::fs::create_dir_all(&output).map_err(|e| format!("{}: {e}", output.display()))?;
+                for check in &checks {
+                    write(&output, &format!("{}.csv", check.name), &check.csv)?;
+                }
+                println!("{} checks in {}", checks.len(), output.display());
                 Ok(())
             }
             Self::Plant { listen, muscle: name, scripts, rate_hz, seed, connections, log } => {
