@@ -31,9 +31,9 @@ pub struct Model {
     last: Option<(f32, f32)>,
     /// Travel that has not left the play, in distances.
     held_back: f32,
-    /// Time since another force was wanted, s, and that force.
-    calm_s: f32,
-    wanted_n: f32,
+    /// The force that was asked of the table in the last tick, if one was.
+    wish: Option<Wish>,
+    asked: bool,
     /// `∂F/∂P` where the last search ended, N/Pa.
     slope: f32,
     /// Least force at which the muscle surely pulls, N.
@@ -48,13 +48,29 @@ const SLIDE: f32 = 2.0e-3;
 /// The part of the free motion that strands slip at held length. Half of what [`model_core::effects::BraidTravel`] takes: friction
 /// that goes over with the pressure asks for more pressure, and must not ask for more than what turned it.
 const SLIP: f32 = 0.025;
-/// Play of the travel that turns friction, in distances: noise of the stroke sensor stays within. While the same force is wanted
-/// for some time, in s, it is wide: a compensation of friction that followed every wiggle would feed the wiggle.
+/// Play of the travel that turns friction, in distances: what noise of the stroke sensor passes is little beside a wish that moves.
 const PLAY: f32 = 0.05;
-const PLAY_CALM: f32 = 20.0;
+/// The same play once a wish has stood still for [`CALM_S`]: no noise passes. What moves a muscle then is its load, however far, and
+/// its friction turns with it. Pressure no longer counts as travel: it would move only because friction has been compensated, and
+/// turn friction by that again.
+const PLAY_CALM: f32 = 0.2;
+/// The same where a trim answers for what the table leaves. Two that answer for one friction hunt: each swing of a mass on a spring
+/// turns the one before the other has undone it. So friction rests until the muscle is moved far, and the trim does the rest.
+const PLAY_TRIMMED: f32 = 20.0;
+/// How long the same force is wanted until a wish stands still, s.
 const CALM_S: f32 = 0.2;
 /// Part of blocked force at which a muscle surely pulls, whatever its table leaves out.
 const TAUT: f32 = 0.02;
+
+/// A force that is asked of a table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Wish {
+    force_n: f32,
+    /// For how long it has been the same, s.
+    still_s: f32,
+    /// Whether a trim answers for what the table leaves.
+    trimmed: bool,
+}
 
 impl Model {
     /// Builds it from a table.
@@ -76,8 +92,8 @@ impl Model {
             per_pascal: 0.0,
             last: None,
             held_back: 0.0,
-            calm_s: 0.0,
-            wanted_n: 0.0,
+            wish: None,
+            asked: false,
             slope: 0.0,
             inv_rest_volume: 0.0,
             taut_n: 0.0,
@@ -106,8 +122,8 @@ impl Model {
         self.per_pascal = slip / distance_m;
         self.last = None;
         self.held_back = 0.0;
-        self.calm_s = 0.0;
-        self.wanted_n = 0.0;
+        self.wish = None;
+        self.asked = false;
         self.slope = area;
         self.inv_rest_volume = 1.0 / self.muscle.braid().gas_volume(&self.now.held.posture).at_least(1.0e-12);
         self.taut_n = TAUT * table.blocked_force.newtons().abs();
@@ -118,9 +134,18 @@ impl Model {
     fn slid(&mut self, motion: &Motion<f32>, pressure_pa: f32) -> f32 {
         let now = (motion.stroke, pressure_pa);
         let (stroke, pressure) = self.last.replace(now).unwrap_or(now);
-        let travel = (motion.stroke - stroke) * self.per_metre + (pressure_pa - pressure) * self.per_pascal;
-        let play = if self.calm_s < CALM_S { PLAY } else { PLAY_CALM };
-        self.calm_s += motion.dt;
+        let by_stroke = (motion.stroke - stroke) * self.per_metre;
+        let by_pressure = (pressure_pa - pressure) * self.per_pascal;
+        if !core::mem::take(&mut self.asked) {
+            self.wish = None;
+        }
+        let (travel, play) = match self.wish {
+            Some(Wish { still_s, trimmed: true, .. }) if still_s >= CALM_S => {
+                (by_stroke + by_pressure, PLAY_TRIMMED)
+            }
+            Some(Wish { still_s, .. }) if still_s >= CALM_S => (by_stroke, PLAY_CALM),
+            _ => (by_stroke + by_pressure, PLAY),
+        };
         // What a change of the play leaves over is forgotten, not travelled.
         let back = self.held_back.within(-play, play) + travel;
         self.held_back = back.within(-play, play);
@@ -169,11 +194,15 @@ impl Model {
         self.taut_n
     }
 
-    /// The pressure for a wanted force in this tick, and whether it can be had.
-    pub fn pressure_for(&mut self, force_n: f32, guess_pa: f32) -> (f32, bool) {
-        if force_n != self.wanted_n {
-            (self.wanted_n, self.calm_s) = (force_n, 0.0);
-        }
+    /// The pressure for a wanted force in this tick, and whether it can be had; `trimmed` where a trim answers for what the table
+    /// leaves.
+    pub fn pressure_for(&mut self, force_n: f32, guess_pa: f32, trimmed: bool) -> (f32, bool) {
+        let still_s = match self.wish {
+            Some(wish) if wish.force_n == force_n => wish.still_s + TICK_S,
+            _ => 0.0,
+        };
+        self.wish = Some(Wish { force_n, still_s, trimmed });
+        self.asked = true;
         let search = Search { tolerance: Pressure::from_pascals(20.0), ..self.muscle.search() };
         let force = Force::from_newtons(force_n);
         let guess = Pressure::from_pascals(guess_pa);
@@ -270,7 +299,10 @@ pub fn feed_forward(
 ) -> (f32, bool) {
     match (settings.feed_forward, model) {
         (FeedForward::Off, _) | (_, None) => (0.0, true),
-        (FeedForward::Table, Some(model)) => model.pressure_for(force_n, guess_pa),
+        (FeedForward::Table, Some(model)) => {
+            let trimmed = settings.force.fitted && settings.force_loop.trim_limit_pa > 0.0;
+            model.pressure_for(force_n, guess_pa, trimmed)
+        }
         (FeedForward::Gaylord, Some(model)) => model.gaylord_pressure(force_n),
     }
 }

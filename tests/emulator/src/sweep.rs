@@ -113,6 +113,17 @@ impl Course {
     }
 }
 
+/// How a force is held.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Still {
+    /// Error, rms in % of blocked force.
+    pub error: f64,
+    /// What of it goes to and fro about its own mean.
+    pub swing: f64,
+    /// How much the command changes from tick to tick, rms in Pa.
+    pub jump: f64,
+}
+
 /// A muscle with the table fitted to it.
 #[derive(Clone, Debug)]
 pub struct Subject {
@@ -247,7 +258,30 @@ impl Subject {
         control.run(course.ticks())
     }
 
-    /// The same where a host sends each tick's set-point and the device knows nothing of the next.
+    /// How a force is held that stays the same, after a step.
+    pub fn still(&self, load: Load, law: Law) -> Still {
+        let bench = BenchSpec::laboratory(self.spec.clone(), 11);
+        let mut control =
+            Loop::start(&bench, &self.motion(load), &self.table, self.settings(law, load), Mode::Force);
+        let (mean, amplitude) = self.wish(Mode::Force);
+        control.point(SetPoint::Force(mean + amplitude));
+        control.run(1_000);
+        control.point(SetPoint::Force(mean));
+        control.run(1_500);
+        let ticks = control.run(5_000);
+        let percent = 100.0 / self.blocked();
+        let n = ticks.len() as f64;
+        let middle = ticks.iter().map(|tick| tick.force).sum::<f64>() / n;
+        let swing = ticks.iter().map(|tick| (tick.force - middle).powi(2)).sum::<f64>() / n;
+        let jumps = ticks.windows(2).map(|pair| (pair[1].command - pair[0].command).powi(2)).sum::<f64>() / n;
+        Still {
+            error: percent * closed_loop::rms(&ticks, |tick| tick.force),
+            swing: percent * swing.sqrt(),
+            jump: jumps.sqrt(),
+        }
+    }
+
+    /// The error of a sine where a host sends each tick's set-point and the device knows nothing of the next.
     pub fn streamed_error(&self, load: Load, hz: f32, law: Law) -> f64 {
         let bench = BenchSpec::laboratory(self.spec.clone(), 11);
         let settings = self.settings(law, load);

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::io;
 use std::path::Path;
 
-use emulator_tests::sweep::{COURSES, Course, LAWS, Law, Load, Subject, in_qemu};
+use emulator_tests::sweep::{COURSES, Course, LAWS, Law, Load, Still, Subject, in_qemu};
 use host::report::{Axis, Colour, Figure, Panel};
 use model_core::link::messages::Mode;
 use virtual_bench::presets;
@@ -66,6 +66,21 @@ fn main() -> io::Result<()> {
         }
         let _ = write!(text, "\n## {}: stroke\n\n{HEAD}", subject.spec.name);
         rows(&mut text, subject, Mode::Stroke, Load::Spring);
+    }
+    text.push_str(
+        "\n## A force that stays the same\n\nFive seconds from 1.5 s after a step on. Swing is what of the error goes to and fro about its \
+         own mean; the command's change from tick to tick is rms. With nothing but sensor noise in it, that change is what the lead makes of the noise.\n\n\
+         | muscle | load | table: error, % | swing, % | change, kPa | table + trim: error, % | swing, % | change, kPa |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+    );
+    for subject in &subjects {
+        for load in [Load::Held, Load::Moved, Load::Spring] {
+            let [table, trimmed] = [Law::Table, Law::Trimmed].map(|law| {
+                let Still { error, swing, jump } = subject.still(load, law);
+                format!("{error:.2} | {swing:.2} | {:.1}", 1e-3 * jump)
+            });
+            let _ = writeln!(text, "| {} | {} | {table} | {trimmed} |", subject.spec.name, load.name());
+        }
     }
     text.push_str(
         "\n## A bladder that is not the table's\n\nForce, moved, sine of 1 Hz: the table's moduli by a factor.\n\n\
