@@ -31,8 +31,8 @@ pub struct Model {
     last: Option<(f32, f32)>,
     /// Travel that has not left the play, in distances.
     held_back: f32,
-    /// The force that was asked of the table in the last tick, if one was.
-    wish: Option<Wish>,
+    /// The force that was last asked of the table, and whether it was since the last tick.
+    wish: Wish,
     asked: bool,
     /// `∂F/∂P` where the last search ended, N/Pa.
     slope: f32,
@@ -92,7 +92,7 @@ impl Model {
             per_pascal: 0.0,
             last: None,
             held_back: 0.0,
-            wish: None,
+            wish: Wish { force_n: 0.0, still_s: 0.0, trimmed: false },
             asked: false,
             slope: 0.0,
             inv_rest_volume: 0.0,
@@ -122,7 +122,6 @@ impl Model {
         self.per_pascal = slip / distance_m;
         self.last = None;
         self.held_back = 0.0;
-        self.wish = None;
         self.asked = false;
         self.slope = area;
         self.inv_rest_volume = 1.0 / self.muscle.braid().gas_volume(&self.now.held.posture).at_least(1.0e-12);
@@ -137,14 +136,12 @@ impl Model {
         let by_stroke = (motion.stroke - stroke) * self.per_metre;
         let by_pressure = (pressure_pa - pressure) * self.per_pascal;
         if !core::mem::take(&mut self.asked) {
-            self.wish = None;
+            self.wish.still_s = 0.0;
         }
-        let (travel, play) = match self.wish {
-            Some(Wish { still_s, trimmed: true, .. }) if still_s >= CALM_S => {
-                (by_stroke + by_pressure, PLAY_TRIMMED)
-            }
-            Some(Wish { still_s, .. }) if still_s >= CALM_S => (by_stroke, PLAY_CALM),
-            _ => (by_stroke + by_pressure, PLAY),
+        let (travel, play) = match (self.wish.still_s >= CALM_S, self.wish.trimmed) {
+            (false, _) => (by_stroke + by_pressure, PLAY),
+            (true, false) => (by_stroke, PLAY_CALM),
+            (true, true) => (by_stroke + by_pressure, PLAY_TRIMMED),
         };
         // What a change of the play leaves over is forgotten, not travelled.
         let back = self.held_back.within(-play, play) + travel;
@@ -197,11 +194,8 @@ impl Model {
     /// The pressure for a wanted force in this tick, and whether it can be had; `trimmed` where a trim answers for what the table
     /// leaves.
     pub fn pressure_for(&mut self, force_n: f32, guess_pa: f32, trimmed: bool) -> (f32, bool) {
-        let still_s = match self.wish {
-            Some(wish) if wish.force_n == force_n => wish.still_s + TICK_S,
-            _ => 0.0,
-        };
-        self.wish = Some(Wish { force_n, still_s, trimmed });
+        let still_s = if self.wish.force_n == force_n { self.wish.still_s + TICK_S } else { 0.0 };
+        self.wish = Wish { force_n, still_s, trimmed };
         self.asked = true;
         let search = Search { tolerance: Pressure::from_pascals(20.0), ..self.muscle.search() };
         let force = Force::from_newtons(force_n);
