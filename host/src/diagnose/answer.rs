@@ -123,11 +123,7 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
     let verdict = if missing.is_empty() {
         // What beats in time is no noise, however well repeats seem to explain it.
         let steady = beat.is_none_or(|l| l.share < 0.3);
-        if left <= own && steady && concealed <= INEXACTNESS * blocked {
-            Verdict::Consistent
-        } else {
-            Verdict::Unexplained
-        }
+        if left <= own && steady { Verdict::Consistent } else { Verdict::Unexplained }
     } else if explained >= 0.8 || left <= own {
         Verdict::Explained
     } else if explained >= 0.25 {
@@ -141,9 +137,6 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
     let pattern = match (&beat, left_regions.first()) {
         (Some(l), _) => format!("periodic in time, {:.2} Hz", l.hertz),
         (None, Some(r)) if left > own => r.words.clone(),
-        (None, _) if verdict == Verdict::Unexplained && concealed > INEXACTNESS * blocked => {
-            "a surface that changes from pressure to pressure and lies in the tables".to_owned()
-        }
         _ => "none".to_owned(),
     };
     if let Some(l) = beat {

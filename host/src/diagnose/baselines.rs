@@ -176,6 +176,9 @@ enum Part {
     AreaSlope,
     /// A settling of friction that is not quite exponential.
     Settling,
+    /// How much of friction does not settle at rest: a friction that needs speed leaves a rest's gap half closed for another reason,
+    /// and what it leaves must not be taken for settling.
+    Unsettled,
 }
 
 /// The columns of a baseline: those with free coefficients, those with a prior, and the functions of pressure in them.
@@ -238,6 +241,9 @@ impl Plan {
         if rows.settling.iter().any(|s| *s != 0.0) {
             hard.push(Part::Settling);
         }
+        if rows.unsettled.iter().any(|u| *u != 0.0) {
+            hard.push(Part::Unsettled);
+        }
         Self { hard, soft, functions }
     }
 }
@@ -272,6 +278,7 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
                 Part::Area => of(&|i| factor[i] * shapes[i].area * contexts[i].pressure),
                 Part::AreaSlope => of(&|i| factor[i] * shapes[i].area_slope * contexts[i].pressure),
                 Part::Settling => of(&|i| -live[i] * rows.sign[i] * quasi[i] * rows.settling[i]),
+                Part::Unsettled => of(&|i| -live[i] * friction[i] * quasi[i] * rows.unsettled[i]),
             }
         };
         let mut joint = Basis::default();
@@ -397,7 +404,7 @@ fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
         friction: vec![0.0; n],
         stiffness: vec![0.0; n],
     };
-    let mut settling = 0.0;
+    let (mut settling, mut unsettled) = (0.0, 0.0);
     let mut elastic = vec![0.0; n];
     for (part, c) in plan.hard.iter().chain(&plan.soft).zip(solution).filter(|(_, c)| **c != 0.0) {
         for i in 0..n {
@@ -422,6 +429,7 @@ fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
                 }
                 Part::AreaSlope => v.gaylord[i] += c * context.pressure * shape.area_slope,
                 Part::Settling => settling = *c,
+                Part::Unsettled => unsettled = *c,
             }
         }
     }
@@ -432,7 +440,8 @@ fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
         v.quasi[i] = v.gaylord[i] + elastic[i];
         v.friction[i] = v.friction[i].clamp(-0.4, 0.8);
         let late = settling * rows.sign[i] * rows.settling[i];
-        v.force[i] = live[i] * v.quasi[i] * (1.0 - v.friction[i] * context.direction - late);
+        let direction = context.direction + unsettled * rows.unsettled[i];
+        v.force[i] = live[i] * v.quasi[i] * (1.0 - v.friction[i] * direction - late);
     }
     v
 }

@@ -59,6 +59,7 @@ fn thin(rows: &Rows, traces: &[Vec<f64>]) -> (Rows, Vec<Vec<f64>>) {
         sign: pick(&rows.sign),
         still: pick(&rows.still),
         settling: pick(&rows.settling),
+        unsettled: pick(&rows.unsettled),
         largest: pick(&rows.largest),
         local_time: pick(&rows.local_time),
         blocks: rows.blocks,

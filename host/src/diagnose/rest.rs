@@ -153,6 +153,7 @@ fn left(rows: &Rows, fitted: &Baseline, holds: &[(usize, usize)], directions: &[
 /// Finds out what friction does at rest and lets the rows' directions say so; `None` where it stays as the model holds it.
 pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
     rows.settling = vec![0.0; rows.len()];
+    rows.unsettled = vec![0.0; rows.len()];
     let resting = rows.still.iter().zip(&rows.root_weight).filter(|(s, w)| **s > 1.0 && **w > 0.0).count();
     if !rows.isometric && resting * 50 < rows.effective() {
         return None;
@@ -216,6 +217,9 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
     let chosen = directions(rows, &holds, &pressures, best);
     for ((from, to), way) in holds.iter().zip(&chosen) {
         for i in *from..*to {
+            if !rows.isometric {
+                rows.unsettled[i] = rows.contexts[i].direction - way[i - from];
+            }
             rows.contexts[i].direction = way[i - from];
             if let AtRest::Fades(time) = best
                 && rows.still[i] > 0.0

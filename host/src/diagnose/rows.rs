@@ -69,6 +69,8 @@ pub(crate) struct Rows {
     pub still: Vec<f64>,
     /// How a settling of friction at rest departs from an exponential; all zeros where it does not settle.
     pub settling: Vec<f64>,
+    /// At rest, the direction that the model holds less the one that friction was found to have settled to; zero elsewhere.
+    pub unsettled: Vec<f64>,
     /// Largest contraction so far in the campaign.
     pub largest: Vec<f64>,
     /// Time within the recording, s.
@@ -314,6 +316,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
             rows.sign.push(k.direction[i]);
             rows.still.push(still);
             rows.settling.push(0.0);
+            rows.unsettled.push(0.0);
             rows.largest.push(largest / braid.rest_length());
             rows.local_time.push(local);
             i = j;
