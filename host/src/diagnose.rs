@@ -14,7 +14,9 @@
 //! | `evidence` | how strongly the recordings speak for an effect |
 //! | `candidates` | the library of effects as columns |
 //! | `select` | which effects, and when to abstain |
+//! | `given` | effects that the user knows to be there |
 //! | `named`, `calibration` | names with their parameters and probabilities; what could be hidden |
+//! | `intervals` | how sure the parameters are |
 //! | `held_out` | the improvement on rows that the fit had not seen |
 //! | [`model`] | the table refitted beside the named effects |
 //! | [`advise`], [`planned`] | the recording that would tell; what a planned protocol can tell |
@@ -30,7 +32,9 @@ mod calibration;
 mod candidates;
 mod evidence;
 mod frequency;
+mod given;
 mod held_out;
+mod intervals;
 mod kinematics;
 mod known;
 mod linear;

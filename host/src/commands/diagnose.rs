@@ -7,6 +7,7 @@ use std::time::Instant;
 use clap::Args;
 use model_core::muscle::Muscle;
 
+use super::effects;
 use super::recordings::Recordings;
 use super::reports::Reports;
 use crate::checks::Checks;
@@ -25,7 +26,8 @@ use crate::table_file::{self, TableFile};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     host diagnose --muscle mini.toml loops/*.csv\n  \
-    host diagnose --muscle mini.toml loops/*.csv --json answer.json -o corrected.pam --report answer.html")]
+    host diagnose --muscle mini.toml loops/*.csv --json answer.json -o corrected.pam --report answer.html\n  \
+    host diagnose --muscle mini.toml --with backlash,force-offset loops/*.csv -o corrected.pam")]
 pub struct Arguments {
     /// The muscle's description.
     #[arg(long, value_name = "M.toml")]
@@ -39,6 +41,10 @@ pub struct Arguments {
     /// given more than once.
     #[arg(long, value_name = "CHECK.csv")]
     check: Vec<PathBuf>,
+    /// Effects that are known to be there, such as a joint's play: they are fitted whatever the evidence and go into the table,
+    /// nothing else is searched for, and the answer says whether the recordings support them. `host effects` lists the names.
+    #[arg(long, value_name = "EFFECT", value_delimiter = ',')]
+    with: Vec<String>,
     /// Write the table refitted beside the named effects; corrections of the bench stay apart in it.
     #[arg(short, long, value_name = "T2.pam")]
     output: Option<PathBuf>,
@@ -59,6 +65,7 @@ impl Arguments {
     /// Files that cannot be read or written, recordings without force.
     pub fn run(self, console: &Console) -> Result<()> {
         let start = Instant::now();
+        let given = self.with.iter().map(|name| effects::named(name.trim())).collect::<Result<Vec<_>>>()?;
         let muscle = MuscleDescription::read(&self.muscle)?;
         // Whoever asks for JSON is a program, or will look at that.
         let watched = if self.json.is_some() { Console::silent() } else { console.clone() };
@@ -66,14 +73,14 @@ impl Arguments {
         for warning in &campaign.warnings {
             console.warning(warning);
         }
-        let given = self.table.as_ref().map(TableFile::read).transpose()?;
+        let table = self.table.as_ref().map(TableFile::read).transpose()?;
         let geometry = muscle.geometry();
         let progress = Arc::new(Progress::new(&watched, "diagnosing"));
         let checks = Checks::read(&self.check)?;
-        let options = Options { muscle: muscle.name.clone(), checks, progress };
+        let options = Options { muscle: muscle.name.clone(), checks, given, progress };
         let mut answer = diagnose::diagnose(&campaign, &geometry, &options)?;
         let diagnosed = start.elapsed();
-        if let Some(table) = &given {
+        if let Some(table) = &table {
             let predicted = predict(table, &campaign)?;
             if let Some(rms) = predicted.rms {
                 answer.misfit_rms_N = rms;

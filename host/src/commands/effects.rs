@@ -51,7 +51,7 @@ impl Arguments {
             }
             return Ok(());
         };
-        let candidate = Candidate::from_name(name).ok_or_else(|| unknown(name))?;
+        let candidate = named(name)?;
         if self.json {
             console.result(format!("{:#}", to_json(candidate)));
         } else {
@@ -70,6 +70,14 @@ impl Arguments {
 
 fn catalogue() -> Result<Vec<(crate::report::effect_trace::Trace, crate::report::Figure)>> {
     effect_page::catalogue().map_err(|e| Error::new(Code::TableInvalid, e.to_string()))
+}
+
+/// The effect of this name.
+///
+/// # Errors
+/// There is none; the nearest is suggested.
+pub(super) fn named(name: &str) -> Result<Candidate> {
+    Candidate::from_name(name).ok_or_else(|| unknown(name))
 }
 
 fn unknown(name: &str) -> Error {

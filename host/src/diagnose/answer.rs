@@ -7,6 +7,7 @@ use model_core::braid::{Braid, Geometry};
 use super::baselines::{self, Kind};
 use super::candidates::{self, library};
 use super::frequency;
+use super::given;
 use super::held_out::held_out;
 use super::known::Known;
 use super::linear::energy;
@@ -16,6 +17,7 @@ use super::rest;
 use super::rows::{self, Rows};
 use super::select::{self, Found, search};
 use super::verdict::{Considered, Diagnosis, HeldOut, PathStep, Region, Trace, Unexplained, Verdict};
+use crate::bench::Candidate as Law;
 use crate::checks::Checks;
 use crate::error::{Code, Error, Result};
 use crate::progress::Progress;
@@ -28,6 +30,8 @@ pub struct Options {
     pub muscle: String,
     /// Checks of the bench on which the recordings were made.
     pub checks: Checks,
+    /// Effects that are known to be there: fitted whatever the evidence, and nothing else is searched for.
+    pub given: Vec<Law>,
     /// Who watches how far it has come; nobody by default.
     pub progress: Arc<Progress>,
 }
@@ -52,13 +56,14 @@ const FEWEST_BLOCKS: usize = 6;
 /// Recordings without force or without rows, or an impossible geometry.
 pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> Result<Diagnosis> {
     let braid = geometry.build().map_err(|e| Error::new(Code::MuscleInvalid, e.to_string()))?;
+    given::check(&options.given)?;
     if campaign.samples() == 0 {
         return Err(Error::new(Code::RecordingEmpty, "the recordings hold no rows"));
     }
     let known = Known::of(&options.checks, campaign, &braid)?;
     let freed = known.free(campaign);
     let asked = ask(&freed, &braid, options, &known)?;
-    known.enter(asked, &freed, &braid)
+    known.enter(asked, &options.given, &freed, &braid)
 }
 
 /// What the recordings themselves say, freed of what checks of the bench have measured.
@@ -95,15 +100,24 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
     let production = baselines::fit(&rows, Kind::Flexible(4), &[]);
     let misfit = production.rms(&rows);
     remarks.extend(tables_as_evidence(&production, &rows));
-    let library: Vec<_> = library(&rows).into_iter().filter(|c| !known.settles(c)).collect();
-    let (found, held) = confirmed(&mut rows, &library, blocked, step);
+    let library: Vec<_> = library(&rows).into_iter().filter(|c| !known.settles(c, &options.given)).collect();
+    let asked: Vec<usize> =
+        options.given.iter().filter_map(|law| library.iter().position(|c| c.law == *law)).collect();
+    let (found, held) = if options.given.is_empty() {
+        confirmed(&mut rows, &library, blocked, step)
+    } else {
+        given::fitted(&mut rows, &library, blocked, step, &asked)
+    };
     remarks.extend(found.remarks.iter().cloned());
     let sigma = found.noise.sigma;
     if !found.noise.from_repeats {
         remarks.push("no stroke is repeated under the same conditions: the noise is what the most flexible model leaves".to_owned());
     }
 
-    let missing = missing(&found, &library, &rows);
+    let mut missing = missing(&found, &library, &rows);
+    if !options.given.is_empty() {
+        given::judge(&mut missing, &found, &rows, &held);
+    }
     let explained: f64 = if found.above > 0.0 && !missing.is_empty() {
         ((energy(&found.bare.residual) - energy(&found.full.residual)) / found.above).clamp(0.0, 1.0)
     } else {
@@ -328,6 +342,7 @@ fn no_judgement(
             gain: 0.0,
             why_not: "these recordings cannot show it".into(),
             hidden_up_to_N: None,
+            checked: false,
             visible: 0.0,
         })
         .collect();
@@ -403,7 +418,7 @@ fn keep_what_helps(found: &mut Found, rows: &mut Rows, library: &[candidates::Ca
             held_out(rows, found.full.kind, &found.traces[..fewer], sigma).rms_after_N
         };
         // An effect that takes a third of what is above the noise lowers the whole by more than this.
-        if with.rms_after_N < 0.985 * before {
+        if with.rms_after_N < given::HELPS * before {
             return with;
         }
         let name = found.taken.last().map_or("", |t| library[t.trial.candidate].name());

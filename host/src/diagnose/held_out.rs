@@ -36,8 +36,8 @@ fn split(words: &'static str, rows: &Rows, key: &dyn Fn(usize) -> u32) -> Split 
     Split { words, group, groups }
 }
 
-/// Every n-th row, with the effects' traces.
-fn thin(rows: &Rows, traces: &[Vec<f64>]) -> (Rows, Vec<Vec<f64>>) {
+/// Every n-th row, with columns over them.
+pub(super) fn thin(rows: &Rows, traces: &[Vec<f64>]) -> (Rows, Vec<Vec<f64>>) {
     let stride = rows.len().div_ceil(ROWS).max(1);
     let keep: Vec<usize> = (0..rows.len()).step_by(stride).collect();
     let pick = |v: &Vec<f64>| keep.iter().map(|i| v[*i]).collect::<Vec<f64>>();

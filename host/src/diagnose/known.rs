@@ -91,20 +91,23 @@ impl Known {
     }
 
     /// Whether a check has said all there is to say about an effect.
-    pub(super) fn settles(&self, candidate: &Candidate) -> bool {
-        let mut all = self.named.iter().chain(&self.absent);
-        all.any(|j| Law::Bench(j.measured.fault) == candidate.law)
+    ///
+    /// What the user gives as known is fitted even where a check found nothing of it that matters.
+    pub(super) fn settles(&self, candidate: &Candidate, given: &[Law]) -> bool {
+        let is = |j: &Judged| Law::Bench(j.measured.fault) == candidate.law;
+        self.named.iter().any(is) || (!given.contains(&candidate.law) && self.absent.iter().any(is))
     }
 
     /// Enters what is known into the answer that was given without it.
     pub(super) fn enter(
         self,
         asked: Asked,
+        given: &[Law],
         freed: &Campaign,
         braid: &Braid<f64>,
     ) -> Result<super::Diagnosis> {
         let Asked { mut diagnosis, kind } = asked;
-        for j in &self.absent {
+        for j in self.absent.iter().filter(|j| !given.contains(&Law::Bench(j.measured.fault))) {
             diagnosis.considered.push(Considered {
                 effect: j.measured.fault.info().name.into(),
                 gain: 0.0,
@@ -113,6 +116,7 @@ impl Known {
                     j.measured.check, j.measured.words, j.at_most
                 ),
                 hidden_up_to_N: Some(j.at_most),
+                checked: true,
                 visible: 1.0,
             });
         }
@@ -127,7 +131,10 @@ impl Known {
         }
         diagnosis.unexplained.share *= 1.0 - share;
         let all: f64 = self.named.iter().map(|j| j.peak * j.peak).sum();
-        let entries = self.named.iter().map(|j| missing(j, share * j.peak * j.peak / all.max(1e-300)));
+        let entries = self.named.iter().map(|j| Missing {
+            given: given.contains(&Law::Bench(j.measured.fault)),
+            ..missing(j, share * j.peak * j.peak / all.max(1e-300))
+        });
         diagnosis.missing.splice(0..0, entries);
         let step = |j: &Judged| PathStep {
             effect: j.measured.fault.info().name.into(),
@@ -196,6 +203,8 @@ fn missing(judged: &Judged, share: f64) -> Missing {
         place: place_in_words(info.link).into(),
         correction: true,
         checked: true,
+        given: false,
+        supported: true,
         summary: info.summary.into(),
         source: info.source.into(),
         peak_N: *peak,

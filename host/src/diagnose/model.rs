@@ -32,7 +32,7 @@ const ROUNDS: usize = 3;
 const SWALLOWED: f64 = 1.1;
 
 /// Fits the table anew beside the named effects. An effect is kept only where the recordings are then
-/// predicted better: a table must not get worse by a diagnosis.
+/// predicted better: a table must not get worse by a diagnosis; one that the user gave is kept in any case.
 ///
 /// # Errors
 /// Recordings that cannot be fitted.
@@ -51,7 +51,8 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
     let mut warnings = plain.summary.warnings.clone();
     let (effects, corrections) = parts(diagnosis);
     let nothing = effects.is_empty() && corrections.is_empty();
-    if nothing || diagnosis.verdict == Verdict::Consistent {
+    let given = diagnosis.missing.iter().any(|m| m.given);
+    if nothing || (diagnosis.verdict == Verdict::Consistent && !given) {
         return Ok(Refitted { file: bare, rms_before: before, rms_after: before, warnings });
     }
     let mut with = TableFile { table: plain.table.clone(), about: about(&plain, corrections.clone()) };
@@ -78,7 +79,12 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
     // What a check has measured is there, even where tables would swallow it.
     let measured = diagnosis.missing.iter().all(|m| m.checked);
     let better = if measured { after <= SWALLOWED * before } else { after < before };
-    if with.table.check().is_err() || !better {
+    if given && after >= before && with.table.check().is_ok() {
+        warnings.push(format!(
+            "with the effects that were given the recordings are predicted no better ({after:.3} N against {before:.3} N); the \
+             table was written with them all the same"
+        ));
+    } else if with.table.check().is_err() || !better {
         warnings.push(format!(
             "with the named effects the recordings are predicted no better ({after:.3} N against {before:.3} N): the table was \
              written without them"

@@ -3,6 +3,7 @@
 use super::advise::what_would_show;
 use super::calibration;
 use super::candidates::{self, place_in_words};
+use super::intervals::deviations;
 use super::linear::energy;
 use super::rows::Rows;
 use super::select::{self, Found};
@@ -10,7 +11,7 @@ use super::verdict::{Considered, Missing, ParameterValue};
 
 /// The effects that were taken, with parameters and intervals, what they cannot be told from, and how probable they are.
 pub(crate) fn missing(found: &Found, library: &[candidates::Candidate], rows: &Rows) -> Vec<Missing> {
-    let deviations = select::deviations(found, library, rows);
+    let deviations = deviations(found, library, rows);
     let explained =
         ((energy(&found.bare.residual) - energy(&found.full.residual)) / found.above).clamp(0.0, 1.0);
     let total: f64 = found.taken.iter().map(|t| t.share.max(0.0)).sum::<f64>().max(1e-12);
@@ -72,6 +73,8 @@ pub(crate) fn missing(found: &Found, library: &[candidates::Candidate], rows: &R
                 place: place_in_words(info.link).into(),
                 correction: candidate.of_the_bench(),
                 checked: false,
+                given: false,
+                supported: true,
                 summary: info.summary.into(),
                 source: info.source.into(),
                 peak_N: t.trial.peak,
@@ -114,17 +117,19 @@ pub(crate) fn considered(
                 by_noise.max(least)
             });
             let hidden = hidden.filter(|h| h.is_finite() && *h < ABSURD * blocked);
-            let could_be = match hidden {
-                Some(h) => format!("it could be hidden in this recording up to {h:.2} N"),
-                None => "it could be hidden in this recording at any size".to_owned(),
+            let size = match hidden {
+                Some(h) => format!("up to {h:.2} N"),
+                None => "at any size".to_owned(),
             };
+            let could_be =
+                format!("it could be hidden in these recordings {size}; {} to know", what_would_show(name));
             let unseen = hidden.is_none_or(|h| h > 0.01 * blocked);
             let why_not = if confusable.iter().any(|c| c.as_str() == name) {
                 "cannot be told from what is named".to_owned()
             } else if t.size <= 0.0 {
-                format!("these recordings do not excite it: {could_be}; {}", what_would_show(name))
+                format!("these recordings do not excite it: {could_be}")
             } else if unseen && t.score < select::LEAST_SCORE {
-                format!("{could_be}; {}", what_would_show(name))
+                could_be
             } else if *p > select::FAMILY_ALPHA && t.score < select::LEAST_SCORE {
                 format!("no more than chance gives over all effects looked at (p = {p:.2}); {could_be}")
             } else if missing.is_empty() && gain >= select::FIRST_OF_ALL {
@@ -132,9 +137,16 @@ pub(crate) fn considered(
             } else if missing.is_empty() {
                 format!("takes too little of the misfit to be named; {could_be}")
             } else {
-                "explains less than what is named, and little besides it".to_owned()
+                format!("explains less than what is named, and little besides it; {could_be}")
             };
-            Considered { effect: name.into(), gain, why_not, hidden_up_to_N: hidden, visible: t.visible }
+            Considered {
+                effect: name.into(),
+                gain,
+                why_not,
+                hidden_up_to_N: hidden,
+                checked: false,
+                visible: t.visible,
+            }
         })
         .collect()
 }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::baselines::{self, Baseline, Give, Kind, cosine};
 use super::candidates::{self, Candidate, Ground, Trial};
 use super::evidence::Scale;
-use super::linear::{Sign, add_scaled, dot, energy};
+use super::linear::{Sign, add_scaled, energy};
 use super::noise::{self, Noise, family_p};
 use super::rows::Rows;
 
@@ -38,7 +38,7 @@ pub(crate) const FIRST_OF_ALL: f64 = 0.4;
 pub(crate) const LEAST_SCORE: f64 = 12.0;
 /// The same where no test by whole blocks can support it: chance in four hundred looks gives 2 ln 400 = 12 at most once in e, and
 /// each 2 ln 10 = 4.6 more once in ten times as many.
-const LEAST_ALONE: f64 = 25.0;
+pub(crate) const LEAST_ALONE: f64 = 25.0;
 /// A name of less than this part of what something else would score is the shadow of that.
 const SHADOW: f64 = 2.0;
 /// Laws that are little more than a slow course of time, which a reading that wanders imitates best.
@@ -126,7 +126,12 @@ fn p_values(best: &[Trial], all: &[Trial]) -> Vec<f64> {
 }
 
 /// One step: every candidate beside the present baseline, the best refined.
-fn look(library: &[Candidate], rows: &Rows, ground: &Ground<'_>, blocked: f64) -> (Vec<Trial>, Vec<f64>) {
+pub(crate) fn look(
+    library: &[Candidate],
+    rows: &Rows,
+    ground: &Ground<'_>,
+    blocked: f64,
+) -> (Vec<Trial>, Vec<f64>) {
     let mut all = ground.scan(library, rows);
     forbid_cancelling(&mut all, blocked);
     let mut best = best_of_each(&all, library);
@@ -232,7 +237,7 @@ const PER_NUMBER: f64 = 0.3;
 
 /// The weight of each rival against the winner, from what each leaves of the misfit above noise where the bladder differs between
 /// pressures as much as it does beside the winner.
-fn rivals(
+pub(crate) fn rivals(
     winner: &Trial,
     best: &[Trial],
     library: &[Candidate],
@@ -455,59 +460,4 @@ fn exchange(
     for t in taken.iter_mut() {
         t.rms = fitted.0.rms(rows);
     }
-}
-
-/// Standard deviations of all parameters of the chosen effects by whole blocks: amplitudes exactly, shapes by their
-/// linearised traces.
-pub(crate) fn deviations(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<Vec<Option<f64>>> {
-    // Tangents: one column per free number.
-    let mut tangents: Vec<Vec<f64>> = Vec::new();
-    let mut place: Vec<(usize, usize)> = Vec::new();
-    for (t, taken) in found.taken.iter().enumerate() {
-        let trial = &taken.trial;
-        let candidate = &library[trial.candidate];
-        for (k, column) in candidate.columns(&trial.shapes, rows).into_iter().enumerate() {
-            if trial.amplitudes[k] != 0.0 {
-                tangents.push(column);
-                place.push((t, k));
-            }
-        }
-        let value = |shapes: &[f64]| {
-            candidates::trace(&Trial { shapes: shapes.to_vec(), ..trial.clone() }, library, rows)
-        };
-        for (j, s) in trial.shapes.iter().enumerate() {
-            let h = 0.02 * s.abs().max(1e-9);
-            let (mut up, mut down) = (trial.shapes.clone(), trial.shapes.clone());
-            up[j] += h;
-            down[j] -= h;
-            let (up, down) = (value(&up), value(&down));
-            tangents.push(up.iter().zip(&down).map(|(u, d)| (u - d) / (2.0 * h)).collect());
-            place.push((t, trial.amplitudes.len() + j));
-        }
-    }
-    let mut result: Vec<Vec<Option<f64>>> =
-        found.taken.iter().map(|t| vec![None; t.trial.amplitudes.len() + t.trial.shapes.len()]).collect();
-    // The bare baseline's span, not the full one's, which holds the amplitudes themselves.
-    let base = baselines::fit(rows, found.full.kind, &[]);
-    let z: Vec<Vec<f64>> = baselines::projected(&tangents, &rows.root_weight, &base.span);
-    let n = z.len();
-    let gram: Vec<Vec<f64>> = z.iter().map(|a| z.iter().map(|b| dot(a, b)).collect()).collect();
-    let all: Vec<usize> = (0..n).collect();
-    for i in 0..n {
-        // Row i of the inverse of the gram matrix, then the scatter of the blocks' scores along it.
-        let unit: Vec<f64> = (0..n).map(|j| f64::from(u8::from(i == j))).collect();
-        let Some(row) = super::linear::solve_symmetric(&gram, &unit, &all) else { continue };
-        let mut per_block = vec![0.0; rows.blocks];
-        for k in 0..rows.len() {
-            let influence: f64 = row.iter().zip(&z).map(|(r, z)| r * z[k]).sum();
-            per_block[rows.block[k] as usize] += influence * found.full.residual[k];
-        }
-        let m = rows.blocks.max(2) as f64;
-        let variance = energy(&per_block) * m / (m - 1.0).max(1.0);
-        let (t, k) = place[i];
-        if variance.is_finite() {
-            result[t][k] = Some(variance.sqrt());
-        }
-    }
-    result
 }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::advise::what_would_show;
 use super::verdict::{Diagnosis, Verdict};
 
 /// The diagnosis in words.
@@ -26,6 +27,8 @@ pub fn summary(d: &Diagnosis) -> String {
                 "NOT JUDGED: these recordings say nothing about the model; why is said below.",
             Verdict::Consistent =>
                 "CONSISTENT: nothing stands above the noise and the model's own inexactness.",
+            Verdict::Explained if d.missing.iter().any(|m| !m.supported) =>
+                "AS GIVEN: beside what was given nothing stands above the noise; what the recordings say of that is below.",
             Verdict::Explained => "EXPLAINED: what the model leaves out has a name.",
             Verdict::PartlyExplained => "PARTLY EXPLAINED: a part of what the model leaves out has a name.",
             Verdict::Unexplained =>
@@ -41,9 +44,12 @@ pub fn summary(d: &Diagnosis) -> String {
     for m in &d.missing {
         let _ = writeln!(
             s,
-            "\nMissing: {} (probability {:.0} %), acts on {}",
-            m.effect,
-            100.0 * m.probability,
+            "\n{}, acts on {}",
+            if m.given {
+                format!("Given: {}", m.effect)
+            } else {
+                format!("Missing: {} (probability {:.0} %)", m.effect, 100.0 * m.probability)
+            },
             m.place
         );
         let _ = writeln!(s, "  {}", m.summary);
@@ -88,17 +94,8 @@ pub fn summary(d: &Diagnosis) -> String {
         let _ =
             writeln!(s, "\nRecord next: {} (expected difference {:.2} N)", n.words, n.expected_difference_N);
     }
-    let hidden: Vec<String> = d
-        .considered
-        .iter()
-        .filter(|c| c.hidden_up_to_N.is_none_or(|h| h > 0.02 * d.blocked_force_N))
-        .map(|c| match c.hidden_up_to_N {
-            Some(h) => format!("{} up to {h:.1} N", c.effect),
-            None => format!("{} of any size", c.effect),
-        })
-        .collect();
-    if !hidden.is_empty() && d.noise_N > 0.0 {
-        let _ = writeln!(s, "\nCould be hidden in these recordings: {}", hidden.join(", "));
+    if d.noise_N > 0.0 {
+        could_be_hidden(&mut s, d);
     }
     if !d.remarks.is_empty() {
         let _ = writeln!(s, "\nTo know");
@@ -107,6 +104,42 @@ pub fn summary(d: &Diagnosis) -> String {
         }
     }
     s
+}
+
+/// What may be there unseen, by what would show it; and what checks of the bench have excluded.
+fn could_be_hidden(s: &mut String, d: &Diagnosis) {
+    let mut by_measure: Vec<(&str, Vec<String>)> = Vec::new();
+    for c in &d.considered {
+        let unseen = c.hidden_up_to_N.is_none_or(|h| h > 0.02 * d.blocked_force_N);
+        if !unseen || c.checked {
+            continue;
+        }
+        let size = match c.hidden_up_to_N {
+            Some(h) => format!("{} up to {h:.1} N", c.effect),
+            None => format!("{} of any size", c.effect),
+        };
+        let measure = what_would_show(&c.effect);
+        match by_measure.iter_mut().find(|m| m.0 == measure) {
+            Some(known) => known.1.push(size),
+            None => by_measure.push((measure, vec![size])),
+        }
+    }
+    if !by_measure.is_empty() {
+        let _ = writeln!(s, "\nCould be hidden in these recordings; what would show it");
+    }
+    for (measure, effects) in by_measure {
+        let _ = writeln!(s, "  {}: {measure}", effects.join(", "));
+    }
+    let checked = d.considered.iter().filter(|c| c.checked);
+    let cleared: Vec<String> = checked
+        .map(|c| match c.hidden_up_to_N {
+            Some(h) => format!("{} (no more than {h:.2} N)", c.effect),
+            None => c.effect.clone(),
+        })
+        .collect();
+    if !cleared.is_empty() {
+        let _ = writeln!(s, "\nExcluded by checks of the bench: {}", cleared.join(", "));
+    }
 }
 
 /// A value with its standard deviation to two digits: `0.924 ± 0.012 N`, `(4.59 ± 0.14)·10^-4 m`.

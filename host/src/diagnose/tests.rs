@@ -75,6 +75,12 @@ fn ask(campaign: &Campaign) -> Diagnosis {
         .expect("an answer")
 }
 
+fn told(campaign: &Campaign, given: &[&str]) -> crate::error::Result<Diagnosis> {
+    let given =
+        given.iter().map(|n| crate::bench::Candidate::from_name(n).expect("in the catalogue")).collect();
+    diagnose(campaign, &geometry(), &Options { muscle: "test".into(), given, ..Options::default() })
+}
+
 fn names(d: &Diagnosis) -> Vec<&str> {
     d.missing.iter().map(|m| m.effect.as_str()).collect()
 }
@@ -129,6 +135,39 @@ fn viscous_damping_is_found_with_its_size() {
     let c = &d.missing[0].parameters[0];
     let std = c.std.expect("determined");
     assert!((c.value - 5.0e3).abs() < 4.0 * std.max(150.0), "{} ± {std}", c.value);
+}
+
+#[test]
+fn what_is_given_is_fitted_and_judged_by_the_recordings() {
+    let rubbed = recorded(loops(&[0.1, 0.4]), 3, coloured(0.1, 2.0), |_, sign, _| -4.0 * sign);
+    // What is there is found with its size whatever else was looked at …
+    let d = told(&rubbed, &["coulomb-friction"]).expect("an answer");
+    assert_eq!(names(&d), ["coulomb-friction"]);
+    let m = &d.missing[0];
+    assert!(m.given && m.supported && m.probability == 1.0, "{}", m.why);
+    assert!((m.parameters[0].value - 4.0).abs() < 0.3, "{:?}", m.parameters);
+    assert!(d.held_out.rms_after_N < 0.5 * d.held_out.rms_before_N, "{:?}", d.held_out);
+    // … beside another, of which nothing is there; and what is not there is fitted too, and said not to be supported.
+    let d = told(&rubbed, &["backlash", "coulomb-friction"]).expect("an answer");
+    assert_eq!(names(&d), ["backlash", "coulomb-friction"]);
+    assert!(!d.missing[0].supported && d.missing[1].supported, "{} | {}", d.missing[0].why, d.missing[1].why);
+    assert!((d.missing[1].parameters[0].value - 4.0).abs() < 0.6, "{:?}", d.missing[1].parameters);
+    let nothing = recorded(loops(&[0.1, 0.4]), 9, coloured(0.3, 10.0), |_, _, _| 0.0);
+    let d = told(&nothing, &["stress-relaxation"]).expect("an answer");
+    assert_eq!(names(&d), ["stress-relaxation"]);
+    assert!(!d.missing[0].supported, "{}", d.missing[0].why);
+    let words = summary(&d);
+    assert!(words.contains("Given: stress-relaxation") && words.contains("do not support it"), "{words}");
+}
+
+#[test]
+fn what_the_base_holds_already_cannot_be_given() {
+    let campaign = recorded(loops(&[0.2]), 5, coloured(0.1, 2.0), |_, _, _| 0.0);
+    let refused = |given: &[&str]| told(&campaign, given).expect_err("refused").to_string();
+    assert!(refused(&["gauge-offset"]).contains("deadband"));
+    assert!(refused(&["higher-order-elasticity"]).contains("offered before"));
+    assert!(refused(&["backlash", "backlash"]).contains("twice"));
+    assert!(refused(&["backlash", "leak", "inertia", "gravity"]).contains("most that recordings can bear"));
 }
 
 #[test]

@@ -48,7 +48,7 @@ pub struct ParameterValue {
     pub name: String,
     /// Its value, SI.
     pub value: f64,
-    /// Its standard deviation, by whole blocks; absent where the data do not determine it.
+    /// Its standard deviation, by what groups of rows and other bases make of it; absent where the data do not determine it.
     pub std: Option<f64>,
     /// Its SI unit.
     pub unit: String,
@@ -87,6 +87,10 @@ pub struct Missing {
     pub correction: bool,
     /// Whether a check of the bench measured it, apart from the recordings.
     pub checked: bool,
+    /// Whether the user gave it as known: then it was fitted whatever the evidence, and its probability is one.
+    pub given: bool,
+    /// Whether the recordings support it, or a check of the bench; always so where it was not given.
+    pub supported: bool,
     /// What it is, for someone who has never heard of it.
     pub summary: String,
     /// Its equation and where it comes from.
@@ -149,6 +153,8 @@ pub struct Considered {
     pub why_not: String,
     /// The largest peak, N, at which it could be hidden in this recording; absent where the recording does not excite it.
     pub hidden_up_to_N: Option<f64>,
+    /// Whether a check of the bench has said so, apart from the recordings.
+    pub checked: bool,
     /// Share of its trace that the flexible tables cannot imitate.
     pub visible: f64,
 }

@@ -221,11 +221,15 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
         table.row([p.name.clone(), figures(p.value, 3), std, unit, remark.into()]);
     }
     section.table(table);
-    section.text(format!(
-        "*Why we think so:* {}. The name is right with a probability of {} %.",
-        m.why,
-        fixed(100.0 * m.probability, 0)
-    ));
+    section.text(if m.given {
+        format!("*What the recordings say of it:* {}.", m.why)
+    } else {
+        format!(
+            "*Why we think so:* {}. The name is right with a probability of {} %.",
+            m.why,
+            fixed(100.0 * m.probability, 0)
+        )
+    });
     if let Some(candidate) = candidate
         && let Ok(demonstration) = Demonstration::new()
     {

@@ -61,6 +61,8 @@ pub struct Missing {
     pub parameters: Vec<Value>,
     /// What it cannot be told from.
     pub confusable_with: Vec<String>,
+    /// Whether a check of the bench measured it.
+    pub checked: bool,
 }
 
 /// A parameter with its error bar.
@@ -96,6 +98,8 @@ pub struct Considered {
     /// Up to which force it could be there unseen, N; absent where it cannot be seen at all.
     #[serde(rename = "hidden_up_to_N")]
     pub hidden_up_to: Option<f64>,
+    /// Whether a check of the bench said so.
+    pub checked: bool,
     /// Share of its trace that the base does not swallow.
     pub visible: Option<f64>,
 }
@@ -280,7 +284,8 @@ fn help(host: &Path) -> Help {
     Help { tables: text.is_empty() || has("-o"), checks: has("--check ") || has("--check=") }
 }
 
-fn version(host: &Path) -> String {
+/// A tool's version and hash.
+pub fn version(host: &Path) -> String {
     let said =
         Command::new(host).arg("--version").output().map(|o| String::from_utf8_lossy(&o.stdout).into_owned());
     let hash = std::fs::read(host).map(|b| sha256(&b)).unwrap_or_default();

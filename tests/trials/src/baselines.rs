@@ -82,7 +82,7 @@ impl Others {
             .iter()
             .filter_map(|(o, h)| {
                 let (h, error) = ((*h)?, self.gp.get(&name(o.id))?);
-                Some(((h.plain - error) / (h.plain - h.twin), h.gain()?))
+                Some(((h.plain - error) / (h.plain - h.twin), h.gain_against_twin()?))
             })
             .collect();
         let median = |mut v: Vec<f64>| {

@@ -3,6 +3,7 @@
 use crate::answer::{recordings, run_limited};
 use crate::generate::TrialTruth;
 use crate::ledger::name;
+use crate::oracle;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -20,14 +21,33 @@ pub struct HeldOut {
     /// A plain fit of the twin without the effect, on the twin's held-out recordings: nothing is missing there.
     #[serde(rename = "twin_N")]
     pub twin: f64,
+    /// The true structure refitted by the tool; absent where it was not asked, or nothing of the muscle is hidden.
+    #[serde(rename = "oracle_N", default)]
+    pub oracle: Option<f64>,
 }
 
+/// Least part of the plain error that the true structure must take for a gain to be measured against it.
+pub const WORTH: f64 = 0.1;
+
 impl HeldOut {
-    /// How much of what could be gained was gained, where something could: what the effect costs a plain fit must be at
-    /// least half of the error that is there without it.
+    /// How much of what the true structure gains, refitted by the same tool, the diagnosed table gains; where that is something.
     pub fn gain(&self) -> Option<f64> {
+        let possible = self.plain - self.oracle?;
+        (possible >= WORTH * self.plain).then(|| (self.plain - self.diagnosed) / possible)
+    }
+
+    /// The same against the muscle without the effect, to which nothing is missing, where something could be gained: what the effect
+    /// costs a plain fit must be at least half of the error that is there without it.
+    pub fn gain_against_twin(&self) -> Option<f64> {
         let possible = self.plain - self.twin;
         (possible > 0.5 * self.twin).then(|| (self.plain - self.diagnosed) / possible)
+    }
+
+    /// What the true structure refitted gains of that.
+    pub fn oracle_against_twin(&self) -> Option<f64> {
+        let possible = self.plain - self.twin;
+        let oracle = self.oracle?;
+        (possible > 0.5 * self.twin).then(|| (self.plain - oracle) / possible)
     }
 
     /// Whether the diagnosed table is worse than the plain one by more than 2 %.
@@ -44,7 +64,7 @@ fn fit(host: &Path, muscle: &Path, files: &[PathBuf], table: &Path) -> Result<()
 }
 
 /// Rms over the last files of a prediction that runs through all of them.
-fn predict(
+pub fn predict(
     host: &Path,
     table: &Path,
     history: &[PathBuf],
@@ -68,15 +88,22 @@ fn predict(
     Ok((sum / f64::max(n, 1.0)).sqrt())
 }
 
+/// Where a trial's tables and predictions lie.
+pub fn work(set: &Path, id: usize) -> Result<PathBuf, String> {
+    let work = set.join("work").join(name(id));
+    std::fs::create_dir_all(&work).map_err(|e| format!("{}: {e}", work.display()))?;
+    Ok(work)
+}
+
 /// Judge one trial's tables.
 pub fn held_out(set: &Path, host: &Path, truth: &TrialTruth) -> Result<HeldOut, String> {
     let id = name(truth.id);
     let (trial, sealed) = (set.join("trials").join(&id), set.join("sealed").join(&id));
-    let work = set.join("work").join(&id);
-    std::fs::create_dir_all(&work).map_err(|e| e.to_string())?;
+    let work = work(set, truth.id)?;
+    let oracle = oracle::read(set, truth.id).and_then(|o| o.error);
     let known = work.join("held_out.json");
-    if let Some(done) = std::fs::read(&known).ok().and_then(|b| serde_json::from_slice(&b).ok()) {
-        return Ok(done);
+    if let Some(done) = std::fs::read(&known).ok().and_then(|b| serde_json::from_slice::<HeldOut>(&b).ok()) {
+        return Ok(HeldOut { oracle, ..done });
     }
     let muscle = trial.join("muscle.toml");
     let (history, held) = (recordings(&trial), recordings(&sealed.join("held_out")));
@@ -98,7 +125,7 @@ pub fn held_out(set: &Path, host: &Path, truth: &TrialTruth) -> Result<HeldOut, 
         let held = recordings(&sealed.join("twin_held_out"));
         predict(host, &table, &twin_history, &held, &work.join("twin.json"))?
     };
-    let all = HeldOut { plain, diagnosed, twin };
+    let all = HeldOut { plain, diagnosed, twin, oracle };
     let text = serde_json::to_string(&all).map_err(|e| e.to_string())?;
     std::fs::write(known, text).map_err(|e| e.to_string())?;
     Ok(all)

@@ -19,10 +19,36 @@ const CONCEALED: [&str; 5] = ["tip-effect", "gravity", "contact-loss", "gauge-ga
 /// What was said of a concealed effect.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Concealed {
-    /// It is in the set, or it is said that it could be there unseen at its true size.
+    /// It is in the set, or it is said that it could be there at its true size, unseen or within a check's bound.
     pub admitted: bool,
-    /// And what to do about it is said: a recording is proposed, or the remarks tell what to measure.
+    /// And nothing more is to be done about it (it is named, or a check has bounded it at its true size), or what to do is said of
+    /// this very effect: a recording that splits the set it is in, or what to measure.
     pub advised: bool,
+}
+
+/// A parameter as stated, and as it is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Interval {
+    /// Effect and parameter.
+    pub of: String,
+    /// The truth's size, SI.
+    pub truth: f64,
+    /// The size stated.
+    pub stated: f64,
+    /// Its standard deviation as stated.
+    pub std: f64,
+}
+
+impl Interval {
+    /// How many stated standard deviations it is off.
+    pub fn z(&self) -> f64 {
+        (self.stated - self.truth) / self.std
+    }
+
+    /// Whether the stated interval of 95 % holds the truth.
+    pub fn holds(&self) -> bool {
+        self.z().abs() <= 1.96
+    }
 }
 
 /// What one trial showed.
@@ -58,8 +84,8 @@ pub struct Outcome {
     pub located: Option<Located>,
     /// For an effect of the concealed kind: what was said of it; absent for others.
     pub concealed: Option<Concealed>,
-    /// Stated intervals of parameters that contain the truth, and how many could be compared.
-    pub covered: (usize, usize),
+    /// Stated intervals of parameters whose truth is one number on both sides.
+    pub intervals: Vec<Interval>,
     /// A recording was proposed.
     pub proposed: bool,
     /// Time of the answer, s.
@@ -134,7 +160,7 @@ pub fn judge(
             || matches!(a.verdict.as_str(), "unexplained" | "partly-explained" | "explained"),
         located,
         concealed: concealed(truth, a, &set),
-        covered: coverage(truth, &missing),
+        intervals: intervals(truth, &missing),
         proposed: a.next_experiment.as_ref().is_some_and(|n| !n.is_null()),
         verdict,
         named,
@@ -149,15 +175,17 @@ fn concealed(truth: &TrialTruth, a: &Answer, set: &[String]) -> Option<Concealed
         return None;
     }
     let peak = 0.01 * effect.amplitude_pct * truth.blocked_force;
-    let unseen = a.considered.iter().any(|c| {
-        c.effect == effect.name
-            && (c.why_not.contains("unseen") || c.hidden_up_to.is_some_and(|n| n >= 0.8 * peak))
-    });
-    let admitted = set.contains(&effect.name) || unseen;
-    let measures = ["weigh", "photo", "gauge", "tare", "calliper", "second length", "dead weight", "vented"];
-    let told = a.remarks.iter().any(|r| measures.iter().any(|m| r.contains(m)));
-    let proposed = a.next_experiment.as_ref().is_some_and(|n| !n.is_null());
-    Some(Concealed { admitted, advised: admitted && (proposed || told) })
+    let named = a.missing.iter().any(|m| m.effect == effect.name);
+    let entry = a.considered.iter().find(|c| c.effect == effect.name);
+    // Without a number the answer is: of any size.
+    let hidden = entry.is_some_and(|c| c.hidden_up_to.is_none_or(|n| n >= 0.8 * peak));
+    let in_set = set.contains(&effect.name);
+    let admitted = in_set || hidden;
+    let proposed = in_set && a.next_experiment.as_ref().is_some_and(|n| !n.is_null());
+    let checked = entry.is_some_and(|c| c.checked);
+    let measures = ["weigh", "photo", "gauge", "tare", "calliper", "dead weight", "vented", "held lengths"];
+    let told = entry.is_some_and(|c| measures.iter().any(|m| c.why_not.contains(m)));
+    Some(Concealed { admitted, advised: admitted && (named || checked || proposed || told) })
 }
 
 /// Effects whose parameter means the same on both sides.
@@ -203,8 +231,8 @@ fn si(value: f64, unit: &str) -> Option<(f64, &'static str)> {
     })
 }
 
-fn coverage(truth: &TrialTruth, missing: &[&Missing]) -> (usize, usize) {
-    let (mut inside, mut compared) = (0, 0);
+fn intervals(truth: &TrialTruth, missing: &[&Missing]) -> Vec<Interval> {
+    let mut compared = Vec::new();
     for effect in truth.effects.iter().filter(|e| COMPARABLE.contains(&e.name.as_str())) {
         let Some(m) = missing.iter().find(|m| m.effect == effect.name) else { continue };
         for p in &effect.parameters {
@@ -219,15 +247,17 @@ fn coverage(truth: &TrialTruth, missing: &[&Missing]) -> (usize, usize) {
                 })
                 .collect();
             if let [(value, std)] = candidates[..] {
-                compared += 1;
                 // Signs are a convention of the correction; sizes are compared.
-                if (value.abs() - want.abs()).abs() <= 1.96 * std {
-                    inside += 1;
-                }
+                compared.push(Interval {
+                    of: format!("{}: {}", effect.name, p.name),
+                    truth: want.abs(),
+                    stated: value.abs(),
+                    std,
+                });
             }
         }
     }
-    (inside, compared)
+    compared
 }
 
 #[cfg(test)]

@@ -1,0 +1,173 @@
+//! How sure the parameters of the named effects are.
+//!
+//! Noise is the smaller part of it. Model error repeats itself from stroke to stroke and looks like certainty: it shows where parts of the
+//! campaign that should agree do not, and where the answer depends on what the bladder is allowed. So the variance of a parameter is
+//!
+//! ```text
+//! s² = max(half-strokes, pressures, recordings, quarters of the time) + (θ_one bladder − θ)² + (θ_free tables − θ)²
+//! ```
+//! where the first is the scatter of whole half-strokes' scores, the next three are jackknives over groups left out, and the last terms
+//! are what the estimate moves by when the same effect stands beside another base.
+
+use rayon::prelude::*;
+
+use super::baselines::{self, Kind};
+use super::candidates::{self, Candidate, Trial};
+use super::held_out::thin;
+use super::linear::{dot, energy};
+use super::rows::Rows;
+use super::select::Found;
+
+/// One free number of the named effects, with what the force changes by per unit of it.
+struct Tangent {
+    effect: usize,
+    parameter: usize,
+    column: Vec<f64>,
+}
+
+fn tangents(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<Tangent> {
+    let mut tangents = Vec::new();
+    for (effect, taken) in found.taken.iter().enumerate() {
+        let trial = &taken.trial;
+        let candidate = &library[trial.candidate];
+        let sized = trial.amplitudes.iter().map(|a| *a != 0.0).collect::<Vec<_>>();
+        if !sized.contains(&true) {
+            continue;
+        }
+        for (parameter, column) in candidate.columns(&trial.shapes, rows).into_iter().enumerate() {
+            if sized[parameter] {
+                tangents.push(Tangent { effect, parameter, column });
+            }
+        }
+        let value = |shapes: &[f64]| {
+            candidates::trace(&Trial { shapes: shapes.to_vec(), ..trial.clone() }, library, rows)
+        };
+        for (j, s) in trial.shapes.iter().enumerate() {
+            let h = 0.02 * s.abs().max(1e-9);
+            let (mut up, mut down) = (trial.shapes.clone(), trial.shapes.clone());
+            up[j] += h;
+            down[j] -= h;
+            let (up, down) = (value(&up), value(&down));
+            let column = up.iter().zip(&down).map(|(u, d)| (u - d) / (2.0 * h)).collect();
+            tangents.push(Tangent { effect, parameter: trial.amplitudes.len() + j, column });
+        }
+    }
+    tangents
+}
+
+/// Standard deviations of all parameters of the chosen effects; none where the recordings do not determine it.
+pub(crate) fn deviations(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<Vec<Option<f64>>> {
+    let tangents = tangents(found, library, rows);
+    let mut result: Vec<Vec<Option<f64>>> =
+        found.taken.iter().map(|t| vec![None; t.trial.amplitudes.len() + t.trial.shapes.len()]).collect();
+    if tangents.is_empty() {
+        return result;
+    }
+    let by_strokes = by_strokes(found, &tangents, rows);
+    let spread = Spread::of(found, &tangents, rows);
+    for (i, t) in tangents.iter().enumerate() {
+        let Some(strokes) = by_strokes[i] else { continue };
+        let variance = strokes.max(spread.groups[i]) + spread.bases[i];
+        if variance.is_finite() {
+            result[t.effect][t.parameter] = Some(variance.sqrt());
+        }
+    }
+    result
+}
+
+/// Variances by the scatter of whole half-strokes: amplitudes exactly, shapes by their linearised traces.
+fn by_strokes(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<Option<f64>> {
+    // The bare baseline's span, not the full one's, which holds the amplitudes themselves.
+    let base = baselines::fit(rows, found.full.kind, &[]);
+    let columns: Vec<Vec<f64>> = tangents.iter().map(|t| t.column.clone()).collect();
+    let z: Vec<Vec<f64>> = baselines::projected(&columns, &rows.root_weight, &base.span);
+    let n = z.len();
+    let gram: Vec<Vec<f64>> = z.iter().map(|a| z.iter().map(|b| dot(a, b)).collect()).collect();
+    let all: Vec<usize> = (0..n).collect();
+    (0..n)
+        .map(|i| {
+            // Row i of the inverse of the gram matrix, then the scatter of the blocks' scores along it.
+            let unit: Vec<f64> = (0..n).map(|j| f64::from(u8::from(i == j))).collect();
+            let row = super::linear::solve_symmetric(&gram, &unit, &all)?;
+            let mut per_block = vec![0.0; rows.blocks];
+            for k in 0..rows.len() {
+                let influence: f64 = row.iter().zip(&z).map(|(r, z)| r * z[k]).sum();
+                per_block[rows.block[k] as usize] += influence * found.full.residual[k];
+            }
+            let m = rows.blocks.max(2) as f64;
+            let variance = energy(&per_block) * m / (m - 1.0).max(1.0);
+            variance.is_finite().then_some(variance)
+        })
+        .collect()
+}
+
+/// How far the estimates move with what they are made from, as variances.
+struct Spread {
+    /// With a pressure, a recording or a quarter of the time left out: the largest of the three jackknives.
+    groups: Vec<f64>,
+    /// With one bladder for all pressures and with free tables instead of what lies between.
+    bases: Vec<f64>,
+}
+
+/// With more recordings than this none is left out by itself: then pressures and quarters of the time tell.
+const MOST_RECORDINGS: usize = 12;
+
+impl Spread {
+    fn of(found: &Found, tangents: &[Tangent], rows: &Rows) -> Self {
+        let mut columns: Vec<Vec<f64>> = tangents.iter().map(|t| t.column.clone()).collect();
+        let numbers = columns.len();
+        columns.extend(found.traces.iter().cloned());
+        let (mut thin, mut columns) = thin(rows, &columns);
+        // What is left to the tangents is how far the estimate is off.
+        for trace in columns.split_off(numbers) {
+            thin.force.iter_mut().zip(&trace).for_each(|(f, t)| *f -= t);
+        }
+        let moved = |rows: &Rows, kind: Kind| baselines::fit(rows, kind, &columns).amplitudes;
+        let kind = found.full.kind;
+        let here = moved(&thin, kind);
+        let quarter = thin.blocks.div_ceil(4).max(1) as u32;
+        let quarters: Vec<u32> = thin.block.iter().map(|b| b / quarter).collect();
+        let mut groups = vec![0.0_f64; numbers];
+        for grouping in [&thin.level, &thin.recording, &quarters] {
+            let variances = jackknife(&thin, grouping, &|blind| moved(blind, kind));
+            groups.iter_mut().zip(variances).for_each(|(g, v)| *g = g.max(v));
+        }
+        let mut bases = vec![0.0; numbers];
+        for other in [Kind::Stiff, Kind::Flexible(4)] {
+            for ((b, there), here) in bases.iter_mut().zip(moved(&thin, other)).zip(&here) {
+                *b += (there - here).powi(2);
+            }
+        }
+        Self { groups, bases }
+    }
+}
+
+/// Variances of estimates by leaving out one group at a time; empty where there are too few groups to tell, or too many to try.
+fn jackknife(rows: &Rows, group: &[u32], estimate: &(dyn Fn(&Rows) -> Vec<f64> + Sync)) -> Vec<f64> {
+    let seen = group.iter().zip(&rows.root_weight).filter(|(_, w)| **w > 0.0);
+    let mut groups: Vec<u32> = seen.map(|(g, _)| *g).collect();
+    groups.sort_unstable();
+    groups.dedup();
+    if !(3..=MOST_RECORDINGS).contains(&groups.len()) {
+        return Vec::new();
+    }
+    let without: Vec<Vec<f64>> = groups
+        .par_iter()
+        .map(|g| {
+            let mut blind = rows.clone();
+            for (w, of) in blind.root_weight.iter_mut().zip(group) {
+                if of == g {
+                    *w = 0.0;
+                }
+            }
+            estimate(&blind)
+        })
+        .collect();
+    let n = without.len() as f64;
+    (0..without[0].len())
+        .map(|i| {
+            let mean = without.iter().map(|w| w[i]).sum::<f64>() / n;
+            (n - 1.0) / n * without.iter().map(|w| (w[i] - mean).powi(2)).sum::<f64>()
+        })
+        .collect()
+}

@@ -1,0 +1,298 @@
+//! The tool on real recordings as they are: isometric pressure staircases of a commercial 10 mm muscle, two sets, eleven lengths. What it
+//! says is put beside what is written about these recordings; what it predicts of unseen ones beside the lab's own formula.
+
+use crate::answer::{Answer, run_limited};
+use crate::queue::in_order;
+use serde_json::Value;
+use std::error::Error;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+/// A set of recordings: its folder's year, its recordings, and the descriptions of its muscles.
+struct Set {
+    year: &'static str,
+    muscles: &'static [(&'static str, &'static str)],
+}
+
+const SETS: [Set; 2] = [
+    Set {
+        year: "2022",
+        muscles: &[
+            ("83mm", "festo10_cut100mm"),
+            ("132mm", "festo10_cut150mm"),
+            ("182mm", "festo10_cut200mm"),
+            ("233mm", "festo10_cut250mm"),
+            ("281mm", "festo10_cut300mm"),
+            ("382mm", "festo10_cut400mm"),
+        ],
+    },
+    Set {
+        year: "2021",
+        muscles: &[
+            ("13cm", "festo10_rest120mm_13cm"),
+            ("23cm", "festo10_rest219mm_23cm"),
+            ("27cm", "festo10_rest257mm_27cm"),
+            ("29cm", "festo10_rest281mm_29cm"),
+            ("30cm", "festo10_rest281mm_30cm"),
+        ],
+    },
+];
+
+/// What is written about the recordings, and which answers would say it.
+struct Written {
+    what: &'static str,
+    effects: &'static [&'static str],
+    regions: &'static [&'static str],
+    words: &'static [&'static str],
+}
+
+const WRITTEN: [Written; 5] = [
+    Written {
+        what: "The first run of a mounting is low: the muscle runs in, and again whenever the mounting is changed",
+        effects: &["mullins-softening", "cyclic-softening", "permanent-set", "breakaway-friction"],
+        regions: &["recording", "cycle", "time"],
+        words: &[],
+    },
+    Written {
+        what: "At constant pressure and length the force creeps, and remembers earlier runs",
+        effects: &["stress-relaxation", "log-creep", "permanent-set"],
+        regions: &["hold-time", "time"],
+        words: &["at rest", "creep"],
+    },
+    Written {
+        what: "A gap between filling and emptying that grows with contraction",
+        effects: &[
+            "friction-asymmetry",
+            "coulomb-friction",
+            "pressure-friction",
+            "seal-friction",
+            "presliding-hysteresis",
+            "minor-loop-memory",
+        ],
+        regions: &["direction", "contraction"],
+        words: &[],
+    },
+    Written {
+        what: "Ends that are not cylinders: the blocked force grows with the muscle's length",
+        effects: &["tip-effect", "contact-loss", "braid-elasticity"],
+        regions: &[],
+        words: &["ends that are not"],
+    },
+    Written {
+        what: "Mounted lengths by tape measure, to within a millimetre",
+        effects: &["displacement-offset", "end-slip"],
+        regions: &["contraction"],
+        words: &["mounting"],
+    },
+];
+
+/// What was asked of a muscle, and the answer.
+struct Asked {
+    label: String,
+    answer: Result<(Answer, Value), String>,
+}
+
+fn project() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn description(year: &str, muscle: &str) -> PathBuf {
+    project().join(format!("examples/muscles/festo10-{year}-{muscle}.toml"))
+}
+
+fn import(year: &str, what: &str) -> PathBuf {
+    project().join(format!("examples/imports/festo-{year}-{what}.toml"))
+}
+
+fn json(path: &Path) -> Result<Value, String> {
+    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    serde_json::from_str(&text).map_err(|e| e.to_string())
+}
+
+fn diagnose(data: &Path, output: &Path, host: &Path, year: &str, muscle: &str, file: &str) -> Asked {
+    let asked = || {
+        let answer = output.join(format!("{year}-{muscle}.json"));
+        let mut c = Command::new(host);
+        c.arg("diagnose").arg("--quiet").arg("--muscle").arg(description(year, muscle));
+        c.arg("--import").arg(import(year, "staircase"));
+        c.arg(data.join(format!("aarl-festo-10mm-{year}")).join(format!("{file}.csv")));
+        c.arg("--json").arg(&answer);
+        run_limited(&mut c, Duration::from_secs(300))?;
+        let value = json(&answer)?;
+        Ok((serde_json::from_value(value.clone()).map_err(|e| e.to_string())?, value))
+    };
+    Asked { label: format!("{year}, {muscle}"), answer: asked() }
+}
+
+fn evaluate(data: &Path, output: &Path, host: &Path, set: &Set) -> Result<Value, String> {
+    let answer = output.join(format!("evaluate-{}.json", set.year));
+    let mut c = Command::new(host);
+    c.arg("evaluate").arg("--quiet");
+    for (muscle, _) in set.muscles {
+        c.arg("--muscle").arg(description(set.year, muscle));
+    }
+    c.arg("--import").arg(import(set.year, "settled")).args(["--fit-geometry", "--fit-lengths"]);
+    c.args(["--published", "bolen-10mm", "--json"]).arg(&answer);
+    c.arg(data.join(format!("aarl-festo-10mm-{}", set.year)).join("settled_points.csv"));
+    run_limited(&mut c, Duration::from_secs(600))?;
+    json(&answer)
+}
+
+/// Asks about every muscle, and writes festo.md.
+pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>> {
+    std::fs::create_dir_all(output)?;
+    let cases: Vec<(&str, &str, &str)> =
+        SETS.iter().flat_map(|s| s.muscles.iter().map(|m| (s.year, m.0, m.1))).collect();
+    let asked = in_order(&cases, |c| Ok(diagnose(data, output, host, c.0, c.1, c.2)))?;
+    let mut text = String::from(
+        "# Real recordings as they are\n\nWritten by `cargo run --release -p trials -- festo -o DIR --page docs/src/festo.md`; nothing here is \
+         typed by hand. Isometric pressure staircases of a commercial 10 mm fluidic muscle (two sets of one laboratory, eleven lengths, \
+         `../shared/data`, which is not part of the project), as they were recorded. The tool sees the columns only; what is written about \
+         these recordings stands below beside what it says. The muscle is never moved under pressure, so strokes, speeds and viscous \
+         friction cannot be judged.\n\n## What it says\n\n\
+         | set, muscle | verdict | named (probability, share explained) | where | unseen rows before → after, N |\n\
+         | --- | --- | --- | --- | --- |\n",
+    );
+    for a in &asked {
+        line(&mut text, a);
+    }
+    beside(&mut text, &asked);
+    text.push_str(
+        "\n## Recordings it has not seen\n\nMean error in percent of the blocked force at the highest pressure, of the settled points: each run, each \
+         contraction, each length predicted from all others (`host evaluate`), beside the laboratory's published formula on the rows of \
+         the unseen runs (its coefficients were fitted to its own recordings, these among them).\n\n\
+         | set, muscle | unseen runs | the lab's formula | unseen contractions | unseen length | end effect by the other lengths, mm |\n\
+         | --- | --- | --- | --- | --- | --- |\n",
+    );
+    for set in &SETS {
+        match evaluate(data, output, host, set) {
+            Ok(e) => errors(&mut text, set.year, &e),
+            Err(e) => {
+                let _ = writeln!(text, "| {} | failed: {} | | | | |", set.year, e.replace('|', "/"));
+            }
+        }
+    }
+    std::fs::write(output.join("festo.md"), &text)?;
+    println!("{text}");
+    Ok(())
+}
+
+fn line(text: &mut String, asked: &Asked) {
+    let (a, whole) = match &asked.answer {
+        Ok(a) => a,
+        Err(e) => {
+            let _ = writeln!(text, "| {} | failed: {} | | | |", asked.label, e.replace('|', "/"));
+            return;
+        }
+    };
+    let of = |v: &Value, key: &str| v.get(key).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    let entries = whole.get("missing").and_then(Value::as_array).cloned().unwrap_or_default();
+    let named: Vec<String> = a
+        .missing
+        .iter()
+        .zip(&entries)
+        .map(|(m, v)| {
+            let share = 100.0 * of(v, "share_explained");
+            format!("{} ({:.2}, {share:.0} %)", m.effect, m.probability.unwrap_or(0.0))
+        })
+        .collect();
+    let places: Vec<&str> = whole
+        .get("where")
+        .and_then(Value::as_array)
+        .map(|w| w.iter().take(2).filter_map(|r| r.get("words").and_then(Value::as_str)).collect())
+        .unwrap_or_default();
+    let held = whole.get("held_out").cloned().unwrap_or_default();
+    let _ = writeln!(
+        text,
+        "| {} | {} | {} | {} | {:.2} → {:.2} |",
+        asked.label,
+        a.verdict,
+        named.join(", "),
+        places.join("; "),
+        of(&held, "rms_before_N"),
+        of(&held, "rms_after_N")
+    );
+}
+
+/// What is written about the recordings, and the answers that say it.
+fn beside(text: &mut String, asked: &[Asked]) {
+    text.push_str(
+        "\n## Beside what is written about them\n\nA name counts where it is one of those that would say it, a set where such a name is \
+         confusable with what is named, a place where the misfit is located on such a coordinate, \"could be\" where such an effect is said \
+         to be possible at more than a hundredth of the blocked force.\n\n\
+         | written | would be said by | named | in a set | located there | could be hidden |\n| --- | --- | --- | --- | --- | --- |\n",
+    );
+    let answers: Vec<(&str, &Answer, &Value)> =
+        asked.iter().filter_map(|a| a.answer.as_ref().ok().map(|(x, v)| (a.label.as_str(), x, v))).collect();
+    for w in &WRITTEN {
+        let says = |name: &str| w.effects.contains(&name);
+        let who = |test: &dyn Fn(&Answer, &Value) -> bool| {
+            let k = answers.iter().filter(|(_, a, v)| test(a, v)).count();
+            format!("{k} of {}", answers.len())
+        };
+        let named = who(&|a, _| a.missing.iter().any(|m| says(&m.effect)));
+        let set = who(&|a, _| a.missing.iter().any(|m| m.confusable_with.iter().any(|c| says(c))));
+        let placed = who(&|a, _| {
+            let told = a.remarks.iter().any(|r| w.words.iter().any(|x| r.contains(x)));
+            told || a.regions.iter().any(|r| w.regions.contains(&r.coordinate.as_str()))
+        });
+        let hidden = who(&|a, v| {
+            let blocked = v.get("blocked_force_N").and_then(Value::as_f64).unwrap_or(f64::NAN);
+            a.considered.iter().any(|c| says(&c.effect) && c.hidden_up_to.is_none_or(|n| n > 0.01 * blocked))
+        });
+        let _ = writeln!(
+            text,
+            "| {} | {} | {named} | {set} | {placed} | {hidden} |",
+            w.what,
+            w.effects.join(", ")
+        );
+    }
+}
+
+fn errors(text: &mut String, year: &str, evaluated: &Value) {
+    let none = Vec::new();
+    let muscles = evaluated.get("muscles").and_then(Value::as_array).unwrap_or(&none);
+    let mut sums = [(0.0, 0); 4];
+    for m in muscles {
+        let percent = |path: &[&str]| path.iter().try_fold(m, |v, k| v.get(k)).and_then(Value::as_f64);
+        let cells = [
+            percent(&["unseen_runs", "table", "mean_pct"]),
+            percent(&["unseen_runs", "published", "mean_pct"]),
+            percent(&["unseen_contractions", "table", "mean_pct"]),
+            percent(&["unseen_length", "table", "mean_pct"]),
+        ];
+        for (sum, c) in sums.iter_mut().zip(cells) {
+            if let Some(c) = c {
+                *sum = (sum.0 + c, sum.1 + 1);
+            }
+        }
+        let name = m.get("muscle").and_then(Value::as_str).unwrap_or("");
+        let shown = cells.map(|c| c.map_or("–".into(), |c| format!("{c:.2} %"))).join(" | ");
+        let end = percent(&["unseen_length", "end_effect_mm"]).map_or("–".into(), |e| format!("{e:.1}"));
+        let _ = writeln!(text, "| {year}, {name} | {shown} | {end} |");
+    }
+    let means = sums.map(|(s, n)| if n > 0 { format!("{:.2} %", s / f64::from(n)) } else { "–".into() });
+    let _ = writeln!(text, "| **{year}, mean** | {} | |", means.join(" | "));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_muscle_and_import_that_is_asked_with_is_among_the_examples() {
+        for set in &SETS {
+            assert!(import(set.year, "staircase").exists() && import(set.year, "settled").exists());
+            assert!(set.muscles.iter().all(|m| description(set.year, m.0).exists()), "{}", set.year);
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_asked_by_names_of_the_catalogue() {
+        for name in WRITTEN.iter().flat_map(|w| w.effects) {
+            assert!(crate::names::owner(name).is_some(), "{name}");
+        }
+    }
+}
