@@ -148,6 +148,13 @@ pub(super) fn judge(missing: &mut [Missing], found: &Found, rows: &Rows, held: &
         m.given = true;
         m.probability = 1.0;
         m.supported = sized && likely && helps;
+        if !m.supported {
+            // What is not there has no rivals.
+            m.confusable_with.clear();
+        }
+        if !sized {
+            m.peak_N = 0.0;
+        }
         m.why = if !sized {
             "it was given; the recordings give it no size: they do not show it, or contradict it".to_owned()
         } else if m.supported {

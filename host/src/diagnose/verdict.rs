@@ -48,7 +48,7 @@ pub struct ParameterValue {
     pub name: String,
     /// Its value, SI.
     pub value: f64,
-    /// Its standard deviation, by what groups of rows and other bases make of it; absent where the data do not determine it.
+    /// Its standard deviation, by what groups of rows make of it and how inexact laws are; absent where the data do not determine it.
     pub std: Option<f64>,
     /// Its SI unit.
     pub unit: String,

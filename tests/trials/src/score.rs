@@ -205,6 +205,19 @@ const COMPARABLE: [&str; 13] = [
     "pressure-sensor-lag",
 ];
 
+/// A true value as the tool's parameter of that name means it.
+fn as_meant(effect: &str, value: f64) -> f64 {
+    match effect {
+        // The bench gives the leak as a part of the line's conductance; the part of the pressure that is lost is less.
+        "leak" => value / (1.0 + value),
+        // A gauge that reads (1 + g) of the truth has to be corrected by 1/(1 + g) − 1.
+        "gauge-gain" => value / (1.0 + value),
+        // The bench's joint bears softly on a tenth of its play at either side: what is free is the rest.
+        "backlash" => 0.8 * value,
+        _ => value,
+    }
+}
+
 /// A value in the SI unit of its dimension, where the unit is known.
 fn si(value: f64, unit: &str) -> Option<(f64, &'static str)> {
     let unit = unit.replace(['·', '⋅', '*'], " ").replace(['²', '^'], "2");
@@ -236,7 +249,7 @@ fn intervals(truth: &TrialTruth, missing: &[&Missing]) -> Vec<Interval> {
     for effect in truth.effects.iter().filter(|e| COMPARABLE.contains(&e.name.as_str())) {
         let Some(m) = missing.iter().find(|m| m.effect == effect.name) else { continue };
         for p in &effect.parameters {
-            let Some((want, dimension)) = si(p.value, &p.unit) else { continue };
+            let Some((want, dimension)) = si(as_meant(&effect.name, p.value), &p.unit) else { continue };
             let candidates: Vec<(f64, f64)> = m
                 .parameters
                 .iter()
