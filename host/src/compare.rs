@@ -18,7 +18,7 @@ pub struct Column {
     pub mean: f64,
     /// Largest size of B − A.
     pub largest: f64,
-    /// When that was, s after the start.
+    /// When that was, s after the start; 0 where nothing differs.
     pub largest_at: f64,
     /// B − A at every row that was compared.
     pub difference: Vec<f64>,
@@ -67,7 +67,10 @@ pub fn compare(a: &Recording, b: &Recording) -> Result<Comparison> {
                 at += 1;
             }
             let share = ((t - b.time[at - 1]) / (b.time[at] - b.time[at - 1])).clamp(0.0, 1.0);
-            let difference = scale * (y[at - 1] + share * (y[at] - y[at - 1]) - x[i]);
+            let read = y[at - 1] + share * (y[at] - y[at - 1]);
+            // Joining by lines rounds: what differs by the last digits only does not differ.
+            let same = (read - x[i]).abs() <= 1e-12 * (y[at - 1].abs() + y[at].abs() + x[i].abs());
+            let difference = if same { 0.0 } else { scale * (read - x[i]) };
             column.rms += difference * difference;
             column.mean += difference;
             column.difference.push(difference);
@@ -91,6 +94,10 @@ impl Comparison {
         text += &format!("{:<18}{:>12}{:>12}{:>12}{:>10}\n", "", "rms", "mean", "largest", "at s");
         for c in &self.columns {
             let name = format!("{}, {}", c.name, c.unit);
+            if c.largest == 0.0 {
+                text += &format!("{name:<18}{:>12}\n", "the same");
+                continue;
+            }
             text += &format!(
                 "{name:<18}{:>12.4}{:>12.4}{:>12.4}{:>10.3}\n",
                 c.rms, c.mean, c.largest, c.largest_at

@@ -3,8 +3,9 @@
 //! ```text
 //! F = (1 − s k_F(P)) [ (P − P0) g(L) + Σ_k E_k(P) c_k(L) ]
 //! ```
-//! `P0`, the `E_k` and `k_F` at every node of pressure are found together (thesis of E. G. Hocking, University of Maryland
-//! 2012, chapter 3, has each pressure by itself). The steps, one file each:
+//! `F` in N of pressure `P` (Pa) and length `L` (m); `g` and `c_k` (m²) are geometry alone and stand in [`basis`]; `s` is +1 while the
+//! muscle shortens, −1 while it lengthens. `P0` (Pa), the `E_k` (Pa) and `k_F` at every node of pressure are found together (thesis of
+//! E. G. Hocking, University of Maryland 2012, chapter 3, has each pressure by itself). The steps, one file each:
 //!
 //! | step | file |
 //! | --- | --- |

@@ -189,3 +189,25 @@ fn settings_are_read_back_and_wrong_ones_refused_by_name() {
     let trace = std::fs::read_to_string(bench.folder.join("trace.csv")).unwrap();
     assert!(trace.starts_with("time_s,pressure_Pa,command_Pa\n") && trace.lines().count() > 100);
 }
+
+/// `host demo` is the first thing a new user runs: every run of it must be there from its first second to its last.
+#[test]
+fn the_demo_tells_the_whole_story() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_host"))
+        .args(["demo", "--on", "native", "--json", "-o"])
+        .arg(folder.path())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let share = |law: usize| told["tracking"][law]["sine_rms_pct"].as_f64().unwrap();
+    assert_eq!(told["tracking"][0]["feed_forward"], "table");
+    assert!(share(0) < 2.0 && share(1) > 10.0, "{told}");
+    for (name, seconds) in [("sine", 5), ("steps", 4)] {
+        let text = std::fs::read_to_string(folder.path().join(format!("run-table-{name}.csv"))).unwrap();
+        let rows = text.lines().count() - 1;
+        assert!(rows.abs_diff(1000 * seconds) < 50, "{rows} rows of {name}");
+    }
+    assert!(folder.path().join("demo.html").exists());
+}

@@ -5,10 +5,12 @@
 
 use std::path::{Path, PathBuf};
 
+use host::fit::nodes::pressures;
 use host::fit::other_length::unseen_length;
+use host::fit::points::points;
 use host::fit::{Options, fit};
 use host::muscle_description::MuscleDescription;
-use host::recording::segment::{Motion, PressureLevels};
+use host::recording::segment::Motion;
 use host::recording::{Campaign, Clock, Import, Reader};
 
 fn project() -> PathBuf {
@@ -41,7 +43,8 @@ fn every_muscle_of_2022_has_its_settled_points() {
         assert_eq!(campaign.clock, Clock::Separate);
         assert_eq!(campaign.warnings, Vec::<String>::new());
         assert!(campaign.recordings.iter().all(|r| r.held_stroke().is_some() && r.force.is_some()));
-        assert!(matches!(PressureLevels::of(&campaign.recordings), PressureLevels::Continuous { .. }));
+        let spread = pressures(&points(&campaign, &Motion::of_campaign(&campaign)), 620e3);
+        assert!(!spread.held, "{:?}", spread.levels);
         rows += campaign.samples();
     }
     assert_eq!(rows, 3925);

@@ -73,7 +73,7 @@ fn every_bad_input_is_told_with_place_and_remedy() {
         ("same", with_header("time_s,pressure_kPa,displacement_mm,pressure_kPa")),
         ("length", with_header("time_s,pressure_kPa,length_mm,force_N")),
         ("no-header", table(20, |_| None)[HEADER.len()..].to_vec()),
-        ("semicolons", String::from_utf8(table(20, |_| None)).unwrap().replace(',', ";").into_bytes()),
+        ("bars", String::from_utf8(table(20, |_| None)).unwrap().replace(',', "|").into_bytes()),
         ("utf16", utf16.clone()),
         ("utf16-no-mark", utf16[2..].to_vec()),
         ("binary", (0..20_000u32).flat_map(|i| (i.wrapping_mul(2_654_435_761)).to_le_bytes()).collect()),

@@ -13,15 +13,16 @@ use crate::studio::server::serve;
 /// Arguments of `host studio`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  host studio\n  host studio --port /dev/ttyACM0\n  host studio --emulate mini\n\n\
+    after_help = "Examples:\n  host studio\n  host studio --port /dev/ttyACM0\n  host studio --emulate\n\n\
     The page is for this machine only. Escape vents. When the last page closes, the controller is vented and disarmed."
 )]
 pub struct Arguments {
     /// Connect to this device at once, unless an emulated one is asked for.
     #[arg(short, long, value_name = "PORT", env = "PAM_PORT")]
     port: Option<String>,
-    /// Start an emulated controller with this muscle of the virtual bench: mini, contractile, push or random:SEED.
-    #[arg(long, value_name = "MUSCLE")]
+    /// Start an emulated controller with this muscle of the virtual bench: mini (where none is named), contractile, push or
+    /// random:SEED.
+    #[arg(long, value_name = "MUSCLE", num_args = 0..=1, default_missing_value = "mini")]
     emulate: Option<String>,
     /// The page's own port; 0: any that is free.
     #[arg(long, value_name = "N", default_value_t = 0)]

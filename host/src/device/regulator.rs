@@ -53,16 +53,17 @@ const LINE_EXPLAINS: f64 = 0.97;
 /// Share of a step, at its end, that counts as settled.
 const SETTLED: f64 = 0.3;
 
-/// Steps a device's pressure between two values (Pa) and finds its regulator.
+/// Steps a device's pressure between two values (Pa) and finds its regulator, all but the deadband. The steps are commands of the
+/// regulator itself, not those that an earlier model of it makes of a wish; the device's settings are as before afterwards, whatever
+/// happens. [`Found::keep`] uses what was found.
 ///
 /// # Errors
 /// As [`run`]; [`Code::DeviceVerify`] when the pressure does not follow.
 pub fn identify(client: &mut Client, low_pa: f64, high_pa: f64) -> Result<Found> {
-    steps(client, low_pa, high_pa, &|| false)
+    with_plain_commands(client, |client| steps(client, low_pa, high_pa, &|| false))
 }
 
-/// The same with the regulator's own commands, not those that an earlier model makes of them, and the deadband as well. The
-/// device's settings are as before afterwards, whatever happens; [`Found::keep`] uses what was found.
+/// As [`identify`], and the deadband as well.
 ///
 /// # Errors
 /// As [`identify`].
@@ -72,15 +73,24 @@ pub fn identify_whole(
     high_pa: f64,
     stop: &dyn Fn() -> bool,
 ) -> Result<Found> {
+    with_plain_commands(client, |client| {
+        let found = steps(client, low_pa, high_pa, stop)?;
+        let deadband_pa = deadband(client, 0.5 * (low_pa + high_pa), &found, stop)?;
+        Ok(Found { deadband_pa, ..found })
+    })
+}
+
+/// Measures while the device commands what it is asked for and corrects nothing.
+fn with_plain_commands(
+    client: &mut Client,
+    measure: impl FnOnce(&mut Client) -> Result<Found>,
+) -> Result<Found> {
     let before = client.call::<GetSettings>(&())?;
     let mut plain = before;
     plain.regulator =
         Regulator { gain: 1.0, offset_pa: 0.0, line_s: 0.0, lead: 0.0, deadband_pa: 0.0, ..before.regulator };
     client.call_once::<SetSettings>(&plain)?;
-    let found = steps(client, low_pa, high_pa, stop).and_then(|found| {
-        let deadband_pa = deadband(client, 0.5 * (low_pa + high_pa), &found, stop)?;
-        Ok(Found { deadband_pa, ..found })
-    });
+    let found = measure(client);
     // A device that is gone keeps what it has; the first error is the one to tell.
     let restored = client.call_once::<SetSettings>(&before);
     let found = found?;

@@ -95,12 +95,13 @@ fn follow(
     stop: impl Fn() -> bool,
     mut next: impl FnMut(f64) -> Option<f32>,
 ) -> Result<Ending> {
-    let status = client.call::<GetStatus>(&())?;
+    let mut status = client.call::<GetStatus>(&())?;
     if status.state == State::Fault {
         return Err(fault(client)?);
     }
     if status.state == State::Running {
         client.call::<Stop>(&())?;
+        status = client.call::<GetStatus>(&())?;
     }
     if status.state == State::Disarmed {
         client.call::<Arm>(&())?;
@@ -121,8 +122,9 @@ fn follow(
         match client.topic(Duration::from_millis(50))? {
             Some(Topic::Telemetry(s)) => {
                 heard = Instant::now();
-                // Samples from before the start may still be on the line.
-                if s.state != State::Running && begun.is_none() {
+                // Samples from before the start may still be on the line, those of an earlier run too.
+                let early = s.state != State::Running || s.time_us <= status.time_us;
+                if early && begun.is_none() {
                     continue;
                 }
                 let start = *begun.get_or_insert(s.time_us);

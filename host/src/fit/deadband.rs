@@ -35,7 +35,8 @@ impl Prepared {
             Some(weight) => Smoothing { elastic: weight, friction: weight },
             None => smoothing::choose(&finer.design, &finer.parameters, &finer.weights).0,
         };
-        finer.solve(smoothing, 6);
+        finer.smoothing = smoothing;
+        finer.solve_softened();
         let data = finer.design.normal(&finer.parameters, &finer.weights);
         let penalty = finer.design.penalty(&data, smoothing.elastic, smoothing.friction);
         self.deadband_std = Some(jackknife(&finer, &penalty).root.std(Layout::DEADBAND));

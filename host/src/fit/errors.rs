@@ -9,7 +9,8 @@
 //! friction of either cancels in the model as in the measurement, so that this is eq. 24 on loops at constant pressure. It also
 //! holds where pressure moves (chunks are cut in pressure too, a hundredth of its range) and where only one branch
 //! was recorded (then the model's friction stands in for the missing branch). Samples just after a turn lie between the
-//! branches and belong to neither: they count in no mid-line.
+//! branches and belong to neither: they count in no mid-line. Nor does a chunk that holds less than a tenth of the rows of the
+//! median one: the noise of the stroke puts a row or two beyond rest length, and these are no mean of a loop.
 //!
 //! ```
 //! use host::fit::errors::{Sample, by_chunk, errors};
@@ -25,10 +26,14 @@
 
 use std::collections::BTreeMap;
 
+use super::points::median;
 use super::prepared::Prepared;
 
 /// Chunks per unit of contraction.
 pub const CHUNKS: f64 = 500.0;
+
+/// A chunk with fewer rows than this share of the median chunk's is no mid-line.
+const LEAST_ROWS: f64 = 0.1;
 
 /// One sample, or a mean over some.
 #[derive(Debug, Clone, Copy)]
@@ -89,9 +94,18 @@ pub fn by_chunk(samples: impl IntoIterator<Item = Sample>) -> Vec<ChunkError> {
         sum.residual[branch] += s.rows * s.residual;
         sum.blocked += s.rows * s.blocked;
     }
+    let mut by_group: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
+    for ((group, ..), sum) in &sums {
+        by_group.entry(*group).or_default().push(sum.rows.iter().sum());
+    }
+    let least: BTreeMap<u32, f64> =
+        by_group.into_iter().map(|(group, mut rows)| (group, LEAST_ROWS * median(&mut rows))).collect();
     sums.into_iter()
         .filter_map(|((group, _, chunk), sum)| {
             let rows: f64 = sum.rows.iter().sum();
+            if rows < least[&group] {
+                return None;
+            }
             let branches = sum.rows.iter().filter(|n| **n > 0.0).count();
             let residual: f64 =
                 (0..3).filter(|b| sum.rows[*b] > 0.0).map(|b| sum.residual[b] / sum.rows[b]).sum();
@@ -166,5 +180,13 @@ mod tests {
         let e = errors(&other, |_| true);
         assert_eq!(e.chunks, 2);
         assert!((e.mean - 2.125).abs() < 1e-12 && (e.max - 4.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_row_that_noise_puts_beyond_rest_length_is_no_mid_line() {
+        let full = (0..60).map(|i| sample(1e-4 * f64::from(i), 1.0, 0.2));
+        let e = errors(&by_chunk(full.chain([sample(-1e-5, 1.0, 20.0)])), |_| true);
+        assert_eq!(e.chunks, 3);
+        assert!((e.max - 0.1).abs() < 1e-12, "{e:?}");
     }
 }

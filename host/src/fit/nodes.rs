@@ -2,7 +2,7 @@
 
 use model_core::spline::MAX_NODES;
 
-use super::points::Points;
+use super::points::{Points, Range};
 
 /// The pressures of a campaign.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +35,10 @@ pub fn pressures(points: &Points, max_pressure: f64) -> Pressures {
     Pressures { levels, held: false, nodes: guarded(&inner, max_pressure) }
 }
 
+/// Half-widths that a level may have, as shares of the range: the steps between few pressures may be small against the ripple
+/// of the regulator and the noise of the sensor, which are what makes a level wide.
+const HALF_WIDTHS: [f64; 4] = [0.0075, 0.015, 0.03, 0.06];
+
 /// The pressures that were held, if nearly all rows lie at a few of them.
 fn held_levels(points: &Points) -> Option<Vec<f64>> {
     let range = points.pressure;
@@ -43,20 +47,41 @@ fn held_levels(points: &Points) -> Option<Vec<f64>> {
         let rows = points.rows.max(1) as f64;
         return Some(vec![points.list.iter().map(|p| f64::from(p.rows) * p.pressure).sum::<f64>() / rows]);
     }
-    let bin = |p: f64| (((p - range.low) / range.span() * BINS as f64) as usize).min(BINS - 1);
     let mut rows = vec![0.0; BINS];
     for p in &points.list {
-        rows[bin(p.pressure)] += f64::from(p.rows);
+        rows[bin(range, p.pressure)] += f64::from(p.rows);
     }
-    // Rows within ±0.75 % of the range: wider than ripple, far narrower than the step between levels.
-    let half = BINS * 3 / 400;
+    HALF_WIDTHS.into_iter().find_map(|share| {
+        let half = (BINS as f64 * share) as usize;
+        let peaks = peaks(&rows, half)?;
+        let mut sums = vec![(0.0, 0.0); peaks.len()];
+        for p in &points.list {
+            let b = bin(range, p.pressure);
+            // Twice as far as a level is wide, so that its mean is not that of the densest part alone.
+            let nearest = (0..peaks.len()).min_by_key(|i| peaks[*i].abs_diff(b));
+            if let Some(i) = nearest.filter(|i| peaks[*i].abs_diff(b) <= 2 * half) {
+                let n = f64::from(p.rows);
+                sums[i] = (sums[i].0 + n * p.pressure, sums[i].1 + n);
+            }
+        }
+        let mut levels: Vec<f64> = sums.iter().map(|(sum, n)| sum / n).collect();
+        levels.sort_by(f64::total_cmp);
+        Some(levels)
+    })
+}
+
+fn bin(range: Range, pressure: f64) -> usize {
+    (((pressure - range.low) / range.span() * BINS as f64) as usize).min(BINS - 1)
+}
+
+/// Where rows crowd within `half` bins, if nearly all of them do: `rows` counts them by bin of pressure.
+fn peaks(rows: &[f64], half: usize) -> Option<Vec<usize>> {
     let total: f64 = rows.iter().sum();
-    let near: Vec<f64> = (0..BINS)
-        .map(|i| rows[i.saturating_sub(half)..(i + half + 1).min(BINS)].iter().sum::<f64>())
-        .collect();
+    let within = |i: usize| rows[i.saturating_sub(half)..(i + half + 1).min(BINS)].iter().sum::<f64>();
+    let near: Vec<f64> = (0..BINS).map(within).collect();
+    let width = 2 * half + 1;
     // A level stands out of its surroundings, however few of all rows it holds: short strokes at low pressure are a level too.
     let stands_out = |i: usize| {
-        let width = 2 * half + 1;
         let around = [i.checked_sub(2 * width), i.checked_sub(width), Some(i + width), Some(i + 2 * width)];
         let beside: f64 = around.into_iter().flatten().filter_map(|k| near.get(k)).sum::<f64>() / 4.0;
         near[i] > 4.0 * beside && near[i] > (0.003 * total).max(8.0)
@@ -65,30 +90,13 @@ fn held_levels(points: &Points) -> Option<Vec<f64>> {
     order.sort_by(|a, b| near[*b].total_cmp(&near[*a]).then(a.cmp(b)));
     let mut peaks: Vec<usize> = Vec::new();
     for i in order {
-        if peaks.iter().all(|p| p.abs_diff(i) > 2 * half + 1) {
+        if peaks.iter().all(|p| p.abs_diff(i) > width) {
             peaks.push(i);
         }
     }
-    if peaks.is_empty() || peaks.len() > MAX_NODES - 2 {
-        return None;
-    }
-    let mut sums = vec![(0.0, 0.0); peaks.len()];
-    let mut within = 0.0;
-    for p in &points.list {
-        let b = bin(p.pressure);
-        if let Some(i) = peaks.iter().position(|k| k.abs_diff(b) <= half) {
-            let n = f64::from(p.rows);
-            sums[i] = (sums[i].0 + n * p.pressure, sums[i].1 + n);
-            within += n;
-        }
-    }
     // Ramps between levels are welcome data, but do not make the levels disappear.
-    if within < 0.8 * total {
-        return None;
-    }
-    let mut levels: Vec<f64> = sums.iter().map(|(sum, n)| sum / n).collect();
-    levels.sort_by(f64::total_cmp);
-    Some(levels)
+    let held: f64 = peaks.iter().map(|i| near[*i]).sum();
+    (!peaks.is_empty() && peaks.len() <= MAX_NODES - 2 && held >= 0.8 * total).then_some(peaks)
 }
 
 /// Nodes beyond the tested pressures: down to where the muscle begins to pull, up to what may be commanded. The evaluator
@@ -146,6 +154,35 @@ mod tests {
             assert!((f - l).abs() < 500.0, "{f} {l}");
         }
         assert_eq!(found.nodes.len(), 8, "one guard below, one above: {:?}", found.nodes);
+    }
+
+    #[test]
+    fn levels_close_to_one_another_are_found_beside_ripple_and_noise() {
+        // Two pressures 60 kPa apart under ±1.5 kPa of ripple; six under noise of 4 kPa, which is what a poor sensor reads.
+        let rippled = |level: f64| (0..3000).map(move |i| level + 1500.0 * (f64::from(i) * 0.044).sin());
+        let two = pressures(&at(rippled(300e3).chain(rippled(360e3)).collect()), 400e3);
+        assert!(two.held, "{two:?}");
+        assert_eq!(two.levels.len(), 2);
+        let noisy = |level: f64| {
+            // A sum of incommensurate waves is about normal.
+            (0..3000).map(move |i| {
+                let wave = |w: f64| (f64::from(i) * w + level).sin();
+                level + 4e3 * (wave(0.7) + wave(1.9) + wave(2.6) + wave(1.23)) / 2f64.sqrt()
+            })
+        };
+        let levels = [207e3, 276e3, 345e3, 414e3, 483e3, 552e3];
+        let six = pressures(&at(levels.into_iter().flat_map(noisy).collect()), 620e3);
+        assert!(six.held, "{six:?}");
+        assert_eq!(six.levels.len(), 6);
+        for (found, level) in six.levels.iter().zip(levels) {
+            assert!((found - level).abs() < 500.0, "{found} {level}");
+        }
+    }
+
+    #[test]
+    fn a_slow_wave_of_pressure_is_a_range() {
+        let wave = (0..5000).map(|i| 380e3 + 170e3 * (f64::from(i) * 0.01).sin());
+        assert!(!pressures(&at(wave.collect()), 620e3).held);
     }
 
     #[test]

@@ -78,6 +78,28 @@ pub struct Points {
     pub force: Range,
     /// Standard deviation of the force from row to row beside its trend, N.
     pub row_noise: f64,
+    /// Standard deviation of a single reading of the stroke, m.
+    pub stroke_noise: f64,
+}
+
+impl Points {
+    /// How far single rows scatter about their point's mean, N, by the median: noise that is correlated over some rows shows here
+    /// and not in `row_noise`. 0 where points hold too few rows to tell.
+    #[must_use]
+    pub fn scatter_within(&self) -> f64 {
+        // The range of n normal values is about 2 √(2 ln n) standard deviations.
+        let deviation =
+            |p: &Point| (p.force_range.1 - p.force_range.0) / (2.0 * (2.0 * f64::from(p.rows).ln()).sqrt());
+        median(&mut self.list.iter().filter(|p| p.rows >= 4).map(deviation).collect::<Vec<_>>())
+    }
+
+    /// Whether a turn of the motion lies just before and just after a point.
+    #[must_use]
+    pub fn beside_turn(&self, i: usize) -> (bool, bool) {
+        let here = &self.list[i];
+        let turns = |there: Option<&Point>| there.is_some_and(|p| p.block != here.block);
+        (turns(i.checked_sub(1).and_then(|k| self.list.get(k))), turns(self.list.get(i + 1)))
+    }
 }
 
 /// About how many points a campaign becomes when its motion is slow against its sampling.
@@ -100,7 +122,8 @@ pub fn points(campaign: &Campaign, motions: &[Motion]) -> Points {
     let force = Range::of(with_force().flat_map(|r| r.force.iter().flatten().copied()));
     let most_rows = (rows / AIM).max(1) as u32;
     let noise = |of: fn(&Recording) -> &[f64]| with_force().map(|r| white_noise(of(r))).fold(0.0, f64::max);
-    let stroke_step = (stroke.span() * STROKE_STEP).max(NOISE_STEP * noise(|r| &r.stroke));
+    let stroke_noise = noise(|r| &r.stroke);
+    let stroke_step = (stroke.span() * STROKE_STEP).max(NOISE_STEP * stroke_noise);
     let pressure_step = (pressure.span() * PRESSURE_STEP).max(NOISE_STEP * noise(|r| &r.pressure));
     let per_stroke = if stroke.span() > 0.0 { 1.0 / stroke.span() } else { 0.0 };
     let per_pressure = if pressure.span() > 0.0 { 1.0 / pressure.span() } else { 0.0 };
@@ -157,7 +180,7 @@ pub fn points(campaign: &Campaign, motions: &[Motion]) -> Points {
         block += 1;
     }
     let row_noise = row_noise(campaign, rows);
-    Points { list, rows, blocks: block, pressure, stroke, force, row_noise }
+    Points { list, rows, blocks: block, pressure, stroke, force, row_noise, stroke_noise }
 }
 
 /// From the median size of second differences of the force, of at most some 40,000 rows spread evenly: trends drop out, and

@@ -155,8 +155,7 @@ impl Prepared {
         if options.physical {
             self.make_physical();
         }
-        self.soften();
-        self.solve(self.smoothing, 8);
+        self.solve_softened();
     }
 }
 

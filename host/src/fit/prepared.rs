@@ -176,16 +176,27 @@ impl Prepared {
     }
 }
 
-/// Columns at strokes spread evenly over the tested range: how long a recording dwelled somewhere does not matter.
+/// Columns at strokes spread evenly over the tested range: how long a recording dwelled somewhere does not matter. Strokes that
+/// only noise sets apart are one stroke.
 fn spread(points: &Points, columns: &[Columns], used: &[Use]) -> Vec<Columns> {
     const PLACES: usize = 400;
+    /// Two readings of one length differ by less than so many standard deviations.
+    const APART: f64 = 12.0;
     let range = points.stroke;
     let per_place = if range.span() > 0.0 { PLACES as f64 / range.span() } else { 0.0 };
     let mut taken = vec![None; PLACES + 1];
     for ((p, c), u) in points.list.iter().zip(columns).zip(used) {
         if matches!(u, Use::Fitted | Use::NearTurn) {
-            taken[((p.stroke - range.low) * per_place) as usize] = Some(*c);
+            taken[((p.stroke - range.low) * per_place) as usize] = Some((p.stroke, *c));
         }
     }
-    taken.into_iter().flatten().collect()
+    let mut last = f64::NEG_INFINITY;
+    let apart = |(stroke, columns): (f64, Columns)| {
+        let far = stroke - last > APART * points.stroke_noise;
+        far.then(|| {
+            last = stroke;
+            columns
+        })
+    };
+    taken.into_iter().flatten().filter_map(apart).collect()
 }

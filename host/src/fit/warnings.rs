@@ -36,19 +36,25 @@ pub fn warnings(prepared: &Prepared, left_out: &[Option<f64>]) -> Vec<String> {
     }
     let l0 = prepared.braid.rest_length();
     let (low, high) = (points.stroke.low / l0, points.stroke.high / l0);
-    if high - low < 0.01 {
+    let order = design.orthonormal.order;
+    let one_length = design.orthonormal.rank <= 1;
+    if one_length {
+        out.push(format!(
+            "every row is at one length (contraction {low:.4}): P0 and elasticity cannot be told apart there, neither is determined \
+             though an interval is given, and the table holds at this length only; record slow strokes"
+        ));
+    } else if high - low < 0.01 {
         out.push(format!(
             "contraction covers only {low:.4} to {high:.4}: the elastic coefficients are hardly determined; record a longer stroke"
         ));
     }
-    if low > 0.01 {
+    if low > 0.01 && !one_length {
         out.push(format!(
             "the recordings begin at a contraction of {low:.3}: P0 rests on elasticity continued to rest length; record the \
              blocked force too"
         ));
     }
-    let order = design.orthonormal.order;
-    if design.orthonormal.rank < order {
+    if (2..order).contains(&design.orthonormal.rank) {
         out.push(format!(
             "the strokes determine only {} of the {order} elastic coefficients (too few different lengths); higher ones are set \
              to zero",

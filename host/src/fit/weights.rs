@@ -9,6 +9,7 @@
 
 use std::collections::HashMap;
 
+use super::design::Row;
 use super::points::{Point, Range, median};
 use super::prepared::Prepared;
 use super::screen::Use;
@@ -78,15 +79,25 @@ impl Prepared {
             .collect()
     }
 
-    /// Huber's weights: what lies beyond four times the scatter counts in proportion to its distance, not its square.
-    pub(super) fn soften(&mut self) {
-        let residuals = self.design.residuals(&self.parameters);
-        let scatter = self.scatter(&residuals);
-        for (i, w) in self.weights.iter_mut().enumerate() {
-            let limit = 4.0 * scatter[self.design.bins[self.design.rows[i].bin as usize].group as usize];
-            let r = residuals[i].abs();
-            if r > limit {
-                *w *= limit / r;
+    /// Huber's weights, and the solution that belongs to them: what lies beyond four times the scatter counts in proportion to its
+    /// distance, not its square. Weights and solution need each other, so they are found in turns: after one round the far
+    /// readings would still hold the solution where they had pulled it.
+    pub(super) fn solve_softened(&mut self) {
+        const ROUNDS: usize = 20;
+        let whole = self.weights.clone();
+        let mut residuals = self.design.residuals(&self.parameters);
+        for _ in 0..ROUNDS {
+            let by_group = self.scatter(&residuals);
+            let scatter_of = |row: &Row| by_group[self.design.bins[row.bin as usize].group as usize];
+            let scatter: Vec<f64> = self.design.rows.iter().map(scatter_of).collect();
+            let soft = |i: usize| whole[i] * (4.0 * scatter[i] / residuals[i].abs()).min(1.0);
+            self.weights = (0..whole.len()).map(soft).collect();
+            self.solve(self.smoothing, 8);
+            let moved = self.design.residuals(&self.parameters);
+            let settled = (0..whole.len()).all(|i| (moved[i] - residuals[i]).abs() <= 0.02 * scatter[i]);
+            residuals = moved;
+            if settled {
+                break;
             }
         }
     }

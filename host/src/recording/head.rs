@@ -2,6 +2,7 @@
 
 use super::cells::{Cells, Dialect};
 use super::import::{Decimal, Import};
+use super::quantity::{Named, named};
 use crate::error::{Code, Error, Result};
 
 /// The beginning of a text file: how it is cut, and what its columns are called.
@@ -21,6 +22,8 @@ impl Head {
         let mut bytes = 0;
         let mut lines = 0;
         let mut skipped = 0;
+        let mut told = None;
+        let mut remark: &[u8] = &[];
         loop {
             let rest = &text[bytes..];
             if rest.is_empty() {
@@ -30,28 +33,47 @@ impl Head {
             }
             let end = memchr::memchr(b'\n', rest).map_or(rest.len(), |e| e + 1);
             let line = rest[..end].trim_ascii_end();
-            let idle = line.is_empty() || line.first() == comment.as_ref();
-            if skipped < import.skip_lines || idle {
+            let remarked = line.first().is_some_and(|b| Some(*b) == comment);
+            // Spreadsheets tell each other the delimiter in a first line of its own.
+            let telling = line.strip_prefix(b"sep=").filter(|d| d.len() == 1 && lines == 0);
+            if let Some([delimiter]) = telling {
+                told = Some(*delimiter);
+            }
+            if remarked {
+                remark = &line[1..];
+            }
+            if skipped < import.skip_lines || line.is_empty() || remarked || telling.is_some() {
                 skipped += 1;
                 bytes += end;
                 lines += 1;
                 continue;
             }
-            let dialect = Dialect {
-                delimiter: import.delimiter()?.unwrap_or_else(|| guess_delimiter(line, import)),
-                comment,
-                decimal_comma: import.decimal == Decimal::Comma,
-            };
             let line = if line.contains(&b'\r') { Err(mac_lines()) } else { Ok(line) }?;
-            let cells = Cells::split(line, dialect).map_err(|()| {
-                Error::new(Code::RecordingWrongWidth, "a quotation mark is not closed").line(lines + 1)
-            })?;
+            let delimiter = import.delimiter()?.or(told).unwrap_or_else(|| guess_delimiter(line, import));
+            let next = rest[end..].split(|b| *b == b'\n').find(|l| !l.trim_ascii().is_empty());
+            let dialect = Dialect {
+                delimiter,
+                comment,
+                decimal_comma: import.decimal == Decimal::Comma
+                    || delimiter != b',' && has_decimal_commas(next.unwrap_or_default(), delimiter),
+            };
+            let split = |line: &[u8]| {
+                Cells::split(line, dialect).map_err(|()| {
+                    Error::new(Code::RecordingWrongWidth, "a quotation mark is not closed").line(lines + 1)
+                })
+            };
+            let cells = split(line)?;
             if import.header == Some(false) {
                 let names = (1..=cells.len()).map(|n| n.to_string()).collect();
                 return Ok(Self { dialect, names, preamble: bytes, bytes, lines });
             }
             let numbers = cells.iter().filter(|c| c.parse::<f64>().is_ok()).count();
             if numbers > 0 && numbers == cells.len() {
+                // Some programs write the names as a remark.
+                let names = split(remark.trim_ascii())?;
+                if names.len() == cells.len() && names.iter().any(|n| named(n) != Named::Other) {
+                    return Ok(Self { dialect, names, preamble: bytes, bytes, lines });
+                }
                 return Err(Error::new(Code::RecordingMissingColumn, "the file has no header line")
                     .line(lines + 1)
                     .value(String::from_utf8_lossy(&line[..line.len().min(100)]))
@@ -75,13 +97,81 @@ fn mac_lines() -> Error {
         .help("save the file with usual line ends")
 }
 
-/// A tab in the header decides, then a comma; with decimal commas, the semicolon that goes with them.
+/// A tab in the header decides, then a comma, a semicolon, a blank; with decimal commas, the semicolon that goes with them.
 fn guess_delimiter(line: &[u8], import: &Import) -> u8 {
     if line.contains(&b'\t') {
         b'\t'
     } else if import.decimal == Decimal::Comma {
         b';'
     } else {
-        b','
+        b",; ".iter().copied().find(|d| line.contains(d)).unwrap_or(b',')
+    }
+}
+
+/// Whether a row's cells are numbers with decimal commas. `207,000` may be either; `0,207`, `1207,5` and `20,7` may not.
+fn has_decimal_commas(row: &[u8], delimiter: u8) -> bool {
+    let decimal = |cell: &[u8]| {
+        let cell: Vec<u8> = cell.iter().copied().filter(|b| !b" \"+-".contains(b)).collect();
+        let mut parts = cell.split(|b| *b == b',');
+        let (Some(whole), Some(rest), None) = (parts.next(), parts.next(), parts.next()) else {
+            return false;
+        };
+        let thousands = rest.len() == 3 && whole.len() <= 3 && whole != b"0";
+        !rest.is_empty() && !thousands && whole.iter().chain(rest).all(u8::is_ascii_digit)
+    };
+    !row.contains(&b'.') && row.trim_ascii_end().split(|b| *b == delimiter).any(decimal)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write;
+
+    use crate::recording::Reader;
+
+    /// The same readings as other programs write them: what is certain needs no import description.
+    #[test]
+    fn what_spreadsheets_and_laboratory_programs_write_is_read() {
+        let rows = |delimiter: &str, comma: bool, end: &str| {
+            (0..20).fold(String::new(), |mut text, i| {
+                let cells = [0.01 * f64::from(i), 300.125, 0.5 + 0.125 * f64::from(i), 40.5].map(|v| {
+                    let cell = format!("{v:.3}");
+                    if comma { cell.replace('.', ",") } else { cell }
+                });
+                write!(text, "{}{end}", cells.join(delimiter)).expect("text grows");
+                text
+            })
+        };
+        let names =
+            |delimiter: &str| ["time_s", "pressure_kPa", "displacement_mm", "force_N"].join(delimiter);
+        let forms = [
+            format!("{}\n{}", names(","), rows(",", false, "\n")),
+            format!("\u{feff}{}\r\n{}", names(","), rows(",", false, "\r\n")),
+            format!("{}\r\n{}", names(";"), rows(";", true, "\r\n")),
+            format!("{}\n{}", names(";"), rows(";", false, "\n")),
+            format!("sep=;\r\n{}\r\n{}", names(";"), rows(";", true, "\r\n")),
+            format!("{}\n{}", names("\t"), rows("\t", true, "\n")),
+            format!("# bench 2\n{}\n{}", names(","), rows(",", false, "\n")),
+            format!("# {}\n{}", names(" "), rows(" ", false, "\n")),
+            format!("Time [s],Pressure (kPa),Displacement [mm], Force_N\n{}", rows(",", false, "\n")),
+        ];
+        let folder = tempfile::tempdir().expect("a folder");
+        let read = |n: usize, text: &str| {
+            let path = folder.path().join(format!("{n}.csv"));
+            std::fs::write(&path, text).expect("a file");
+            Reader::new().file(&path).unwrap_or_else(|e| panic!("{text}: {e}")).remove(0)
+        };
+        for (n, form) in forms.iter().enumerate() {
+            let recording = read(n, form);
+            assert_eq!(recording.len(), 20, "{form}");
+            assert!((recording.pressure[7] - 300_125.0).abs() < 1e-6, "{form}");
+            assert!((recording.stroke[19] - 2.875e-3).abs() < 1e-12, "{form}");
+        }
+    }
+
+    #[test]
+    fn a_comma_between_thousands_is_no_decimal_comma() {
+        assert!(!super::has_decimal_commas(b"1;207,000;3;40", b';'));
+        assert!(super::has_decimal_commas(b"0,010;207,000;3;40", b';'));
+        assert!(!super::has_decimal_commas(b"0.5;a,b;3", b';'));
     }
 }

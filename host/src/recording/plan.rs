@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::cells::{Want, Wanted};
 use super::import::{Column, ColumnRef, Import, constant};
-use super::quantity::{Named, Quantity, Unit, named};
+use super::quantity::{Named, Quantity, Unit, named, usual_name};
 use crate::error::{Code, Error, Result, nearest};
 
 /// What a column that is read is for.
@@ -261,14 +261,15 @@ fn usual(names: &[String], quantity: Quantity) -> Result<Usual<'_>> {
 }
 
 fn unknown_unit(quantity: Quantity, name: &str) -> Error {
-    let cause = match name.strip_prefix(quantity.name()) {
+    let usual = usual_name(name);
+    let cause = match usual.strip_prefix(quantity.name()) {
         Some("") => format!("the column `{name}` does not say its unit"),
         Some(unit) => format!("unknown unit `{}` of {}", unit.trim_start_matches('_'), quantity.name()),
         None => format!("unknown unit of {}", quantity.name()),
     };
     let headers: Vec<_> = quantity.headers().collect();
     // Only the spelling of a unit can be guessed, not another unit.
-    let near = headers.iter().find(|h| h.eq_ignore_ascii_case(name));
+    let near = headers.iter().find(|h| h.eq_ignore_ascii_case(&usual));
     let mut help = format!("the unit stands behind the last underscore: {}", quantity.unit_list());
     if let Some(near) = near {
         help = format!("did you mean `{near}`? {help}");

@@ -140,24 +140,48 @@ pub enum Named {
     Other,
 }
 
+/// A header's name in its usual form, quantity and unit parted by the last underscore: `Force [N]`, `Force (N)` and `Force_N` are
+/// `force_N`. The letters of a unit stay as they are, since `mPa` is not `MPa`.
+pub(super) fn usual_name(header: &str) -> String {
+    let header = header.trim();
+    let bracketed = [('[', ']'), ('(', ')')].into_iter().find_map(|(open, close)| {
+        let (base, unit) = header.strip_suffix(close)?.rsplit_once(open)?;
+        Some((base.trim_end_matches(['_', ' ']), unit.trim()))
+    });
+    let (base, unit) = match bracketed {
+        Some(parts) => parts,
+        // The last underscore of a bare `pressure_command` belongs to the name.
+        None if header.eq_ignore_ascii_case(Quantity::PressureCommand.name()) => (header, ""),
+        None => header.rsplit_once('_').unwrap_or((header, "")),
+    };
+    let base = base.to_lowercase().replace(' ', "_");
+    if unit.is_empty() || unit == "-" { base } else { format!("{base}_{unit}") }
+}
+
 /// Reads a header's name.
 ///
 /// ```
 /// use host::recording::{Named, Quantity, named};
 /// assert!(matches!(named("pressure_command_kPa"), Named::Known(Quantity::PressureCommand, u) if u.scale == 1e3));
+/// assert_eq!(named("Force [lbf]"), named("force_lbf"));
 /// assert_eq!(named("pressure_mmHg"), Named::UnknownUnit(Quantity::Pressure));
 /// assert_eq!(named("pressure_sd_kPa"), Named::Other);
 /// ```
 #[must_use]
 pub fn named(header: &str) -> Named {
-    let (base, unit) = match header.rsplit_once('_') {
-        // The last underscore of a bare `pressure_command` belongs to the name.
-        Some(_) if header == Quantity::PressureCommand.name() => (header, ""),
-        Some((base, unit)) => (base, unit),
-        None => (header, ""),
-    };
-    match Quantity::IN_HEADERS.into_iter().find(|q| q.name() == base) {
-        Some(quantity) => {
+    let usual = usual_name(header);
+    let known = Quantity::IN_HEADERS.into_iter().filter_map(|q| {
+        // `pressure_command_kPa` is no pressure in `command_kPa`: a unit has no underscore.
+        let unit = usual.strip_prefix(q.name())?;
+        if unit.is_empty() {
+            Some((q, ""))
+        } else {
+            Some((q, unit.strip_prefix('_').filter(|u| !u.contains('_'))?))
+        }
+    });
+    // The longest name: a bare `pressure_command` is no pressure in `command`.
+    match known.max_by_key(|(q, _)| q.name().len()) {
+        Some((quantity, unit)) => {
             quantity.unit(unit).map_or(Named::UnknownUnit(quantity), |u| Named::Known(quantity, u))
         }
         None => Named::Other,

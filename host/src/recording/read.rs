@@ -156,7 +156,9 @@ impl<'a> Reader<'a> {
     }
 
     fn description(&self) -> Cow<'a, Import> {
-        self.import.map_or_else(|| Cow::Owned(Import::default()), Cow::Borrowed)
+        // What a file of no description has for sure: a line that begins with a number sign is a remark.
+        let own = || Cow::Owned(Import { comment: Some('#'), ..Import::default() });
+        self.import.map_or_else(own, Cow::Borrowed)
     }
 
     /// Decides what to read of columns with these names.
@@ -249,10 +251,12 @@ fn rows_error(error: RowsError, head: &Head, import: &Import) -> Error {
         Fault::NotANumber => {
             let comma =
                 value.contains(',') && value.chars().all(|c| c.is_ascii_digit() || ",.-+ ".contains(c));
-            let help = if comma && import.decimal == Decimal::Point {
+            let help = if comma && !head.dialect.decimal_comma {
                 "decimals are written with a point; for decimal commas use an import description with decimal = \"comma\""
-            } else if import.decimal == Decimal::Comma && value.contains('.') {
+            } else if head.dialect.decimal_comma && value.contains('.') && import.decimal == Decimal::Comma {
                 "the import description says that decimals are written with a comma"
+            } else if head.dialect.decimal_comma && value.contains('.') {
+                "decimals are written with a comma in this file's first row; write numbers without points between thousands"
             } else {
                 "every cell of a column that is used must be a number"
             };

@@ -1,4 +1,4 @@
-//! How the muscle was moved: directions, turning points, holds, cycles, pressure levels.
+//! How the muscle was moved: directions, turning points, holds, cycles.
 //!
 //! Which way friction points: while the muscle moves, the sign of its speed; while its length is held, the way the pressure
 //! drives it (filling counts as shortening); while neither changes, the last direction stays; before anything has changed it
@@ -6,13 +6,11 @@
 //! counts from where it began, not from where it was noticed, for a sample on the wrong side costs 2 k_F F.
 
 mod holding;
-mod levels;
 mod rates;
 mod scale;
 mod turning;
 
 pub use holding::Hold;
-pub use levels::{PressureLevel, PressureLevels};
 pub use rates::Rates;
 
 use super::campaign::{Campaign, Clock};

@@ -11,8 +11,12 @@ pub fn page(a: &Recording, b: &Recording, found: &Comparison) -> Page {
     let mut page = Page::new("Two recordings compared", format!("{} and {}", names[0], names[1]));
     page.verdict(Tone::Plain, verdict(a, found));
     for c in &found.columns {
-        let note = format!("rms; {} on average, {} at most", signed(c.mean), figures(c.largest, 3));
         let label = format!("{}, B − A", title(c.name));
+        if c.largest == 0.0 {
+            page.fact(label, "the same", "at every row", Tone::Plain);
+            continue;
+        }
+        let note = format!("rms; {} on average, {} at most", signed(c.mean), figures(c.largest, 3));
         page.fact(label, format!("{} {}", figures(c.rms, 3), c.unit), note, Tone::Plain);
     }
     page.push(numbers(found));
@@ -55,6 +59,9 @@ fn verdict(a: &Recording, found: &Comparison) -> String {
     let Some(force) = found.columns.iter().find(|c| c.name == "force") else {
         return format!("Over the {seconds} s that both cover there is no force in both to compare.");
     };
+    if force.largest == 0.0 {
+        return format!("Over the {seconds} s that both cover, B reads the same force as A.");
+    }
     let largest = a.force.iter().flatten().fold(0.0f64, |m, f| m.max(f.abs()));
     let share = if largest > 0.0 {
         format!(", {} % of the largest force of A", figures(100.0 * force.mean.abs() / largest, 2))
@@ -103,8 +110,16 @@ fn over_time_of(
         &tb,
         &yb,
     );
-    let reading = "Where the curves part, the recordings differ.";
+    let same = column.largest == 0.0;
+    let reading = if same {
+        "Both are the same at every row."
+    } else {
+        "Where the curves part, the recordings differ."
+    };
     section.figure(Figure::new(column.name, capital(title), reading, both));
+    if same {
+        return;
+    }
     let difference = Panel::new(time(), Axis::new("B − A", column.unit)).line(
         "B − A",
         Colour::Series(2),
@@ -200,6 +215,7 @@ mod tests {
         );
         assert_eq!(page.subtitle, "A: before/run.csv and B: after/run.csv");
         assert!(page.markdown().contains("| force, N | 4.90 | +4.90 |"), "{}", page.markdown());
-        assert_eq!(page.figures().count(), 7);
+        // Force, its difference, and the loops; pressure and stroke are the same and have no difference to show.
+        assert_eq!(page.figures().count(), 5);
     }
 }

@@ -1,0 +1,177 @@
+//! Recordings of a kind that a tidy campaign does not have: the fit gives the truth, or says why it cannot.
+//!
+//! The truth is the thesis's own model (shared/model.md), written out here once more, so that nothing but the recording is odd.
+
+#![allow(clippy::unwrap_used, reason = "what fails here fails the test")]
+
+use std::f64::consts::PI;
+
+use host::fit::{Options, fit, result::Fit};
+use host::muscle_description::MuscleDescription;
+use host::recording::{Campaign, Recording};
+
+const REST: f64 = 39.16e-3;
+const DEADBAND: f64 = 76.5e3;
+
+fn description() -> MuscleDescription {
+    let text = "name = \"mini\"\nkind = \"contractile\"\nrest_length_mm = 39.16\nbraid_angle_deg = 77.4\n\
+                bladder_outer_diameter_mm = 3.0\nbladder_wall_mm = 0.5\n";
+    toml::from_str(text).unwrap()
+}
+
+/// `k_F`, linear in pressure as the thesis found it.
+fn friction(pressure: f64) -> f64 {
+    0.14 - 0.093 * (pressure - 207e3) / 345e3
+}
+
+/// F of a pressure (Pa), a stroke (m) and a direction, N.
+fn force(pressure: f64, stroke: f64, direction: f64) -> f64 {
+    let (angle, diameter, wall) = (77.4_f64.to_radians(), 3e-3, 0.5e-3);
+    let fibre = REST / angle.sin();
+    let turns = fibre * angle.cos() / (PI * diameter);
+    let volume = PI / 4.0 * REST * (diameter * diameter - (diameter - 2.0 * wall) * (diameter - 2.0 * wall));
+    let length = REST - stroke;
+    let radius = (fibre * fibre - length * length).sqrt() / (2.0 * PI * turns);
+    let thickness = radius - (radius * radius - volume / (PI * length)).sqrt();
+    let (radial, axial) = (radius / (diameter / 2.0) - 1.0, length / REST - 1.0);
+    let about = (pressure - 380e3) / 172e3;
+    let moduli = [
+        2e6 * (1.0 + 0.2 * about),
+        -3e6 * (1.0 + 0.3 * about),
+        4e6 * (1.0 + 0.3 * about),
+        -1.5e6 * (1.0 + 0.3 * about),
+    ];
+    let gaylord =
+        (pressure - DEADBAND) * (3.0 * length * length - fibre * fibre) / (4.0 * PI * turns * turns);
+    let elastic: f64 = (1..)
+        .zip(moduli)
+        .map(|(k, e)| {
+            let hoop = thickness * length * length * radial.powi(k) / (2.0 * PI * turns * turns * radius);
+            e * (volume / length * axial.powi(k) - hoop)
+        })
+        .sum();
+    (gaylord + elastic) * (1.0 - friction(pressure) * direction)
+}
+
+/// Normal numbers of unit variance, correlated from one to the next by `memory`.
+struct Noise {
+    state: u64,
+    memory: f64,
+    last: f64,
+}
+
+impl Noise {
+    fn new(seed: u64, memory: f64) -> Self {
+        Self { state: seed, memory, last: 0.0 }
+    }
+
+    fn uniform(&mut self) -> f64 {
+        self.state =
+            self.state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+    }
+
+    fn next(&mut self) -> f64 {
+        // Box and Muller: the tails of a sum of uniform numbers would be too short for a test of outliers.
+        let normal = (-2.0 * self.uniform().ln()).sqrt() * (2.0 * PI * self.uniform()).cos();
+        self.last = self.memory * self.last + (1.0 - self.memory * self.memory).sqrt() * normal;
+        self.last
+    }
+}
+
+/// Three strokes there and back at a pressure, which ripples by `ripple` Pa. `turned` is how many rows before each turn at rest
+/// length friction has turned already.
+fn strokes(
+    level: f64,
+    rows: usize,
+    rate: f64,
+    ripple: f64,
+    turned: usize,
+    noise: (f64, &mut Noise),
+) -> Recording {
+    let mut white = Noise::new(level as u64, 0.0);
+    let mut r =
+        Recording { force: Some(Vec::new()), name: format!("{:.0}", level / 1e3), ..Recording::default() };
+    let phase = |i: usize| (i as f64 / rows as f64 * 3.0).fract();
+    for i in 0..rows {
+        let time = i as f64 / rate;
+        let pressure = level + ripple * (2.0 * PI * 0.7 * time).sin();
+        let stroke = 2.5e-3 * (1.0 - (1.0 - 2.0 * phase(i)).abs());
+        let ahead = phase((i + turned).min(rows - 1));
+        let direction = if phase(i) < 0.5 || ahead < 0.5 { 1.0 } else { -1.0 };
+        r.time.push(time);
+        r.pressure.push(pressure + 300.0 * white.next());
+        r.stroke.push(stroke + 1e-6 * white.next());
+        r.force.as_mut().unwrap().push(force(pressure, stroke, direction) + noise.0 * noise.1.next());
+    }
+    r
+}
+
+const SIX: [f64; 6] = [207e3, 276e3, 345e3, 414e3, 483e3, 552e3];
+
+/// `P0` (Pa) within `deadband`, `k_F` within 0.005, and the friction-free force within `share` of blocked force.
+fn assert_truth(found: &Fit, deadband: f64, share: f64) {
+    let p0 = found.summary.deadband_kPa * 1e3;
+    assert!((p0 - DEADBAND).abs() < deadband, "P0 {p0} Pa; {:?}", found.summary.warnings);
+    for p in &found.summary.pressures {
+        let pressure = p.pressure_kPa * 1e3;
+        assert!((p.k_F - friction(pressure)).abs() < 0.005, "k_F {} at {pressure} Pa", p.k_F);
+        let blocked = force(pressure, 0.0, 0.0);
+        let off = (p.blocked_force_N - blocked).abs() / blocked;
+        assert!(off < share, "blocked force off by {off} at {pressure} Pa");
+    }
+}
+
+/// A row or two at each turn belong to the other branch: the stroke turned between two samples, or the instruments are not in step to
+/// the sample. They lie off by twice friction where the load line is steepest, and must not move the table.
+#[test]
+fn rows_of_the_other_branch_at_a_turn_move_nothing() {
+    let mut noise = Noise::new(1, 0.0);
+    let files = SIX.map(|p| strokes(p, 3000, 100.0, 0.0, 2, (0.05, &mut noise)));
+    let found = fit(&Campaign::new(files.to_vec()), &description(), &Options::default()).unwrap();
+    assert_truth(&found, 300.0, 0.003);
+    // Those rows stand in the mid-line that the model is judged against, two in some twenty of a chunk.
+    assert!(found.summary.max_error_pct < 2.0, "{}", found.summary.max_error_pct);
+    assert_eq!(found.summary.outliers.len(), 0, "{:?}", found.summary.outliers);
+}
+
+/// Normal noise has no outliers, however many rows there are and however long it remembers.
+#[test]
+fn correlated_noise_has_no_outliers() {
+    for memory in [0.0, 0.9, 0.995] {
+        let mut noise = Noise::new(2, memory);
+        let files = SIX.map(|p| strokes(p, 100_000, 1000.0, 0.0, 0, (0.5, &mut noise)));
+        let found = fit(&Campaign::new(files.to_vec()), &description(), &Options::default()).unwrap();
+        assert_eq!(found.summary.outliers.len(), 0, "memory {memory}: {:?}", found.summary.outliers);
+        assert_truth(&found, 500.0, 0.005);
+    }
+}
+
+/// Two pressures whose step is small against the regulator's ripple are two pressures, not a range.
+#[test]
+fn two_close_pressures_are_two_levels() {
+    let mut noise = Noise::new(3, 0.0);
+    let files = [300e3, 360e3].map(|p| strokes(p, 6000, 100.0, 1500.0, 0, (0.05, &mut noise)));
+    let found = fit(&Campaign::new(files.to_vec()), &description(), &Options::default()).unwrap();
+    let levels: Vec<f64> = found.summary.pressures.iter().map(|p| p.pressure_kPa.round()).collect();
+    assert_eq!(levels, [300.0, 360.0]);
+    assert_truth(&found, 500.0, 0.005);
+}
+
+/// At one length `P0` and elasticity are one number: said, not guessed.
+#[test]
+fn one_held_length_determines_no_deadband() {
+    let (mut force_noise, mut white) = (Noise::new(4, 0.0), Noise::new(5, 0.0));
+    let mut r = Recording { force: Some(Vec::new()), ..Recording::default() };
+    for i in 0..3000 {
+        let phase = (f64::from(i) / 1000.0).fract();
+        let pressure = 150e3 + 400e3 * (1.0 - (1.0 - 2.0 * phase).abs());
+        let direction = if phase < 0.5 { 1.0 } else { -1.0 };
+        r.time.push(f64::from(i) / 100.0);
+        r.pressure.push(pressure + 300.0 * white.next());
+        r.stroke.push(0.02 * REST + 1e-6 * white.next());
+        r.force.as_mut().unwrap().push(force(pressure, 0.02 * REST, direction) + 0.05 * force_noise.next());
+    }
+    let found = fit(&Campaign::new(vec![r]), &description(), &Options::default()).unwrap();
+    assert!(found.summary.warnings.iter().any(|w| w.contains("one length")), "{:?}", found.summary.warnings);
+}
