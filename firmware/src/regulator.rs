@@ -162,10 +162,9 @@ impl RegulatorState {
         }
     }
 
-    /// Zero pressure at once.
+    /// Zero pressure at once. Nothing of what was wanted is left, only what is still in line and muscle.
     pub fn vent(&mut self, dt: f32, air: &Air, regulator: &Regulator) {
-        self.wanted_pa = 0.0;
-        self.rate_pa_per_s = 0.0;
+        *self = Self { supplied_pa: self.supplied_pa, model_pa: self.model_pa, ..Self::default() };
         self.predict(dt, 0.0, air, regulator);
     }
 
@@ -248,6 +247,28 @@ mod tests {
         assert!(run(5e3).0.abs() < 50.0, "{:?}", run(5e3));
         let most = 300e3 + BIAS * settings.regulator.command_max_pa;
         assert!((run(-200e3).1 - most).abs() < 1.0, "{:?}", run(-200e3));
+    }
+
+    #[test]
+    fn after_a_vent_nothing_of_what_was_wanted_comes_back() {
+        let settings = Settings::default();
+        let regulator = Regulator { line_s: 5e-3, ..settings.regulator };
+        let step = |state: &mut RegulatorState, wanted: f32| {
+            let foreseen = Wish { pressure_pa: wanted, foreseen_pa: 100.0 };
+            state.step(1e-3, foreseen, 600e3, &Air::default(), &regulator, &settings.limits)
+        };
+        let mut vented = RegulatorState::default();
+        for tick in 0..500 {
+            step(&mut vented, 600.0 * tick as f32);
+            vented.observe(1e-3, 0.0, &regulator);
+        }
+        vented.vent(1e-3, &Air::default(), &regulator);
+        assert!(vented.model_pa() > 100e3, "the muscle is not empty at once");
+        // What is commanded next is what a new one would command.
+        let mut new = RegulatorState::default();
+        for wanted in [0.0, 5e3, 20e3] {
+            assert_eq!(step(&mut vented, wanted), step(&mut new, wanted));
+        }
     }
 
     #[test]

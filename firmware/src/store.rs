@@ -9,7 +9,7 @@
 //! | --- | --- |
 //! | 0x10 + side | which slot holds the table in use: [`Selected`], postcard |
 //! | 0x20 + 2·side + slot | image of a table |
-//! | 0x31 | [`Settings`], postcard (0x30 held those of layout 1, which are not read) |
+//! | 0x32 | [`Settings`], postcard (0x30 and 0x31 held those of the layouts 1 and 2, which are not read) |
 //! | 0x40 + side | generation of a table, and what its effects remember if it must survive a power cycle: a new table brings its own; postcard |
 //! | 0x50 + n | past fault n of a ring, postcard; 0x5F its next place |
 //! | 0x60 | starts of the device, `u32` |
@@ -29,12 +29,13 @@ use model_core::link::messages::{FAULT_LOG, FaultReport, Side, StoreFault, Table
 use model_core::link::settings::Settings;
 use sequential_storage::Error;
 use sequential_storage::cache::{Cache, Uncached};
-use sequential_storage::map::{MapConfig, MapStorage};
+use sequential_storage::map::{MapConfig, MapStorage, SerializationError, Value};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-/// Version of the layout.
-pub const FORMAT: u16 = 2;
+/// Version of the layout. It moves whenever anything that is kept has other fields: postcard's bytes do not say what they are,
+/// so a value of another layout would be read as if it were of this one. Its key moves with it.
+pub const FORMAT: u16 = 3;
 /// Longest item with its key, rounded up to the largest word of flash.
 const BUFFER: usize = image::MAX_LEN + 64;
 
@@ -75,11 +76,28 @@ impl Selected {
 /// What effects remember of one muscle.
 pub type Memories = Vec<Memory<f32>, MAX_EFFECTS>;
 
+/// A value on its way into the store, which writes it where the item is put together: no copy on the stack. It is read by
+/// [`Store::value`].
+struct Written<'v, V>(&'v V);
+
+impl<V: Serialize> Value<'_> for Written<'_, V> {
+    fn serialize_into(&self, buffer: &mut [u8]) -> Result<usize, SerializationError> {
+        match postcard::to_slice(self.0, buffer) {
+            Ok(used) => Ok(used.len()),
+            Err(_) => Err(SerializationError::BufferTooSmall),
+        }
+    }
+
+    fn deserialize_from(_: &[u8]) -> Result<(Self, usize), SerializationError> {
+        Err(SerializationError::InvalidFormat)
+    }
+}
+
 type NoCache = Cache<Uncached, Uncached, Uncached, u8>;
 
 const SELECTED: u8 = 0x10;
 const IMAGE: u8 = 0x20;
-const SETTINGS: u8 = 0x31;
+const SETTINGS: u8 = 0x32;
 const MEMORIES: u8 = 0x40;
 const PAST_FAULT: u8 = 0x50;
 const PAST_FAULT_NEXT: u8 = 0x5F;
@@ -91,9 +109,11 @@ fn image_key(side: Side, slot: u8) -> u8 {
 
 fn fault_of<E>(error: Error<E>) -> StoreFault {
     match error {
-        Error::FullStorage | Error::ItemTooBig | Error::BufferTooSmall(_) | Error::BufferTooBig => {
-            StoreFault::Full
-        }
+        Error::FullStorage
+        | Error::ItemTooBig
+        | Error::BufferTooSmall(_)
+        | Error::BufferTooBig
+        | Error::SerializationError(SerializationError::BufferTooSmall) => StoreFault::Full,
         _ => StoreFault::Medium,
     }
 }
@@ -135,8 +155,12 @@ impl<F: NorFlash> Store<F> {
         block_on(self.map.fetch_item::<&[u8]>(&mut self.buffer[..], &key)).map_err(fault_of)
     }
 
+    fn put(&mut self, key: u8, value: &dyn Value<'_>) -> Result<(), StoreFault> {
+        block_on(self.map.store_item_generic(&mut self.buffer[..], &key, value)).map_err(fault_of)
+    }
+
     fn put_bytes(&mut self, key: u8, bytes: &[u8]) -> Result<(), StoreFault> {
-        block_on(self.map.store_item(&mut self.buffer[..], &key, &bytes)).map_err(fault_of)
+        self.put(key, &bytes)
     }
 
     /// A small value; one that cannot be read counts as absent.
@@ -145,9 +169,7 @@ impl<F: NorFlash> Store<F> {
     }
 
     fn put_value<V: Serialize>(&mut self, key: u8, value: &V) -> Result<(), StoreFault> {
-        let mut bytes = [0; 512];
-        let used = postcard::to_slice(value, &mut bytes).map_err(|_| StoreFault::Full)?;
-        self.put_bytes(key, used)
+        self.put(key, &Written(value))
     }
 
     /// Which table of a muscle is in use.

@@ -502,6 +502,20 @@ struct Running<T> {
     memory: Memory<T>,
 }
 
+/// Called, not written into the loop over effects: a compiler takes out of a loop whatever stays the same in it, here the
+/// arithmetic of every effect there is on a context that all share, and a table that carries one would pay for all.
+impl<T: Scalar> Running<T> {
+    #[inline(never)]
+    fn step(&mut self, context: &Context<T>) {
+        self.effect.step(&self.parameters, context, &mut self.memory);
+    }
+
+    #[inline(never)]
+    fn force(&self, context: &Context<T>) -> T {
+        self.effect.force(&self.parameters, context, &self.memory)
+    }
+}
+
 impl<T: Scalar> Chain<T> {
     /// The effects of a table on a muscle as new and at rest: for running through recordings from their beginning.
     pub fn new(fitted: &[FittedEffect]) -> Self {
@@ -555,7 +569,7 @@ impl<T: Scalar> Chain<T> {
     /// Lets time pass in every memory.
     pub fn step(&mut self, context: &Context<T>) {
         for e in &mut self.effects {
-            e.effect.step(&e.parameters, context, &mut e.memory);
+            e.step(context);
         }
     }
 
@@ -563,7 +577,7 @@ impl<T: Scalar> Chain<T> {
     pub fn force(&self, context: &Context<T>) -> T {
         let mut sum = T::ZERO;
         for e in &self.effects {
-            sum += e.effect.force(&e.parameters, context, &e.memory);
+            sum += e.force(context);
         }
         sum
     }

@@ -128,7 +128,8 @@ impl<T: Scalar> Parts<T> {
 }
 
 impl<T: Scalar> Muscle<T> {
-    /// Turns a table into the form that is evaluated. Lossless but for rounding to `T`.
+    /// Turns a table into the form that is evaluated. Lossless but for rounding to `T`, in which all of it is computed: a controller
+    /// has no double precision, and its software would cost more flash than all of the model's constants.
     ///
     /// # Errors
     /// The first number of the table that cannot be used.
@@ -163,15 +164,15 @@ impl<T: Scalar> Muscle<T> {
     pub fn rebuild(&mut self, table: &MuscleTable) -> Result<(), TableError> {
         table.check()?;
         self.braid = table.geometry.cast::<T>().build().map_err(TableError::Geometry)?;
-        let in_double = |values: &[f32]| {
-            let mut double = [0.0_f64; MAX_NODES];
-            for (to, from) in double.iter_mut().zip(values) {
-                *to = f64::from(*from);
+        let in_full = |values: &[f32]| {
+            let mut full = [T::ZERO; MAX_NODES];
+            for (to, from) in full.iter_mut().zip(values) {
+                *to = T::from_f32(*from);
             }
-            double
+            full
         };
         let count = table.nodes.len();
-        let nodes = in_double(&table.nodes);
+        let nodes = in_full(&table.nodes);
         let nodes = &nodes[..count];
         self.nodes = Nodes::new(nodes);
         self.order = table.order();
@@ -187,10 +188,10 @@ impl<T: Scalar> Muscle<T> {
         let friction = table.elastic.len();
         for (k, values) in table.elastic.iter().chain([&table.friction]).enumerate() {
             let pieces = &mut self.pieces;
-            spline::each_piece(nodes, &in_double(values)[..count], &mut |n, cubic| {
+            spline::each_piece(nodes, &in_full(values)[..count], &mut |n, cubic| {
                 let piece = &mut pieces[n];
                 let to = if k == friction { &mut piece.friction } else { &mut piece.elastic[k] };
-                *to = cubic.map(T::from_f64);
+                *to = cubic;
             });
         }
         Ok(())

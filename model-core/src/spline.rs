@@ -17,35 +17,37 @@ pub type Cubic<T> = [T; 4];
 ///
 /// One node gives no segment; two give a straight line. The second derivative is continuous, and zero at both ends
 /// (C. de Boor, *A Practical Guide to Splines*, chapter IV). `values` and `nodes` are of one length, at most
-/// [`MAX_NODES`]. Computed in double precision.
+/// [`MAX_NODES`].
 #[inline]
-pub fn natural_cubic(nodes: &[f64], values: &[f64], segment: &mut dyn FnMut(usize, Cubic<f64>)) {
+pub fn natural_cubic<T: Scalar>(nodes: &[T], values: &[T], segment: &mut dyn FnMut(usize, Cubic<T>)) {
     let n = nodes.len().min(values.len()).min(MAX_NODES);
     if n < 2 {
         return;
     }
     // Second derivatives m at the nodes, from the tridiagonal system, by elimination without pivoting (it is
     // diagonally dominant).
-    let mut second = [0.0_f64; MAX_NODES];
-    let mut upper = [0.0_f64; MAX_NODES];
+    let [two, six] = [2.0, 6.0].map(T::from_f32);
+    let mut second = [T::ZERO; MAX_NODES];
+    let mut upper = [T::ZERO; MAX_NODES];
     for i in 1..n - 1 {
         let before = nodes[i] - nodes[i - 1];
         let after = nodes[i + 1] - nodes[i];
-        let bend = 6.0 * ((values[i + 1] - values[i]) / after - (values[i] - values[i - 1]) / before);
-        let diagonal = 2.0 * (before + after) - before * upper[i - 1];
+        let bend = six * ((values[i + 1] - values[i]) / after - (values[i] - values[i - 1]) / before);
+        let diagonal = two * (before + after) - before * upper[i - 1];
         upper[i] = after / diagonal;
         second[i] = (bend - before * second[i - 1]) / diagonal;
     }
     for i in (1..n - 1).rev() {
-        second[i] -= upper[i] * second[i + 1];
+        let above = upper[i] * second[i + 1];
+        second[i] -= above;
     }
     for i in 0..n - 1 {
         let h = nodes[i + 1] - nodes[i];
         let cubic = [
             values[i],
-            (values[i + 1] - values[i]) / h - h * (2.0 * second[i] + second[i + 1]) / 6.0,
-            second[i] / 2.0,
-            (second[i + 1] - second[i]) / (6.0 * h),
+            (values[i + 1] - values[i]) / h - h * (two * second[i] + second[i + 1]) / six,
+            second[i] / two,
+            (second[i + 1] - second[i]) / (six * h),
         ];
         segment(i, cubic);
     }
@@ -93,12 +95,12 @@ impl<T: Scalar> Nodes<T> {
     pub const NONE: Self = Self { edges: [T::ZERO; MAX_PIECES + 1], count: 0 };
 
     /// From increasing numbers; more than [`MAX_NODES`] are cut off.
-    pub fn new(nodes: &[f64]) -> Self {
+    pub fn new(nodes: &[T]) -> Self {
         let count = nodes.len().min(MAX_NODES);
-        let mut edges = [T::from_f64(f64::INFINITY); MAX_PIECES + 1];
-        edges[0] = T::from_f64(f64::NEG_INFINITY);
+        let mut edges = [T::from_f32(f32::INFINITY); MAX_PIECES + 1];
+        edges[0] = T::from_f32(f32::NEG_INFINITY);
         for (to, from) in edges[1..=count].iter_mut().zip(nodes) {
-            *to = T::from_f64(*from);
+            *to = *from;
         }
         Self { edges, count }
     }
@@ -149,8 +151,8 @@ impl<T: Scalar> Nodes<T> {
     }
 
     /// The cubics of all pieces of a curve that [`natural_cubic`] runs through `values` at these nodes.
-    pub fn pieces(nodes: &[f64], values: &[f64]) -> [Cubic<f64>; MAX_PIECES] {
-        let mut pieces = [[0.0; 4]; MAX_PIECES];
+    pub fn pieces(nodes: &[T], values: &[T]) -> [Cubic<T>; MAX_PIECES] {
+        let mut pieces = [[T::ZERO; 4]; MAX_PIECES];
         each_piece(nodes, values, &mut |n, cubic| pieces[n] = cubic);
         pieces
     }
@@ -159,14 +161,14 @@ impl<T: Scalar> Nodes<T> {
 /// Hands each piece of a curve to `piece` with its number, as [`Nodes::pieces`] gives them; pieces behind the last node's are
 /// left out.
 #[inline]
-pub fn each_piece(nodes: &[f64], values: &[f64], piece: &mut dyn FnMut(usize, Cubic<f64>)) {
+pub fn each_piece<T: Scalar>(nodes: &[T], values: &[T], piece: &mut dyn FnMut(usize, Cubic<T>)) {
     let count = nodes.len().min(values.len()).min(MAX_NODES);
     if count == 0 {
         return;
     }
-    piece(0, [values[0], 0.0, 0.0, 0.0]);
+    piece(0, [values[0], T::ZERO, T::ZERO, T::ZERO]);
     natural_cubic(nodes, values, &mut |n, cubic| piece(n + 1, cubic));
-    piece(count, [values[count - 1], 0.0, 0.0, 0.0]);
+    piece(count, [values[count - 1], T::ZERO, T::ZERO, T::ZERO]);
 }
 
 #[cfg(test)]

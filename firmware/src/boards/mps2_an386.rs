@@ -33,18 +33,28 @@ use model_core::link::hello::Board;
 use model_core::link::settings::Settings;
 use static_cell::StaticCell;
 
-use self::bench::{Bench, BenchUart, Benches};
+use self::bench::{Bench, BenchPipes, BenchUart, Benches};
 use self::flash::FileFlash;
-use self::uart::{Receiver, Sender, Uart};
+use self::uart::{Pipes, Receiver, Sender, Uart};
 
-/// A host that cannot be held back sends a burst of requests at once.
+/// Twice what the line of a real board needs (`nucleo_f446re.rs` has the numbers): the emulated one keeps no baud rate, so a host's burst
+/// of requests comes at once, and the emulator may leave the program without time for several milliseconds of the host's.
 const LINK_RX: usize = 1024;
 const LINK_TX: usize = 512;
 type LinkUart = Uart<LINK_RX, LINK_TX>;
 
-static LINK: LinkUart = Uart::new(0x4000_4000);
-static BENCH: BenchUart = Uart::new(0x4000_5000);
-static SECOND_BENCH: BenchUart = Uart::new(0x4000_6000);
+static LINK: LinkUart = {
+    static PIPES: Pipes<LINK_RX, LINK_TX> = Pipes::new();
+    Uart::new(0x4000_4000, &PIPES)
+};
+static BENCH: BenchUart = {
+    static PIPES: BenchPipes = Pipes::new();
+    Uart::new(0x4000_5000, &PIPES)
+};
+static SECOND_BENCH: BenchUart = {
+    static PIPES: BenchPipes = Pipes::new();
+    Uart::new(0x4000_6000, &PIPES)
+};
 
 type Port = Mutex<CriticalSectionRawMutex, Sender<LINK_RX, LINK_TX>>;
 

@@ -79,6 +79,15 @@ const FULL_SCALE: f32 = 4095.0;
 /// Longer than the erasure of a flash sector.
 const WATCHDOG_US: u32 = 4_000_000;
 
+/// What waits to go out: a line of 1 Mbaud takes 100 bytes a millisecond, so the task that sends has 2.5 ms to bring more before the
+/// line rests. Nothing keeps it longer while something is controlled: the control step above it takes hundredths of a millisecond, and
+/// the flash, which stops the processor, is only written at rest. A longest answer holds up telemetry for
+/// [`MAX_WIRE`](model_core::link::frame::MAX_WIRE) bytes, 5.2 ms; samples then wait in a queue of 16 ms
+/// (`firmware/src/shared.rs`). So 1 kHz of two muscles, less than 100 bytes a tick, would fit too.
+const SENDING: usize = 256;
+/// What has come and is not read: all that the line can bring in the 5 ms in which a longest answer goes out and nobody reads.
+const RECEIVED: usize = 512;
+
 type Port = Mutex<CriticalSectionRawMutex, BufferedUartTx<'static>>;
 
 /// The last two sectors.
@@ -305,15 +314,15 @@ fn clocks() -> Config {
 #[inline(never)]
 fn spawn(spawner: Spawner, started_by: StartedBy) -> Option<()> {
     static PORT: StaticCell<Port> = StaticCell::new();
-    static SENDING: StaticCell<[u8; 256]> = StaticCell::new();
-    static RECEIVED: StaticCell<[u8; 512]> = StaticCell::new();
+    static OUT: StaticCell<[u8; SENDING]> = StaticCell::new();
+    static IN: StaticCell<[u8; RECEIVED]> = StaticCell::new();
     let p = embassy_stm32::init(clocks());
     supply::watch();
     // Low from the first moment: vented.
     let valve = Output::new(p.PB5, Level::Low, Speed::Low);
     let mut line = usart::Config::default();
     line.baudrate = 1_000_000;
-    let (sending, received) = (SENDING.init([0; 256]), RECEIVED.init([0; 512]));
+    let (sending, received) = (OUT.init([0; SENDING]), IN.init([0; RECEIVED]));
     let uart = BufferedUart::new(p.USART2, p.PA3, p.PA2, sending, received, Interrupts, line).ok()?;
     let (sender, receiver) = uart.split();
     let shared = Shared::take(Settings::default(), Seat::single());

@@ -10,6 +10,7 @@ use model_core::link::messages::{
     TableRead, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead, Value,
 };
 use model_core::link::settings::Settings;
+use model_core::muscle::Held;
 use model_core::single;
 use model_core::units::{Length, Pressure};
 
@@ -182,8 +183,10 @@ impl<F: NorFlash> Service for Session<'_, F> {
             let pressure = Pressure::from_pascals(point.pressure_pa);
             let value = self.shared.with(|controller| {
                 let muscle = &controller.model(request.side)?.muscle;
-                let force = single::force(muscle, pressure, stroke, direction);
-                let found = single::pressure_at(muscle, stroke, direction, force, pressure, &muscle.search());
+                // As the control step does it, so that no other form of either is in the image.
+                let mut held = Held::NONE;
+                let force = single::pose(muscle, &mut held, stroke, pressure, direction);
+                let found = single::pressure_for(muscle, &held, direction, force, pressure, &muscle.search());
                 Some(Value { force_n: force.newtons(), pressure_pa: found.pressure.pascals() })
             });
             values.push(value.ok_or(Refusal::NoTable(request.side))?).map_err(|_| Refusal::Range)?;

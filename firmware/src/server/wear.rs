@@ -10,7 +10,7 @@ use model_core::effects::Memory;
 /// Writes that may follow each other at once.
 const BURST: u8 = 16;
 /// Ticks after which one more is allowed: a minute.
-const REFILL_TICKS: u64 = 60_000;
+const REFILL_TICKS: u32 = 60_000;
 /// Relative change of a memory that is worth a write.
 const WORTH: f32 = 1.0e-3;
 
@@ -31,9 +31,10 @@ impl Wear {
     /// Whether one write is allowed at a tick; it is then counted.
     pub(super) fn allows(&mut self, tick: u64) -> bool {
         // Ticks begin anew with a controller that was restarted.
-        let passed = tick.saturating_sub(self.refilled) / REFILL_TICKS;
+        let ticks = tick.saturating_sub(self.refilled).min(u64::from(u32::MAX)) as u32;
+        let passed = ticks / REFILL_TICKS;
         if passed > 0 || tick < self.refilled {
-            self.left = self.left.saturating_add(passed.min(u64::from(BURST)) as u8).min(BURST);
+            self.left = self.left.saturating_add(passed.min(u32::from(BURST)) as u8).min(BURST);
             self.refilled = tick;
         }
         let allowed = self.left > 0;
@@ -56,7 +57,7 @@ mod tests {
         let mut wear = Wear::default();
         let mut written = (0..1000).filter(|tick| wear.allows(*tick)).count();
         assert_eq!(written, usize::from(BURST));
-        written += (1..=10).filter(|minute| wear.allows(minute * REFILL_TICKS + 5)).count();
+        written += (1..=10).filter(|minute| wear.allows(minute * u64::from(REFILL_TICKS) + 5)).count();
         assert_eq!(written, usize::from(BURST) + 10);
         // An hour of starting and stopping ten times a second.
         let mut wear = Wear::default();

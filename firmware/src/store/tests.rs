@@ -295,3 +295,91 @@ fn the_log_keeps_the_last_faults_and_starts_are_counted() {
     assert_eq!(store.past_fault(FAULT_LOG as u8), Ok(None));
     assert_eq!((store.count_start(), store.count_start()), (Ok(1), Ok(2)));
 }
+
+/// What [`written`] keeps.
+fn report() -> FaultReport {
+    FaultReport {
+        fault: model_core::link::messages::Fault::PressureNotFalling,
+        side: Side::Antagonist,
+        sensor: Some(model_core::link::messages::Sensor::Pressure),
+        from: State::Running,
+        mode: Mode::Pair,
+        time_us: 123_456_789_012,
+        value: 250e3,
+        limit: 150e3,
+        last: SideSample { pressure_pa: 300e3, stroke_m: 1e-3, ..SideSample::default() },
+    }
+}
+
+fn memories() -> Memories {
+    [1.5, -2.5].map(|value| Memory::<f32>::from([value; _])).into_iter().collect()
+}
+
+/// One of everything that is kept, on an erased flash.
+fn written() -> MockFlash {
+    let mut store = open(MockFlash::erased());
+    store.commit(Side::Agonist, &table(1)).expect("room");
+    store.commit(Side::Agonist, &table(2)).expect("room");
+    let mut settings = Settings::default();
+    settings.regulator.line_s = 4.5e-3;
+    settings.pressure_band_pa = 1_234.0;
+    store.put_settings(&settings).expect("room");
+    store.put_memories(Side::Agonist, &memories()).expect("room");
+    store.put_fault(&report()).expect("room");
+    store.count_start().expect("room");
+    store.close()
+}
+
+/// A flash as text: 32 bytes a line, those that are erased at its end left out.
+fn text(flash: &MockFlash) -> std::string::String {
+    let used = flash.bytes.iter().rposition(|byte| *byte != 0xFF).map_or(0, |last| last + 1);
+    let line =
+        |bytes: &[u8]| bytes.iter().map(|byte| std::format!("{byte:02x}")).collect::<std::string::String>();
+    flash.bytes[..used].chunks(32).map(|bytes| line(bytes) + "\n").collect()
+}
+
+fn flash_of(text: &str) -> MockFlash {
+    let mut flash = MockFlash::erased();
+    let digits: std::vec::Vec<u8> = text.bytes().filter(u8::is_ascii_hexdigit).collect();
+    for (byte, pair) in flash.bytes.iter_mut().zip(digits.as_chunks::<2>().0) {
+        *byte = u8::from_str_radix(std::str::from_utf8(pair).expect("digits"), 16).expect("digits");
+    }
+    flash
+}
+
+/// If this test breaks, something that is kept has other fields: raise [`FORMAT`] and the key of what changed, run the test once with
+/// `STORE=overwrite`, which writes `format-N.txt` of the new number, and keep the files of the numbers before for the test below.
+#[test]
+fn what_this_format_wrote_is_read_and_written_alike() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("src/store/fixtures")
+        .join(std::format!("format-{FORMAT}.txt"));
+    if std::env::var_os("STORE").is_some_and(|value| value == "overwrite") {
+        std::fs::write(&path, text(&written())).expect("a file");
+    }
+    let fixture = std::fs::read_to_string(&path).expect("a fixture of this format");
+    assert!(fixture == text(&written()), "the bytes on the flash are others than format {FORMAT} has");
+    let mut store = open(flash_of(&fixture));
+    assert_eq!(kept(&mut store, Side::Agonist).as_deref(), Some(&table(2)[..]));
+    assert!(store.selected(Side::Agonist).expect("readable").is_some_and(|s| s.previous.is_some()));
+    let settings = store.settings().expect("readable").expect("kept");
+    assert_eq!((settings.regulator.line_s, settings.pressure_band_pa), (4.5e-3, 1_234.0));
+    let mut remembered = Memories::new();
+    store.each_memory(Side::Agonist, &mut |_, one| remembered.push(*one).expect("two")).expect("readable");
+    assert_eq!(remembered, memories());
+    assert_eq!(store.past_fault(0), Ok(Some(report())));
+    assert_eq!(store.count_start(), Ok(2));
+}
+
+/// A flash that the firmware of format 2 wrote: its settings know no line behind the regulator. They are not read, the device takes its
+/// defaults instead; tables, faults and starts have kept their layout.
+#[test]
+fn settings_of_format_2_are_not_taken_for_those_of_today() {
+    let mut store = open(flash_of(include_str!("fixtures/format-2.txt")));
+    assert_eq!(store.settings(), Ok(None));
+    assert_eq!(kept(&mut store, Side::Agonist).as_deref(), Some(&table(2)[..]));
+    assert_eq!(store.past_fault(0), Ok(Some(report())));
+    assert_eq!(store.count_start(), Ok(2));
+    store.put_settings(&Settings::default()).expect("room");
+    assert_eq!(store.settings(), Ok(Some(Settings::default())));
+}

@@ -12,7 +12,6 @@
 //! a receiver that lost its place waits for the next zero and is in step again, whatever came before.
 
 use cobs::CobsEncoder;
-use crc::Digest;
 use postcard::ser_flavors::Flavor;
 
 use crate::check::{self, crc32};
@@ -133,7 +132,7 @@ pub fn encode_bytes(header: Header, body: &[u8], out: &mut [u8]) -> Result<usize
 /// A frame on its way out. Each byte is checked and stuffed as it comes, so that a message is never held a second time.
 struct Writer<'a> {
     wire: CobsEncoder<'a>,
-    check: Digest<'static, u32>,
+    check: check::Digest,
     /// Bytes that there is still room for.
     room: usize,
 }

@@ -230,9 +230,15 @@ fn the_regulator_is_identified_kept_and_shown_over_a_serial_device() {
     stand.host(&["flash", "mini.pam"]);
     let settings = || json(&stand.host(&["device", "settings", "--json"]))["regulator"].clone();
     let before = settings();
-    let found = json(&stand.host(&["device", "identify", "--low", "100", "--high", "300", "--json"]));
+    let identify = ["device", "identify", "--low", "100", "--high", "300", "--json"];
+    let shown = json(&stand.host(&[&identify[..], &["--dry-run"]].concat()));
+    assert_eq!(shown["kept"], false);
+    assert_eq!(settings(), before, "a dry run leaves the settings as they are");
+    let found = json(&stand.host(&identify));
     eprintln!("{found}");
     assert_eq!(found["kept"], true);
+    let [first, second] = [&shown, &found].map(|one| number(&one["lag_s"]));
+    assert!((first / second - 1.0).abs() < 0.05, "{shown} {found}");
     let of = |name: &str| number(&found[name]);
     assert!((of("gain") - 1.0).abs() < 0.01 && of("offset_Pa").abs() < 1.5e3, "{found}");
     assert!((of("lag_s") / true_to.lag - 1.0).abs() < 0.1, "{found}");

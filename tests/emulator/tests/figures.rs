@@ -19,6 +19,9 @@ fn instruction_counts_stay_where_they_are() {
     for figure in counted.iter().filter(|figure| figure.name.starts_with("effect:")) {
         assert!(figure.mean < 600.0, "{figure:?}");
     }
+    // What the first effect of a table costs beside itself: the shape's slopes and all that effects look at.
+    let context = of("context-of-effects");
+    assert!((100.0..250.0).contains(&context.mean), "context: {context:?}");
     for figure in [force, inverse, step] {
         assert!(figure.worst <= 1.5 * figure.mean, "{figure:?}");
     }

@@ -10,7 +10,7 @@ use embassy_time::{Duration, Instant, Timer};
 use embedded_io_async::{Read, Write};
 use firmware::board::{Command, Inputs, Outputs, Plant, Readings};
 
-use super::uart::{Receiver, Sender, Uart};
+use super::uart::{Pipes, Receiver, Sender, Uart};
 use super::watchdog;
 
 const REQUEST: usize = 18;
@@ -40,6 +40,8 @@ struct Said {
 
 /// The pipes of a bench's UART.
 pub type BenchUart = Uart<64, 32>;
+/// Its pipes.
+pub type BenchPipes = Pipes<64, 32>;
 
 /// CRC-16/IBM-3740.
 fn crc16(bytes: &[u8]) -> u16 {

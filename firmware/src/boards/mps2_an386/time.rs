@@ -23,7 +23,10 @@ const ENABLE: u32 = 1 << 0;
 const ENABLE_INTERRUPT: u32 = 1 << 3;
 
 /// Timer clocks in a microsecond, the tick of embassy's time.
-const CLOCKS_PER_TICK: u64 = 25;
+const CLOCKS_PER_TICK: u32 = 25;
+/// Ticks in a wrap of 2³² clocks, and the clocks left over.
+const WRAP: (u64, u32) =
+    ((1 << 32) / CLOCKS_PER_TICK as u64, ((1_u64 << 32) % CLOCKS_PER_TICK as u64) as u32);
 /// Longest alarm that is set in one piece; the queue is looked through again when it ends.
 const LONGEST: u64 = 100_000_000;
 
@@ -38,7 +41,8 @@ embassy_time_driver::time_driver_impl!(static CLOCK: Clock = Clock {
 });
 
 impl Clock {
-    fn clocks(&self) -> u64 {
+    /// Wraps, and clocks since the last.
+    fn clocks(&self) -> (u32, u32) {
         critical_section::with(|_| {
             let mut wraps = self.wraps.load(Ordering::Relaxed);
             let mut left = Register::at(TIMER0 + VALUE).read();
@@ -48,7 +52,7 @@ impl Clock {
                 left = Register::at(TIMER0 + VALUE).read();
                 wraps = wraps.wrapping_add(1);
             }
-            (u64::from(wraps) << 32) | u64::from(u32::MAX - left)
+            (wraps, u32::MAX - left)
         })
     }
 
@@ -62,8 +66,8 @@ impl Clock {
                 return;
             }
             if let Some(wait) = next.checked_sub(self.now()).filter(|&wait| wait > 0) {
-                let clocks = wait.min(LONGEST) * CLOCKS_PER_TICK;
-                Register::at(TIMER1 + RELOAD).write(clocks as u32);
+                let clocks = wait.min(LONGEST) as u32 * CLOCKS_PER_TICK;
+                Register::at(TIMER1 + RELOAD).write(clocks);
                 Register::at(TIMER1 + CTRL).write(ENABLE | ENABLE_INTERRUPT);
                 return;
             }
@@ -73,7 +77,10 @@ impl Clock {
 
 impl Driver for Clock {
     fn now(&self) -> u64 {
-        self.clocks() / CLOCKS_PER_TICK
+        // In words: a division of 64 bits would be the only one of the image, and a kilobyte.
+        let (wraps, clocks) = self.clocks();
+        let rest = (clocks % CLOCKS_PER_TICK + wraps * WRAP.1) / CLOCKS_PER_TICK;
+        u64::from(wraps) * WRAP.0 + u64::from(clocks / CLOCKS_PER_TICK) + u64::from(rest)
     }
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {

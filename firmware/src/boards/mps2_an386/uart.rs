@@ -25,17 +25,29 @@ const ALL_ON: u32 = 0b1111;
 /// 25 MHz / 25 = 1 Mbaud.
 const DIVIDER: u32 = 25;
 
-/// One UART with pipes of `RX` and `TX` bytes.
-pub struct Uart<const RX: usize, const TX: usize> {
-    base: usize,
+/// Pipes of `RX` and `TX` bytes. A static of their own is all zeros and takes no flash.
+pub struct Pipes<const RX: usize, const TX: usize> {
     received: Pipe<CriticalSectionRawMutex, RX>,
     sending: Pipe<CriticalSectionRawMutex, TX>,
 }
 
+impl<const RX: usize, const TX: usize> Pipes<RX, TX> {
+    /// Empty ones.
+    pub const fn new() -> Self {
+        Self { received: Pipe::new(), sending: Pipe::new() }
+    }
+}
+
+/// One UART with its pipes.
+pub struct Uart<const RX: usize, const TX: usize> {
+    base: usize,
+    pipes: &'static Pipes<RX, TX>,
+}
+
 impl<const RX: usize, const TX: usize> Uart<RX, TX> {
     /// The UART at a base address.
-    pub const fn new(base: usize) -> Self {
-        Self { base, received: Pipe::new(), sending: Pipe::new() }
+    pub const fn new(base: usize, pipes: &'static Pipes<RX, TX>) -> Self {
+        Self { base, pipes }
     }
 
     fn register(&self, offset: usize) -> Register {
@@ -53,7 +65,7 @@ impl<const RX: usize, const TX: usize> Uart<RX, TX> {
         self.register(INTERRUPT).write(INTERRUPT_RX);
         while self.register(STATE).read() & RX_FULL != 0 {
             let byte = self.register(DATA).read() as u8;
-            let _ = self.received.try_write(&[byte]);
+            let _ = self.pipes.received.try_write(&[byte]);
         }
     }
 
@@ -63,7 +75,7 @@ impl<const RX: usize, const TX: usize> Uart<RX, TX> {
         critical_section::with(|_| {
             while self.register(STATE).read() & TX_FULL == 0 {
                 let mut byte = [0];
-                if self.sending.try_read(&mut byte).is_err() {
+                if self.pipes.sending.try_read(&mut byte).is_err() {
                     break;
                 }
                 self.register(DATA).write(u32::from(byte[0]));
@@ -73,7 +85,7 @@ impl<const RX: usize, const TX: usize> Uart<RX, TX> {
 
     /// Forgets what has been received and not read.
     pub fn discard(&self) {
-        self.received.clear();
+        self.pipes.received.clear();
     }
 }
 
@@ -89,7 +101,7 @@ impl<const RX: usize, const TX: usize> ErrorType for Receiver<RX, TX> {
 
 impl<const RX: usize, const TX: usize> Read for Receiver<RX, TX> {
     async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
-        Ok(self.0.received.read(buffer).await)
+        Ok(self.0.pipes.received.read(buffer).await)
     }
 }
 
@@ -99,7 +111,7 @@ impl<const RX: usize, const TX: usize> ErrorType for Sender<RX, TX> {
 
 impl<const RX: usize, const TX: usize> Write for Sender<RX, TX> {
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
-        let written = self.0.sending.write(bytes).await;
+        let written = self.0.pipes.sending.write(bytes).await;
         self.0.on_transmit();
         Ok(written)
     }
