@@ -94,12 +94,7 @@ pub fn by_chunk(samples: impl IntoIterator<Item = Sample>) -> Vec<ChunkError> {
         sum.residual[branch] += s.rows * s.residual;
         sum.blocked += s.rows * s.blocked;
     }
-    let mut by_group: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
-    for ((group, ..), sum) in &sums {
-        by_group.entry(*group).or_default().push(sum.rows.iter().sum());
-    }
-    let least: BTreeMap<u32, f64> =
-        by_group.into_iter().map(|(group, mut rows)| (group, LEAST_ROWS * median(&mut rows))).collect();
+    let least = least_rows(sums.iter().map(|((group, ..), sum)| (*group, sum.rows.iter().sum())));
     sums.into_iter()
         .filter_map(|((group, _, chunk), sum)| {
             let rows: f64 = sum.rows.iter().sum();
@@ -117,6 +112,15 @@ pub fn by_chunk(samples: impl IntoIterator<Item = Sample>) -> Vec<ChunkError> {
             })
         })
         .collect()
+}
+
+/// How many rows a chunk of each group must hold to be a mid-line, from the group and the rows of every chunk.
+pub(super) fn least_rows(chunks: impl IntoIterator<Item = (u32, f64)>) -> BTreeMap<u32, f64> {
+    let mut by_group: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
+    for (group, rows) in chunks {
+        by_group.entry(group).or_default().push(rows);
+    }
+    by_group.into_iter().map(|(group, mut rows)| (group, LEAST_ROWS * median(&mut rows))).collect()
 }
 
 /// Errors by eq. 24 of points that took part and that `take` accepts.

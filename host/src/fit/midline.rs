@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use super::errors::CHUNKS;
+use super::errors::{CHUNKS, least_rows};
 use super::prepared::Prepared;
 
 /// One chunk of a mid-line.
@@ -61,8 +61,11 @@ pub fn midline(prepared: &Prepared) -> Vec<MidPoint> {
         b.stroke += n * x;
         b.force += n * p.force;
     }
+    let rows = |branches: &[Branch; 3]| branches.iter().map(|b| b.rows).sum::<f64>();
+    let least_rows = least_rows(chunks.iter().map(|((group, ..), branches)| (*group, rows(branches))));
     chunks
         .into_iter()
+        .filter(|((group, ..), branches)| rows(branches) >= least_rows[group])
         .map(|((group, _, _), branches)| {
             let present: Vec<&Branch> = branches.iter().filter(|b| b.rows > 0.0).collect();
             let n = present.len() as f64;

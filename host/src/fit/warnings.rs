@@ -60,7 +60,7 @@ pub fn warnings(prepared: &Prepared, left_out: &[Option<f64>]) -> Vec<String> {
              to zero",
             design.orthonormal.rank
         ));
-    } else if design.orthonormal.condition > 1e5 {
+    } else if design.orthonormal.rank == order && design.orthonormal.condition > 1e5 {
         out.push(format!(
             "the elastic columns have a condition number of {:.0}: single E_k mean little by themselves, only their sum does; a \
              lower order or a longer stroke would help",
@@ -70,8 +70,8 @@ pub fn warnings(prepared: &Prepared, left_out: &[Option<f64>]) -> Vec<String> {
     if !design.friction {
         let known = points.list.iter().any(|p| p.direction != 0.0);
         out.push(if known {
-            "motion in one direction only: friction cannot be told from elasticity, k_F is set to zero and the table holds for \
-             that direction"
+            "motion in one direction only: friction cannot be told from elasticity, k_F is set to zero, P0 and the E_k hold friction \
+             too, and the table holds for that direction"
                 .into()
         } else {
             "no direction of motion was found: k_F is set to zero".into()

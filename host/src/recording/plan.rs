@@ -271,8 +271,9 @@ fn unknown_unit(quantity: Quantity, name: &str) -> Error {
     // Only the spelling of a unit can be guessed, not another unit.
     let near = headers.iter().find(|h| h.eq_ignore_ascii_case(&usual));
     let mut help = format!("the unit stands behind the last underscore: {}", quantity.unit_list());
-    if let Some(near) = near {
-        help = format!("did you mean `{near}`? {help}");
+    match near {
+        Some(near) => help = format!("did you mean `{near}`? {help}"),
+        None => help += "; any other is a factor in an import description (--import)",
     }
     Error::new(Code::RecordingUnknownUnit, cause).column(name).help(help)
 }
@@ -303,7 +304,10 @@ fn missing(what: &str, headers: impl Iterator<Item = String>, names: &[String]) 
     } else if let Some((name, near)) = near {
         help = format!("did you mean `{near}` by `{name}`? {help}");
     } else if !headers.is_empty() {
-        help = format!("{help}; needed is one of {}", headers.join(", "));
+        help = format!(
+            "{help}; needed is one of {}, or an import description (--import) that says which column it is",
+            headers.join(", ")
+        );
     }
     Error::new(Code::RecordingMissingColumn, format!("no column of {what}")).help(help)
 }
