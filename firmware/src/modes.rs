@@ -2,6 +2,7 @@
 
 use model_core::effects::{Chain, EffectName};
 use model_core::inverse::{Reach, Search};
+use model_core::link::messages::Mode;
 use model_core::link::settings::{FeedForward, ForceLoop, Settings, StrokeLoop};
 use model_core::motion::{Motion, Slide};
 use model_core::muscle::{Held, Moment, Muscle};
@@ -55,8 +56,9 @@ const PLAY: f32 = 0.05;
 /// turn friction by that again.
 const PLAY_CALM: f32 = 0.2;
 /// The same where a trim answers for what the table leaves. Two that answer for one friction hunt: each swing of a mass on a spring
-/// turns the one before the other has undone it. So friction rests until the muscle is moved far, and the trim does the rest.
-const PLAY_TRIMMED: f32 = 20.0;
+/// turns the one before the other has undone it. So friction rests until the muscle is moved far, and the trim does the rest. So it
+/// does in a joint, where each muscle is the other's load and a push should meet the stiffness that was asked for, not less.
+const PLAY_RESTING: f32 = 20.0;
 /// How long the same force is wanted until a wish stands still, s.
 const CALM_S: f32 = 0.2;
 /// Part of blocked force at which a muscle surely pulls, whatever its table leaves out.
@@ -68,8 +70,8 @@ struct Wish {
     force_n: f32,
     /// For how long it has been the same, s.
     still_s: f32,
-    /// Whether a trim answers for what the table leaves.
-    trimmed: bool,
+    /// Whether friction rests while it stays the same.
+    rests: bool,
 }
 
 impl Model {
@@ -92,7 +94,7 @@ impl Model {
             per_pascal: 0.0,
             last: None,
             held_back: 0.0,
-            wish: Wish { force_n: 0.0, still_s: 0.0, trimmed: false },
+            wish: Wish { force_n: 0.0, still_s: 0.0, rests: false },
             asked: false,
             slope: 0.0,
             inv_rest_volume: 0.0,
@@ -138,10 +140,10 @@ impl Model {
         if !core::mem::take(&mut self.asked) {
             self.wish.still_s = 0.0;
         }
-        let (travel, play) = match (self.wish.still_s >= CALM_S, self.wish.trimmed) {
+        let (travel, play) = match (self.wish.still_s >= CALM_S, self.wish.rests) {
             (false, _) => (by_stroke + by_pressure, PLAY),
             (true, false) => (by_stroke, PLAY_CALM),
-            (true, true) => (by_stroke + by_pressure, PLAY_TRIMMED),
+            (true, true) => (by_stroke + by_pressure, PLAY_RESTING),
         };
         // What a change of the play leaves over is forgotten, not travelled.
         let back = self.held_back.within(-play, play) + travel;
@@ -191,11 +193,11 @@ impl Model {
         self.taut_n
     }
 
-    /// The pressure for a wanted force in this tick, and whether it can be had; `trimmed` where a trim answers for what the table
-    /// leaves.
-    pub fn pressure_for(&mut self, force_n: f32, guess_pa: f32, trimmed: bool) -> (f32, bool) {
+    /// The pressure for a wanted force in this tick, and whether it can be had; `rests` where friction is not to turn while the same
+    /// force is wanted.
+    pub fn pressure_for(&mut self, force_n: f32, guess_pa: f32, rests: bool) -> (f32, bool) {
         let still_s = if self.wish.force_n == force_n { self.wish.still_s + TICK_S } else { 0.0 };
-        self.wish = Wish { force_n, still_s, trimmed };
+        self.wish = Wish { force_n, still_s, rests };
         self.asked = true;
         let search = Search { tolerance: Pressure::from_pascals(20.0), ..self.muscle.search() };
         let force = Force::from_newtons(force_n);
@@ -287,6 +289,7 @@ impl Seat {
 /// The feed-forward pressure of a wanted force, Pa; without a table there is none.
 pub fn feed_forward(
     settings: &Settings,
+    mode: Mode,
     model: Option<&mut Model>,
     force_n: f32,
     guess_pa: f32,
@@ -295,7 +298,7 @@ pub fn feed_forward(
         (FeedForward::Off, _) | (_, None) => (0.0, true),
         (FeedForward::Table, Some(model)) => {
             let trimmed = settings.force.fitted && settings.force_loop.trim_limit_pa > 0.0;
-            model.pressure_for(force_n, guess_pa, trimmed)
+            model.pressure_for(force_n, guess_pa, trimmed || mode == Mode::Pair)
         }
         (FeedForward::Gaylord, Some(model)) => model.gaylord_pressure(force_n),
     }

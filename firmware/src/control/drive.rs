@@ -88,7 +88,7 @@ impl Controller {
         actuator.wanted_n = force_n;
         let model_n = actuator.model_n;
         let model = actuator.model.as_mut().filter(|_| model_n.is_some());
-        let (forward, reached) = modes::feed_forward(settings, model, coming_n, actuator.guess_pa);
+        let (forward, reached) = modes::feed_forward(settings, self.mode, model, coming_n, actuator.guess_pa);
         actuator.guess_pa = forward;
         actuator.forward_pa = forward;
         let measures = settings.force.fitted && actuator.sample.force_n.is_finite();
