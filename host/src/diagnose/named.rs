@@ -9,6 +9,10 @@ use super::rows::Rows;
 use super::select::{self, Found};
 use super::verdict::{Considered, Missing, ParameterValue};
 
+/// A rival of at least this weight against the winner is said to be possible beside it. Of 34 names of a development set all sets so made
+/// hold the truth, with 2.2 members on average; from a weight of 0.1 on, or of whatever weight where traces are parallel, 3.3.
+const AMONG: f64 = 0.15;
+
 /// The effects that were taken, with parameters and intervals, what they cannot be told from, and how probable they are.
 pub(crate) fn missing(found: &Found, library: &[candidates::Candidate], rows: &Rows) -> Vec<Missing> {
     let deviations = deviations(found, library, rows);
@@ -41,7 +45,7 @@ pub(crate) fn missing(found: &Found, library: &[candidates::Candidate], rows: &R
             let confusable: Vec<String> = t
                 .rivals
                 .iter()
-                .filter(|r| r.1 > select::CONFUSABLE || r.2.abs() > select::PARALLEL)
+                .filter(|r| r.1 > AMONG)
                 .take(8)
                 .map(|r| library[r.0].name().to_owned())
                 .collect();

@@ -223,7 +223,7 @@ fn seen_past_tables(trial: &Trial, library: &[Candidate], rows: &Rows, ground: &
 /// A rival of at least this weight against the winner is confusable with it.
 pub(crate) const CONFUSABLE: f64 = 0.1;
 /// A rival whose trace is as parallel as this to the winner's, once the base is refitted, is confusable whatever its weight.
-pub(crate) const PARALLEL: f64 = 0.95;
+const PARALLEL: f64 = 0.95;
 /// So many candidates may fail when everything is fitted together before the search ends.
 const MOST_BARRED: usize = 4;
 /// With more rivals than this a name says nothing.

@@ -88,6 +88,10 @@ const WRITTEN: [Written; 5] = [
     },
 ];
 
+/// The two forms of the recordings: as the instruments wrote them, and the mean of each stay after the ringing.
+const FORMS: [(&str, &str); 2] =
+    [("staircase", "as recorded, valve pulses and all"), ("settled", "settled points, one a stay")];
+
 /// What was asked of a muscle, and the answer.
 struct Asked {
     label: String,
@@ -111,12 +115,16 @@ fn json(path: &Path) -> Result<Value, String> {
     serde_json::from_str(&text).map_err(|e| e.to_string())
 }
 
-fn diagnose(data: &Path, output: &Path, host: &Path, year: &str, muscle: &str, file: &str) -> Asked {
+/// A muscle of a set, in one form of its recordings.
+type Case = (&'static str, &'static str, &'static str, &'static str);
+
+fn diagnose(data: &Path, output: &Path, host: &Path, (year, muscle, file, form): Case) -> Asked {
     let asked = || {
-        let answer = output.join(format!("{year}-{muscle}.json"));
+        let answer = output.join(format!("{year}-{muscle}-{form}.json"));
         let mut c = Command::new(host);
         c.arg("diagnose").arg("--quiet").arg("--muscle").arg(description(year, muscle));
-        c.arg("--import").arg(import(year, "staircase"));
+        let file = if form == "settled" { "settled_points" } else { file };
+        c.arg("--import").arg(import(year, form));
         c.arg(data.join(format!("aarl-festo-10mm-{year}")).join(format!("{file}.csv")));
         c.arg("--json").arg(&answer);
         run_limited(&mut c, Duration::from_secs(300))?;
@@ -143,22 +151,31 @@ fn evaluate(data: &Path, output: &Path, host: &Path, set: &Set) -> Result<Value,
 /// Asks about every muscle, and writes festo.md.
 pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(output)?;
-    let cases: Vec<(&str, &str, &str)> =
-        SETS.iter().flat_map(|s| s.muscles.iter().map(|m| (s.year, m.0, m.1))).collect();
-    let asked = in_order(&cases, |c| Ok(diagnose(data, output, host, c.0, c.1, c.2)))?;
+    let cases: Vec<Case> = FORMS
+        .iter()
+        .flat_map(|f| SETS.iter().flat_map(|s| s.muscles.iter().map(|m| (s.year, m.0, m.1, f.0))))
+        .collect();
+    let asked = in_order(&cases, |c| Ok(diagnose(data, output, host, *c)))?;
     let mut text = String::from(
         "# Real recordings as they are\n\nWritten by `cargo run --release -p trials -- festo -o DIR --page docs/src/festo.md`; nothing here is \
          typed by hand. Isometric pressure staircases of a commercial 10 mm fluidic muscle (two sets of one laboratory, eleven lengths, \
          `../shared/data`, which is not part of the project), as they were recorded. The tool sees the columns only; what is written about \
          these recordings stands below beside what it says. The muscle is never moved under pressure, so strokes, speeds and viscous \
-         friction cannot be judged.\n\n## What it says\n\n\
-         | set, muscle | verdict | named (probability, share explained) | where | unseen rows before → after, N |\n\
-         | --- | --- | --- | --- | --- |\n",
+         friction cannot be judged.\n",
     );
-    for a in &asked {
-        line(&mut text, a);
+    let per_form = cases.len() / FORMS.len();
+    for ((_, words), asked) in FORMS.iter().zip(asked.chunks(per_form)) {
+        let _ = writeln!(
+            text,
+            "\n## What it says: {words}\n\n\
+             | set, muscle | verdict | named (probability, share explained) | where | unseen rows before → after, N |\n\
+             | --- | --- | --- | --- | --- |"
+        );
+        for a in asked {
+            line(&mut text, a);
+        }
+        beside(&mut text, asked);
     }
-    beside(&mut text, &asked);
     text.push_str(
         "\n## Recordings it has not seen\n\nMean error in percent of the blocked force at the highest pressure, of the settled points: each run, each \
          contraction, each length predicted from all others (`host evaluate`), beside the laboratory's published formula on the rows of \
@@ -219,7 +236,7 @@ fn line(text: &mut String, asked: &Asked) {
 /// What is written about the recordings, and the answers that say it.
 fn beside(text: &mut String, asked: &[Asked]) {
     text.push_str(
-        "\n## Beside what is written about them\n\nA name counts where it is one of those that would say it, a set where such a name is \
+        "\n### Beside what is written about them\n\nA name counts where it is one of those that would say it, a set where such a name is \
          confusable with what is named, a place where the misfit is located on such a coordinate, \"could be\" where such an effect is said \
          to be possible at more than a hundredth of the blocked force.\n\n\
          | written | would be said by | named | in a set | located there | could be hidden |\n| --- | --- | --- | --- | --- | --- |\n",
