@@ -8,7 +8,7 @@ use super::baselines::{self, Kind};
 use super::candidates::{self, library};
 use super::frequency;
 use super::given;
-use super::held_out::held_out;
+use super::held_out::{HELPS, held_out};
 use super::known::Known;
 use super::linear::energy;
 use super::locate::{block_ranges, locate};
@@ -418,7 +418,7 @@ fn keep_what_helps(found: &mut Found, rows: &mut Rows, library: &[candidates::Ca
             held_out(rows, found.full.kind, &found.traces[..fewer], sigma).rms_after_N
         };
         // An effect that takes a third of what is above the noise lowers the whole by more than this.
-        if with.rms_after_N < given::HELPS * before {
+        if with.rms_after_N < HELPS * before {
             return with;
         }
         let name = found.taken.last().map_or("", |t| library[t.trial.candidate].name());

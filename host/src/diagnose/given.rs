@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::baselines::{self, Kind};
 use super::candidates::{Candidate, Ground, Trial};
 use super::evidence::Scale;
-use super::held_out::held_out;
+use super::held_out::{HELPS, held_out};
 use super::linear::energy;
 use super::rows::Rows;
 use super::select::{self, Found, MAX_NAMED, Taken, look, refit, rivals, search};
@@ -125,9 +125,6 @@ fn forced(index: usize, ground: &Ground<'_>, library: &[Candidate], rows: &Rows)
     let refined = ground.refine(best, library, rows);
     if refined.gain > 0.0 { refined } else { ground.attempt(index, candidate, &best.shapes, rows, true) }
 }
-
-/// Unseen rows must be predicted better by this factor for an effect to have helped.
-pub(super) const HELPS: f64 = 0.985;
 
 /// Marks the names as given, and says what the recordings say of each.
 pub(super) fn judge(missing: &mut [Missing], found: &Found, rows: &Rows, held: &HeldOut) {

@@ -9,6 +9,8 @@ use super::baselines::{self, Kind};
 use super::rows::Rows;
 use super::verdict::HeldOut;
 
+/// Unseen rows must be predicted better by this factor for an effect to have helped.
+pub(super) const HELPS: f64 = 0.985;
 /// Rows at most: held-out error needs no more.
 const ROWS: usize = 6_000;
 

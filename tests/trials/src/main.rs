@@ -83,6 +83,33 @@ impl Tool {
     }
 }
 
+/// What is asked about the real recordings of the 10 mm fluidic muscle.
+#[derive(Args)]
+struct Real {
+    /// Directory that holds aarl-festo-10mm-2021 and -2022.
+    #[arg(long, default_value = "../shared/data")]
+    data: PathBuf,
+    /// Where to.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// The tool.
+    #[arg(long, default_value = "target/release/host")]
+    host: PathBuf,
+    /// Write the tables as this page of the book, too.
+    #[arg(long)]
+    page: Option<PathBuf>,
+}
+
+impl Real {
+    /// Copies what was written to the page of the book, where one is wanted.
+    fn into_book(&self, written: &str) -> Result<(), Box<dyn Error>> {
+        if let Some(page) = &self.page {
+            std::fs::copy(self.output.join(written), page)?;
+        }
+        Ok(())
+    }
+}
+
 #[derive(Subcommand)]
 enum Command {
     /// Make a set: trials/ID for the tool, sealed/ID for the judge, ledger.json with the seals' hashes.
@@ -140,35 +167,9 @@ enum Command {
         minutes: Option<f64>,
     },
     /// Put effects into the real recordings of the 10 mm fluidic muscle and ask what was put in.
-    Semi {
-        /// Directory that holds aarl-festo-10mm-2022.
-        #[arg(long, default_value = "../shared/data")]
-        data: PathBuf,
-        /// Where to.
-        #[arg(short, long)]
-        output: PathBuf,
-        /// The tool.
-        #[arg(long, default_value = "target/release/host")]
-        host: PathBuf,
-        /// Write the table as this page of the book, too.
-        #[arg(long)]
-        page: Option<PathBuf>,
-    },
+    Semi(Real),
     /// Ask about the real recordings of the 10 mm fluidic muscle as they are, and set the answers beside what is written about them.
-    Festo {
-        /// Directory that holds aarl-festo-10mm-2021 and -2022.
-        #[arg(long, default_value = "../shared/data")]
-        data: PathBuf,
-        /// Where to.
-        #[arg(short, long)]
-        output: PathBuf,
-        /// The tool.
-        #[arg(long, default_value = "target/release/host")]
-        host: PathBuf,
-        /// Write the tables as this page of the book, too.
-        #[arg(long)]
-        page: Option<PathBuf>,
-    },
+    Festo(Real),
     /// Generate, answer and score in one go; each goes on where an earlier run was broken off.
     Prove {
         /// dev or final.
@@ -209,17 +210,11 @@ fn main() -> ExitCode {
             let until = minutes.map(|m| Instant::now() + Duration::from_secs_f64(60.0 * m.max(0.0)));
             again::run(&set, &host, &residuals::Residuals::read(&data), until, draw)
         }
-        Command::Semi { data, output, host, page } => {
-            semi::run(&data, &output, &host).and_then(|()| match &page {
-                Some(page) => Ok(std::fs::copy(output.join("semi.md"), page).map(|_| ())?),
-                None => Ok(()),
-            })
+        Command::Semi(real) => {
+            semi::run(&real.data, &real.output, &real.host).and_then(|()| real.into_book("semi.md"))
         }
-        Command::Festo { data, output, host, page } => {
-            festo::run(&data, &output, &host).and_then(|()| match &page {
-                Some(page) => Ok(std::fs::copy(output.join("festo.md"), page).map(|_| ())?),
-                None => Ok(()),
-            })
+        Command::Festo(real) => {
+            festo::run(&real.data, &real.output, &real.host).and_then(|()| real.into_book("festo.md"))
         }
         Command::Prove { set, what, tool, check } => prove(&set, &what, &tool, check),
     };
