@@ -135,7 +135,7 @@ impl<F: NorFlash> Server<F> {
         });
         if let Some(report) = fault {
             // A store that fails here has no better place to say so than the next request that needs it.
-            let _ = self.store.put_fault(&report);
+            let _ = self.store.put_fault(report);
         }
         if state != State::Running {
             self.keep_memories(shared, false);
@@ -168,7 +168,7 @@ impl<F: NorFlash> Server<F> {
         }
         if self.wear.allows(tick) || always {
             // What cannot be written now is tried again with the next change of state.
-            let _ = self.store.put_memories(side, &memories);
+            let _ = self.store.put_memories(side, memories);
         }
     }
 
@@ -210,11 +210,11 @@ impl<F: NorFlash> Server<F> {
         let answered = if header.id == hello::ID {
             let hello = self.hello().to_bytes();
             frame::encode_bytes(Header { kind: Kind::Response, ..header }, &hello, exchange.room())
+                .map_err(|_| Refusal::Range)
         } else {
             let mut session = Session { server: self, shared };
-            endpoints::answer(&mut session, &mut exchange).or_else(|refusal| {
-                frame::encode(Header { kind: Kind::Refusal, ..header }, &refusal, exchange.room())
-            })
+            endpoints::answer(&mut session, &mut exchange)
+                .or_else(|mut refusal| exchange.answer(Kind::Refusal, &mut refusal))
         };
         exchange.written(answered.unwrap_or(0))
     }

@@ -152,15 +152,15 @@ impl Shared {
 
     /// The next frame to send without being asked, if there is one.
     pub fn next_spoken(&self, out: &mut [u8; MAX_TOPIC]) -> Option<usize> {
-        self.spoken.try_receive().ok().map(|spoken| encode(&spoken, out))
+        self.spoken.try_receive().ok().map(|mut spoken| encode(&mut spoken, out))
     }
 }
 
-pub(crate) fn encode(spoken: &Spoken, out: &mut [u8; MAX_TOPIC]) -> usize {
+pub(crate) fn encode(spoken: &mut Spoken, out: &mut [u8; MAX_TOPIC]) -> usize {
     let header = |id, sequence| Header { kind: Kind::Topic, id, sequence };
     let written = match spoken {
-        Spoken::Sample(number, sample) => frame::encode(header(TELEMETRY, *number), sample, out),
-        Spoken::Event(event) => frame::encode(header(EVENT, 0), event, out),
+        Spoken::Sample(number, sample) => frame::encode_fields(header(TELEMETRY, *number), sample, out),
+        Spoken::Event(event) => frame::encode_fields(header(EVENT, 0), event, out),
         #[cfg(feature = "log")]
         Spoken::Log(line) => frame::encode_bytes(header(LOG, 0), line, out),
     };

@@ -18,20 +18,22 @@
 //! item, so it is there whole or not at all. Whenever power fails, the old table or the new one is in use. [`FORMAT`] moves
 //! when this layout does.
 
+use core::cell::RefCell;
+
 use crate::room::{Room, room};
 use embassy_futures::block_on;
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 use model_core::check;
-use model_core::effects::{MAX_EFFECTS, Memory};
+use model_core::effects::{MAX_EFFECTS, MEMORY, Memory};
+use model_core::fields;
+use model_core::fields::{Fields, Walk};
 use model_core::image;
 use model_core::link::messages::{FAULT_LOG, FaultReport, Side, StoreFault, TableInfo};
 use model_core::link::settings::Settings;
 use sequential_storage::Error;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage, SerializationError, Value};
-use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 
 /// Version of the layout. It moves whenever anything that is kept has other fields: postcard's bytes do not say what they are,
 /// so a value of another layout would be read as if it were of this one. Its key moves with it.
@@ -40,7 +42,7 @@ pub const FORMAT: u16 = 3;
 const BUFFER: usize = image::MAX_LEN + 64;
 
 /// Which slot holds the table in use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Selected {
     /// 0 or 1.
     pub slot: u8,
@@ -51,7 +53,7 @@ pub struct Selected {
 }
 
 /// A kept image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Described {
     /// Length in bytes.
     pub length: u16,
@@ -60,6 +62,9 @@ pub struct Described {
     /// Counts commits.
     pub generation: u32,
 }
+
+fields!(Selected { slot, table, previous });
+fields!(Described { length, crc, generation });
 
 impl Selected {
     /// As the host is told.
@@ -78,18 +83,26 @@ pub type Memories = Vec<Memory<f32>, MAX_EFFECTS>;
 
 /// A value on its way into the store, which writes it where the item is put together: no copy on the stack. It is read by
 /// [`Store::value`].
-struct Written<'v, V>(&'v V);
+struct Written<'v>(RefCell<&'v mut dyn Fields>);
 
-impl<V: Serialize> Value<'_> for Written<'_, V> {
+impl Value<'_> for Written<'_> {
     fn serialize_into(&self, buffer: &mut [u8]) -> Result<usize, SerializationError> {
-        match postcard::to_slice(self.0, buffer) {
-            Ok(used) => Ok(used.len()),
-            Err(_) => Err(SerializationError::BufferTooSmall),
-        }
+        let written = self.0.try_borrow_mut().ok().and_then(|mut value| fields::write(&mut **value, buffer));
+        written.ok_or(SerializationError::BufferTooSmall)
     }
 
     fn deserialize_from(_: &[u8]) -> Result<(Self, usize), SerializationError> {
         Err(SerializationError::InvalidFormat)
+    }
+}
+
+/// Memories with the generation of their table.
+struct Kept(u32, Memories);
+
+impl Fields for Kept {
+    fn walk(&mut self, walk: &mut Walk<'_>) {
+        self.0.walk(walk);
+        self.1.walk(walk);
     }
 }
 
@@ -164,12 +177,14 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// A small value; one that cannot be read counts as absent.
-    fn value<V: DeserializeOwned>(&mut self, key: u8) -> Result<Option<V>, StoreFault> {
-        Ok(self.bytes(key)?.and_then(|bytes| postcard::from_bytes(bytes).ok()))
+    fn value<V: Fields + Default>(&mut self, key: u8) -> Result<Option<V>, StoreFault> {
+        let mut value = V::default();
+        let there = self.bytes(key)?.is_some_and(|bytes| fields::read(bytes, &mut value));
+        Ok(there.then_some(value))
     }
 
-    fn put_value<V: Serialize>(&mut self, key: u8, value: &V) -> Result<(), StoreFault> {
-        self.put(key, &Written(value))
+    fn put_value(&mut self, key: u8, value: &mut dyn Fields) -> Result<(), StoreFault> {
+        self.put(key, &Written(RefCell::new(value)))
     }
 
     /// Which table of a muscle is in use.
@@ -228,8 +243,8 @@ impl<F: NorFlash> Store<F> {
         self.select(side, Selected { slot, table: before, previous: Some(now.table) })
     }
 
-    fn select(&mut self, side: Side, selected: Selected) -> Result<Selected, StoreFault> {
-        self.put_value(SELECTED + side.index() as u8, &selected)?;
+    fn select(&mut self, side: Side, mut selected: Selected) -> Result<Selected, StoreFault> {
+        self.put_value(SELECTED + side.index() as u8, &mut selected)?;
         match self.selected(side)? {
             Some(kept) if kept == selected => Ok(selected),
             _ => Err(StoreFault::Verify),
@@ -248,8 +263,8 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// As the medium fails.
-    pub fn put_settings(&mut self, settings: &Settings) -> Result<(), StoreFault> {
-        self.put_value(SETTINGS, settings)
+    pub fn put_settings(&mut self, mut settings: Settings) -> Result<(), StoreFault> {
+        self.put_value(SETTINGS, &mut settings)
     }
 
     /// Hands what each effect remembered of a muscle since its table was committed to `act`, by its place in the table; gives how
@@ -264,21 +279,23 @@ impl<F: NorFlash> Store<F> {
     ) -> Result<usize, StoreFault> {
         let generation = self.generation(side)?;
         let Some(bytes) = self.bytes(MEMORIES + side.index() as u8)? else { return Ok(0) };
-        let Ok(((kept, count), mut rest)) = postcard::take_from_bytes::<(u32, u32)>(bytes) else {
-            return Ok(0);
-        };
+        let mut rest = bytes;
+        let mut walk = Walk::new(&mut rest);
+        // A list is its length and its elements.
+        let (mut kept, mut count) = (0_u32, 0_u32);
+        kept.walk(&mut walk);
+        count.walk(&mut walk);
         if kept != generation {
             return Ok(0);
         }
         let mut read = 0;
         while read < (count as usize).min(MAX_EFFECTS) {
-            let Some((bytes, after)) = rest.split_at_checked(size_of::<Memory<f32>>()) else { break };
-            let mut memory = Memory::default();
-            for (value, bytes) in memory.iter_mut().zip(bytes.as_chunks().0) {
-                *value = f32::from_le_bytes(*bytes);
+            let mut memory: Memory<f32> = [0.0; MEMORY];
+            memory.walk(&mut walk);
+            if !walk.is_whole() {
+                break;
             }
             act(read, &memory);
-            rest = after;
             read += 1;
         }
         Ok(read)
@@ -288,10 +305,9 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// As the medium fails.
-    pub fn put_memories(&mut self, side: Side, memories: &Memories) -> Result<(), StoreFault> {
+    pub fn put_memories(&mut self, side: Side, memories: Memories) -> Result<(), StoreFault> {
         let generation = self.generation(side)?;
-        // A list is its length and its elements.
-        self.put_value(MEMORIES + side.index() as u8, &(generation, memories))
+        self.put_value(MEMORIES + side.index() as u8, &mut Kept(generation, memories))
     }
 
     fn generation(&mut self, side: Side) -> Result<u32, StoreFault> {
@@ -302,10 +318,11 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// As the medium fails.
-    pub fn put_fault(&mut self, report: &FaultReport) -> Result<(), StoreFault> {
+    pub fn put_fault(&mut self, mut report: FaultReport) -> Result<(), StoreFault> {
         let next = self.value::<u8>(PAST_FAULT_NEXT)?.unwrap_or(0) % FAULT_LOG as u8;
-        self.put_value(PAST_FAULT + next, report)?;
-        self.put_value(PAST_FAULT_NEXT, &((next + 1) % FAULT_LOG as u8))
+        self.put_value(PAST_FAULT + next, &mut report)?;
+        let mut after = (next + 1) % FAULT_LOG as u8;
+        self.put_value(PAST_FAULT_NEXT, &mut after)
     }
 
     /// A past fault, 0 the last.
@@ -326,8 +343,8 @@ impl<F: NorFlash> Store<F> {
     /// # Errors
     /// As the medium fails.
     pub fn count_start(&mut self) -> Result<u32, StoreFault> {
-        let starts = self.value::<u32>(STARTS)?.unwrap_or(0).wrapping_add(1);
-        self.put_value(STARTS, &starts)?;
+        let mut starts = self.value::<u32>(STARTS)?.unwrap_or(0).wrapping_add(1);
+        self.put_value(STARTS, &mut starts)?;
         Ok(starts)
     }
 }

@@ -57,8 +57,8 @@ pub async fn link<R: Read, W: Write, F: NorFlash>(
 pub async fn telemetry<W: Write>(sender: &Gate<CriticalSectionRawMutex, W>, shared: &Shared) {
     let mut out = [0; MAX_TOPIC];
     loop {
-        let spoken = shared.next().await;
-        let length = shared::encode(&spoken, &mut out);
+        let mut spoken = shared.next().await;
+        let length = shared::encode(&mut spoken, &mut out);
         if sender.lock().await.write_all(&out[..length]).await.is_err() {
             return;
         }

@@ -137,24 +137,23 @@ impl Trace {
         }
     }
 
-    /// As many whole records as fit a piece, from one on.
+    /// Fills an empty piece with as many whole records as fit it, from one on.
     ///
     /// # Errors
     /// [`Refusal::Range`] behind the last record, and while it still records.
-    pub fn read(&self, record: u32) -> Result<TracePiece, Refusal> {
+    pub fn read(&self, record: u32, piece: &mut TracePiece) -> Result<(), Refusal> {
         let from = record as usize;
         if self.phase != Phase::Complete || from >= self.records {
             return Err(Refusal::Range);
         }
         let width = self.variables.len();
         let oldest = if self.records == self.room { self.next } else { 0 };
-        let mut values = Vec::new();
         for at in from..self.records.min(from + TRACE_PIECE / width) {
             let place = (oldest + at) % self.room * width;
             let record = self.values.get(place..place + width).ok_or(Refusal::Range)?;
-            values.extend_from_slice(record).map_err(|_| Refusal::Range)?;
+            piece.values.extend_from_slice(record).map_err(|_| Refusal::Range)?;
         }
-        Ok(TracePiece { values })
+        Ok(())
     }
 }
 
@@ -175,8 +174,10 @@ mod tests {
 
     fn read_all(trace: &Trace) -> std::vec::Vec<f32> {
         let mut all = std::vec::Vec::new();
-        while let Ok(piece) = trace.read(all.len() as u32 / 3) {
+        let mut piece = TracePiece::default();
+        while trace.read(all.len() as u32 / 3, &mut piece).is_ok() {
             all.extend_from_slice(&piece.values);
+            piece.values.clear();
         }
         all
     }
@@ -218,6 +219,6 @@ mod tests {
         trace.on_start();
         trace.sample(1, value(1));
         assert_eq!((trace.info().records, trace.info().first_tick), (1, 1));
-        assert_eq!(trace.read(0), Err(Refusal::Range), "still recording");
+        assert_eq!(trace.read(0, &mut TracePiece::default()), Err(Refusal::Range), "still recording");
     }
 }

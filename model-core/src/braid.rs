@@ -3,6 +3,7 @@
 //! Source: E. G. Hocking, thesis, University of Maryland (2012), chapter 2. Fibres of fixed length `B` wind `N` turns
 //! about a cylinder; the bladder's material keeps its volume `V_B`.
 
+use crate::fields::fields;
 use crate::scalar::Scalar;
 use crate::units::{Angle, Length};
 use core::f64::consts::PI;
@@ -22,6 +23,8 @@ pub struct Geometry<T = f64> {
     /// Whether the load-bearing length is shortened by the rounded ends (`L′` in place of `L`).
     pub tip_correction: bool,
 }
+
+fields!(Geometry<f32> { rest_length, braid_angle, outer_diameter, wall, tip_correction });
 
 /// Which dimension of a muscle cannot be right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -44,6 +44,7 @@
 //!
 //! Adding an effect: write its file, and add it to the list below.
 
+use crate::fields::{Fields, Walk, fields};
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
@@ -466,6 +467,27 @@ pub struct FittedEffect {
     /// What its memory held when the recordings behind the table ended, where that must outlive a power cycle
     /// ([`Info::persistent`]): a controller takes over a muscle that has been worked, not a new one. Further slots are zero.
     pub remembered: heapless::Vec<f32, REMEMBERED>,
+}
+
+fields!(FittedEffect { effect, parameters, remembered });
+
+impl Default for FittedEffect {
+    /// The first of the list, with nothing known of it.
+    fn default() -> Self {
+        Self {
+            effect: EffectName::CoulombFriction,
+            parameters: heapless::Vec::new(),
+            remembered: heapless::Vec::new(),
+        }
+    }
+}
+
+impl Fields for EffectName {
+    fn walk(&mut self, walk: &mut Walk<'_>) {
+        if let Some(found) = Self::ALL.get(usize::from(walk.variant(*self as u8, Self::ALL.len() as u8))) {
+            *self = *found;
+        }
+    }
 }
 
 impl FittedEffect {

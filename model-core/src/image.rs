@@ -6,13 +6,9 @@
 //! The layout of the first eight bytes never changes. A reader refuses another [`VERSION`] and says both.
 
 use crate::check::crc32;
+use crate::fields;
 use crate::table::{MuscleTable, TableError};
-use serde::de::DeserializeSeed;
 use serde::{Deserialize, Serialize};
-
-mod place;
-
-use place::Place;
 
 /// First four bytes.
 pub const MAGIC: [u8; 4] = *b"PAMT";
@@ -124,8 +120,9 @@ pub fn read_with<R>(
 
 #[inline]
 fn read_into(bytes: &[u8], table: &mut MuscleTable) -> Result<(), ImageError> {
-    let mut body = postcard::Deserializer::from_bytes(body(bytes)?);
-    Place(table).deserialize(&mut body).map_err(|_| ImageError::Body)?;
+    if !fields::read(body(bytes)?, table) {
+        return Err(ImageError::Body);
+    }
     table.check().map_err(ImageError::Table)
 }
 

@@ -8,6 +8,7 @@
 //! | length to radius, wall and strains | [`braid`] |
 //! | curves over pressure | [`spline`] |
 //! | what a fit finds and a file keeps | [`table`], [`image`], [`check`] |
+//! | values as bytes, as a small device reads and writes them | [`fields`] |
 //! | force and its slope | [`muscle`] |
 //! | pressure for a wanted force | [`inverse`] |
 //! | which way friction points | [`motion`] |
@@ -24,6 +25,7 @@
 pub mod braid;
 pub mod check;
 pub mod effects;
+pub mod fields;
 pub mod image;
 pub mod inverse;
 pub mod link;

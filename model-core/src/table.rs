@@ -5,6 +5,7 @@
 
 use crate::braid::{self, Geometry, GeometryError};
 use crate::effects::{FittedEffect, MAX_EFFECTS};
+use crate::fields::{codes, fields};
 use crate::spline::MAX_NODES;
 use crate::units::{Force, Pressure};
 use serde::{Deserialize, Serialize};
@@ -60,6 +61,22 @@ pub struct MuscleTable {
     /// Physics beyond the base model.
     pub effects: heapless::Vec<FittedEffect, MAX_EFFECTS>,
 }
+
+codes!(Kind { Contractile, Push });
+fields!(Tested { pressure_low, pressure_high, contraction_low, contraction_high });
+fields!(MuscleTable {
+    kind,
+    geometry,
+    deadband,
+    goes_slack,
+    nodes,
+    elastic,
+    friction,
+    tested,
+    max_pressure,
+    blocked_force,
+    effects,
+});
 
 /// Why a table cannot be used. Every variant names the number at fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -3,6 +3,7 @@
 //! Each is a newtype over a [`Scalar`] in its SI unit, with a constructor and a getter per unit in use. Raw numbers
 //! appear only inside numerical kernels, where the SI unit is understood.
 
+use crate::fields::{Fields, Walk};
 use crate::scalar::Scalar;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use serde::{Deserialize, Serialize};
@@ -65,6 +66,12 @@ macro_rules! quantity {
             #[inline]
             pub fn is_finite(self) -> bool {
                 self.0.is_finite()
+            }
+        }
+
+        impl<T: Fields> Fields for $name<T> {
+            fn walk(&mut self, walk: &mut Walk<'_>) {
+                self.0.walk(walk);
             }
         }
 

@@ -1,7 +1,6 @@
 //! The answer to each endpoint.
 
 use embedded_storage_async::nor_flash::NorFlash;
-use heapless::Vec;
 use model_core::image;
 use model_core::link::endpoints::Service;
 use model_core::link::messages::{
@@ -31,9 +30,9 @@ pub(super) struct Session<'a, F: NorFlash> {
 impl<F: NorFlash> Session<'_, F> {
     /// The status, if what was asked for could be done.
     #[inline(never)]
-    fn status_after(&self, done: Result<(), Refusal>) -> Result<Status, Refusal> {
+    fn status_after(&self, done: Result<(), Refusal>, answer: &mut Status) -> Result<(), Refusal> {
         done?;
-        Ok(self.shared.with(|controller| Status {
+        *answer = self.shared.with(|controller| Status {
             state: controller.state(),
             mode: controller.mode(),
             fault: controller.faults().latched.map(|report| report.fault),
@@ -44,7 +43,8 @@ impl<F: NorFlash> Session<'_, F> {
             frames_bad: self.server.counts.bad,
             telemetry_dropped: self.shared.telemetry_dropped(),
             saturated_ticks: controller.saturated_ticks(),
-        }))
+        });
+        Ok(())
     }
 
     /// The store may only be written while nothing is controlled.
@@ -65,8 +65,8 @@ impl<F: NorFlash> Session<'_, F> {
 }
 
 impl<F: NorFlash> Service for Session<'_, F> {
-    fn info(&mut self, (): ()) -> Result<DeviceInfo, Refusal> {
-        Ok(DeviceInfo {
+    fn info(&mut self, (): &(), answer: &mut DeviceInfo) -> Result<(), Refusal> {
+        *answer = DeviceInfo {
             ticks_per_s: TICKS_PER_S,
             muscles: self.server.identity.muscles,
             table_capacity: image::MAX_LEN as u32,
@@ -74,110 +74,115 @@ impl<F: NorFlash> Service for Session<'_, F> {
             reference_capacity: reference::CAPACITY as u32,
             tables: Side::ALL.map(|side| self.server.table_info(side)),
             started_by: self.server.identity.started_by,
-        })
+        };
+        Ok(())
     }
 
-    fn status(&mut self, (): ()) -> Result<Status, Refusal> {
-        self.status_after(Ok(()))
+    fn status(&mut self, (): &(), answer: &mut Status) -> Result<(), Refusal> {
+        self.status_after(Ok(()), answer)
     }
 
-    fn arm(&mut self, (): ()) -> Result<Status, Refusal> {
-        self.status_after(self.shared.with(Controller::arm))
+    fn arm(&mut self, (): &(), answer: &mut Status) -> Result<(), Refusal> {
+        self.status_after(self.shared.with(Controller::arm), answer)
     }
 
-    fn start(&mut self, request: Start) -> Result<Status, Refusal> {
-        self.status_after(self.shared.with(|controller| controller.start(request.mode)))
+    fn start(&mut self, request: &Start, answer: &mut Status) -> Result<(), Refusal> {
+        self.status_after(self.shared.with(|controller| controller.start(request.mode)), answer)
     }
 
-    fn stop(&mut self, (): ()) -> Result<Status, Refusal> {
-        self.status_after(self.shared.with(Controller::stop))
+    fn stop(&mut self, (): &(), answer: &mut Status) -> Result<(), Refusal> {
+        self.status_after(self.shared.with(Controller::stop), answer)
     }
 
-    fn disarm(&mut self, (): ()) -> Result<Status, Refusal> {
-        self.status_after(self.shared.with(Controller::disarm))
+    fn disarm(&mut self, (): &(), answer: &mut Status) -> Result<(), Refusal> {
+        self.status_after(self.shared.with(Controller::disarm), answer)
     }
 
-    fn set_point(&mut self, request: SetPoint) -> Result<Status, Refusal> {
-        self.status_after(self.shared.with(|controller| controller.set_point(request)))
+    fn set_point(&mut self, request: &SetPoint, answer: &mut Status) -> Result<(), Refusal> {
+        self.status_after(self.shared.with(|controller| controller.set_point(*request)), answer)
     }
 
-    fn reference(&mut self, request: Reference) -> Result<Status, Refusal> {
-        self.status_after(self.shared.with(|controller| controller.reference(request)))
+    fn reference(&mut self, request: &Reference, answer: &mut Status) -> Result<(), Refusal> {
+        self.status_after(self.shared.with(|controller| controller.reference(*request)), answer)
     }
 
-    fn reference_points(&mut self, request: ReferencePoints) -> Result<u16, Refusal> {
-        self.shared.with(|controller| controller.generator().take_points(&request))
+    fn reference_points(&mut self, request: &ReferencePoints, answer: &mut u16) -> Result<(), Refusal> {
+        *answer = self.shared.with(|controller| controller.generator().take_points(request))?;
+        Ok(())
     }
 
-    fn telemetry(&mut self, request: TelemetryRate) -> Result<TelemetryRate, Refusal> {
+    fn telemetry(&mut self, request: &TelemetryRate, answer: &mut TelemetryRate) -> Result<(), Refusal> {
         self.shared.with(|controller| controller.set_telemetry(request.every_ticks));
-        Ok(request)
+        *answer = *request;
+        Ok(())
     }
 
-    fn faults(&mut self, (): ()) -> Result<Faults, Refusal> {
-        Ok(self.shared.with(|controller| controller.faults().clone()))
+    fn faults(&mut self, (): &(), answer: &mut Faults) -> Result<(), Refusal> {
+        self.shared.with(|controller| answer.clone_from(controller.faults()));
+        Ok(())
     }
 
-    fn past_fault(&mut self, request: PastFault) -> Result<Option<FaultReport>, Refusal> {
+    fn past_fault(&mut self, request: &PastFault, answer: &mut Option<FaultReport>) -> Result<(), Refusal> {
         self.server.keep(self.shared);
-        self.server.store.past_fault(request.back).map_err(Refusal::Store)
+        *answer = self.server.store.past_fault(request.back).map_err(Refusal::Store)?;
+        Ok(())
     }
 
-    fn clear_fault(&mut self, (): ()) -> Result<Status, Refusal> {
+    fn clear_fault(&mut self, (): &(), answer: &mut Status) -> Result<(), Refusal> {
         // The report goes to the log before it is forgotten.
         self.server.keep(self.shared);
-        self.status_after(self.shared.with(Controller::clear))
+        self.status_after(self.shared.with(Controller::clear), answer)
     }
 
-    fn settings(&mut self, (): ()) -> Result<Settings, Refusal> {
-        Ok(self.shared.with(|controller| *controller.settings()))
+    fn settings(&mut self, (): &(), answer: &mut Settings) -> Result<(), Refusal> {
+        self.shared.with(|controller| *answer = *controller.settings());
+        Ok(())
     }
 
-    fn set_settings(&mut self, request: Settings) -> Result<Settings, Refusal> {
-        control::check_settings(&request)?;
+    fn set_settings(&mut self, request: &Settings, answer: &mut Settings) -> Result<(), Refusal> {
+        control::check_settings(request)?;
         self.at_rest()?;
-        self.server.store.put_settings(&request).map_err(Refusal::Store)?;
-        self.shared.with(|controller| controller.use_settings(request));
-        Ok(request)
+        self.server.store.put_settings(*request).map_err(Refusal::Store)?;
+        self.shared.with(|controller| controller.use_settings(*request));
+        *answer = *request;
+        Ok(())
     }
 
-    fn table_begin(&mut self, request: TableBegin) -> Result<(), Refusal> {
+    fn table_begin(&mut self, request: &TableBegin, (): &mut ()) -> Result<(), Refusal> {
         self.drives(request.side)?;
-        self.server.upload.begin(request)
+        self.server.upload.begin(*request)
     }
 
-    fn table_piece(&mut self, request: TablePiece) -> Result<u32, Refusal> {
-        self.server.upload.add(&request)
+    fn table_piece(&mut self, request: &TablePiece, answer: &mut u32) -> Result<(), Refusal> {
+        *answer = self.server.upload.add(request)?;
+        Ok(())
     }
 
-    fn table_commit(&mut self, (): ()) -> Result<TableInfo, Refusal> {
+    fn table_commit(&mut self, (): &(), answer: &mut TableInfo) -> Result<(), Refusal> {
         self.at_rest()?;
         let (side, bytes) = self.server.upload.whole()?;
         let selected = self.server.store.commit(side, bytes).map_err(Refusal::Store)?;
         self.server.upload.forget();
-        self.server.use_kept(side, self.shared)?;
-        Ok(selected.info())
+        *answer = selected.info();
+        self.server.use_kept(side, self.shared)
     }
 
-    fn table_read(&mut self, request: TableRead) -> Result<TablePiece, Refusal> {
+    fn table_read(&mut self, request: &TableRead, answer: &mut TablePiece) -> Result<(), Refusal> {
         let image = self.server.store.table(request.side).map_err(Refusal::Store)?;
         let image = image.ok_or(Refusal::NoTable(request.side))?;
         let rest = image.get(request.offset as usize..).unwrap_or_default();
-        let piece = &rest[..rest.len().min(PIECE)];
-        let bytes = Vec::from_slice(piece).map_err(|_| Refusal::Range)?;
-        Ok(TablePiece { offset: request.offset, bytes })
+        answer.offset = request.offset;
+        answer.bytes.extend_from_slice(&rest[..rest.len().min(PIECE)]).map_err(|_| Refusal::Range)
     }
 
-    fn table_rollback(&mut self, request: Side) -> Result<TableInfo, Refusal> {
+    fn table_rollback(&mut self, request: &Side, answer: &mut TableInfo) -> Result<(), Refusal> {
         self.at_rest()?;
-        let selected = self.server.store.roll_back(request).map_err(Refusal::Store)?;
-        self.server.use_kept(request, self.shared)?;
-        Ok(selected.info())
+        *answer = self.server.store.roll_back(*request).map_err(Refusal::Store)?.info();
+        self.server.use_kept(*request, self.shared)
     }
 
-    fn evaluate(&mut self, request: Evaluate) -> Result<Evaluated, Refusal> {
+    fn evaluate(&mut self, request: &Evaluate, answer: &mut Evaluated) -> Result<(), Refusal> {
         let direction = f32::from(request.direction.signum());
-        let mut values = Vec::new();
         for point in &request.points {
             let stroke = Length::from_metres(point.stroke_m);
             let pressure = Pressure::from_pascals(point.pressure_pa);
@@ -189,35 +194,38 @@ impl<F: NorFlash> Service for Session<'_, F> {
                 let found = single::pressure_for(muscle, &held, direction, force, pressure, &muscle.search());
                 Some(Value { force_n: force.newtons(), pressure_pa: found.pressure.pascals() })
             });
-            values.push(value.ok_or(Refusal::NoTable(request.side))?).map_err(|_| Refusal::Range)?;
+            let value = value.ok_or(Refusal::NoTable(request.side))?;
+            answer.values.push(value).map_err(|_| Refusal::Range)?;
         }
-        Ok(Evaluated { values })
+        Ok(())
     }
 
-    fn trace_arm(&mut self, request: TraceArm) -> Result<TraceInfo, Refusal> {
+    fn trace_arm(&mut self, request: &TraceArm, answer: &mut TraceInfo) -> Result<(), Refusal> {
         self.shared.with(|controller| {
-            controller.trace().arm(&request)?;
-            Ok(controller.trace().info())
+            controller.trace().arm(request)?;
+            *answer = controller.trace().info();
+            Ok(())
         })
     }
 
-    fn trace_info(&mut self, (): ()) -> Result<TraceInfo, Refusal> {
-        Ok(self.shared.with(|controller| controller.trace().info()))
+    fn trace_info(&mut self, (): &(), answer: &mut TraceInfo) -> Result<(), Refusal> {
+        self.shared.with(|controller| *answer = controller.trace().info());
+        Ok(())
     }
 
-    fn trace_read(&mut self, request: TraceRead) -> Result<TracePiece, Refusal> {
-        self.shared.with(|controller| controller.trace().read(request.record))
+    fn trace_read(&mut self, request: &TraceRead, answer: &mut TracePiece) -> Result<(), Refusal> {
+        self.shared.with(|controller| controller.trace().read(request.record, answer))
     }
 
-    fn forget_memory(&mut self, request: ForgetMemory) -> Result<(), Refusal> {
+    fn forget_memory(&mut self, request: &ForgetMemory, (): &mut ()) -> Result<(), Refusal> {
         self.at_rest()?;
-        self.server.store.put_memories(request.side, &Memories::new()).map_err(Refusal::Store)?;
+        self.server.store.put_memories(request.side, Memories::new()).map_err(Refusal::Store)?;
         self.server.use_kept(request.side, self.shared)
     }
 
-    fn restart(&mut self, (): ()) -> Result<(), Refusal> {
+    fn restart(&mut self, (): &(), (): &mut ()) -> Result<(), Refusal> {
         match self.shared.with(|controller| controller.state()) {
-            State::Running | State::Armed => Err(Refusal::WrongState(self.shared.with(|c| c.state()))),
+            state @ (State::Running | State::Armed) => Err(Refusal::WrongState(state)),
             State::Disarmed | State::Fault => {
                 self.server.keep_all(self.shared);
                 self.server.restart = true;

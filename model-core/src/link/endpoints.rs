@@ -1,6 +1,6 @@
 //! ONE table of endpoints: number, name, request, response. Everything else about them is made from it.
 
-use super::frame::{self, Exchange, Header, Kind};
+use super::frame::{Exchange, Kind};
 use super::messages::{
     DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, PastFault, Reference,
     ReferencePoints, Refusal, SetPoint, Start, Status, TableBegin, TableInfo, TablePiece, TableRead,
@@ -8,6 +8,7 @@ use super::messages::{
 };
 use super::messages::{Event, Side, Telemetry};
 use super::settings::Settings;
+use crate::fields::{self, Fields};
 use postcard_schema::{Schema, key::hash::fnv1a64::hash_ty_path};
 use serde::{Serialize, de::DeserializeOwned};
 
@@ -71,18 +72,18 @@ macro_rules! endpoints {
             ),
         }),*];
 
-        /// What a device must be able to answer: one function for each endpoint.
+        /// What a device must be able to answer: one function for each endpoint, which fills an answer that is there already.
         pub trait Service {
             $(
                 $(#[$doc])*
-                fn $name(&mut self, request: $request) -> Result<$response, Refusal>;
+                fn $name(&mut self, request: &$request, answer: &mut $response) -> Result<(), Refusal>;
             )*
         }
 
         /// Answers one request with a service, in its own place; gives the length of the answer's frame.
         pub fn answer<S: Service + ?Sized>(service: &mut S, exchange: &mut Exchange<'_>) -> Result<usize, Refusal> {
             match exchange.header().id {
-                $($id => respond(exchange, |request: $request| service.$name(request)),)*
+                $($id => respond(exchange, |request: &$request, answer: &mut $response| service.$name(request, answer)),)*
                 _ => Err(Refusal::UnknownEndpoint),
             }
         }
@@ -93,7 +94,7 @@ macro_rules! endpoints {
 
         #[cfg(test)]
         impl Service for Deaf {
-            $(fn $name(&mut self, _: $request) -> Result<$response, Refusal> {
+            $(fn $name(&mut self, _: &$request, _: &mut $response) -> Result<(), Refusal> {
                 Err(Refusal::NotSupported)
             })*
         }
@@ -102,14 +103,17 @@ macro_rules! endpoints {
 
 /// Reads a request and writes the answer to it. A function for each endpoint, so that the stack holds one message at a time.
 #[inline(never)]
-fn respond<Q: DeserializeOwned, A: Serialize>(
+fn respond<Q: Fields + Default, A: Fields + Default>(
     exchange: &mut Exchange<'_>,
-    act: impl FnOnce(Q) -> Result<A, Refusal>,
+    act: impl FnOnce(&Q, &mut A) -> Result<(), Refusal>,
 ) -> Result<usize, Refusal> {
-    let request = postcard::from_bytes(exchange.body()).map_err(|_| Refusal::Malformed)?;
-    let response = act(request)?;
-    let header = Header { kind: Kind::Response, ..exchange.header() };
-    frame::encode(header, &response, exchange.room()).map_err(|_| Refusal::Range)
+    let mut request = Q::default();
+    if !fields::read(exchange.body(), &mut request) {
+        return Err(Refusal::Malformed);
+    }
+    let mut answer = A::default();
+    act(&request, &mut answer)?;
+    exchange.answer(Kind::Response, &mut answer)
 }
 
 endpoints! {
@@ -192,7 +196,7 @@ pub const SCHEMA_HASH: u64 = {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::frame::{Accumulator, MAX_BODY, MAX_TOPIC, MAX_WIRE};
+    use crate::link::frame::{self, Accumulator, Header, MAX_BODY, MAX_TOPIC, MAX_WIRE};
     use crate::link::messages::{
         Fault, FaultReport, Mode, PIECE, POINTS, Sensor, SideSample, State, TRACE_PIECE, Value,
     };

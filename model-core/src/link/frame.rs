@@ -14,7 +14,9 @@
 use cobs::CobsEncoder;
 use postcard::ser_flavors::Flavor;
 
+use super::messages::Refusal;
 use crate::check::{self, crc32};
+use crate::fields::{Fields, Walk, Way};
 
 /// Largest body that a frame carries.
 pub const MAX_BODY: usize = 512;
@@ -109,7 +111,7 @@ impl core::fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-/// Writes a frame around a message and returns its length in `out`, the closing zero included.
+/// Writes a frame around a message and returns its length in `out`, the closing zero included, as a host does it.
 ///
 /// `out` of [`MAX_WIRE`] bytes always suffices. Fails with [`FrameError::Space`] when the message is longer than
 /// [`MAX_BODY`] or `out` is too short for it.
@@ -122,11 +124,23 @@ pub fn encode<M: serde::Serialize + ?Sized>(
     close(length.map_err(|_| FrameError::Space)?, out)
 }
 
+/// As [`encode`], by the fields of the message: as a controller does it.
+pub fn encode_fields(header: Header, message: &mut dyn Fields, out: &mut [u8]) -> Result<usize, FrameError> {
+    let mut writer = Writer::new(header, out)?;
+    let mut walk = Walk::new(&mut writer);
+    message.walk(&mut walk);
+    if !walk.is_whole() {
+        return Err(FrameError::Space);
+    }
+    let length = writer.end().ok_or(FrameError::Space)?;
+    close(length, out)
+}
+
 /// As [`encode`], for a body that is already bytes.
 pub fn encode_bytes(header: Header, body: &[u8], out: &mut [u8]) -> Result<usize, FrameError> {
     let mut writer = Writer::new(header, out)?;
-    let length = writer.try_extend(body).and_then(|()| writer.finalize());
-    close(length.map_err(|_| FrameError::Space)?, out)
+    let length = writer.push(body).and_then(|()| writer.end()).ok_or(FrameError::Space)?;
+    close(length, out)
 }
 
 /// A frame on its way out. Each byte is checked and stuffed as it comes, so that a message is never held a second time.
@@ -141,33 +155,50 @@ impl<'a> Writer<'a> {
     fn new(header: Header, out: &'a mut [u8]) -> Result<Self, FrameError> {
         let mut writer = Self { wire: CobsEncoder::new(out), check: check::begin(), room: HEADER + MAX_BODY };
         let [low, high] = header.sequence.to_le_bytes();
-        writer.try_extend(&[header.kind as u8, header.id, low, high]).map_err(|_| FrameError::Space)?;
+        writer.push(&[header.kind as u8, header.id, low, high]).ok_or(FrameError::Space)?;
         Ok(writer)
+    }
+
+    #[inline(never)]
+    fn push(&mut self, bytes: &[u8]) -> Option<()> {
+        self.room = self.room.checked_sub(bytes.len())?;
+        self.check.update(bytes);
+        self.wire.push(bytes).ok()
+    }
+
+    /// Gives the length without the closing zero.
+    #[inline(never)]
+    fn end(mut self) -> Option<usize> {
+        let check = self.check.finalize().to_le_bytes();
+        self.wire.push(&check).ok()?;
+        Some(self.wire.finalize())
     }
 }
 
-// Neither function is grown into the code of each message: that would be most of what messages take of a small flash.
+impl Way for Writer<'_> {
+    fn reads(&self) -> bool {
+        false
+    }
+
+    fn pass(&mut self, bytes: &mut [u8]) -> bool {
+        self.push(bytes).is_some()
+    }
+}
+
 impl Flavor for Writer<'_> {
     /// The length without the closing zero.
     type Output = usize;
 
-    #[inline(never)]
     fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
         self.try_extend(&[byte])
     }
 
-    #[inline(never)]
     fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
-        self.room = self.room.checked_sub(bytes.len()).ok_or(postcard::Error::SerializeBufferFull)?;
-        self.check.update(bytes);
-        self.wire.push(bytes).map_err(|_| postcard::Error::SerializeBufferFull)
+        self.push(bytes).ok_or(postcard::Error::SerializeBufferFull)
     }
 
-    #[inline(never)]
-    fn finalize(mut self) -> postcard::Result<usize> {
-        let check = self.check.finalize().to_le_bytes();
-        self.wire.push(&check).map_err(|_| postcard::Error::SerializeBufferFull)?;
-        Ok(self.wire.finalize())
+    fn finalize(self) -> postcard::Result<usize> {
+        self.end().ok_or(postcard::Error::SerializeBufferFull)
     }
 }
 
@@ -222,6 +253,14 @@ impl<'a> Exchange<'a> {
     /// Room for an answer; what has come is overwritten.
     pub fn room(&mut self) -> &mut [u8; MAX_WIRE] {
         self.bytes
+    }
+
+    /// Writes an answer, and gives the length of its frame.
+    ///
+    /// # Errors
+    /// [`Refusal::Range`] when it does not fit a frame.
+    pub fn answer(&mut self, kind: Kind, message: &mut dyn Fields) -> Result<usize, Refusal> {
+        encode_fields(Header { kind, ..self.header }, message, self.bytes).map_err(|_| Refusal::Range)
     }
 
     /// The first bytes, when an answer is in them.

@@ -11,6 +11,8 @@ mod trace;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+use crate::fields::codes;
+
 pub use self::asked::{REFERENCE_PIECE, Reference, ReferencePoints, SetPoint, Start};
 pub use self::device::{DeviceInfo, StartedBy, Status};
 pub use self::refusal::{Field, Refusal, StoreFault, TableFault};
@@ -33,6 +35,8 @@ pub enum Side {
     /// The second of a pair.
     Antagonist,
 }
+
+codes!(Side { Agonist, Antagonist });
 
 impl Side {
     /// Both, in order.
@@ -62,3 +66,5 @@ pub enum Mode {
     /// Angle and stiffness of a joint with two muscles.
     Pair,
 }
+
+codes!(Mode { Vent, Pressure, Force, Stroke, Pair });

@@ -3,10 +3,13 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+use crate::fields::{codes, fields};
+
 /// Where the pressure for a wanted force comes from before any trim.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum FeedForward {
     /// The inverse of the muscle's table.
+    #[default]
     Table,
     /// The ideal braid alone, `P = F · 4πN² / (3L² − B²)`: no bladder, no deadband, no friction.
     Gaylord,
@@ -14,14 +17,19 @@ pub enum FeedForward {
     Off,
 }
 
+codes!(FeedForward { Table, Gaylord, Off });
+
 /// What a fault does to the regulator. Either way the fault is latched and the state is `Fault`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Reaction {
     /// Command zero pressure at once.
+    #[default]
     Vent,
     /// Keep the last command, for loads that must not fall; over-pressure never allows it.
     Hold,
 }
+
+codes!(Reaction { Vent, Hold });
 
 /// Trim of force on a load cell, added to the feed-forward pressure:
 /// `trim = K_p e + K_i ∫ e dt`, `e = F_wanted − F_measured`, the integral stopped where the command saturates.
@@ -34,6 +42,8 @@ pub struct ForceLoop {
     /// Largest trim to either side, Pa; zero switches the trim off.
     pub trim_limit_pa: f32,
 }
+
+fields!(ForceLoop { proportional_pa_per_n, integral_pa_per_n_s, trim_limit_pa });
 
 /// Stroke loop around the force feed-forward:
 /// `F = F_load + K_p e + K_i ∫ e dt − K_d v`, `e = x_wanted − x`.
@@ -53,6 +63,15 @@ pub struct StrokeLoop {
     pub force_limit_n: f32,
 }
 
+fields!(StrokeLoop {
+    proportional_n_per_m,
+    integral_n_per_m_s,
+    damping_n_s_per_m,
+    load_n,
+    load_stiffness_n_per_m,
+    force_limit_n
+});
+
 /// Two muscles on one pulley: strokes are `x_rest ± r θ`, the torque is `r (F_agonist − F_antagonist)`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Joint {
@@ -69,6 +88,15 @@ pub struct Joint {
     /// Largest torque that the loop may ask for, N·m.
     pub torque_limit_nm: f32,
 }
+
+fields!(Joint {
+    radius_m,
+    rest_stroke_m,
+    proportional_nm_per_rad,
+    integral_nm_per_rad_s,
+    damping_nm_s_per_rad,
+    torque_limit_nm
+});
 
 /// Model of the pressure regulator, found by the host: `gain · (command + offset)` behind a first-order lag, a rate limit
 /// and a deadband. The controller inverts the parts that can be inverted.
@@ -92,6 +120,8 @@ pub struct Regulator {
     pub lead: f32,
 }
 
+fields!(Regulator { gain, offset_pa, lag_s, line_s, rate_pa_per_s, deadband_pa, command_max_pa, lead });
+
 /// Limits of operation; crossing one is a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Limits {
@@ -109,6 +139,8 @@ pub struct Limits {
     pub slew_pa_per_s: f32,
 }
 
+fields!(Limits { pressure_pa, stroke_min_m, stroke_max_m, speed_m_per_s, force_n, slew_pa_per_s });
+
 /// How one sensor is watched, in its own unit (Pa, m or N).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct SensorWatch {
@@ -123,6 +155,8 @@ pub struct SensorWatch {
     /// Ticks of bit-equal readings, while the command moves, after which the sensor counts as stuck; 0 never.
     pub stuck_ticks: u16,
 }
+
+fields!(SensorWatch { fitted, low, high, jump, stuck_ticks });
 
 /// The remaining watches.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -148,6 +182,19 @@ pub struct Watch {
     /// Ticks missed in a row before the fault.
     pub overrun_ticks: u16,
 }
+
+fields!(Watch {
+    debounce_ticks,
+    noisy_jumps,
+    disagree_n,
+    disagree_ticks,
+    follow_pa,
+    follow_ticks,
+    silence_ticks,
+    host_silence_ticks,
+    autonomous,
+    overrun_ticks
+});
 
 /// Everything a user may choose. One for the device; both muscles of a pair share it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -179,6 +226,22 @@ pub struct Settings {
     /// Band of pressure within which a reversal at held length is noise, Pa.
     pub pressure_band_pa: f32,
 }
+
+fields!(Settings {
+    feed_forward,
+    force_loop,
+    stroke_loop,
+    joint,
+    regulator,
+    limits,
+    pressure,
+    stroke,
+    force,
+    watch,
+    hold_on,
+    motion_band_m,
+    pressure_band_pa
+});
 
 impl Default for Settings {
     /// Sensible for the muscles of the thesis on a 0–10 bar regulator.

@@ -5,16 +5,19 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use super::Mode;
+use crate::fields::{choices, fields};
 
 /// Points of a reference table in one piece.
 pub const REFERENCE_PIECE: usize = 32;
 
 /// Starts a mode; from `Armed`, or from `Running` to change over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Start {
     /// What to control.
     pub mode: Mode,
 }
+
+fields!(Start { mode });
 
 /// What is wanted, in the terms of a mode.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -34,11 +37,26 @@ pub enum SetPoint {
     },
 }
 
+impl Default for SetPoint {
+    /// No pressure.
+    fn default() -> Self {
+        Self::Pressure(0.0)
+    }
+}
+
+choices!(SetPoint {
+    0 Pressure { 0: pascals },
+    1 Force { 0: newtons },
+    2 Stroke { 0: metres },
+    3 Pair { angle_rad: angle, stiffness_nm_per_rad: stiffness },
+});
+
 /// A wave that the device makes itself, in the unit of the mode's first value (Pa, N, m, rad); it begins at once and
 /// holds its last value at its end. A pair's stiffness is the last set-point's.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Reference {
     /// None: set-points of the host.
+    #[default]
     SetPoint,
     /// `mean + amplitude · sin(2π f t)`, for ever.
     Sine {
@@ -82,11 +100,21 @@ pub enum Reference {
     },
 }
 
+choices!(Reference {
+    0 SetPoint {},
+    1 Sine { mean: mean, amplitude: amplitude, frequency_hz: frequency },
+    2 Trapezoid { low: low, high: high, ramp_s: ramp, hold_s: hold },
+    3 Chirp { mean: mean, amplitude: amplitude, from_hz: from, to_hz: to, duration_s: duration },
+    4 Table { step_s: step, repeat: repeat },
+});
+
 /// Points of the reference table.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct ReferencePoints {
     /// Place of the first; 0 begins a new table.
     pub offset: u16,
     /// The points, in the unit of the mode.
     pub points: Vec<f32, REFERENCE_PIECE>,
 }
+
+fields!(ReferencePoints { offset, points });

@@ -4,9 +4,10 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use super::{Fault, Mode, State, TableInfo};
+use crate::fields::{codes, fields};
 
 /// Identity and limits of a device.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct DeviceInfo {
     /// Ticks of the control loop in a second.
     pub ticks_per_s: u32,
@@ -24,6 +25,16 @@ pub struct DeviceInfo {
     pub started_by: StartedBy,
 }
 
+fields!(DeviceInfo {
+    ticks_per_s,
+    muscles,
+    table_capacity,
+    trace_capacity,
+    reference_capacity,
+    tables,
+    started_by
+});
+
 /// Why a device started.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum StartedBy {
@@ -38,8 +49,10 @@ pub enum StartedBy {
     BrownOut,
 }
 
+codes!(StartedBy { Power, Request, Watchdog, BrownOut });
+
 /// What a device is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Status {
     /// State of safety.
     pub state: State,
@@ -62,3 +75,16 @@ pub struct Status {
     /// Wanted forces that the table could not give, and were limited.
     pub saturated_ticks: u32,
 }
+
+fields!(Status {
+    state,
+    mode,
+    fault,
+    time_us,
+    ticks,
+    overruns,
+    frames_good,
+    frames_bad,
+    telemetry_dropped,
+    saturated_ticks
+});

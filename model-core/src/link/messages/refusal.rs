@@ -4,6 +4,7 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use super::{Fault, Mode, Side, State};
+use crate::fields::{codes, told};
 
 /// Why a device refuses a request.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -48,10 +49,28 @@ pub enum Refusal {
     },
 }
 
+told!(Refusal {
+    0 UnknownEndpoint {},
+    1 Malformed {},
+    2 WrongState { 0: state },
+    3 Latched { 0: fault },
+    4 StillFaulty { 0: fault },
+    5 NoTable { 0: side },
+    6 WrongMode { 0: mode },
+    7 Value { 0: field },
+    8 Table { 0: fault },
+    9 Store { 0: fault },
+    10 Range {},
+    11 NotSupported {},
+    12 Stiffness { low_nm_per_rad: low, high_nm_per_rad: high },
+    13 Angle { low_rad: low, high_rad: high },
+});
+
 /// The setting or value that a refusal is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Field {
     /// A set-point.
+    #[default]
     SetPoint,
     /// A reference generator's parameter.
     Reference,
@@ -74,6 +93,20 @@ pub enum Field {
     /// Telemetry or trace.
     Rate,
 }
+
+codes!(Field {
+    SetPoint,
+    Reference,
+    ForceLoop,
+    StrokeLoop,
+    Joint,
+    Regulator,
+    Limits,
+    SensorWatch,
+    Watch,
+    Bands,
+    Rate
+});
 
 /// Why a table is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
@@ -107,10 +140,25 @@ pub enum TableFault {
     UnknownEffect,
 }
 
+told!(TableFault {
+    0 NotBegun {},
+    1 Gap { 0: offset },
+    2 TooLong { 0: length },
+    3 Incomplete { 0: length },
+    4 Check {},
+    5 Version { found: found, known: known },
+    6 Malformed {},
+    7 NotFinite {},
+    8 NotOrdered {},
+    9 OutOfRange {},
+    10 UnknownEffect {},
+});
+
 /// Why the store failed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum StoreFault {
     /// Reading or writing failed.
+    #[default]
     Medium,
     /// No room.
     Full,
@@ -119,3 +167,5 @@ pub enum StoreFault {
     /// The bytes read back are not those written.
     Verify,
 }
+
+codes!(StoreFault { Medium, Full, NoPrevious, Verify });

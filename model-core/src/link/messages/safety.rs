@@ -4,6 +4,7 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use super::{Mode, Side, SideSample};
+use crate::fields::{codes, fields};
 
 /// Past faults that are kept.
 pub const FAULT_LOG: usize = 8;
@@ -22,10 +23,13 @@ pub enum State {
     Fault,
 }
 
+codes!(State { Disarmed, Armed, Running, Fault });
+
 /// What went wrong. The number on the wire is the bit in [`Settings::hold_on`](crate::link::settings::Settings::hold_on).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Fault {
     /// A reading is outside what the sensor can give: broken wire, short circuit.
+    #[default]
     SensorRange,
     /// A reading does not change although the command moves.
     SensorStuck,
@@ -65,6 +69,28 @@ pub enum Fault {
     HostSilence,
 }
 
+codes!(Fault {
+    SensorRange,
+    SensorStuck,
+    SensorNoisy,
+    SensorsDisagree,
+    SensorsSilent,
+    PressureNotRising,
+    PressureNotFalling,
+    OverPressure,
+    OverStroke,
+    OverSpeed,
+    OverForce,
+    SetPointSilence,
+    LoopOverrun,
+    TableMissing,
+    TableInvalid,
+    BrownOut,
+    Watchdog,
+    NotANumber,
+    HostSilence
+});
+
 impl Fault {
     /// All of them, in the order of their codes.
     pub const ALL: [Self; 19] = [
@@ -96,9 +122,10 @@ impl Fault {
 }
 
 /// Which sensor a fault is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Sensor {
     /// Pressure.
+    #[default]
     Pressure,
     /// Stroke.
     Stroke,
@@ -106,8 +133,10 @@ pub enum Sensor {
     Force,
 }
 
+codes!(Sensor { Pressure, Stroke, Force });
+
 /// A fault as it happened.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct FaultReport {
     /// What went wrong.
     pub fault: Fault,
@@ -129,6 +158,8 @@ pub struct FaultReport {
     pub last: SideSample,
 }
 
+fields!(FaultReport { fault, side, sensor, from, mode, time_us, value, limit, last });
+
 /// Faults since the start.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Faults {
@@ -138,9 +169,13 @@ pub struct Faults {
     pub counts: [u16; 19],
 }
 
+fields!(Faults { latched, counts });
+
 /// Asks for one past fault: 0 the last, 1 the one before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct PastFault {
     /// How far back, less than [`FAULT_LOG`].
     pub back: u8,
 }
+
+fields!(PastFault { back });

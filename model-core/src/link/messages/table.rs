@@ -5,6 +5,7 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use super::Side;
+use crate::fields::fields;
 
 /// Bytes of a table or trace in one piece.
 pub const PIECE: usize = 256;
@@ -13,7 +14,7 @@ pub const PIECE: usize = 256;
 pub const POINTS: usize = 16;
 
 /// A table as the device knows it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct TableInfo {
     /// Length of the image in bytes.
     pub length: u32,
@@ -25,8 +26,10 @@ pub struct TableInfo {
     pub has_previous: bool,
 }
 
+fields!(TableInfo { length, crc, generation, has_previous });
+
 /// Begins an upload; whatever was begun before is forgotten.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct TableBegin {
     /// Muscle the table is for.
     pub side: Side,
@@ -36,8 +39,10 @@ pub struct TableBegin {
     pub crc: u32,
 }
 
+fields!(TableBegin { side, length, crc });
+
 /// One piece of a table.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct TablePiece {
     /// Place of the first byte.
     pub offset: u32,
@@ -45,8 +50,10 @@ pub struct TablePiece {
     pub bytes: Vec<u8, PIECE>,
 }
 
+fields!(TablePiece { offset, bytes });
+
 /// Asks for a piece of the table in use, from the store.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct TableRead {
     /// Muscle.
     pub side: Side,
@@ -54,8 +61,10 @@ pub struct TableRead {
     pub offset: u32,
 }
 
+fields!(TableRead { side, offset });
+
 /// A point to evaluate the table at.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Point {
     /// Gauge pressure, Pa.
     pub pressure_pa: f32,
@@ -63,8 +72,10 @@ pub struct Point {
     pub stroke_m: f32,
 }
 
+fields!(Point { pressure_pa, stroke_m });
+
 /// Asks the device what its table says, so that a host can compare bit for bit.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Evaluate {
     /// Muscle.
     pub side: Side,
@@ -74,15 +85,19 @@ pub struct Evaluate {
     pub points: Vec<Point, POINTS>,
 }
 
+fields!(Evaluate { side, direction, points });
+
 /// What the table says at the points asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Evaluated {
     /// Force and pressure at each point.
     pub values: Vec<Value, POINTS>,
 }
 
+fields!(Evaluated { values });
+
 /// The table at one point.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Value {
     /// Force, N.
     pub force_n: f32,
@@ -90,9 +105,13 @@ pub struct Value {
     pub pressure_pa: f32,
 }
 
+fields!(Value { force_n, pressure_pa });
+
 /// What happens to an effect's remembered state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct ForgetMemory {
     /// Muscle whose history is forgotten: a new one was fitted.
     pub side: Side,
 }
+
+fields!(ForgetMemory { side });

@@ -5,13 +5,16 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use super::{FaultReport, Mode, State};
+use crate::fields::{fields, told};
 
 /// Sets the stream of telemetry.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct TelemetryRate {
     /// One sample every so many ticks; 0 stops.
     pub every_ticks: u16,
 }
+
+fields!(TelemetryRate { every_ticks });
 
 /// One muscle at one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
@@ -30,8 +33,10 @@ pub struct SideSample {
     pub model_n: f32,
 }
 
+fields!(SideSample { pressure_pa, stroke_m, force_n, wanted_pa, command_pa, model_n });
+
 /// One tick as the device saw it. The frame's sequence number counts samples: a gap is a loss on the way.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Telemetry {
     /// Device time of the tick, µs.
     pub time_us: u64,
@@ -49,6 +54,8 @@ pub struct Telemetry {
     pub sides: Vec<SideSample, 2>,
 }
 
+fields!(Telemetry { time_us, tick, state, mode, asked, asked_second, sides });
+
 /// Something that happened, told without being asked.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Event {
@@ -59,3 +66,5 @@ pub enum Event {
     /// A trace is full.
     TraceFull,
 }
+
+told!(Event { 0 Fault { 0: report }, 1 State { 0: state }, 2 TraceFull {} });

@@ -4,6 +4,8 @@ use heapless::Vec;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+use crate::fields::{codes, fields};
+
 /// Variables that one trace records.
 pub const TRACE_VARIABLES: usize = 16;
 
@@ -11,9 +13,10 @@ pub const TRACE_VARIABLES: usize = 16;
 pub const TRACE_PIECE: usize = 64;
 
 /// Variables of the loop that a trace can record.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Variable {
     /// Measured pressure, Pa.
+    #[default]
     Pressure,
     /// Measured stroke, m.
     Stroke,
@@ -53,10 +56,33 @@ pub enum Variable {
     SecondCommand,
 }
 
+codes!(Variable {
+    Pressure,
+    Stroke,
+    Force,
+    Speed,
+    Direction,
+    Asked,
+    WantedForce,
+    FeedForward,
+    Trim,
+    WantedPressure,
+    Command,
+    ModelPressure,
+    ModelForce,
+    State,
+    StepTime,
+    SecondPressure,
+    SecondStroke,
+    SecondForce,
+    SecondCommand
+});
+
 /// When a trace begins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Trigger {
     /// At once.
+    #[default]
     Now,
     /// With the next start of a mode or reference.
     Start,
@@ -64,8 +90,10 @@ pub enum Trigger {
     UntilFault,
 }
 
+codes!(Trigger { Now, Start, UntilFault });
+
 /// Arms a trace; what an earlier one recorded is forgotten.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct TraceArm {
     /// What to record.
     pub variables: Vec<Variable, TRACE_VARIABLES>,
@@ -75,8 +103,10 @@ pub struct TraceArm {
     pub trigger: Trigger,
 }
 
+fields!(TraceArm { variables, every_ticks, trigger });
+
 /// A trace as it stands.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct TraceInfo {
     /// Whether it has ended and can be read.
     pub complete: bool,
@@ -90,16 +120,22 @@ pub struct TraceInfo {
     pub variables: Vec<Variable, TRACE_VARIABLES>,
 }
 
+fields!(TraceInfo { complete, records, first_tick, every_ticks, variables });
+
 /// Asks for values of a trace.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct TraceRead {
     /// Record to begin with.
     pub record: u32,
 }
 
+fields!(TraceRead { record });
+
 /// Values of whole records, one record after the other.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct TracePiece {
     /// The values.
     pub values: Vec<f32, TRACE_PIECE>,
 }
+
+fields!(TracePiece { values });
