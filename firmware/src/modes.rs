@@ -111,7 +111,9 @@ impl Model {
     pub fn rebuild(&mut self, table: &MuscleTable) -> Result<(), TableError> {
         self.muscle.rebuild(table)?;
         self.chain.resume(&table.effects);
-        self.now = self.muscle.moment();
+        self.muscle.begin(&mut self.now);
+        // At rest, without pressure. As the control step does it, so that no other form of it is in the image.
+        single::update(&self.muscle, &mut self.now, &Motion::default(), Pressure::ZERO);
         let reach_m = table.tested.contraction_high.at_least(1.0e-2) * self.muscle.braid().rest_length();
         let distance_m = SLIDE * reach_m;
         let area = self.now.held.posture.area;

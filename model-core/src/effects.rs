@@ -520,7 +520,8 @@ pub struct Chain<T> {
 #[derive(Clone, Debug, PartialEq)]
 struct Running<T> {
     effect: EffectName,
-    parameters: heapless::Vec<T, MAX_PARAMETERS>,
+    /// Those that the effect does not have are zero: of so many no effect asks beyond the end, and none is looked for there.
+    parameters: [T; MAX_PARAMETERS],
     memory: Memory<T>,
 }
 
@@ -554,7 +555,10 @@ impl<T: Scalar> Chain<T> {
     fn begin(&mut self, fitted: &[FittedEffect]) {
         self.effects.clear();
         for one in fitted.iter().take(MAX_EFFECTS) {
-            let parameters = one.parameters.iter().map(|p| T::from_f32(*p)).collect();
+            let mut parameters = [T::ZERO; MAX_PARAMETERS];
+            for (to, from) in parameters.iter_mut().zip(&one.parameters) {
+                *to = T::from_f32(*from);
+            }
             // The iterator is no longer than the vector.
             let _ = self.effects.push(Running { effect: one.effect, parameters, memory: [T::ZERO; MEMORY] });
         }

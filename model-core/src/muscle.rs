@@ -320,24 +320,36 @@ impl<T: Scalar> Muscle<T> {
 
     /// A moment at rest length without pressure, to begin with.
     pub fn moment(&self) -> Moment<T> {
-        let held = self.held(Length::ZERO);
-        let context = Context {
-            rest_length: self.braid.rest_length(),
-            fibre_length: self.braid.fibre_length(),
-            turns: self.braid.turns(),
-            rest_radius: self.braid.rest_radius(),
-            order: self.order_scalar,
-            ..Context::default()
-        };
-        Moment { slopes: self.slopes(&held), held, context }
+        let mut moment = Moment::NONE;
+        self.begin(&mut moment);
+        moment.held = self.held(Length::ZERO);
+        moment.slopes = self.slopes(&moment.held);
+        moment
+    }
+
+    /// Puts into a moment what stays the same in all of this muscle; the rest comes with [`Muscle::update`].
+    pub fn begin(&self, moment: &mut Moment<T>) {
+        *moment = Moment::NONE;
+        let context = &mut moment.context;
+        context.rest_length = self.braid.rest_length();
+        context.fibre_length = self.braid.fibre_length();
+        context.turns = self.braid.turns();
+        context.rest_radius = self.braid.rest_radius();
+        context.order = self.order_scalar;
     }
 
     /// Brings a moment to a motion and a pressure.
     #[inline]
     pub fn update(&self, moment: &mut Moment<T>, motion: &Motion<T>, pressure: Pressure<T>) {
+        moment.held = self.held(Length::from_metres(motion.stroke));
+        moment.slopes = self.slopes(&moment.held);
+        self.look(moment, motion, pressure);
+    }
+
+    /// The rest of [`Muscle::update`]: what effects look at, in a moment that has its shape and slopes already.
+    #[inline]
+    pub(crate) fn look(&self, moment: &mut Moment<T>, motion: &Motion<T>, pressure: Pressure<T>) {
         let Moment { held, slopes, context } = moment;
-        *held = self.held(Length::from_metres(motion.stroke));
-        *slopes = self.slopes(held);
         let posture = &held.posture;
         context.dt = motion.dt;
         context.time = motion.time;

@@ -6,7 +6,7 @@
 use crate::effects::{Chain, Context};
 use crate::inverse::{Search, Solution};
 use crate::motion::{Motion, MotionTracker};
-use crate::muscle::{Held, Moment, Muscle, Parts};
+use crate::muscle::{Held, HeldSlopes, Moment, Muscle, Parts};
 use crate::units::{Force, Length, Pressure};
 
 /// [`Muscle::force`].
@@ -35,8 +35,14 @@ pub fn pose(
     pressure: Pressure<f32>,
     direction: f32,
 ) -> Force<f32> {
-    *held = muscle.held(stroke);
+    hold(muscle, held, stroke);
     muscle.pull(muscle.force_posed(&held.posture, pressure, direction))
+}
+
+/// [`Muscle::slopes`], into their place.
+#[inline(never)]
+fn lean(muscle: &Muscle<f32>, held: &Held<f32>, slopes: &mut HeldSlopes<f32>) {
+    *slopes = muscle.slopes(held);
 }
 
 /// [`Muscle::parts`].
@@ -48,7 +54,9 @@ pub fn parts(muscle: &Muscle<f32>, held: &Held<f32>, pressure: Pressure<f32>) ->
 /// [`Muscle::stroke_slope`].
 #[inline(never)]
 pub fn stroke_slope(muscle: &Muscle<f32>, held: &Held<f32>, pressure: Pressure<f32>) -> f32 {
-    muscle.stroke_slope(held, &muscle.slopes(held), pressure)
+    let mut slopes = HeldSlopes::default();
+    lean(muscle, held, &mut slopes);
+    muscle.stroke_slope(held, &slopes, pressure)
 }
 
 /// [`Muscle::pressure_for`].
@@ -97,7 +105,9 @@ pub fn pressure_with(
 /// [`Muscle::update`].
 #[inline(never)]
 pub fn update(muscle: &Muscle<f32>, moment: &mut Moment<f32>, motion: &Motion<f32>, pressure: Pressure<f32>) {
-    muscle.update(moment, motion, pressure);
+    hold(muscle, &mut moment.held, Length::from_metres(motion.stroke));
+    lean(muscle, &moment.held, &mut moment.slopes);
+    muscle.look(moment, motion, pressure);
 }
 
 /// [`Chain::step`].

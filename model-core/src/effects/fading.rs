@@ -50,6 +50,8 @@ impl<const N: usize, const D: usize> Fading<N, D> {
         Self::FIRST + branch * D + drive
     }
 
+    const SIZE: Size = Size { branches: N, drives: D };
+
     /// Lets `dt ≥ 0` seconds pass, while the drives ran straight to `drives`. `times` are in seconds, the shortest first.
     ///
     /// The first call only takes note of the drives: they are assumed to have been there for long.
@@ -59,10 +61,14 @@ impl<const N: usize, const D: usize> Fading<N, D> {
         let first = memory[SEEN] == T::ZERO;
         let dt = dt.at_least(T::ZERO);
         let full = times[0].at_least(T::from_f32(SHORTEST)) * T::from_f32(0.02);
-        if !first && dt < full && memory[PENDING] + dt < full {
-            Self::step_short(memory, dt, times, drives);
-        } else {
-            Self::step_whole(memory, dt, full, times, drives);
+        if first || !(dt < full) {
+            Self::SIZE.step_long(memory, dt, times, drives);
+            return;
+        }
+        Self::step_short(memory, dt, times, drives);
+        if !(memory[PENDING] < full) {
+            Self::SIZE.settle(memory, times);
+            Self::SIZE.sum(memory);
         }
     }
 
@@ -91,30 +97,41 @@ impl<const N: usize, const D: usize> Fading<N, D> {
         memory[Self::SUMS..Self::SLOTS].copy_from_slice(&sums);
     }
 
-    /// Any other step.
-    #[inline(never)]
-    fn step_whole<T: Scalar>(memory: &mut Memory<T>, dt: T, full: T, times: &[T; N], drives: &[T; D]) {
+    /// The sum over the time constants of one drive's over-stresses, with the drive now at `now`.
+    #[inline(always)]
+    pub fn value<T: Scalar>(memory: &Memory<T>, drive: usize, now: T) -> T {
         if memory[SEEN] == T::ZERO {
-            memory[SEEN] = T::ONE;
-            memory[Self::LAST..Self::FIRST].copy_from_slice(drives);
-        } else if dt < full {
-            Self::step_short(memory, dt, times, drives);
-            Self::settle(memory, times);
-        } else {
-            Self::step_long(memory, dt, times, drives);
+            return T::ZERO;
         }
-        // Nothing pends, so all of every over-stress is left.
-        for d in 0..D {
-            let mut sum = T::ZERO;
-            for i in 0..N {
-                sum += memory[Self::slot(d, i)];
-            }
-            memory[Self::SUMS + d] = sum;
-        }
+        memory[Self::SUMS + drive] + T::from_f32(N as f32) * (now - memory[Self::LAST + drive])
+    }
+}
+
+/// How many time constants and drives there are: for the steps that come once in a while, which are the same code for all.
+#[derive(Clone, Copy)]
+struct Size {
+    branches: usize,
+    drives: usize,
+}
+
+impl Size {
+    /// The over-stresses, branch by branch, and behind them the sums of each drive.
+    fn stresses<T>(self, memory: &mut Memory<T>) -> (&mut [T], &mut [T]) {
+        let (_, behind) = memory.split_at_mut(SHARES + self.branches + self.drives);
+        behind.split_at_mut(self.branches * self.drives)
     }
 
-    fn step_long<T: Scalar>(memory: &mut Memory<T>, dt: T, times: &[T; N], drives: &[T; D]) {
-        Self::settle(memory, times);
+    /// The first step, and any that is not short beside the time constants.
+    #[inline(never)]
+    fn step_long<T: Scalar>(self, memory: &mut Memory<T>, dt: T, times: &[T], drives: &[T]) {
+        let last = SHARES + self.branches;
+        if memory[SEEN] == T::ZERO {
+            memory[SEEN] = T::ONE;
+            memory[last..last + self.drives].copy_from_slice(drives);
+            self.sum(memory);
+            return;
+        }
+        self.settle(memory, times);
         let shortest = T::from_f32(SHORTEST);
         if memory[SHARES_FOR] != dt {
             // An endless pause is not worth remembering, and would not be a finite number.
@@ -124,39 +141,44 @@ impl<const N: usize, const D: usize> Fading<N, D> {
             }
         }
         for (d, drive) in drives.iter().enumerate() {
-            let change = *drive - memory[Self::LAST + d];
-            memory[Self::LAST + d] = *drive;
+            let change = *drive - memory[last + d];
+            memory[last + d] = *drive;
             for (i, tau) in times.iter().enumerate() {
                 let share = memory[SHARES + i];
-                let q = &mut memory[Self::slot(d, i)];
+                let q = &mut memory[last + self.drives + i * self.drives + d];
                 *q = *q - *q * share + change * (share * (tau.at_least(shortest) / dt));
             }
         }
+        self.sum(memory);
     }
 
     /// Fades by the time that has been pending.
-    fn settle<T: Scalar>(memory: &mut Memory<T>, times: &[T; N]) {
-        let pending = memory[PENDING];
+    #[inline(never)]
+    fn settle<T: Scalar>(self, memory: &mut Memory<T>, times: &[T]) {
+        let pending = core::mem::replace(&mut memory[PENDING], T::ZERO);
         if pending == T::ZERO {
             return;
         }
-        memory[PENDING] = T::ZERO;
-        for (i, tau) in times.iter().enumerate() {
+        let (stresses, _) = self.stresses(memory);
+        for (branch, tau) in stresses.chunks_exact_mut(self.drives).zip(times) {
             let share = small_share(pending / tau.at_least(T::from_f32(SHORTEST)));
-            for d in 0..D {
-                let q = &mut memory[Self::slot(d, i)];
+            for q in branch {
                 *q = *q - *q * share;
             }
         }
     }
 
-    /// The sum over the time constants of one drive's over-stresses, with the drive now at `now`.
-    #[inline(always)]
-    pub fn value<T: Scalar>(memory: &Memory<T>, drive: usize, now: T) -> T {
-        if memory[SEEN] == T::ZERO {
-            return T::ZERO;
+    /// Sums where nothing pends, so that all of every over-stress is left.
+    #[inline(never)]
+    fn sum<T: Scalar>(self, memory: &mut Memory<T>) {
+        let (stresses, sums) = self.stresses(memory);
+        let sums = &mut sums[..self.drives];
+        sums.fill(T::ZERO);
+        for branch in stresses.chunks_exact(self.drives) {
+            for (sum, q) in sums.iter_mut().zip(branch) {
+                *sum += *q;
+            }
         }
-        memory[Self::SUMS + drive] + T::from_f32(N as f32) * (now - memory[Self::LAST + drive])
     }
 }
 
