@@ -122,13 +122,14 @@ impl Machine {
         self.unsaved.take()
     }
 
-    fn go(&mut self, cause: Cause) -> Result<State, Refusal> {
+    /// Where a request would lead.
+    ///
+    /// # Errors
+    /// As [`Machine::request`].
+    pub fn allows(&self, cause: Cause) -> Result<State, Refusal> {
         let to = TRANSITIONS.iter().find(|(from, with, _)| *from == self.state && *with == cause);
         match (to, self.latched()) {
-            (Some((_, _, to)), _) => {
-                self.state = *to;
-                Ok(*to)
-            }
+            (Some((_, _, to)), _) => Ok(*to),
             (None, Some(fault)) => Err(Refusal::Latched(fault)),
             (None, None) => Err(Refusal::WrongState(self.state)),
         }
@@ -139,16 +140,12 @@ impl Machine {
     /// # Errors
     /// [`Refusal::Latched`] while a fault stands, else [`Refusal::WrongState`].
     pub fn request(&mut self, cause: Cause) -> Result<State, Refusal> {
-        let state = self.go(cause)?;
+        let state = self.allows(cause)?;
+        self.state = state;
         if cause == Cause::Clear {
             self.faults.latched = None;
         }
         Ok(state)
-    }
-
-    /// Whether a request would be allowed.
-    pub fn allows(&self, cause: Cause) -> Result<(), Refusal> {
-        self.clone().go(cause).map(|_| ())
     }
 
     /// A fault: counted each time, latched if it is the first. Returns whether it was.
@@ -161,7 +158,7 @@ impl Machine {
         self.faults.latched = Some(report);
         self.unsaved = Some(report);
         // The table has a way to `Fault` from every state.
-        let _ = self.go(Cause::Fault);
+        let _ = self.request(Cause::Fault);
         true
     }
 }

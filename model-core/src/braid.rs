@@ -97,7 +97,7 @@ impl<T: Scalar> Geometry<T> {
         let alpha = self.braid_angle.si();
         let d0 = self.outer_diameter.si();
         let t0 = self.wall.si();
-        let [pi, right] = [PI, PI / 2.0].map(T::from_f64);
+        let (pi, right) = (T::from_f64(PI), T::from_f64(PI / 2.0));
         let two = T::ONE + T::ONE;
         if !(l0.is_finite() && l0 > T::ZERO) {
             return Err(GeometryError::RestLength);

@@ -87,10 +87,11 @@ impl<'a> Walk<'a> {
         one[0]
     }
 
-    /// A number of so many bits.
+    /// A number in at most so many bytes, of which the last may have so many bits.
     #[inline(never)]
-    fn number(&mut self, number: u64, bits: u32) -> u64 {
-        let most = bits.div_ceil(7) as usize;
+    fn number(&mut self, number: u64, most: usize, bits: u32) -> u64 {
+        let mut bytes = [0_u8; 10];
+        let mut length = 0;
         if !self.reads() {
             let mut rest = number;
             while rest > 0x7F {
@@ -100,17 +101,20 @@ impl<'a> Walk<'a> {
             self.byte(rest as u8);
             return number;
         }
-        let mut bytes = [0; 10];
         for place in &mut bytes[..most] {
             *place = self.byte(0);
+            length += 1;
             if *place & 0x80 == 0 {
-                // The last byte has no more than the bits that are left.
-                self.whole &= bytes[most - 1] >> (bits as usize - 7 * (most - 1)) == 0;
-                return bytes.iter().rev().fold(0, |sum, byte| sum << 7 | u64::from(byte & 0x7F));
+                break;
             }
         }
-        self.whole = false;
-        number
+        let mut found = 0;
+        for byte in bytes[..length].iter().rev() {
+            found = found << 7 | u64::from(byte & 0x7F);
+        }
+        // What is behind the last bit, the sign that more follow with it.
+        self.whole &= bytes[most - 1] >> bits == 0;
+        found
     }
 
     /// The number of a variant, below `count`.
@@ -250,21 +254,21 @@ impl Fields for bool {
 impl Fields for u16 {
     #[inline(never)]
     fn walk(&mut self, walk: &mut Walk<'_>) {
-        *self = walk.number(u64::from(*self), Self::BITS) as u16;
+        *self = walk.number(u64::from(*self), 3, 2) as u16;
     }
 }
 
 impl Fields for u32 {
     #[inline(never)]
     fn walk(&mut self, walk: &mut Walk<'_>) {
-        *self = walk.number(u64::from(*self), Self::BITS) as u32;
+        *self = walk.number(u64::from(*self), 5, 4) as u32;
     }
 }
 
 impl Fields for u64 {
     #[inline(never)]
     fn walk(&mut self, walk: &mut Walk<'_>) {
-        *self = walk.number(*self, Self::BITS);
+        *self = walk.number(*self, 10, 1);
     }
 }
 
@@ -293,32 +297,26 @@ impl<V: Fields, const N: usize> Fields for [V; N] {
     }
 }
 
+#[inline(never)]
 fn each<V: Fields>(values: &mut [V], walk: &mut Walk<'_>) {
     for value in values {
         value.walk(walk);
     }
 }
 
-impl<V: Fields + Default, const N: usize> Fields for Vec<V, N> {
+impl<V: Fields + Default + Clone, const N: usize> Fields for Vec<V, N> {
     fn walk(&mut self, walk: &mut Walk<'_>) {
         list(self.as_mut_view(), walk);
     }
 }
 
 #[inline(never)]
-fn list<V: Fields + Default>(values: &mut VecView<V>, walk: &mut Walk<'_>) {
-    let length = walk.number(values.len() as u64, u32::BITS);
-    if walk.reads() {
-        values.clear();
-        for _ in 0..length {
-            let mut value = V::default();
-            value.walk(walk);
-            if !walk.whole || values.push(value).is_err() {
-                walk.whole = false;
-                return;
-            }
-        }
-    } else {
-        each(values, walk);
+fn list<V: Fields + Default + Clone>(values: &mut VecView<V>, walk: &mut Walk<'_>) {
+    let mut length = values.len() as u32;
+    length.walk(walk);
+    if walk.reads() && values.resize_default(length as usize).is_err() {
+        walk.whole = false;
+        return;
     }
+    each(values, walk);
 }

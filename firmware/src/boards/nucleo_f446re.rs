@@ -235,14 +235,15 @@ impl Plant for Sensors {
         self.command.set(Value::Bit12Right(code as u16));
         self.valve.set_level(if command.vent { Level::Low } else { Level::High });
         self.watchdog.pet();
-        let step_us = self.began.elapsed().as_micros() as f32;
+        // In words: no tick is an hour late, and nothing here divides 64 bits.
+        let step_us = self.began.elapsed().as_micros() as u32 as f32;
         self.ticker.next().await;
         self.began = Instant::now();
-        let late = self.began.saturating_duration_since(self.due).as_micros() / TICK_US;
-        self.due += Duration::from_micros(TICK_US * (1 + late));
+        let late = self.began.saturating_duration_since(self.due).as_micros() as u32 / TICK_US as u32;
+        self.due += Duration::from_micros(TICK_US * u64::from(1 + late));
         Inputs {
             sides: [Some(self.read()), None],
-            missed_ticks: late.min(u64::from(u16::MAX)) as u16,
+            missed_ticks: late.min(u32::from(u16::MAX)) as u16,
             supply_low: supply::is_low(),
             step_us,
         }

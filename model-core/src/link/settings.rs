@@ -243,68 +243,70 @@ fields!(Settings {
     pressure_band_pa
 });
 
-impl Default for Settings {
+impl Settings {
     /// Sensible for the muscles of the thesis on a 0–10 bar regulator.
+    pub const DEFAULT: Self = Self {
+        feed_forward: FeedForward::Table,
+        force_loop: ForceLoop { proportional_pa_per_n: 0.0, integral_pa_per_n_s: 0.0, trim_limit_pa: 0.0 },
+        stroke_loop: StrokeLoop {
+            proportional_n_per_m: 5_000.0,
+            integral_n_per_m_s: 20_000.0,
+            damping_n_s_per_m: 50.0,
+            load_n: 0.0,
+            load_stiffness_n_per_m: 0.0,
+            force_limit_n: 2_000.0,
+        },
+        joint: Joint {
+            radius_m: 0.02,
+            rest_stroke_m: 0.002,
+            proportional_nm_per_rad: 12.0,
+            integral_nm_per_rad_s: 400.0,
+            damping_nm_s_per_rad: 0.2,
+            torque_limit_nm: 20.0,
+        },
+        regulator: Regulator {
+            gain: 1.0,
+            offset_pa: 0.0,
+            lag_s: 0.03,
+            line_s: 0.0,
+            rate_pa_per_s: 20e6,
+            deadband_pa: 0.0,
+            command_max_pa: 650e3,
+            lead: 1.0,
+        },
+        limits: Limits {
+            pressure_pa: 700e3,
+            stroke_min_m: -0.01,
+            stroke_max_m: 0.08,
+            speed_m_per_s: 2.0,
+            force_n: 3_000.0,
+            slew_pa_per_s: 20e6,
+        },
+        pressure: SensorWatch { fitted: true, low: -50e3, high: 1_000e3, jump: 150e3, stuck_ticks: 200 },
+        stroke: SensorWatch { fitted: true, low: -0.02, high: 0.2, jump: 0.01, stuck_ticks: 0 },
+        force: SensorWatch { fitted: true, low: -500.0, high: 4_000.0, jump: 800.0, stuck_ticks: 200 },
+        watch: Watch {
+            debounce_ticks: 2,
+            noisy_jumps: 8,
+            disagree_n: 0.0,
+            disagree_ticks: 200,
+            follow_pa: 150e3,
+            follow_ticks: 200,
+            silence_ticks: 0,
+            host_silence_ticks: 1_000,
+            autonomous: false,
+            overrun_ticks: 5,
+        },
+        hold_on: 0,
+        motion_band_m: 20e-6,
+        pressure_band_pa: 2e3,
+    };
+}
+
+impl Default for Settings {
+    /// [`Settings::DEFAULT`].
+    #[inline(never)]
     fn default() -> Self {
-        Self {
-            feed_forward: FeedForward::Table,
-            force_loop: ForceLoop {
-                proportional_pa_per_n: 0.0,
-                integral_pa_per_n_s: 0.0,
-                trim_limit_pa: 0.0,
-            },
-            stroke_loop: StrokeLoop {
-                proportional_n_per_m: 5_000.0,
-                integral_n_per_m_s: 20_000.0,
-                damping_n_s_per_m: 50.0,
-                load_n: 0.0,
-                load_stiffness_n_per_m: 0.0,
-                force_limit_n: 2_000.0,
-            },
-            joint: Joint {
-                radius_m: 0.02,
-                rest_stroke_m: 0.002,
-                proportional_nm_per_rad: 12.0,
-                integral_nm_per_rad_s: 400.0,
-                damping_nm_s_per_rad: 0.2,
-                torque_limit_nm: 20.0,
-            },
-            regulator: Regulator {
-                gain: 1.0,
-                offset_pa: 0.0,
-                lag_s: 0.03,
-                line_s: 0.0,
-                rate_pa_per_s: 20e6,
-                deadband_pa: 0.0,
-                command_max_pa: 650e3,
-                lead: 1.0,
-            },
-            limits: Limits {
-                pressure_pa: 700e3,
-                stroke_min_m: -0.01,
-                stroke_max_m: 0.08,
-                speed_m_per_s: 2.0,
-                force_n: 3_000.0,
-                slew_pa_per_s: 20e6,
-            },
-            pressure: SensorWatch { fitted: true, low: -50e3, high: 1_000e3, jump: 150e3, stuck_ticks: 200 },
-            stroke: SensorWatch { fitted: true, low: -0.02, high: 0.2, jump: 0.01, stuck_ticks: 0 },
-            force: SensorWatch { fitted: true, low: -500.0, high: 4_000.0, jump: 800.0, stuck_ticks: 200 },
-            watch: Watch {
-                debounce_ticks: 2,
-                noisy_jumps: 8,
-                disagree_n: 0.0,
-                disagree_ticks: 200,
-                follow_pa: 150e3,
-                follow_ticks: 200,
-                silence_ticks: 0,
-                host_silence_ticks: 1_000,
-                autonomous: false,
-                overrun_ticks: 5,
-            },
-            hold_on: 0,
-            motion_band_m: 20e-6,
-            pressure_band_pa: 2e3,
-        }
+        Self::DEFAULT
     }
 }

@@ -178,7 +178,7 @@ impl Benches {
 
 impl Plant for Benches {
     async fn exchange(&mut self, outputs: &Outputs) -> Inputs {
-        let step_us = self.stepped_at.elapsed().as_micros() as f32;
+        let step_us = self.stepped_at.elapsed().as_micros() as u32 as f32;
         let first = self.first.exchange(&outputs.sides[0], outputs.asked).await;
         let mut second = None;
         if self.second.started || self.second.look() {
