@@ -22,6 +22,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo:rustc-link-search={}", out.display());
     println!("cargo:rustc-link-arg-bins=--nmagic");
     println!("cargo:rustc-link-arg-bins=-Tlink.x");
+    // Functions of the same instructions once.
+    println!("cargo:rustc-link-arg-bins=--icf=all");
     if chosen("LOG") {
         println!("cargo:rustc-link-arg-bins=-Tdefmt.x");
     }

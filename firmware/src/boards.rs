@@ -5,6 +5,7 @@ mod mps2_an386;
 #[cfg(feature = "nucleo-f446re")]
 mod nucleo_f446re;
 
+mod division;
 mod memory;
 
 /// A line of the log, where logs are built in.

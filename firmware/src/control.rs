@@ -368,6 +368,9 @@ impl Controller {
 
     /// Both muscles of a joint, if both have tables.
     fn arms(&self) -> Option<[Arm<'_>; 2]> {
+        if !pair::SUPPORTED {
+            return None;
+        }
         let [first, second] = &self.sides;
         Some([self.arm_of(first)?, self.arm_of(second)?])
     }

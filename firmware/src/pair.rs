@@ -18,6 +18,9 @@ use model_core::units::{Force, Length, Pressure};
 
 use crate::modes::{Integral, Model};
 
+/// Whether this image can move a joint: that of a board for one muscle carries nothing of it.
+pub const SUPPORTED: bool = cfg!(any(test, feature = "joint"));
+
 /// Step of pressure over which the stiffness is differentiated, and the most that a tick moves the tension by, Pa.
 const PROBE_PA: f32 = 10e3;
 const QUICKEST_PA: f32 = 1e3;

@@ -11,7 +11,7 @@ use model_core::link::frame::{self, Exchange, Header, Kind};
 use model_core::link::hello::{self, Hello};
 use model_core::link::messages::{Fault, Refusal, Side, StartedBy, State, StoreFault, TableFault, TableInfo};
 use model_core::link::{LINK_VERSION, SCHEMA_HASH};
-use model_core::table::TableError;
+use model_core::table::{MuscleTable, TableError};
 
 use crate::board::Identity;
 use crate::control::{self, Controller};
@@ -103,10 +103,7 @@ impl<F: NorFlash> Server<F> {
             shared.with(|controller| controller.forget_table(side));
             return Ok(());
         };
-        image::read_with(bytes, |table| {
-            shared.with(|controller| controller.use_table(side, table)).map_err(ImageError::Table)
-        })
-        .map_err(|error| Refusal::Table(table_fault(error)))?;
+        look_at(bytes, &mut |table| shared.with(|controller| controller.use_table(side, table)))?;
         self.remember(side, shared);
         Ok(())
     }
@@ -241,6 +238,16 @@ impl<F: NorFlash> Server<F> {
     fn table_info(&mut self, side: Side) -> Option<TableInfo> {
         self.store.selected(side).ok().flatten().map(|selected| selected.info())
     }
+}
+
+/// Hands the table of an image on, which is as good as checked then.
+///
+/// # Errors
+/// What is wrong with the image, or with the table as `act` says.
+#[inline(never)]
+fn look_at(image: &[u8], act: &mut dyn FnMut(&MuscleTable) -> Result<(), TableError>) -> Result<(), Refusal> {
+    image::read_with(image, |table| act(table).map_err(ImageError::Table))
+        .map_err(|error| Refusal::Table(table_fault(error)))
 }
 
 /// What all effects of a table remember, if any of them must; nothing otherwise.

@@ -1,11 +1,11 @@
 //! What the tasks share: the controller, and what waits to be said to the host.
 
-use core::cell::RefCell;
+use core::cell::{RefCell, RefMut};
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use critical_section::{CriticalSection, Mutex, RestoreState};
 #[cfg(feature = "log")]
 use embassy_futures::select::{Either, select};
-use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
@@ -34,11 +34,39 @@ pub(crate) enum Spoken {
     Log(crate::log::Frame),
 }
 
+/// The controller, in a critical section of its own. Neither end of it is grown into the many places that enter.
+struct Entered<'s> {
+    // Dropped before the section is left.
+    controller: RefMut<'s, Controller>,
+    _section: Section,
+}
+
+impl<'s> Entered<'s> {
+    #[inline(never)]
+    fn enter(controller: &'s Mutex<RefCell<Controller>>) -> Self {
+        // SAFETY: left by the drop of `section`, which nothing outside this module holds: sections end in the order of their scopes.
+        let section = Section(unsafe { critical_section::acquire() });
+        // SAFETY: in the section, and what is borrowed goes before it ends.
+        let inside = unsafe { CriticalSection::new() };
+        Self { controller: controller.borrow_ref_mut(inside), _section: section }
+    }
+}
+
+struct Section(RestoreState);
+
+impl Drop for Section {
+    #[inline(never)]
+    fn drop(&mut self) {
+        // SAFETY: entered once, by `Entered::enter`.
+        unsafe { critical_section::release(self.0) }
+    }
+}
+
 type Waiting = Channel<CriticalSectionRawMutex, Spoken, WAITING>;
 
 /// What the tasks share: the controller, entered for short and never across an await, and what waits to be sent.
 pub struct Shared {
-    controller: Mutex<CriticalSectionRawMutex, RefCell<Controller>>,
+    controller: Mutex<RefCell<Controller>>,
     spoken: Room<Waiting>,
     dropped: AtomicU32,
     /// The state changed: there may be something to keep.
@@ -70,7 +98,7 @@ impl Shared {
 
     /// Enters the controller.
     pub fn with<R>(&self, act: impl FnOnce(&mut Controller) -> R) -> R {
-        self.controller.lock(|controller| act(&mut controller.borrow_mut()))
+        act(&mut Entered::enter(&self.controller).controller)
     }
 
     /// Samples that found no room, since the start.

@@ -26,6 +26,7 @@ pub(crate) struct Digest(u32);
 
 impl Digest {
     /// Takes the next bytes.
+    #[inline(never)]
     pub(crate) fn update(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             self.0 ^= u32::from(byte);

@@ -143,6 +143,7 @@ pub trait Fields {
 }
 
 /// Reads a value into its place; bytes behind it are left. Says whether it was there.
+#[inline(never)]
 pub fn read(mut bytes: &[u8], value: &mut dyn Fields) -> bool {
     let mut walk = Walk::new(&mut bytes);
     value.walk(&mut walk);
@@ -150,6 +151,7 @@ pub fn read(mut bytes: &[u8], value: &mut dyn Fields) -> bool {
 }
 
 /// Writes a value; gives its length, if it had room.
+#[inline(never)]
 pub fn write(value: &mut dyn Fields, room: &mut [u8]) -> Option<usize> {
     let length = room.len();
     let mut rest = room;
@@ -175,6 +177,7 @@ macro_rules! fields {
 macro_rules! codes {
     ($name:ty { $($variant:ident),* $(,)? }) => {
         impl $crate::fields::Fields for $name {
+            #[inline(never)]
             fn walk(&mut self, walk: &mut $crate::fields::Walk<'_>) {
                 const ALL: &[$name] = &[$(<$name>::$variant),*];
                 // Says so when a variant is missing in the list.
@@ -246,6 +249,7 @@ impl Fields for i8 {
 }
 
 impl Fields for bool {
+    #[inline(never)]
     fn walk(&mut self, walk: &mut Walk<'_>) {
         *self = walk.variant(u8::from(*self), 2) == 1;
     }

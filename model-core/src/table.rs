@@ -174,19 +174,20 @@ impl MuscleTable {
         if self.elastic.is_empty() {
             return Err(TableError::NoOrder);
         }
+        let count = self.nodes.len();
         for (k, curve) in self.elastic.iter().enumerate() {
-            if curve.len() != self.nodes.len() || curve.iter().any(|e| !(e.abs() < 1.0e13)) {
+            if !is_curve(curve, count, -STIFFEST, STIFFEST) {
                 return Err(TableError::Elastic(k as u8 + 1));
             }
         }
-        if self.friction.len() != self.nodes.len() || self.friction.iter().any(|k| !(-0.5..=0.95).contains(k))
-        {
+        if !is_curve(&self.friction, count, -0.5, 0.95) {
             return Err(TableError::Friction);
         }
         let t = &self.tested;
-        let ordered = |low: f32, high: f32| low.is_finite() && high.is_finite() && low <= high;
-        if !ordered(t.pressure_low.pascals(), t.pressure_high.pascals())
-            || !ordered(t.contraction_low, t.contraction_high)
+        let (low, high) = (t.pressure_low.pascals(), t.pressure_high.pascals());
+        if !all_finite(&[low, high, t.contraction_low, t.contraction_high])
+            || low > high
+            || t.contraction_low > t.contraction_high
         {
             return Err(TableError::Tested);
         }
@@ -198,13 +199,27 @@ impl MuscleTable {
         }
         for (i, e) in self.effects.iter().enumerate() {
             if e.parameters.len() != e.effect.parameter_count()
-                || e.parameters.iter().chain(&e.remembered).any(|p| !p.is_finite())
+                || !all_finite(&e.parameters)
+                || !all_finite(&e.remembered)
             {
                 return Err(TableError::Effect(i as u8));
             }
         }
         Ok(())
     }
+}
+
+/// The largest elastic coefficient that is taken for one, Pa.
+const STIFFEST: f32 = 1.0e13_f32.next_down();
+
+fn all_finite(values: &[f32]) -> bool {
+    is_curve(values, values.len(), f32::MIN, f32::MAX)
+}
+
+/// Whether there are so many values, all between two limits.
+#[inline]
+fn is_curve(values: &[f32], count: usize, low: f32, high: f32) -> bool {
+    values.len() == count && values.iter().all(|value| *value >= low && *value <= high)
 }
 
 /// A table in the manner of the thesis's miniature muscle, for examples and tests: six pressures, `M = 4`.

@@ -5,7 +5,7 @@ use model_core::check;
 use model_core::image;
 use model_core::link::messages::{Refusal, Side, TableBegin, TableFault, TablePiece};
 
-use super::table_fault;
+use super::{look_at, table_fault};
 use crate::room::{Room, room};
 
 /// What an upload has gathered.
@@ -68,7 +68,7 @@ impl Upload {
         if image::announced_len(bytes).map_err(refused)? != bytes.len() {
             return Err(Refusal::Table(TableFault::Malformed));
         }
-        image::read_with(bytes, |_| Ok(())).map_err(refused)?;
+        look_at(bytes, &mut |_| Ok(()))?;
         Ok((begun.side, bytes))
     }
 }
