@@ -117,6 +117,8 @@ impl Candidate {
             ("misalignment", [loss, rub], _) => *rub >= 0.1 * (2.0 * loss.max(0.0)).sqrt(),
             // The frame that gives under load is the frame that gives at the turns.
             ("rig-compliance", [give], [at_turns]) => *give <= 2.5 * at_turns,
+            // No joint is looser than free.
+            ("backlash", [free], _) => *free <= 1.3,
             _ => true,
         }
     }

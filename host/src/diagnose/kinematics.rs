@@ -336,8 +336,8 @@ pub(crate) fn kinematics(
     k
 }
 
-/// A ramp begins before it has passed the threshold by which it is found: back to where the pressure left the hold's own. And a
-/// hold begins and ends within `margin` rows of where the motion's slope says.
+/// A ramp begins before it has passed the threshold by which it is found: back to where the pressure left what it had been about the
+/// hold's beginning, be it that the muscle still moved. And a hold begins and ends within `margin` rows of where the motion's slope says.
 fn mark_ramps_from_their_start(k: &mut Kinematics, pressure: &[f64], noise: f64, margin: usize) {
     let n = pressure.len();
     let mut from = 0;
@@ -349,11 +349,12 @@ fn mark_ramps_from_their_start(k: &mut Kinematics, pressure: &[f64], noise: f64,
         if k.held[from]
             && let Some(first) = (from..to).find(|i| k.ramped[*i])
         {
-            let begun = (from..first)
+            let earliest = from.saturating_sub(2 * margin);
+            let before = median(&mut pressure[earliest..=from.saturating_sub(margin)].to_vec());
+            let begun = (earliest..first)
                 .rev()
-                .find(|i| (pressure[*i] - pressure[from]).abs() <= noise)
-                .map_or(from, |i| i + 1);
-            let begun = if begun == from { from.saturating_sub(margin) } else { begun };
+                .find(|i| (pressure[*i] - before).abs() <= noise)
+                .map_or(earliest, |i| i + 1);
             k.ramped[begun..(to + margin).min(n)].fill(true);
         }
         from = to;
