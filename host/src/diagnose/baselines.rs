@@ -179,6 +179,8 @@ enum Part {
     /// How much of friction does not settle at rest: a friction that needs speed leaves a rest's gap half closed for another reason,
     /// and what it leaves must not be taken for settling.
     Unsettled,
+    /// How much further than at a turn of the stroke, or less far, friction turns while the pressure ramps at held length.
+    Ramping,
 }
 
 /// The columns of a baseline: those with free coefficients, those with a prior, and the functions of pressure in them.
@@ -244,6 +246,9 @@ impl Plan {
         if rows.unsettled.iter().any(|u| *u != 0.0) {
             hard.push(Part::Unsettled);
         }
+        if rows.on_ramp.iter().any(|r| *r) {
+            hard.push(Part::Ramping);
+        }
         Self { hard, soft, functions }
     }
 }
@@ -279,6 +284,9 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
                 Part::AreaSlope => of(&|i| factor[i] * shapes[i].area_slope * contexts[i].pressure),
                 Part::Settling => of(&|i| -live[i] * rows.sign[i] * quasi[i] * rows.settling[i]),
                 Part::Unsettled => of(&|i| -live[i] * friction[i] * quasi[i] * rows.unsettled[i]),
+                Part::Ramping => of(&|i| {
+                    if rows.on_ramp[i] { -live[i] * friction[i] * quasi[i] * rows.sign[i] } else { 0.0 }
+                }),
             }
         };
         let mut joint = Basis::default();
@@ -404,7 +412,7 @@ fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
         friction: vec![0.0; n],
         stiffness: vec![0.0; n],
     };
-    let (mut settling, mut unsettled) = (0.0, 0.0);
+    let (mut settling, mut unsettled, mut ramping) = (0.0, 0.0, 0.0);
     let mut elastic = vec![0.0; n];
     for (part, c) in plan.hard.iter().chain(&plan.soft).zip(solution).filter(|(_, c)| **c != 0.0) {
         for i in 0..n {
@@ -430,6 +438,7 @@ fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
                 Part::AreaSlope => v.gaylord[i] += c * context.pressure * shape.area_slope,
                 Part::Settling => settling = *c,
                 Part::Unsettled => unsettled = *c,
+                Part::Ramping => ramping = *c,
             }
         }
     }
@@ -440,7 +449,8 @@ fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
         v.quasi[i] = v.gaylord[i] + elastic[i];
         v.friction[i] = v.friction[i].clamp(-0.4, 0.8);
         let late = settling * rows.sign[i] * rows.settling[i];
-        let direction = context.direction + unsettled * rows.unsettled[i];
+        let on_ramp = if rows.on_ramp[i] { ramping * rows.sign[i] } else { 0.0 };
+        let direction = context.direction + unsettled * rows.unsettled[i] + on_ramp;
         v.force[i] = live[i] * v.quasi[i] * (1.0 - v.friction[i] * direction - late);
     }
     v

@@ -33,6 +33,8 @@ pub(crate) struct Kinematics {
     pub held: Vec<bool>,
     /// Whether the pressure has left the place where this hold began.
     pub ramped: Vec<bool>,
+    /// Whether it moves on a ramp of which friction is sure to have turned, as far as it turns at held length.
+    pub on_ramp: Vec<bool>,
     /// Time since the braid last moved, by its length or by a change of pressure, s; zero while moving.
     pub still: Vec<f64>,
 }
@@ -220,6 +222,7 @@ pub(crate) fn kinematics(
         held,
         still: vec![0.0; n],
         ramped: vec![false; n],
+        on_ramp: vec![false; n],
         ..Kinematics::default()
     };
     let mut next = 0;
@@ -302,6 +305,8 @@ pub(crate) fn kinematics(
         k.travel[row] = (stroke[row] - stroke[turn_row]).abs();
     }
     mark_ramps_from_their_start(&mut k, pressure, 4.0 * white_noise(pressure), half + 2);
+    k.pressure_rate = slopes(time, pressure, half, |_| (0, n));
+    mark_steady_ramps(&mut k, time, pressure, thresholds.pressure);
     for (row, _, doubt) in &starts {
         let at = time[*row];
         let mut j = *row;
@@ -332,7 +337,6 @@ pub(crate) fn kinematics(
         }
     }
     k.acceleration = slopes(time, &raw_speed, half, |_| (0, n));
-    k.pressure_rate = slopes(time, pressure, half, |_| (0, n));
     k
 }
 
@@ -358,6 +362,22 @@ fn mark_ramps_from_their_start(k: &mut Kinematics, pressure: &[f64], noise: f64,
             k.ramped[begun..(to + margin).min(n)].fill(true);
         }
         from = to;
+    }
+}
+
+/// A ramp is judged from so long after its turn, s: what a regulator does in a step is another matter.
+const RAMP_SETTLES: f64 = 3.0;
+
+/// Marks the rows of slow ramps, from `turning` Pa after a turn on, as long as the pressure goes on the same way.
+fn mark_steady_ramps(k: &mut Kinematics, time: &[f64], pressure: &[f64], turning: f64) {
+    let mut turn = 0;
+    for row in 1..pressure.len() {
+        if !k.ramped[row] || !k.ramped[row - 1] || k.direction[row] != k.direction[row - 1] {
+            turn = row;
+        }
+        let (passed, gone) = (time[row] - time[turn], (pressure[row] - pressure[turn]) * k.direction[row]);
+        let goes_on = k.pressure_rate[row] * k.direction[row] > 0.3 * gone / passed.max(1e-9);
+        k.on_ramp[row] = k.ramped[row] && k.held[row] && passed > RAMP_SETTLES && gone > turning && goes_on;
     }
 }
 

@@ -141,7 +141,7 @@ fn left(rows: &Rows, fitted: &Baseline, holds: &[(usize, usize)], directions: &[
     let mut sum = 0.0;
     for ((from, to), way) in holds.iter().zip(directions) {
         for i in *from..*to {
-            let w = rows.root_weight[i];
+            let w = if rows.on_ramp[i] { 0.0 } else { rows.root_weight[i] };
             let friction = fitted.quasi[i] * fitted.friction[i];
             let r = fitted.raw_residual[i] + friction * (way[i - from] - rows.contexts[i].direction);
             sum += (w * r).powi(2);
@@ -216,7 +216,7 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
     }
     let chosen = directions(rows, &holds, &pressures, best);
     for ((from, to), way) in holds.iter().zip(&chosen) {
-        for i in *from..*to {
+        for i in (*from..*to).filter(|i| !rows.on_ramp[*i]) {
             if !rows.isometric {
                 rows.unsettled[i] = rows.contexts[i].direction - way[i - from];
             }

@@ -71,6 +71,8 @@ pub(crate) struct Rows {
     pub settling: Vec<f64>,
     /// At rest, the direction that the model holds less the one that friction was found to have settled to; zero elsewhere.
     pub unsettled: Vec<f64>,
+    /// Whether the pressure ramps at held length, where friction turns by a share that is fitted.
+    pub on_ramp: Vec<bool>,
     /// Largest contraction so far in the campaign.
     pub largest: Vec<f64>,
     /// Time within the recording, s.
@@ -221,6 +223,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
                 && k.piece[j] == k.piece[i]
                 && k.sure[j] == k.sure[i]
                 && k.ramped[j] == k.ramped[i]
+                && k.on_ramp[j] == k.on_ramp[i]
                 && k.turns[j] == k.turns[i]
             {
                 let add = [
@@ -306,9 +309,11 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
             });
             rows.shapes.push(shape(braid, stroke));
             rows.force.push(if good > 0.0 { force_sum / good } else { 0.0 });
-            // How far friction turns on a ramp at held length the model only guesses; where the muscle also moves, its
-            // strokes are what is judged.
-            let judged = k.sure[i] && (rows.isometric || !k.ramped[i]);
+            // Just after a turn of the pressure at held length the model only guesses how far friction has turned; where the muscle
+            // also moves, its strokes and what ramps are steady are what is judged.
+            let on_ramp = k.on_ramp[i] && !rows.isometric;
+            let judged = k.sure[i] && (rows.isometric || !k.ramped[i] || on_ramp);
+            rows.on_ramp.push(on_ramp);
             rows.root_weight.push(if good > 0.0 && judged { (good / per_row as f64).sqrt() } else { 0.0 });
             rows.recording.push(index as u32);
             rows.block.push(piece_number);
