@@ -179,8 +179,20 @@ enum Part {
     /// How much of friction does not settle at rest: a friction that needs speed leaves a rest's gap half closed for another reason,
     /// and what it leaves must not be taken for settling.
     Unsettled,
+    /// Where in the gap between the branches friction rests over these rows: what a wandering pressure made of it nobody measured.
+    Rest(usize, usize),
     /// How much further than at a turn of the stroke, or less far, friction turns while the pressure ramps at held length.
     Ramping,
+}
+
+/// The stretches of rows with the same number other than zero.
+fn rests(of: &[u32]) -> impl Iterator<Item = (usize, usize)> + '_ {
+    let mut from = 0;
+    of.chunk_by(|a, b| a == b).filter_map(move |stretch| {
+        let begun = from;
+        from += stretch.len();
+        (stretch[0] != 0).then_some((begun, from))
+    })
 }
 
 /// The columns of a baseline: those with free coefficients, those with a prior, and the functions of pressure in them.
@@ -215,7 +227,8 @@ impl Plan {
                 .chain(over.map(Part::Friction))
                 .collect::<Vec<Part>>()
         };
-        let mut hard = vec![Part::Deadband];
+        let mut hard: Vec<Part> = rests(&rows.rest).map(|(from, to)| Part::Rest(from, to)).collect();
+        hard.push(Part::Deadband);
         let mut soft = Vec::new();
         if let Kind::Flexible(order) = kind {
             let over = cardinals(&mut functions);
@@ -284,6 +297,9 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
                 Part::AreaSlope => of(&|i| factor[i] * shapes[i].area_slope * contexts[i].pressure),
                 Part::Settling => of(&|i| -live[i] * rows.sign[i] * quasi[i] * rows.settling[i]),
                 Part::Unsettled => of(&|i| -live[i] * friction[i] * quasi[i] * rows.unsettled[i]),
+                Part::Rest(from, to) => of(&|i| {
+                    if (from..to).contains(&i) { -live[i] * friction[i] * quasi[i] } else { 0.0 }
+                }),
                 Part::Ramping => of(&|i| {
                     if rows.on_ramp[i] { -live[i] * friction[i] * quasi[i] * rows.sign[i] } else { 0.0 }
                 }),
@@ -297,8 +313,8 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
         for part in &plan.soft {
             joint.push_beyond(column(part), DISTINCT);
         }
-        let soft: Vec<Vec<f64>> = joint.columns()[hard.columns().len()..].to_vec();
-        let of_friction: Vec<bool> = joint.kept()[hard.columns().len()..]
+        let soft = joint.columns(hard.rank(), n);
+        let of_friction: Vec<bool> = joint.kept()[hard.rank()..]
             .iter()
             .map(|j| matches!(plan.soft[j - plan.hard.len()], Part::Friction(_)))
             .collect();
@@ -334,8 +350,8 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
         }
         let mut core = y;
         span.hard.project_out(&mut core);
-        let mut coefficients: Vec<f64> = joint.columns().iter().map(|q| dot(q, &freed)).collect();
-        for (c, keep) in coefficients[span.hard.columns().len()..].iter_mut().zip(&span.keep) {
+        let mut coefficients = joint.along(&freed);
+        for (c, keep) in coefficients[span.hard.rank()..].iter_mut().zip(&span.keep) {
             *c *= 1.0 - keep * keep;
         }
         let solution = joint.unravel(&coefficients);
@@ -358,7 +374,7 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
             core,
             raw_residual,
             amplitudes,
-            deadband: solution[0],
+            deadband: fitted.deadband,
             quasi: fitted.quasi,
             gaylord: fitted.gaylord,
             friction: fitted.friction,
@@ -401,6 +417,7 @@ struct Values {
     gaylord: Vec<f64>,
     friction: Vec<f64>,
     stiffness: Vec<f64>,
+    deadband: f64,
 }
 
 fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
@@ -411,10 +428,17 @@ fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
         gaylord: vec![0.0; n],
         friction: vec![0.0; n],
         stiffness: vec![0.0; n],
+        deadband: 0.0,
     };
+    let mut rests = vec![0.0; n];
     let (mut settling, mut unsettled, mut ramping) = (0.0, 0.0, 0.0);
     let mut elastic = vec![0.0; n];
     for (part, c) in plan.hard.iter().chain(&plan.soft).zip(solution).filter(|(_, c)| **c != 0.0) {
+        match *part {
+            Part::Deadband => v.deadband = *c,
+            Part::Rest(from, to) => rests[from..to].fill(*c),
+            _ => {}
+        }
         for i in 0..n {
             let (shape, context) = (&rows.shapes[i], &rows.contexts[i]);
             match *part {
@@ -439,6 +463,7 @@ fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
                 Part::Settling => settling = *c,
                 Part::Unsettled => unsettled = *c,
                 Part::Ramping => ramping = *c,
+                Part::Rest(..) => break,
             }
         }
     }
@@ -450,7 +475,7 @@ fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
         v.friction[i] = v.friction[i].clamp(-0.4, 0.8);
         let late = settling * rows.sign[i] * rows.settling[i];
         let on_ramp = if rows.on_ramp[i] { ramping * rows.sign[i] } else { 0.0 };
-        let direction = context.direction + unsettled * rows.unsettled[i] + on_ramp;
+        let direction = context.direction + unsettled * rows.unsettled[i] + on_ramp + rests[i];
         v.force[i] = live[i] * v.quasi[i] * (1.0 - v.friction[i] * direction - late);
     }
     v

@@ -62,6 +62,7 @@ pub(super) fn thin(rows: &Rows, traces: &[Vec<f64>]) -> (Rows, Vec<Vec<f64>>) {
         still: pick(&rows.still),
         settling: pick(&rows.settling),
         unsettled: pick(&rows.unsettled),
+        rest: pick_u(&rows.rest),
         on_ramp: keep.iter().map(|i| rows.on_ramp[*i]).collect(),
         largest: pick(&rows.largest),
         local_time: pick(&rows.local_time),

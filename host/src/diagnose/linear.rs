@@ -32,10 +32,39 @@ pub(crate) fn add_scaled(to: &mut [f64], factor: f64, from: &[f64]) {
 /// A column less than this share of itself outside the basis (in norm) counts as lying in it.
 const DEPENDENT: f64 = 1e-7;
 
+/// A unit vector that is zero outside a stretch of rows.
+#[derive(Clone, Debug)]
+struct Direction {
+    from: usize,
+    values: Vec<f64>,
+}
+
+impl Direction {
+    fn new(column: Vec<f64>) -> Self {
+        let from = column.iter().position(|v| *v != 0.0).unwrap_or(0);
+        let to = column.iter().rposition(|v| *v != 0.0).map_or(0, |i| i + 1);
+        let whole = 2 * (to - from) > column.len();
+        if whole { Self { from: 0, values: column } } else { Self { from, values: column[from..to].to_vec() } }
+    }
+
+    fn along(&self, v: &[f64]) -> f64 {
+        dot(&self.values, &v[self.from..self.from + self.values.len()])
+    }
+
+    /// Takes out of `v` what lies along it; gives how much that was.
+    fn out_of(&self, v: &mut [f64]) -> f64 {
+        let c = self.along(v);
+        add_scaled(&mut v[self.from..self.from + self.values.len()], -c, &self.values);
+        c
+    }
+}
+
 /// An orthonormal basis of weighted columns, with the triangle that leads back to their coefficients.
+///
+/// Columns that are zero on most rows cost no more than the rows they have, if they come before those that are not.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Basis {
-    q: Vec<Vec<f64>>,
+    q: Vec<Direction>,
     /// For each kept column: its coefficients on the basis vectors up to its own.
     r: Vec<Vec<f64>>,
     /// Which of the columns offered were kept.
@@ -77,32 +106,34 @@ impl Basis {
         }
         column.iter_mut().for_each(|v| *v /= norm);
         r.push(norm);
-        self.q.push(column);
+        self.q.push(Direction::new(column));
         self.r.push(r);
         self.kept.push(index);
         true
     }
 
     /// How many independent columns it has.
-    #[cfg(test)]
     pub(crate) fn rank(&self) -> usize {
         self.q.len()
     }
 
     fn coefficients_out(&self, v: &mut [f64]) -> Vec<f64> {
-        self.q
-            .iter()
-            .map(|q| {
-                let c = dot(q, v);
-                add_scaled(v, -c, q);
-                c
-            })
-            .collect()
+        self.q.iter().map(|q| q.out_of(v)).collect()
     }
 
-    /// The orthonormal columns.
-    pub(crate) fn columns(&self) -> &[Vec<f64>] {
-        &self.q
+    /// The orthonormal columns from the `first` on.
+    pub(crate) fn columns(&self, first: usize, rows: usize) -> Vec<Vec<f64>> {
+        let spread = |q: &Direction| {
+            let mut column = vec![0.0; rows];
+            column[q.from..q.from + q.values.len()].copy_from_slice(&q.values);
+            column
+        };
+        self.q[first..].iter().map(spread).collect()
+    }
+
+    /// What a weighted column has along each of the orthonormal ones.
+    pub(crate) fn along(&self, v: &[f64]) -> Vec<f64> {
+        self.q.iter().map(|q| q.along(v)).collect()
     }
 
     /// Which of the columns offered were kept.

@@ -21,6 +21,10 @@ const FOLLOWS: [f64; 7] = [100.0, 300.0, 1.0e3, 3.0e3, 1.0e4, 3.0e4, 1.0e5];
 const SMOOTHING: [usize; 3] = [0, 1, 3];
 /// Factors by which the best law is varied, coarse and fine.
 const NEARBY: [[f64; 4]; 2] = [[0.7, 0.87, 1.15, 1.4], [0.9, 0.95, 1.05, 1.1]];
+/// A change of the friction's direction that ends one rest and begins another.
+const LETS_GO: f64 = 0.1;
+/// At most so many rests beyond one for each hold.
+const MOST_RESTS: u32 = 100;
 /// Another law than the model's must leave less than this share of what the rows at rest leave.
 const CLEARLY: f64 = 0.7;
 
@@ -154,6 +158,7 @@ fn left(rows: &Rows, fitted: &Baseline, holds: &[(usize, usize)], directions: &[
 pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
     rows.settling = vec![0.0; rows.len()];
     rows.unsettled = vec![0.0; rows.len()];
+    rows.rest = vec![0; rows.len()];
     let resting = rows.still.iter().zip(&rows.root_weight).filter(|(s, w)| **s > 1.0 && **w > 0.0).count();
     if !rows.isometric && resting * 50 < rows.effective() {
         return None;
@@ -217,7 +222,7 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
     let chosen = directions(rows, &holds, &pressures, best);
     for ((from, to), way) in holds.iter().zip(&chosen) {
         for i in (*from..*to).filter(|i| !rows.on_ramp[*i]) {
-            if !rows.isometric {
+            if !rows.isometric && matches!(best, AtRest::Fades(_)) {
                 rows.unsettled[i] = rows.contexts[i].direction - way[i - from];
             }
             rows.contexts[i].direction = way[i - from];
@@ -229,5 +234,32 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
             }
         }
     }
+    if matches!(best, AtRest::Follows { .. }) && !rows.isometric {
+        number_rests(rows, &holds, &chosen);
+    }
     Some(best)
+}
+
+/// Static friction lets go by jumps too small and too quick for the pressure's samples to tell when: between those that a law sees,
+/// where friction rests is fitted.
+fn number_rests(rows: &mut Rows, holds: &[(usize, usize)], directions: &[Vec<f64>]) {
+    let mut jump = LETS_GO;
+    loop {
+        let mut number = 0;
+        for ((from, to), way) in holds.iter().zip(directions) {
+            number += 1;
+            let mut since = way[0];
+            for i in *from..*to {
+                if (way[i - from] - since).abs() > jump {
+                    since = way[i - from];
+                    number += 1;
+                }
+                rows.rest[i] = if rows.on_ramp[i] { 0 } else { number };
+            }
+        }
+        if number <= MOST_RESTS + holds.len() as u32 {
+            return;
+        }
+        jump *= 2.0;
+    }
 }

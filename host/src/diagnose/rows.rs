@@ -71,6 +71,8 @@ pub(crate) struct Rows {
     pub settling: Vec<f64>,
     /// At rest, the direction that the model holds less the one that friction was found to have settled to; zero elsewhere.
     pub unsettled: Vec<f64>,
+    /// Number of the stretch of a hold over which friction rests somewhere in its gap, nobody knows where; zero elsewhere.
+    pub rest: Vec<u32>,
     /// Whether the pressure ramps at held length, where friction turns by a share that is fitted.
     pub on_ramp: Vec<bool>,
     /// Largest contraction so far in the campaign.
@@ -322,6 +324,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
             rows.still.push(still);
             rows.settling.push(0.0);
             rows.unsettled.push(0.0);
+            rows.rest.push(0);
             rows.largest.push(largest / braid.rest_length());
             rows.local_time.push(local);
             i = j;
