@@ -106,7 +106,8 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> [f64
             let fitted = baselines::fit(&blind, kind, traces);
             let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
             for i in 0..rows.len() {
-                if split.group[i] == *g && rows.sign[i] != 0.0 && claimed[i] {
+                // Where friction rests was fitted: nothing predicts it.
+                if split.group[i] == *g && rows.sign[i] != 0.0 && claimed[i] && rows.rest[i] == 0 {
                     let square = fitted.raw_residual[i].powi(2);
                     if square.is_finite() {
                         sums[1] += square;

@@ -9,6 +9,7 @@
 use rayon::prelude::*;
 
 use super::baselines::{self, Baseline, Kind};
+use super::linear::energy as energy_of;
 use super::rows::Rows;
 
 /// Settling times that are tried, s.
@@ -21,6 +22,8 @@ const FOLLOWS: [f64; 7] = [100.0, 300.0, 1.0e3, 3.0e3, 1.0e4, 3.0e4, 1.0e5];
 const SMOOTHING: [usize; 3] = [0, 1, 3];
 /// Factors by which the best law is varied, coarse and fine.
 const NEARBY: [[f64; 4]; 2] = [[0.7, 0.87, 1.15, 1.4], [0.9, 0.95, 1.05, 1.1]];
+/// Rows at rest that leave so many times what the moving ones leave, and follow no law, are fitted rest by rest.
+const NO_LAW: f64 = 4.0;
 /// A change of the friction's direction that ends one rest and begins another.
 const LETS_GO: f64 = 0.1;
 /// At most so many rests beyond one for each hold.
@@ -217,12 +220,15 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
         }
     }
     if !(energy < CLEARLY * held) {
+        if !rows.isometric && held > NO_LAW * per_row(&moving, &fitted) * weight_at(rows, &holds) {
+            number_rests(rows, &holds, &stays);
+        }
         return None;
     }
     let chosen = directions(rows, &holds, &pressures, best);
     for ((from, to), way) in holds.iter().zip(&chosen) {
         for i in (*from..*to).filter(|i| !rows.on_ramp[*i]) {
-            if !rows.isometric && matches!(best, AtRest::Fades(_)) {
+            if !rows.isometric {
                 rows.unsettled[i] = rows.contexts[i].direction - way[i - from];
             }
             rows.contexts[i].direction = way[i - from];
@@ -238,6 +244,17 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
         number_rests(rows, &holds, &chosen);
     }
     Some(best)
+}
+
+/// What a fit leaves of a row, N².
+fn per_row(rows: &Rows, fitted: &Baseline) -> f64 {
+    energy_of(&fitted.residual) / energy_of(&rows.root_weight).max(1e-12)
+}
+
+/// The weight of the rows at rest.
+fn weight_at(rows: &Rows, holds: &[(usize, usize)]) -> f64 {
+    let resting = holds.iter().flat_map(|(from, to)| *from..*to).filter(|i| !rows.on_ramp[*i]);
+    resting.map(|i| rows.root_weight[i].powi(2)).sum()
 }
 
 /// Static friction lets go by jumps too small and too quick for the pressure's samples to tell when: between those that a law sees,
