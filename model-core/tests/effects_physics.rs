@@ -296,7 +296,9 @@ fn speed_and_pressure_laws() {
     close(coulomb.at(Context { direction: -1.0, speed: -1e-3, ..moment() }), 3.0, 0.0);
     close(coulomb.at(Context { direction: 1.0, ..moment() }), 3.0, 0.0);
     let area = core::f64::consts::PI * 25e-6;
-    close(Alone::new("pressure-friction", &[0.1]).at(moving), -0.1 * 2e5 * area, 1e-12);
+    close(Alone::new("pressure-friction", &[0.1, 0.0]).at(moving), -0.1 * 2e5 * area, 1e-12);
+    let unchanging = Alone::new("pressure-friction", &[0.0, 0.1]).at(Context { rest_radius: 4e-3, ..moving });
+    close(unchanging, -0.1 * 2e5 * core::f64::consts::PI * 16e-6, 1e-12);
     close(Alone::new("friction-asymmetry", &[0.1]).at(moving), -2.5, 1e-12);
     close(Alone::new("friction-asymmetry", &[0.1]).at(Context { direction: -1.0, ..moving }), -2.5, 1e-12);
     assert_eq!(Alone::new("friction-asymmetry", &[0.1]).at(Context { direction: 0.0, ..moving }), 0.0);

@@ -31,19 +31,41 @@ pub struct Span {
     pub time: (f64, f64),
     /// Least and greatest contraction.
     pub contraction: (f64, f64),
+    /// Least and greatest stroke, m.
+    pub stroke: (f64, f64),
 }
+
+/// Plays narrower than this share of the travel are no memory of loops: they are a dry friction under another name.
+const NARROWEST_PLAY: f64 = 0.02;
 
 impl Span {
     /// The span of some moments; `None` where there is none.
     #[must_use]
     pub fn of(contexts: &[Context<f64>]) -> Option<Self> {
         let first = contexts.first()?;
-        let start =
-            Self { time: (first.time, first.time), contraction: (first.contraction, first.contraction) };
-        Some(contexts.iter().fold(start, |s, c| Self {
-            time: (s.time.0.min(c.time), s.time.1.max(c.time)),
-            contraction: (s.contraction.0.min(c.contraction), s.contraction.1.max(c.contraction)),
-        }))
+        let range = |of: fn(&Context<f64>) -> f64| {
+            let values = contexts.iter().map(of);
+            values.fold((of(first), of(first)), |(low, high), v| (low.min(v), high.max(v)))
+        };
+        Some(Self {
+            time: range(|c| c.time),
+            contraction: range(|c| c.contraction),
+            stroke: range(|c| c.stroke),
+        })
+    }
+
+    /// The range of a shape parameter: the plausible one, within what the recordings can show of it.
+    #[must_use]
+    pub fn range(&self, shape: &Parameter) -> (f64, f64) {
+        match shape.name {
+            "slip_time" => self.time,
+            "jamming_contraction" => (self.contraction.0.max(0.0), self.contraction.1),
+            "widest_play" => {
+                let least = NARROWEST_PLAY * (self.stroke.1 - self.stroke.0);
+                (shape.low.max(least), shape.high.max(2.0 * least))
+            }
+            _ => (shape.low, shape.high),
+        }
     }
 }
 
@@ -182,11 +204,7 @@ impl Candidate {
     pub fn grid(self, count: usize, span: &Span) -> Vec<Vec<f64>> {
         let mut shapes = vec![Vec::new()];
         for parameter in self.shapes() {
-            let (low, high) = match parameter.name {
-                "slip_time" => span.time,
-                "jamming_contraction" => (span.contraction.0.max(0.0), span.contraction.1),
-                _ => (parameter.low, parameter.high),
-            };
+            let (low, high) = span.range(parameter);
             let values = spaced(low, high, count);
             shapes = shapes
                 .iter()
@@ -226,7 +244,7 @@ mod tests {
 
     #[test]
     fn grids_cover_each_range_by_equal_ratios_or_evenly() {
-        let span = Span { time: (0.0, 100.0), contraction: (-0.01, 0.2) };
+        let span = Span { time: (0.0, 100.0), contraction: (-0.01, 0.2), stroke: (-1e-3, 20e-3) };
         let relaxation = Candidate::from_name("stress-relaxation").expect("in the catalogue");
         let grid = relaxation.grid(4, &span);
         assert_eq!(grid.len(), 4);

@@ -14,7 +14,7 @@ impl Effect for Gravity {
         name: "gravity",
         link: Link::LoadPath,
         parameters: &[
-            Parameter::amplitude("mass", "kg", -1.0, 1.0),
+            Parameter::amplitude("mass", "kg", -5.0, 5.0),
             Parameter::amplitude("mass_per_length", "kg/m", -5.0, 5.0),
         ],
         depends_on_pressure: false,

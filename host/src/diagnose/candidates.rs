@@ -34,11 +34,7 @@ impl Candidate {
     /// Its shape parameters, with ranges that the recordings reach.
     fn shapes(&self) -> impl Iterator<Item = Parameter> + '_ {
         self.info.parameters.iter().filter(|p| p.role == Role::Shape).map(|p| {
-            let (low, high) = match p.name {
-                "slip_time" => self.span.time,
-                "jamming_contraction" => (self.span.contraction.0.max(0.0), self.span.contraction.1),
-                _ => (p.low, p.high),
-            };
+            let (low, high) = self.span.range(p);
             Parameter { low, high, ..*p }
         })
     }
@@ -59,6 +55,11 @@ impl Candidate {
                 }
             })
             .collect()
+    }
+
+    /// How inexact its law is, as a share of its trace: a weight or an offset is what it is.
+    fn law_error(&self) -> f64 {
+        if matches!(self.name(), "force-offset" | "gravity") { 0.0 } else { LAW_ERROR }
     }
 
     /// Whether its force is read even when the muscle is vented and slack.
@@ -159,7 +160,11 @@ fn unplace(p: &Parameter, value: f64) -> f64 {
 /// All effects that are looked at, in the order of the library. What cannot be told from a part of the base model in any
 /// recording stays out: the gauge's offset is the deadband, and a higher elastic order is offered by the baselines.
 pub(crate) fn library(rows: &Rows) -> Vec<Candidate> {
-    let span = Span::of(&rows.contexts).unwrap_or(Span { time: (0.0, 1.0), contraction: (0.0, 1.0) });
+    let span = Span::of(&rows.contexts).unwrap_or(Span {
+        time: (0.0, 1.0),
+        contraction: (0.0, 1.0),
+        stroke: (0.0, 1.0),
+    });
     Law::all()
         .filter(|law| !matches!(law.name(), "gauge-offset" | "higher-order-elasticity"))
         .map(|law| Candidate { law, info: law.info(), span })
@@ -365,7 +370,7 @@ impl<'a> Ground<'a> {
             (trial.relief, trial.unrelieved) = self.relief(&products, &w);
         }
         self.measure(&mut trial, &columns, rows);
-        trial.score -= self.inexactness(&trial);
+        trial.score -= self.inexactness(&trial, candidate.law_error());
         if whole && trial.gain > 0.0 {
             self.score_blocks(&mut trial, &z, &w.given, rows);
         }
@@ -410,13 +415,13 @@ impl<'a> Ground<'a> {
 
     /// What it costs that no law is exact: where nearly all of a trace has to be cancelled by the base, the little that is left of
     /// it is no larger than the law's own error.
-    fn inexactness(&self, trial: &Trial) -> f64 {
+    fn inexactness(&self, trial: &Trial, law_error: f64) -> f64 {
         if trial.gain <= 0.0 {
             return 0.0;
         }
         let floor = self.scale.sigma * self.scale.sigma * self.scale.weight;
         let left = (trial.before - trial.gain).max(floor).max(1e-300);
-        let own = (LAW_ERROR * trial.size).powi(2) * self.scale.weight;
+        let own = (law_error * trial.size).powi(2) * self.scale.weight;
         self.scale.independent.min(SYSTEMATIC_ROWS) * (own / left).ln_1p()
     }
 

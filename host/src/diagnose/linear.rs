@@ -44,7 +44,11 @@ impl Direction {
         let from = column.iter().position(|v| *v != 0.0).unwrap_or(0);
         let to = column.iter().rposition(|v| *v != 0.0).map_or(0, |i| i + 1);
         let whole = 2 * (to - from) > column.len();
-        if whole { Self { from: 0, values: column } } else { Self { from, values: column[from..to].to_vec() } }
+        if whole {
+            Self { from: 0, values: column }
+        } else {
+            Self { from, values: column[from..to].to_vec() }
+        }
     }
 
     fn along(&self, v: &[f64]) -> f64 {
