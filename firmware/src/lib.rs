@@ -13,7 +13,7 @@
 //! | tables and settings in flash | [`store`] |
 //! | answers to the host | [`server`] |
 //! | what the tasks share | [`shared`] |
-//! | places for what is large | [`room`] |
+//! | places for what is large | [`room`], [`common_room`] |
 //! | the tasks that a board starts | [`tasks`] |
 //! | the length of a tick | [`tick`] |
 //! | what a board must give | [`board`] |
@@ -25,6 +25,7 @@
 #![cfg_attr(not(any(test, feature = "std")), no_std)]
 
 pub mod board;
+pub mod common_room;
 pub mod control;
 #[cfg(feature = "log")]
 pub mod log;

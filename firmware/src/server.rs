@@ -103,7 +103,13 @@ impl<F: NorFlash> Server<F> {
             shared.with(|controller| controller.forget_table(side));
             return Ok(());
         };
-        look_at(bytes, &mut |table| shared.with(|controller| controller.use_table(side, table)))?;
+        let table = &mut self.upload.place(shared)?.table;
+        let used = read_table(bytes, table).and_then(|()| {
+            let used = shared.with(|controller| controller.use_table(side, table));
+            used.map_err(|error| table_refusal(ImageError::Table(error)))
+        });
+        self.upload.forget(shared);
+        used?;
         self.remember(side, shared);
         Ok(())
     }
@@ -240,14 +246,14 @@ impl<F: NorFlash> Server<F> {
     }
 }
 
-/// Hands the table of an image on, which is as good as checked then.
-///
-/// # Errors
-/// What is wrong with the image, or with the table as `act` says.
+fn table_refusal(error: ImageError) -> Refusal {
+    Refusal::Table(table_fault(error))
+}
+
+/// Reads a table from its image, in the one copy of that code.
 #[inline(never)]
-fn look_at(image: &[u8], act: &mut dyn FnMut(&MuscleTable) -> Result<(), TableError>) -> Result<(), Refusal> {
-    image::read_with(image, |table| act(table).map_err(ImageError::Table))
-        .map_err(|error| Refusal::Table(table_fault(error)))
+fn read_table(image: &[u8], table: &mut MuscleTable) -> Result<(), Refusal> {
+    image::read_into(image, table).map_err(table_refusal)
 }
 
 /// What all effects of a table remember, if any of them must; nothing otherwise.

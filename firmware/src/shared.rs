@@ -1,6 +1,7 @@
 //! What the tasks share: the controller, and what waits to be said to the host.
 
 use core::cell::{RefCell, RefMut};
+use core::mem::ManuallyDrop;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use critical_section::{CriticalSection, Mutex, RestoreState};
@@ -36,29 +37,29 @@ pub(crate) enum Spoken {
 
 /// The controller, in a critical section of its own. Neither end of it is grown into the many places that enter.
 struct Entered<'s> {
-    // Dropped before the section is left.
-    controller: RefMut<'s, Controller>,
-    _section: Section,
+    controller: ManuallyDrop<RefMut<'s, Controller>>,
+    restore: RestoreState,
 }
 
 impl<'s> Entered<'s> {
     #[inline(never)]
     fn enter(controller: &'s Mutex<RefCell<Controller>>) -> Self {
-        // SAFETY: left by the drop of `section`, which nothing outside this module holds: sections end in the order of their scopes.
-        let section = Section(unsafe { critical_section::acquire() });
+        // SAFETY: left by the drop of what is given, which stays within `Shared::with`: sections end in the order of their scopes.
+        let restore = unsafe { critical_section::acquire() };
         // SAFETY: in the section, and what is borrowed goes before it ends.
         let inside = unsafe { CriticalSection::new() };
-        Self { controller: controller.borrow_ref_mut(inside), _section: section }
+        Self { controller: ManuallyDrop::new(controller.borrow_ref_mut(inside)), restore }
     }
 }
 
-struct Section(RestoreState);
-
-impl Drop for Section {
+impl Drop for Entered<'_> {
     #[inline(never)]
     fn drop(&mut self) {
-        // SAFETY: entered once, by `Entered::enter`.
-        unsafe { critical_section::release(self.0) }
+        // SAFETY: both were made by `Entered::enter`, and nothing uses them after this.
+        unsafe {
+            ManuallyDrop::drop(&mut self.controller);
+            critical_section::release(self.restore);
+        }
     }
 }
 

@@ -5,11 +5,7 @@ use model_core::link::messages::{
     Field, Refusal, TRACE_PIECE, TRACE_VARIABLES, TraceArm, TraceInfo, TracePiece, Trigger, Variable,
 };
 
-use crate::room::{Room, room};
-
-/// Values that a trace holds, four bytes each: the largest single part of the controller's memory, and a free choice. It may be
-/// as large as the chip allows; a host asks the device how many there are.
-pub const CAPACITY: usize = 1024;
+use crate::common_room::{CommonRoom, TRACE_CAPACITY};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
@@ -27,7 +23,8 @@ pub struct Trace {
     every_ticks: u16,
     trigger: Trigger,
     countdown: u16,
-    values: Room<[f32; CAPACITY]>,
+    /// None while a table has it.
+    values: Option<CommonRoom>,
     /// Records that fit.
     room: usize,
     records: usize,
@@ -44,7 +41,7 @@ impl Default for Trace {
             every_ticks: 1,
             trigger: Trigger::Now,
             countdown: 0,
-            values: room!([f32; CAPACITY], [0.0; CAPACITY]),
+            values: Some(CommonRoom::new()),
             room: 0,
             records: 0,
             next: 0,
@@ -65,15 +62,30 @@ impl Trace {
         self.variables = request.variables.clone();
         self.every_ticks = request.every_ticks;
         self.trigger = request.trigger;
-        self.room = CAPACITY / self.variables.len();
+        self.room = TRACE_CAPACITY / self.variables.len();
         self.records = 0;
         self.next = 0;
         self.countdown = 0;
+        if let Some(room) = &mut self.values {
+            room.clear_for_trace();
+        }
         self.phase = match request.trigger {
             Trigger::Start => Phase::Waiting,
             Trigger::Now | Trigger::UntilFault => Phase::Recording,
         };
         Ok(())
+    }
+
+    /// Gives its room away, if it has it; what was recorded is lost, and nothing is recorded until it is armed again.
+    pub fn lend(&mut self) -> Option<CommonRoom> {
+        self.phase = Phase::Off;
+        self.records = 0;
+        self.values.take()
+    }
+
+    /// Takes the room back.
+    pub fn take_back(&mut self, room: CommonRoom) {
+        self.values = Some(room);
     }
 
     /// A mode or reference starts.
@@ -100,11 +112,14 @@ impl Trace {
             return false;
         }
         self.countdown = self.every_ticks - 1;
-        let width = self.variables.len();
-        let place = self.next * width;
-        if let Some(record) = self.values.get_mut(place..place + width) {
-            for (to, variable) in record.iter_mut().zip(&self.variables) {
-                *to = value(*variable);
+        let Some(values) = self.values.as_mut().and_then(CommonRoom::trace) else { return false };
+        let first = self.next * self.variables.len();
+        for (place, variable) in (first..).zip(&self.variables) {
+            let now = value(*variable);
+            match values.get_mut(place) {
+                Some(old) => *old = now,
+                // As many records are made as the room has places for.
+                None => drop(values.push(now)),
             }
         }
         if self.records == 0 {
@@ -126,15 +141,13 @@ impl Trace {
         false
     }
 
-    /// The trace as it stands.
-    pub fn info(&self) -> TraceInfo {
-        TraceInfo {
-            complete: self.phase == Phase::Complete,
-            records: self.records as u32,
-            first_tick: self.first_tick,
-            every_ticks: self.every_ticks,
-            variables: self.variables.clone(),
-        }
+    /// Tells how the trace stands.
+    pub fn tell(&self, info: &mut TraceInfo) {
+        info.complete = self.phase == Phase::Complete;
+        info.records = self.records as u32;
+        info.first_tick = self.first_tick;
+        info.every_ticks = self.every_ticks;
+        info.variables.clone_from(&self.variables);
     }
 
     /// Fills an empty piece with as many whole records as fit it, from one on.
@@ -146,11 +159,12 @@ impl Trace {
         if self.phase != Phase::Complete || from >= self.records {
             return Err(Refusal::Range);
         }
+        let values = self.values.as_ref().map_or(&[][..], CommonRoom::values);
         let width = self.variables.len();
         let oldest = if self.records == self.room { self.next } else { 0 };
         for at in from..self.records.min(from + TRACE_PIECE / width) {
             let place = (oldest + at) % self.room * width;
-            let record = self.values.get(place..place + width).ok_or(Refusal::Range)?;
+            let record = values.get(place..place + width).ok_or(Refusal::Range)?;
             piece.values.extend_from_slice(record).map_err(|_| Refusal::Range)?;
         }
         Ok(())
@@ -166,6 +180,12 @@ mod tests {
         let variables = [Variable::Pressure, Variable::Force, Variable::Stroke].into_iter().collect();
         assert_eq!(trace.arm(&TraceArm { variables, every_ticks, trigger }), Ok(()));
         trace
+    }
+
+    fn info(trace: &Trace) -> TraceInfo {
+        let mut info = TraceInfo::default();
+        trace.tell(&mut info);
+        info
     }
 
     fn value(tick: u64) -> impl Fn(Variable) -> f32 {
@@ -187,11 +207,11 @@ mod tests {
         let mut trace = arm(Trigger::Now, 2);
         let full = (0..5000).filter(|tick| trace.sample(*tick, value(*tick))).count();
         assert_eq!(full, 1);
-        let info = trace.info();
-        assert!(info.complete);
-        assert_eq!(info.records as usize, CAPACITY / 3);
+        let stands = info(&trace);
+        assert!(stands.complete);
+        assert_eq!(stands.records as usize, TRACE_CAPACITY / 3);
         let all = read_all(&trace);
-        assert_eq!(all.len(), CAPACITY / 3 * 3);
+        assert_eq!(all.len(), TRACE_CAPACITY / 3 * 3);
         assert_eq!(all[..6], [0.0, 0.5, 0.0, 2.0, 2.5, 2.0]);
     }
 
@@ -204,21 +224,42 @@ mod tests {
         trace.on_fault();
         trace.sample(1000, value(1000));
         let all = read_all(&trace);
-        let room = CAPACITY / 3;
+        let room = TRACE_CAPACITY / 3;
         assert_eq!(all.len(), room * 3);
         assert_eq!(all[0], (1000 - room) as f32);
-        assert_eq!(trace.info().first_tick, (1000 - room) as u64);
+        assert_eq!(info(&trace).first_tick, (1000 - room) as u64);
         assert_eq!(all[all.len() - 3], 999.0);
+    }
+
+    #[test]
+    fn a_table_that_takes_its_room_ends_and_forgets_it() {
+        let mut trace = arm(Trigger::UntilFault, 1);
+        trace.sample(0, value(0));
+        let mut room = trace.lend().expect("there");
+        room.clear_for_table();
+        room.table().expect("a table's").image.push(7).expect("room");
+        assert!(trace.lend().is_none());
+        assert!(!trace.sample(1, value(1)));
+        trace.on_fault();
+        assert_eq!((info(&trace).complete, info(&trace).records), (false, 0));
+        trace.take_back(room);
+        assert!(!trace.sample(2, value(2)), "not before it is armed again");
+        let variables = [Variable::Force].into_iter().collect();
+        assert_eq!(trace.arm(&TraceArm { variables, every_ticks: 1, trigger: Trigger::Now }), Ok(()));
+        assert_eq!((3..5000).filter(|tick| trace.sample(*tick, value(*tick))).count(), 1);
+        let mut piece = TracePiece::default();
+        assert_eq!(trace.read(0, &mut piece), Ok(()));
+        assert_eq!(piece.values[..2], [3.5, 4.5]);
     }
 
     #[test]
     fn it_waits_for_a_start() {
         let mut trace = arm(Trigger::Start, 1);
         trace.sample(0, value(0));
-        assert_eq!(trace.info().records, 0);
+        assert_eq!(info(&trace).records, 0);
         trace.on_start();
         trace.sample(1, value(1));
-        assert_eq!((trace.info().records, trace.info().first_tick), (1, 1));
+        assert_eq!((info(&trace).records, info(&trace).first_tick), (1, 1));
         assert_eq!(trace.read(0, &mut TracePiece::default()), Err(Refusal::Range), "still recording");
     }
 }

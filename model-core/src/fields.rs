@@ -219,9 +219,9 @@ macro_rules! told {
     ($name:ty { $($number:literal $variant:ident { $($field:tt: $binding:ident),* }),* $(,)? }) => {
         impl $crate::fields::Fields for $name {
             fn walk(&mut self, walk: &mut $crate::fields::Walk<'_>) {
+                walk.tell(match self { $(Self::$variant { .. } => $number,)* });
                 match self {
                     $(Self::$variant { $($field: $binding),* } => {
-                        walk.tell($number);
                         $($crate::fields::Fields::walk($binding, walk);)*
                     })*
                 }

@@ -101,25 +101,17 @@ pub fn announced_len(bytes: &[u8]) -> Result<usize, ImageError> {
 /// # Errors
 /// What is wrong with the bytes, or with a number in the table.
 pub fn read(bytes: &[u8]) -> Result<MuscleTable, ImageError> {
-    read_with(bytes, |table| Ok(table.clone()))
-}
-
-/// As [`read`], for whoever only looks at the table: it is a kilobyte, and is not moved about.
-///
-/// # Errors
-/// As [`read`], and what `look` gives.
-#[inline(always)]
-pub fn read_with<R>(
-    bytes: &[u8],
-    look: impl FnOnce(&MuscleTable) -> Result<R, ImageError>,
-) -> Result<R, ImageError> {
     let mut table = MuscleTable::empty();
     read_into(bytes, &mut table)?;
-    look(&table)
+    Ok(table)
 }
 
+/// As [`read`], into a place that is there already: a table is a kilobyte, and is not moved about.
+///
+/// # Errors
+/// As [`read`]; what was in the place is lost then.
 #[inline]
-fn read_into(bytes: &[u8], table: &mut MuscleTable) -> Result<(), ImageError> {
+pub fn read_into(bytes: &[u8], table: &mut MuscleTable) -> Result<(), ImageError> {
     if !fields::read(body(bytes)?, table) {
         return Err(ImageError::Body);
     }

@@ -158,7 +158,7 @@ async fn link(port: &'static Port, shared: &'static Shared, server: &'static mut
 }
 
 fn spawn(spawner: SendSpawner, shared: &'static Shared, port: &'static Port) -> Result<(), &'static str> {
-    let flash = FileFlash::open(c"pam-store.bin").ok_or("the file pam-store.bin cannot be opened")?;
+    let flash = FileFlash::open(c"pam-store.bin").ok_or("pam-store.bin cannot be opened")?;
     let identity = Identity {
         board: Board::Mps2An386,
         muscles: 2,
@@ -169,7 +169,7 @@ fn spawn(spawner: SendSpawner, shared: &'static Shared, port: &'static Port) -> 
     static SERVER: StaticCell<Server<FileFlash>> = StaticCell::new();
     let server =
         SERVER.init(Server::start(identity, flash, shared).map_err(|_| "the store cannot be opened")?);
-    let full = |_| "a task does not fit its place";
+    let full = |_| "a task has no place";
     spawner.spawn(control(shared).map_err(full)?);
     watchdog::start();
     spawner.spawn(telemetry(port, shared).map_err(full)?);

@@ -14,12 +14,12 @@ use model_core::single;
 use model_core::units::{Length, Pressure};
 
 use super::Server;
+use crate::common_room::TRACE_CAPACITY;
 use crate::control::{self, Controller};
 use crate::reference;
 use crate::shared::Shared;
 use crate::store::Memories;
 use crate::tick::TICKS_PER_S;
-use crate::trace;
 
 /// A server and the controller it asks.
 pub(super) struct Session<'a, F: NorFlash> {
@@ -70,7 +70,7 @@ impl<F: NorFlash> Service for Session<'_, F> {
             ticks_per_s: TICKS_PER_S,
             muscles: self.server.identity.muscles,
             table_capacity: image::MAX_LEN as u32,
-            trace_capacity: trace::CAPACITY as u32,
+            trace_capacity: TRACE_CAPACITY as u32,
             reference_capacity: reference::CAPACITY as u32,
             tables: Side::ALL.map(|side| self.server.table_info(side)),
             started_by: self.server.identity.started_by,
@@ -118,7 +118,7 @@ impl<F: NorFlash> Service for Session<'_, F> {
     }
 
     fn faults(&mut self, (): &(), answer: &mut Faults) -> Result<(), Refusal> {
-        self.shared.with(|controller| answer.clone_from(controller.faults()));
+        self.shared.with(|controller| *answer = *controller.faults());
         Ok(())
     }
 
@@ -150,7 +150,7 @@ impl<F: NorFlash> Service for Session<'_, F> {
 
     fn table_begin(&mut self, request: &TableBegin, (): &mut ()) -> Result<(), Refusal> {
         self.drives(request.side)?;
-        self.server.upload.begin(*request)
+        self.server.upload.begin(*request, self.shared)
     }
 
     fn table_piece(&mut self, request: &TablePiece, answer: &mut u32) -> Result<(), Refusal> {
@@ -162,7 +162,6 @@ impl<F: NorFlash> Service for Session<'_, F> {
         self.at_rest()?;
         let (side, bytes) = self.server.upload.whole()?;
         let selected = self.server.store.commit(side, bytes).map_err(Refusal::Store)?;
-        self.server.upload.forget();
         *answer = selected.info();
         self.server.use_kept(side, self.shared)
     }
@@ -201,15 +200,17 @@ impl<F: NorFlash> Service for Session<'_, F> {
     }
 
     fn trace_arm(&mut self, request: &TraceArm, answer: &mut TraceInfo) -> Result<(), Refusal> {
+        // A table on its way in has the trace's room.
+        self.server.upload.forget(self.shared);
         self.shared.with(|controller| {
             controller.trace().arm(request)?;
-            *answer = controller.trace().info();
+            controller.trace().tell(answer);
             Ok(())
         })
     }
 
     fn trace_info(&mut self, (): &(), answer: &mut TraceInfo) -> Result<(), Refusal> {
-        self.shared.with(|controller| *answer = controller.trace().info());
+        self.shared.with(|controller| controller.trace().tell(answer));
         Ok(())
     }
 

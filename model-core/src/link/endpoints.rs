@@ -151,7 +151,7 @@ endpoints! {
     14 settings GetSettings: () => Settings;
     /// Checks, keeps and uses settings; only while disarmed or armed.
     15 set_settings SetSettings: Settings => Settings;
-    /// Begins the upload of a table.
+    /// Begins the upload of a table, in the room of the trace: what that recorded is lost.
     16 table_begin BeginTable: TableBegin => ();
     /// The next piece; the answer is how many bytes are there.
     17 table_piece SendTablePiece: TablePiece => u32;
@@ -163,7 +163,7 @@ endpoints! {
     20 table_rollback RollBackTable: Side => TableInfo;
     /// What the table says at some points.
     21 evaluate EvaluateTable: Evaluate => Evaluated;
-    /// Arms a trace.
+    /// Arms a trace; an upload that was not finished is forgotten.
     22 trace_arm ArmTrace: TraceArm => TraceInfo;
     /// The trace as it stands.
     23 trace_info GetTrace: () => TraceInfo;

@@ -83,8 +83,14 @@ impl Bench {
         bytes
     }
 
-    /// The whole answer to this tick, if it has come.
-    fn answer(&mut self) -> Option<Said> {
+    /// Whether what is held is a whole answer.
+    fn is_whole(&self) -> bool {
+        let crc = u16::from_le_bytes([self.buffer[20], self.buffer[21]]);
+        self.buffer[0] == ANSWER_SYNC && crc16(&self.buffer[..20]) == crc
+    }
+
+    /// What a whole answer says, if it is to this tick.
+    fn answer(&self) -> Option<Said> {
         let number = |at: usize| {
             f32::from_le_bytes([
                 self.buffer[at],
@@ -93,10 +99,8 @@ impl Bench {
                 self.buffer[at + 3],
             ])
         };
-        let crc = u16::from_le_bytes([self.buffer[20], self.buffer[21]]);
-        let good = self.buffer[0] == ANSWER_SYNC && crc16(&self.buffer[..20]) == crc;
         let ours = self.buffer[4..8] == self.tick.to_le_bytes();
-        (good && ours).then(|| Said {
+        ours.then(|| Said {
             readings: Readings { pressure_pa: number(8), stroke_m: number(12), force_n: number(16) },
             supply_low: self.buffer[1] & SUPPLY_LOW != 0,
             missed: u16::from(self.buffer[1] >> 4),
@@ -111,10 +115,9 @@ impl Bench {
                 let Ok(count) = Receiver(self.uart).read(room).await;
                 self.held += count;
             }
-            let found = self.answer();
+            let whole = self.is_whole();
+            let found = if whole { self.answer() } else { None };
             // A whole frame that is not ours is passed over; a broken one up to its next sync byte.
-            let whole = self.buffer[0] == ANSWER_SYNC
-                && crc16(&self.buffer[..20]) == u16::from_le_bytes([self.buffer[20], self.buffer[21]]);
             let next = if whole {
                 ANSWER
             } else {

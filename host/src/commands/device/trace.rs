@@ -28,7 +28,7 @@ pub(super) struct Arguments {
     /// When to begin.
     #[arg(long, value_enum, value_name = "WHEN", default_value_t = Begin::Now)]
     trigger: Begin,
-    /// Only read what an armed trace has recorded.
+    /// Only read what an armed trace has recorded; flashing a table before that takes its room.
     #[arg(long, conflicts_with_all = ["variables", "every", "trigger"])]
     read: bool,
     /// How long to wait for the trace to end, s.
@@ -122,9 +122,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         finished(&mut client, arguments.wait)?
     };
     if trace.records == 0 {
-        return Err(
-            Error::new(Code::DeviceRefused, "the trace is empty").help("arm one first, without --read")
-        );
+        return Err(Error::new(Code::DeviceRefused, "the trace is empty")
+            .help("arm one first, without --read; a table that is put to use takes the trace's room"));
     }
     let ticks_per_s = client.call::<GetInfo>(&())?.ticks_per_s;
     let columns = read_columns(&mut client, &trace, ticks_per_s)?;

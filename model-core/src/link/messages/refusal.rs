@@ -4,7 +4,7 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use super::{Fault, Mode, Side, State};
-use crate::fields::{codes, told};
+use crate::fields::told;
 
 /// Why a device refuses a request.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -94,19 +94,7 @@ pub enum Field {
     Rate,
 }
 
-codes!(Field {
-    SetPoint,
-    Reference,
-    ForceLoop,
-    StrokeLoop,
-    Joint,
-    Regulator,
-    Limits,
-    SensorWatch,
-    Watch,
-    Bands,
-    Rate
-});
+told!(Field { 0 SetPoint {}, 1 Reference {}, 2 ForceLoop {}, 3 StrokeLoop {}, 4 Joint {}, 5 Regulator {}, 6 Limits {}, 7 SensorWatch {}, 8 Watch {}, 9 Bands {}, 10 Rate {} });
 
 /// Why a table is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
@@ -168,4 +156,4 @@ pub enum StoreFault {
     Verify,
 }
 
-codes!(StoreFault { Medium, Full, NoPrevious, Verify });
+told!(StoreFault { 0 Medium {}, 1 Full {}, 2 NoPrevious {}, 3 Verify {} });

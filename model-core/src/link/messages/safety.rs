@@ -161,7 +161,7 @@ pub struct FaultReport {
 fields!(FaultReport { fault, side, sensor, from, mode, time_us, value, limit, last });
 
 /// Faults since the start.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Faults {
     /// The one that stopped the device, until it is cleared.
     pub latched: Option<FaultReport>,
