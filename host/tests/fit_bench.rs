@@ -6,6 +6,7 @@ use host::fit::{Options, fit, result::Fit};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::Muscle;
 use virtual_bench::presets;
+use virtual_bench::rng::Rng;
 
 mod bench_campaign;
 
@@ -42,6 +43,61 @@ fn the_three_muscles_of_the_thesis() {
         }
         assert!(error("table") < 2.0 * error("m4"), "fitted together, hardly worse than each by itself");
     }
+}
+
+/// Noise of force asks for stiff curves over pressure. Friction, which falls with pressure, must not become flatter by it: the mean of
+/// several noisy campaigns is the truth.
+#[test]
+fn noise_of_force_does_not_flatten_friction_over_pressure() {
+    const CAMPAIGNS: u64 = 4;
+    let spec = presets::miniature();
+    let levels = presets::miniature_pressures();
+    let truth = Muscle::new(spec.clone()).truth(&levels);
+    let mut off = vec![0.0; levels.len()];
+    for seed in 0..CAMPAIGNS {
+        let mut campaign = thesis(&spec, &levels, 1 + seed, 30.0);
+        let mut noise = Rng::new(100 + seed);
+        for force in campaign.recordings.iter_mut().filter_map(|r| r.force.as_mut()).flatten() {
+            *force += 3.0 * noise.normal();
+        }
+        let fitted = fit(&campaign, &description(&spec), &Options::default()).expect("a fit");
+        for ((off, found), true_at) in off.iter_mut().zip(&fitted.summary.pressures).zip(&truth.pressures) {
+            *off += (found.k_F - true_at.k_f) / CAMPAIGNS as f64;
+        }
+    }
+    println!("k_F is off by {off:.4?} in the mean");
+    assert!(off.iter().all(|d| d.abs() < 0.005), "{off:?}");
+}
+
+/// Without rows near rest length the blocked force is a continuation: the interval of `P0` says how little that is worth.
+#[test]
+fn without_blocked_force_the_interval_of_the_deadband_holds_the_truth() {
+    let spec = presets::miniature();
+    let levels = presets::miniature_pressures();
+    let truth = Muscle::new(spec.clone()).truth(&levels).deadband_kpa;
+    let whole = thesis(&spec, &levels, 1, 30.0);
+    let mut last = 0.0;
+    for least_mm in [0.1, 0.15, 0.2, 0.25, 0.3] {
+        let mut campaign = whole.clone();
+        for r in &mut campaign.recordings {
+            let kept: Vec<bool> = r.stroke.iter().map(|x| *x > least_mm * 1e-3).collect();
+            for column in [&mut r.time, &mut r.pressure, &mut r.stroke].into_iter().chain(&mut r.force) {
+                let mut of = kept.iter();
+                column.retain(|_| *of.next().expect("as many as rows"));
+            }
+        }
+        let s = fit(&campaign, &description(&spec), &Options::default()).expect("a fit").summary;
+        println!(
+            "from {least_mm} mm: P0 {:.2} ± {:.2} kPa of {truth:.2}",
+            s.deadband_kPa,
+            1.96 * s.deadband_std_kPa
+        );
+        assert!((s.deadband_kPa - truth).abs() < 1.96 * s.deadband_std_kPa, "from {least_mm} mm");
+        // Nor is it so wide that it says nothing, and it widens the further the way is.
+        assert!(s.deadband_std_kPa < 5.0, "{}", s.deadband_std_kPa);
+        last = s.deadband_std_kPa;
+    }
+    assert!(last > 1.0, "{last}");
 }
 
 /// A curve through separate fits, as the thesis joins them: M = 4 at each pressure by itself, natural splines between.

@@ -129,7 +129,8 @@ fn rows_of_the_other_branch_at_a_turn_move_nothing() {
     let mut noise = Noise::new(1, 0.0);
     let files = SIX.map(|p| strokes(p, 3000, 100.0, 0.0, 2, (0.05, &mut noise)));
     let found = fit(&Campaign::new(files.to_vec()), &description(), &Options::default()).unwrap();
-    assert_truth(&found, 300.0, 0.003);
+    // What is left of them in P0 is a few hundred pascals, less than a thousandth of the blocked force.
+    assert_truth(&found, 400.0, 0.003);
     // Those rows stand in the mid-line that the model is judged against, two in some twenty of a chunk.
     assert!(found.summary.max_error_pct < 2.0, "{}", found.summary.max_error_pct);
     assert_eq!(found.summary.outliers.len(), 0, "{:?}", found.summary.outliers);

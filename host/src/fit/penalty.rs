@@ -3,6 +3,7 @@
 use super::design::{Design, Layout};
 use super::linear::Symmetric;
 use super::normal::Normal;
+use super::smoothing::Smoothing;
 
 impl Design {
     /// The penalty on curves that bend, and on unknowns that nothing else holds.
@@ -47,9 +48,11 @@ impl Design {
                 }
             }
             if k == layout.order {
-                // Beyond the data friction tends to stay: a trend continued for long would pass zero or one.
+                // Beyond the data friction tends to stay: a trend continued for long would pass zero or one. So weakly that it never
+                // speaks against data: noise asks for stiff curves, and a pull as stiff as these would flatten k_F over pressure.
+                let stay = 0.02 * bend_friction.min(Smoothing::START.friction) * scale * force_squared;
                 for j in 1..nodes.len() {
-                    penalty.add_row(&[(place(j - 1), -1.0), (place(j), 1.0)], 0.02 * weight);
+                    penalty.add_row(&[(place(j - 1), -1.0), (place(j), 1.0)], stay);
                 }
             }
         }
@@ -73,5 +76,25 @@ impl Design {
             penalty.add(layout.extra(m), layout.extra(m), *p);
         }
         penalty
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::fit::joint::tests::known;
+
+    #[test]
+    fn a_steep_straight_friction_stays_steep_however_stiff_the_curve() {
+        let (design, truth) = known(3);
+        let weights = vec![1.0; design.rows.len()];
+        let mut found = truth.clone();
+        let data = design.normal(&found, &weights);
+        let penalty = design.penalty(&data, 0.0, 1e3);
+        design.solve(&mut found, &weights, &penalty, 30);
+        let layout = design.layout();
+        for j in 0..6 {
+            let (f, t) = (found[layout.friction(j)], truth[layout.friction(j)]);
+            assert!((f - t).abs() < 2e-4, "k_F {f} for {t}");
+        }
     }
 }

@@ -7,6 +7,9 @@ use super::design::Design;
 use super::linear::dot;
 use super::normal::Normal;
 
+/// Scores that differ by less than this share are alike.
+const ALIKE: f64 = 0.01;
+
 /// Weights of the penalty on bending, relative to the data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Smoothing {
@@ -57,18 +60,23 @@ pub fn choose(design: &Design, parameters: &[f64], weights: &[f64]) -> (Smoothin
     };
     // Both together first, then friction by itself: two curves that hardly speak to each other.
     let grid = |from: i32, to: i32| (from..=to).map(|e| 10.0_f64.powf(f64::from(e) / 2.0));
-    let best_of = |scored: Vec<(f64, f64)>| {
+    // Of weights that score alike the stiffest: where the data do not care, curves stay calm.
+    let best_of = |scored: Vec<(f64, f64)>, alike: f64| {
         let least = scored.iter().map(|(_, s)| *s).fold(f64::INFINITY, f64::min);
-        // Of weights that score alike within a hundredth the stiffest: where the data do not care, curves stay calm.
-        scored.into_iter().filter(|(_, s)| *s <= 1.01 * least).map(|(w, _)| w).fold(0.0, f64::max)
+        scored.into_iter().filter(|(_, s)| *s <= (1.0 + alike) * least).map(|(w, _)| w).fold(0.0, f64::max)
     };
     let elastic = best_of(
         grid(-10, 6)
             .map(|w| (w, score(Smoothing { elastic: w, friction: Smoothing::START.friction })))
             .collect(),
+        ALIKE,
     );
     let friction = if design.friction {
-        best_of(grid(-8, 6).map(|w| (w, score(Smoothing { elastic, friction: w }))).collect())
+        // Friction is a small part of a force that noise is as large as: a hundredth of the score is then much evidence. Four units of
+        // χ² is what chance does, and each point is about one.
+        let points = weights.iter().filter(|w| **w > 0.0).count().max(1) as f64;
+        let alike = ALIKE.min(4.0 / points);
+        best_of(grid(-8, 6).map(|w| (w, score(Smoothing { elastic, friction: w }))).collect(), alike)
     } else {
         Smoothing::START.friction
     };
