@@ -19,7 +19,7 @@
 //! | `P0` by itself | [`deadband`] |
 //! | how much curves may bend, stress that rises with strain | [`smoothing`], [`physical`] |
 //! | effective dimensions | [`dimensions`], [`geometry`] |
-//! | errors as the thesis measures them | [`errors`], [`midline`] |
+//! | errors as the thesis measures them | [`chunks`], [`errors`], [`midline`] |
 //! | the thesis's models side by side | [`models`] |
 //! | errors on what a fit did not see, other lengths, published formulas | [`hold_out`], [`other_length`], [`published`] |
 //! | how uncertain it all is, what is not determined | [`uncertainty`], [`determined`] |
@@ -64,6 +64,7 @@
 //! ```
 
 pub mod basis;
+pub mod chunks;
 pub mod deadband;
 pub mod design;
 pub mod determined;

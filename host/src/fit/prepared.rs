@@ -3,6 +3,7 @@
 use model_core::braid::{Braid, Geometry};
 
 use super::basis::{Columns, Orthonormal, PressureBasis, columns};
+use super::chunks::Place;
 use super::design::{Bin, Design, Layout, Row};
 use super::dimensions::{Adjusted, Mounting};
 use super::linear::dot;
@@ -127,6 +128,22 @@ impl Prepared {
         self.used[i] == Use::Fitted && !self.held_down.get(i).copied().unwrap_or(false)
     }
 
+    /// Every point that [counts](Self::counts), by its number, and where it lies in the loop.
+    pub fn counted(&self) -> impl Iterator<Item = (usize, Place)> {
+        let l0 = self.braid.rest_length();
+        (0..self.points.list.len()).filter(|i| self.counts(*i)).map(move |i| {
+            let p = &self.points.list[i];
+            let place = Place {
+                group: self.design.bins[self.design.rows[i].bin as usize].group,
+                fine: self.fine_pressure(p.pressure),
+                contraction: (p.stroke + self.shift[i]) / l0,
+                direction: p.direction,
+                rows: f64::from(p.rows),
+            };
+            (i, place)
+        })
+    }
+
     /// Whether enough points move either way for friction to be told from elasticity.
     fn both_directions(&self) -> bool {
         let rows = |s: f64| {
@@ -155,6 +172,13 @@ impl Prepared {
     pub fn blocked(&self, pressure: f64) -> f64 {
         // Every elastic column vanishes at rest length (without the tip correction exactly, with it to first order).
         (pressure - self.deadband()) * columns(&self.braid, 0.0).area
+    }
+
+    /// What errors at a pressure are a share of, N: `F_B`, but at least a twentieth of the largest, as below the deadband there is no
+    /// blocked force to compare with.
+    #[must_use]
+    pub fn blocked_for_errors(&self, pressure: f64) -> f64 {
+        self.blocked(pressure).max(0.05 * self.blocked(self.points.pressure.high).abs())
     }
 
     /// `E_1 … E_M` in pascals and `k_F` at a pressure.
