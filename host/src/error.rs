@@ -245,7 +245,10 @@ impl Error {
     /// Names the file. A file already named stays: the innermost place is the exact one.
     #[must_use]
     pub fn file(mut self, file: impl AsRef<Path>) -> Self {
-        self.0.place.file.get_or_insert_with(|| file.as_ref().to_path_buf());
+        // What was put together in memory has no file.
+        if !file.as_ref().as_os_str().is_empty() {
+            self.0.place.file.get_or_insert_with(|| file.as_ref().to_path_buf());
+        }
         self
     }
 

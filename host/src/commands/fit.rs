@@ -21,8 +21,8 @@ use crate::table_file::{self, TableFile};
 #[command(after_help = "Examples:\n  \
     host fit --muscle mini.toml loops/*.csv -o mini.pam --report mini.html\n  \
     host fit --muscle festo.toml --import bench.toml run*.csv -o festo.pam --order 3\n\n\
-    Recordings: CSV or tab-separated text, a header with units behind the last underscore (time_s, pressure_kPa,\n\
-    displacement_mm, force_N); anything else comes in by --import.")]
+    Recordings: CSV or tab-separated text (also .gz and .zst), Parquet, MATLAB or HDF5, whose columns have their units behind\n\
+    the last underscore (time_s, pressure_kPa, displacement_mm, force_N); anything else comes in by --import.")]
 pub struct Arguments {
     /// The muscle's description.
     #[arg(long, value_name = "MUSCLE.toml")]

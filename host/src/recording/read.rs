@@ -16,6 +16,7 @@ use super::plan::{Context, Plan, plan};
 use super::sheet::select;
 use super::source;
 use crate::error::{Code, Error, Result};
+use crate::file_kind::FileKind;
 use crate::muscle_description::MuscleDescription;
 use crate::progress::Progress;
 
@@ -102,7 +103,7 @@ impl<'a> Reader<'a> {
     /// # Errors
     /// Any `file::`, `recording::` or `import::` code, with file, line, column and value as far as they apply.
     pub fn file(&self, path: &Path) -> Result<Vec<Recording>> {
-        self.open(path).map_err(|e| e.file(path))
+        self.open(path).map_err(|e| FileKind::Recording.wanted(path, e))
     }
 
     fn open(&self, path: &Path) -> Result<Vec<Recording>> {

@@ -241,7 +241,7 @@ fn axes(out: &mut String, panel: &Panel, frame: &Frame, y_ticks: &[Tick]) -> f64
     if base < bottom - 0.5 {
         let _ = write!(lines, "M{} {}H{}", px(frame.left), px(base), px(right));
     }
-    if frame.y_down && frame.x_ends.0 <= 0.0 && !frame.x_log {
+    if frame.y_down && frame.x_ends.0 <= 0.0 && !frame.x_log && !named {
         let zero = px(frame.x(0.0));
         let _ = write!(lines, "M{zero} {}V{}", px(frame.top), px(bottom));
     }
