@@ -75,7 +75,7 @@ def make(path: Path, rows: int) -> float:
     return path.stat().st_size / 1e6
 
 
-def machine() -> str:
+def machine(packages: tuple[str, ...]) -> str:
     import platform
     from importlib.metadata import version
 
@@ -89,8 +89,8 @@ def machine() -> str:
         pass
     # Whoever else works on the machine shows in wall times first.
     load = f"load {os.getloadavg()[0]:.1f}"
-    packages = ", ".join(f"{p} {version(p)}" for p in ("numpy", "scipy", "polars", "pandas"))
-    return f"{os.cpu_count()} cores, {model}, {load}; Python {platform.python_version()}, {packages}."
+    versions = "".join(f", {p} {version(p)}" for p in packages)
+    return f"{os.cpu_count()} cores, {model}, {load}; Python {platform.python_version()}{versions}."
 
 
 @dataclass
@@ -139,11 +139,14 @@ def linear(costs: dict[int, dict[str, Cost]], name: str) -> list[Bound]:
     ]
 
 
-def finish(script: str, title: str, lines: list[str], bounds: list[Bound]) -> None:
-    """Writes the page beside the script, and ends with 1 where a bound is missed."""
+PEERS = ("numpy", "scipy", "polars", "pandas")
+
+
+def finish(script: str, title: str, lines: list[str], bounds: list[Bound], packages: tuple[str, ...] = PEERS) -> None:
+    """Writes the page beside the script, with the versions of the packages that took part, and ends with 1 where a bound is missed."""
     script = Path(script).name
     page = [f"# {title}", "", *lines, "", "## Bounds", "", "| | bound | measured | met |", "| --- | --- | ---: | --- |"]
-    page += [*map(str, bounds), "", f"{machine()} Written by tests/benchmarks/{script}."]
+    page += [*map(str, bounds), "", f"{machine(packages)} Written by tests/benchmarks/{script}."]
     (HERE / script).with_suffix(".md").write_text("\n".join(page) + "\n")
     print("\n".join(map(str, bounds)))
     sys.exit(0 if all(b.met for b in bounds) else 1)

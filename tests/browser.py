@@ -1,0 +1,131 @@
+"""`host studio` and a real headless Chromium on it, through WebDriver; nothing of Python beyond its own library."""
+
+import base64
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+import urllib.request
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+def ended(program):
+    """Asked to end, it ends the emulator too, if it has one."""
+    program.send_signal(signal.SIGINT)
+    try:
+        program.wait(10)
+    except subprocess.TimeoutExpired:
+        program.kill()
+
+
+def started(*command):
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+
+
+@contextlib.contextmanager
+def studio(program, on=None, muscle="mini"):
+    """`host studio` with an emulated controller, and a driver of browsers: the page's address, the driver's, and the program.
+
+    The studio's own controller runs in QEMU where that is there; `on` ("qemu", "native") has one in another process, connected to by
+    its port."""
+    port = free_port()
+    running = [subprocess.Popen(["chromedriver", f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)]
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            which = ["--emulate", muscle]
+            if on:
+                running.append(started(program, "emulate", muscle, "--on", on))
+                which = ["--port", running[-1].stdout.readline().strip()]
+            running.append(started(program, "studio", *which, "-o", folder))
+            url = running[-1].stdout.readline().split("open ")[1].strip()
+            time.sleep(2)
+            yield url, f"http://127.0.0.1:{port}", running[-1]
+        finally:
+            for one in reversed(running):
+                ended(one)
+
+
+class Browser:
+    """A page under WebDriver."""
+
+    def __init__(self, driver, url, size):
+        self.driver = driver
+        arguments = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--window-size=" + size]
+        arguments += ["--enable-precise-memory-info", "--js-flags=--expose-gc"]
+        wanted = {"browserName": "chrome", "goog:chromeOptions": {"args": arguments}, "goog:loggingPrefs": {"browser": "ALL"}}
+        self.path = "/session/" + self.ask("POST", "/session", {"capabilities": {"alwaysMatch": wanted}})["sessionId"]
+        self.ask("POST", self.path + "/url", {"url": url})
+
+    def ask(self, method, path, body=None):
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(self.driver + path, data=data, method=method, headers={"Content-Type": "application/json"})
+        return json.load(urllib.request.urlopen(request, timeout=90))["value"]
+
+    def js(self, text):
+        return self.ask("POST", self.path + "/execute/sync", {"script": text, "args": []})
+
+    def click(self, name):
+        self.js(f"document.getElementById('{name}').click()")
+
+    def text(self, name):
+        return self.js(f"return document.getElementById('{name}').textContent")
+
+    def until(self, condition, seconds=60):
+        end = time.time() + seconds
+        while time.time() < end:
+            if self.js(f"return !!({condition})"):
+                return
+            time.sleep(0.1)
+        raise AssertionError(f"never came: {condition}; the page says: {self.text('message')}")
+
+    def state(self, wanted, seconds=30):
+        self.until(f"document.getElementById('state').textContent.startsWith('{wanted}')", seconds)
+
+    def cdp(self, command, **parameters):
+        return self.ask("POST", self.path + "/goog/cdp/execute", {"cmd": command, "params": parameters})
+
+    def shot(self, folder, name):
+        """The whole page in light and dark, wide and on a phone; nothing without a folder."""
+        if not folder:
+            return
+        os.makedirs(folder, exist_ok=True)
+        for scheme in ["light", "dark"]:
+            self.cdp("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+            for size, (width, height, phone) in {"wide": (1300, 1000, False), "phone": (390, 844, True)}.items():
+                self.cdp("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1 + phone, mobile=phone)
+                time.sleep(0.7)
+                picture = self.cdp("Page.captureScreenshot", captureBeyondViewport=True, format="png")["data"]
+                with open(os.path.join(folder, f"{name}-{scheme}-{size}.png"), "wb") as file:
+                    file.write(base64.b64decode(picture))
+        self.cdp("Emulation.clearDeviceMetricsOverride")
+        self.cdp("Emulation.setEmulatedMedia", features=[])
+
+    def key(self, value):
+        actions = [{"type": "keyDown", "value": value}, {"type": "keyUp", "value": value}]
+        self.ask("POST", self.path + "/actions", {"actions": [{"type": "key", "id": "k", "actions": actions}]})
+
+    def mishap(self, code):
+        self.js(f"let s = document.getElementById('mishap'); s.value = '{code}'; s.dispatchEvent(new Event('change'))")
+
+    def table_on_device(self):
+        """From nothing to a controller that has a table: the example's recordings, fitted and sent."""
+        self.click("example")
+        self.until("document.querySelectorAll('#list li').length == 6")
+        self.click("fit")
+        self.until("!document.getElementById('fit-text').hidden")
+        self.click("difference")
+        self.until("!document.getElementById('difference-text').hidden")
+        self.click("flash")
+        self.until("document.getElementById('message').textContent.includes('read back')")
+
+    def close(self):
+        self.ask("DELETE", self.path)
