@@ -108,7 +108,7 @@ def story(url, driver):
     time.sleep(1)
     page.click("clear")
     page.state("disarmed")
-    page.until("document.getElementById('out-force').hidden", 90)
+    page.until("document.getElementById('out-force').hidden", 240)
     passed("tells_a_fault_in_words_and_clears_it")
     page.click("record")
     page.until("document.querySelectorAll('#list li').length == 7")

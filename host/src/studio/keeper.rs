@@ -13,6 +13,7 @@ use model_core::link::endpoints::{
 };
 use model_core::link::hello::Board;
 use model_core::link::messages::{Event, Side, Start, State, Status, Telemetry, TelemetryRate};
+use model_core::link::settings::Settings;
 use serde_json::{Value, json};
 use tokio::sync::{broadcast, oneshot};
 
@@ -71,6 +72,7 @@ const REPORT: Duration = Duration::from_millis(400);
 struct Connected {
     client: Client,
     status: Status,
+    settings: Settings,
     emulated: Option<(Emulated, Arc<AtomicU8>)>,
     running: Option<(Quantity, Steps, Option<u64>)>,
     recorder: Option<(Recorder, Value)>,
@@ -181,9 +183,11 @@ impl Connected {
     fn new(mut client: Client, emulated: Option<(Emulated, Arc<AtomicU8>)>) -> Result<Self> {
         client.call::<SetTelemetry>(&TelemetryRate { every_ticks: 1 })?;
         let status = client.call::<GetStatus>(&())?;
+        let settings = client.call::<GetSettings>(&())?;
         let mut now = Self {
             client,
             status,
+            settings,
             emulated,
             running: None,
             recorder: None,
@@ -226,6 +230,7 @@ impl Connected {
             "fault": self.fault,
             "lost": losses.samples, "bad_frames": losses.bad_frames,
             "recording": self.recorder.as_ref().map(|r| r.0.rows()),
+            "credible": credible(&self.settings),
         })
     }
 
@@ -353,6 +358,7 @@ impl Connected {
                 ));
             }
         }
+        self.settings = settings;
         Ok(json!(settings))
     }
 
@@ -387,6 +393,24 @@ impl Connected {
         about["ended_by"] = json!("the page");
         recorder.finish(&about).map(Some)
     }
+}
+
+/// Between what each fitted sensor can read, and the unit, by the names and in the units of [`batch`].
+fn credible(settings: &Settings) -> Value {
+    let sensors = [
+        ("F", &settings.force, 1.0, "N"),
+        ("P", &settings.pressure, 1e-3, "kPa"),
+        ("x", &settings.stroke, 1e3, "mm"),
+    ];
+    sensors
+        .into_iter()
+        .filter(|(_, watch, ..)| watch.fitted)
+        .map(|(name, watch, scale, unit)| {
+            let end = |v: f32| (f64::from(v) * scale * 1e3).round() / 1e3;
+            (name.to_owned(), json!([end(watch.low), end(watch.high), unit]))
+        })
+        .collect::<serde_json::Map<_, _>>()
+        .into()
 }
 
 /// Samples as columns: times in s, forces in N, pressures in kPa, strokes in mm.

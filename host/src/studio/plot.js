@@ -37,6 +37,7 @@ class Ring {
 
 // A ring's samples drawn together in stretches of time as long as one column of pixels: of each curve the least, the greatest, the
 // first and the last. Only samples that are new are looked at, so that a picture costs its width, not its window times the rate.
+// A sample that is infinite is a reading that its sensor cannot give: on which side it left is kept, and nothing else.
 class Stretches {
   constructor(ring) { this.ring = ring; this.step = 0; this.room = 0; }
   // Takes in what came since the last time; begins anew where the window, the width or the recording is another.
@@ -45,7 +46,7 @@ class Stretches {
     if (step !== this.step || room !== this.room || r.cleared !== this.cleared) {
       this.step = step; this.room = room; this.cleared = r.cleared; this.seen = r.pushed - r.length; this.newest = -1;
       this.number = new Float64Array(room).fill(-1);
-      const parts = () => ({ least: new Float64Array(room), most: new Float64Array(room), first: new Float64Array(room), last: new Float64Array(room) });
+      const parts = () => ({ least: new Float64Array(room), most: new Float64Array(room), first: new Float64Array(room), last: new Float64Array(room), left: new Int8Array(room) });
       this.curves = Object.fromEntries(r.names.filter((n) => n !== "t").map((n) => [n, parts()]));
     }
     const fresh = Math.min(r.pushed - this.seen, r.length), start = r.index(r.length - fresh), size = r.size, times = r.columns.t;
@@ -54,8 +55,13 @@ class Stretches {
       this.number[slot] = number; this.newest = number;
       for (const name in this.curves) {
         const c = this.curves[name], v = r.columns[name][i];
-        if (begins) c.least[slot] = c.most[slot] = c.first[slot] = v;
-        else { if (v < c.least[slot]) c.least[slot] = v; if (v > c.most[slot]) c.most[slot] = v; }
+        if (begins) { c.least[slot] = Infinity; c.most[slot] = -Infinity; c.left[slot] = 0; }
+        if (!(v >= c.least[slot] && v <= c.most[slot])) {
+          if (!Number.isFinite(v)) { c.left[slot] = v > 0 ? 1 : -1; continue; }
+          if (c.least[slot] > c.most[slot]) c.first[slot] = v;
+          if (v < c.least[slot]) c.least[slot] = v;
+          if (v > c.most[slot]) c.most[slot] = v;
+        }
         c.last[slot] = v;
       }
       if (++i === size) i = 0;
@@ -109,7 +115,7 @@ class Axes {
       g.fillText(text, Math.min(X(v), w - half - 1), bottom + 4);
     }
     g.save(); g.beginPath(); g.rect(left, top, right - left, bottom - top); g.clip();
-    this.map = { X, Y, left, right };
+    this.map = { X, Y, left, right, top, bottom };
     return this.map;
   }
   end() { this.g.restore(); }
@@ -134,7 +140,8 @@ function extent(...lists) {
 // Where a picture's data begin and end, beside its labels.
 const LEFT = 46, RIGHT = 8;
 
-// Curves of a ring over the last seconds.
+// Curves of a ring over the last seconds. Where a reading left what its sensor can give, the curve has a gap and the picture's edge a
+// mark, on the side to which it left; the axis is set by the other readings.
 class Scope {
   constructor(canvas, ring, curves) { this.axes = new Axes(canvas); this.ring = ring; this.curves = curves; this.stretches = new Stretches(ring); }
   draw(seconds) {
@@ -146,13 +153,16 @@ class Scope {
       s.each((slot) => { if (least[slot] < low) low = least[slot]; if (most[slot] > high) high = most[slot]; });
     }
     if (low > high) { low = 0; high = 1; }
-    const { X, Y } = this.axes.begin(x0, x1, low, high, (v, d) => v.toFixed(d) + " s"), g = this.axes.g;
+    const { X, Y, top, bottom } = this.axes.begin(x0, x1, low, high, (v, d) => v.toFixed(d) + " s"), g = this.axes.g;
+    this.left = 0;
     for (const [name, shade] of this.curves) {
-      const { least, most, first, last } = s.curves[name];
+      const { least, most, first, last, left } = s.curves[name];
       let begun = false;
       g.strokeStyle = colour(shade); g.lineWidth = 1.5; g.beginPath();
       s.each((slot, number) => {
         const x = X(number * s.step);
+        if (left[slot]) { this.left = left[slot]; g.fillStyle = colour("--alarm"); g.fillRect(x - 0.5, left[slot] > 0 ? top : bottom - 5, 1.5, 5); }
+        if (least[slot] > most[slot]) { begun = false; return; }
         if (begun) g.lineTo(x, Y(first[slot])); else { g.moveTo(x, Y(first[slot])); begun = true; }
         if (most[slot] > least[slot]) { g.lineTo(x, Y(most[slot])); g.lineTo(x, Y(least[slot])); g.lineTo(x, Y(last[slot])); }
       });
@@ -162,7 +172,7 @@ class Scope {
   }
 }
 
-// One quantity of a ring against another over the last seconds. Points are picked by their number since the beginning, not since the
+// One quantity of a ring against another over the last seconds, where both are finite. Points are picked by their number since the beginning, not since the
 // window's edge: else every picture would show others, and the curve would shimmer.
 class Loop {
   constructor(canvas, ring, x, y, shade) { this.axes = new Axes(canvas); this.ring = ring; this.x = x; this.y = y; this.shade = shade; this.most = 2000; }
@@ -173,14 +183,17 @@ class Loop {
     let x0 = Infinity, x1 = -Infinity, y0 = Infinity, y1 = -Infinity;
     for (let k = begin, i = start; k < r.length; k += every) {
       const x = xs[i], y = ys[i];
+      if (!Number.isFinite(x + y)) { i += every; if (i >= r.size) i -= r.size; continue; }
       if (x < x0) x0 = x; if (x > x1) x1 = x; if (y < y0) y0 = y; if (y > y1) y1 = y;
       i += every; if (i >= r.size) i -= r.size;
     }
     if (x0 > x1) { x0 = y0 = 0; x1 = y1 = 1; }
     const { X, Y } = this.axes.begin(x0, x1, y0, y1), g = this.axes.g;
     g.strokeStyle = colour(this.shade); g.lineWidth = 1.2; g.beginPath();
-    for (let k = begin, i = start; k < r.length; k += every) {
-      if (k === begin) g.moveTo(X(xs[i]), Y(ys[i])); else g.lineTo(X(xs[i]), Y(ys[i]));
+    for (let k = begin, i = start, begun = false; k < r.length; k += every) {
+      if (!Number.isFinite(xs[i] + ys[i])) begun = false;
+      else if (begun) g.lineTo(X(xs[i]), Y(ys[i]));
+      else { g.moveTo(X(xs[i]), Y(ys[i])); begun = true; }
       i += every; if (i >= r.size) i -= r.size;
     }
     g.stroke(); this.axes.end();

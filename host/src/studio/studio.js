@@ -53,6 +53,7 @@ function draw() {
   scopes[1].curves = mode === "pressure" ? [["a", "--s2"], ["c", "--s1"], ["P", "--s0"]] : [["c", "--s1"], ["P", "--s0"]];
   scopes[2].curves = mode === "stroke" ? [["a", "--s1"], ["x", "--s0"]] : [["x", "--s0"]];
   for (const s of scopes) s.draw(seconds);
+  scopes.forEach((s, i) => { const [text, name] = outside[i]; $(text).hidden = !s.left; if (s.left) $(text).textContent = unbelievable[name]; });
   loop.draw(seconds);
 }
 requestAnimationFrame(frame);
@@ -64,9 +65,24 @@ function redraw() { ink.clear(); fresh = ring.length > 0; for (const [canvas, pa
 addEventListener("resize", redraw);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 
+// Readings that a sensor cannot give, by its settings: what they were, for the picture that leaves them out.
+const outside = [["out-force", "F"], ["out-pressure", "P"], ["out-stroke", "x"]], unbelievable = {};
+function disbelieve(m) {
+  for (const name in state.credible || {}) {
+    const [low, high, unit] = state.credible[name], column = m[name];
+    for (let i = 0; i < column.length; i++) {
+      const v = column[i];
+      if (v >= low && v <= high) continue;
+      unbelievable[name] = `out of range: the sensor reads ${v} ${unit}, and can read ${low} to ${high}; not drawn`;
+      column[i] = v < low ? -Infinity : Infinity;
+    }
+  }
+}
+
 // One message of the stream.
 function take(m) {
   if (m.k === "t") {
+    disbelieve(m);
     if (ring.length && m.t[0] < ring.last("t")) ring.clear();
     ring.push(m, m.t.length); samples += m.t.length; mode = m.mode; fresh = true;
   } else if (m.k === "s") show(m);
