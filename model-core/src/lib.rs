@@ -8,7 +8,7 @@
 //! | length to radius, wall and strains | [`braid`] |
 //! | curves over pressure | [`spline`] |
 //! | what a fit finds and a file keeps | [`table`], [`image`], [`check`] |
-//! | values as bytes, as a small device reads and writes them | [`fields`] |
+//! | values as bytes, as a small device reads and writes them | [`mod@fields`] |
 //! | force and its slope | [`muscle`] |
 //! | pressure for a wanted force | [`inverse`] |
 //! | which way friction points | [`motion`] |

@@ -40,7 +40,7 @@ pub enum Kind {
     Request = 0,
     /// The device answers.
     Response = 1,
-    /// The device refuses; the body is a [`Refusal`](super::messages::Refusal).
+    /// The device refuses; the body is a [`Refusal`].
     Refusal = 2,
     /// The device speaks by itself: telemetry and events.
     Topic = 3,
