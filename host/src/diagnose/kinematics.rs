@@ -447,4 +447,26 @@ mod tests {
         assert_eq!((k.direction[50], k.direction[300], k.direction[700]), (0.0, 1.0, -1.0));
         assert!(k.held.iter().all(|h| *h));
     }
+
+    #[test]
+    fn a_ramp_is_marked_from_where_the_pressure_left_and_judged_once_friction_has_turned() {
+        // 10 Hz: 10 s of stroke at 400 kPa; the pressure falls by 10 kPa/s for 20 s, begun half a second before the muscle stood.
+        let n = 500;
+        let time: Vec<f64> = (0..n).map(|i| i as f64 * 0.1).collect();
+        let stroke: Vec<f64> =
+            time.iter().enumerate().map(|(i, t)| 1e-3 * t.min(10.0) + 1e-6 * noisy(i)).collect();
+        let pressure: Vec<f64> = time
+            .iter()
+            .enumerate()
+            .map(|(i, t)| 400e3 - 10e3 * (t - 9.5).clamp(0.0, 20.0) + 20.0 * noisy(i + n))
+            .collect();
+        let k = kinematics(&time, &stroke, &pressure, None, 0.0, Thresholds { stroke: 1e-4, pressure: 5e3 });
+        assert!(k.ramped[97..].iter().all(|r| *r), "the ramp is left out from its start, while the muscle moved");
+        assert!(k.ramped[..80].iter().all(|r| !*r));
+        let judged: Vec<usize> = (0..n).filter(|i| k.on_ramp[*i]).collect();
+        assert!((128..150).contains(&judged[0]), "from row {}", judged[0]);
+        let last = judged[judged.len() - 1];
+        assert!((285..300).contains(&last), "to row {last}: where the pressure stands again nothing is known");
+        assert!(judged.iter().all(|i| k.direction[*i] == -1.0));
+    }
 }

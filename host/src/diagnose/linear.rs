@@ -306,6 +306,33 @@ mod tests {
     use super::*;
 
     #[test]
+    fn columns_that_are_zero_on_most_rows_make_the_same_basis() {
+        let mut random = Random(3);
+        let stretch = |from: usize, to: usize| -> Vec<f64> {
+            (0..90).map(|i| if (from..to).contains(&i) { 1.0 + i as f64 } else { 0.0 }).collect()
+        };
+        let (first, second) = (stretch(10, 20), stretch(20, 35));
+        let whole: Vec<f64> = (0..90).map(|_| random.normal()).collect();
+        let y: Vec<f64> = (0..90).map(|i| 2.0 * first[i] - 3.0 * second[i] + 0.5 * whole[i]).collect();
+        let ones = vec![1.0; 90];
+        for columns in [[&first, &second, &whole], [&whole, &second, &first]] {
+            let basis = Basis::new(&columns.map(Vec::clone), &ones);
+            let found = basis.solve(&y);
+            let expected = columns.map(|c| if *c == first { 2.0 } else if *c == second { -3.0 } else { 0.5 });
+            for (a, b) in found.iter().zip(expected) {
+                assert!((a - b).abs() < 1e-9, "{found:?}");
+            }
+            let (mut rest, along) = (y.clone(), basis.along(&y));
+            basis.project_out(&mut rest);
+            assert!(energy(&rest) < 1e-16 * energy(&y));
+            assert!((energy(&along) - energy(&y)).abs() < 1e-9 * energy(&y));
+            for (q, c) in basis.columns(0, 90).iter().zip(along) {
+                assert!((energy(q) - 1.0).abs() < 1e-12 && (dot(q, &y) - c).abs() < 1e-9 * energy(&y).sqrt());
+            }
+        }
+    }
+
+    #[test]
     fn coefficients_of_an_exact_combination_come_back_and_dependent_columns_are_left_out() {
         let n = 200;
         let t: Vec<f64> = (0..n).map(|i| i as f64 / n as f64).collect();
