@@ -51,10 +51,13 @@ impl<const N: usize> Chunk<N> {
     }
 }
 
+/// Rows, and the sums of the quantities over them, of each branch.
+type Sums<const N: usize> = [(f64, [f64; N]); 3];
+
 /// Cuts samples of `N` quantities into chunks, in order of group, finer pressure and contraction.
 #[must_use]
 pub fn cut<const N: usize>(samples: impl IntoIterator<Item = (Place, [f64; N])>) -> Vec<Chunk<N>> {
-    let mut sums: BTreeMap<(u32, u32, i64), [(f64, [f64; N]); 3]> = BTreeMap::new();
+    let mut sums: BTreeMap<(u32, u32, i64), Sums<N>> = BTreeMap::new();
     for (at, values) in samples {
         let number = (at.contraction * PER_CONTRACTION).floor() as i64;
         let branches = sums.entry((at.group, at.fine, number)).or_insert([(0.0, [0.0; N]); 3]);
@@ -65,7 +68,7 @@ pub fn cut<const N: usize>(samples: impl IntoIterator<Item = (Place, [f64; N])>)
             *s += at.rows * v;
         }
     }
-    let rows = |branches: &[(f64, [f64; N]); 3]| branches.iter().map(|(rows, _)| rows).sum::<f64>();
+    let rows = |branches: &Sums<N>| branches.iter().map(|(rows, _)| rows).sum::<f64>();
     let mut by_group: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
     for ((group, ..), branches) in &sums {
         by_group.entry(*group).or_default().push(rows(branches));
