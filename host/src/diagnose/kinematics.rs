@@ -461,12 +461,18 @@ mod tests {
             .map(|(i, t)| 400e3 - 10e3 * (t - 9.5).clamp(0.0, 20.0) + 20.0 * noisy(i + n))
             .collect();
         let k = kinematics(&time, &stroke, &pressure, None, 0.0, Thresholds { stroke: 1e-4, pressure: 5e3 });
-        assert!(k.ramped[97..].iter().all(|r| *r), "the ramp is left out from its start, while the muscle moved");
+        assert!(
+            k.ramped[97..].iter().all(|r| *r),
+            "the ramp is left out from its start, while the muscle moved"
+        );
         assert!(k.ramped[..80].iter().all(|r| !*r));
         let judged: Vec<usize> = (0..n).filter(|i| k.on_ramp[*i]).collect();
         assert!((128..150).contains(&judged[0]), "from row {}", judged[0]);
         let last = judged[judged.len() - 1];
-        assert!((285..300).contains(&last), "to row {last}: where the pressure stands again nothing is known");
+        assert!(
+            (285..300).contains(&last),
+            "to row {last}: where the pressure stands again nothing is known"
+        );
         assert!(judged.iter().all(|i| k.direction[*i] == -1.0));
     }
 }

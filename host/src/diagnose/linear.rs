@@ -318,7 +318,15 @@ mod tests {
         for columns in [[&first, &second, &whole], [&whole, &second, &first]] {
             let basis = Basis::new(&columns.map(Vec::clone), &ones);
             let found = basis.solve(&y);
-            let expected = columns.map(|c| if *c == first { 2.0 } else if *c == second { -3.0 } else { 0.5 });
+            let expected = columns.map(|c| {
+                if *c == first {
+                    2.0
+                } else if *c == second {
+                    -3.0
+                } else {
+                    0.5
+                }
+            });
             for (a, b) in found.iter().zip(expected) {
                 assert!((a - b).abs() < 1e-9, "{found:?}");
             }
