@@ -48,7 +48,7 @@ fn raised(error: Error) -> PyErr {
 }
 
 fn wrong(text: impl Into<String>) -> PyErr {
-    raised(Error::new(Code::CallInvalid, text))
+    raised(Error::new(Code::CallInvalid, text).help("help() of the function shows what it takes"))
 }
 
 /// Anything that numpy takes for a column of numbers.
@@ -68,7 +68,14 @@ fn column(name: &str, values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
 /// Anything that numpy can turn into an array of numbers.
 fn numbers<'py>(name: &str, values: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let py = values.py();
-    PyModule::import(py, "numpy")?.call_method1("asarray", (values, "float64")).map_err(|e| {
+    let numpy = PyModule::import(py, "numpy")?;
+    // numpy would drop the imaginary parts with no more than a warning.
+    if numpy.call_method1("iscomplexobj", (values,))?.is_truthy()? {
+        return Err(raised(
+            Error::new(Code::CallInvalid, format!("`{name}` holds complex numbers")).help("give its real part"),
+        ));
+    }
+    numpy.call_method1("asarray", (values, "float64")).map_err(|e| {
         raised(
             Error::new(Code::CallInvalid, format!("`{name}` is no array of numbers: {}", e.value(py))).help(
                 "give a numpy array, a list or a column of a data frame; missing values are not filled in",
@@ -177,7 +184,7 @@ impl Recording {
             temperature: temperature.map(|t| column("temperature", t)).transpose()?,
             ..HostRecording::default()
         };
-        recording.check().map_err(raised)?;
+        recording.check().map_err(|e| raised(e.file(format!("recording `{}`", recording.name))))?;
         Ok(Self(recording))
     }
 
@@ -456,6 +463,9 @@ fn over<'py>(
     })?;
     let part = |i: usize| -> PyResult<PyReadonlyArrayDyn<'py, f64>> { Ok(same.get_item(i)?.extract()?) };
     let (p, x, s) = (part(0)?, part(1)?, part(2)?);
+    if let Some(wrong_way) = s.as_array().iter().find(|s| !(-1.0..=1.0).contains(*s)) {
+        return Err(wrong(format!("`direction` is {wrong_way}; it is 1 shortening, -1 lengthening, 0 the mid-line")));
+    }
     let values: Vec<f64> =
         p.as_array().iter().zip(x.as_array()).zip(s.as_array()).map(|((p, x), s)| of(*p, *x, *s)).collect();
     let shape = p.as_array().shape().to_vec();
@@ -516,16 +526,17 @@ fn fit(
     py: Python<'_>,
     campaign: PyRef<'_, Campaign>,
     muscle: PyRef<'_, Muscle>,
-    order: usize,
+    order: i64,
     tip_correction: bool,
     smoothing: Option<f64>,
     fit_geometry: bool,
     fit_lengths: bool,
     physical: bool,
 ) -> PyResult<Fit> {
-    if !(1..=6).contains(&order) {
-        return Err(wrong(format!("`order` is {order}; it must lie between 1 and 6")));
-    }
+    let order = usize::try_from(order)
+        .ok()
+        .filter(|m| (1..=6).contains(m))
+        .ok_or_else(|| wrong(format!("`order` is {order}; it must lie between 1 and 6")))?;
     if smoothing.is_some_and(|w| !(w.is_finite() && w >= 0.0)) {
         return Err(wrong("`smoothing` must be a number from 0 up, or None to have it chosen"));
     }

@@ -147,6 +147,23 @@ def refused(act):
     raise AssertionError("it was taken")
 
 
+def test_wrong_arrays_and_options_are_refused_by_name():
+    muscle, campaign = everything()
+    time, pressure, stroke, force = np.arange(100) * 0.01, np.full(100, 3e5), np.linspace(0, 1e-3, 100), np.linspace(50, 20, 100)
+    hole = force.copy()
+    hole[7] = np.nan
+    told = refused(lambda: pam.Recording("a", time, pressure, stroke, hole))
+    assert "row 8" in str(told) and "recording `a`" in str(told), told
+    assert "complex" in str(refused(lambda: pam.Recording("a", time, pressure, stroke, force + 1j)))
+    assert "time does not increase" in str(refused(lambda: pam.Recording("a", time[::-1], pressure, stroke, force)))
+    assert "50 rows" in str(refused(lambda: pam.Recording("a", time, pressure, stroke[:50], force)))
+    assert "0 rows" in str(refused(lambda: pam.fit(pam.Campaign([]), muscle)))
+    assert "`order` is -1" in str(refused(lambda: pam.fit(campaign, muscle, order=-1)))
+    table = pam.fit(campaign, muscle).table
+    assert "`direction` is 5" in str(refused(lambda: table.force(3e5, stroke, direction=5)))
+    assert "muscle's description" in str(refused(lambda: pam.read(bench() / "muscle.toml")))
+
+
 def test_the_listing_of_the_book_runs():
     page = pathlib.Path(__file__).resolve().parents[3] / "docs/src/python.md"
     listing = page.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
