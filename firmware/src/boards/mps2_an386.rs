@@ -158,7 +158,7 @@ async fn link(port: &'static Port, shared: &'static Shared, server: &'static mut
 }
 
 fn spawn(spawner: SendSpawner, shared: &'static Shared, port: &'static Port) -> Result<(), &'static str> {
-    let flash = FileFlash::open(c"pam-store.bin").ok_or("pam-store.bin cannot be opened")?;
+    let flash = FileFlash::open(c"pam-store.bin").ok_or("no pam-store.bin")?;
     let identity = Identity {
         board: Board::Mps2An386,
         muscles: 2,
