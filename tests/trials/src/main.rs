@@ -102,7 +102,7 @@ struct Real {
 
 impl Real {
     /// Copies what was written to the page of the book, where one is wanted.
-    fn into_book(&self, written: &str) -> Result<(), Box<dyn Error>> {
+    fn copy_to_book(&self, written: &str) -> Result<(), Box<dyn Error>> {
         if let Some(page) = &self.page {
             std::fs::copy(self.output.join(written), page)?;
         }
@@ -211,10 +211,10 @@ fn main() -> ExitCode {
             again::run(&set, &host, &residuals::Residuals::read(&data), until, draw)
         }
         Command::Semi(real) => {
-            semi::run(&real.data, &real.output, &real.host).and_then(|()| real.into_book("semi.md"))
+            semi::run(&real.data, &real.output, &real.host).and_then(|()| real.copy_to_book("semi.md"))
         }
         Command::Festo(real) => {
-            festo::run(&real.data, &real.output, &real.host).and_then(|()| real.into_book("festo.md"))
+            festo::run(&real.data, &real.output, &real.host).and_then(|()| real.copy_to_book("festo.md"))
         }
         Command::Prove { set, what, tool, check } => prove(&set, &what, &tool, check),
     };
