@@ -176,10 +176,15 @@ macro_rules! fields {
 /// An enum without fields, its variants in their order.
 macro_rules! codes {
     ($name:ty { $($variant:ident),* $(,)? }) => {
+        impl $name {
+            /// All of them, in the order of their codes.
+            pub const ALL: [Self; [$(stringify!($variant)),*].len()] = [$(Self::$variant),*];
+        }
+
         impl $crate::fields::Fields for $name {
             #[inline(never)]
             fn walk(&mut self, walk: &mut $crate::fields::Walk<'_>) {
-                const ALL: &[$name] = &[$(<$name>::$variant),*];
+                const ALL: &[$name] = &<$name>::ALL;
                 // Says so when a variant is missing in the list.
                 let code = match self { $(Self::$variant => Self::$variant as u8,)* };
                 if let Some(found) = ALL.get(usize::from(walk.variant(code, ALL.len() as u8))) {

@@ -43,9 +43,15 @@ impl Effect for SensorDelay {
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         Filter::step(memory, context.dt, &[parameters[3]], &[context.force()]);
+        let force = context.force();
+        if memory[SEEN] == T::ZERO {
+            memory[SEEN] = T::ONE;
+            memory[SEEN + 1..SEEN + 2 + ROW].fill(force);
+            return;
+        }
         let row = &mut memory[SEEN + 1..SEEN + 2 + ROW];
-        let mut input = (row[0], context.force());
-        row[0] = input.1;
+        let mut input = (row[0], force);
+        row[0] = force;
         let time = parameters[3].max(T::from_f32(1.0e-4)) / T::from_f64(ROW as f64);
         let dt = context.dt.max(T::ZERO);
         let kept = (-dt / time).exp();
@@ -55,10 +61,6 @@ impl Effect for SensorDelay {
             let before = *output;
             *output = kept * before + (T::ONE - mean) * input.1 + (mean - kept) * input.0;
             input = (before, *output);
-        }
-        if memory[SEEN] == T::ZERO {
-            memory[SEEN] = T::ONE;
-            memory[SEEN + 1..SEEN + 2 + ROW].fill(context.force());
         }
     }
 

@@ -140,7 +140,12 @@ pub(crate) struct Baseline {
 impl Baseline {
     /// Weighted root mean square of the residual, N.
     pub(crate) fn rms(&self, rows: &Rows) -> f64 {
-        (energy(&self.residual) / energy(&rows.root_weight).max(1e-12)).sqrt()
+        self.per_row(rows).sqrt()
+    }
+
+    /// Weighted mean square of the residual, N².
+    pub(crate) fn per_row(&self, rows: &Rows) -> f64 {
+        energy(&self.residual) / energy(&rows.root_weight).max(1e-12)
     }
 }
 
@@ -183,6 +188,18 @@ enum Part {
     Rest(usize, usize),
     /// How much further than at a turn of the stroke, or less far, friction turns while the pressure ramps at held length.
     Ramping,
+}
+
+impl Part {
+    /// By how much friction's direction departs at a row from what the model holds, per unit of a part of this kind.
+    fn departure(self, rows: &Rows, i: usize) -> f64 {
+        match self {
+            Self::Unsettled => rows.unsettled[i],
+            Self::Rest(from, to) if (from..to).contains(&i) => 1.0,
+            Self::Ramping if rows.on_ramp[i] => rows.sign[i],
+            _ => 0.0,
+        }
+    }
 }
 
 /// The stretches of rows with the same number other than zero.
@@ -296,13 +313,9 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
                 Part::Area => of(&|i| factor[i] * shapes[i].area * contexts[i].pressure),
                 Part::AreaSlope => of(&|i| factor[i] * shapes[i].area_slope * contexts[i].pressure),
                 Part::Settling => of(&|i| -live[i] * rows.sign[i] * quasi[i] * rows.settling[i]),
-                Part::Unsettled => of(&|i| -live[i] * friction[i] * quasi[i] * rows.unsettled[i]),
-                Part::Rest(from, to) => of(&|i| {
-                    if (from..to).contains(&i) { -live[i] * friction[i] * quasi[i] } else { 0.0 }
-                }),
-                Part::Ramping => of(&|i| {
-                    if rows.on_ramp[i] { -live[i] * friction[i] * quasi[i] * rows.sign[i] } else { 0.0 }
-                }),
+                Part::Unsettled | Part::Rest(..) | Part::Ramping => {
+                    of(&|i| -live[i] * friction[i] * quasi[i] * part.departure(rows, i))
+                }
             }
         };
         let mut joint = Basis::default();
@@ -430,14 +443,11 @@ fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
         stiffness: vec![0.0; n],
         deadband: 0.0,
     };
-    let mut rests = vec![0.0; n];
-    let (mut settling, mut unsettled, mut ramping) = (0.0, 0.0, 0.0);
-    let mut elastic = vec![0.0; n];
+    let mut settling = 0.0;
+    let (mut elastic, mut departure) = (vec![0.0; n], vec![0.0; n]);
     for (part, c) in plan.hard.iter().chain(&plan.soft).zip(solution).filter(|(_, c)| **c != 0.0) {
-        match *part {
-            Part::Deadband => v.deadband = *c,
-            Part::Rest(from, to) => rests[from..to].fill(*c),
-            _ => {}
+        if let Part::Deadband = part {
+            v.deadband = *c;
         }
         for i in 0..n {
             let (shape, context) = (&rows.shapes[i], &rows.contexts[i]);
@@ -461,9 +471,9 @@ fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
                 }
                 Part::AreaSlope => v.gaylord[i] += c * context.pressure * shape.area_slope,
                 Part::Settling => settling = *c,
-                Part::Unsettled => unsettled = *c,
-                Part::Ramping => ramping = *c,
-                Part::Rest(..) => break,
+                Part::Unsettled | Part::Rest(..) | Part::Ramping => {
+                    departure[i] += c * part.departure(rows, i)
+                }
             }
         }
     }
@@ -474,8 +484,7 @@ fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
         v.quasi[i] = v.gaylord[i] + elastic[i];
         v.friction[i] = v.friction[i].clamp(-0.4, 0.8);
         let late = settling * rows.sign[i] * rows.settling[i];
-        let on_ramp = if rows.on_ramp[i] { ramping * rows.sign[i] } else { 0.0 };
-        let direction = context.direction + unsettled * rows.unsettled[i] + on_ramp + rests[i];
+        let direction = context.direction + departure[i];
         v.force[i] = live[i] * v.quasi[i] * (1.0 - v.friction[i] * direction - late);
     }
     v

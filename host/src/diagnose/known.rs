@@ -9,7 +9,6 @@ use super::answer::Asked;
 use super::baselines::{self, Baseline, Kind};
 use super::candidates::{Candidate, place_in_words};
 use super::held_out::held_out;
-use super::linear::energy;
 use super::locate::locate;
 use super::rows::{self, Rows};
 use super::verdict::{Considered, Missing, ParameterValue, PathStep, Verdict};
@@ -122,8 +121,7 @@ impl Known {
         }
         let Some((rows, before)) = self.before else { return Ok(diagnosis) };
         let (freed_rows, after) = as_read(freed, braid)?;
-        let per_row = |b: &Baseline, r: &Rows| energy(&b.residual) / energy(&r.root_weight).max(1e-12);
-        let (was, is) = (per_row(&before, &rows), per_row(&after, &freed_rows));
+        let (was, is) = (before.per_row(&rows), after.per_row(&freed_rows));
         let noise = diagnosis.noise_N.powi(2);
         let share = ((was - is) / (was - noise).max(1e-3 * was)).clamp(0.0, 1.0);
         for m in &mut diagnosis.missing {

@@ -9,7 +9,6 @@
 use rayon::prelude::*;
 
 use super::baselines::{self, Baseline, Kind};
-use super::linear::energy as energy_of;
 use super::rows::Rows;
 
 /// Settling times that are tried, s.
@@ -220,7 +219,7 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
         }
     }
     if !(energy < CLEARLY * held) {
-        if !rows.isometric && held > NO_LAW * per_row(&moving, &fitted) * weight_at(rows, &holds) {
+        if !rows.isometric && held > NO_LAW * fitted.per_row(&moving) * weight_at(rows, &holds) {
             number_rests(rows, &holds, &stays);
         }
         return None;
@@ -244,11 +243,6 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
         number_rests(rows, &holds, &chosen);
     }
     Some(best)
-}
-
-/// What a fit leaves of a row, N².
-fn per_row(rows: &Rows, fitted: &Baseline) -> f64 {
-    energy_of(&fitted.residual) / energy_of(&rows.root_weight).max(1e-12)
 }
 
 /// The weight of the rows at rest.

@@ -39,9 +39,6 @@ pub enum Side {
 codes!(Side { Agonist, Antagonist });
 
 impl Side {
-    /// Both, in order.
-    pub const ALL: [Self; 2] = [Self::Agonist, Self::Antagonist];
-
     /// 0 or 1.
     pub const fn index(self) -> usize {
         match self {

@@ -92,29 +92,6 @@ codes!(Fault {
 });
 
 impl Fault {
-    /// All of them, in the order of their codes.
-    pub const ALL: [Self; 19] = [
-        Self::SensorRange,
-        Self::SensorStuck,
-        Self::SensorNoisy,
-        Self::SensorsDisagree,
-        Self::SensorsSilent,
-        Self::PressureNotRising,
-        Self::PressureNotFalling,
-        Self::OverPressure,
-        Self::OverStroke,
-        Self::OverSpeed,
-        Self::OverForce,
-        Self::SetPointSilence,
-        Self::LoopOverrun,
-        Self::TableMissing,
-        Self::TableInvalid,
-        Self::BrownOut,
-        Self::Watchdog,
-        Self::NotANumber,
-        Self::HostSilence,
-    ];
-
     /// Its number, 0 for the first of [`Fault::ALL`].
     pub const fn code(self) -> u8 {
         self as u8
