@@ -159,12 +159,38 @@ fn the_thesis_raw_form_comes_in_with_its_units() {
     assert_eq!(Motion::of(recording).turns.len(), 2);
 }
 
+/// Effective dimensions are found, not stumbled upon: what two of three runs give hardly depends on which two.
+#[test]
+fn dimensions_from_two_of_three_runs_are_those_from_the_others() {
+    let options = Options { fit_geometry: true, fit_lengths: true, ..Options::default() };
+    for name in ["festo10-2022-83mm.toml", "festo10-2022-382mm.toml"] {
+        let Some(campaign) =
+            read("aarl-festo-10mm-2022", "settled_points.csv", "festo-2022-settled.toml", name)
+        else {
+            return;
+        };
+        let muscle = MuscleDescription::read(project().join("examples/muscles").join(name)).unwrap();
+        let blocked: Vec<f64> = ["8", "9", "10"]
+            .map(|run| {
+                let kept =
+                    campaign.recordings.iter().filter(|r| r.labels.iter().all(|(_, value)| value != run));
+                let part = Campaign { recordings: kept.cloned().collect(), ..campaign.clone() };
+                assert_eq!(part.recordings.len(), 8, "{name} without run {run}");
+                fit(&part, &muscle, &options).unwrap().summary.blocked_force_N
+            })
+            .into();
+        let (low, high) = blocked.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), b| (l.min(*b), h.max(*b)));
+        println!("{name}: {blocked:.1?} N");
+        assert!(high < 1.06 * low, "{name}: {blocked:?} N");
+    }
+}
+
 /// Muscles of one stock predict each other's lengths: percent of blocked force, mean over the muscles, with bounds on both sides.
 #[test]
 fn a_length_that_was_not_recorded_is_predicted_from_the_others() {
     let options = Options { fit_geometry: true, fit_lengths: true, ..Options::default() };
     for (year, muscles, bounds) in [
-        ("2022", &["83mm", "132mm", "182mm", "233mm", "281mm", "382mm"][..], 2.7..3.2),
+        ("2022", &["83mm", "132mm", "182mm", "233mm", "281mm", "382mm"][..], 3.0..3.5),
         ("2021", &["13cm", "23cm", "27cm", "29cm", "30cm"][..], 3.0..3.5),
     ] {
         let mut cases = Vec::new();

@@ -1,8 +1,9 @@
 //! Effective dimensions, and the true length of each mounting: what a tape measure and a data sheet leave open.
 //!
 //! Each such unknown enters as one more column of the joint problem, `∂F/∂p` at the present solution, with a prior as wide as
-//! the measurement it stands for; the columns are computed anew until nothing moves (Gauss–Newton). Values stay within stated
-//! bounds, and each is reported with how much of the prior's uncertainty the recordings removed.
+//! the measurement it stands for. The columns are computed anew at every step (Gauss–Newton), and a step goes only as far as it lowers
+//! the objective of a table solved anew at its end. Values stay within stated bounds, and each is reported with how much of the prior's
+//! uncertainty the recordings removed.
 
 use model_core::braid::Geometry;
 
@@ -43,10 +44,43 @@ fn mountings(prepared: &Prepared) -> (Vec<f64>, Vec<Option<usize>>) {
     (strokes, list.iter().map(|p| of[p.recording as usize]).collect())
 }
 
+/// The dimensions of a muscle while they are being found.
+struct Search {
+    nominal: Geometry,
+    unknowns: Vec<Unknown>,
+    /// The strokes that recordings were held at, m.
+    strokes: Vec<f64>,
+    /// Which of them each point belongs to.
+    mounting: Vec<Option<usize>>,
+    /// Where the unknowns stand, each in its own scale.
+    at: Vec<f64>,
+    /// The measured force of every point, N.
+    forces: Vec<f64>,
+    /// How much larger the misfit is than the weights take it for.
+    excess: f64,
+}
+
+impl Search {
+    /// What the unknowns' priors make of a place, in the misfit's scale.
+    fn prior(&self, at: &[f64]) -> f64 {
+        self.excess * self.unknowns.iter().zip(at).map(|(u, a)| (a / u.prior().0).powi(2)).sum::<f64>()
+    }
+}
+
+/// A table with its dimensions held: `Σ w r²`, and that with all penalties and priors.
+struct Held {
+    misfit: f64,
+    objective: f64,
+}
+
+/// How often the priors are weighed anew against the misfit that is left.
+const PASSES: usize = 3;
+/// Steps of a pass.
+const STEPS: usize = 12;
+
 impl Prepared {
     /// Finds what `options` leaves open, in place.
     pub(super) fn adjust(&mut self, options: &Options) {
-        let nominal = self.nominal;
         let (strokes, mounting) = mountings(self);
         let mut unknowns = Vec::new();
         if options.fit_geometry {
@@ -61,70 +95,126 @@ impl Prepared {
         if unknowns.is_empty() {
             return;
         }
-        let forces: Vec<f64> = self.design.rows.iter().map(|r| r.force).collect();
-        let mut at = vec![0.0; unknowns.len()];
         let size = self.design.layout().len();
-        self.design.extras = unknowns.len();
-        self.design.extra = vec![0.0; self.design.rows.len() * unknowns.len()];
-        self.design.extra_prior = unknowns.iter().map(|u| u.prior().0.powi(-2)).collect();
+        let mut search = Search {
+            nominal: self.nominal,
+            at: vec![0.0; unknowns.len()],
+            forces: self.design.rows.iter().map(|r| r.force).collect(),
+            unknowns,
+            strokes,
+            mounting,
+            excess: 1.0,
+        };
+        self.design.extras = search.at.len();
+        self.design.extra = vec![0.0; self.design.rows.len() * search.at.len()];
         // With the dimensions free, trends of E_k with pressure are theirs to explain first.
         self.design.level = 0.03;
-        self.parameters.extend(&at);
-        for round in 0..12 {
-            self.apply(&nominal, &unknowns, &at, &mounting);
-            self.sensitivities(&nominal, &unknowns, &at, &mounting);
-            for (i, row) in self.design.rows.iter_mut().enumerate() {
-                let z = &self.design.extra[i * at.len()..(i + 1) * at.len()];
-                // Linear about `at`: F(p) ≈ F(at) + z (p − at).
-                row.force = forces[i] + dot(z, &at);
-            }
-            self.parameters[size..].copy_from_slice(&at);
-            let misfit = self.solve(Smoothing::START, 6);
+        self.parameters.extend(&search.at);
+        for pass in 0..PASSES {
+            let misfit = self.held_at(&search, &search.at.clone()).misfit;
             // Weights take the model for nearly right. Where it is not, they overstate what the points know by as much as the
             // misfit exceeds them, and the priors have to keep up.
-            let excess = (misfit / self.cells).max(1.0);
-            self.design.extra_prior = unknowns.iter().map(|u| excess * u.prior().0.powi(-2)).collect();
-            self.design.hold_deadband = excess * self.design.origin.max(1.0).powi(-2);
-            let mut moved = 0.0_f64;
-            for (a, (u, new)) in at.iter_mut().zip(unknowns.iter().zip(&self.parameters[size..])) {
-                let (sigma, bound) = u.prior();
-                // A long step leaves the range in which the columns are good.
-                let next = (*a + (new - *a).clamp(-sigma, sigma)).clamp(-bound, bound);
-                moved = moved.max((next - *a).abs() / sigma);
-                *a = next;
-            }
-            if moved < 1e-3 && round > 0 {
+            let before = std::mem::replace(&mut search.excess, (misfit / self.cells).max(1.0));
+            self.design.extra_prior =
+                search.unknowns.iter().map(|u| search.excess * u.prior().0.powi(-2)).collect();
+            self.design.hold_deadband = search.excess * self.design.origin.max(1.0).powi(-2);
+            if pass > 0 && (search.excess / before - 1.0).abs() < 0.05 {
                 break;
             }
+            self.descend(&mut search);
         }
+        self.linearise(&search);
         let data = self.design.normal(&self.parameters, &self.weights);
         let penalty = self.design.penalty(&data, Smoothing::START.elastic, Smoothing::START.friction);
         let root = uncertainty::jackknife(self, &penalty).root;
-        self.apply(&nominal, &unknowns, &at, &mounting);
-        self.adjusted = unknowns
-            .iter()
-            .zip(&at)
-            .enumerate()
-            .map(|(m, (u, value))| describe(&nominal, *u, *value, root.std(size + m), &strokes))
+        let found = || search.unknowns.iter().zip(&search.at).enumerate();
+        self.adjusted = found()
+            .map(|(m, (u, value))| describe(&search.nominal, *u, *value, root.std(size + m), &search.strokes))
             .collect();
-        self.mountings = unknowns
-            .iter()
-            .zip(&at)
-            .filter_map(|(u, v)| match u {
-                Unknown::Offset(m) => Some(Mounting { stroke: strokes[*m], offset: *v }),
+        self.mountings = found()
+            .filter_map(|(_, (u, v))| match u {
+                Unknown::Offset(m) => Some(Mounting { stroke: search.strokes[*m], offset: *v }),
                 _ => None,
             })
             .collect();
-        self.shift = self.shifts(&unknowns, &at, &mounting);
+        self.shift = self.shifts(&search.unknowns, &search.at, &search.mounting);
         // From here on the dimensions are given.
         self.parameters.truncate(size);
         self.design.extras = 0;
         self.design.extra.clear();
         self.design.extra_prior.clear();
-        for (row, force) in self.design.rows.iter_mut().zip(&forces) {
+        for (row, force) in self.design.rows.iter_mut().zip(&search.forces) {
             row.force = *force;
         }
         self.solve(Smoothing::START, 8);
+    }
+
+    /// Gauss–Newton steps in the dimensions, each no longer than lowers the objective of a table solved anew there: far from the
+    /// solution the columns `∂F/∂p` hold over a part of a step only, and whole steps would leap from side to side for ever.
+    fn descend(&mut self, search: &mut Search) {
+        let size = self.parameters.len() - search.at.len();
+        let mut best = self.held_at(search, &search.at.clone()).objective;
+        for _ in 0..STEPS {
+            let before = self.parameters.clone();
+            self.linearise(search);
+            self.solve(Smoothing::START, 6);
+            let aim: Vec<f64> = search
+                .unknowns
+                .iter()
+                .zip(&search.at)
+                .zip(&self.parameters[size..])
+                .map(|((u, a), new)| {
+                    let (sigma, bound) = u.prior();
+                    // A long step leaves the range in which the columns are good.
+                    (*a + (new - *a).clamp(-sigma, sigma)).clamp(-bound, bound)
+                })
+                .collect();
+            let lower = [1.0, 0.5, 0.25, 0.125, 0.0625].into_iter().find_map(|share| {
+                let there: Vec<f64> = search.at.iter().zip(&aim).map(|(a, b)| a + share * (b - a)).collect();
+                self.parameters.clone_from(&before);
+                let objective = self.held_at(search, &there).objective;
+                (objective < best).then_some((there, objective))
+            });
+            let Some((there, objective)) = lower else {
+                self.parameters = before;
+                self.held_at(search, &search.at.clone());
+                return;
+            };
+            let gained = best - objective;
+            (search.at, best) = (there, objective);
+            if gained < 1e-4 * best {
+                return;
+            }
+        }
+    }
+
+    /// The table solved with the dimensions held at a place.
+    fn held_at(&mut self, search: &Search, at: &[f64]) -> Held {
+        self.apply(&search.nominal, &search.unknowns, at, &search.mounting);
+        self.design.extra.fill(0.0);
+        for (row, force) in self.design.rows.iter_mut().zip(&search.forces) {
+            row.force = *force;
+        }
+        let size = self.parameters.len() - at.len();
+        self.parameters[size..].fill(0.0);
+        let data = self.design.normal(&self.parameters, &self.weights);
+        let penalty = self.design.penalty(&data, Smoothing::START.elastic, Smoothing::START.friction);
+        let misfit = self.design.solve(&mut self.parameters, &self.weights, &penalty, 6).misfit;
+        Held { misfit, objective: misfit + penalty.quadratic(&self.parameters) + search.prior(at) }
+    }
+
+    /// Puts the dimensions where they stand, and the columns of their steps beside the others.
+    fn linearise(&mut self, search: &Search) {
+        let Search { nominal, unknowns, mounting, at, forces, .. } = search;
+        self.apply(nominal, unknowns, at, mounting);
+        self.sensitivities(nominal, unknowns, at, mounting);
+        for (i, row) in self.design.rows.iter_mut().enumerate() {
+            let z = &self.design.extra[i * at.len()..(i + 1) * at.len()];
+            // Linear about `at`: F(p) ≈ F(at) + z (p − at).
+            row.force = forces[i] + dot(z, at);
+        }
+        let size = self.parameters.len() - at.len();
+        self.parameters[size..].copy_from_slice(at);
     }
 
     fn shifts(&self, unknowns: &[Unknown], at: &[f64], mounting: &[Option<usize>]) -> Vec<f64> {

@@ -21,7 +21,6 @@ impl Prepared {
             return;
         }
         let curves = self.design.curves(&self.parameters);
-        let layout = self.design.layout();
         let noise = self.points.row_noise;
         let force = self.points.force.span();
         let shares = (0..self.points.list.len()).filter_map(|i| {
@@ -37,7 +36,6 @@ impl Prepared {
                 .then(|| (p.since_turn, residual / friction, f64::from(p.rows) * friction * friction))
         });
         let zone = turn_zone(shares.collect::<Vec<_>>());
-        debug_assert!(layout.len() == self.parameters.len());
         self.mark_turns(zone);
     }
 }
