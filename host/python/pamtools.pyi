@@ -131,7 +131,8 @@ class Table:
         """k_F at the nodes."""
     def force(self, pressure: ArrayLike, stroke: ArrayLike, direction: ArrayLike | None = None) -> Any:
         """Force (N) of the base model; direction is 1 shortening, -1 lengthening, 0 (or None) the mid-line. Arrays as numpy
-        broadcasts them; numbers give a number."""
+        broadcasts them; numbers give a number. Raises PamError for a length that the braid cannot have; warns where the table was
+        not fitted."""
     def force_band(self, pressure: ArrayLike, stroke: ArrayLike, direction: ArrayLike | None = None) -> Any:
         """Half the width of that force's 95 % interval, N; None where the table holds no uncertainty."""
     def predict(self, campaign: Campaign) -> list[_Array]:

@@ -16,6 +16,7 @@ pub mod file_kind;
 pub mod fit;
 pub mod muscle_description;
 pub mod output;
+pub mod possible;
 pub mod predict;
 pub mod progress;
 pub mod recording;

@@ -9,12 +9,14 @@ use std::fs;
 
 use model_core::effects::{Chain, Memory};
 use model_core::muscle::Muscle;
+use model_core::table::MuscleTable;
 use model_core::units::{Force, Length, Pressure};
 use rayon::prelude::*;
 
 use crate::band::{ForceBand, HALF_95};
 use crate::bench::Candidate;
 use crate::error::{Code, Error, Result};
+use crate::possible::Contractions;
 use crate::recording::segment::Motion;
 use crate::recording::{Campaign, Follower, Recording};
 use crate::table_file::TableFile;
@@ -56,7 +58,8 @@ pub struct Bands {
 /// Runs a table over a campaign.
 ///
 /// # Errors
-/// [`Code::TableInvalid`] where the table cannot be evaluated, or names a correction that this program does not know.
+/// [`Code::TableInvalid`] where the table cannot be evaluated, or names a correction that this program does not know;
+/// [`Code::RecordingOutOfRange`] where a recording has a length that the table's braid cannot have.
 pub fn predict(file: &TableFile, campaign: &Campaign) -> Result<Prediction> {
     run(file, campaign, None)
 }
@@ -105,6 +108,15 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ForceBand>) -> Resul
     let (mut square, mut rows) = (0.0, 0.0);
     let corrected: Vec<Cow<'_, Recording>> =
         campaign.recordings.iter().map(|r| with_true_length(file, r)).collect();
+    let rest_length = muscle.braid().rest_length();
+    let contractions = Contractions::of(muscle.braid());
+    for recording in &corrected {
+        for (i, stroke) in recording.stroke.iter().enumerate() {
+            contractions
+                .check(stroke / rest_length)
+                .map_err(|e| e.file(&recording.source).value(format!("row {}", i + 1)))?;
+        }
+    }
     for (index, (recording, motion)) in
         corrected.iter().map(Cow::as_ref).zip(Motion::of_campaign(campaign)).enumerate()
     {
@@ -141,7 +153,12 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ForceBand>) -> Resul
         recordings.push(Predicted { force, rms, bands });
     }
     let rms = (rows > 0.0).then(|| (square / rows).sqrt());
-    Ok(Prediction { recordings, rms, warnings: beyond(file, campaign) })
+    let places: Vec<(f64, f64)> = campaign
+        .recordings
+        .iter()
+        .flat_map(|r| r.pressure.iter().copied().zip(r.stroke.iter().copied()))
+        .collect();
+    Ok(Prediction { recordings, rms, warnings: beyond(&file.table, &places) })
 }
 
 /// The recording with the correction of its mounting, where the table knows the stroke that it was held at.
@@ -156,34 +173,28 @@ fn with_true_length<'a>(file: &TableFile, recording: &'a Recording) -> Cow<'a, R
     }
 }
 
-/// Says where the recordings leave the range that the table was fitted to.
-fn beyond(file: &TableFile, campaign: &Campaign) -> Vec<String> {
-    let t = &file.table.tested;
-    let l0 = f64::from(file.table.geometry.rest_length.metres());
+/// Says where pressures (Pa) and strokes (m), pair by pair, leave the range that a table was fitted to: there its force is an
+/// extrapolation. Up to a hundredth of them may, and a fiftieth of the range counts as within.
+#[must_use]
+pub fn beyond(table: &MuscleTable, places: &[(f64, f64)]) -> Vec<String> {
+    let t = &table.tested;
+    let l0 = f64::from(table.geometry.rest_length.metres());
     let mut warnings = Vec::new();
-    let mut say = |what: &str,
-                   unit: f64,
-                   name: &str,
-                   low: f32,
-                   high: f32,
-                   values: &dyn Fn(&Recording) -> Vec<f64>| {
-        let slack = 0.02 * f64::from(high - low).abs() + 1e-9;
-        let (low, high) = (f64::from(low) - slack, f64::from(high) + slack);
-        let all: Vec<f64> = campaign.recordings.iter().flat_map(values).collect();
-        let out = all.iter().filter(|v| **v < low || **v > high).count();
-        if out * 100 > all.len() {
+    let mut say = |what: &str, unit: f64, name: &str, range: (f32, f32), of: &dyn Fn(&(f64, f64)) -> f64| {
+        let (low, high) = (f64::from(range.0), f64::from(range.1));
+        let slack = 0.02 * (high - low).abs() + 1e-9;
+        let out = places.iter().map(of).filter(|v| *v < low - slack || *v > high + slack).count();
+        if out * 100 > places.len() {
             warnings.push(format!(
                 "{} % of the rows lie outside the {what} that the table was fitted to ({:.4} to {:.4}{name}): an extrapolation there",
-                out * 100 / all.len(),
+                out * 100 / places.len(),
                 low / unit,
                 high / unit
             ));
         }
     };
-    let (p_low, p_high) = (t.pressure_low.pascals(), t.pressure_high.pascals());
-    say("pressures", 1e3, " kPa", p_low, p_high, &|r| r.pressure.clone());
-    let scaled = |r: &Recording| r.stroke.iter().map(|x| x / l0).collect();
-    say("contractions", 1.0, "", t.contraction_low, t.contraction_high, &scaled);
+    say("pressures", 1e3, " kPa", (t.pressure_low.pascals(), t.pressure_high.pascals()), &|(p, _)| *p);
+    say("contractions", 1.0, "", (t.contraction_low, t.contraction_high), &|(_, x)| x / l0);
     warnings
 }
 

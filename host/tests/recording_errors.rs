@@ -62,6 +62,7 @@ fn every_bad_input_is_told_with_place_and_remedy() {
         ("decimal-commas", line_12("1,0,300,0,0,1,50,0")),
         ("open-quote", line_12("1.0,\"300,0.1,50")),
         ("vacuum", line_12("1.0,-500,0.1,50")),
+        ("counts-as-newtons", line_12("1.0,300,0.1,16777215")),
         ("no-pressure", with_header("time_s,presure_kPa,displacement_mm,force_N")),
         ("no-time", with_header("Time,pressure_kPa,displacement_mm,force_N")),
         ("no-stroke", with_header("time_s,pressure_kPa,x,force_N")),

@@ -2,6 +2,7 @@
 //!
 //! Everything is in SI units inside arrays (s, Pa, m, N, K), whatever the files' units were.
 
+use std::ffi::CString;
 use std::path::PathBuf;
 
 use host::band::{ForceBand, HALF_95};
@@ -10,7 +11,8 @@ use host::error::{Code, Error};
 use host::fit::Options;
 use host::fit::result::Fit as HostFit;
 use host::muscle_description::{Kind, MuscleDescription};
-use host::predict::{Predicted, predict as host_predict, predict_with_bands};
+use host::possible::{self, Contractions};
+use host::predict::{Predicted, beyond, predict as host_predict, predict_with_bands};
 use host::recording::{Campaign as HostCampaign, Import, Reader, Recording as HostRecording};
 use host::report::{Page, diagnose_page, fit_page};
 use host::table_file::{self, About, TableFile};
@@ -18,7 +20,7 @@ use model_core::muscle::Muscle as Model;
 use model_core::units::{Length, Pressure};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::create_exception;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyModule, PyTuple};
 
@@ -385,6 +387,7 @@ impl Table {
     }
 
     /// Force (N) of the base model at pressures (Pa) and strokes (m); `direction` is 1 shortening, -1 lengthening, 0 the mid-line.
+    /// Raises PamError for a length that the braid cannot have; warns where the table was not fitted.
     /// Numbers and arrays of any shape, as numpy broadcasts them.
     #[pyo3(signature = (pressure, stroke, direction = None))]
     fn force<'py>(
@@ -394,7 +397,7 @@ impl Table {
         direction: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let model = Model::<f64>::build(&self.0.table).map_err(|e| wrong(e.to_string()))?;
-        over(pressure, stroke, direction, |p, x, s| {
+        over(&self.0, &model, pressure, stroke, direction, |p, x, s| {
             model.force(Pressure::from_pascals(p), Length::from_metres(x), s).newtons()
         })
     }
@@ -409,7 +412,8 @@ impl Table {
         direction: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Option<Bound<'py, PyAny>>> {
         let Some(band) = ForceBand::of(&self.0) else { return Ok(None) };
-        over(pressure, stroke, direction, |p, x, s| HALF_95 * band.std(p, x, s)).map(Some)
+        let model = Model::<f64>::build(&self.0.table).map_err(|e| wrong(e.to_string()))?;
+        over(&self.0, &model, pressure, stroke, direction, |p, x, s| HALF_95 * band.std(p, x, s)).map(Some)
     }
 
     /// The force that the load cell would read, N: one array a recording. Effects and their memory run through the campaign.
@@ -420,6 +424,7 @@ impl Table {
     ) -> PyResult<Vec<Bound<'py, PyArray1<f64>>>> {
         let (table, campaign) = (self.0.clone(), campaign.0.clone());
         let prediction = py.detach(move || host_predict(&table, &campaign)).map_err(raised)?;
+        warn(py, &prediction.warnings)?;
         Ok(prediction.recordings.into_iter().map(|r| r.force.into_pyarray(py)).collect())
     }
 
@@ -427,6 +432,7 @@ impl Table {
     fn predict_with_bands(&self, py: Python<'_>, campaign: PyRef<'_, Campaign>) -> PyResult<Vec<Prediction>> {
         let (table, campaign) = (self.0.clone(), campaign.0.clone());
         let prediction = py.detach(move || predict_with_bands(&table, &campaign)).map_err(raised)?;
+        warn(py, &prediction.warnings)?;
         Ok(prediction.recordings.into_iter().map(Prediction).collect())
     }
 
@@ -440,8 +446,20 @@ impl Table {
     }
 }
 
-/// A function of pressure, stroke and direction over arrays, as numpy broadcasts them.
+/// What the user should know, as Python's own warnings: shown once a line, and silenced or raised by its filters.
+fn warn(py: Python<'_>, warnings: &[String]) -> PyResult<()> {
+    for text in warnings {
+        let text = CString::new(text.as_str())?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
+    }
+    Ok(())
+}
+
+/// A function of pressure, stroke and direction over arrays, as numpy broadcasts them. What the table's muscle cannot have is
+/// refused, where the table extrapolates is said.
 fn over<'py>(
+    table: &TableFile,
+    model: &Model<f64>,
     pressure: &Bound<'py, PyAny>,
     stroke: &Bound<'py, PyAny>,
     direction: Option<&Bound<'py, PyAny>>,
@@ -466,8 +484,14 @@ fn over<'py>(
     if let Some(wrong_way) = s.as_array().iter().find(|s| !(-1.0..=1.0).contains(*s)) {
         return Err(wrong(format!("`direction` is {wrong_way}; it is 1 shortening, -1 lengthening, 0 the mid-line")));
     }
-    let values: Vec<f64> =
-        p.as_array().iter().zip(x.as_array()).zip(s.as_array()).map(|((p, x), s)| of(*p, *x, *s)).collect();
+    let places: Vec<(f64, f64)> = p.as_array().iter().copied().zip(x.as_array().iter().copied()).collect();
+    let contractions = Contractions::of(model.braid());
+    for (p, x) in &places {
+        possible::pressure(*p).map_err(raised)?;
+        contractions.check(x / model.braid().rest_length()).map_err(raised)?;
+    }
+    warn(py, &beyond(&table.table, &places))?;
+    let values: Vec<f64> = places.iter().zip(s.as_array()).map(|((p, x), s)| of(*p, *x, *s)).collect();
     let shape = p.as_array().shape().to_vec();
     let array = values.into_pyarray(py).call_method1("reshape", (shape,))?;
     // One number for one place.

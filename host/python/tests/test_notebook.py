@@ -11,6 +11,7 @@ import os
 import pathlib
 import sys
 import tempfile
+import warnings
 
 import numpy as np
 import pamtools as pam
@@ -94,6 +95,23 @@ def test_the_table_is_evaluated_kept_and_read_back():
         table.write(path)
         again = pam.Table.read(path)
         np.testing.assert_array_equal(again.force(np.full(50, 400e3), stroke, 1), shortening)
+
+
+def test_a_force_outside_the_braid_is_refused_and_one_outside_the_recordings_is_told():
+    muscle, campaign = everything()
+    table = pam.fit(campaign, muscle).table
+    # Shortened by three quarters, and pulled beyond its fibres' length: the equations would give −10⁸ N, and not a word.
+    for stroke in [0.75 * muscle.rest_length, -0.2 * muscle.rest_length]:
+        for ask in [table.force, table.force_band]:
+            told = refused(lambda: ask(3e5, [1e-3, stroke]))
+            assert told.code == "recording::out-of-range" and "this braid cannot have" in str(told), told
+    assert "no pressure" in str(refused(lambda: table.force(3e11, 1e-3)))
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        table.force(3e5, 1e-3)
+        assert not said
+        table.force(9e5, 1e-3)
+        assert "outside the pressures" in str(said[0].message), said
 
 
 def test_own_arrays_become_a_recording():

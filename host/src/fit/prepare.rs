@@ -1,10 +1,11 @@
 //! From a campaign to a solved joint problem: points, screening, weights, smoothing, in the order in which they need each other.
 
-use model_core::braid::{Braid, Geometry};
+use model_core::braid::Geometry;
 use model_core::table::MAX_ORDER;
 
 use crate::error::{Code, Error, Result};
 use crate::muscle_description::MuscleDescription;
+use crate::possible::Contractions;
 use crate::recording::Campaign;
 use crate::recording::segment::Motion;
 
@@ -13,7 +14,7 @@ use super::basis::{Orthonormal, PressureBasis};
 use super::design::Design;
 use super::nodes::pressures;
 use super::outliers::despike;
-use super::points::{Points, points};
+use super::points::points;
 use super::prepared::Prepared;
 use super::screen::{self, Clip, Use};
 use super::smoothing::{self, Smoothing};
@@ -49,7 +50,10 @@ impl Prepared {
         }
         let geometry = Geometry { tip_correction: options.tip_correction, ..muscle.geometry() };
         let braid = geometry.build().map_err(|e| Error::new(Code::MuscleInvalid, e.to_string()))?;
-        check_strokes(&points, &braid)?;
+        let contractions = Contractions::of(&braid);
+        for stroke in [points.stroke.low, points.stroke.high] {
+            contractions.check(stroke / braid.rest_length())?;
+        }
         let max_pressure = muscle.max_pressure_kPa.map_or(points.pressure.high, |kpa| kpa * 1e3);
         let clips = screen::clip(campaign, &points);
         let outliers = despike(campaign, &mut points);
@@ -157,23 +161,4 @@ impl Prepared {
         }
         self.solve_softened();
     }
-}
-
-fn check_strokes(points: &Points, braid: &Braid<f64>) -> Result<()> {
-    let l0 = braid.rest_length();
-    let (low, high) = (points.stroke.low / l0, points.stroke.high / l0);
-    // Half the length is more than any braid contracts; beyond its fibres' length none stretches.
-    let taut = braid.fibre_length() / l0 - 1.0;
-    if high > 0.5 || low < -taut {
-        return Err(Error::new(
-            Code::FitUnderdetermined,
-            format!("the recordings' contraction runs from {low:.3} to {high:.3}, which this braid cannot do"),
-        )
-        .help(format!(
-            "contraction is (L0 − L)/L0 and lies between {:.3} (braid pulled straight) and about 0.4: check the rest length, \
-             the sign of the displacement and its zero",
-            -taut
-        )));
-    }
-    Ok(())
 }

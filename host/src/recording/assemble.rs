@@ -11,6 +11,7 @@ use super::import::{FoundZero, Import, Value, Zero};
 use super::plan::{Plan, Role};
 use super::quantity::Quantity;
 use crate::error::{Code, Error, Result};
+use crate::possible;
 
 /// A lookup table as text.
 #[derive(Debug, Default)]
@@ -445,13 +446,11 @@ fn check(recording: &Recording, line_of_row: &dyn Fn(usize) -> u64) -> Result<()
             .value(format!("{after} s after {before} s"))
             .help("time must strictly increase within a file; if several runs are in one file, split it (split_by)"));
     }
-    // Gauge pressure cannot be below vacuum; the margin is for a sensor's zero.
-    if let Some(i) = recording.pressure.iter().position(|p| *p < -120e3 || *p > 1e8) {
-        return Err(Error::new(Code::RecordingOutOfRange, "no pressure of a pneumatic muscle")
-            .line(line(i))
-            .column("pressure")
-            .value(format!("{} kPa", recording.pressure[i] / 1e3))
-            .help("check the unit in the column's name; gauge pressure is never below -101 kPa"));
+    for (i, p) in recording.pressure.iter().enumerate() {
+        possible::pressure(*p).map_err(|e| e.line(line(i)))?;
+    }
+    for (i, f) in recording.force.iter().flatten().enumerate() {
+        possible::force(*f).map_err(|e| e.line(line(i)))?;
     }
     if let Some(rest) = recording.rest_length
         && let Some(i) = recording.stroke.iter().position(|s| *s >= rest || *s <= -rest)
