@@ -84,15 +84,24 @@ pub struct Orthonormal {
     pub condition: f64,
 }
 
+/// Below this share of the muscle's area the first column is none: at a modulus twenty times the pressure the bladder would still
+/// bear less than a five-thousandth of the force, and rounding or the noise of the stroke decides what would be found.
+const NO_STRAIN: f64 = 1e-5;
+
 impl Orthonormal {
     /// Over these strokes, all of equal weight. Columns that depend on earlier ones over these strokes (fewer different
-    /// strokes than columns, or strokes so close that only rounding sets them apart) are left out: their `T_kk` is zero.
+    /// strokes than columns, or strokes so close that only rounding sets them apart) are left out: their `T_kk` is zero. So are
+    /// all of them where every stroke is at rest length.
     #[must_use]
     pub fn over(columns: &[Columns], order: usize) -> Self {
         let rows = columns.len().max(1);
         let mut scale = vec![0.0_f64; order];
         for (k, s) in scale.iter_mut().enumerate() {
             *s = (columns.iter().map(|c| c.elastic[k].powi(2)).sum::<f64>() / rows as f64).sqrt();
+        }
+        let area = (columns.iter().map(|c| c.area.powi(2)).sum::<f64>() / rows as f64).sqrt();
+        if scale.first().is_some_and(|first| *first < NO_STRAIN * area) {
+            scale.fill(0.0);
         }
         let scaled = DMatrix::from_fn(columns.len(), order, |i, k| {
             if scale[k] > 0.0 { columns[i].elastic[k] / scale[k] } else { 0.0 }
@@ -209,6 +218,14 @@ mod tests {
         assert_eq!(basis.rank, 2);
         assert!(basis.condition.is_infinite());
         assert_eq!(basis.to_moduli(&[1.0, 1.0, 0.0, 0.0])[2..], [0.0, 0.0]);
+    }
+
+    #[test]
+    fn at_rest_length_no_modulus_is_determined_however_the_stroke_rounds() {
+        let all = mini([0.0, 1e-12, -2e-9, 1e-8].into_iter());
+        let basis = Orthonormal::over(&all, 4);
+        assert_eq!(basis.rank, 0);
+        assert_eq!(basis.to_moduli(&[1.0; 4]), [0.0; 4]);
     }
 
     #[test]

@@ -319,7 +319,7 @@ pub(super) fn summarise(
         physical: None,
         outliers,
         adjusted: prepared.adjusted.clone(),
-        warnings: super::warnings::warnings(prepared, left_out),
+        warnings: super::warnings::warnings(prepared, all.mean, left_out),
     }
 }
 

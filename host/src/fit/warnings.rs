@@ -3,10 +3,20 @@
 use super::prepared::Prepared;
 use super::screen::Use;
 
-/// Everything worth saying. `left_out` is the error of each pressure predicted from the others, percent.
+/// A mean error beyond this, percent, is no misfit of a muscle: something else is wrong.
+const NO_MUSCLE: f64 = 10.0;
+
+/// Everything worth saying. `mean_error` is that of all mid-lines by eq. 24, `left_out` the error of each pressure predicted from the
+/// others; both in percent.
 #[must_use]
-pub fn warnings(prepared: &Prepared, left_out: &[Option<f64>]) -> Vec<String> {
+pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) -> Vec<String> {
     let mut out = prepared.warnings.clone();
+    if mean_error > NO_MUSCLE {
+        out.push(format!(
+            "the table does not describe these recordings: it is off by {mean_error:.0} % of the blocked force on average; check the \
+             units of force and pressure, the sign of the displacement, and the muscle's dimensions"
+        ));
+    }
     let design = &prepared.design;
     let points = &prepared.points;
     let rows = |wanted: Use| -> f64 {
@@ -38,7 +48,13 @@ pub fn warnings(prepared: &Prepared, left_out: &[Option<f64>]) -> Vec<String> {
     let (low, high) = (points.stroke.low / l0, points.stroke.high / l0);
     let order = design.orthonormal.order;
     let one_length = design.orthonormal.rank <= 1;
-    if one_length {
+    if design.orthonormal.rank == 0 {
+        out.push(
+            "every row is at rest length: nothing is known of the bladder's elasticity, the E_k are set to zero and the table holds at \
+             this length only; record slow strokes"
+                .into(),
+        );
+    } else if one_length {
         out.push(format!(
             "every row is at one length (contraction {low:.4}): P0 and elasticity cannot be told apart there, neither is determined \
              though an interval is given, and the table holds at this length only; record slow strokes"
@@ -101,8 +117,12 @@ pub fn warnings(prepared: &Prepared, left_out: &[Option<f64>]) -> Vec<String> {
              fit the blocked force; try --fit-geometry",
             p0 / 1e3
         ));
-    } else if p0 > points.pressure.high {
-        out.push(format!("the deadband comes out at {:.0} kPa, above every tested pressure", p0 / 1e3));
+    } else if prepared.pressures.levels.iter().all(|p| *p < p0) {
+        out.push(format!(
+            "the deadband comes out at {:.0} kPa, above every tested pressure: the muscle would never pull; check the unit and the \
+             sign of the force",
+            p0 / 1e3
+        ));
     }
     let side = |name: &str, clip: &super::screen::Clip| {
         format!(
