@@ -9,7 +9,7 @@ use crate::recording::Recording;
 pub fn page(a: &Recording, b: &Recording, found: &Comparison) -> Page {
     let names = [named("A", a, b), named("B", b, a)];
     let mut page = Page::new("Two recordings compared", format!("{} and {}", names[0], names[1]));
-    page.verdict(Tone::Plain, verdict(a, found));
+    page.verdict(Tone::Plain, verdict(a, b, found));
     for c in &found.columns {
         let label = format!("{}, B − A", title(c.name));
         if c.largest == 0.0 {
@@ -54,7 +54,7 @@ fn signed(value: f64) -> String {
     format!("{sign}{}", figures(value, 3))
 }
 
-fn verdict(a: &Recording, found: &Comparison) -> String {
+fn verdict(a: &Recording, b: &Recording, found: &Comparison) -> String {
     let seconds = fixed(found.overlap, 1);
     let Some(force) = found.columns.iter().find(|c| c.name == "force") else {
         return format!("Over the {seconds} s that both cover there is no force in both to compare.");
@@ -62,9 +62,11 @@ fn verdict(a: &Recording, found: &Comparison) -> String {
     if force.largest == 0.0 {
         return format!("Over the {seconds} s that both cover, B reads the same force as A.");
     }
-    let largest = a.force.iter().flatten().fold(0.0f64, |m, f| m.max(f.abs()));
+    // Of both: A may be a tare, of whose noise anything is thousands of percent.
+    let largest =
+        [a, b].into_iter().flat_map(|r| r.force.iter().flatten()).fold(0.0f64, |m, f| m.max(f.abs()));
     let share = if largest > 0.0 {
-        format!(", {} % of the largest force of A", figures(100.0 * force.mean.abs() / largest, 2))
+        format!(", {} % of the largest force in either", figures(100.0 * force.mean.abs() / largest, 2))
     } else {
         String::new()
     };
@@ -210,7 +212,7 @@ mod tests {
         let page = page(&a, &b, &compare(&a, &b).expect("a comparison"));
         let (_, verdict) = page.verdict.clone().expect("a verdict");
         assert!(
-            verdict.contains("B pulls 4.90 N more than A on average, 10 % of the largest force of A"),
+            verdict.contains("B pulls 4.90 N more than A on average, 9.1 % of the largest force in either"),
             "{verdict}"
         );
         assert_eq!(page.subtitle, "A: before/run.csv and B: after/run.csv");

@@ -8,6 +8,7 @@ use super::effect_trace::Demonstration;
 use super::{Axis, Colour, Figure, Mark, Page, Panel, Section, Table, Tone, figures, fixed};
 use crate::bench::Candidate;
 use crate::diagnose::verdict::{Diagnosis, Missing, Profile, Verdict};
+use crate::fit::points::median;
 
 /// The page of a diagnosis. `geometry` is that of the muscle at rest, to say what a force means in pressure.
 #[must_use]
@@ -167,18 +168,19 @@ fn located(d: &Diagnosis) -> Section {
     }
     let t = &d.trace;
     if t.time.len() > 1 {
+        let [time, before, after, effects] = with_pauses(&t.time, [&t.time, &t.before, &t.after, &t.effects]);
         let mut panel = Panel::new(Axis::new("time", "s"), Axis::new("residual", "N")).hair(
             "plain model",
             Colour::Series(1),
-            &t.time,
-            &t.before,
+            &time,
+            &before,
         );
         if !d.missing.is_empty() {
-            panel = panel.hair("with what was found", Colour::Series(2), &t.time, &t.after).line(
+            panel = panel.hair("with what was found", Colour::Series(2), &time, &after).line(
                 "what the found effects add",
                 Colour::Ink,
-                &t.time,
-                &t.effects,
+                &time,
+                &effects,
             );
         }
         if let Some(r) = d.r#where.iter().find(|r| r.coordinate == "time") {
@@ -196,6 +198,22 @@ fn located(d: &Diagnosis) -> Section {
         ));
     }
     section
+}
+
+/// Columns with an empty row in each pause, where nothing was recorded: a line would claim that something was.
+fn with_pauses<const N: usize>(time: &[f64], columns: [&[f64]; N]) -> [Vec<f64>; N] {
+    let steps: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).collect();
+    let usual = median(&mut steps.clone());
+    columns.map(|column| {
+        let mut broken = Vec::with_capacity(column.len());
+        for (i, value) in column.iter().enumerate() {
+            if i > 0 && !(steps[i - 1] < 20.0 * usual) {
+                broken.push(f64::NAN);
+            }
+            broken.push(*value);
+        }
+        broken
+    })
 }
 
 fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
@@ -385,8 +403,8 @@ fn next(d: &Diagnosis) -> Section {
     if let Some(n) = &d.next_experiment {
         let separates: Vec<String> = n.separates.iter().map(|s| format!("`{s}`")).collect();
         section.text(format!(
-            "{} It would tell {} apart, by up to {} N.",
-            n.words,
+            "{}. It would tell {} apart, by up to {} N.",
+            sentence(&n.words),
             separates.join(" and "),
             figures(n.expected_difference_N, 2)
         ));
@@ -397,6 +415,12 @@ fn next(d: &Diagnosis) -> Section {
         section.text("Nothing more is needed for what these recordings cover.");
     }
     section
+}
+
+/// Words as the beginning of a sentence, without its end.
+fn sentence(words: &str) -> String {
+    let mut letters = words.trim_end_matches('.').chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
 fn looked_at(d: &Diagnosis) -> Section {

@@ -100,7 +100,8 @@ fn section(number: usize, section: &Section) -> Markup {
                     Block::List(points) => ul { @for point in points { li { (rich::html(point)) } } },
                     Block::Figure(one) => (figure(one)),
                     Block::Table(one) => (table(one)),
-                    Block::Listing(text) => pre { code { (text) } },
+                    // By keyboard, too, what is longer than its window can be scrolled.
+                    Block::Listing(text) => pre tabindex="0" { code { (text) } },
                 }
             }
         }
