@@ -53,6 +53,11 @@ fn there_is_a_manual_page_for_every_command() {
         let text = std::fs::read_to_string(folder.path().join("man1").join(page)).unwrap();
         assert!(text.contains(".TH") && text.contains(word), "{page}: {text}");
     }
+    // Examples are lines to be copied: none is joined with the next or hyphenated.
+    let fit = std::fs::read_to_string(folder.path().join("man1/host-fit.1")).unwrap();
+    assert!(fit.contains(".SH EXAMPLES\n.nf\n  host fit \\-\\-muscle mini.toml"), "{fit}");
+    // Pages of `help fit` would say what `man host-fit` says.
+    assert!(!folder.path().join("man1/host-help.1").exists());
 }
 
 #[test]

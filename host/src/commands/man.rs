@@ -39,16 +39,38 @@ impl Arguments {
 }
 
 fn page(command: clap::Command) -> Result<Vec<u8>> {
+    let below = command.get_after_help().map(ToString::to_string).unwrap_or_default();
     let mut text = Vec::new();
-    let man = clap_mangen::Man::new(command).manual("Pneumatic artificial muscles");
+    let man = clap_mangen::Man::new(command.after_help(None::<&str>)).manual("Pneumatic artificial muscles");
     man.render(&mut text).map_err(|e| Error::unwritable("-", &e))?;
+    text.extend(closing(&below).into_bytes());
     Ok(text)
+}
+
+/// What stands below the help: examples as lines to be copied, which a paragraph would join and hyphenate, and notes.
+fn closing(below: &str) -> String {
+    let (mut page, mut notes) = (String::new(), false);
+    for line in below.lines().filter(|l| !l.is_empty()) {
+        let escaped = line.replace('\\', "\\e").replace('-', "\\-");
+        if line.starts_with("Example") {
+            page += ".SH EXAMPLES\n";
+        } else if line.starts_with(' ') {
+            page += &format!(".nf\n{escaped}\n.fi\n");
+        } else {
+            page += if notes { "" } else { ".SH NOTES\n" };
+            notes = true;
+            // A line that begins with a dot or an apostrophe would be an order to the formatter.
+            page += &format!("\\&{escaped}\n");
+        }
+    }
+    page
 }
 
 /// One page a command, named by the way to it: `host-device-log.1`.
 fn write_all(command: clap::Command, name: &str, folder: &Path) -> Result<usize> {
     let mut count = 1;
-    for sub in command.get_subcommands() {
+    // `help` repeats every other command.
+    for sub in command.get_subcommands().filter(|c| c.get_name() != "help") {
         count += write_all(sub.clone(), &format!("{name}-{}", sub.get_name()), folder)?;
     }
     // The parser knows names of commands only for as long as the program runs.
