@@ -358,23 +358,30 @@ impl<T: Scalar> Context<T> {
         pressure_slope: T::ZERO,
     };
 
+    /// What a part of the friction-free balance comes to at the muscle's ends: `(1 − s k_F)` of it, as the braid rubs in proportion
+    /// to the whole. Whatever changes that balance (its gas, its shape, its bladder) changes the friction with it.
+    #[inline]
+    pub fn rubbed(&self, part: T) -> T {
+        part * (T::ONE - self.friction * self.direction)
+    }
+
     /// Force of the base model with its friction, N.
     #[inline]
     pub fn force(&self) -> T {
-        self.quasi * (T::ONE - self.friction * self.direction)
+        self.rubbed(self.quasi)
     }
 
     /// `∂F/∂x = ∂F_quasi/∂x (1 − s k_F)`, N/m: how much less the muscle pulls per metre of shortening, its friction with it.
     #[inline]
     pub fn slope(&self) -> T {
-        self.stiffness * (T::ONE - self.friction * self.direction)
+        self.rubbed(self.stiffness)
     }
 
     /// `g (1 − s k_F)`, m²: how much harder the muscle pulls per pascal at its gas. Not the slope of the table: `E_k` that change
     /// from one test pressure to the next say how a fit took up other errors, not what a change of pressure does.
     #[inline]
     pub fn pull_per_pressure(&self) -> T {
-        self.area * (T::ONE - self.friction * self.direction)
+        self.rubbed(self.area)
     }
 
     /// What the memories of load are driven by, N: the elastic force and Gaylord's, of a muscle that pulls. A slack one carries

@@ -1,7 +1,7 @@
 //! Where the muscle is shortened its bladder has to swell to the braid first, and that pressure does not pull.
 //!
 //! ```text
-//! F_add = −g(L) · [λ clamp(P′, 0, p_c ε_x) + p_1 ε_x]
+//! F_add = −g(L) (1 − s k_F) · [λ clamp(P′, 0, p_c ε_x) + p_1 ε_x]
 //! ```
 //! Two laws to choose from. In the first the bladder reaches the braid at `P′ = p_c ε_x`: the deadband grows with the radial strain `ε_x`,
 //! with slope `p_c`, Pa; below, the force is missing, above, what it took to get there. `λ` (dimensionless) is 1 for the whole law,
@@ -28,7 +28,7 @@ impl Effect for ContactLoss {
         alternatives: true,
         start: Start::Known,
         fading: &[],
-        equation: "F = −g·[λ·clamp(P′, 0, p_c·ε_x) + p_1·ε_x]",
+        equation: "F = −g·(1 − s·k_F)·[λ·clamp(P′, 0, p_c·ε_x) + p_1·ε_x]",
         summary: "A shortened muscle needs some pressure before its bladder touches the braid and pulls.",
         source: "deadband that depends on length, after S. Davis and D. Caldwell, Int. J. Robotics Research 25 (2006) 359–369, doi 10.1177/0278364906063227",
     };
@@ -36,6 +36,6 @@ impl Effect for ContactLoss {
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let needed = (parameters[2] * context.radial_strain).max(T::ZERO);
         let missing = parameters[0] * context.corrected_pressure.clamp(T::ZERO, needed);
-        -context.area * (missing + parameters[1] * context.radial_strain)
+        -context.pull_per_pressure() * (missing + parameters[1] * context.radial_strain)
     }
 }

@@ -1,8 +1,8 @@
 //! The bladder softens with the strain it has been worked through:
-//! `F_add = −[b log10(1 + s/s_0) + b_∞ (1 − e^(−s/s_0))] F_el`.
+//! `F_add = −(1 − s k_F) [b log10(1 + ℓ/ℓ_0) + b_∞ (1 − e^(−ℓ/ℓ_0))] F_el`.
 //!
-//! `s` is the path that the strands have slid since the muscle was new, in rest lengths: a full cycle of 15 % contraction is 0.3, a small one
-//! counts for less. `b` is the softening per tenfold of path beyond `s_0`, `b_∞` the final one of a law that ends. The two are laws to choose
+//! `ℓ` is the path that the strands have slid since the muscle was new, in rest lengths: a full cycle of 15 % contraction is 0.3, a small one
+//! counts for less. `b` is the softening per tenfold of path beyond `ℓ_0`, `b_∞` the final one of a law that ends. The two are laws to choose
 //! from. Unlike a warming bladder a worn one does not recover at rest. The logarithm is computed only where the path has grown by
 //! a thousandth.
 
@@ -19,7 +19,7 @@ const FOR_PATH: usize = WORK_SLOTS + 1;
 pub(super) struct CyclicSoftening;
 
 impl Effect for CyclicSoftening {
-    // memory: see `work`, then log10(1 + s/s_0) and the path it belongs to
+    // memory: see `work`, then log10(1 + ℓ/ℓ_0) and the path it belongs to
     const INFO: Info = Info {
         name: "cyclic-softening",
         link: Link::Bladder,
@@ -33,7 +33,7 @@ impl Effect for CyclicSoftening {
         alternatives: true,
         start: Start::Virgin,
         fading: &[],
-        equation: "F = −[b·log10(1 + s/s_0) + b_∞·(1 − exp(−s/s_0))]·F_el",
+        equation: "F = −(1 − s·k_F)·[b·log10(1 + ℓ/ℓ_0) + b_∞·(1 − exp(−ℓ/ℓ_0))]·F_el",
         summary: "Every cycle wears the bladder a little, so it resists less and less.",
         source: "B. Woods, M. Gentry, C. Kothera, N. Wereley, J. Intelligent Material Systems and Structures 23 (2012) 327–343: fatigue of swaged muscles",
     };
@@ -50,6 +50,6 @@ impl Effect for CyclicSoftening {
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
         let settled = T::ONE - decay(memory[PATH] / parameters[2].max(T::from_f32(1.0e-3)));
-        -(parameters[0] * memory[LOGARITHM] + parameters[1] * settled) * context.elastic
+        -context.rubbed((parameters[0] * memory[LOGARITHM] + parameters[1] * settled) * context.elastic)
     }
 }

@@ -1,7 +1,7 @@
 //! Terms of the bladder's elastic law beyond the table's order `M`.
 //!
 //! ```text
-//! F_add = E_{M+1} c_{M+1} + E_{M+2} c_{M+2} + G c_H
+//! F_add = (1 − s k_F) (E_{M+1} c_{M+1} + E_{M+2} c_{M+2} + G c_H)
 //! c_k = (V_B/L) ε_z^k − t L² ε_x^k/(2πN²R)        c_H = (V_B/L) h(λ_z) − t L²/(2πN²R) h(λ_x),  h(λ) = λ − 1/λ²
 //! ```
 //! `E_k`, Pa, do not depend on pressure; `c_H` is the neo-Hookean law of rubber in each direction, `λ = 1 + ε`, `G` its shear modulus, Pa.
@@ -23,12 +23,12 @@ impl Effect for HigherOrderElasticity {
             Parameter::amplitude("second_next_modulus", "Pa", -1.0e9, 1.0e9),
             Parameter::amplitude("shear_modulus", "Pa", -3.0e6, 3.0e6),
         ],
-        depends_on_pressure: false,
+        depends_on_pressure: true,
         persistent: false,
         alternatives: true,
         start: Start::Known,
         fading: &[],
-        equation: "F = E_(M+1)·c_(M+1) + E_(M+2)·c_(M+2) + G·c_H",
+        equation: "F = (1 − s·k_F)·[E_(M+1)·c_(M+1) + E_(M+2)·c_(M+2) + G·c_H]",
         summary: "The rubber wall follows a more curved law than the table has terms for.",
         source: "E. G. Hocking, thesis, University of Maryland (2012), chapter 3; neo-Hookean law: L. R. G. Treloar, The Physics of Rubber Elasticity, 1975",
     };
@@ -52,6 +52,6 @@ impl Effect for HigherOrderElasticity {
             stretch - T::ONE / (stretch * stretch)
         };
         let hooke = context.axial_area * rubber(z) - context.hoop_area * rubber(x);
-        parameters[0] * next + parameters[1] * second + parameters[2] * hooke
+        context.rubbed(parameters[0] * next + parameters[1] * second + parameters[2] * hooke)
     }
 }

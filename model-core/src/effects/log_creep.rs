@@ -1,10 +1,11 @@
 //! Creep that goes on with the logarithm of time: five fading branches, one per decade.
 //!
 //! ```text
-//! dq_i/dt = du/dt − q_i/τ_i,  τ_i = τ_0 · (1, 10, … 10⁴)        F_add = a · Σ q_i
+//! dq_i/dt = du/dt − q_i/τ_i,  τ_i = τ_0 · (1, 10, … 10⁴)
+//! F_add = (1 − s k_F) a · Σ q_i        or, of the pull,    F_add = −(1 − s k_F) a · Σ (u − q_i)
 //! ```
-//! After a step of the drive the sum falls by `a` times the step in each decade of time, as `−a log10(1 + 5 t/τ_0)` does to within 0.11 `a`
-//! up to `3000 τ_0`, and then ends, as every real creep must. It remembers earlier runs: a load held for an hour
+//! After a step of the drive the force falls by `a` times the step in each decade of time, as `−a log10(1 + 5 t/τ_0)` does to within
+//! 0.11 `a` up to `3000 τ_0`, and then ends, as every real creep must. It remembers earlier runs: a load held for an hour
 //! still shows in the next run.
 //!
 //! Three drives, three laws (their amplitudes may be tried singly):
@@ -13,9 +14,11 @@
 //! | --- | --- | --- |
 //! | `relaxing_part_per_decade` | `F_el` where the muscle pulls, N | stress fades in proportion to the bladder's stress |
 //! | `strain_modulus_per_decade`, Pa | `c_1 = (V_B/L) ε_z − t L² ε_x/(2πN²R)`, m² | stress fades in proportion to strain, whatever the pressure |
-//! | `settling_part_per_decade` | `−F_G(P′, L)` where the muscle pulls, N | the pull follows the pressure late: braid and wall settle under load, also at constant length |
+//! | `yielding_part_per_decade` | `F_quasi` where the muscle pulls, N | the pull itself yields: braid, ends and wall give under load, also at constant length |
 //!
-//! The memory begins settled; over-stresses left from before fade on their own.
+//! The stress of a bladder is known from the tests that its coefficients come from, when it had long settled; what the gas pulls with is
+//! known at once. So the pull is counted from the fresh load, and the muscle hung unloaded before the first moment; of the bladder the
+//! memory begins settled, and over-stresses left from before fade on their own.
 
 use super::{Context, Effect, Fading, Info, Link, Memory, Parameter, Start};
 use crate::scalar::Scalar;
@@ -24,6 +27,11 @@ type Spectrum = Fading<5, 3>;
 
 fn times<T: Scalar>(first: T) -> [T; 5] {
     [1.0, 10.0, 100.0, 1000.0, 1.0e4].map(|decade| first * T::from_f32(decade))
+}
+
+/// The pull of a muscle that pulls, N.
+fn pull<T: Scalar>(context: &Context<T>) -> T {
+    context.quasi.max(T::ZERO)
 }
 
 /// See the [module](self).
@@ -37,7 +45,7 @@ impl Effect for LogCreep {
         parameters: &[
             Parameter::amplitude("relaxing_part_per_decade", "", 2.0e-3, 0.2),
             Parameter::amplitude("strain_modulus_per_decade", "Pa", 1.0e3, 5.0e5),
-            Parameter::amplitude("settling_part_per_decade", "", -0.1, 0.1),
+            Parameter::amplitude("yielding_part_per_decade", "", -0.1, 0.1),
             Parameter::shape("first_time", "s", 0.03, 30.0),
         ],
         depends_on_pressure: true,
@@ -51,21 +59,29 @@ impl Effect for LogCreep {
             Spectrum::slot(0, 3),
             Spectrum::slot(0, 4),
         ],
-        equation: "F = a·Σq_i(F_el) + E_c·Σq_i(c_1) − a_P·Σq_i(F_G), τ_i = τ_0·(1, 10, … 10⁴)",
+        equation: "F = (1 − s·k_F)·[a·Σq_i(F_el) + E_c·Σq_i(c_1) − a_F·Σ(u − q_i)(F_quasi)], τ_i = τ_0·(1, 10, … 10⁴)",
         summary: "At constant length and pressure the force creeps, as much in each tenfold of time, and remembers earlier runs.",
         source: "S. M. Clarke, F. Elias, E. M. Terentjev, European Physical Journal E 2 (2000) 335–341, doi 10.1007/s101890050015; W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     };
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
-        let (elastic, gaylord) = context.loads();
-        let drives = [elastic, context.unit_elastic(), gaylord];
-        Spectrum::step(memory, context.dt, &times(parameters[3]), &drives);
+        let times = times(parameters[3]);
+        let (elastic, _) = context.loads();
+        let drives = [elastic, context.unit_elastic(), pull(context)];
+        if memory[0] == T::ZERO {
+            Spectrum::step(memory, T::ZERO, &times, &[drives[0], drives[1], T::ZERO]);
+        }
+        Spectrum::step(memory, context.dt, &times, &drives);
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
-        let (elastic, gaylord) = context.loads();
-        parameters[0] * Spectrum::value(memory, 0, elastic)
-            + parameters[1] * Spectrum::value(memory, 1, context.unit_elastic())
-            - parameters[2] * Spectrum::value(memory, 2, gaylord)
+        let (elastic, _) = context.loads();
+        let pull = pull(context);
+        let yielded = pull * T::from_f32(5.0) - Spectrum::value(memory, 2, pull);
+        context.rubbed(
+            parameters[0] * Spectrum::value(memory, 0, elastic)
+                + parameters[1] * Spectrum::value(memory, 1, context.unit_elastic())
+                - parameters[2] * yielded,
+        )
     }
 }

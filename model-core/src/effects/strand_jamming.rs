@@ -1,4 +1,4 @@
-//! The strands lock against each other near the greatest contraction: `F_add = −k_j · max(0, ε − ε_j)²`.
+//! The strands lock against each other near the greatest contraction: `F_add = −(1 − s k_F) k_j · max(0, ε − ε_j)²`.
 //!
 //! `ε = ΔL/L0`; `ε_j` where the strands begin to touch; `k_j`, N, how hard the wall is. One-sided. The true wall is steeper the further one
 //! goes; beyond a few per cent past `ε_j` the square is too soft.
@@ -17,18 +17,18 @@ impl Effect for StrandJamming {
             Parameter::amplitude("wall_stiffness", "N", 3.0e2, 1.0e7),
             Parameter::shape("jamming_contraction", "", 0.02, 0.35),
         ],
-        depends_on_pressure: false,
+        depends_on_pressure: true,
         persistent: false,
         alternatives: false,
         start: Start::Known,
         fading: &[],
-        equation: "F = −k_j·max(0, ε − ε_j)²",
+        equation: "F = −(1 − s·k_F)·k_j·max(0, ε − ε_j)²",
         summary: "Near full contraction the strands of the braid touch and lock, which stops the muscle.",
         source: "S. Davis and D. Caldwell, Int. J. Robotics Research 25 (2006) 359–369, doi 10.1177/0278364906063227",
     };
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let over = (context.contraction - parameters[1]).max(T::ZERO);
-        -parameters[0] * over * over
+        -context.rubbed(parameters[0] * over * over)
     }
 }

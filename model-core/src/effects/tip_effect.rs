@@ -1,7 +1,7 @@
 //! The ends are not cylinders.
 //!
 //! ```text
-//! F_add = −k_t P′ π R² (R/L) ε − k_v P′ (R − R0)(3R − R0) L/(4πN²R)
+//! F_add = −(1 − s k_F) P′ [k_t π R² (R/L) ε + k_v (R − R0)(3R − R0) L/(4πN²R)]
 //! ```
 //! Near its fittings the muscle tapers, and the more it has swollen the longer the taper. Two laws to choose from. In the first the
 //! effective length is shorter than `L` by about `2 k_t R`, so the pressure pulls less, in proportion to `R/L` and to the contraction
@@ -29,7 +29,7 @@ impl Effect for TipEffect {
         alternatives: true,
         start: Start::Known,
         fading: &[],
-        equation: "F = −P′·[k_t·π·R²·(R/L)·ε + k_v·(R − R0)·(3R − R0)·L/(4πN²R)]",
+        equation: "F = −(1 − s·k_F)·P′·[k_t·π·R²·(R/L)·ε + k_v·(R − R0)·(3R − R0)·L/(4πN²R)]",
         summary: "The muscle narrows towards its ends, which do not pull like a cylinder.",
         source: "J. Chambers and N. Wereley, Actuators 10(4) (2021) 72, doi 10.3390/act10040072; E. G. Hocking, thesis, University of Maryland (2012), appendix on tip correction",
     };
@@ -42,7 +42,7 @@ impl Effect for TipEffect {
             context.turns * context.turns * context.radius * T::from_f64(4.0 * core::f64::consts::PI);
         let per_length = context.length / around.max(T::from_f32(1.0e-9));
         let lost = (swollen + context.radius + context.radius) * swollen * per_length;
-        -context.corrected_pressure
-            * (parameters[0] * cross_section * slender * context.contraction + parameters[1] * lost)
+        let area = parameters[0] * cross_section * slender * context.contraction + parameters[1] * lost;
+        -context.rubbed(context.corrected_pressure * area)
     }
 }
