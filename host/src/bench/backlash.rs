@@ -6,9 +6,10 @@
 //! `b`, m, is the width of the play, `play` its output: it stands still until the stroke has gone back by `b`. `κ` (dimensionless) is 1 for a joint
 //! that is free over all of `b`, less if it is tight at times. A preloaded joint has none. The side on which the play begins is
 //! unknown until the first turn. While the joint is
-//! loose the muscle rests, and its friction keeps the direction `s_play` of its own last motion.
+//! loose the muscle rests, and its friction keeps the direction `s_play` of its own last motion; once it is drawn along again, that turns
+//! over a travel of `η b`, as the joint does not bear all at once and the braid gives a little before it slides.
 
-use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start, decay};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -21,13 +22,14 @@ impl Effect for Backlash {
         parameters: &[
             Parameter::amplitude("free_part", "", 0.1, 1.2),
             Parameter::shape("width", "m", 5.0e-6, 2.0e-3),
+            Parameter::shape("softness", "", 0.02, 0.5),
         ],
         depends_on_pressure: true,
         persistent: false,
         alternatives: false,
         start: Start::Branch,
         fading: &[],
-        equation: "F = κ·[∂F/∂x·(play_b(x) − x) + k_F·F_quasi·(s − s_play)]",
+        equation: "F = κ·[∂F/∂x·(play_b(x) − x) + k_F·F_quasi·(s − s_play)], ds_play = (s − s_play)·|d play|/(η·b)",
         summary: "A loose joint lets the sensor move before the muscle does, after every turn.",
         source: "play operator; sensitivity of the base model",
     };
@@ -39,7 +41,9 @@ impl Effect for Backlash {
         let behind = memory[0] - moved;
         memory[0] = behind.clamp(-half, half);
         if behind != memory[0] {
-            memory[3] = if memory[0] < T::ZERO { T::ONE } else { -T::ONE };
+            let drawn = if memory[0] < T::ZERO { T::ONE } else { -T::ONE };
+            let over = (parameters[2] * parameters[1]).max(T::from_f32(1.0e-9));
+            memory[3] = drawn + (memory[3] - drawn) * decay((behind - memory[0]) / over);
         } else if memory[3] == T::ZERO {
             memory[3] = context.direction;
         }

@@ -1,4 +1,4 @@
-//! The pressure gauge's scale is wrong: `F_add = g(L) · (γ P + γ_2 P²)`.
+//! The pressure gauge's scale is wrong: `F_add = g(L) (1 − s k_F) · (γ P + γ_2 P²)`.
 //!
 //! `γ` (dimensionless) is the part by which it reads too low, `γ_2`, 1/Pa, a curvature. Of the same shape as a wrong force gain and a
 //! direction-dependent friction within a few per cent: compare with a reference gauge at three pressures.
@@ -22,12 +22,12 @@ impl Effect for GaugeGain {
         alternatives: true,
         start: Start::Known,
         fading: &[],
-        equation: "F = g·(γ·P + γ_2·P²)",
+        equation: "F = g·(1 − s·k_F)·(γ·P + γ_2·P²)",
         summary: "The scale of the pressure gauge is off by some per cent.",
         source: "usual gauge accuracy, 0.1 to 1 %; sensitivity of the base model",
     };
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
-        context.area * context.pressure * (parameters[0] + parameters[1] * context.pressure)
+        context.pull_per_pressure() * context.pressure * (parameters[0] + parameters[1] * context.pressure)
     }
 }

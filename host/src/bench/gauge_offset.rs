@@ -1,4 +1,4 @@
-//! The pressure gauge reads too low by `δ`: `F_add = g(L) · δ`.
+//! The pressure gauge reads too low by `δ`: `F_add = g(L) (1 − s k_F) · δ`.
 //!
 //! `g = ∂F_G/∂P`, m². Identical to a shift of the deadband `P0`, at every pressure and stroke: never named alone, reported as "`P0` includes the
 //! gauge's zero". Read the gauge with the muscle vented.
@@ -19,12 +19,12 @@ impl Effect for GaugeOffset {
         alternatives: false,
         start: Start::Known,
         fading: &[],
-        equation: "F = g·δ",
+        equation: "F = g·(1 − s·k_F)·δ",
         summary: "The pressure gauge does not read zero when the muscle is vented.",
         source: "usual gauge accuracy, 0.1 to 0.5 % of full scale; sensitivity of the base model",
     };
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
-        parameters[0] * context.area
+        parameters[0] * context.pull_per_pressure()
     }
 }

@@ -48,8 +48,9 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
         let (play, play_std) = (found.values[2].max(0.0), found.deviations[2]);
         measured.push(Measured {
             fault: BenchName::Backlash,
-            parameters: vec![1.0, play],
-            deviations: vec![None, Some(play_std)],
+            // How softly a braid is taken along behind the play a bar does not show.
+            parameters: vec![1.0, play, 0.1],
+            deviations: vec![None, Some(play_std), None],
             words: format!("the joint has a play of {:.3} ± {:.3} mm", 1e3 * found.values[2], 2e3 * play_std),
             check: CHECK,
         });
