@@ -39,6 +39,11 @@ pub struct Rig {
 pub struct RigState {
     with: Rig,
     pull: f64,
+    /// Where the muscle's end was in the last step, m; and before, with the force that it then gave, N.
+    muscle_at: f64,
+    bore: Option<(f64, f64)>,
+    /// How stiff the muscle has shown itself of late, N/m.
+    muscle_stiffness: f64,
     played: Option<f64>,
     last: Option<(f64, f64)>,
     guide: f64,
@@ -52,15 +57,33 @@ const GUIDE_TRAVEL: f64 = 20e-6;
 impl RigState {
     /// Unloaded.
     pub fn new(with: Rig) -> Self {
-        Self { with, pull: 0.0, played: None, last: None, guide: 0.0, stuck: 0.0, clock: 0.0 }
+        Self {
+            with,
+            pull: 0.0,
+            muscle_at: 0.0,
+            bore: None,
+            muscle_stiffness: 0.0,
+            played: None,
+            last: None,
+            guide: 0.0,
+            stuck: 0.0,
+            clock: 0.0,
+        }
     }
 
     /// Stroke of the muscle (m) when the crosshead stands at `crosshead` (m) under the force of the last step (N).
     pub fn stroke(&mut self, crosshead: f64, force: f64) -> f64 {
         let mut stroke = crosshead + self.with.offset;
         if self.with.stiffness > 0.0 {
-            // Half of each change is taken per step: the muscle's own stiffness must not make the two chase each other.
-            self.pull += 0.5 * (force - self.pull);
+            // A step of Newton's method, by how stiff the muscle has just shown itself: while its strands stick it is many times stiffer
+            // than while they slide, and the two must not chase each other.
+            if let Some((x, f)) = self.bore {
+                let seen = if self.muscle_at == x { 0.0 } else { ((force - f) / (self.muscle_at - x)).abs() };
+                self.muscle_stiffness = seen.max(0.9 * self.muscle_stiffness);
+            }
+            self.bore = Some((self.muscle_at, force));
+            let part = self.with.stiffness / (self.with.stiffness + self.muscle_stiffness);
+            self.pull += part.min(0.5) * (force - self.pull);
             stroke += self.pull / self.with.stiffness;
         }
         if self.with.play > 0.0 {
@@ -74,6 +97,7 @@ impl RigState {
             self.played = Some(at + gap.signum() * push.min(gap.abs()));
             stroke = self.played.unwrap_or(stroke);
         }
+        self.muscle_at = stroke;
         stroke
     }
 
@@ -124,6 +148,19 @@ mod tests {
         assert!((1e-3 - end - 0.5e-4).abs() < 1e-5, "lags by half the play: {end}");
         let turned = r.stroke(1e-3 - 0.5e-4, 0.0);
         assert!((turned - end).abs() < 1e-6, "and stays there on the way back: {turned} {end}");
+    }
+
+    #[test]
+    fn a_soft_frame_and_a_muscle_that_sticks_come_to_rest() {
+        // Strands that stick: four times as stiff as the frame, until the friction of 40 N is full.
+        let mut r = RigState::new(Rig { stiffness: 1e5, ..Rig::default() });
+        let (mut force, mut last) = (0.0, [0.0; 2]);
+        for i in 0..400 {
+            let x = r.stroke(1e-6 * f64::from(i.min(200)), force);
+            force = 100.0 - (4e5 * x).min(40.0) - 2e3 * x;
+            last = [last[1], force];
+        }
+        assert!((last[1] - last[0]).abs() < 1e-6, "the force no longer changes: {last:?}");
     }
 
     #[test]
