@@ -321,6 +321,10 @@ pub(crate) fn kinematics(
     for (sure, direction) in k.sure.iter_mut().zip(&k.direction) {
         *sure &= *direction != 0.0;
     }
+    // Friction that has faded in a hold comes back somewhere within the first row of the motion after it.
+    for row in 1..n {
+        k.sure[row] &= !k.held[row - 1] || k.held[row];
+    }
     // The speed: lines that do not run across a turn or into a hold.
     let mut bounds = vec![(0, n); n];
     let mut from = 0;

@@ -9,6 +9,7 @@
 use rayon::prelude::*;
 
 use super::baselines::{self, Baseline, Kind};
+use super::linear::median;
 use super::rows::Rows;
 
 /// Settling times that are tried, s.
@@ -25,6 +26,12 @@ const NEARBY: [[f64; 4]; 2] = [[0.7, 0.87, 1.15, 1.4], [0.9, 0.95, 1.05, 1.1]];
 const NO_LAW: f64 = 4.0;
 /// A change of the friction's direction that ends one rest and begins another.
 const LETS_GO: f64 = 0.1;
+/// A step of the force at rest that is so many times what the moving rows leave ends one as well …
+const STEP: f64 = 6.0;
+/// … where this part of it happens between two rows: what relaxes or drifts takes longer.
+const SHARP: f64 = 0.7;
+/// Rows each way over which the force before and after a step is taken.
+const BESIDE: usize = 5;
 /// At most so many rests beyond one for each hold.
 const MOST_RESTS: u32 = 100;
 /// Another law than the model's must leave less than this share of what the rows at rest leave.
@@ -218,13 +225,17 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
             (best, energy) = (b, e);
         }
     }
+    let moved = fitted.per_row(&moving);
     if !(energy < CLEARLY * held) {
-        if !rows.isometric && held > NO_LAW * fitted.per_row(&moving) * weight_at(rows, &holds) {
-            number_rests(rows, &holds, &stays);
+        if !rows.isometric {
+            let lawless = held > NO_LAW * moved * weight_at(rows, &holds);
+            let steps = steps(rows, &fitted, &holds, &stays, moved.sqrt());
+            number_rests(rows, &holds, &stays, &steps, lawless);
         }
         return None;
     }
     let chosen = directions(rows, &holds, &pressures, best);
+    let steps = steps(rows, &fitted, &holds, &chosen, moved.sqrt());
     for ((from, to), way) in holds.iter().zip(&chosen) {
         for i in (*from..*to).filter(|i| !rows.on_ramp[*i]) {
             if !rows.isometric {
@@ -239,8 +250,8 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
             }
         }
     }
-    if matches!(best, AtRest::Follows { .. }) && !rows.isometric {
-        number_rests(rows, &holds, &chosen);
+    if !rows.isometric {
+        number_rests(rows, &holds, &chosen, &steps, matches!(best, AtRest::Follows { .. }));
     }
     Some(best)
 }
@@ -251,21 +262,60 @@ fn weight_at(rows: &Rows, holds: &[(usize, usize)]) -> f64 {
     resting.map(|i| rows.root_weight[i].powi(2)).sum()
 }
 
-/// Static friction lets go by jumps too small and too quick for the pressure's samples to tell when: between those that a law sees,
-/// where friction rests is fitted.
-fn number_rests(rows: &mut Rows, holds: &[(usize, usize)], directions: &[Vec<f64>]) {
+/// Where the force steps while the length is held, hold by hold: static friction let go there, shaken by more than the pressure's
+/// samples show.
+fn steps(
+    rows: &Rows,
+    fitted: &Baseline,
+    holds: &[(usize, usize)],
+    directions: &[Vec<f64>],
+    noise: f64,
+) -> Vec<Vec<bool>> {
+    let middle = |part: &[f64]| median(&mut part.to_vec());
+    let found = |((from, to), way): (&(usize, usize), &Vec<f64>)| {
+        let left: Vec<f64> = (*from..*to)
+            .map(|i| {
+                let friction = fitted.quasi[i] * fitted.friction[i];
+                fitted.raw_residual[i] + friction * (way[i - from] - rows.contexts[i].direction)
+            })
+            .collect();
+        let mut steps = vec![false; left.len()];
+        let mut last = 0;
+        for i in BESIDE..left.len().saturating_sub(BESIDE) {
+            let step = middle(&left[i + 1..=i + BESIDE]) - middle(&left[i - BESIDE..i]);
+            let sharp = (left[i + 1] - left[i - 1]) * step.signum() >= SHARP * step.abs();
+            if step.abs() > STEP * noise && sharp && i > last + BESIDE {
+                (steps[i], last) = (true, i);
+            }
+        }
+        steps
+    };
+    holds.iter().zip(directions).map(found).collect()
+}
+
+/// Static friction lets go by jumps too small and too quick for the pressure's samples to tell when: between those that a law sees or
+/// the force itself shows, where friction rests is fitted; where no law is doubted, only after such a step.
+fn number_rests(
+    rows: &mut Rows,
+    holds: &[(usize, usize)],
+    directions: &[Vec<f64>],
+    steps: &[Vec<bool>],
+    doubted: bool,
+) {
     let mut jump = LETS_GO;
     loop {
         let mut number = 0;
-        for ((from, to), way) in holds.iter().zip(directions) {
-            number += 1;
+        for (((from, to), way), steps) in holds.iter().zip(directions).zip(steps) {
+            let mut known = !doubted;
+            number += u32::from(doubted);
             let mut since = way[0];
             for i in *from..*to {
-                if (way[i - from] - since).abs() > jump {
+                if (doubted && (way[i - from] - since).abs() > jump) || steps[i - from] {
                     since = way[i - from];
                     number += 1;
+                    known = false;
                 }
-                rows.rest[i] = if rows.on_ramp[i] { 0 } else { number };
+                rows.rest[i] = if known || rows.on_ramp[i] { 0 } else { number };
             }
         }
         if number <= MOST_RESTS + holds.len() as u32 {

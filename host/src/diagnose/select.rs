@@ -23,8 +23,8 @@ pub(crate) const STATIC_PEAK: f64 = 0.015;
 pub(crate) const CONCEALED: f64 = 0.04;
 /// And it must move the fit by this much, rms as a share of the blocked force.
 const STATIC_MOVED: f64 = 1e-3;
-/// A trace that must be larger than this share of the blocked force to explain a small misfit is no explanation: nearly all of it
-/// would have to be cancelled by the tables.
+/// A trace that must be larger than this share of the blocked force to explain a small misfit is no explanation where the tables would
+/// have to cancel nearly all of it.
 const LARGEST_PEAK: f64 = 0.25;
 /// At most so many effects are named.
 pub(crate) const MAX_NAMED: usize = 3;
@@ -154,10 +154,10 @@ pub(crate) fn look(
     (best, p)
 }
 
-/// Takes away the gain of trials whose trace is implausibly large.
+/// Takes away the gain of trials whose trace is implausibly large beside the little that is seen of it.
 fn forbid_cancelling(trials: &mut [Trial], blocked: f64) {
     for t in trials {
-        if t.gain > 0.0 && t.peak > LARGEST_PEAK * blocked {
+        if t.gain > 0.0 && t.peak > LARGEST_PEAK * blocked && t.visible < CONCEALED {
             (t.gain, t.score) = (0.0, 0.0);
         }
     }
