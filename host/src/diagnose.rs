@@ -45,6 +45,7 @@ mod noise;
 pub mod planned;
 mod rest;
 mod rows;
+mod search;
 mod select;
 pub mod summary;
 #[cfg(test)]

@@ -1,0 +1,303 @@
+//! Forward selection with exchange: what is taken next, whether it is enough, and what the whole refit makes of it.
+
+use std::ops::ControlFlow;
+
+use super::baselines::{self, Baseline, Give, Kind};
+use super::candidates::{Candidate, Ground, Trial};
+use super::evidence::Scale;
+use super::linear::energy;
+use super::noise::{self, Noise};
+use super::rows::Rows;
+use super::select::{
+    CONFUSABLE, FAMILY_ALPHA, FIRST_OF_ALL, Found, LEAST_ALONE, LEAST_SCORE, OWN_INEXACTNESS, Taken,
+    best_of_each, look, refit, rivals, worth_naming,
+};
+
+/// At most so many effects are named.
+pub(crate) const MAX_NAMED: usize = 3;
+/// A further effect must take this share of all misfit above noise …
+const FURTHER_OF_ALL: f64 = 0.1;
+/// … and this share of what its predecessors left.
+const FURTHER_OF_REST: f64 = 0.4;
+/// A name of less than this part of what something else would score is the shadow of that.
+const SHADOW: f64 = 2.0;
+/// Laws that are little more than a slow course of time, which a reading that wanders imitates best.
+const SLOW: [&str; 4] = ["force-drift", "thermal-softening", "cyclic-softening", "permanent-set"];
+/// However long the noise's memory is, half-strokes over several pressures and two directions say more than one number.
+const FEWEST_INDEPENDENT: f64 = 8.0;
+/// So many candidates may fail when everything is fitted together before the search ends.
+const MOST_BARRED: usize = 4;
+/// With more rivals than this a name says nothing.
+const MOST_RIVALS: usize = 10;
+/// A trace as high as this share of the blocked force counts although few rows have it.
+const NARROW_PEAK: f64 = 0.01;
+
+/// Searches for what is missing. Candidates in `refused` are looked at and may be rivals, but are not taken.
+pub(crate) fn search(
+    rows: &mut Rows,
+    library: &[Candidate],
+    blocked: f64,
+    step: f64,
+    refused: &[usize],
+) -> Found {
+    let mut search = Search::begin(rows, library, blocked, step, refused);
+    while search.chosen.len() < MAX_NAMED
+        && search.barred.len() < refused.len() + MOST_BARRED
+        && search.next().is_continue()
+    {}
+    search.end()
+}
+
+/// A forward selection under way.
+struct Search<'a> {
+    rows: &'a mut Rows,
+    library: &'a [Candidate],
+    blocked: f64,
+    /// The middle distance in time between rows, s.
+    step: f64,
+    noise: Noise,
+    /// What evidence is weighed with; fixed at the beginning.
+    scale: Scale,
+    kind: Kind,
+    bare: Baseline,
+    full: Baseline,
+    /// The effects so far, and how each came to be taken.
+    chosen: Vec<Trial>,
+    taken: Vec<Taken>,
+    traces: Vec<Vec<f64>>,
+    /// The energy above noise before anything was taken, N².
+    above: f64,
+    first_look: Option<(Vec<Trial>, Vec<f64>)>,
+    /// Candidates that are not taken (again).
+    barred: Vec<usize>,
+    remarks: Vec<String>,
+}
+
+impl<'a> Search<'a> {
+    /// The baseline and the noise before any effect.
+    fn begin(
+        rows: &'a mut Rows,
+        library: &'a [Candidate],
+        blocked: f64,
+        step: f64,
+        refused: &[usize],
+    ) -> Self {
+        let order = if rows.isometric { 4 } else { 6 };
+        let flexible = baselines::fit(rows, Kind::Flexible(order), &[]);
+        let weight = energy(&rows.root_weight).max(1e-12);
+        let noise = noise::estimate(rows, &flexible.residual, step);
+        let scale = Scale {
+            weight,
+            independent: noise.independent.max(rows.blocks as f64),
+            sigma: noise.sigma.max(1e-6 * blocked),
+            blocked,
+        };
+        let row = scale.sigma * (weight / scale.independent).sqrt();
+        let first = Give { elastic: 1e-3 * blocked, friction: 5e-4 * blocked, row };
+        let begun = baselines::fit(rows, Kind::Soft(first), &[]);
+        baselines::into_contexts(rows, &begun);
+        let kind = Kind::Soft(Ground::new(&begun, scale).give);
+        let full = baselines::fit(rows, kind, &[]);
+        baselines::into_contexts(rows, &full);
+        let mut search = Self {
+            rows,
+            library,
+            blocked,
+            step,
+            noise,
+            scale,
+            kind,
+            bare: full.clone(),
+            full,
+            chosen: Vec::new(),
+            taken: Vec::new(),
+            traces: Vec::new(),
+            above: 0.0,
+            first_look: None,
+            barred: refused.to_vec(),
+            remarks: Vec::new(),
+        };
+        search.above = search.above_noise(energy(&search.bare.residual));
+        search
+    }
+
+    fn above_noise(&self, energy: f64) -> f64 {
+        (energy - self.noise.sigma.powi(2) * self.scale.weight).max(0.02 * energy).max(1e-12)
+    }
+
+    /// Looks for one more effect: whether another look may be worth it.
+    fn next(&mut self) -> ControlFlow<()> {
+        let full = self.full.clone();
+        let ground = Ground::new(&full, self.scale);
+        let (best, p) = look(self.library, self.rows, &ground, self.blocked);
+        if self.first_look.is_none() {
+            self.first_look = Some((best.clone(), p.clone()));
+        }
+        let Some(at) = self.winner(&best, &ground) else { return ControlFlow::Break(()) };
+        let winner = best[at].clone();
+        if !self.is_enough(&winner, p[at]) {
+            return ControlFlow::Break(());
+        }
+        let beside = Kind::Soft(winner.give);
+        let metric = baselines::fit(self.rows, beside, &[]);
+        let rivals = rivals(&winner, &best, self.library, self.rows, &ground, &metric.span);
+        let open: Vec<&str> =
+            rivals.iter().filter(|r| r.1 > CONFUSABLE).map(|r| self.library[r.0].name()).collect();
+        if open.len() > MOST_RIVALS {
+            self.remarks.push(format!(
+                "{} would explain {:.0} % of the misfit, but so would, nearly as well, {}: these recordings cannot say which, so none \
+                 is named",
+                self.library[winner.candidate].name(),
+                100.0 * self.of_rest(&winner),
+                open.join(", ")
+            ));
+            return ControlFlow::Break(());
+        }
+        self.take(winner, p[at], rivals, metric);
+        ControlFlow::Continue(())
+    }
+
+    /// Which of the best of each candidate is to be judged.
+    fn winner(&self, best: &[Trial], ground: &Ground<'_>) -> Option<usize> {
+        let rival = |t: &Trial| {
+            self.taken.iter().any(|k| k.rivals.iter().any(|r| r.0 == t.candidate && r.1 > CONFUSABLE))
+        };
+        let (at, winner) = best
+            .iter()
+            .enumerate()
+            .filter(|(_, t)| {
+                t.gain > 0.0
+                    && !self.chosen.iter().any(|c| c.candidate == t.candidate)
+                    && !self.barred.contains(&t.candidate)
+                    && !rival(t)
+                    && worth_naming(t, self.library, self.rows, ground)
+            })
+            .max_by(|a, b| a.1.score.total_cmp(&b.1.score))?;
+        // Where something that tables imitate explains far more, naming the next best would be naming a shadow of it.
+        let best_of_all = best.iter().map(|t| t.score).fold(0.0, f64::max);
+        let shadow = best_of_all > (winner.score + LEAST_ALONE).max(SHADOW * winner.score);
+        (!self.chosen.is_empty() || !shadow).then_some(at)
+    }
+
+    /// The share it takes of what the bladder's own differences leave; or, for an effect that spares the bladder these
+    /// differences, of what one bladder leaves.
+    fn of_rest(&self, winner: &Trial) -> f64 {
+        let spared = winner.relief / self.above_noise(winner.unrelieved);
+        (winner.gain / self.above_noise(winner.before)).max(spared)
+    }
+
+    /// Whether it is beyond chance, explains enough, and is large enough to matter.
+    fn is_enough(&mut self, winner: &Trial, p: f64) -> bool {
+        if self.chosen.is_empty() {
+            self.above = self.above_noise(winner.before);
+        }
+        // What lives in a few strokes can never give a large sum over blocks in units of its scatter: six strokes that all agree
+        // happen by chance once in 64. There the likelihood counts, whose independent rows are those that the residual's own
+        // correlation leaves.
+        let significant = winner.score >= if p <= FAMILY_ALPHA { LEAST_SCORE } else { LEAST_ALONE };
+        let of_rest = self.of_rest(winner);
+        let worth = if self.chosen.is_empty() {
+            of_rest >= FIRST_OF_ALL
+        } else {
+            winner.gain / self.above >= FURTHER_OF_ALL && of_rest >= FURTHER_OF_REST
+        };
+        // A wall at the end of the stroke is high and narrow.
+        let narrow = winner.peak >= NARROW_PEAK * self.blocked && winner.score >= 2.0 * LEAST_ALONE;
+        let moved = (winner.gain.max(winner.relief) / self.scale.weight).sqrt();
+        significant && worth && moved >= if narrow { 0.4 } else { 1.0 } * OWN_INEXACTNESS * self.blocked
+    }
+
+    /// Fits everything together with it, and keeps it if it then still does what it promised; else it is barred.
+    fn take(&mut self, winner: Trial, p: f64, rivals: Vec<(usize, f64, f64)>, metric: Baseline) {
+        let name = self.library[winner.candidate].name();
+        let beside = Kind::Soft(winner.give);
+        let seen = self.rows.contexts.clone();
+        self.chosen.push(winner.clone());
+        let (with, traces) = refit(self.rows, beside, &mut self.chosen, self.library);
+        // One step of a linear problem promised this; the whole refit has to keep a good part of it.
+        let kept = energy(&with.residual) <= winner.before - 0.6 * winner.gain;
+        // What the effect leaves tells anew how many rows are independent: a wandering zero that flexible tables had followed from
+        // pressure to pressure shows itself only now.
+        let again = noise::estimate(self.rows, &with.residual, self.step).independent.max(FEWEST_INDEPENDENT);
+        let score = winner.score * (again / self.scale.independent).min(1.0);
+        let least = if SLOW.contains(&name) { LEAST_ALONE } else { LEAST_SCORE };
+        if !kept || score < least {
+            self.chosen.pop();
+            self.rows.contexts = seen;
+            self.barred.push(winner.candidate);
+            self.remarks.push(format!(
+                "{name} would take much of the misfit, but {}: not named",
+                if kept {
+                    "so would a reading that wanders by itself as slowly as what it leaves"
+                } else {
+                    "keeps little of it when everything is fitted together"
+                }
+            ));
+            return;
+        }
+        self.kind = beside;
+        self.bare = metric;
+        (self.full, self.traces) = (with, traces);
+        self.noise =
+            Noise { sigma: self.noise.sigma, ..noise::estimate(self.rows, &self.full.residual, self.step) };
+        let share = winner.gain / self.above;
+        self.taken.push(Taken { trial: winner, p, share, rivals, rms: self.full.rms(self.rows) });
+        if self.chosen.len() > 1 {
+            self.exchange();
+        }
+    }
+
+    /// Tries to replace each effect taken by another beside the rest; a better one takes its place.
+    fn exchange(&mut self) {
+        for position in 0..self.chosen.len().saturating_sub(1) {
+            let mut others: Vec<Trial> = self.chosen.clone();
+            others.remove(position);
+            let (without, _) = refit(self.rows, self.kind, &mut others, self.library);
+            let ground = Ground::new(&without, self.scale);
+            let best = best_of_each(&ground.scan(self.library, self.rows), self.library);
+            let present = self.chosen[position].candidate;
+            let own = best.iter().find(|t| t.candidate == present).map_or(0.0, |t| t.score);
+            let challenger = best
+                .iter()
+                .filter(|t| !self.chosen.iter().any(|c| c.candidate == t.candidate))
+                .max_by(|a, b| a.score.total_cmp(&b.score));
+            if let Some(c) = challenger {
+                let refined = ground.refine(c, self.library, self.rows);
+                let (mine, _) =
+                    ground.left_under(&self.chosen[position], self.library, self.rows, refined.give);
+                // It must leave clearly less than the present one does.
+                if refined.score > own + LEAST_SCORE && refined.before - refined.gain < 0.8 * mine {
+                    let taken = &mut self.taken[position];
+                    taken.rivals.retain(|r| r.0 != refined.candidate);
+                    taken.rivals.insert(0, (present, 0.1, 0.0));
+                    taken.trial = refined.clone();
+                    self.chosen[position] = refined;
+                }
+            }
+            (self.full, self.traces) = refit(self.rows, self.kind, &mut self.chosen, self.library);
+        }
+        let rms = self.full.rms(self.rows);
+        for t in &mut self.taken {
+            t.rms = rms;
+        }
+    }
+
+    /// What was found, without what the joint fit brought to nothing: that was not there.
+    fn end(mut self) -> Found {
+        let alive: Vec<bool> = self.chosen.iter().map(|c| c.amplitudes.iter().any(|a| *a != 0.0)).collect();
+        if alive.iter().any(|a| !a) {
+            let mut keep = alive.iter();
+            self.chosen.retain(|_| *keep.next().unwrap_or(&true));
+            let mut keep = alive.iter();
+            self.taken.retain(|_| *keep.next().unwrap_or(&true));
+            (self.full, self.traces) = refit(self.rows, self.kind, &mut self.chosen, self.library);
+        }
+        for (t, c) in self.taken.iter_mut().zip(&self.chosen) {
+            t.trial.amplitudes.clone_from(&c.amplitudes);
+            t.trial.shapes.clone_from(&c.shapes);
+        }
+        let (first_look, first_p) = self.first_look.unwrap_or_default();
+        let Self { bare, full, taken, above, traces, noise, remarks, .. } = self;
+        Found { bare, full, taken, first_look, first_p, above, traces, noise, remarks }
+    }
+}
