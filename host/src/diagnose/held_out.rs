@@ -10,7 +10,7 @@ use super::rows::Rows;
 use super::verdict::HeldOut;
 
 /// Unseen rows must be predicted better by this factor for an effect to have helped.
-pub(super) const HELPS: f64 = 0.985;
+pub(super) const HELPS: f64 = 0.96;
 /// Rows at most: held-out error needs no more.
 const ROWS: usize = 6_000;
 

@@ -19,6 +19,9 @@ pub(crate) const OWN_INEXACTNESS: f64 = 4e-4;
 pub(crate) const STATIC_PEAK: f64 = 0.015;
 /// Below this share of its energy outside the flexible tables an effect counts as concealed by them.
 pub(crate) const CONCEALED: f64 = 0.04;
+/// Below this share tables that differ from pressure to pressure are the very same surface: no recording can tell a bladder that stiffens with
+/// pressure from it.
+const TWIN_OF_TABLES: f64 = 2e-4;
 /// And it must move the fit by this much, rms as a share of the blocked force.
 const STATIC_MOVED: f64 = 1e-3;
 /// A trace that must be larger than this share of the blocked force to explain a small misfit is no explanation where the tables would
@@ -192,8 +195,9 @@ pub(crate) fn refit(
 pub(super) fn worth_naming(t: &Trial, library: &[Candidate], rows: &Rows, ground: &Ground<'_>) -> bool {
     let Scale { weight, blocked, .. } = ground.scale;
     let moved = (t.gain.max(t.relief) / weight).sqrt();
+    let table = t.beyond_tables < TWIN_OF_TABLES;
     t.beyond_tables >= CONCEALED
-        || (t.peak >= STATIC_PEAK * blocked && moved >= STATIC_MOVED * blocked)
+        || (!table && t.peak >= STATIC_PEAK * blocked && moved >= STATIC_MOVED * blocked)
         || seen_past_tables(t, library, rows, ground)
 }
 
