@@ -37,9 +37,13 @@ let held = false, fresh = false, mode = "", samples = 0, state = {};
 // How long the last pictures took to draw and how far apart they were, in ms: rings again, so that they cannot grow.
 const perf = { frames: 0, draw: new Float64Array(512), gap: new Float64Array(512), last: 0 };
 
+// Pictures are at least this far apart, ms: more than some thirty a second nobody sees, and where the processor paints they would take
+// the time that the next one needs. Less than two frames of a screen of 60 Hz, so that every second one of these is drawn.
+const APART = 24;
+
 function frame(now) {
   requestAnimationFrame(frame);
-  if (!fresh || held) return;
+  if (!fresh || held || now - perf.last < APART) return;
   const begun = performance.now();
   draw();
   perf.draw[perf.frames % perf.draw.length] = performance.now() - begun;
