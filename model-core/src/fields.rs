@@ -173,9 +173,14 @@ macro_rules! fields {
     };
 }
 
-/// An enum without fields, its variants in their order.
+/// Declares an enum without fields; its variants are numbered in their order.
 macro_rules! codes {
-    ($name:ty { $($variant:ident),* $(,)? }) => {
+    ($(#[$outer:meta])* pub enum $name:ident { $($(#[$inner:meta])* $variant:ident),* $(,)? }) => {
+        $(#[$outer])*
+        pub enum $name {
+            $($(#[$inner])* $variant,)*
+        }
+
         impl $name {
             /// All of them, in the order of their codes.
             pub const ALL: [Self; [$(stringify!($variant)),*].len()] = [$(Self::$variant),*];
@@ -185,9 +190,7 @@ macro_rules! codes {
             #[inline(never)]
             fn walk(&mut self, walk: &mut $crate::fields::Walk<'_>) {
                 const ALL: &[$name] = &<$name>::ALL;
-                // Says so when a variant is missing in the list.
-                let code = match self { $(Self::$variant => Self::$variant as u8,)* };
-                if let Some(found) = ALL.get(usize::from(walk.variant(code, ALL.len() as u8))) {
+                if let Some(found) = ALL.get(usize::from(walk.variant(*self as u8, ALL.len() as u8))) {
                     *self = *found;
                 }
             }

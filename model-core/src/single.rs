@@ -1,7 +1,8 @@
 //! The model in single precision as a controller runs it: each function once in a program, and compiled with this crate.
 //!
 //! Everything else here is generic, or marked to be compiled with whichever crate calls it. A controller's image is built for
-//! size; what it does a thousand times a second is built here, for speed (`profile.firmware` in the workspace's manifest).
+//! size by all means; what it does a thousand times a second is built here, where it is not slowed down for it
+//! (`profile.firmware` in the workspace's manifest).
 
 use crate::effects::{Chain, Context};
 use crate::inverse::{Search, Solution};

@@ -13,13 +13,15 @@ use serde::{Deserialize, Serialize};
 /// The largest order `M` of the elastic polynomial.
 pub const MAX_ORDER: usize = 6;
 
-/// Whether the muscle pulls, or its motion is reversed by a push-rod.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Kind {
-    /// It shortens and pulls.
-    Contractile,
-    /// It extends a rod and pushes; stroke and force count positive outward.
-    Push,
+codes! {
+    /// Whether the muscle pulls, or its motion is reversed by a push-rod.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    pub enum Kind {
+        /// It shortens and pulls.
+        Contractile,
+        /// It extends a rod and pushes; stroke and force count positive outward.
+        Push,
+    }
 }
 
 /// The range that the recordings behind a table covered. Beyond it the table is an extrapolation.
@@ -61,8 +63,6 @@ pub struct MuscleTable {
     /// Physics beyond the base model.
     pub effects: heapless::Vec<FittedEffect, MAX_EFFECTS>,
 }
-
-codes!(Kind { Contractile, Push });
 fields!(Tested { pressure_low, pressure_high, contraction_low, contraction_high });
 fields!(MuscleTable {
     kind,
@@ -131,6 +131,7 @@ impl core::error::Error for TableError {}
 
 impl MuscleTable {
     /// Nothing in it yet; it does not pass [`MuscleTable::check`].
+    #[inline(always)]
     pub fn empty() -> Self {
         Self {
             kind: Kind::Contractile,

@@ -26,17 +26,17 @@ pub use self::trace::{
     TRACE_PIECE, TRACE_VARIABLES, TraceArm, TraceInfo, TracePiece, TraceRead, Trigger, Variable,
 };
 
-/// Which muscle of the board.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Side {
-    /// The first, or the only one.
-    #[default]
-    Agonist,
-    /// The second of a pair.
-    Antagonist,
+codes! {
+    /// Which muscle of the board.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+    pub enum Side {
+        /// The first, or the only one.
+        #[default]
+        Agonist,
+        /// The second of a pair.
+        Antagonist,
+    }
 }
-
-codes!(Side { Agonist, Antagonist });
 
 impl Side {
     /// 0 or 1.
@@ -48,20 +48,20 @@ impl Side {
     }
 }
 
-/// What the controller controls.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Mode {
-    /// Nothing: zero pressure.
-    #[default]
-    Vent,
-    /// Pressure.
-    Pressure,
-    /// Force.
-    Force,
-    /// Stroke.
-    Stroke,
-    /// Angle and stiffness of a joint with two muscles.
-    Pair,
+codes! {
+    /// What the controller controls.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+    pub enum Mode {
+        /// Nothing: zero pressure.
+        #[default]
+        Vent,
+        /// Pressure.
+        Pressure,
+        /// Force.
+        Force,
+        /// Stroke.
+        Stroke,
+        /// Angle and stiffness of a joint with two muscles.
+        Pair,
+    }
 }
-
-codes!(Mode { Vent, Pressure, Force, Stroke, Pair });

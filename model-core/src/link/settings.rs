@@ -5,31 +5,31 @@ use serde::{Deserialize, Serialize};
 
 use crate::fields::{codes, fields};
 
-/// Where the pressure for a wanted force comes from before any trim.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum FeedForward {
-    /// The inverse of the muscle's table.
-    #[default]
-    Table,
-    /// The ideal braid alone, `P = F · 4πN² / (3L² − B²)`: no bladder, no deadband, no friction.
-    Gaylord,
-    /// None: feedback does everything.
-    Off,
+codes! {
+    /// Where the pressure for a wanted force comes from before any trim.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+    pub enum FeedForward {
+        /// The inverse of the muscle's table.
+        #[default]
+        Table,
+        /// The ideal braid alone, `P = F · 4πN² / (3L² − B²)`: no bladder, no deadband, no friction.
+        Gaylord,
+        /// None: feedback does everything.
+        Off,
+    }
 }
 
-codes!(FeedForward { Table, Gaylord, Off });
-
-/// What a fault does to the regulator. Either way the fault is latched and the state is `Fault`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Reaction {
-    /// Command zero pressure at once.
-    #[default]
-    Vent,
-    /// Keep the last command, for loads that must not fall; over-pressure never allows it.
-    Hold,
+codes! {
+    /// What a fault does to the regulator. Either way the fault is latched and the state is `Fault`.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+    pub enum Reaction {
+        /// Command zero pressure at once.
+        #[default]
+        Vent,
+        /// Keep the last command, for loads that must not fall; over-pressure never allows it.
+        Hold,
+    }
 }
-
-codes!(Reaction { Vent, Hold });
 
 /// Trim of force on a load cell, added to the feed-forward pressure:
 /// `trim = K_p e + K_i ∫ e dt`, `e = F_wanted − F_measured`, the integral stopped where the command saturates.

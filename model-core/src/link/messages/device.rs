@@ -35,21 +35,21 @@ fields!(DeviceInfo {
     started_by
 });
 
-/// Why a device started.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum StartedBy {
-    /// Power came on.
-    #[default]
-    Power,
-    /// The host or a person asked.
-    Request,
-    /// The watchdog.
-    Watchdog,
-    /// The supply sagged.
-    BrownOut,
+codes! {
+    /// Why a device started.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+    pub enum StartedBy {
+        /// Power came on.
+        #[default]
+        Power,
+        /// The host or a person asked.
+        Request,
+        /// The watchdog.
+        Watchdog,
+        /// The supply sagged.
+        BrownOut,
+    }
 }
-
-codes!(StartedBy { Power, Request, Watchdog, BrownOut });
 
 /// What a device is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]

@@ -9,87 +9,67 @@ use crate::fields::{codes, fields};
 /// Past faults that are kept.
 pub const FAULT_LOG: usize = 8;
 
-/// States of safety. Nothing but a host's request leads towards `Running`, and no fault is left without one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum State {
-    /// After every start: vented, answers questions.
-    #[default]
-    Disarmed,
-    /// Ready: watches run, still vented.
-    Armed,
-    /// In control.
-    Running,
-    /// Stopped by a fault, which stays until it is cleared.
-    Fault,
+codes! {
+    /// States of safety. Nothing but a host's request leads towards `Running`, and no fault is left without one.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+    pub enum State {
+        /// After every start: vented, answers questions.
+        #[default]
+        Disarmed,
+        /// Ready: watches run, still vented.
+        Armed,
+        /// In control.
+        Running,
+        /// Stopped by a fault, which stays until it is cleared.
+        Fault,
+    }
 }
 
-codes!(State { Disarmed, Armed, Running, Fault });
-
-/// What went wrong. The number on the wire is the bit in [`Settings::hold_on`](crate::link::settings::Settings::hold_on).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Fault {
-    /// A reading is outside what the sensor can give: broken wire, short circuit.
-    #[default]
-    SensorRange,
-    /// A reading does not change although the command moves.
-    SensorStuck,
-    /// A reading jumps about.
-    SensorNoisy,
-    /// Readings contradict each other: force from the table and from the load cell.
-    SensorsDisagree,
-    /// No readings at all: bus or converter silent.
-    SensorsSilent,
-    /// Pressure stays below what is commanded: burst, leak, no supply.
-    PressureNotRising,
-    /// Pressure stays above what is commanded: jammed valve, blocked line.
-    PressureNotFalling,
-    /// More pressure than allowed.
-    OverPressure,
-    /// Stroke outside its limits.
-    OverStroke,
-    /// Faster than allowed: the load has come off.
-    OverSpeed,
-    /// More force than allowed.
-    OverForce,
-    /// No new set-point for too long.
-    SetPointSilence,
-    /// Ticks were missed.
-    LoopOverrun,
-    /// The mode needs a table and there is none.
-    TableMissing,
-    /// A table in use is no longer what was checked.
-    TableInvalid,
-    /// The supply sagged.
-    BrownOut,
-    /// The watchdog restarted the device.
-    Watchdog,
-    /// A calculation gave something that is no number.
-    NotANumber,
-    /// No frame of a host for too long while running: the program that was in charge is gone.
-    HostSilence,
+codes! {
+    /// What went wrong. The number on the wire is the bit in [`Settings::hold_on`](crate::link::settings::Settings::hold_on).
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+    pub enum Fault {
+        /// A reading is outside what the sensor can give: broken wire, short circuit.
+        #[default]
+        SensorRange,
+        /// A reading does not change although the command moves.
+        SensorStuck,
+        /// A reading jumps about.
+        SensorNoisy,
+        /// Readings contradict each other: force from the table and from the load cell.
+        SensorsDisagree,
+        /// No readings at all: bus or converter silent.
+        SensorsSilent,
+        /// Pressure stays below what is commanded: burst, leak, no supply.
+        PressureNotRising,
+        /// Pressure stays above what is commanded: jammed valve, blocked line.
+        PressureNotFalling,
+        /// More pressure than allowed.
+        OverPressure,
+        /// Stroke outside its limits.
+        OverStroke,
+        /// Faster than allowed: the load has come off.
+        OverSpeed,
+        /// More force than allowed.
+        OverForce,
+        /// No new set-point for too long.
+        SetPointSilence,
+        /// Ticks were missed.
+        LoopOverrun,
+        /// The mode needs a table and there is none.
+        TableMissing,
+        /// A table in use is no longer what was checked.
+        TableInvalid,
+        /// The supply sagged.
+        BrownOut,
+        /// The watchdog restarted the device.
+        Watchdog,
+        /// A calculation gave something that is no number.
+        NotANumber,
+        /// No frame of a host for too long while running: the program that was in charge is gone.
+        HostSilence,
+    }
 }
-
-codes!(Fault {
-    SensorRange,
-    SensorStuck,
-    SensorNoisy,
-    SensorsDisagree,
-    SensorsSilent,
-    PressureNotRising,
-    PressureNotFalling,
-    OverPressure,
-    OverStroke,
-    OverSpeed,
-    OverForce,
-    SetPointSilence,
-    LoopOverrun,
-    TableMissing,
-    TableInvalid,
-    BrownOut,
-    Watchdog,
-    NotANumber,
-    HostSilence
-});
 
 impl Fault {
     /// Its number, 0 for the first of [`Fault::ALL`].
@@ -98,19 +78,19 @@ impl Fault {
     }
 }
 
-/// Which sensor a fault is about.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Sensor {
-    /// Pressure.
-    #[default]
-    Pressure,
-    /// Stroke.
-    Stroke,
-    /// Load cell.
-    Force,
+codes! {
+    /// Which sensor a fault is about.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+    pub enum Sensor {
+        /// Pressure.
+        #[default]
+        Pressure,
+        /// Stroke.
+        Stroke,
+        /// Load cell.
+        Force,
+    }
 }
-
-codes!(Sensor { Pressure, Stroke, Force });
 
 /// A fault as it happened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
@@ -143,7 +123,7 @@ pub struct Faults {
     /// The one that stopped the device, until it is cleared.
     pub latched: Option<FaultReport>,
     /// How often each happened, in the order of [`Fault::ALL`].
-    pub counts: [u16; 19],
+    pub counts: [u16; Fault::ALL.len()],
 }
 
 fields!(Faults { latched, counts });

@@ -12,85 +12,65 @@ pub const TRACE_VARIABLES: usize = 16;
 /// Values in one [`TracePiece`].
 pub const TRACE_PIECE: usize = 64;
 
-/// Variables of the loop that a trace can record.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Variable {
-    /// Measured pressure, Pa.
-    #[default]
-    Pressure,
-    /// Measured stroke, m.
-    Stroke,
-    /// Measured force, N.
-    Force,
-    /// Speed of stroke, m/s.
-    Speed,
-    /// Direction of friction, −1 to 1.
-    Direction,
-    /// First value asked for.
-    Asked,
-    /// Wanted force, N.
-    WantedForce,
-    /// Feed-forward pressure, Pa.
-    FeedForward,
-    /// Trim, Pa.
-    Trim,
-    /// Wanted pressure after its limits, Pa.
-    WantedPressure,
-    /// Command to the regulator, Pa.
-    Command,
-    /// Pressure of the regulator's model, Pa.
-    ModelPressure,
-    /// Force by the table, N.
-    ModelForce,
-    /// State of safety as a number.
-    State,
-    /// Time that the step took, µs.
-    StepTime,
-    /// Measured pressure of the second muscle, Pa.
-    SecondPressure,
-    /// Measured stroke of the second muscle, m.
-    SecondStroke,
-    /// Measured force of the second muscle, N.
-    SecondForce,
-    /// Command to the second regulator, Pa.
-    SecondCommand,
+codes! {
+    /// Variables of the loop that a trace can record.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+    pub enum Variable {
+        /// Measured pressure, Pa.
+        #[default]
+        Pressure,
+        /// Measured stroke, m.
+        Stroke,
+        /// Measured force, N.
+        Force,
+        /// Speed of stroke, m/s.
+        Speed,
+        /// Direction of friction, −1 to 1.
+        Direction,
+        /// First value asked for.
+        Asked,
+        /// Wanted force, N.
+        WantedForce,
+        /// Feed-forward pressure, Pa.
+        FeedForward,
+        /// Trim, Pa.
+        Trim,
+        /// Wanted pressure after its limits, Pa.
+        WantedPressure,
+        /// Command to the regulator, Pa.
+        Command,
+        /// Pressure of the regulator's model, Pa.
+        ModelPressure,
+        /// Force by the table, N.
+        ModelForce,
+        /// State of safety as a number.
+        State,
+        /// Time that the step took, µs.
+        StepTime,
+        /// Measured pressure of the second muscle, Pa.
+        SecondPressure,
+        /// Measured stroke of the second muscle, m.
+        SecondStroke,
+        /// Measured force of the second muscle, N.
+        SecondForce,
+        /// Command to the second regulator, Pa.
+        SecondCommand,
+    }
 }
 
-codes!(Variable {
-    Pressure,
-    Stroke,
-    Force,
-    Speed,
-    Direction,
-    Asked,
-    WantedForce,
-    FeedForward,
-    Trim,
-    WantedPressure,
-    Command,
-    ModelPressure,
-    ModelForce,
-    State,
-    StepTime,
-    SecondPressure,
-    SecondStroke,
-    SecondForce,
-    SecondCommand
-});
-
-/// When a trace begins.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Trigger {
-    /// At once.
-    #[default]
-    Now,
-    /// With the next start of a mode or reference.
-    Start,
-    /// It runs round and round and stops with a fault, so that it shows what led there.
-    UntilFault,
+codes! {
+    /// When a trace begins.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+    pub enum Trigger {
+        /// At once.
+        #[default]
+        Now,
+        /// With the next start of a mode or reference.
+        Start,
+        /// It runs round and round and stops with a fault, so that it shows what led there.
+        UntilFault,
+    }
 }
-
-codes!(Trigger { Now, Start, UntilFault });
 
 /// Arms a trace; what an earlier one recorded is forgotten.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
