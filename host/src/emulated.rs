@@ -3,7 +3,7 @@
 use std::io;
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::Child;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::thread;
@@ -18,6 +18,10 @@ use virtual_bench::plant::{Motion, Plant};
 
 use crate::device::Address;
 use crate::error::{Code, Error, Result};
+
+mod guard;
+
+pub use guard::guarded;
 
 /// Where the firmware runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -243,10 +247,19 @@ impl Drop for Qemu {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         // It may have ended by itself; there is nobody left to tell.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        end(&mut self.child);
         let _ = std::fs::remove_dir_all(&self.folder);
     }
+}
+
+/// Ends a [`guarded`] program.
+pub fn end(child: &mut Child) {
+    if cfg!(unix) {
+        drop(child.stdin.take());
+    } else {
+        let _ = child.kill();
+    }
+    let _ = child.wait();
 }
 
 impl Qemu {
@@ -261,7 +274,7 @@ impl Qemu {
         let folder = std::env::temp_dir().join(format!("pam-emulated-{}-{link_port}", std::process::id()));
         std::fs::create_dir_all(&folder).map_err(|e| format!("no temporary folder can be made ({e})"))?;
         let started = std::fs::File::create(folder.join("qemu.log")).and_then(|log| {
-            Command::new("qemu-system-arm")
+            guarded("qemu-system-arm")?
                 .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"])
                 .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
                 .arg(&image)
@@ -269,7 +282,6 @@ impl Qemu {
                 .args(["-serial", &format!("tcp:127.0.0.1:{bench_port},nodelay=on"), "-serial", "null"])
                 // The store's file is made where the emulator runs.
                 .current_dir(&folder)
-                .stdin(Stdio::null())
                 .stdout(log.try_clone()?)
                 .stderr(log)
                 .spawn()

@@ -10,6 +10,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use host::device::{Client, Patience, Port};
+use host::emulated::{end, guarded};
 use virtual_bench::lockstep::{self, Station};
 
 use crate::debugger::Debugger;
@@ -207,7 +208,7 @@ impl Machine {
 
     fn start_image(image: &Path, folder: &Path, options: Options) -> Self {
         let (link, link_port) = listener();
-        let mut command = Command::new("qemu-system-arm");
+        let mut command = guarded("qemu-system-arm").expect("QEMU starts");
         command
             .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"])
             .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
@@ -239,7 +240,6 @@ impl Machine {
         }
         let mut child = command
             .current_dir(folder)
-            .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .spawn()
@@ -296,8 +296,7 @@ impl Machine {
     }
 
     fn end(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        end(&mut self.child);
         for bench in self.benches.drain(..) {
             let _ = bench.join();
         }

@@ -9,7 +9,7 @@ use crate::line::Line;
 ///
 /// # Panics
 /// When it is not there.
-fn path() -> PathBuf {
+pub fn path() -> PathBuf {
     // Tests lie in `deps` beside the program.
     let test = std::env::current_exe().expect("this test's path");
     let path = test.ancestors().nth(2).expect("the profile's folder").join("emulated-host");
