@@ -59,6 +59,11 @@ const PLAY_CALM: f32 = 0.2;
 /// turns the one before the other has undone it. So friction rests until the muscle is moved far, and the trim does the rest. So it
 /// does in a joint, where each muscle is the other's load and a push should meet the stiffness that was asked for, not less.
 const PLAY_RESTING: f32 = 20.0;
+/// Part of friction that is made good in a joint. Of two muscles that pull against each other each is the other's load: with all of
+/// its friction taken away, nothing holds the joint where it stands. It creeps, the friction turns, and it jumps to the other end of
+/// what friction would have held, some hundredths of a radian to and fro. What a push meets is then a matter of where it was. A
+/// quarter of the friction that stays holds it, at the cost of some stiffness more than was asked for.
+const JOINT_SHARE: f32 = 0.75;
 /// How long the same force is wanted until a wish stands still, s.
 const CALM_S: f32 = 0.2;
 /// Part of blocked force at which a muscle surely pulls, whatever its table leaves out.
@@ -108,6 +113,7 @@ impl Model {
     ///
     /// # Errors
     /// As [`Model::build`]; what was in the place is lost then.
+    #[inline(never)]
     pub fn rebuild(&mut self, table: &MuscleTable) -> Result<(), TableError> {
         self.muscle.rebuild(table)?;
         self.chain.resume(&table.effects);
@@ -196,19 +202,23 @@ impl Model {
     }
 
     /// The pressure for a wanted force in this tick, and whether it can be had; `rests` where friction is not to turn while the same
-    /// force is wanted.
-    pub fn pressure_for(&mut self, force_n: f32, guess_pa: f32, rests: bool) -> (f32, bool) {
+    /// force is wanted, `share` of it made good.
+    pub fn pressure_for(&mut self, force_n: f32, guess_pa: f32, rests: bool, share: f32) -> (f32, bool) {
         let still_s = if self.wish.force_n == force_n { self.wish.still_s + TICK_S } else { 0.0 };
         self.wish = Wish { force_n, still_s, rests };
         self.asked = true;
         let search = Search { tolerance: Pressure::from_pascals(20.0), ..self.muscle.search() };
         let force = Force::from_newtons(force_n);
         let guess = Pressure::from_pascals(guess_pa);
-        let found = if self.chain.is_empty() {
-            single::pressure_for(&self.muscle, &self.now.held, self.direction(), force, guess, &search)
+        let Self { muscle, chain, now, .. } = self;
+        let direction = now.context.direction;
+        now.context.direction = share * direction;
+        let found = if chain.is_empty() {
+            single::pressure_for(muscle, &now.held, now.context.direction, force, guess, &search)
         } else {
-            single::pressure_with(&self.muscle, &self.chain, &self.now, force, guess, &search)
+            single::pressure_with(muscle, chain, now, force, guess, &search)
         };
+        now.context.direction = direction;
         self.slope = found.slope;
         (found.pressure.pascals(), found.reach == Reach::Reached)
     }
@@ -300,7 +310,8 @@ pub fn feed_forward(
         (FeedForward::Off, _) | (_, None) => (0.0, true),
         (FeedForward::Table, Some(model)) => {
             let trimmed = settings.force.fitted && settings.force_loop.trim_limit_pa > 0.0;
-            model.pressure_for(force_n, guess_pa, trimmed || mode == Mode::Pair)
+            let joint = mode == Mode::Pair;
+            model.pressure_for(force_n, guess_pa, trimmed || joint, if joint { JOINT_SHARE } else { 1.0 })
         }
         (FeedForward::Gaylord, Some(model)) => model.gaylord_pressure(force_n),
     }
