@@ -23,6 +23,11 @@ pub struct Command {
     pub vent: bool,
 }
 
+impl Command {
+    /// No pressure, and the dump valve open.
+    pub const VENT: Self = Self { pressure_pa: 0.0, vent: true };
+}
+
 /// All that the control step is given each tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inputs {
@@ -43,6 +48,11 @@ pub struct Outputs {
     pub sides: [Command; 2],
     /// What is asked for, for a plant that logs it.
     pub asked: f32,
+}
+
+impl Outputs {
+    /// Every muscle vented: what a board does before the first step.
+    pub const VENT: Self = Self { sides: [Command::VENT; 2], asked: 0.0 };
 }
 
 /// The sensors and regulators of a board, which also keep its time: one return is one control tick.

@@ -4,11 +4,14 @@ use heapless::Vec;
 use model_core::image;
 use model_core::table::MuscleTable;
 
+use crate::brief::Brief;
+use crate::pair;
 use crate::room::{Room, room};
 
-/// Values that a trace holds, four bytes each: the largest single part of the controller's memory, and a free choice. It may be
-/// as large as the chip allows; a host asks the device how many there are.
-pub const TRACE_CAPACITY: usize = 1024;
+/// Values that a trace holds, three bytes each: the largest single part of the memory of a board for one muscle, and a free choice.
+/// It may be as large as the chip allows; a host asks the device how many there are. A second muscle's table takes as much again,
+/// and leaves the trace what a table on its way into use needs anyway.
+pub const TRACE_CAPACITY: usize = if pair::SUPPORTED { 640 } else { 1024 };
 
 /// A table on its way into use.
 #[derive(Debug)]
@@ -19,10 +22,12 @@ pub struct Incoming {
     pub table: MuscleTable,
 }
 
+/// With a number of its own for what it is: an empty trace is all zeros then, and takes no flash.
+#[repr(u8)]
 #[derive(Debug)]
 #[allow(clippy::large_enum_variant, reason = "it is never moved: the one lends its room to the other")]
 enum Content {
-    Trace(Vec<f32, TRACE_CAPACITY>),
+    Trace(Vec<Brief, TRACE_CAPACITY>),
     Table(Incoming),
 }
 
@@ -37,7 +42,7 @@ impl CommonRoom {
     }
 
     /// The values of a trace that is in it.
-    pub fn values(&self) -> &[f32] {
+    pub fn values(&self) -> &[Brief] {
         match &*self.0 {
             Content::Trace(values) => values,
             Content::Table(_) => &[],
@@ -50,7 +55,7 @@ impl CommonRoom {
     }
 
     /// The values of the trace that is in it, if it is a trace's.
-    pub fn trace(&mut self) -> Option<&mut Vec<f32, TRACE_CAPACITY>> {
+    pub fn trace(&mut self) -> Option<&mut Vec<Brief, TRACE_CAPACITY>> {
         match &mut *self.0 {
             Content::Trace(values) => Some(values),
             Content::Table(_) => None,

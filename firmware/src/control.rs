@@ -7,20 +7,18 @@
 //! ```
 //! Watches look at every tick before the command is made, so a fault changes the command of the tick it is noticed in.
 
-use model_core::link::messages::{
-    Event, Fault, FaultReport, Field, Mode, Reference, Refusal, SetPoint, Side, State, Telemetry,
-};
-use model_core::link::settings::{FeedForward, Reaction, Settings};
+use model_core::link::messages::{Fault, FaultReport, Mode, Side, State};
+use model_core::link::settings::{Reaction, Settings};
 use model_core::motion::{MotionSettings, MotionTracker};
 use model_core::single;
 use model_core::table::{MuscleTable, TableError};
 
-use crate::board::{Command, Inputs, Outputs, Readings};
+use crate::board::{Inputs, Outputs, Readings};
 use crate::modes::{Model, Seat};
-use crate::pair::{self, Arm, PairState};
+use crate::pair::PairState;
 use crate::reference::Generator;
 use crate::regulator;
-use crate::safety::{self, Cause, Machine};
+use crate::safety::{self, Machine};
 use crate::tick::{TICK_S, TICK_US};
 use crate::trace::Trace;
 use crate::watch::{Finding, SideWatch};
@@ -30,6 +28,7 @@ mod check;
 mod drive;
 mod look_out;
 mod record;
+mod requests;
 
 pub use check::check_settings;
 
@@ -41,6 +40,14 @@ fn motion_settings(settings: &Settings) -> MotionSettings<f32> {
         pressure_threshold: settings.pressure_band_pa,
         ..MotionSettings::default()
     }
+}
+
+/// What the host is to hear of; the report of a fault is the latched one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum News {
+    Fault,
+    State(State),
+    TraceFull,
 }
 
 /// The whole controller but for its board, its link and its store.
@@ -70,29 +77,19 @@ pub struct Controller {
     trace: Trace,
     /// A finding of the last tick: what would stand in the way of clearing.
     present: Option<Fault>,
-    event: Option<Event>,
+    news: Option<News>,
     step_us: f32,
-}
-
-/// What one step gives.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Stepped {
-    /// Commands to the regulators.
-    pub outputs: Outputs,
-    /// A sample that is due, with its number.
-    pub telemetry: Option<(u16, Telemetry)>,
-    /// Something to tell the host.
-    pub event: Option<Event>,
 }
 
 impl Controller {
     /// As after power-up: disarmed, vented, without tables; for two muscles.
-    pub fn new(settings: Settings) -> Self {
+    pub fn new(settings: &Settings) -> Self {
         Self::seated(settings, Seat::pair())
     }
 
     /// The same with places for the tables of the muscles that a board drives.
-    pub fn seated(settings: Settings, seats: [Seat; 2]) -> Self {
+    #[inline(always)]
+    pub fn seated(settings: &Settings, [first, second]: [Seat; 2]) -> Self {
         Self {
             machine: Machine::default(),
             mode: Mode::Vent,
@@ -103,8 +100,8 @@ impl Controller {
             coming_step: 0.0,
             asked_age: 0,
             host_age: 0,
-            sides: seats.map(|seat| Actuator::new(&settings, seat)),
-            settings,
+            sides: [Actuator::new(settings, first), Actuator::new(settings, second)],
+            settings: *settings,
             pair: PairState::default(),
             tick: 0,
             overruns: 0,
@@ -115,7 +112,7 @@ impl Controller {
             telemetry_number: 0,
             trace: Trace::default(),
             present: None,
-            event: None,
+            news: None,
             step_us: 0.0,
         }
     }
@@ -176,10 +173,10 @@ impl Controller {
     }
 
     /// Uses other settings, which must have passed [`check_settings`].
-    pub fn use_settings(&mut self, settings: Settings) {
-        self.settings = settings;
+    pub fn use_settings(&mut self, settings: &Settings) {
+        self.settings = *settings;
         for side in &mut self.sides {
-            side.motion = MotionTracker::new(motion_settings(&settings));
+            side.motion = MotionTracker::new(motion_settings(settings));
             side.watch = SideWatch::default();
         }
     }
@@ -222,204 +219,6 @@ impl Controller {
         side == Side::Agonist || self.mode == Mode::Pair
     }
 
-    /// Arms.
-    ///
-    /// # Errors
-    /// As [`Machine::request`].
-    pub fn arm(&mut self) -> Result<(), Refusal> {
-        self.change(Cause::Arm)?;
-        for side in &mut self.sides {
-            side.watch = SideWatch::default();
-        }
-        Ok(())
-    }
-
-    fn change(&mut self, cause: Cause) -> Result<(), Refusal> {
-        let before = self.machine.state();
-        let state = self.machine.request(cause)?;
-        if state != before {
-            self.event = Some(Event::State(state));
-        }
-        if state != State::Running {
-            self.mode = Mode::Vent;
-            self.generator.begin(Reference::SetPoint)?;
-        }
-        Ok(())
-    }
-
-    /// Starts a mode at what is measured now.
-    ///
-    /// # Errors
-    /// As [`Machine::request`]; [`Refusal::NoTable`], with the fault latched, where the mode needs a table.
-    pub fn start(&mut self, mode: Mode) -> Result<(), Refusal> {
-        self.machine.allows(Cause::Start)?;
-        let needs: &[Side] = match mode {
-            Mode::Vent | Mode::Pressure => &[],
-            Mode::Force if self.settings.feed_forward == FeedForward::Off => &[],
-            Mode::Force | Mode::Stroke => &[Side::Agonist],
-            Mode::Pair => &Side::ALL,
-        };
-        if let Some(side) = needs.iter().copied().find(|side| self.model(*side).is_none()) {
-            let none = Finding { fault: Fault::TableMissing, sensor: None, value: 0.0, limit: 1.0 };
-            self.raise(side, &none);
-            return Err(Refusal::NoTable(side));
-        }
-        self.change(Cause::Start)?;
-        self.mode = mode;
-        self.generator.begin(Reference::SetPoint)?;
-        let first = self.sides[0].sample;
-        let joint = self.settings.joint;
-        self.asked_second = 0.0;
-        self.asked = match mode {
-            Mode::Vent => 0.0,
-            Mode::Pressure => first.pressure_pa.max(0.0),
-            Mode::Force => first.force_n.max(0.0),
-            Mode::Stroke => first.stroke_m,
-            Mode::Pair => (first.stroke_m - self.sides[1].sample.stroke_m) / (2.0 * joint.radius_m),
-        };
-        self.asked_age = 0;
-        for side in &mut self.sides {
-            side.regulator.begin(side.sample.pressure_pa);
-            side.trim.reset();
-            side.stroke_loop.reset();
-            side.guess_pa = side.sample.pressure_pa;
-            side.cut = 0.0;
-            side.watch = SideWatch::default();
-        }
-        if mode == Mode::Pair
-            && let Some(arms) = self.arms()
-        {
-            let mut pair = self.pair;
-            pair.begin(arms);
-            self.pair = pair;
-        }
-        self.trace.on_start();
-        Ok(())
-    }
-
-    /// Vents, and stays ready.
-    ///
-    /// # Errors
-    /// As [`Machine::request`].
-    pub fn stop(&mut self) -> Result<(), Refusal> {
-        self.vent_now();
-        self.change(Cause::Stop)
-    }
-
-    /// Vents, and is no longer ready.
-    ///
-    /// # Errors
-    /// As [`Machine::request`].
-    pub fn disarm(&mut self) -> Result<(), Refusal> {
-        self.vent_now();
-        self.change(Cause::Disarm)
-    }
-
-    fn vent_now(&mut self) {
-        // In `Fault` with a held command this is the way to let go of it.
-        for side in &mut self.sides {
-            side.command = Command { pressure_pa: 0.0, vent: true };
-        }
-    }
-
-    /// Forgets the latched fault.
-    ///
-    /// # Errors
-    /// [`Refusal::StillFaulty`] while what caused a fault is still there.
-    pub fn clear(&mut self) -> Result<(), Refusal> {
-        if self.machine.state() == State::Fault
-            && let Some(fault) = self.present
-        {
-            return Err(Refusal::StillFaulty(fault));
-        }
-        self.vent_now();
-        self.change(Cause::Clear)
-    }
-
-    /// A new set-point; ends a reference.
-    ///
-    /// # Errors
-    /// [`Refusal::WrongMode`] where it is not the running mode's, [`Refusal::Value`] where it is no finite number,
-    /// [`Refusal::Angle`] or [`Refusal::Stiffness`] where a joint cannot have it.
-    pub fn set_point(&mut self, set_point: SetPoint) -> Result<(), Refusal> {
-        let (mode, asked, second) = match set_point {
-            SetPoint::Pressure(pascals) => (Mode::Pressure, pascals, 0.0),
-            SetPoint::Force(newtons) => (Mode::Force, newtons, 0.0),
-            SetPoint::Stroke(metres) => (Mode::Stroke, metres, 0.0),
-            SetPoint::Pair { angle_rad, stiffness_nm_per_rad } => {
-                (Mode::Pair, angle_rad, stiffness_nm_per_rad)
-            }
-        };
-        self.running()?;
-        if mode != self.mode {
-            return Err(Refusal::WrongMode(self.mode));
-        }
-        if !(asked.is_finite() && second.is_finite()) || second < 0.0 {
-            return Err(Refusal::Value(Field::SetPoint));
-        }
-        if mode == Mode::Pair {
-            self.can_pose(asked, second)?;
-        }
-        self.generator.begin(Reference::SetPoint)?;
-        (self.asked, self.asked_second) = (asked, second);
-        self.asked_age = 0;
-        Ok(())
-    }
-
-    /// Both muscles of a joint, if both have tables.
-    fn arms(&self) -> Option<[Arm<'_>; 2]> {
-        if !pair::SUPPORTED {
-            return None;
-        }
-        let [first, second] = &self.sides;
-        Some([self.arm_of(first)?, self.arm_of(second)?])
-    }
-
-    fn arm_of<'a>(&self, side: &'a Actuator) -> Option<Arm<'a>> {
-        let model = side.model.as_ref()?;
-        let Settings { regulator, limits, .. } = &self.settings;
-        let reached_pa = regulator.gain * (regulator.command_max_pa + regulator.offset_pa);
-        let high_pa = model.muscle.max_pressure().pascals().min(limits.pressure_pa).min(reached_pa);
-        Some(Arm { model, pressure_pa: side.guess_pa, high_pa })
-    }
-
-    /// Whether a joint can have an angle and a stiffness.
-    fn can_pose(&self, angle_rad: f32, stiffness_nm_per_rad: f32) -> Result<(), Refusal> {
-        let arms = self.arms().ok_or(Refusal::WrongMode(self.mode))?;
-        pair::check(&self.settings.joint, arms, angle_rad, stiffness_nm_per_rad)
-    }
-
-    /// A wave of the device's own.
-    ///
-    /// # Errors
-    /// As [`Generator::begin`]; [`Refusal::WrongMode`] while venting; [`Refusal::Angle`] or [`Refusal::Stiffness`] where a joint
-    /// cannot have an end of the wave.
-    pub fn reference(&mut self, reference: Reference) -> Result<(), Refusal> {
-        self.running()?;
-        if self.mode == Mode::Vent {
-            return Err(Refusal::WrongMode(Mode::Vent));
-        }
-        if self.mode == Mode::Pair {
-            let (low, high) = self.generator.range(reference);
-            self.can_pose(low, self.asked_second)?;
-            self.can_pose(high, self.asked_second)?;
-        }
-        self.generator.begin(reference)?;
-        // Here, so that no tick has all of it to do.
-        self.generator.look_ahead(regulator::ahead(&self.settings.regulator));
-        self.asked_age = 0;
-        self.trace.on_start();
-        Ok(())
-    }
-
-    fn running(&self) -> Result<(), Refusal> {
-        match (self.machine.state(), self.machine.latched()) {
-            (State::Running, _) => Ok(()),
-            (_, Some(fault)) => Err(Refusal::Latched(fault)),
-            (state, None) => Err(Refusal::WrongState(state)),
-        }
-    }
-
     /// Latches a fault.
     pub fn raise(&mut self, side: Side, finding: &Finding) {
         let report = FaultReport {
@@ -433,10 +232,10 @@ impl Controller {
             limit: finding.limit,
             last: self.sides[side.index()].sample,
         };
-        if !self.machine.fault(report) {
+        if !self.machine.fault(&report) {
             return;
         }
-        self.event = Some(Event::Fault(report));
+        self.news = Some(News::Fault);
         self.trace.on_fault();
         if safety::reaction(finding.fault, self.settings.hold_on) == Reaction::Vent {
             self.vent_now();
@@ -447,8 +246,8 @@ impl Controller {
         }
     }
 
-    /// One millisecond.
-    pub fn step(&mut self, inputs: &Inputs) -> Stepped {
+    /// One millisecond. What it says to the host is left for [`Controller::take_event`] and [`Controller::take_sample`].
+    pub fn step(&mut self, inputs: &Inputs) -> Outputs {
         self.tick += 1;
         self.step_us = inputs.step_us;
         for side in Side::ALL {

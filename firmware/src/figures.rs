@@ -181,7 +181,7 @@ fn functions(table: &MuscleTable, muscle: &Muscle<f32>) {
 /// The whole 1 kHz step in force control: muscle moving, wave of force, telemetry at every tenth tick.
 fn whole_step(table: &MuscleTable) {
     static CONTROLLER: StaticCell<Controller> = StaticCell::new();
-    let controller = CONTROLLER.init_with(|| Controller::new(Settings::default()));
+    let controller = CONTROLLER.init_with(|| Controller::new(&Settings::default()));
     if controller.use_table(Side::Agonist, table).is_err() {
         return;
     }
@@ -203,8 +203,10 @@ fn whole_step(table: &MuscleTable) {
         let readings = inputs(pressure, 0.3e-3 + 2.4e-3 * triangle, 45.0 + phase);
         let mut wanted = 0.0;
         controller.heard();
-        let spent =
-            ticks(|| wanted = black_box(controller.step(black_box(&readings))).outputs.sides[0].pressure_pa);
+        let spent = ticks(|| {
+            wanted = black_box(controller.step(black_box(&readings))).sides[0].pressure_pa;
+            black_box((controller.take_event(), controller.take_sample()));
+        });
         pressure += (wanted - pressure) * 0.03 + if tick % 2 == 0 { 3.0 } else { -3.0 };
         sweep.add(spent as f32 * INSTRUCTIONS_PER_TICK);
     }

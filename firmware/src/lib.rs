@@ -10,9 +10,11 @@
 //! | sine, trapezoid, chirp, table | [`mod@reference`] |
 //! | lag, limits and scaling of the pressure regulator | [`regulator`] |
 //! | the record of every loop variable | [`trace`] |
+//! | a number in three bytes | [`brief`] |
 //! | tables and settings in flash | [`store`] |
 //! | answers to the host | [`server`] |
 //! | what the tasks share | [`shared`] |
+//! | what waits to be said to the host | [`spoken`] |
 //! | places for what is large | [`room`], [`common_room`] |
 //! | the tasks that a board starts | [`tasks`] |
 //! | the length of a tick | [`tick`] |
@@ -25,6 +27,7 @@
 #![cfg_attr(not(any(test, feature = "std")), no_std)]
 
 pub mod board;
+pub mod brief;
 pub mod common_room;
 pub mod control;
 #[cfg(feature = "log")]
@@ -39,6 +42,7 @@ pub mod room;
 pub mod safety;
 pub mod server;
 pub mod shared;
+pub mod spoken;
 pub mod store;
 pub mod tasks;
 pub mod tick;

@@ -11,6 +11,7 @@ use critical_section::RestoreState;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use heapless::Vec;
+use model_core::link::messages::{Event, FaultReport};
 
 /// Bytes of the longest line.
 const LINE: usize = 64;
@@ -26,9 +27,17 @@ static TICK: AtomicU32 = AtomicU32::new(0);
 
 defmt::timestamp!("{=u32:ms}", TICK.load(Ordering::Relaxed));
 
-/// Tells the log what time it is, in ticks of a millisecond.
-pub fn set_tick(tick: u64) {
+/// Tells the log what time it is, in ticks of a millisecond, and what happened in that tick.
+pub(crate) fn tell(tick: u64, event: Option<&Event>) {
     TICK.store(tick as u32, Ordering::Relaxed);
+    match event {
+        Some(Event::Fault(FaultReport { fault, value, limit, .. })) => {
+            defmt::warn!("fault {=u8}, {=f32} against {=f32}", fault.code(), *value, *limit);
+        }
+        Some(Event::State(state)) => defmt::info!("state {=u8}", *state as u8),
+        Some(Event::TraceFull) => defmt::info!("trace full"),
+        None => {}
+    }
 }
 
 /// The next line, when there is one.

@@ -255,10 +255,7 @@ fn run(
     connected: &AtomicBool,
     mut pace: Pace,
 ) {
-    let mut outputs = Outputs::default();
-    for side in &mut outputs.sides {
-        side.vent = true;
-    }
+    let mut outputs = Outputs::VENT;
     while !stop.load(Ordering::Relaxed) {
         pace.wait();
         // Nothing here runs in hard time, so the loop may wait for the link instead of dropping samples.
@@ -295,7 +292,7 @@ fn serve(
             }
         }
         if server.wants_restart() {
-            shared.with(|controller| *controller = Controller::new(Settings::default()));
+            shared.with(|controller| *controller = Controller::new(&Settings::default()));
             match server.restarted(shared) {
                 Ok(again) => server = again,
                 Err(_) => return,

@@ -8,10 +8,11 @@ use heapless::Vec;
 use micromath::F32Ext;
 use model_core::link::messages::{Field, REFERENCE_PIECE, Reference, ReferencePoints, Refusal};
 
+use crate::brief::Brief;
 use crate::room::{Room, room};
 use crate::tick::{TICK_S, TICKS_PER_S};
 
-/// Points that a reference table holds.
+/// Points that a reference table holds, three bytes each ([`Brief`]).
 pub const CAPACITY: usize = 256;
 
 /// Ticks that a wave can be looked at ahead of its time.
@@ -26,7 +27,7 @@ pub struct Generator {
     /// Ticks since it began.
     ticks: u32,
     phase: u32,
-    points: Room<Vec<f32, CAPACITY>>,
+    points: Room<Vec<Brief, CAPACITY>>,
     last: f32,
     /// The last values made, at their number; how many were made, and how many of these have had their time.
     coming: [f32; AHEAD],
@@ -40,7 +41,7 @@ impl Default for Generator {
             reference: Reference::SetPoint,
             ticks: 0,
             phase: 0,
-            points: room!(Vec<f32, CAPACITY>, Vec::new()),
+            points: room!(Vec<Brief, CAPACITY>, Vec::new()),
             last: 0.0,
             coming: [0.0; AHEAD],
             made: 0,
@@ -122,8 +123,9 @@ impl Generator {
             }
             Reference::Trapezoid { low, high, .. } => (low.min(high), low.max(high)),
             Reference::Table { .. } => {
-                let least = self.points.iter().copied().fold(f32::MAX, f32::min);
-                (least, self.points.iter().copied().fold(least, f32::max))
+                let points = || self.points.iter().map(|point| point.value());
+                let least = points().fold(f32::MAX, f32::min);
+                (least, points().fold(least, f32::max))
             }
         }
     }
@@ -146,7 +148,9 @@ impl Generator {
         if usize::from(piece.offset) != self.points.len() {
             return Err(Refusal::Range);
         }
-        self.points.extend_from_slice(&piece.points).map_err(|_| Refusal::Range)?;
+        for point in &piece.points {
+            self.points.push(Brief::of(*point)).map_err(|_| Refusal::Range)?;
+        }
         Ok(self.points.len() as u16)
     }
 
@@ -226,8 +230,10 @@ impl Generator {
         }
         let index = self.ticks / ticks_per_point;
         let share = (self.ticks % ticks_per_point) as f32 / ticks_per_point as f32;
-        let point =
-            |at: u32| self.points.get(at.min(count.saturating_sub(1)) as usize).copied().unwrap_or(self.last);
+        let point = |at: u32| {
+            let place = at.min(count.saturating_sub(1)) as usize;
+            self.points.get(place).map_or(self.last, |point| point.value())
+        };
         let next = if repeat && index + 1 >= count { 0 } else { index + 1 };
         let from = point(index);
         from + (point(next) - from) * share

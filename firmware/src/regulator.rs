@@ -169,10 +169,8 @@ impl RegulatorState {
     }
 
     /// The last command again.
-    pub fn hold(&mut self, dt: f32, air: &Air, regulator: &Regulator) -> f32 {
-        let command = self.command_pa;
-        self.predict(dt, command, air, regulator);
-        command
+    pub fn hold(&mut self, dt: f32, air: &Air, regulator: &Regulator) {
+        self.predict(dt, self.command_pa, air, regulator);
     }
 
     fn predict(&mut self, dt: f32, command_pa: f32, air: &Air, regulator: &Regulator) {

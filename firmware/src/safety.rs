@@ -60,7 +60,7 @@ const fn rule(fault: Fault, while_armed: bool, may_hold: bool) -> Rule {
 }
 
 /// Every fault, in the order of its code. How long each takes to be noticed is in [`watch`](crate::watch).
-pub const RULES: [Rule; 19] = [
+pub const RULES: [Rule; Fault::ALL.len()] = [
     rule(Fault::SensorRange, true, true),
     rule(Fault::SensorStuck, false, true),
     rule(Fault::SensorNoisy, true, true),
@@ -97,8 +97,8 @@ pub fn reaction(fault: Fault, hold_on: u32) -> Reaction {
 pub struct Machine {
     state: State,
     faults: Faults,
-    /// A fault that the store has not been given yet.
-    unsaved: Option<FaultReport>,
+    /// Whether the store has not been given the latched fault yet.
+    unsaved: bool,
 }
 
 impl Machine {
@@ -117,9 +117,9 @@ impl Machine {
         self.faults.latched.map(|report| report.fault)
     }
 
-    /// Takes the last fault that has not been taken yet, to be kept.
+    /// Takes the latched fault, to be kept, if it has not been taken yet.
     pub fn take_unsaved(&mut self) -> Option<FaultReport> {
-        self.unsaved.take()
+        if core::mem::take(&mut self.unsaved) { self.faults.latched } else { None }
     }
 
     /// Where a request would lead.
@@ -149,14 +149,14 @@ impl Machine {
     }
 
     /// A fault: counted each time, latched if it is the first. Returns whether it was.
-    pub fn fault(&mut self, report: FaultReport) -> bool {
+    pub fn fault(&mut self, report: &FaultReport) -> bool {
         let count = &mut self.faults.counts[usize::from(report.fault.code()) % RULES.len()];
         *count = count.saturating_add(1);
         if self.faults.latched.is_some() {
             return false;
         }
-        self.faults.latched = Some(report);
-        self.unsaved = Some(report);
+        self.faults.latched = Some(*report);
+        self.unsaved = true;
         // The table has a way to `Fault` from every state.
         let _ = self.request(Cause::Fault);
         true
@@ -214,9 +214,9 @@ mod tests {
     fn the_first_fault_is_latched_and_the_rest_are_counted() {
         let mut machine = Machine::default();
         assert!(machine.request(Cause::Arm).is_ok() && machine.request(Cause::Start).is_ok());
-        assert!(machine.fault(report(Fault::OverStroke)));
-        assert!(!machine.fault(report(Fault::OverPressure)));
-        assert!(!machine.fault(report(Fault::OverPressure)));
+        assert!(machine.fault(&report(Fault::OverStroke)));
+        assert!(!machine.fault(&report(Fault::OverPressure)));
+        assert!(!machine.fault(&report(Fault::OverPressure)));
         assert_eq!(machine.latched(), Some(Fault::OverStroke));
         assert_eq!(machine.faults().counts[usize::from(Fault::OverPressure.code())], 2);
         assert_eq!(machine.request(Cause::Arm), Err(Refusal::Latched(Fault::OverStroke)));

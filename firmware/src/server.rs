@@ -5,6 +5,7 @@ mod upload;
 mod wear;
 
 use embedded_storage_async::nor_flash::NorFlash;
+use model_core::effects::Memory;
 use model_core::image::{self, ImageError};
 use model_core::link::endpoints;
 use model_core::link::frame::{self, Exchange, Header, Kind};
@@ -17,7 +18,7 @@ use crate::board::Identity;
 use crate::control::{self, Controller};
 use crate::modes::Model;
 use crate::shared::Shared;
-use crate::store::{self, Memories, Store};
+use crate::store::{self, Store};
 use crate::watch::Finding;
 
 use self::session::Session;
@@ -56,6 +57,7 @@ impl<F: NorFlash> Server<F> {
     ///
     /// # Errors
     /// The flash cannot hold a store at all.
+    #[inline(never)]
     pub fn start(identity: Identity, flash: F, shared: &Shared) -> Result<Self, StoreFault> {
         let mut store = Store::open(flash)?;
         let mut damaged = false;
@@ -67,11 +69,7 @@ impl<F: NorFlash> Server<F> {
                 store.count_start()?
             }
         };
-        if let Ok(Some(settings)) = store.settings()
-            && control::check_settings(&settings).is_ok()
-        {
-            shared.with(|controller| controller.use_settings(settings));
-        }
+        use_settings(&mut store, shared);
         let counts = frame::Counts::default();
         let mut server = Self {
             identity,
@@ -97,11 +95,21 @@ impl<F: NorFlash> Server<F> {
         Ok(server)
     }
 
-    /// Has the controller use the kept table of a muscle, its effects with what they remembered.
+    /// Has the controller use the kept table of a muscle, its effects with what they remembered. Apart from each other: what the one
+    /// takes of the stack the other does not stand on.
     fn use_kept(&mut self, side: Side, shared: &Shared) -> Result<(), Refusal> {
+        if self.use_table(side, shared)? {
+            self.remember(side, shared);
+        }
+        Ok(())
+    }
+
+    /// Has the controller use the kept table of a muscle; says whether there is one.
+    #[inline(never)]
+    fn use_table(&mut self, side: Side, shared: &Shared) -> Result<bool, Refusal> {
         let Some(bytes) = self.store.table(side).map_err(Refusal::Store)? else {
             shared.with(|controller| controller.forget_table(side));
-            return Ok(());
+            return Ok(false);
         };
         let table = &mut self.upload.place(shared)?.table;
         let used = read_table(bytes, table).and_then(|()| {
@@ -109,12 +117,11 @@ impl<F: NorFlash> Server<F> {
             used.map_err(|error| table_refusal(ImageError::Table(error)))
         });
         self.upload.forget(shared);
-        used?;
-        self.remember(side, shared);
-        Ok(())
+        used.map(|()| true)
     }
 
     /// Gives a table's effects the memories that were kept.
+    #[inline(never)]
     fn remember(&mut self, side: Side, shared: &Shared) {
         // What cannot be read is as if it had not been kept.
         let _ = self.store.each_memory(side, &mut |position, memory| {
@@ -132,16 +139,18 @@ impl<F: NorFlash> Server<F> {
     /// Keeps what must not be lost and is not asked for: new faults, memories of effects. Called now and then by the link's
     /// task, and never while running: a flash may stop the processor while it erases.
     pub fn keep(&mut self, shared: &Shared) {
-        let (state, fault) = shared.with(|c| {
-            let state = c.state();
-            (state, if state == State::Running { None } else { c.machine().take_unsaved() })
-        });
-        if let Some(report) = fault {
-            // A store that fails here has no better place to say so than the next request that needs it.
-            let _ = self.store.put_fault(report);
+        if shared.with(|controller| controller.state()) == State::Running {
+            return;
         }
-        if state != State::Running {
-            self.keep_memories(shared, false);
+        self.keep_fault(shared);
+        self.keep_memories(shared, false);
+    }
+
+    #[inline(never)]
+    fn keep_fault(&mut self, shared: &Shared) {
+        if let Some(mut report) = shared.with(|controller| controller.machine().take_unsaved()) {
+            // A store that fails here has no better place to say so than the next request that needs it.
+            let _ = self.store.put_fault(&mut report);
         }
     }
 
@@ -157,30 +166,29 @@ impl<F: NorFlash> Server<F> {
         }
     }
 
+    /// Keeps what all effects of a muscle's table remember, if any of them must and has moved.
     #[inline(never)]
     fn keep_memory(&mut self, side: Side, shared: &Shared, always: bool) {
-        let mut memories = Memories::new();
-        let tick = shared.with(|c| {
-            if let Some(model) = c.model(side) {
-                persistent_memories(model, &mut memories);
-            }
-            c.ticks()
-        });
-        if memories.is_empty() || !self.is_worth_keeping(side, &memories) {
+        let (count, tick) = shared.with(|c| (c.model(side).map_or(0, persistent_memories), c.ticks()));
+        let memory = |position| {
+            let found = |model: &Model| model.chain.memories().nth(position).map(|(_, memory)| *memory);
+            shared.with(|c| c.model(side).and_then(found).unwrap_or_default())
+        };
+        if count == 0 || !self.is_worth_keeping(side, count, &memory) {
             return;
         }
         if self.wear.allows(tick) || always {
             // What cannot be written now is tried again with the next change of state.
-            let _ = self.store.put_memories(side, memories);
+            let _ = self.store.put_memories(side, count, &memory);
         }
     }
 
-    fn is_worth_keeping(&mut self, side: Side, memories: &Memories) -> bool {
+    fn is_worth_keeping(&mut self, side: Side, count: usize, memory: &dyn Fn(usize) -> Memory<f32>) -> bool {
         let mut moved = false;
-        let count = self.store.each_memory(side, &mut |position, kept| {
-            moved |= memories.get(position).is_none_or(|now| wear::has_moved(kept, now));
+        let kept = self.store.each_memory(side, &mut |position, kept| {
+            moved |= position >= count || wear::has_moved(kept, &memory(position));
         });
-        moved || count != Ok(memories.len())
+        moved || kept != Ok(count)
     }
 
     /// Starts again on the same flash, as after a restart that was asked for.
@@ -246,6 +254,16 @@ impl<F: NorFlash> Server<F> {
     }
 }
 
+/// Has the controller use the kept settings, if it can.
+#[inline(never)]
+fn use_settings<F: NorFlash>(store: &mut Store<F>, shared: &Shared) {
+    if let Ok(Some(settings)) = store.settings()
+        && control::check_settings(&settings).is_ok()
+    {
+        shared.with(|controller| controller.use_settings(&settings));
+    }
+}
+
 fn table_refusal(error: ImageError) -> Refusal {
     Refusal::Table(table_fault(error))
 }
@@ -256,12 +274,8 @@ fn read_table(image: &[u8], table: &mut MuscleTable) -> Result<(), Refusal> {
     image::read_into(image, table).map_err(table_refusal)
 }
 
-/// What all effects of a table remember, if any of them must; nothing otherwise.
-fn persistent_memories(model: &Model, memories: &mut Memories) {
-    if model.chain.memories().any(|(effect, _)| effect.is_persistent()) {
-        for (_, memory) in model.chain.memories() {
-            // The chain is no longer than the vector.
-            let _ = memories.push(*memory);
-        }
-    }
+/// How many effects' memories must survive a power cycle: those of all, if any of them must.
+fn persistent_memories(model: &Model) -> usize {
+    let any = model.chain.memories().any(|(effect, _)| effect.is_persistent());
+    if any { model.chain.memories().count() } else { 0 }
 }

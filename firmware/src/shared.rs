@@ -10,30 +10,18 @@ use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
-#[cfg(feature = "log")]
-use model_core::link::endpoints::LOG;
-use model_core::link::endpoints::{EVENT, TELEMETRY};
-use model_core::link::frame::{self, Header, Kind, MAX_TOPIC};
-use model_core::link::messages::{Event, Telemetry};
+use model_core::link::frame::MAX_TOPIC;
 use model_core::link::settings::Settings;
 
 use crate::board::Outputs;
-use crate::control::{Controller, Stepped};
+use crate::control::Controller;
 #[cfg(feature = "board")]
 use crate::modes::Seat;
 use crate::room::{Room, room};
+use crate::spoken::Spoken;
 
-/// Samples that wait for the link: a longest answer takes 5 ms at 1 Mbaud.
-const WAITING: usize = 16;
-
-/// What the device says by itself.
-#[derive(Clone, Debug)]
-pub(crate) enum Spoken {
-    Sample(u16, Telemetry),
-    Event(Event),
-    #[cfg(feature = "log")]
-    Log(crate::log::Frame),
-}
+/// Samples that wait for the link: twice as many as come in the 5.2 ms that a longest answer takes at 1 Mbaud.
+const WAITING: usize = 12;
 
 /// The controller, in a critical section of its own. Neither end of it is grown into the many places that enter.
 struct Entered<'s> {
@@ -77,9 +65,10 @@ pub struct Shared {
 impl Shared {
     /// A controller as after power-up, for two muscles.
     pub fn new(settings: Settings) -> Self {
-        Self::around(Controller::new(settings))
+        Self::around(Controller::new(&settings))
     }
 
+    #[inline(always)]
     fn around(controller: Controller) -> Self {
         Self {
             controller: Mutex::new(RefCell::new(controller)),
@@ -89,12 +78,12 @@ impl Shared {
         }
     }
 
-    /// The one of a board: a static of its own, made apart from what goes on to use it.
+    /// The one of a board: a static of its own, made in its place and apart from what goes on to use it.
     #[cfg(feature = "board")]
     #[inline(never)]
-    pub fn take(settings: Settings, seats: [Seat; 2]) -> &'static Self {
+    pub fn take(settings: &Settings, seats: [Seat; 2]) -> &'static Self {
         static SHARED: static_cell::StaticCell<Shared> = static_cell::StaticCell::new();
-        SHARED.init_with(|| Self::around(Controller::seated(settings, seats)))
+        SHARED.uninit().write(Self::around(Controller::seated(settings, seats)))
     }
 
     /// Enters the controller.
@@ -110,37 +99,28 @@ impl Shared {
     /// One control step; what it says is put where the telemetry task finds it. A sample without room is dropped and
     /// counted: the loop never waits for the link.
     pub fn step(&self, inputs: &crate::board::Inputs) -> Outputs {
-        let Stepped { outputs, telemetry, event } = self.with(|controller| controller.step(inputs));
+        let outputs = self.with(|controller| controller.step(inputs));
+        self.tell();
+        outputs
+    }
+
+    /// Apart from the step: what this takes of the stack the step does not stand on.
+    #[inline(never)]
+    fn tell(&self) {
+        let event = self.with(Controller::take_event);
         #[cfg(feature = "log")]
-        crate::log::set_tick(self.with(|controller| controller.ticks()));
-        #[cfg(feature = "log")]
-        match &event {
-            Some(Event::Fault(report)) => {
-                defmt::warn!(
-                    "fault {=u8}, {=f32} against {=f32}",
-                    report.fault.code(),
-                    report.value,
-                    report.limit
-                );
-            }
-            Some(Event::State(state)) => defmt::info!("state {=u8}", *state as u8),
-            Some(Event::TraceFull) => defmt::info!("trace full"),
-            None => {}
-        }
-        if event.is_some() {
-            self.changed.signal(());
-        }
+        crate::log::tell(self.with(|controller| controller.ticks()), event.as_ref());
         if let Some(event) = event {
+            self.changed.signal(());
             // The host must hear of it, whatever else waits: the oldest sample makes room.
             if self.spoken.is_full() && self.spoken.try_receive().is_ok() {
                 self.drop_one();
             }
             self.say(Spoken::Event(event));
         }
-        if let Some((number, sample)) = telemetry {
-            self.say(Spoken::Sample(number, sample));
+        if let Some(sample) = self.with(Controller::take_sample) {
+            self.say(Spoken::Sample(sample));
         }
-        outputs
     }
 
     fn say(&self, spoken: Spoken) {
@@ -168,33 +148,25 @@ impl Shared {
         self.spoken.free_capacity() >= 2
     }
 
-    /// What is to be said next, when there is something.
-    pub(crate) async fn next(&self) -> Spoken {
-        #[cfg(feature = "log")]
-        return match select(self.spoken.receive(), crate::log::next()).await {
-            Either::First(spoken) => spoken,
-            Either::Second(line) => Spoken::Log(line),
-        };
-        #[cfg(not(feature = "log"))]
-        self.spoken.receive().await
+    /// The next frame to send without being asked, when there is one. Written where it is taken: nothing of it is kept over a wait.
+    pub(crate) async fn next(&self, out: &mut [u8; MAX_TOPIC]) -> usize {
+        loop {
+            #[cfg(feature = "log")]
+            if let Either::Second(line) = select(self.spoken.ready_to_receive(), crate::log::next()).await {
+                return Spoken::Log(line).encode(out);
+            }
+            #[cfg(not(feature = "log"))]
+            self.spoken.ready_to_receive().await;
+            if let Some(length) = self.next_spoken(out) {
+                return length;
+            }
+        }
     }
 
     /// The next frame to send without being asked, if there is one.
     pub fn next_spoken(&self, out: &mut [u8; MAX_TOPIC]) -> Option<usize> {
-        self.spoken.try_receive().ok().map(|mut spoken| encode(&mut spoken, out))
+        self.spoken.try_receive().ok().map(|mut spoken| spoken.encode(out))
     }
-}
-
-pub(crate) fn encode(spoken: &mut Spoken, out: &mut [u8; MAX_TOPIC]) -> usize {
-    let header = |id, sequence| Header { kind: Kind::Topic, id, sequence };
-    let written = match spoken {
-        Spoken::Sample(number, sample) => frame::encode_fields(header(TELEMETRY, *number), sample, out),
-        Spoken::Event(event) => frame::encode_fields(header(EVENT, 0), event, out),
-        #[cfg(feature = "log")]
-        Spoken::Log(line) => frame::encode_bytes(header(LOG, 0), line, out),
-    };
-    // The largest of both fits, which `model_core::link::endpoints` tests.
-    written.unwrap_or(0)
 }
 
 #[cfg(test)]

@@ -19,11 +19,10 @@
 //! when this layout does.
 
 use core::cell::RefCell;
+use core::pin::pin;
 
-use crate::room::{Room, room};
 use embassy_futures::block_on;
 use embedded_storage_async::nor_flash::NorFlash;
-use heapless::Vec;
 use model_core::check;
 use model_core::effects::{MAX_EFFECTS, MEMORY, Memory};
 use model_core::fields;
@@ -35,11 +34,13 @@ use sequential_storage::Error;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage, SerializationError, Value};
 
+use crate::room::{Room, room};
+
 /// Version of the layout. It moves whenever anything that is kept has other fields: postcard's bytes do not say what they are,
 /// so a value of another layout would be read as if it were of this one. Its key moves with it.
 pub const FORMAT: u16 = 3;
-/// Longest item with its key, rounded up to the largest word of flash.
-const BUFFER: usize = image::MAX_LEN + 64;
+/// Longest item with its key, rounded up to words of a flash of at most 16 bytes.
+const BUFFER: usize = image::MAX_LEN + 16;
 
 /// Which slot holds the table in use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -78,9 +79,6 @@ impl Selected {
     }
 }
 
-/// What effects remember of one muscle.
-pub type Memories = Vec<Memory<f32>, MAX_EFFECTS>;
-
 /// A value on its way into the store, which writes it where the item is put together: no copy on the stack. It is read by
 /// [`Store::value`].
 struct Written<'v>(RefCell<&'v mut dyn Fields>);
@@ -96,13 +94,21 @@ impl Value<'_> for Written<'_> {
     }
 }
 
-/// Memories with the generation of their table.
-struct Kept(u32, Memories);
+/// Memories on their way into the store, asked for one at a time: all of them are half a kilobyte. Only ever written.
+struct Remembered<'m> {
+    generation: u32,
+    count: usize,
+    memory: &'m dyn Fn(usize) -> Memory<f32>,
+}
 
-impl Fields for Kept {
+impl Fields for Remembered<'_> {
     fn walk(&mut self, walk: &mut Walk<'_>) {
-        self.0.walk(walk);
-        self.1.walk(walk);
+        self.generation.walk(walk);
+        // A list is its length and its elements.
+        (self.count as u32).walk(walk);
+        for position in 0..self.count {
+            (self.memory)(position).walk(walk);
+        }
     }
 }
 
@@ -161,15 +167,15 @@ impl<F: NorFlash> Store<F> {
     /// # Errors
     /// [`StoreFault::Medium`].
     pub fn erase(&mut self) -> Result<(), StoreFault> {
-        block_on(self.map.erase_all()).map_err(fault_of)
+        block_on(pin!(self.map.erase_all())).map_err(fault_of)
     }
 
     fn bytes(&mut self, key: u8) -> Result<Option<&[u8]>, StoreFault> {
-        block_on(self.map.fetch_item::<&[u8]>(&mut self.buffer[..], &key)).map_err(fault_of)
+        block_on(pin!(self.map.fetch_item::<&[u8]>(&mut self.buffer[..], &key))).map_err(fault_of)
     }
 
     fn put(&mut self, key: u8, value: &dyn Value<'_>) -> Result<(), StoreFault> {
-        block_on(self.map.store_item_generic(&mut self.buffer[..], &key, value)).map_err(fault_of)
+        block_on(pin!(self.map.store_item_generic(&mut self.buffer[..], &key, value))).map_err(fault_of)
     }
 
     fn put_bytes(&mut self, key: u8, bytes: &[u8]) -> Result<(), StoreFault> {
@@ -263,8 +269,8 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// As the medium fails.
-    pub fn put_settings(&mut self, mut settings: Settings) -> Result<(), StoreFault> {
-        self.put_value(SETTINGS, &mut settings)
+    pub fn put_settings(&mut self, settings: &mut Settings) -> Result<(), StoreFault> {
+        self.put_value(SETTINGS, settings)
     }
 
     /// Hands what each effect remembered of a muscle since its table was committed to `act`, by its place in the table; gives how
@@ -278,36 +284,22 @@ impl<F: NorFlash> Store<F> {
         act: &mut dyn FnMut(usize, &Memory<f32>),
     ) -> Result<usize, StoreFault> {
         let generation = self.generation(side)?;
-        let Some(bytes) = self.bytes(MEMORIES + side.index() as u8)? else { return Ok(0) };
-        let mut rest = bytes;
-        let mut walk = Walk::new(&mut rest);
-        // A list is its length and its elements.
-        let (mut kept, mut count) = (0_u32, 0_u32);
-        kept.walk(&mut walk);
-        count.walk(&mut walk);
-        if kept != generation {
-            return Ok(0);
-        }
-        let mut read = 0;
-        while read < (count as usize).min(MAX_EFFECTS) {
-            let mut memory: Memory<f32> = [0.0; MEMORY];
-            memory.walk(&mut walk);
-            if !walk.is_whole() {
-                break;
-            }
-            act(read, &memory);
-            read += 1;
-        }
-        Ok(read)
+        let kept = self.bytes(MEMORIES + side.index() as u8)?;
+        Ok(kept.map_or(0, |bytes| each_kept(bytes, generation, act)))
     }
 
-    /// Keeps what effects remember. An empty list forgets.
+    /// Keeps what so many effects remember, by their places in the table; none forgets.
     ///
     /// # Errors
     /// As the medium fails.
-    pub fn put_memories(&mut self, side: Side, memories: Memories) -> Result<(), StoreFault> {
+    pub fn put_memories(
+        &mut self,
+        side: Side,
+        count: usize,
+        memory: &dyn Fn(usize) -> Memory<f32>,
+    ) -> Result<(), StoreFault> {
         let generation = self.generation(side)?;
-        self.put_value(MEMORIES + side.index() as u8, &mut Kept(generation, memories))
+        self.put_value(MEMORIES + side.index() as u8, &mut Remembered { generation, count, memory })
     }
 
     fn generation(&mut self, side: Side) -> Result<u32, StoreFault> {
@@ -318,9 +310,9 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// As the medium fails.
-    pub fn put_fault(&mut self, mut report: FaultReport) -> Result<(), StoreFault> {
+    pub fn put_fault(&mut self, report: &mut FaultReport) -> Result<(), StoreFault> {
         let next = self.value::<u8>(PAST_FAULT_NEXT)?.unwrap_or(0) % FAULT_LOG as u8;
-        self.put_value(PAST_FAULT + next, &mut report)?;
+        self.put_value(PAST_FAULT + next, report)?;
         let mut after = (next + 1) % FAULT_LOG as u8;
         self.put_value(PAST_FAULT_NEXT, &mut after)
     }
@@ -347,6 +339,31 @@ impl<F: NorFlash> Store<F> {
         self.put_value(STARTS, &mut starts)?;
         Ok(starts)
     }
+}
+
+/// Hands what was kept for a table of this generation to `act`; gives how many memories there were.
+#[inline(never)]
+fn each_kept(bytes: &[u8], generation: u32, act: &mut dyn FnMut(usize, &Memory<f32>)) -> usize {
+    let mut rest = bytes;
+    let mut walk = Walk::new(&mut rest);
+    // A list is its length and its elements.
+    let (mut kept, mut count) = (0_u32, 0_u32);
+    kept.walk(&mut walk);
+    count.walk(&mut walk);
+    if kept != generation {
+        return 0;
+    }
+    let mut read = 0;
+    while read < (count as usize).min(MAX_EFFECTS) {
+        let mut memory: Memory<f32> = [0.0; MEMORY];
+        memory.walk(&mut walk);
+        if !walk.is_whole() {
+            break;
+        }
+        act(read, &memory);
+        read += 1;
+    }
+    read
 }
 
 fn fits(image: &[u8], described: &Described) -> bool {

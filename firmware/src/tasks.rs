@@ -9,14 +9,11 @@ use model_core::link::frame::{Accumulator, MAX_TOPIC};
 
 use crate::board::{Outputs, Plant};
 use crate::server::Server;
-use crate::shared::{self, Shared};
+use crate::shared::Shared;
 
 /// The control loop, for ever, in the plant's time.
 pub async fn control(plant: &mut impl Plant, shared: &Shared) -> ! {
-    let mut outputs = Outputs::default();
-    for side in &mut outputs.sides {
-        side.vent = true;
-    }
+    let mut outputs = Outputs::VENT;
     loop {
         let inputs = plant.exchange(&outputs).await;
         outputs = shared.step(&inputs);
@@ -32,7 +29,7 @@ pub async fn link<R: Read, W: Write, F: NorFlash>(
     shared: &Shared,
 ) {
     let mut accumulator = Accumulator::new();
-    let mut bytes = [0; 64];
+    let mut bytes = [0; 32];
     loop {
         let count = match select(receiver.read(&mut bytes), shared.change()).await {
             Either::First(Ok(count)) => count,
@@ -57,8 +54,7 @@ pub async fn link<R: Read, W: Write, F: NorFlash>(
 pub async fn telemetry<W: Write>(sender: &Gate<CriticalSectionRawMutex, W>, shared: &Shared) {
     let mut out = [0; MAX_TOPIC];
     loop {
-        let mut spoken = shared.next().await;
-        let length = shared::encode(&mut spoken, &mut out);
+        let length = shared.next(&mut out).await;
         if sender.lock().await.write_all(&out[..length]).await.is_err() {
             return;
         }

@@ -5,6 +5,7 @@ use model_core::link::messages::{
     Field, Refusal, TRACE_PIECE, TRACE_VARIABLES, TraceArm, TraceInfo, TracePiece, Trigger, Variable,
 };
 
+use crate::brief::Brief;
 use crate::common_room::{CommonRoom, TRACE_CAPACITY};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,7 +116,7 @@ impl Trace {
         let Some(values) = self.values.as_mut().and_then(CommonRoom::trace) else { return false };
         let first = self.next * self.variables.len();
         for (place, variable) in (first..).zip(&self.variables) {
-            let now = value(*variable);
+            let now = Brief::of(value(*variable));
             match values.get_mut(place) {
                 Some(old) => *old = now,
                 // As many records are made as the room has places for.
@@ -165,7 +166,9 @@ impl Trace {
         for at in from..self.records.min(from + TRACE_PIECE / width) {
             let place = (oldest + at) % self.room * width;
             let record = values.get(place..place + width).ok_or(Refusal::Range)?;
-            piece.values.extend_from_slice(record).map_err(|_| Refusal::Range)?;
+            for value in record {
+                piece.values.push(value.value()).map_err(|_| Refusal::Range)?;
+            }
         }
         Ok(())
     }

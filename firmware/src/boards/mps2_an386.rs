@@ -33,30 +33,24 @@ use model_core::link::hello::Board;
 use model_core::link::settings::Settings;
 use static_cell::StaticCell;
 
-use self::bench::{Bench, BenchPipes, BenchUart, Benches};
+use self::bench::{Bench, Benches};
 use self::flash::FileFlash;
 use self::uart::{Pipes, Receiver, Sender, Uart};
 
-/// Twice what the line of a real board needs (`nucleo_f446re.rs` has the numbers): the emulated one keeps no baud rate, so a host's burst
-/// of requests comes at once, and the emulator may leave the program without time for several milliseconds of the host's.
-const LINK_RX: usize = 1024;
-const LINK_TX: usize = 512;
-type LinkUart = Uart<LINK_RX, LINK_TX>;
-
-static LINK: LinkUart = {
-    static PIPES: Pipes<LINK_RX, LINK_TX> = Pipes::new();
+static LINK: Uart = {
+    static PIPES: Pipes = Pipes::new();
     Uart::new(0x4000_4000, &PIPES)
 };
-static BENCH: BenchUart = {
-    static PIPES: BenchPipes = Pipes::new();
+static BENCH: Uart = {
+    static PIPES: Pipes = Pipes::new();
     Uart::new(0x4000_5000, &PIPES)
 };
-static SECOND_BENCH: BenchUart = {
-    static PIPES: BenchPipes = Pipes::new();
+static SECOND_BENCH: Uart = {
+    static PIPES: Pipes = Pipes::new();
     Uart::new(0x4000_6000, &PIPES)
 };
 
-type Port = Mutex<CriticalSectionRawMutex, Sender<LINK_RX, LINK_TX>>;
+type Port = Mutex<CriticalSectionRawMutex, Sender>;
 
 /// One word of the vector table.
 #[repr(C)]
@@ -85,7 +79,8 @@ extern "C" fn second_sent() {
 }
 
 /// Everything runs on an interrupt that no device uses, below all that do, and the main program sleeps: in QEMU only an
-/// interrupt wait lets the host's processor rest (an event wait, the thread executor's, spins).
+/// interrupt wait lets the host's processor rest (an event wait, the thread executor's, spins). The control loop is not above the rest
+/// as on a real board: the bench keeps its time, and would go on while the link waits for the file that stands for the flash.
 static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 const EXECUTOR_LINE: Line = Line(10);
 
@@ -188,7 +183,7 @@ fn start() -> Result<(), &'static str> {
     }
     LINK.start();
     start_interrupts();
-    let shared = Shared::take(Settings::default(), Seat::pair());
+    let shared = Shared::take(&Settings::default(), Seat::pair());
     let port: &'static Port = PORT.init_with(|| Mutex::new(Sender(&LINK)));
     spawn(EXECUTOR.start(EXECUTOR_LINE), shared, port)
 }

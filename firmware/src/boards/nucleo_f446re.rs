@@ -82,7 +82,7 @@ const WATCHDOG_US: u32 = 4_000_000;
 /// What waits to go out: a line of 1 Mbaud takes 100 bytes a millisecond, so the task that sends has 2.5 ms to bring more before the
 /// line rests. Nothing keeps it longer while something is controlled: the control step above it takes hundredths of a millisecond, and
 /// the flash, which stops the processor, is only written at rest. A longest answer holds up telemetry for
-/// [`MAX_WIRE`](model_core::link::frame::MAX_WIRE) bytes, 5.2 ms; samples then wait in a queue of 16 ms
+/// [`MAX_WIRE`](model_core::link::frame::MAX_WIRE) bytes, 5.2 ms; samples then wait in a queue of 12 ms
 /// (`firmware/src/shared.rs`). So 1 kHz of two muscles, less than 100 bytes a tick, would fit too.
 const SENDING: usize = 256;
 /// What has come and is not read: all that the line can bring in the 5 ms in which a longest answer goes out and nobody reads.
@@ -326,7 +326,7 @@ fn spawn(spawner: Spawner, started_by: StartedBy) -> Option<()> {
     let (sending, received) = (OUT.init([0; SENDING]), IN.init([0; RECEIVED]));
     let uart = BufferedUart::new(p.USART2, p.PA3, p.PA2, sending, received, Interrupts, line).ok()?;
     let (sender, receiver) = uart.split();
-    let shared = Shared::take(Settings::default(), Seat::single());
+    let shared = Shared::take(&Settings::default(), Seat::single());
     let port: &'static Port = PORT.init_with(|| Mutex::new(sender));
     let identity =
         Identity { board: Board::NucleoF446re, muscles: 1, serial: embassy_stm32::uid::uid(), started_by };

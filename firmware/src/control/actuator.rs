@@ -1,13 +1,14 @@
 //! One muscle at work: its table, its readings, its loops and its regulator.
 
 use model_core::link::messages::SideSample;
-use model_core::link::settings::Settings;
+use model_core::link::settings::{Regulator, Settings};
 use model_core::motion::MotionTracker;
 
 use super::motion_settings;
 use crate::board::Command;
 use crate::modes::{Integral, Model, Seat};
 use crate::regulator::{Air, RegulatorState};
+use crate::tick::TICK_S;
 use crate::watch::SideWatch;
 
 /// One muscle at work.
@@ -32,6 +33,7 @@ pub(super) struct Actuator {
 }
 
 impl Actuator {
+    #[inline(always)]
     pub(super) fn new(settings: &Settings, model: Seat) -> Self {
         Self {
             model,
@@ -43,12 +45,20 @@ impl Actuator {
             guess_pa: 0.0,
             cut: 0.0,
             sample: SideSample::default(),
-            command: Command { pressure_pa: 0.0, vent: true },
+            command: Command::VENT,
             wanted_n: 0.0,
             forward_pa: 0.0,
             trim_pa: 0.0,
             model_n: None,
         }
+    }
+
+    /// Lets the air out, and nothing of what was wanted stays.
+    pub(super) fn vent(&mut self, regulator: &Regulator) {
+        let air = self.air();
+        self.regulator.vent(TICK_S, &air, regulator);
+        self.command = Command::VENT;
+        self.sample.wanted_pa = 0.0;
     }
 
     /// The air in the muscle, as far as a table tells.

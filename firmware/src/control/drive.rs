@@ -17,7 +17,7 @@ impl Controller {
     pub(super) fn drive(&mut self) {
         let mut wishes = [(Wish::default(), true); 2];
         match self.mode {
-            Mode::Vent => {}
+            Mode::Vent => return self.rest(),
             Mode::Pressure => {
                 wishes[0] = (Wish { pressure_pa: self.coming, foreseen_pa: self.coming_step }, true);
             }
@@ -46,12 +46,12 @@ impl Controller {
         }
         let mut bad = None;
         for side in Side::ALL {
-            let used = self.uses(side) && self.mode != Mode::Vent;
+            let used = self.uses(side);
             let Self { settings, sides, .. } = self;
             let actuator = &mut sides[side.index()];
             let (wish, reached) = wishes[side.index()];
             if !used {
-                actuator.command = Command { pressure_pa: 0.0, vent: true };
+                actuator.command = Command::VENT;
                 continue;
             }
             if !wish.pressure_pa.is_finite() {
@@ -113,6 +113,8 @@ impl Controller {
         (Wish { pressure_pa: forward + actuator.trim_pa, foreseen_pa }, reached)
     }
 
+    // Apart from the rest of a step, so that the stack does not hold a joint's forces while an inverse is looked for.
+    #[inline(never)]
     fn pair_forces(&mut self) -> Pull {
         let joint = self.settings.joint;
         let [first, second] = &self.sides;
@@ -133,17 +135,15 @@ impl Controller {
         pull
     }
 
-    /// Keeps the commands of a state that does not control: vented, or held by a fault.
+    /// Keeps the commands of a state or mode that does not control: vented, or held by a fault.
     pub(super) fn rest(&mut self) {
-        let regulator = self.settings.regulator;
-        for side in &mut self.sides {
-            let air = side.air();
-            if self.machine.state() == State::Fault && !side.command.vent {
-                side.regulator.hold(TICK_S, &air, &regulator);
+        let Self { sides, settings, machine, .. } = self;
+        for side in sides {
+            if machine.state() == State::Fault && !side.command.vent {
+                let air = side.air();
+                side.regulator.hold(TICK_S, &air, &settings.regulator);
             } else {
-                side.regulator.vent(TICK_S, &air, &regulator);
-                side.command = Command { pressure_pa: 0.0, vent: true };
-                side.sample.wanted_pa = 0.0;
+                side.vent(&settings.regulator);
             }
         }
     }

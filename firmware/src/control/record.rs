@@ -1,31 +1,42 @@
 //! What a tick leaves behind: outputs, trace, telemetry.
 
-use heapless::Vec;
-use model_core::link::messages::{Event, Mode, Side, SideSample, State, Telemetry, Variable};
+use model_core::link::messages::{Event, Mode, Side, State, Variable};
 
 use super::actuator::Actuator;
-use super::{Controller, Stepped};
+use super::{Controller, News};
 use crate::board::Outputs;
+use crate::spoken::{SIDES, Sample};
 
 impl Controller {
-    pub(super) fn record(&mut self) -> Stepped {
+    pub(super) fn record(&mut self) -> Outputs {
         for side in &mut self.sides {
             side.sample.command_pa = if side.command.vent { 0.0 } else { side.command.pressure_pa };
         }
-        let outputs = Outputs {
-            sides: [self.sides[0].command, self.sides[1].command],
-            asked: if self.mode == Mode::Force { self.asked } else { self.sides[0].wanted_n },
-        };
         let Self { trace, sides, machine, tick, asked, step_us, .. } = self;
         let state = machine.state();
         let full = trace.sample(*tick, |variable| value_of(variable, sides, state, *asked, *step_us));
         if full {
-            self.event = self.event.or(Some(Event::TraceFull));
+            self.news = self.news.or(Some(News::TraceFull));
         }
-        Stepped { outputs, telemetry: self.telemetry(), event: self.event.take() }
+        Outputs {
+            sides: [self.sides[0].command, self.sides[1].command],
+            asked: if self.mode == Mode::Force { self.asked } else { self.sides[0].wanted_n },
+        }
     }
 
-    fn telemetry(&mut self) -> Option<(u16, Telemetry)> {
+    /// Something to tell the host, once.
+    #[inline(never)]
+    pub fn take_event(&mut self) -> Option<Event> {
+        match self.news.take()? {
+            News::Fault => self.faults().latched.map(Event::Fault),
+            News::State(state) => Some(Event::State(state)),
+            News::TraceFull => Some(Event::TraceFull),
+        }
+    }
+
+    /// The sample of this tick, if one is due; to be asked for once in each.
+    #[inline(never)]
+    pub fn take_sample(&mut self) -> Option<Sample> {
         if self.telemetry_every == 0 {
             return None;
         }
@@ -36,18 +47,17 @@ impl Controller {
         self.telemetry_countdown = self.telemetry_every - 1;
         let number = self.telemetry_number;
         self.telemetry_number = number.wrapping_add(1);
-        let used = if self.uses(Side::Antagonist) { 2 } else { 1 };
-        let sides: Vec<SideSample, 2> = self.sides.iter().take(used).map(|side| side.sample).collect();
-        let sample = Telemetry {
-            time_us: self.time_us(),
+        let used = if self.uses(Side::Antagonist) { SIDES as u8 } else { 1 };
+        Some(Sample {
+            number,
             tick: self.tick,
             state: self.machine.state(),
             mode: self.mode,
             asked: self.asked,
             asked_second: self.asked_second,
-            sides,
-        };
-        Some((number, sample))
+            used,
+            all: core::array::from_fn(|at| self.sides[at].sample),
+        })
     }
 }
 

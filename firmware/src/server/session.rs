@@ -1,6 +1,7 @@
 //! The answer to each endpoint.
 
 use embedded_storage_async::nor_flash::NorFlash;
+use model_core::effects::Memory;
 use model_core::image;
 use model_core::link::endpoints::Service;
 use model_core::link::messages::{
@@ -18,7 +19,6 @@ use crate::common_room::TRACE_CAPACITY;
 use crate::control::{self, Controller};
 use crate::reference;
 use crate::shared::Shared;
-use crate::store::Memories;
 use crate::tick::TICKS_PER_S;
 
 /// A server and the controller it asks.
@@ -142,9 +142,9 @@ impl<F: NorFlash> Service for Session<'_, F> {
     fn set_settings(&mut self, request: &Settings, answer: &mut Settings) -> Result<(), Refusal> {
         control::check_settings(request)?;
         self.at_rest()?;
-        self.server.store.put_settings(*request).map_err(Refusal::Store)?;
-        self.shared.with(|controller| controller.use_settings(*request));
         *answer = *request;
+        self.server.store.put_settings(answer).map_err(Refusal::Store)?;
+        self.shared.with(|controller| controller.use_settings(request));
         Ok(())
     }
 
@@ -220,7 +220,7 @@ impl<F: NorFlash> Service for Session<'_, F> {
 
     fn forget_memory(&mut self, request: &ForgetMemory, (): &mut ()) -> Result<(), Refusal> {
         self.at_rest()?;
-        self.server.store.put_memories(request.side, Memories::new()).map_err(Refusal::Store)?;
+        self.server.store.put_memories(request.side, 0, &|_| Memory::default()).map_err(Refusal::Store)?;
         self.server.use_kept(request.side, self.shared)
     }
 

@@ -2,6 +2,7 @@
 
 use super::*;
 use embedded_storage_async::nor_flash::{ErrorType, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use heapless::Vec;
 use model_core::link::messages::{Mode, SideSample, State};
 
 const PAGE: usize = 2048;
@@ -141,7 +142,7 @@ fn used(commits: u8) -> Store<MockFlash> {
     for n in 0..commits {
         store.commit(Side::Agonist, &table(n)).expect("room");
         store.commit(Side::Antagonist, &table(100 + n)).expect("room");
-        store.put_settings(Settings::default()).expect("room");
+        store.put_settings(&mut Settings::default()).expect("room");
     }
     store
 }
@@ -223,7 +224,7 @@ fn settings_that_lose_power_are_the_old_or_the_new() {
     let before = store.close();
     cut_everywhere(
         &before,
-        |store| store.put_settings(changed).is_ok(),
+        |store| store.put_settings(&mut { changed }).is_ok(),
         |store, left| {
             let after = store.settings().expect("readable");
             assert!(after == Some(changed) || after == Some(Settings::default()), "after {left} words");
@@ -286,7 +287,7 @@ fn the_log_keeps_the_last_faults_and_starts_are_counted() {
             limit: 0.5,
             last: SideSample::default(),
         };
-        store.put_fault(report).expect("room");
+        store.put_fault(&mut { report }).expect("room");
     }
     for back in 0..FAULT_LOG as u8 {
         let report = store.past_fault(back).expect("readable").expect("kept");
@@ -311,8 +312,8 @@ fn report() -> FaultReport {
     }
 }
 
-fn memories() -> Memories {
-    [1.5, -2.5].map(|value| Memory::<f32>::from([value; _])).into_iter().collect()
+fn memories() -> [Memory<f32>; 2] {
+    [1.5, -2.5].map(|value| [value; MEMORY])
 }
 
 /// One of everything that is kept, on an erased flash.
@@ -323,9 +324,9 @@ fn written() -> MockFlash {
     let mut settings = Settings::default();
     settings.regulator.line_s = 4.5e-3;
     settings.pressure_band_pa = 1_234.0;
-    store.put_settings(settings).expect("room");
-    store.put_memories(Side::Agonist, memories()).expect("room");
-    store.put_fault(report()).expect("room");
+    store.put_settings(&mut settings).expect("room");
+    store.put_memories(Side::Agonist, 2, &|position| memories()[position]).expect("room");
+    store.put_fault(&mut report()).expect("room");
     store.count_start().expect("room");
     store.close()
 }
@@ -364,8 +365,8 @@ fn what_this_format_wrote_is_read_and_written_alike() {
     assert!(store.selected(Side::Agonist).expect("readable").is_some_and(|s| s.previous.is_some()));
     let settings = store.settings().expect("readable").expect("kept");
     assert_eq!((settings.regulator.line_s, settings.pressure_band_pa), (4.5e-3, 1_234.0));
-    let mut remembered = Memories::new();
-    store.each_memory(Side::Agonist, &mut |_, one| remembered.push(*one).expect("two")).expect("readable");
+    let mut remembered = std::vec::Vec::new();
+    store.each_memory(Side::Agonist, &mut |_, one| remembered.push(*one)).expect("readable");
     assert_eq!(remembered, memories());
     assert_eq!(store.past_fault(0), Ok(Some(report())));
     assert_eq!(store.count_start(), Ok(2));
@@ -380,6 +381,6 @@ fn settings_of_format_2_are_not_taken_for_those_of_today() {
     assert_eq!(kept(&mut store, Side::Agonist).as_deref(), Some(&table(2)[..]));
     assert_eq!(store.past_fault(0), Ok(Some(report())));
     assert_eq!(store.count_start(), Ok(2));
-    store.put_settings(Settings::default()).expect("room");
+    store.put_settings(&mut Settings::default()).expect("room");
     assert_eq!(store.settings(), Ok(Some(Settings::default())));
 }

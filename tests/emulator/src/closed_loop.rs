@@ -2,8 +2,9 @@
 //! many cases, and for long runs.
 
 use firmware::board::{Inputs, Outputs, Readings};
-use firmware::control::{Controller, Stepped};
+use firmware::control::Controller;
 use firmware::regulator::SMOOTHING;
+use firmware::spoken::Sample;
 use firmware::tick::TICK_S;
 use host::device::regulator::{self, Found};
 use model_core::link::messages::{Mode, Reference, SetPoint, Side, State};
@@ -50,29 +51,25 @@ impl Loop {
     ) -> Self {
         // There is no link here, and so no host to hear from.
         settings.watch.autonomous = true;
-        let mut controller = Controller::new(settings);
+        let mut controller = Controller::new(&settings);
         controller.use_table(Side::Agonist, table).expect("a valid table");
-        let mut this = Self { controller, plant: Plant::new(bench, motion), outputs: Outputs::default() };
-        for side in &mut this.outputs.sides {
-            side.vent = true;
-        }
+        let mut this = Self { controller, plant: Plant::new(bench, motion), outputs: Outputs::VENT };
         this.tick();
         this.controller.arm().expect("it arms");
         this.controller.start(mode).expect("it starts");
         this
     }
 
-    /// One millisecond.
-    pub fn tick(&mut self) -> Stepped {
+    /// One millisecond; gives the sample, if one was due.
+    pub fn tick(&mut self) -> Option<Sample> {
         let command = self.outputs.sides[0];
         let pressure = if command.vent { 0.0 } else { f64::from(command.pressure_pa) };
         let r = self.plant.step(f64::from(TICK_S), pressure);
         let readings =
             Readings { pressure_pa: r.pressure as f32, stroke_m: r.stroke as f32, force_n: r.force as f32 };
         let inputs = Inputs { sides: [Some(readings), None], ..Inputs::default() };
-        let stepped = self.controller.step(&inputs);
-        self.outputs = stepped.outputs;
-        stepped
+        self.outputs = self.controller.step(&inputs);
+        self.controller.take_sample()
     }
 
     /// Goes on for some ticks and tells what was true in each.
@@ -83,12 +80,12 @@ impl Loop {
         self.controller.set_telemetry(1);
         (0..ticks)
             .map(|_| {
-                let stepped = self.tick();
+                let sample = self.tick();
                 let latched = self.controller.faults().latched;
                 assert!(self.controller.state() == State::Running, "stopped by {latched:?}");
                 let truth = self.plant.truth();
                 Tick {
-                    asked: f64::from(stepped.telemetry.map_or(f32::NAN, |(_, sample)| sample.asked)),
+                    asked: f64::from(sample.map_or(f32::NAN, |sample| sample.asked)),
                     force: truth.force,
                     stroke: truth.stroke,
                     pressure: truth.pressure,
@@ -139,10 +136,10 @@ pub fn identified(bench: &BenchSpec, table: &MuscleTable, stroke_mm: f64) -> Fou
     for pascals in [100e3, 300e3, 100e3, 300e3] {
         control.point(SetPoint::Pressure(pascals));
         for _ in 0..500 {
-            if let Some((_, sample)) = control.tick().telemetry {
-                let side = sample.sides[0];
+            if let Some(sample) = control.tick() {
+                let side = sample.sides()[0];
                 samples.push((
-                    sample.time_us as f64 * 1e-6,
+                    sample.time_us() as f64 * 1e-6,
                     f64::from(side.command_pa),
                     f64::from(side.pressure_pa),
                 ));

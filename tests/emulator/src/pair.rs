@@ -66,14 +66,11 @@ impl PairLoop {
     pub fn start(joint: Joint, table: &MuscleTable, mut settings: Settings) -> Self {
         // There is no link here, and so no host to hear from.
         settings.watch.autonomous = true;
-        let mut controller = Controller::new(settings);
+        let mut controller = Controller::new(&settings);
         for side in Side::ALL {
             controller.use_table(side, table).expect("a valid table");
         }
-        let mut this = Self { controller, joint, outputs: Outputs::default() };
-        for side in &mut this.outputs.sides {
-            side.vent = true;
-        }
+        let mut this = Self { controller, joint, outputs: Outputs::VENT };
         this.tick();
         this.controller.arm().expect("it arms");
         this.controller.start(Mode::Pair).expect("it starts");
@@ -97,7 +94,7 @@ impl PairLoop {
             let answer = self.joint.answer(side);
             Some(Readings { pressure_pa: answer.pressure, stroke_m: answer.stroke, force_n: answer.force })
         });
-        self.outputs = self.controller.step(&Inputs { sides, ..Inputs::default() }).outputs;
+        self.outputs = self.controller.step(&Inputs { sides, ..Inputs::default() });
     }
 
     /// Goes on for some ticks and gives the mean of what was true in the last `judged` of them.

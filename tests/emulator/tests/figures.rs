@@ -1,6 +1,6 @@
-//! Instructions per call, with bounds on both sides: an improvement is committed on purpose.
+//! Instructions per call and memory of the images, with bounds on both sides: an improvement is committed on purpose.
 
-use emulator_tests::figures;
+use emulator_tests::figures::{self, memory};
 
 #[test]
 fn instruction_counts_stay_where_they_are() {
@@ -33,4 +33,16 @@ fn single_precision_costs_less_than_a_hundredth_of_a_percent() {
     let one = figures::precision("example", &model_core::table::example());
     assert!(one.points > 50_000 && one.worst_percent < 0.01, "{one:?}");
     assert!(one.worst_percent > 1e-6, "single precision is compared with itself: {one:?}");
+}
+
+#[test]
+fn both_images_fit_their_flash_and_their_memory() {
+    let (Ok(sizes), Ok(stack)) = (memory::sizes(), memory::stack()) else { return };
+    eprintln!("{}", memory::markdown(&sizes, stack));
+    // Less would be a measurement that missed the store, whose futures alone take more than a half.
+    assert!(stack > 1_000, "{stack} bytes of stack");
+    for size in sizes {
+        assert!(size.flash <= memory::FLASH && size.flash > memory::FLASH / 2, "{size:?}");
+        assert!(size.memory(stack) <= memory::RAM, "{size:?} with {stack} bytes of stack");
+    }
 }

@@ -10,7 +10,7 @@ use embassy_time::{Duration, Instant, Timer};
 use embedded_io_async::{Read, Write};
 use firmware::board::{Command, Inputs, Outputs, Plant, Readings};
 
-use super::uart::{Pipes, Receiver, Sender, Uart};
+use super::uart::{Receiver, Sender, Uart};
 use super::watchdog;
 
 const REQUEST: usize = 18;
@@ -38,11 +38,6 @@ struct Said {
     missed: u16,
 }
 
-/// The pipes of a bench's UART.
-pub type BenchUart = Uart<64, 32>;
-/// Its pipes.
-pub type BenchPipes = Pipes<64, 32>;
-
 /// CRC-16/IBM-3740.
 fn crc16(bytes: &[u8]) -> u16 {
     let mut crc = 0xFFFF_u16;
@@ -57,7 +52,7 @@ fn crc16(bytes: &[u8]) -> u16 {
 
 /// One muscle's bench.
 pub struct Bench {
-    uart: &'static BenchUart,
+    uart: &'static Uart,
     tick: u32,
     /// Whether the bench has been told to start from its initial state.
     started: bool,
@@ -67,7 +62,7 @@ pub struct Bench {
 
 impl Bench {
     /// The bench behind a UART.
-    pub const fn new(uart: &'static BenchUart) -> Self {
+    pub const fn new(uart: &'static Uart) -> Self {
         Self { uart, tick: 0, started: false, buffer: [0; ANSWER], held: 0 }
     }
 

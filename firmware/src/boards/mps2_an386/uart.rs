@@ -1,7 +1,8 @@
 //! CMSDK UARTs as asynchronous byte streams: interrupts on both sides of two pipes.
 //!
-//! The hardware holds one byte each way. QEMU keeps further bytes back until the one is read, so nothing is lost as long
-//! as the receiving pipe has room.
+//! The hardware holds one byte each way. QEMU keeps further bytes back until the one is read: a byte that finds its pipe full stays
+//! where it is until the pipe is read, and nothing is ever lost. A real line would go on sending; what a real board needs is in
+//! `nucleo_f446re.rs`.
 
 use core::convert::Infallible;
 
@@ -25,13 +26,18 @@ const ALL_ON: u32 = 0b1111;
 /// 25 MHz / 25 = 1 Mbaud.
 const DIVIDER: u32 = 25;
 
-/// Pipes of `RX` and `TX` bytes. A static of their own is all zeros and takes no flash.
-pub struct Pipes<const RX: usize, const TX: usize> {
-    received: Pipe<CriticalSectionRawMutex, RX>,
-    sending: Pipe<CriticalSectionRawMutex, TX>,
+/// What waits in a pipe keeps the rest waiting at the emulator, so these are as short as the tasks' own buffers allow; and alike for
+/// all lines, whose code is there once then.
+const RECEIVED: usize = 64;
+const SENDING: usize = 128;
+
+/// Pipes of one line. A static of their own is all zeros and takes no flash.
+pub struct Pipes {
+    received: Pipe<CriticalSectionRawMutex, RECEIVED>,
+    sending: Pipe<CriticalSectionRawMutex, SENDING>,
 }
 
-impl<const RX: usize, const TX: usize> Pipes<RX, TX> {
+impl Pipes {
     /// Empty ones.
     pub const fn new() -> Self {
         Self { received: Pipe::new(), sending: Pipe::new() }
@@ -39,14 +45,14 @@ impl<const RX: usize, const TX: usize> Pipes<RX, TX> {
 }
 
 /// One UART with its pipes.
-pub struct Uart<const RX: usize, const TX: usize> {
+pub struct Uart {
     base: usize,
-    pipes: &'static Pipes<RX, TX>,
+    pipes: &'static Pipes,
 }
 
-impl<const RX: usize, const TX: usize> Uart<RX, TX> {
+impl Uart {
     /// The UART at a base address.
-    pub const fn new(base: usize, pipes: &'static Pipes<RX, TX>) -> Self {
+    pub const fn new(base: usize, pipes: &'static Pipes) -> Self {
         Self { base, pipes }
     }
 
@@ -60,13 +66,15 @@ impl<const RX: usize, const TX: usize> Uart<RX, TX> {
         self.register(CTRL).write(ALL_ON);
     }
 
-    /// Its receive interrupt. A byte that finds the pipe full is lost, as on any UART; the frames' check sums tell.
+    /// Its receive interrupt: takes what has come, as far as there is room.
     pub fn on_receive(&self) {
         self.register(INTERRUPT).write(INTERRUPT_RX);
-        while self.register(STATE).read() & RX_FULL != 0 {
-            let byte = self.register(DATA).read() as u8;
-            let _ = self.pipes.received.try_write(&[byte]);
-        }
+        critical_section::with(|_| {
+            while self.register(STATE).read() & RX_FULL != 0 && !self.pipes.received.is_full() {
+                let byte = self.register(DATA).read() as u8;
+                let _ = self.pipes.received.try_write(&[byte]);
+            }
+        });
     }
 
     /// Its transmit interrupt: sends what waits, as far as the hardware takes it.
@@ -86,30 +94,33 @@ impl<const RX: usize, const TX: usize> Uart<RX, TX> {
     /// Forgets what has been received and not read.
     pub fn discard(&self) {
         self.pipes.received.clear();
+        self.on_receive();
     }
 }
 
 /// The receiving half.
-pub struct Receiver<const RX: usize, const TX: usize>(pub &'static Uart<RX, TX>);
+pub struct Receiver(pub &'static Uart);
 
 /// The sending half.
-pub struct Sender<const RX: usize, const TX: usize>(pub &'static Uart<RX, TX>);
+pub struct Sender(pub &'static Uart);
 
-impl<const RX: usize, const TX: usize> ErrorType for Receiver<RX, TX> {
+impl ErrorType for Receiver {
     type Error = Infallible;
 }
 
-impl<const RX: usize, const TX: usize> Read for Receiver<RX, TX> {
+impl Read for Receiver {
     async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
-        Ok(self.0.pipes.received.read(buffer).await)
+        let count = self.0.pipes.received.read(buffer).await;
+        self.0.on_receive();
+        Ok(count)
     }
 }
 
-impl<const RX: usize, const TX: usize> ErrorType for Sender<RX, TX> {
+impl ErrorType for Sender {
     type Error = Infallible;
 }
 
-impl<const RX: usize, const TX: usize> Write for Sender<RX, TX> {
+impl Write for Sender {
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
         let written = self.0.pipes.sending.write(bytes).await;
         self.0.on_transmit();

@@ -3,12 +3,14 @@
 use std::io;
 use std::path::Path;
 
-use emulator_tests::figures::{self, count, precisions, reference_error, sizes, stack};
+use emulator_tests::figures::memory::{self, sizes, stack};
+use emulator_tests::figures::{self, count, precisions, reference_error};
 
 fn main() -> io::Result<()> {
     let (Ok(counted), Ok(sizes), Ok(stack)) = (count(), sizes(), stack()) else { return Ok(()) };
     let text = figures::markdown(&counted)
-        + &figures::more_markdown(&sizes, stack, &precisions(), reference_error());
+        + &memory::markdown(&sizes, stack)
+        + &figures::precision_markdown(&precisions(), reference_error());
     print!("{text}");
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/figures");
     std::fs::create_dir_all(&folder)?;

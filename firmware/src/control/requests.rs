@@ -1,0 +1,253 @@
+//! What a host asks of the controller: states, modes, set-points, references.
+
+use model_core::link::messages::{Fault, Field, Mode, Reference, Refusal, SetPoint, Side, State};
+use model_core::link::settings::{FeedForward, Settings};
+
+use super::actuator::Actuator;
+use super::{Controller, News};
+use crate::board::Command;
+use crate::pair::{self, Arm};
+use crate::regulator;
+use crate::safety::Cause;
+use crate::watch::{Finding, SideWatch};
+
+impl Controller {
+    /// Arms.
+    ///
+    /// # Errors
+    /// As [`Machine::request`].
+    pub fn arm(&mut self) -> Result<(), Refusal> {
+        self.change(Cause::Arm)?;
+        for side in &mut self.sides {
+            side.watch = SideWatch::default();
+        }
+        Ok(())
+    }
+
+    fn change(&mut self, cause: Cause) -> Result<(), Refusal> {
+        let before = self.machine.state();
+        let state = self.machine.request(cause)?;
+        if state != before {
+            self.news = Some(News::State(state));
+        }
+        if state != State::Running {
+            self.mode = Mode::Vent;
+            self.generator.begin(Reference::SetPoint)?;
+        }
+        Ok(())
+    }
+
+    /// Starts a mode at what is measured now.
+    ///
+    /// # Errors
+    /// As [`Machine::request`]; [`Refusal::NoTable`], with the fault latched, where the mode needs a table.
+    pub fn start(&mut self, mode: Mode) -> Result<(), Refusal> {
+        self.machine.allows(Cause::Start)?;
+        let needs: &[Side] = match mode {
+            Mode::Vent | Mode::Pressure => &[],
+            Mode::Force if self.settings.feed_forward == FeedForward::Off => &[],
+            Mode::Force | Mode::Stroke => &[Side::Agonist],
+            Mode::Pair => &Side::ALL,
+        };
+        if let Some(side) = needs.iter().copied().find(|side| self.model(*side).is_none()) {
+            let none = Finding { fault: Fault::TableMissing, sensor: None, value: 0.0, limit: 1.0 };
+            self.raise(side, &none);
+            return Err(Refusal::NoTable(side));
+        }
+        self.change(Cause::Start)?;
+        self.mode = mode;
+        self.generator.begin(Reference::SetPoint)?;
+        let first = self.sides[0].sample;
+        let joint = self.settings.joint;
+        self.asked_second = 0.0;
+        self.asked = match mode {
+            Mode::Vent => 0.0,
+            Mode::Pressure => first.pressure_pa.max(0.0),
+            Mode::Force => first.force_n.max(0.0),
+            Mode::Stroke => first.stroke_m,
+            Mode::Pair => (first.stroke_m - self.sides[1].sample.stroke_m) / (2.0 * joint.radius_m),
+        };
+        self.asked_age = 0;
+        for side in &mut self.sides {
+            side.regulator.begin(side.sample.pressure_pa);
+            side.trim.reset();
+            side.stroke_loop.reset();
+            side.guess_pa = side.sample.pressure_pa;
+            side.cut = 0.0;
+            side.watch = SideWatch::default();
+        }
+        if mode == Mode::Pair
+            && let Some(arms) = self.arms()
+        {
+            let mut pair = self.pair;
+            pair.begin(arms);
+            self.pair = pair;
+        }
+        self.trace.on_start();
+        Ok(())
+    }
+
+    /// Vents, and stays ready.
+    ///
+    /// # Errors
+    /// As [`Machine::request`].
+    pub fn stop(&mut self) -> Result<(), Refusal> {
+        self.vent_now();
+        self.change(Cause::Stop)
+    }
+
+    /// Vents, and is no longer ready.
+    ///
+    /// # Errors
+    /// As [`Machine::request`].
+    pub fn disarm(&mut self) -> Result<(), Refusal> {
+        self.vent_now();
+        self.change(Cause::Disarm)
+    }
+
+    pub(super) fn vent_now(&mut self) {
+        // In `Fault` with a held command this is the way to let go of it.
+        for side in &mut self.sides {
+            side.command = Command::VENT;
+        }
+    }
+
+    /// Forgets the latched fault.
+    ///
+    /// # Errors
+    /// [`Refusal::StillFaulty`] while what caused a fault is still there.
+    pub fn clear(&mut self) -> Result<(), Refusal> {
+        if self.machine.state() == State::Fault
+            && let Some(fault) = self.present
+        {
+            return Err(Refusal::StillFaulty(fault));
+        }
+        self.vent_now();
+        self.change(Cause::Clear)
+    }
+
+    /// A new set-point; ends a reference.
+    ///
+    /// # Errors
+    /// [`Refusal::WrongMode`] where it is not the running mode's, [`Refusal::Value`] where it is no finite number,
+    /// [`Refusal::Angle`] or [`Refusal::Stiffness`] where a joint cannot have it.
+    pub fn set_point(&mut self, set_point: SetPoint) -> Result<(), Refusal> {
+        let (mode, asked, second) = match set_point {
+            SetPoint::Pressure(pascals) => (Mode::Pressure, pascals, 0.0),
+            SetPoint::Force(newtons) => (Mode::Force, newtons, 0.0),
+            SetPoint::Stroke(metres) => (Mode::Stroke, metres, 0.0),
+            SetPoint::Pair { angle_rad, stiffness_nm_per_rad } => {
+                (Mode::Pair, angle_rad, stiffness_nm_per_rad)
+            }
+        };
+        self.running()?;
+        if mode != self.mode {
+            return Err(Refusal::WrongMode(self.mode));
+        }
+        if !(asked.is_finite() && second.is_finite()) || second < 0.0 {
+            return Err(Refusal::Value(Field::SetPoint));
+        }
+        if mode == Mode::Pair {
+            self.can_pose(asked, second)?;
+        }
+        self.generator.begin(Reference::SetPoint)?;
+        (self.asked, self.asked_second) = (asked, second);
+        self.asked_age = 0;
+        Ok(())
+    }
+
+    /// Both muscles of a joint, if both have tables.
+    pub(super) fn arms(&self) -> Option<[Arm<'_>; 2]> {
+        if !pair::SUPPORTED {
+            return None;
+        }
+        let [first, second] = &self.sides;
+        Some([self.arm_of(first)?, self.arm_of(second)?])
+    }
+
+    fn arm_of<'a>(&self, side: &'a Actuator) -> Option<Arm<'a>> {
+        let model = side.model.as_ref()?;
+        let Settings { regulator, limits, .. } = &self.settings;
+        let reached_pa = regulator.gain * (regulator.command_max_pa + regulator.offset_pa);
+        let high_pa = model.muscle.max_pressure().pascals().min(limits.pressure_pa).min(reached_pa);
+        Some(Arm { model, pressure_pa: side.guess_pa, high_pa })
+    }
+
+    /// Whether a joint can have an angle and a stiffness.
+    fn can_pose(&self, angle_rad: f32, stiffness_nm_per_rad: f32) -> Result<(), Refusal> {
+        let arms = self.arms().ok_or(Refusal::WrongMode(self.mode))?;
+        pair::check(&self.settings.joint, arms, angle_rad, stiffness_nm_per_rad)
+    }
+
+    /// A wave of the device's own.
+    ///
+    /// # Errors
+    /// As [`Generator::begin`]; [`Refusal::WrongMode`] while venting; [`Refusal::Angle`] or [`Refusal::Stiffness`] where a joint
+    /// cannot have an end of the wave.
+    pub fn reference(&mut self, reference: Reference) -> Result<(), Refusal> {
+        self.running()?;
+        if self.mode == Mode::Vent {
+            return Err(Refusal::WrongMode(Mode::Vent));
+        }
+        if self.mode == Mode::Pair {
+            let (low, high) = self.generator.range(reference);
+            self.can_pose(low, self.asked_second)?;
+            self.can_pose(high, self.asked_second)?;
+        }
+        self.generator.begin(reference)?;
+        // Here, so that no tick has all of it to do.
+        self.generator.look_ahead(regulator::ahead(&self.settings.regulator));
+        self.asked_age = 0;
+        self.trace.on_start();
+        Ok(())
+    }
+
+    fn running(&self) -> Result<(), Refusal> {
+        match (self.machine.state(), self.machine.latched()) {
+            (State::Running, _) => Ok(()),
+            (_, Some(fault)) => Err(Refusal::Latched(fault)),
+            (state, None) => Err(Refusal::WrongState(state)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::board::{Inputs, Readings};
+
+    /// So many ticks of a muscle that follows its command within 30 ms.
+    fn run(controller: &mut Controller, pressure_pa: &mut f32, ticks: u32) {
+        for tick in 0..ticks {
+            // Live sensors never read the same twice.
+            let wiggle = (tick % 7) as f32 - 3.0;
+            let now = Readings {
+                pressure_pa: *pressure_pa + wiggle,
+                stroke_m: 1e-3 + 1e-7 * wiggle,
+                force_n: 1e-3 * wiggle,
+            };
+            let command = controller.step(&Inputs { sides: [Some(now), None], ..Inputs::default() }).sides[0];
+            let target = if command.vent { 0.0 } else { command.pressure_pa };
+            *pressure_pa += (target - *pressure_pa) / 31.0;
+            controller.heard();
+        }
+    }
+
+    #[test]
+    fn a_change_over_to_vent_lets_the_pressure_fall_and_no_watch_misses_it() {
+        let mut settings = Settings::default();
+        settings.watch.follow_pa = 60e3;
+        let mut controller = Controller::new(&settings);
+        let mut pressure = 0.0;
+        run(&mut controller, &mut pressure, 10);
+        assert_eq!(controller.arm(), Ok(()));
+        assert_eq!(controller.start(Mode::Pressure), Ok(()));
+        assert_eq!(controller.set_point(SetPoint::Pressure(300e3)), Ok(()));
+        run(&mut controller, &mut pressure, 1000);
+        assert!((pressure - 300e3).abs() < 1e3, "{pressure}");
+        assert_eq!(controller.start(Mode::Vent), Ok(()));
+        run(&mut controller, &mut pressure, 1000);
+        assert_eq!((controller.state(), controller.faults().latched), (State::Running, None));
+        assert!(pressure < 1e3, "{pressure}");
+    }
+}
