@@ -94,15 +94,18 @@ fn an_unknown_beginning_fades() {
         let shape = [30.0];
         let traces = candidate.fading_columns(&contexts, &shape);
         assert_eq!(traces.len(), candidate.info().fading.len());
+        // What is left of an over-stress in the muscle is rubbed as all that it pulls.
+        let rubbed = |row: usize| if candidate.is_bench() { 1.0 } else { contexts[row].rubbed(1.0) };
         for trace in traces {
             assert!(trace[0].abs() > 0.5, "{name} begins with {}", trace[0]);
-            assert!(trace[799].abs() < trace[0].abs());
+            assert!((trace[799] / rubbed(799)).abs() < (trace[0] / rubbed(0)).abs(), "{name} fades");
         }
     }
     // A standard solid's: e^(−t/τ), also over the pause.
     let solid = Candidate::from_name("stress-relaxation").expect("in the catalogue");
     let trace = &solid.fading_columns(&contexts, &[30.0])[0];
-    assert!((trace[700] - (-35.0_f64 / 30.0).exp()).abs() < 1e-3, "{}", trace[700]);
+    let kept = trace[700] / contexts[700].rubbed(1.0);
+    assert!((kept - (-35.0_f64 / 30.0).exp()).abs() < 1e-3, "{kept}");
     assert!(trace[800].abs() < 1e-12);
 }
 

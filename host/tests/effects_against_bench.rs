@@ -50,7 +50,8 @@ const BOUNDS: [(&str, f64); 28] = [
     ("cross-talk", 0.97),
     ("sensor-delay", 0.95),
     ("log-creep", 0.85),
-    ("tip-effect", 0.80),
+    // The bench's tapers use up fibre by their own steepness, which neither law of the tips knows.
+    ("tip-effect", 0.75),
     ("braid-elasticity", 0.92),
     ("strand-jamming", 0.80),
     ("friction-asymmetry", 0.75),
