@@ -10,8 +10,8 @@ use super::select::{self, Found};
 use super::verdict::{Considered, Missing, ParameterValue};
 
 /// A rival of at least this weight against the winner is said to be possible beside it. Of 34 names of a development set all sets so made
-/// hold the truth, with 2.2 members on average; from a weight of 0.1 on, or of whatever weight where traces are parallel, 3.3. Of 64 larger
-/// effects of the sealed set after it 56 sets held it, with 2.0 members.
+/// hold the truth, with 2.2 members on average; from a weight of 0.1 on, or of whatever weight where traces are parallel, 3.3. Of 62 larger
+/// effects of the last sealed set 59 sets held it, with 1.6 members (`docs/src/proof.md`).
 const AMONG: f64 = 0.15;
 
 /// The effects that were taken, with parameters and intervals, what they cannot be told from, and how probable they are.
