@@ -15,7 +15,7 @@ impl Controller {
     /// Arms.
     ///
     /// # Errors
-    /// As [`Machine::request`].
+    /// As [`Machine::request`](crate::safety::Machine::request).
     pub fn arm(&mut self) -> Result<(), Refusal> {
         self.change(Cause::Arm)?;
         for side in &mut self.sides {
@@ -40,7 +40,7 @@ impl Controller {
     /// Starts a mode at what is measured now.
     ///
     /// # Errors
-    /// As [`Machine::request`]; [`Refusal::NoTable`], with the fault latched, where the mode needs a table.
+    /// As [`Machine::request`](crate::safety::Machine::request); [`Refusal::NoTable`], with the fault latched, where the mode needs a table.
     pub fn start(&mut self, mode: Mode) -> Result<(), Refusal> {
         self.machine.allows(Cause::Start)?;
         let needs: &[Side] = match mode {
@@ -90,7 +90,7 @@ impl Controller {
     /// Vents, and stays ready.
     ///
     /// # Errors
-    /// As [`Machine::request`].
+    /// As [`Machine::request`](crate::safety::Machine::request).
     pub fn stop(&mut self) -> Result<(), Refusal> {
         self.vent_now();
         self.change(Cause::Stop)
@@ -99,7 +99,7 @@ impl Controller {
     /// Vents, and is no longer ready.
     ///
     /// # Errors
-    /// As [`Machine::request`].
+    /// As [`Machine::request`](crate::safety::Machine::request).
     pub fn disarm(&mut self) -> Result<(), Refusal> {
         self.vent_now();
         self.change(Cause::Disarm)
@@ -182,7 +182,7 @@ impl Controller {
     /// A wave of the device's own.
     ///
     /// # Errors
-    /// As [`Generator::begin`]; [`Refusal::WrongMode`] while venting; [`Refusal::Angle`] or [`Refusal::Stiffness`] where a joint
+    /// As [`Generator::begin`](crate::reference::Generator::begin); [`Refusal::WrongMode`] while venting; [`Refusal::Angle`] or [`Refusal::Stiffness`] where a joint
     /// cannot have an end of the wave.
     pub fn reference(&mut self, reference: Reference) -> Result<(), Refusal> {
         self.running()?;
