@@ -83,12 +83,12 @@ pub fn summary(d: &Diagnosis) -> String {
         );
     }
     if d.verdict != Verdict::Consistent {
-        let _ = writeln!(
-            s,
-            "\nLeft: {:.0} % of the misfit above noise; {}",
-            100.0 * d.unexplained.share,
-            d.unexplained.pattern
-        );
+        let pattern = match d.unexplained.pattern.as_str() {
+            "none" => "without a pattern",
+            pattern => pattern,
+        };
+        let _ =
+            writeln!(s, "\nLeft: {:.0} % of the misfit above noise; {pattern}", 100.0 * d.unexplained.share);
     }
     if let Some(n) = &d.next_experiment {
         let _ =
