@@ -11,7 +11,7 @@ use crate::room::{Room, room};
 /// Values that a trace holds, three bytes each: the largest single part of the memory of a board for one muscle, and a free choice.
 /// It may be as large as the chip allows; a host asks the device how many there are. A second muscle's table takes as much again,
 /// and leaves the trace what a table on its way into use needs anyway.
-pub const TRACE_CAPACITY: usize = if pair::SUPPORTED { 640 } else { 1024 };
+pub const TRACE_CAPACITY: usize = if pair::SUPPORTED { 640 } else { 960 };
 
 /// A table on its way into use.
 #[derive(Debug)]

@@ -21,7 +21,7 @@ use crate::room::{Room, room};
 use crate::spoken::Spoken;
 
 /// Samples that wait for the link: twice as many as come in the 5.2 ms that a longest answer takes at 1 Mbaud.
-const WAITING: usize = 12;
+const WAITING: usize = 11;
 
 /// The controller, in a critical section of its own. Neither end of it is grown into the many places that enter.
 struct Entered<'s> {
