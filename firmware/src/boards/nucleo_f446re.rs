@@ -82,7 +82,7 @@ const WATCHDOG_US: u32 = 4_000_000;
 /// What waits to go out: a line of 1 Mbaud takes 100 bytes a millisecond, so the task that sends has 2.5 ms to bring more before the
 /// line rests. Nothing keeps it longer while something is controlled: the control step above it takes hundredths of a millisecond, and
 /// the flash, which stops the processor, is only written at rest. A longest answer holds up telemetry for
-/// [`MAX_WIRE`](model_core::link::frame::MAX_WIRE) bytes, 5.2 ms; samples then wait in a queue of 12 ms
+/// [`MAX_WIRE`](model_core::link::frame::MAX_WIRE) bytes, 5.2 ms; samples then wait in a queue of 11 ms
 /// (`firmware/src/shared.rs`). So 1 kHz of two muscles, less than 100 bytes a tick, would fit too.
 const SENDING: usize = 256;
 /// What has come and is not read: all that the line can bring in the 5 ms in which a longest answer goes out and nobody reads.

@@ -40,7 +40,8 @@ impl Controller {
     /// Starts a mode at what is measured now.
     ///
     /// # Errors
-    /// As [`Machine::request`](crate::safety::Machine::request); [`Refusal::NoTable`], with the fault latched, where the mode needs a table.
+    /// As [`Machine::request`](crate::safety::Machine::request); [`Refusal::NoTable`], with the fault latched, where the mode needs
+    /// a table.
     pub fn start(&mut self, mode: Mode) -> Result<(), Refusal> {
         self.machine.allows(Cause::Start)?;
         let needs: &[Side] = match mode {
@@ -182,8 +183,8 @@ impl Controller {
     /// A wave of the device's own.
     ///
     /// # Errors
-    /// As [`Generator::begin`](crate::reference::Generator::begin); [`Refusal::WrongMode`] while venting; [`Refusal::Angle`] or [`Refusal::Stiffness`] where a joint
-    /// cannot have an end of the wave.
+    /// As [`Generator::begin`](crate::reference::Generator::begin); [`Refusal::WrongMode`] while venting; [`Refusal::Angle`] or
+    /// [`Refusal::Stiffness`] where a joint cannot have an end of the wave.
     pub fn reference(&mut self, reference: Reference) -> Result<(), Refusal> {
         self.running()?;
         if self.mode == Mode::Vent {

@@ -148,6 +148,11 @@ fn directions(rows: &Rows, holds: &[(usize, usize)], pressures: &[Vec<f64>], law
     }
 }
 
+/// What is left of a row, N, where friction acts in a direction.
+fn left_of(rows: &Rows, fitted: &Baseline, i: usize, direction: f64) -> f64 {
+    fitted.raw_residual[i] + fitted.quasi[i] * fitted.friction[i] * (direction - rows.contexts[i].direction)
+}
+
 /// What a law leaves of the rows at rest: the friction is that of the moving rows, and the part of the force that stays the same
 /// through a hold is not held against it.
 fn left(rows: &Rows, fitted: &Baseline, holds: &[(usize, usize)], directions: &[Vec<f64>]) -> f64 {
@@ -155,9 +160,7 @@ fn left(rows: &Rows, fitted: &Baseline, holds: &[(usize, usize)], directions: &[
     for ((from, to), way) in holds.iter().zip(directions) {
         for i in *from..*to {
             let w = if rows.on_ramp[i] { 0.0 } else { rows.root_weight[i] };
-            let friction = fitted.quasi[i] * fitted.friction[i];
-            let r = fitted.raw_residual[i] + friction * (way[i - from] - rows.contexts[i].direction);
-            sum += (w * r).powi(2);
+            sum += (w * left_of(rows, fitted, i, way[i - from])).powi(2);
         }
     }
     sum
@@ -225,24 +228,25 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
             (best, energy) = (b, e);
         }
     }
-    let moved = fitted.per_row(&moving);
-    if !(energy < CLEARLY * held) {
-        if !rows.isometric {
-            let lawless = held > NO_LAW * moved * weight_at(rows, &holds);
-            let steps = steps(rows, &fitted, &holds, &stays, moved.sqrt());
-            number_rests(rows, &holds, &stays, &steps, lawless);
-        }
-        return None;
+    let law = (energy < CLEARLY * held).then_some(best);
+    let chosen = law.map_or(stays, |law| directions(rows, &holds, &pressures, law));
+    if !rows.isometric {
+        let moved = fitted.per_row(&moving);
+        let doubted = match law {
+            Some(law) => matches!(law, AtRest::Follows { .. }),
+            None => held > NO_LAW * moved * weight_at(rows, &holds),
+        };
+        let steps = steps(rows, &fitted, &holds, &chosen, moved.sqrt());
+        number_rests(rows, &holds, &chosen, &steps, doubted);
     }
-    let chosen = directions(rows, &holds, &pressures, best);
-    let steps = steps(rows, &fitted, &holds, &chosen, moved.sqrt());
+    let law = law?;
     for ((from, to), way) in holds.iter().zip(&chosen) {
         for i in (*from..*to).filter(|i| !rows.on_ramp[*i]) {
             if !rows.isometric {
                 rows.unsettled[i] = rows.contexts[i].direction - way[i - from];
             }
             rows.contexts[i].direction = way[i - from];
-            if let AtRest::Fades(time) = best
+            if let AtRest::Fades(time) = law
                 && rows.still[i] > 0.0
             {
                 // How a settling departs from an exponential is fitted beside it.
@@ -250,10 +254,7 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
             }
         }
     }
-    if !rows.isometric {
-        number_rests(rows, &holds, &chosen, &steps, matches!(best, AtRest::Follows { .. }));
-    }
-    Some(best)
+    Some(law)
 }
 
 /// The weight of the rows at rest.
@@ -273,12 +274,7 @@ fn steps(
 ) -> Vec<Vec<bool>> {
     let middle = |part: &[f64]| median(&mut part.to_vec());
     let found = |((from, to), way): (&(usize, usize), &Vec<f64>)| {
-        let left: Vec<f64> = (*from..*to)
-            .map(|i| {
-                let friction = fitted.quasi[i] * fitted.friction[i];
-                fitted.raw_residual[i] + friction * (way[i - from] - rows.contexts[i].direction)
-            })
-            .collect();
+        let left: Vec<f64> = (*from..*to).map(|i| left_of(rows, fitted, i, way[i - from])).collect();
         let mut steps = vec![false; left.len()];
         let mut last = 0;
         for i in BESIDE..left.len().saturating_sub(BESIDE) {

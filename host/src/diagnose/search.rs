@@ -127,14 +127,16 @@ impl<'a> Search<'a> {
 
     /// Looks for one more effect: whether another look may be worth it.
     fn next(&mut self) -> ControlFlow<()> {
-        let full = self.full.clone();
-        let ground = Ground::new(&full, self.scale);
+        let ground = Ground::new(&self.full, self.scale);
         let (best, p) = look(self.library, self.rows, &ground, self.blocked);
         if self.first_look.is_none() {
             self.first_look = Some((best.clone(), p.clone()));
         }
         let Some(at) = self.winner(&best, &ground) else { return ControlFlow::Break(()) };
         let winner = best[at].clone();
+        if self.chosen.is_empty() {
+            self.above = self.above_noise(winner.before);
+        }
         if !self.is_enough(&winner, p[at]) {
             return ControlFlow::Break(());
         }
@@ -187,10 +189,7 @@ impl<'a> Search<'a> {
     }
 
     /// Whether it is beyond chance, explains enough, and is large enough to matter.
-    fn is_enough(&mut self, winner: &Trial, p: f64) -> bool {
-        if self.chosen.is_empty() {
-            self.above = self.above_noise(winner.before);
-        }
+    fn is_enough(&self, winner: &Trial, p: f64) -> bool {
         // What lives in a few strokes can never give a large sum over blocks in units of its scatter: six strokes that all agree
         // happen by chance once in 64. There the likelihood counts, whose independent rows are those that the residual's own
         // correlation leaves.
@@ -218,8 +217,9 @@ impl<'a> Search<'a> {
         let kept = energy(&with.residual) <= winner.before - 0.6 * winner.gain;
         // What the effect leaves tells anew how many rows are independent: a wandering zero that flexible tables had followed from
         // pressure to pressure shows itself only now.
-        let again = noise::estimate(self.rows, &with.residual, self.step).independent.max(FEWEST_INDEPENDENT);
-        let score = winner.score * (again / self.scale.independent).min(1.0);
+        let left = noise::estimate(self.rows, &with.residual, self.step);
+        let independent = left.independent.max(FEWEST_INDEPENDENT);
+        let score = winner.score * (independent / self.scale.independent).min(1.0);
         let least = if SLOW.contains(&name) { LEAST_ALONE } else { LEAST_SCORE };
         if !kept || score < least {
             self.chosen.pop();
@@ -238,8 +238,7 @@ impl<'a> Search<'a> {
         self.kind = beside;
         self.bare = metric;
         (self.full, self.traces) = (with, traces);
-        self.noise =
-            Noise { sigma: self.noise.sigma, ..noise::estimate(self.rows, &self.full.residual, self.step) };
+        self.noise = Noise { sigma: self.noise.sigma, ..left };
         let share = winner.gain / self.above;
         self.taken.push(Taken { trial: winner, p, share, rivals, rms: self.full.rms(self.rows) });
         if self.chosen.len() > 1 {
@@ -284,12 +283,13 @@ impl<'a> Search<'a> {
 
     /// What was found, without what the joint fit brought to nothing: that was not there.
     fn end(mut self) -> Found {
-        let alive: Vec<bool> = self.chosen.iter().map(|c| c.amplitudes.iter().any(|a| *a != 0.0)).collect();
-        if alive.iter().any(|a| !a) {
-            let mut keep = alive.iter();
-            self.chosen.retain(|_| *keep.next().unwrap_or(&true));
-            let mut keep = alive.iter();
-            self.taken.retain(|_| *keep.next().unwrap_or(&true));
+        let all = self.chosen.len();
+        (self.chosen, self.taken) = std::mem::take(&mut self.chosen)
+            .into_iter()
+            .zip(std::mem::take(&mut self.taken))
+            .filter(|(c, _)| c.amplitudes.iter().any(|a| *a != 0.0))
+            .unzip();
+        if self.chosen.len() < all {
             (self.full, self.traces) = refit(self.rows, self.kind, &mut self.chosen, self.library);
         }
         for (t, c) in self.taken.iter_mut().zip(&self.chosen) {

@@ -58,7 +58,7 @@ impl<const N: usize, const D: usize> Fading<N, D> {
     #[inline(always)]
     pub fn step<T: Scalar>(memory: &mut Memory<T>, dt: T, times: &[T; N], drives: &[T; D]) {
         let () = Self::FITS;
-        let first = memory[SEEN] == T::ZERO;
+        let first = Self::is_new(memory);
         let dt = dt.at_least(T::ZERO);
         let full = times[0].at_least(T::from_f32(SHORTEST)) * T::from_f32(0.02);
         if first || !(dt < full) {
@@ -97,10 +97,16 @@ impl<const N: usize, const D: usize> Fading<N, D> {
         memory[Self::SUMS..Self::SLOTS].copy_from_slice(&sums);
     }
 
+    /// Whether nothing has been remembered yet.
+    #[inline(always)]
+    pub fn is_new<T: Scalar>(memory: &Memory<T>) -> bool {
+        memory[SEEN] == T::ZERO
+    }
+
     /// The sum over the time constants of one drive's over-stresses, with the drive now at `now`.
     #[inline(always)]
     pub fn value<T: Scalar>(memory: &Memory<T>, drive: usize, now: T) -> T {
-        if memory[SEEN] == T::ZERO {
+        if Self::is_new(memory) {
             return T::ZERO;
         }
         memory[Self::SUMS + drive] + T::from_f32(N as f32) * (now - memory[Self::LAST + drive])

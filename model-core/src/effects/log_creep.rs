@@ -23,9 +23,11 @@
 use super::{Context, Effect, Fading, Info, Link, Memory, Parameter, Start};
 use crate::scalar::Scalar;
 
-type Spectrum = Fading<5, 3>;
+/// Branches, one per decade.
+const DECADES: usize = 5;
+type Spectrum = Fading<DECADES, 3>;
 
-fn times<T: Scalar>(first: T) -> [T; 5] {
+fn times<T: Scalar>(first: T) -> [T; DECADES] {
     [1.0, 10.0, 100.0, 1000.0, 1.0e4].map(|decade| first * T::from_f32(decade))
 }
 
@@ -68,7 +70,7 @@ impl Effect for LogCreep {
         let times = times(parameters[3]);
         let (elastic, _) = context.loads();
         let drives = [elastic, context.unit_elastic(), pull(context)];
-        if memory[0] == T::ZERO {
+        if Spectrum::is_new(memory) {
             Spectrum::step(memory, T::ZERO, &times, &[drives[0], drives[1], T::ZERO]);
         }
         Spectrum::step(memory, context.dt, &times, &drives);
@@ -77,7 +79,7 @@ impl Effect for LogCreep {
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
         let (elastic, _) = context.loads();
         let pull = pull(context);
-        let yielded = pull * T::from_f32(5.0) - Spectrum::value(memory, 2, pull);
+        let yielded = pull * T::from_f32(DECADES as f32) - Spectrum::value(memory, 2, pull);
         context.rubbed(
             parameters[0] * Spectrum::value(memory, 0, elastic)
                 + parameters[1] * Spectrum::value(memory, 1, context.unit_elastic())
