@@ -7,6 +7,7 @@ mod assemble;
 mod blocks;
 mod campaign;
 mod cells;
+mod check;
 mod columns;
 mod container;
 mod decimal;
@@ -26,6 +27,7 @@ mod read;
 pub mod segment;
 mod sheet;
 mod source;
+mod zero;
 
 pub use campaign::{Campaign, Clock};
 pub use columns::Recording;

@@ -5,13 +5,14 @@ use std::path::Path;
 
 use super::blocks::Rows;
 use super::cells::{Want, Words};
+use super::check::check;
 use super::columns::Recording;
 use super::decimal;
 use super::import::{FoundZero, Import, Value, Zero};
 use super::plan::{Plan, Role};
 use super::quantity::Quantity;
+use super::zero::{at_largest, first_level, smallest};
 use crate::error::{Code, Error, Result};
-use crate::possible;
 
 /// A lookup table as text.
 #[derive(Debug, Default)]
@@ -251,48 +252,6 @@ fn set_zero(job: &Job<'_>, table: &mut Table) {
     }
 }
 
-/// The level that a column begins at: the median of the samples that stay within the noise of the first.
-fn first_level(column: &[f64]) -> f64 {
-    let noise = super::noise::white_noise(&column[..column.len().min(4096)]);
-    let mut start: Vec<f64> = match column.first() {
-        Some(first) => {
-            column.iter().take(50).take_while(|x| (*x - first).abs() <= 4.0 * noise).copied().collect()
-        }
-        None => return 0.0,
-    };
-    start.sort_unstable_by(f64::total_cmp);
-    start[start.len() / 2]
-}
-
-/// The smallest reading that a neighbour supports: a single wild one must not become the zero.
-fn smallest(column: &[f64]) -> f64 {
-    let some = &column[..column.len().min(1 << 16)];
-    let mut steps: Vec<f64> = some.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
-    if steps.is_empty() {
-        return column.first().copied().unwrap_or(0.0);
-    }
-    let middle = steps.len() / 2;
-    let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let near = 3.0 * step + 6.0 * super::noise::white_noise(some);
-    let pairs = column.windows(2).filter(|w| (w[1] - w[0]).abs() <= near);
-    pairs.map(|w| w[0].min(w[1])).fold(f64::INFINITY, f64::min)
-}
-
-/// The median stroke where the force is among its largest thousandth.
-fn at_largest(stroke: &[f64], force: &[f64]) -> f64 {
-    let mut order: Vec<usize> = (0..force.len()).collect();
-    let count = (force.len() / 1000).max(3).min(force.len());
-    if count == 0 {
-        return 0.0;
-    }
-    if count < order.len() {
-        order.select_nth_unstable_by(count - 1, |a, b| force[*b].total_cmp(&force[*a]));
-    }
-    let mut top: Vec<f64> = order[..count].iter().map(|i| stroke[*i]).collect();
-    top.sort_unstable_by(f64::total_cmp);
-    top[count / 2]
-}
-
 /// Which rows the filters leave; `None` when all.
 fn keep(job: &Job<'_>, table: &Table, rows: usize) -> Result<Option<Vec<bool>>> {
     if job.filters.is_empty() {
@@ -432,39 +391,4 @@ fn take(job: &Job<'_>, table: &mut Table, rows: Option<Vec<u32>>, labels: &[Stri
         direction,
         rows,
     })
-}
-
-/// The checks that a single cell does not show.
-fn check(recording: &Recording, line_of_row: &dyn Fn(usize) -> u64) -> Result<()> {
-    let line = |i: usize| line_of_row(recording.rows.as_ref().map_or(i, |r| r[i] as usize));
-    if let Some(i) = recording.time.windows(2).position(|w| w[1] <= w[0]) {
-        let (before, after) = (recording.time[i], recording.time[i + 1]);
-        let cause = if after == before { "time stands still" } else { "time goes backwards" };
-        return Err(Error::new(Code::RecordingTimeOrder, cause)
-            .line(line(i + 1))
-            .column("time")
-            .value(format!("{after} s after {before} s"))
-            .help("time must strictly increase within a file; if several runs are in one file, split it (split_by)"));
-    }
-    for (i, p) in recording.pressure.iter().enumerate() {
-        possible::pressure(*p).map_err(|e| e.line(line(i)))?;
-    }
-    for (i, f) in recording.force.iter().flatten().enumerate() {
-        possible::force(*f).map_err(|e| e.line(line(i)))?;
-    }
-    if let Some(rest) = recording.rest_length
-        && let Some(i) = recording.stroke.iter().position(|s| *s >= rest || *s <= -rest)
-    {
-        return Err(Error::new(Code::RecordingOutOfRange, "the muscle cannot have this length")
-            .line(line(i))
-            .value(format!("{} mm", (rest - recording.stroke[i]) * 1e3))
-            .help(format!("its rest length is {} mm; check the unit and the zero", rest * 1e3)));
-    }
-    if let Some(i) = recording.temperature.as_ref().and_then(|t| t.iter().position(|k| *k <= 0.0)) {
-        return Err(Error::new(Code::RecordingOutOfRange, "a temperature below absolute zero")
-            .line(line(i))
-            .column("temperature")
-            .help("check the unit in the column's name: C or K"));
-    }
-    Ok(())
 }

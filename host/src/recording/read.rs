@@ -228,8 +228,13 @@ fn block_error(error: BlockError) -> Error {
         BlockError::Io(e) if matches!(e.kind(), std::io::ErrorKind::PermissionDenied) => {
             Error::new(Code::FileUnreadable, format!("cannot be read: {e}"))
         }
-        BlockError::Io(e) => Error::new(Code::RecordingContainer, format!("cannot be read to its end: {e}"))
-            .help("the file may be damaged or cut short; get it again from where it was recorded"),
+        BlockError::Io(e) => {
+            // What follows a colon is the unpacker's own, written for its authors.
+            let reason = e.to_string();
+            let reason = reason.split(':').next().unwrap_or_default();
+            Error::new(Code::RecordingContainer, format!("cannot be read to its end: {reason}"))
+                .help("the file may be damaged or cut short; get it again from where it was recorded")
+        }
     }
 }
 
