@@ -115,7 +115,8 @@ impl Progress {
         if due && self.drawn.compare_exchange(last, now, Ordering::Relaxed, Ordering::Relaxed).is_ok() {
             let stage = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
             let text = line(&stage.what, done, self.total.load(Ordering::Relaxed), stage.begun.elapsed());
-            let _ = write!(std::io::stderr().lock(), "\r\u{1b}[2K{text}");
+            // One write that clears behind itself: an empty line between two pictures is a flicker.
+            let _ = std::io::stderr().lock().write_all(format!("\r{text}\u{1b}[K").as_bytes());
         }
     }
 
@@ -135,7 +136,7 @@ impl Default for Progress {
 impl Drop for Progress {
     fn drop(&mut self) {
         if self.drawn.load(Ordering::Relaxed) > 0 {
-            let _ = write!(std::io::stderr().lock(), "\r\u{1b}[2K");
+            let _ = std::io::stderr().lock().write_all(b"\r\x1b[K");
         }
     }
 }
