@@ -9,10 +9,10 @@ use crate::queue::in_order;
 use crate::report::Rate;
 use crate::residuals::Residuals;
 use crate::spec::{Spec, Stratum};
+use crate::tool;
 use serde::{Deserialize, Serialize};
 use std::error::Error;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 use std::time::{Duration, Instant};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::Muscle;
@@ -167,18 +167,15 @@ fn ask(
     if json.exists() {
         return said(&json);
     }
-    let files: Vec<PathBuf> = after(&case.spec, &case.truth.bench, residuals, next)
-        .iter()
-        .enumerate()
-        .filter_map(|(n, f)| {
+    let mut files = recordings(&trial);
+    files.extend(after(&case.spec, &case.truth.bench, residuals, next).iter().enumerate().filter_map(
+        |(n, f)| {
             std::fs::create_dir_all(&dir).ok()?;
             let path = dir.join(format!("{:02}_{}.csv", n + 1, f.name));
             std::fs::write(&path, f.csv(Columns::default())).ok().map(|()| path)
-        })
-        .collect();
-    let mut c = Command::new(host);
-    c.arg("diagnose").arg("--quiet").arg("--muscle").arg(trial.join("muscle.toml"));
-    c.args(recordings(&trial)).args(&files).arg("--json").arg(&json);
+        },
+    ));
+    let mut c = tool::diagnose(host, &trial.join("muscle.toml"), &files, &json);
     // No answer names nothing: the trial counts as not resolved.
     if run_limited(&mut c, Duration::from_secs(120)).is_err() {
         return Vec::new();

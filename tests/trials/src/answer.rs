@@ -3,6 +3,7 @@
 use crate::ledger::{Ledger, name, read_ledger, sha256, write_ledger};
 use crate::progress::Progress;
 use crate::queue::in_order;
+use crate::tool;
 use serde::{Deserialize, Serialize};
 use std::error::Error;
 use std::io::Write as _;
@@ -198,16 +199,12 @@ pub fn ask(set: &Path, how: &Asking) -> Result<bool, Box<dyn Error>> {
         let table = answers.join(format!("{}.pam", name(id)));
         // What an earlier run left must not pass for an answer.
         let _ = (std::fs::remove_file(&json), std::fs::remove_file(&table));
-        let mut command = Command::new(&how.host);
-        command.arg("diagnose").arg("--quiet").arg("--muscle").arg(trial.join("muscle.toml"));
-        command.args(recordings(&trial)).arg("--json").arg(&json);
+        let mut command = tool::diagnose(&how.host, &trial.join("muscle.toml"), &recordings(&trial), &json);
         if help.tables {
             command.arg("-o").arg(&table);
         }
         if help.checks {
-            for check in recordings(&trial.join("checks")) {
-                command.arg("--check").arg(check);
-            }
+            tool::add_checks(&mut command, &trial);
         }
         let start = Instant::now();
         let failed = run_limited(&mut command, how.limit).err();

@@ -3,6 +3,7 @@
 
 use crate::answer::{Answer, run_limited};
 use crate::queue::in_order;
+use crate::tool;
 use serde_json::Value;
 use std::error::Error;
 use std::fmt::Write as _;
@@ -121,12 +122,10 @@ type Case = (&'static str, &'static str, &'static str, &'static str);
 fn diagnose(data: &Path, output: &Path, host: &Path, (year, muscle, file, form): Case) -> Asked {
     let asked = || {
         let answer = output.join(format!("{year}-{muscle}-{form}.json"));
-        let mut c = Command::new(host);
-        c.arg("diagnose").arg("--quiet").arg("--muscle").arg(description(year, muscle));
         let file = if form == "settled" { "settled_points" } else { file };
+        let recording = data.join(format!("aarl-festo-10mm-{year}")).join(format!("{file}.csv"));
+        let mut c = tool::diagnose(host, &description(year, muscle), &[recording], &answer);
         c.arg("--import").arg(import(year, form));
-        c.arg(data.join(format!("aarl-festo-10mm-{year}")).join(format!("{file}.csv")));
-        c.arg("--json").arg(&answer);
         run_limited(&mut c, Duration::from_secs(300))?;
         let value = json(&answer)?;
         Ok((serde_json::from_value(value.clone()).map_err(|e| e.to_string())?, value))

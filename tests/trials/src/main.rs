@@ -20,6 +20,7 @@ mod residuals;
 mod score;
 mod semi;
 mod spec;
+mod tool;
 
 use clap::{Args, Parser, Subcommand};
 use rayon::prelude::*;

@@ -8,11 +8,11 @@ use crate::ledger::{self, name};
 use crate::names::{Owner, owner};
 use crate::progress::Progress;
 use crate::queue::in_order;
+use crate::tool;
 use crate::{answer, ledger::Ledger};
 use serde::{Deserialize, Serialize};
 use std::error::Error;
 use std::path::Path;
-use std::process::Command;
 use std::time::Instant;
 
 /// What the true structure, refitted, leaves on held-out recordings.
@@ -71,13 +71,10 @@ fn tell(set: &Path, how: &Asking, truth: &TrialTruth) -> Result<f64, String> {
     let table = work.join("oracle.pam");
     let names: Vec<&str> = truth.effects.iter().map(|e| e.name.as_str()).collect();
     let history = recordings(&trial);
-    let mut command = Command::new(&how.host);
-    command.arg("diagnose").arg("--quiet").arg("--muscle").arg(trial.join("muscle.toml")).args(&history);
-    for check in recordings(&trial.join("checks")) {
-        command.arg("--check").arg(check);
-    }
+    let json = work.join("oracle_answer.json");
+    let mut command = tool::diagnose(&how.host, &trial.join("muscle.toml"), &history, &json);
+    tool::add_checks(&mut command, &trial);
     command.arg("--with").arg(names.join(",")).arg("-o").arg(&table);
-    command.arg("--json").arg(work.join("oracle_answer.json"));
     answer::run_limited(&mut command, how.limit)?;
     let held = recordings(&set.join("sealed").join(name(truth.id)).join("held_out"));
     predict(&how.host, &table, &history, &held, &work.join("oracle_predicted.json"))

@@ -6,11 +6,11 @@
 
 use crate::answer::{Answer, run_limited};
 use crate::names::class;
+use crate::tool;
 use rayon::prelude::*;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::time::Duration;
 use virtual_bench::rng::Rng;
 use virtual_bench::rubber::{Branches, Relaxation};
@@ -180,9 +180,7 @@ fn write(dir: &Path, m: &Muscle) -> Result<Vec<PathBuf>, String> {
 
 fn ask(host: &Path, dir: &Path, files: &[PathBuf]) -> Result<Answer, String> {
     let json = dir.join("answer.json");
-    let mut c = Command::new(host);
-    c.arg("diagnose").arg("--muscle").arg(dir.join("muscle.toml")).args(files).arg("--json").arg(&json);
-    run_limited(&mut c, Duration::from_secs(180))?;
+    run_limited(&mut tool::diagnose(host, &dir.join("muscle.toml"), files, &json), Duration::from_secs(180))?;
     let text = std::fs::read_to_string(&json).map_err(|e| e.to_string())?;
     serde_json::from_str(&text).map_err(|e| e.to_string())
 }
