@@ -3,6 +3,7 @@
 mod controller;
 mod curves;
 mod loads;
+mod models;
 mod parameters;
 mod residuals;
 mod view;
@@ -36,14 +37,12 @@ pub fn page(fit: &Fit, campaign: &Campaign, options: &Options) -> Page {
     head(&mut page, &view);
     page.push(remarks(&view));
     page.push(loads::section(&view));
-    page.push(loads::models(&view));
+    page.push(models::section(&view));
     page.push(curves::section(&view));
     page.push(controller::section(&view));
     page.push(residuals::section(&view));
     page.push(parameters::section(&view));
-    for recording in &campaign.recordings {
-        page.origin(&recording.name, format!("{} rows", recording.len()));
-    }
+    page.recordings(campaign);
     page.origin("made by", format!("host {}", env!("CARGO_PKG_VERSION")));
     page
 }

@@ -1,6 +1,7 @@
 //! A report as plain values: what it says, in which order. [`Page::html`] and [`Page::markdown`] give it a form.
 
 use super::figure::Figure;
+use crate::recording::Campaign;
 
 /// How a fact or a notice is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -213,6 +214,13 @@ impl Page {
     /// Adds a line on where the report comes from.
     pub fn origin(&mut self, what: impl Into<String>, value: impl Into<String>) {
         self.origin.push((what.into(), value.into()));
+    }
+
+    /// Adds a line for every recording that the report is made from.
+    pub fn recordings(&mut self, campaign: &Campaign) {
+        for recording in &campaign.recordings {
+            self.origin(&recording.name, format!("{} rows", recording.len()));
+        }
     }
 
     /// All pictures, in order.
