@@ -7,7 +7,7 @@ use super::tracking::{SETTLE, Task, Track};
 use crate::error::{Code, Error, Result};
 use crate::fit::result::Fit;
 use crate::recording::Campaign;
-use crate::report::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone};
+use crate::report::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, fixed};
 
 /// What the page tells.
 #[derive(Debug)]
@@ -28,8 +28,6 @@ pub struct Story<'a> {
     pub blocked_force: f64,
     /// Root mean square of the table's error on the telemetry, N, and its rows.
     pub telemetry: (f64, usize),
-    /// Mean error of a table fitted to the telemetry alone, percent of blocked force.
-    pub refit: Option<f64>,
     /// Seconds that everything took.
     pub seconds: f64,
 }
@@ -106,7 +104,7 @@ pub fn page(story: &Story<'_>) -> Result<Page> {
     lines.text(format!(
         "{} rows of the thesis's test protocol: at each pressure three slow loops from blocked to free and back. One fit over \
          all pressures gives E_{{k}}(P), k_{{F}}(P) and P_{{0}} together.",
-        summary.samples
+        fixed(summary.samples as f64, 0)
     ));
     lines.figure(load_lines(story.campaign, story.fit)?);
     page.push(lines);
@@ -114,13 +112,10 @@ pub fn page(story: &Story<'_>) -> Result<Page> {
     let mut back = Section::new("And back");
     back.text(format!(
         "The controller's telemetry is a recording like any other: on its {} rows inside the tested range, which no fit has seen, the table is wrong by \
-         {:.2} N rms ({:.2} % of blocked force).{}",
-        story.telemetry.1,
+         {:.2} N rms ({:.2} % of blocked force).",
+        fixed(story.telemetry.1 as f64, 0),
         story.telemetry.0,
         percent(story.telemetry.0),
-        story.refit.map_or(String::new(), |e| format!(
-            " A table fitted to the telemetry alone has a mean error of {e:.2} % on it."
-        ))
     ));
     page.push(back);
     page.origin("controller", story.controller);
