@@ -87,6 +87,9 @@ pub fn c_header(file: &TableFile) -> String {
     if g.tip_correction {
         text += "/* With the tip correction L' = L - 2 (pi/2 - 1)(R - R0) stands for L in the forces. */\n";
     }
+    if t.goes_slack {
+        text += "/* A muscle that hangs slack pushes nothing: where F comes out below zero it is zero (GOES_SLACK). */\n";
+    }
     if !t.effects.is_empty() {
         text += "/* The table also carries effects, which are not in this header. */\n";
     }
@@ -160,6 +163,7 @@ pub fn matlab(file: &TableFile) -> Vec<u8> {
         ("outer_diameter", t.geometry.outer_diameter.metres()),
         ("wall", t.geometry.wall.metres()),
         ("tip_correction", if t.geometry.tip_correction { 1.0 } else { 0.0 }),
+        ("goes_slack", if t.goes_slack { 1.0 } else { 0.0 }),
         ("blocked_force", t.blocked_force.newtons()),
         ("max_pressure", t.max_pressure.pascals()),
     ];
@@ -209,6 +213,7 @@ mod tests {
             at += 8 + word(at + 4) as usize;
             count += 1;
         }
-        assert_eq!((at, count), (bytes.len(), 11));
+        // Three arrays and nine numbers.
+        assert_eq!((at, count), (bytes.len(), 3 + 9));
     }
 }

@@ -3,6 +3,9 @@
 //! ```text
 //! e = |F_model − F_AVG| / F_B(P)                                     thesis, eq. 24
 //! ```
+//! `F_B(P)` counts as at least a twentieth of that of the highest pressure
+//! ([`blocked_for_errors`](super::prepared::Prepared::blocked_for_errors)): at the deadband it is zero.
+//!
 //! Chunks are those of the mid-line ([`super::chunks`]); in each the residual `F − F_model` (each sample with its own pressure and
 //! direction) is averaged per branch, and the branches are averaged. Where both branches are there, the friction of either cancels in
 //! the model as in the measurement, so that this is eq. 24 on loops at constant pressure. It also holds where pressure moves and where

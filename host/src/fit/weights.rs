@@ -4,7 +4,8 @@
 //! w = n_i / n_c / (σ²/n_c + (0.002 F_B(P))²)
 //! ```
 //! with `n_i` rows in the point, `n_c` in its chunk of stroke, pressure and direction, `σ` the noise of a row: a place where the
-//! recording dwelled does not outweigh the others. Far residuals count by their distance, not its square (P. J. Huber, Ann. Math.
+//! recording dwelled does not outweigh the others. `F_B(P)` is not fitted yet where weights are wanted first: it is the largest force
+//! that was read, in proportion to `P − P0`, and at least a tenth of it. Far residuals count by their distance, not its square (P. J. Huber, Ann. Math.
 //! Statist. 35 (1964) 73, doi 10.1214/aoms/1177703732).
 
 use std::collections::HashMap;
