@@ -21,6 +21,8 @@ pub enum FileKind {
     Table,
     /// A recording: text with a header, MCAP, MATLAB, Parquet.
     Recording,
+    /// A check of the bench: a table with a column of what is known.
+    Check,
     /// JSON that this program wrote.
     Json,
     /// A report that this program wrote.
@@ -47,6 +49,9 @@ impl FileKind {
             return Some(Self::Json);
         }
         let header = text.lines().next()?;
+        if header.split([',', '\t']).any(|name| name.trim().starts_with("reference_")) {
+            return Some(Self::Check);
+        }
         if header.contains([',', ';', '\t']) && header.contains("time_") && !header.contains('=') {
             return Some(Self::Recording);
         }
@@ -83,6 +88,7 @@ impl FileKind {
             Self::Protocol => "a protocol",
             Self::Table => "a table",
             Self::Recording => "a recording",
+            Self::Check => "a check of the bench",
             Self::Json => "the JSON of a result",
             Self::Report => "a report",
         }
@@ -95,6 +101,7 @@ impl FileKind {
             Self::Import => Code::ImportInvalid,
             Self::Protocol => Code::ProtocolInvalid,
             Self::Table => Code::TableInvalid,
+            Self::Check => Code::CheckInvalid,
             Self::Recording | Self::Json | Self::Report => Code::RecordingNotText,
         }
     }
@@ -140,11 +147,12 @@ mod tests {
     #[test]
     fn files_are_known_by_what_is_in_them() {
         let muscle = "name = \"m\"\nkind = \"push\"\nrest_length_mm = 3\nbraid_angle_deg= 77\n";
-        let cases: [(&[u8], Option<FileKind>); 9] = [
+        let cases: [(&[u8], Option<FileKind>); 10] = [
             (muscle.as_bytes(), Some(FileKind::Muscle)),
             (b"name = \"p\"\nsample_Hz = 30.0\n\n[[step]]\ndo = \"rest\"\n", Some(FileKind::Protocol)),
             (b"# bench\n[columns.force]\ncolumn = 3\n", Some(FileKind::Import)),
             (b"time_s,pressure_kPa,displacement_mm,force_N\n1,2,3,4\n", Some(FileKind::Recording)),
+            (b"time_s,force_N,reference_force_N\n1,2,2\n", Some(FileKind::Check)),
             (b"\x89MCAP0\r\n\x01", Some(FileKind::Recording)),
             (b"PAMF\x01\x00", Some(FileKind::Table)),
             (b"{\n  \"schema\": \"pam-fit/1\",\n", Some(FileKind::Json)),

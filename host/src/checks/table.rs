@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::{Code, Error, Result};
+use crate::file_kind::FileKind;
 use crate::recording::{Named, Quantity, named};
 
 /// What a column's name begins with when it holds what is known.
@@ -20,12 +21,12 @@ pub(super) struct Table {
 impl Table {
     /// Reads a comma- or tab-separated table with one header line.
     pub(super) fn read(file: &Path) -> Result<Self> {
-        let text = std::fs::read(file).map_err(|e| Error::unreadable(file, &e))?;
-        let tabs = text.iter().take_while(|b| **b != b'\n').any(|b| *b == b'\t');
+        let text = FileKind::Check.read_text(file)?;
+        let tabs = text.lines().next().is_some_and(|header| header.contains('\t'));
         let mut reader = csv::ReaderBuilder::new()
             .delimiter(if tabs { b'\t' } else { b',' })
             .trim(csv::Trim::All)
-            .from_reader(text.as_slice());
+            .from_reader(text.as_bytes());
         let damaged = |e: &csv::Error| {
             let line = e.position().map_or(1, csv::Position::line);
             Error::new(Code::CheckInvalid, format!("line {line}: {e}")).file(file)

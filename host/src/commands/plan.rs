@@ -7,7 +7,7 @@ use model_core::muscle::Muscle;
 
 use crate::console::Console;
 use crate::diagnose::advise::isolability;
-use crate::diagnose::planned::Protocol;
+use crate::diagnose::planned;
 use crate::error::{Code, Error, Result};
 use crate::output::write_whole;
 use crate::table_file::TableFile;
@@ -37,7 +37,7 @@ impl Arguments {
         let file = TableFile::read(&self.table)?;
         let muscle =
             Muscle::<f64>::build(&file.table).map_err(|e| Error::new(Code::TableInvalid, e.to_string()))?;
-        let protocol = Protocol::read(&self.protocol)?;
+        let protocol = planned::read(&self.protocol)?;
         let rows = isolability(&protocol, &muscle).map_err(|e| e.file(&self.protocol))?;
         if let Some(path) = &self.json {
             let json =

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::baselines::cosine;
 use super::linear::{Basis, add_scaled, energy};
-use super::planned::{Place, Protocol, Step, free_stroke, moments};
+use super::planned::{Place, Protocol, Step, free_stroke, moments, play};
 use super::verdict::{Diagnosis, NextExperiment};
 use crate::bench::Candidate;
 use crate::error::Result;
@@ -18,19 +18,35 @@ struct Item {
     protocol: Protocol,
 }
 
+/// With three figures: what a person sets on a bench.
+fn settable(value: f64) -> f64 {
+    if !(value.abs() > 0.0 && value.is_finite()) {
+        return value;
+    }
+    let digits = 2 - value.abs().log10().floor() as i32;
+    // By division where the number is large: a power of ten below one is not exact.
+    if digits < 0 {
+        let step = 10_f64.powi(-digits);
+        (value / step).round() * step
+    } else {
+        let parts = 10_f64.powi(digits);
+        (value * parts).round() / parts
+    }
+}
+
 /// Recordings that tell effects apart, cheapest first, for a muscle and its pressures (Pa).
 fn menu(muscle: &Muscle<f64>, low: f64, high: f64) -> Vec<Item> {
-    let levels = [0.35 * high + 0.65 * low, 0.9 * high + 0.1 * low].map(|p| p * 1e-3);
-    let slow = (free_stroke(muscle, high) * 1e3 / 27.0).max(1e-3);
+    let levels = [0.35 * high + 0.65 * low, 0.9 * high + 0.1 * low].map(|p| settable(p * 1e-3));
+    let slow = settable((free_stroke(muscle, high) * 1e3 / 27.0).max(1e-3));
     let set = |p: f64| Step::Pressure { to_kpa: p, rate_kpa_s: Some(50.0), settle_s: 2.0 };
     let loops = |part: f64, speed: f64, count: u32| Step::Cycles {
         to: Place { free: Some(part), ..Place::default() },
-        speed_mm_s: speed,
+        speed_mm_s: settable(speed),
         count,
     };
     let go = |part: f64, speed: f64| Step::Move {
         to: Place { free: Some(part), ..Place::default() },
-        speed_mm_s: speed,
+        speed_mm_s: settable(speed),
     };
     let each = |name: &str, inner: &dyn Fn(f64) -> Vec<Step>| {
         let mut step =
@@ -72,7 +88,8 @@ fn menu(muscle: &Muscle<f64>, low: f64, high: f64) -> Vec<Item> {
         for part in [0.0, 0.3, 0.6] {
             s.push(go(part, 4.0 * slow));
             for to in [0.4 * p, p, 0.4 * p, p] {
-                s.push(Step::Pressure { to_kpa: to, rate_kpa_s: Some(p / 20.0), settle_s: 2.0 });
+                let rate = settable(p / 20.0);
+                s.push(Step::Pressure { to_kpa: settable(to), rate_kpa_s: Some(rate), settle_s: 2.0 });
             }
         }
         s
@@ -237,7 +254,7 @@ pub fn next_experiment(
     let tried: Vec<Option<(f64, f64, String, &'static str)>> = menu(muscle, low, high)
         .par_iter()
         .map(|item| {
-            let campaign = item.protocol.play(muscle).ok()?;
+            let campaign = play(&item.protocol, muscle).ok()?;
             let contexts = moments(muscle, &campaign);
             let basis = tables(&contexts);
             let mine = trace(law, shape, amplitudes, &contexts);
@@ -259,7 +276,7 @@ pub fn next_experiment(
                 }
                 least = least.min(best);
             }
-            let text = item.protocol.to_text().ok()?;
+            let text = item.protocol.to_toml().ok()?;
             Some((least / item.minutes.sqrt(), least, text, item.words))
         })
         .collect();
@@ -293,7 +310,7 @@ pub struct Isolability {
 /// # Errors
 /// A protocol that cannot be played.
 pub fn isolability(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Vec<Isolability>> {
-    let campaign = protocol.play(muscle)?;
+    let campaign = play(protocol, muscle)?;
     let contexts = moments(muscle, &campaign);
     let stride = contexts.len().div_ceil(12_000).max(1);
     let keep: Vec<usize> = (0..contexts.len()).step_by(stride).collect();
@@ -370,9 +387,11 @@ mod tests {
     fn protocols_survive_their_own_text() {
         let muscle = Muscle::<f64>::build(&table::example()).expect("the example table");
         for item in menu(&muscle, 207e3, 552e3) {
-            let text = item.protocol.to_text().expect("writable");
-            assert_eq!(Protocol::parse(&text).expect("readable"), item.protocol);
-            assert!(item.protocol.play(&muscle).expect("playable").samples() > 100);
+            let text = item.protocol.to_toml().expect("writable");
+            assert_eq!(crate::diagnose::planned::parse(&text).expect("readable"), item.protocol);
+            let longest = text.split([' ', '\n']).filter(|w| w.parse::<f64>().is_ok()).map(str::len).max();
+            assert!(longest.is_some_and(|l| l <= 7), "{text}");
+            assert!(play(&item.protocol, &muscle).expect("playable").samples() > 100);
         }
     }
 }

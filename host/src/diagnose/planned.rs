@@ -1,6 +1,6 @@
 //! Protocols before they are run: their motion with our own model, and what effects would look like in it.
 //!
-//! The file is the virtual bench's: `name`, `sample_Hz` and `[[step]]` tables with `do = "pressure" | "move" | "cycles" | "hold" |
+//! The file is the virtual bench's, read by its own types: `name`, `sample_Hz` and `[[step]]` tables with `do = "pressure" | "move" | "cycles" | "hold" |
 //! "tare" | "rest" | "sine" | "file" | "end-file"`; a place is `to_mm`, `to_contraction` or `to_free` (part of the free stroke).
 
 use std::path::Path;
@@ -8,7 +8,7 @@ use std::path::Path;
 use model_core::effects::Context;
 use model_core::muscle::Muscle;
 use model_core::units::{Length, Pressure};
-use serde::{Deserialize, Serialize};
+pub use virtual_bench::protocol::{Place, Protocol, Step};
 
 use crate::error::{Code, Error, Result};
 use crate::file_kind::FileKind;
@@ -16,176 +16,70 @@ use crate::recording::segment::Motion;
 use crate::recording::{Campaign, Follower, Recording};
 use crate::toml_words::toml_error;
 
-/// A list of steps at a sampling rate.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Protocol {
-    /// What it is called.
-    pub name: String,
-    /// Samples per second.
-    #[serde(rename = "sample_Hz")]
-    pub sample_hz: f64,
-    /// What is done, in order.
-    pub step: Vec<Step>,
-}
-
-/// A stroke, said in one of three ways.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Place {
-    /// In mm.
-    #[serde(rename = "to_mm", skip_serializing_if = "Option::is_none", default)]
-    pub mm: Option<f64>,
-    /// Of the rest length.
-    #[serde(rename = "to_contraction", skip_serializing_if = "Option::is_none", default)]
-    pub contraction: Option<f64>,
-    /// Of the free stroke at the present pressure.
-    #[serde(rename = "to_free", skip_serializing_if = "Option::is_none", default)]
-    pub free: Option<f64>,
-}
-
-/// One step.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "do", rename_all = "kebab-case")]
-pub enum Step {
-    /// A new recording.
-    File {
-        /// Its name.
-        name: String,
-    },
-    /// What follows is not recorded.
-    EndFile,
-    /// Vented at rest length.
-    Tare {
-        /// s.
-        seconds: f64,
-    },
-    /// Another pressure at held length.
-    Pressure {
-        /// kPa.
-        #[serde(rename = "to_kPa")]
-        to_kpa: f64,
-        /// kPa/s.
-        #[serde(rename = "rate_kPa_s", skip_serializing_if = "Option::is_none", default)]
-        rate_kpa_s: Option<f64>,
-        /// s.
-        #[serde(default)]
-        settle_s: f64,
-    },
-    /// A motion at constant pressure.
-    Move {
-        /// Where to.
-        #[serde(flatten)]
-        to: Place,
-        /// mm/s.
-        speed_mm_s: f64,
-    },
-    /// Triangular loops.
-    Cycles {
-        /// Where to.
-        #[serde(flatten)]
-        to: Place,
-        /// mm/s.
-        speed_mm_s: f64,
-        /// How often.
-        count: u32,
-    },
-    /// Everything as it is.
-    Hold {
-        /// s.
-        seconds: f64,
-    },
-    /// Vented, not recorded.
-    Rest {
-        /// s.
-        seconds: f64,
-    },
-    /// A sine about the present place.
-    Sine {
-        /// mm.
-        amplitude_mm: f64,
-        /// Hz.
-        #[serde(rename = "frequency_Hz")]
-        frequency_hz: f64,
-        /// s.
-        seconds: f64,
-    },
-}
-
 /// More samples than this are no protocol but a mistake.
 const MOST: usize = 400_000;
 
-impl Protocol {
-    /// Reads a protocol file.
-    ///
-    /// # Errors
-    /// [`Code::FileUnreadable`], or [`Code::ProtocolInvalid`] with the line, or with what the file is instead.
-    pub fn read(path: &Path) -> Result<Self> {
-        let text = FileKind::Protocol.read_text(path)?;
-        Self::parse(&text).map_err(|e| FileKind::Protocol.wanted(path, e))
-    }
+/// Reads a protocol file.
+///
+/// # Errors
+/// [`Code::FileUnreadable`], or [`Code::ProtocolInvalid`] with the line or the step, or with what the file is instead.
+pub fn read(path: &Path) -> Result<Protocol> {
+    let text = FileKind::Protocol.read_text(path)?;
+    parse(&text).map_err(|e| FileKind::Protocol.wanted(path, e))
+}
 
-    /// From the text of a protocol file.
-    ///
-    /// # Errors
-    /// [`Code::ProtocolInvalid`] with the line.
-    pub fn parse(text: &str) -> Result<Self> {
-        let protocol: Self = toml::from_str(text).map_err(|e| toml_error(Code::ProtocolInvalid, text, &e))?;
-        if !(protocol.sample_hz > 0.0 && protocol.sample_hz <= 1e5) {
-            return Err(Error::new(Code::ProtocolInvalid, "sample_Hz must lie between 0 and 100000"));
-        }
-        Ok(protocol)
-    }
+/// From the text of a protocol file.
+///
+/// # Errors
+/// [`Code::ProtocolInvalid`] with the line, or with the step whose numbers cannot be.
+pub fn parse(text: &str) -> Result<Protocol> {
+    let protocol: Protocol = toml::from_str(text).map_err(|e| toml_error(Code::ProtocolInvalid, text, &e))?;
+    protocol.check().map_err(|e| Error::new(Code::ProtocolInvalid, e.to_string()))?;
+    Ok(protocol)
+}
 
-    /// As the text of a protocol file.
-    ///
-    /// # Errors
-    /// [`Code::CallInvalid`] where it cannot be written as TOML.
-    pub fn to_text(&self) -> Result<String> {
-        toml::to_string(self).map_err(|e| Error::new(Code::CallInvalid, e.to_string()))
+/// The recordings that a protocol would make of a muscle, without noise and with the model's force.
+///
+/// # Errors
+/// [`Code::ProtocolInvalid`] for one that takes too long, or that records nothing.
+pub fn play(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Campaign> {
+    let dt = 1.0 / protocol.sample_hz.min(10.0);
+    let mut player = Player {
+        muscle,
+        dt,
+        time: 0.0,
+        pressure: 0.0,
+        stroke: 0.0,
+        open: None,
+        done: Vec::new(),
+        samples: 0,
+    };
+    let any_file = protocol.step.iter().any(|s| matches!(s, Step::File { .. }));
+    if !any_file {
+        player.begin(&protocol.name);
     }
-
-    /// The recordings that it would make of a muscle, without noise and with the model's force.
-    ///
-    /// # Errors
-    /// [`Code::ProtocolInvalid`] for speeds and times that cannot be.
-    pub fn play(&self, muscle: &Muscle<f64>) -> Result<Campaign> {
-        let dt = 1.0 / self.sample_hz.min(10.0);
-        let mut player = Player {
-            muscle,
-            dt,
-            time: 0.0,
-            pressure: 0.0,
-            stroke: 0.0,
-            open: None,
-            done: Vec::new(),
-            samples: 0,
-        };
-        let any_file = self.step.iter().any(|s| matches!(s, Step::File { .. }));
-        if !any_file {
-            player.begin(&self.name);
-        }
-        for (i, step) in self.step.iter().enumerate() {
-            player.step(step).map_err(|what| {
-                Error::new(Code::ProtocolInvalid, format!("step {} of the protocol: {what}", i + 1))
-            })?;
-        }
-        player.end();
-        let mut recordings = player.done;
-        recordings.retain(|r| r.len() >= 3);
-        if recordings.is_empty() {
-            return Err(Error::new(Code::ProtocolInvalid, "the protocol records nothing"));
-        }
-        for r in &mut recordings {
-            let force = (0..r.len())
-                .map(|i| {
-                    muscle
-                        .force(Pressure::from_pascals(r.pressure[i]), Length::from_metres(r.stroke[i]), 0.0)
-                        .newtons()
-                })
-                .collect();
-            r.force = Some(force);
-        }
-        Ok(Campaign::new(recordings))
+    for (i, step) in protocol.step.iter().enumerate() {
+        player.step(step).map_err(|what| {
+            Error::new(Code::ProtocolInvalid, format!("step {} of the protocol: {what}", i + 1))
+        })?;
     }
+    player.end();
+    let mut recordings = player.done;
+    recordings.retain(|r| r.len() >= 3);
+    if recordings.is_empty() {
+        return Err(Error::new(Code::ProtocolInvalid, "the protocol records nothing"));
+    }
+    for r in &mut recordings {
+        let force = (0..r.len())
+            .map(|i| {
+                muscle
+                    .force(Pressure::from_pascals(r.pressure[i]), Length::from_metres(r.stroke[i]), 0.0)
+                    .newtons()
+            })
+            .collect();
+        r.force = Some(force);
+    }
+    Ok(Campaign::new(recordings))
 }
 
 struct Player<'a> {
@@ -252,7 +146,7 @@ impl Player<'_> {
 
     fn go(&mut self, to: f64, speed: f64) -> Result<(), &'static str> {
         if !(speed > 0.0 && to.is_finite()) {
-            return Err("a speed must be positive");
+            return Err("a speed must be positive, a place finite");
         }
         let from = self.stroke;
         let steps = ((to - from).abs() / (speed * self.dt)).ceil().max(1.0) as usize;

@@ -140,6 +140,7 @@ impl std::fmt::Display for ProtocolError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Text(t) => write!(f, "not a protocol file: {t}"),
+            Self::Number(0, what) => write!(f, "{what}"),
             Self::Number(step, what) => write!(f, "step {step} of the protocol: {what}"),
         }
     }
