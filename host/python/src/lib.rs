@@ -592,7 +592,7 @@ fn diagnose<'py>(
     let options = diagnosis::Options { muscle: muscle.name.clone(), ..Default::default() };
     let answer = py.detach(|| diagnosis::diagnose(&campaign, &geometry, &options)).map_err(raised)?;
     if let Some(path) = &report {
-        write_report(&diagnose_page::page(&answer, &geometry), path)?;
+        write_report(&diagnose_page::page(&answer, &geometry, &campaign), path)?;
     }
     loads(py, &answer.to_json())
 }

@@ -101,10 +101,16 @@ impl Arguments {
             Some(Err(e)) => answer.remarks.push(format!("no advice on the next recording: {e}")),
             None => {}
         }
+        if let (Some(path), None) = (&self.next, &answer.next_experiment) {
+            console.warning(format!(
+                "{} is not written: nothing was found that another recording would have to tell from something else",
+                path.display()
+            ));
+        }
         if let Some(path) = &self.json {
             write_whole(path, (answer.to_json() + "\n").as_bytes())?;
         }
-        self.reports.write(console, || diagnose_page::page(&answer, &geometry))?;
+        self.reports.write(console, || diagnose_page::page(&answer, &geometry, &campaign))?;
         if self.json.as_deref() != Some(std::path::Path::new("-")) {
             console.result(summary(&answer).trim_end());
         }

@@ -51,6 +51,9 @@ const INEXACTNESS: f64 = 1.5e-3;
 const FEWEST_ROWS: usize = 60;
 const FEWEST_BLOCKS: usize = 6;
 
+/// A gauge that never reads more than this, Pa, is dead or was never connected: vented, a muscle does not pull.
+const VENTED: f64 = 1e3;
+
 /// Finds out what the model leaves out of a campaign of recordings.
 ///
 /// # Errors
@@ -100,6 +103,14 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
     // The model as it was: four orders, tables free over pressure.
     let production = baselines::fit(&rows, Kind::Flexible(4), &[]);
     let misfit = production.rms(&rows);
+    let measured = baselines::measured_rms(&rows);
+    if !(misfit < measured) {
+        let reason = format!(
+            "the model of this muscle misses the force by {misfit:.3} N, and all that was measured is {measured:.3} N: look at the \
+             muscle's description and at the units before anything else"
+        );
+        return unjudged(no_judgement(&rows, options, remarks, reason, blocked));
+    }
     remarks.extend(tables_as_evidence(&production, &rows));
     let library: Vec<_> = library(&rows).into_iter().filter(|c| !known.settles(c, &options.given)).collect();
     let asked: Vec<usize> =
@@ -181,6 +192,7 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
         schema: "pam-diagnose/1".into(),
         muscle: options.muscle.clone(),
         samples: rows.samples,
+        judged: true,
         verdict,
         noise_N: sigma,
         misfit_rms_N: misfit,
@@ -287,6 +299,14 @@ fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<String> {
             rows.blocks
         ));
     }
+    let judged = || rows.root_weight.iter().zip(&rows.contexts).filter(|(w, _)| **w > 0.0);
+    let highest = judged().map(|(_, c)| c.pressure).fold(f64::NEG_INFINITY, f64::max);
+    if highest <= VENTED {
+        return Some(format!(
+            "the pressure never rises above {:.1} kPa, where no muscle pulls: look at the gauge and at the unit",
+            highest * 1e-3
+        ));
+    }
     let (lo, hi) = rows
         .force
         .iter()
@@ -316,7 +336,7 @@ fn what_can_be_judged(rows: &Rows) -> Vec<String> {
     }
     let moving = rows.sign.iter().filter(|s| **s > 0.0).count();
     let back = rows.sign.iter().filter(|s| **s < 0.0).count();
-    if moving.min(back) * 50 < rows.len() {
+    if moving + back > 0 && moving.min(back) * 50 < rows.len() {
         remarks.push("the muscle moves one way only: friction cannot be judged".to_owned());
     }
     if !rows.vented.iter().any(|v| *v) {
@@ -351,6 +371,7 @@ fn no_judgement(
         schema: "pam-diagnose/1".into(),
         muscle: options.muscle.clone(),
         samples: rows.samples,
+        judged: false,
         verdict: Verdict::Consistent,
         noise_N: 0.0,
         misfit_rms_N: 0.0,
@@ -432,9 +453,10 @@ fn keep_what_helps(found: &mut Found, rows: &mut Rows, library: &[candidates::Ca
     }
 }
 
+/// Of the rows that are judged: elsewhere no residual is a misfit, and what an effect adds there is no one's claim.
 fn trace(rows: &Rows, found: &Found) -> Trace {
-    let stride = rows.len().div_ceil(1_500).max(1);
-    let pick: Vec<usize> = (0..rows.len()).step_by(stride).collect();
+    let judged: Vec<usize> = (0..rows.len()).filter(|i| rows.root_weight[*i] > 0.0).collect();
+    let pick: Vec<usize> = judged.iter().copied().step_by(judged.len().div_ceil(1_500).max(1)).collect();
     Trace {
         time: pick.iter().map(|i| rows.contexts[*i].time).collect(),
         before: pick.iter().map(|i| found.bare.residual[*i]).collect(),

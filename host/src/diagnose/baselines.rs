@@ -149,6 +149,12 @@ impl Baseline {
     }
 }
 
+/// Weighted root mean square of the measured force itself, N: the error of a model that knows nothing.
+pub(crate) fn measured_rms(rows: &Rows) -> f64 {
+    let sum: f64 = rows.force.iter().zip(&rows.root_weight).map(|(f, w)| (f * w).powi(2)).sum();
+    (sum / energy(&rows.root_weight).max(1e-12)).sqrt()
+}
+
 /// The cardinal functions of the natural spline on the levels, at pressure `p` (held at the ends).
 fn cardinal(levels: &[f64], cubics: &[[spline::Cubic<f64>; spline::MAX_PIECES]], p: f64, out: &mut [f64]) {
     let places = spline::Nodes::<f64>::new(levels);

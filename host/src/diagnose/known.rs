@@ -119,11 +119,20 @@ impl Known {
                 visible: 1.0,
             });
         }
+        if !diagnosis.judged {
+            // What the bench does is known all the same; what it does to these recordings is not.
+            let words = self
+                .named
+                .iter()
+                .map(|j| format!("measured with {}: {}", j.measured.check, j.measured.words));
+            diagnosis.remarks.extend(words);
+            return Ok(diagnosis);
+        }
         let Some((rows, before)) = self.before else { return Ok(diagnosis) };
         let (freed_rows, after) = as_read(freed, braid)?;
         let (was, is) = (before.per_row(&rows), after.per_row(&freed_rows));
         let noise = diagnosis.noise_N.powi(2);
-        let share = ((was - is) / (was - noise).max(1e-3 * was)).clamp(0.0, 1.0);
+        let share = ((was - is) / (was - noise).max(1e-3 * was).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
         for m in &mut diagnosis.missing {
             m.share_explained *= 1.0 - share;
         }

@@ -9,21 +9,25 @@ use super::verdict::{Diagnosis, Verdict};
 #[must_use]
 pub fn summary(d: &Diagnosis) -> String {
     let mut s = String::new();
-    let _ = writeln!(
-        s,
-        "{}: {} rows, blocked force {:.1} N, noise {:.3} N, misfit of the plain model {:.3} N rms ({:.2} % of blocked force)",
-        d.muscle,
-        d.samples,
-        d.blocked_force_N,
-        d.noise_N,
-        d.misfit_rms_N,
-        100.0 * d.misfit_rms_N / d.blocked_force_N.max(1e-12)
-    );
+    let _ = if d.judged {
+        writeln!(
+            s,
+            "{}: {} rows, blocked force {:.1} N, noise {:.3} N, misfit of the plain model {:.3} N rms ({:.2} % of blocked force)",
+            d.muscle,
+            d.samples,
+            d.blocked_force_N,
+            d.noise_N,
+            d.misfit_rms_N,
+            100.0 * d.misfit_rms_N / d.blocked_force_N.max(1e-12)
+        )
+    } else {
+        writeln!(s, "{}: {} rows", d.muscle, d.samples)
+    };
     let _ = writeln!(
         s,
         "\n{}",
         match d.verdict {
-            Verdict::Consistent if d.nothing_judged() =>
+            Verdict::Consistent if !d.judged =>
                 "NOT JUDGED: these recordings say nothing about the model; why is said below.",
             Verdict::Consistent =>
                 "CONSISTENT: nothing stands above the noise and the model's own inexactness.",

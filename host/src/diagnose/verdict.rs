@@ -211,6 +211,9 @@ pub struct Diagnosis {
     pub muscle: String,
     /// Rows in the recordings.
     pub samples: usize,
+    /// Whether there was anything to judge. Where there was not (too few rows, a dead sensor) nothing was fitted, nothing stands
+    /// above anything, and the first of the remarks says why.
+    pub judged: bool,
     /// The judgement.
     pub verdict: Verdict,
     /// Noise, N.
@@ -244,12 +247,6 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// Whether the recordings were too few or too dull for any judgement: then nothing was fitted.
-    #[must_use]
-    pub fn nothing_judged(&self) -> bool {
-        self.profiles.is_empty() && self.path.is_empty() && self.misfit_rms_N == 0.0
-    }
-
     /// As JSON text.
     ///
     /// Every number is finite: what could not be computed is absent or zero before it comes here.

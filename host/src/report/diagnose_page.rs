@@ -1,25 +1,32 @@
 //! The report of a diagnosis, for an engineer who has never heard of the effect.
 
+mod located;
+
 use model_core::braid::Geometry;
 use model_core::units::Length;
 
 use super::effect_page::place;
 use super::effect_trace::Demonstration;
-use super::{Axis, Colour, Figure, Mark, Page, Panel, Section, Table, Tone, figures, fixed};
+use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
 use crate::bench::Candidate;
-use crate::diagnose::verdict::{Diagnosis, Missing, Profile, Verdict};
-use crate::fit::points::median;
+use crate::diagnose::verdict::{Diagnosis, Missing, Verdict};
+use crate::recording::Campaign;
 
-/// The page of a diagnosis. `geometry` is that of the muscle at rest, to say what a force means in pressure.
+/// The page of a diagnosis. `geometry` is that of the muscle at rest, to say what a force means in pressure; `campaign` gives the
+/// recordings' names.
 #[must_use]
-pub fn page(d: &Diagnosis, geometry: &Geometry) -> Page {
+pub fn page(d: &Diagnosis, geometry: &Geometry, campaign: &Campaign) -> Page {
     let mut page = Page::new(
         format!("Diagnosis of {}", d.muscle),
-        format!("{} rows, blocked force {} N", fixed(d.samples as f64, 0), figures(d.blocked_force_N, 3)),
+        if d.judged {
+            format!("{} rows, blocked force {} N", fixed(d.samples as f64, 0), figures(d.blocked_force_N, 3))
+        } else {
+            format!("{} rows", fixed(d.samples as f64, 0))
+        },
     );
     head(&mut page, d);
     page.push(wrong(d));
-    page.push(located(d));
+    page.push(located::section(d));
     for missing in &d.missing {
         page.push(what_it_is(d, missing));
     }
@@ -29,6 +36,7 @@ pub fn page(d: &Diagnosis, geometry: &Geometry) -> Page {
     page.push(remains(d));
     page.push(next(d));
     page.push(looked_at(d));
+    page.recordings(campaign);
     page.origin("made by", format!("host {}", env!("CARGO_PKG_VERSION")));
     page
 }
@@ -48,6 +56,9 @@ fn percent(part: f64, whole: f64) -> String {
 
 fn head(page: &mut Page, d: &Diagnosis) {
     let (tone, words) = match d.verdict {
+        Verdict::Consistent if !d.judged => {
+            (Tone::Caution, "These recordings say nothing about the model: nothing could be judged.".to_owned())
+        }
         Verdict::Consistent => (
             Tone::Good,
             "Model and recordings agree: nothing stands above the noise and the model's own inexactness.".to_owned(),
@@ -62,6 +73,9 @@ fn head(page: &mut Page, d: &Diagnosis) {
         ),
     };
     page.verdict(tone, words);
+    if !d.judged {
+        return;
+    }
     page.fact(
         "misfit of the plain model",
         format!("{} N", figures(d.misfit_rms_N, 2)),
@@ -90,7 +104,11 @@ fn head(page: &mut Page, d: &Diagnosis) {
 }
 
 fn wrong(d: &Diagnosis) -> Section {
-    let mut section = Section::new("What is wrong").summarised();
+    let mut section = Section::new(if d.judged { "What is wrong" } else { "Why" }).summarised();
+    if !d.judged {
+        section.list(d.remarks.iter().cloned());
+        return section;
+    }
     let relation = if d.noise_N > 0.0 { d.misfit_rms_N / d.noise_N } else { 0.0 };
     section.text(format!(
         "The plain model, with its tables free over pressure, misses the measured force by {} N (root mean square); the \
@@ -105,115 +123,6 @@ fn wrong(d: &Diagnosis) -> Section {
     ));
     section.list(d.remarks.iter().cloned());
     section
-}
-
-/// A coordinate's name and numbers as an engineer reads them.
-fn shown(profile: &Profile) -> (String, &'static str, f64, f64) {
-    let name = profile.coordinate.replace('-', " ");
-    match profile.coordinate.as_str() {
-        "pressure" => (name, "kPa", 1e-3, 0.0),
-        "pressure-rate" => (name, "kPa/s", 1e-3, 0.0),
-        "contraction" | "largest-contraction-so-far" => (name, "%", 100.0, 0.0),
-        "speed" => (name, "mm/s", 1e3, 0.0),
-        "acceleration" => (name, "mm/s²", 1e3, 0.0),
-        "temperature" => (name, "°C", 1.0, -273.15),
-        "force" => (name, "N", 1.0, 0.0),
-        "time" | "since-reversal" | "hold-time" => (name, "s", 1.0, 0.0),
-        "frequency" => (name, "Hz", 1.0, 0.0),
-        _ => (name, "", 1.0, 0.0),
-    }
-}
-
-fn located(d: &Diagnosis) -> Section {
-    let mut section = Section::new("Where").summarised();
-    if d.r#where.is_empty() {
-        section.text(
-            "The misfit sits nowhere in particular: no part of any coordinate holds more than its share.",
-        );
-    } else {
-        section.list(d.r#where.iter().take(5).map(|r| format!("{} (p = {})", r.words, figures(r.p, 2))));
-    }
-    // The coordinates where it sits come first, then those that also were looked at.
-    let rank =
-        |p: &Profile| d.r#where.iter().position(|r| r.coordinate == p.coordinate).unwrap_or(usize::MAX);
-    let mut profiles: Vec<&Profile> = d.profiles.iter().filter(|p| p.at.len() > 1).collect();
-    profiles.sort_by_key(|p| rank(p));
-    let panels: Vec<Panel> = profiles
-        .into_iter()
-        .take(6)
-        .map(|p| {
-            let (name, unit, scale, offset) = shown(p);
-            let x: Vec<f64> = p.at.iter().map(|v| scale * v + offset).collect();
-            let mut panel = Panel::new(Axis::new(name.clone(), unit), Axis::new("misfit", "N").from_zero())
-                .titled(name)
-                .line("root mean square", Colour::Series(1), &x, &p.rms_before)
-                .dashes("mean", Colour::Series(0), &x, &p.mean_before);
-            if !d.missing.is_empty() {
-                panel = panel.line("root mean square, explained", Colour::Series(2), &x, &p.rms_after);
-            }
-            if let Some(r) = d.r#where.iter().find(|r| r.coordinate == p.coordinate) {
-                panel = panel.region("here it sits", scale * r.from + offset, scale * r.to + offset);
-            }
-            panel.with("noise", Colour::Muted, Mark::Level(d.noise_N))
-        })
-        .collect();
-    if !panels.is_empty() {
-        section.figure(Figure::multiples(
-            "where",
-            "Misfit along each coordinate",
-            "Where the orange line rises far above the noise the model is wrong; the shaded part is the region that holds more \
-             than its share.",
-            panels,
-        ));
-    }
-    let t = &d.trace;
-    if t.time.len() > 1 {
-        let [time, before, after, effects] = with_pauses(&t.time, [&t.time, &t.before, &t.after, &t.effects]);
-        let mut panel = Panel::new(Axis::new("time", "s"), Axis::new("residual", "N")).hair(
-            "plain model",
-            Colour::Series(1),
-            &time,
-            &before,
-        );
-        if !d.missing.is_empty() {
-            panel = panel.hair("with what was found", Colour::Series(2), &time, &after).line(
-                "what the found effects add",
-                Colour::Ink,
-                &time,
-                &effects,
-            );
-        }
-        if let Some(r) = d.r#where.iter().find(|r| r.coordinate == "time") {
-            panel = panel.region("here it sits", r.from, r.to);
-        }
-        section.figure(Figure::new(
-            "misfit-time",
-            "Measured minus computed force over time",
-            if d.missing.is_empty() {
-                "The plain model's misfit: where it is a band of even width around zero, it is noise."
-            } else {
-                "The plain model's misfit; the dark line is what the found effects make of it, and what remains should be noise."
-            },
-            panel,
-        ));
-    }
-    section
-}
-
-/// Columns with an empty row in each pause, where nothing was recorded: a line would claim that something was.
-fn with_pauses<const N: usize>(time: &[f64], columns: [&[f64]; N]) -> [Vec<f64>; N] {
-    let steps: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).collect();
-    let usual = median(&mut steps.clone());
-    columns.map(|column| {
-        let mut broken = Vec::with_capacity(column.len());
-        for (i, value) in column.iter().enumerate() {
-            if i > 0 && !(steps[i - 1] < 20.0 * usual) {
-                broken.push(f64::NAN);
-            }
-            broken.push(*value);
-        }
-        broken
-    })
 }
 
 fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
@@ -380,6 +289,9 @@ fn remains(d: &Diagnosis) -> Section {
             }
         ));
     }
+    if !d.judged {
+        return section;
+    }
     let hidden: Vec<String> = d
         .considered
         .iter()
@@ -411,7 +323,7 @@ fn next(d: &Diagnosis) -> Section {
         if !n.protocol.is_empty() {
             section.listing(n.protocol.clone());
         }
-    } else if d.verdict == Verdict::Consistent {
+    } else if d.judged && d.verdict == Verdict::Consistent {
         section.text("Nothing more is needed for what these recordings cover.");
     }
     section
@@ -425,6 +337,9 @@ fn sentence(words: &str) -> String {
 
 fn looked_at(d: &Diagnosis) -> Section {
     let mut section = Section::new("All that was looked at");
+    if !d.judged {
+        return section;
+    }
     if !d.path.is_empty() {
         let mut table = Table::new(
             "Step by step: what was taken, and what came next",

@@ -206,7 +206,7 @@ impl Workshop {
             &geometry,
             &diagnose::Options { muscle: muscle.name.clone(), ..Default::default() },
         )?;
-        self.reports.insert("diagnosis", diagnose_page::page(&answer, &geometry).html());
+        self.reports.insert("diagnosis", diagnose_page::page(&answer, &geometry, &campaign).html());
         Ok(json!({ "text": diagnose::summary::summary(&answer) }))
     }
 
