@@ -241,3 +241,28 @@ pub fn moments(muscle: &Muscle<f64>, campaign: &Campaign) -> Vec<Context<f64>> {
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_cannot_be_are_refused_with_their_step() {
+        let with = |step: &str| {
+            format!("name = \"p\"\nsample_Hz = 10.0\n[[step]]\ndo = \"hold\"\nseconds = 1.0\n{step}")
+        };
+        assert!(parse(&with("")).is_ok());
+        for step in [
+            "[[step]]\ndo = \"sine\"\namplitude_mm = nan\nfrequency_Hz = 1.0\nseconds = 1.0\n",
+            "[[step]]\ndo = \"sine\"\namplitude_mm = 1.0\nfrequency_Hz = inf\nseconds = 1.0\n",
+            "[[step]]\ndo = \"pressure\"\nto_kPa = -inf\n",
+            "[[step]]\ndo = \"move\"\nto_free = 1.0\nspeed_mm_s = 0.0\n",
+            "[[step]]\ndo = \"move\"\nspeed_mm_s = 1.0\n",
+        ] {
+            let error = parse(&with(step)).expect_err(step).to_string();
+            assert!(error.contains("step 2 of the protocol"), "{error}");
+        }
+        let error = parse("name = \"p\"\nsample_Hz = -1.0\nstep = []\n").expect_err("no rate").to_string();
+        assert!(error.contains("the sampling rate") && !error.contains("step 0"), "{error}");
+    }
+}
