@@ -27,8 +27,23 @@ def ended(program):
         program.kill()
 
 
-def started(*command):
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+class Program(subprocess.Popen):
+    """A program that says where it is in its first line, after some word."""
+
+    def __init__(self, *command):
+        # Errors and notes go to a file, which never fills as a pipe that nobody reads would.
+        self.notes = tempfile.TemporaryFile("w+")
+        super().__init__(command, stdout=subprocess.PIPE, stderr=self.notes, text=True)
+
+    def address(self, after=""):
+        line = self.stdout.readline()
+        at = line.find(after) if line else -1
+        if at < 0:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self.wait(5)
+            self.notes.seek(0)
+            raise SystemExit(f"`{' '.join(self.args)}` does not say its address, but:\n{line}{self.notes.read()}")
+        return line[at + len(after) :].strip()
 
 
 @contextlib.contextmanager
@@ -43,10 +58,10 @@ def studio(program, on=None, muscle="mini"):
         try:
             which = ["--emulate", muscle]
             if on:
-                running.append(started(program, "emulate", muscle, "--on", on))
-                which = ["--port", running[-1].stdout.readline().strip()]
-            running.append(started(program, "studio", *which, "-o", folder))
-            url = running[-1].stdout.readline().split("open ")[1].strip()
+                running.append(Program(program, "emulate", muscle, "--on", on))
+                which = ["--port", running[-1].address()]
+            running.append(Program(program, "studio", *which, "-o", folder))
+            url = running[-1].address("open ")
             time.sleep(2)
             yield url, f"http://127.0.0.1:{port}", running[-1]
         finally:
