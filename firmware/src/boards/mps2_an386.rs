@@ -80,7 +80,8 @@ extern "C" fn second_sent() {
 
 /// Everything runs on an interrupt that no device uses, below all that do, and the main program sleeps: in QEMU only an
 /// interrupt wait lets the host's processor rest (an event wait, the thread executor's, spins). The control loop is not above the rest
-/// as on a real board: the bench keeps its time, and would go on while the link waits for the file that stands for the flash.
+/// as on a real board, except in the image that is built to try that: the bench keeps its time, and would go on while the link waits
+/// for the file that stands for the flash.
 static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 const EXECUTOR_LINE: Line = Line(10);
 
@@ -89,14 +90,17 @@ extern "C" fn run_tasks() {
     unsafe { EXECUTOR.on_interrupt() }
 }
 
+#[cfg(feature = "preempting")]
+mod preempting;
+
 const RESERVED: Vector = Vector { reserved: 0 };
 
-/// The board's interrupts by their numbers: three UARTs (receive, transmit), two GPIO blocks, two timers, and the one that
-/// runs the tasks.
+/// The board's interrupts by their numbers: three UARTs (receive, transmit), two GPIO blocks, two timers, the one that runs the tasks,
+/// and one for a control loop above them.
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 #[used]
-pub static __INTERRUPTS: [Vector; 11] = [
+pub static __INTERRUPTS: [Vector; 12] = [
     Vector { handler: link_received },
     Vector { handler: link_sent },
     Vector { handler: bench_received },
@@ -108,6 +112,10 @@ pub static __INTERRUPTS: [Vector; 11] = [
     Vector { handler: time::on_wrap },
     Vector { handler: time::on_alarm },
     Vector { handler: run_tasks },
+    #[cfg(feature = "preempting")]
+    Vector { handler: preempting::run_control },
+    #[cfg(not(feature = "preempting"))]
+    RESERVED,
 ];
 
 /// An interrupt's number.
@@ -135,7 +143,10 @@ fn start_interrupts() {
 
 #[embassy_executor::task]
 async fn control(shared: &'static Shared) {
-    let mut benches = Benches::new(Bench::new(&BENCH), Bench::new(&SECOND_BENCH));
+    let benches = Benches::new(Bench::new(&BENCH), Bench::new(&SECOND_BENCH));
+    #[cfg(feature = "preempting")]
+    let benches = preempting::Counted(benches);
+    let mut benches = benches;
     tasks::control(&mut benches, shared).await
 }
 
@@ -165,6 +176,9 @@ fn spawn(spawner: SendSpawner, shared: &'static Shared, port: &'static Port) -> 
     let server =
         SERVER.init(Server::start(identity, flash, shared).map_err(|_| "the store cannot be opened")?);
     let full = |_| "a task has no place";
+    #[cfg(feature = "preempting")]
+    preempting::start().spawn(control(shared).map_err(full)?);
+    #[cfg(not(feature = "preempting"))]
     spawner.spawn(control(shared).map_err(full)?);
     watchdog::start();
     spawner.spawn(telemetry(port, shared).map_err(full)?);
