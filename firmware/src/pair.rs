@@ -125,13 +125,18 @@ fn taut(arms: [Arm<'_>; 2]) -> f32 {
     arms[0].model.taut_n().max(arms[1].model.taut_n())
 }
 
+/// What depends on a muscle's length alone, where the pulley has turned by `turn`, m, of its circumference.
+fn held_at(joint: &Joint, arm: Arm<'_>, turn: f32) -> Held<f32> {
+    let mut held = Held::NONE;
+    single::hold(&arm.model.muscle, &mut held, Length::from_metres(joint.rest_stroke_m + turn));
+    held
+}
+
 /// The least and the greatest tension at an angle, N, if both muscles can pull there.
 fn tensions(joint: &Joint, arms: [Arm<'_>; 2], angle_rad: f32) -> Option<(f32, f32)> {
     let most = |arm: Arm<'_>, turn: f32| {
-        let muscle = &arm.model.muscle;
-        let mut held = Held::NONE;
-        single::hold(muscle, &mut held, Length::from_metres(joint.rest_stroke_m + turn));
-        single::parts(muscle, &held, Pressure::from_pascals(arm.high_pa)).quasi()
+        let held = held_at(joint, arm, turn);
+        single::parts(&arm.model.muscle, &held, Pressure::from_pascals(arm.high_pa)).quasi()
     };
     let turn = joint.radius_m * angle_rad;
     let (low, high) = (taut(arms), most(arms[0], turn).min(most(arms[1], -turn)));
@@ -142,9 +147,7 @@ fn tensions(joint: &Joint, arms: [Arm<'_>; 2], angle_rad: f32) -> Option<(f32, f
 fn stiffness_at(joint: &Joint, arms: [Arm<'_>; 2], angle_rad: f32, tension_n: f32) -> f32 {
     let turn = joint.radius_m * angle_rad;
     let resists = |arm: Arm<'_>, turn: f32| {
-        let muscle = &arm.model.muscle;
-        let mut held = Held::NONE;
-        single::hold(muscle, &mut held, Length::from_metres(joint.rest_stroke_m + turn));
+        let (muscle, held) = (&arm.model.muscle, held_at(joint, arm, turn));
         let guess = Pressure::from_pascals(0.5 * arm.high_pa);
         let force = Force::from_newtons(tension_n);
         let found = single::pressure_for(muscle, &held, 0.0, force, guess, &muscle.search());

@@ -1,18 +1,12 @@
 //! A controller without hardware: the firmware in QEMU, or the same firmware in this process, on a muscle of the virtual bench.
 
-use std::io;
-use std::net::TcpListener;
-use std::path::{Path, PathBuf};
-use std::process::Child;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicU8, Ordering};
 
 use firmware::board::{Inputs, Outputs, Readings};
 use firmware::native::{Device, Options};
 use virtual_bench::bench::BenchSpec;
-use virtual_bench::lockstep::{self, Answer, Station};
+use virtual_bench::lockstep::{Answer, Station};
 use virtual_bench::muscle::{Muscle, MuscleSpec};
 use virtual_bench::plant::{Motion, Plant};
 
@@ -20,8 +14,12 @@ use crate::device::Address;
 use crate::error::{Code, Error, Result};
 
 mod guard;
+pub mod qemu;
+mod relay;
+pub mod wire;
 
-pub use guard::guarded;
+use qemu::Qemu;
+pub use qemu::image;
 
 /// Where the firmware runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -149,13 +147,13 @@ enum Running {
 impl Emulated {
     /// Starts the firmware on a stand: in QEMU where emulator and image are there, else in this process.
     ///
-    /// `only` insists on one of them. `speed` is device seconds in a second for the native one; QEMU takes its own.
+    /// `only` insists on one of them. `speed` is device seconds in a second: what this machine can do is at most that, infinite without a bound.
     ///
     /// # Errors
     /// [`Code::DevicePort`] when what was insisted on cannot be started.
     pub fn start(stand: Stand, only: Option<Kind>, speed: f64) -> Result<Self> {
         if only != Some(Kind::Native) {
-            match Qemu::start(stand.clone()) {
+            match Qemu::start(stand.clone(), speed) {
                 Ok((qemu, address)) => {
                     return Ok(Self {
                         kind: Kind::Qemu,
@@ -230,114 +228,10 @@ impl Emulated {
     #[must_use]
     pub fn log(&self) -> String {
         match &self._running {
-            Running::Qemu(qemu) => std::fs::read_to_string(qemu.folder.join("qemu.log")).unwrap_or_default(),
+            Running::Qemu(qemu) => qemu.log(),
             Running::Native { .. } => String::new(),
         }
     }
-}
-
-#[derive(Debug)]
-struct Qemu {
-    child: Child,
-    folder: PathBuf,
-    stop: Arc<AtomicBool>,
-}
-
-impl Drop for Qemu {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        // It may have ended by itself; there is nobody left to tell.
-        end(&mut self.child);
-        let _ = std::fs::remove_dir_all(&self.folder);
-    }
-}
-
-/// Ends a [`guarded`] program.
-pub fn end(child: &mut Child) {
-    if cfg!(unix) {
-        drop(child.stdin.take());
-    } else {
-        let _ = child.kill();
-    }
-    let _ = child.wait();
-}
-
-impl Qemu {
-    /// The reason in words where it cannot be started.
-    fn start(stand: Stand) -> std::result::Result<(Self, Address), String> {
-        let image = image().ok_or("the firmware's image is not built (firmware/build)")?;
-        let bench = TcpListener::bind("127.0.0.1:0").map_err(|e| format!("no port can be opened ({e})"))?;
-        let bench_port = bench.local_addr().map_err(|e| e.to_string())?.port();
-        // QEMU opens the link's port itself; this one was free a moment ago.
-        let link_port =
-            TcpListener::bind("127.0.0.1:0").and_then(|l| l.local_addr()).map_err(|e| e.to_string())?.port();
-        let folder = std::env::temp_dir().join(format!("pam-emulated-{}-{link_port}", std::process::id()));
-        std::fs::create_dir_all(&folder).map_err(|e| format!("no temporary folder can be made ({e})"))?;
-        let started = std::fs::File::create(folder.join("qemu.log")).and_then(|log| {
-            guarded("qemu-system-arm")?
-                .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"])
-                .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
-                .arg(&image)
-                .args(["-serial", &format!("tcp:127.0.0.1:{link_port},server=on,wait=off,nodelay=on")])
-                .args(["-serial", &format!("tcp:127.0.0.1:{bench_port},nodelay=on"), "-serial", "null"])
-                // The store's file is made where the emulator runs.
-                .current_dir(&folder)
-                .stdout(log.try_clone()?)
-                .stderr(log)
-                .spawn()
-        });
-        let child = started.map_err(|e| match e.kind() {
-            io::ErrorKind::NotFound => "QEMU is not installed".to_owned(),
-            _ => format!("QEMU cannot be run ({e})"),
-        })?;
-        let stop = Arc::new(AtomicBool::new(false));
-        let mut qemu = Self { child, folder, stop: Arc::clone(&stop) };
-        let stream = qemu.accept(&bench)?;
-        let mut stand = stand;
-        thread::spawn(move || {
-            let mut stream = stream;
-            // It ends with the emulator: then the stream closes.
-            let _ = lockstep::serve(&mut stream, &mut stand);
-        });
-        let address = Address::Tcp { host: "127.0.0.1".into(), port: link_port };
-        Ok((qemu, address))
-    }
-
-    fn accept(&mut self, listener: &TcpListener) -> std::result::Result<std::net::TcpStream, String> {
-        let broken = |e: io::Error| format!("QEMU cannot be reached ({e})");
-        listener.set_nonblocking(true).map_err(broken)?;
-        let deadline = Instant::now() + Duration::from_secs(15);
-        loop {
-            match listener.accept() {
-                Ok((stream, _)) => {
-                    stream.set_nonblocking(false).map_err(broken)?;
-                    stream.set_nodelay(true).map_err(broken)?;
-                    return Ok(stream);
-                }
-                Err(e) if e.kind() == io::ErrorKind::WouldBlock => {}
-                Err(e) => return Err(broken(e)),
-            }
-            if let Ok(Some(status)) = self.child.try_wait() {
-                let log = std::fs::read_to_string(self.folder.join("qemu.log")).unwrap_or_default();
-                return Err(format!("QEMU ended at once ({status}): {}", log.trim()));
-            }
-            if Instant::now() > deadline {
-                return Err("QEMU does not connect to the bench within 15 s".to_owned());
-            }
-            thread::sleep(Duration::from_millis(2));
-        }
-    }
-}
-
-/// The firmware's image: `PAM_FIRMWARE`, or where `firmware/build` puts it, seen from here or from this program.
-#[must_use]
-pub fn image() -> Option<PathBuf> {
-    if let Some(path) = std::env::var_os("PAM_FIRMWARE") {
-        return Some(PathBuf::from(path)).filter(|p| p.is_file());
-    }
-    let below = |top: &Path| Some(top.join("target/firmware/mps2-an386.elf")).filter(|p| p.is_file());
-    let from = |start: Option<PathBuf>| start.and_then(|s| s.ancestors().find_map(below));
-    from(std::env::current_dir().ok()).or_else(|| from(std::env::current_exe().ok()))
 }
 
 #[cfg(test)]

@@ -34,6 +34,8 @@ pub struct Case {
     pub spec: MuscleSpec,
     /// How its free end is moved while the controller works.
     pub motion: Motion,
+    /// What is asked of the force meanwhile.
+    pub asked: Vec<Stretch>,
     /// Blocked force at the highest level, N.
     pub blocked: f64,
 }
@@ -49,6 +51,19 @@ fn sizes(spec: &MuscleSpec) -> (f64, f64, f64) {
 /// Swings about 20 % of the free stroke `x` (m).
 fn swing(x: f64, frequency_hz: f64) -> Motion {
     Motion::Sine { mean_mm: 0.2e3 * x, amplitude_mm: 0.1e3 * x, frequency_hz }
+}
+
+/// Rests a second and a half, goes on by two hundredths of the free stroke `x` (m) within a second, and so on to and fro, as a gripper
+/// that feels its way: what grows during a rest and is lost over the first bit of motion has its say in each move.
+fn inching(x: f64) -> Motion {
+    const MOVES: [f64; 8] = [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0];
+    let mut points = vec![(0.0, 0.2e3 * x)];
+    for (n, way) in MOVES.iter().cycle().take(40).enumerate() {
+        let (began, at) = (2.5 * n as f64, points.last().map_or(0.0, |last| last.1));
+        points.push((began + 1.5, at));
+        points.push((began + 2.5, at + way * 0.02e3 * x));
+    }
+    Motion::Path { points }
 }
 
 /// A muscle that nobody has seen, whose braid gives too little before it slides for any sample to see: its plain law of friction is
@@ -91,18 +106,19 @@ pub fn cases() -> Vec<Case> {
             .to_vec(),
     };
     type Course<'a> = &'a dyn Fn(f64) -> Motion;
-    let all: [(&'static str, u64, Conceal, Course<'_>); 4] = [
-        ("coulomb-friction", 101, seal, &swing(0.2)),
-        ("viscous-damping", 102, viscous, &swing(0.5)),
-        ("stress-relaxation", 103, relaxation, &path),
-        ("breakaway-friction", 104, breakaway, &swing(0.2)),
+    type Asked = fn(f64) -> Vec<Stretch>;
+    let all: [(&'static str, u64, Conceal, Course<'_>, Asked); 4] = [
+        ("coulomb-friction", 101, seal, &swing(0.2), sine_and_steps),
+        ("viscous-damping", 102, viscous, &swing(0.5), sine_and_steps),
+        ("stress-relaxation", 103, relaxation, &path, sine_and_steps),
+        ("breakaway-friction", 104, breakaway, &inching, steady),
     ];
-    all.map(|(effect, seed, conceal, motion)| {
+    all.map(|(effect, seed, conceal, motion, asked)| {
         let plain = simple(seed);
         let (blocked, x, v) = sizes(&plain);
         let mut spec = plain.clone();
         let words = conceal(&mut spec, blocked, x, v);
-        Case { effect, words, plain, spec, motion: motion(x), blocked }
+        Case { effect, words, plain, spec, motion: motion(x), asked: asked(blocked), blocked }
     })
     .to_vec()
 }
@@ -170,14 +186,20 @@ pub fn table_without(case: &Case) -> MuscleTable {
     fit::fit(&campaign, &muscle, &Options::default()).expect("a fit").table
 }
 
-/// What is asked of the force: a slow sine, then two steps; the first part fills the muscle.
-fn wanted(blocked: f64) -> (Reference, [f32; 2]) {
+/// A slow sine of force about a third of blocked force `b`, N, then two steps; the first part of the sine fills the muscle.
+fn sine_and_steps(blocked: f64) -> Vec<Stretch> {
     let b = blocked as f32;
-    (Reference::Sine { mean: 0.35 * b, amplitude: 0.12 * b, frequency_hz: 0.5 }, [0.45 * b, 0.28 * b])
+    let sine = Reference::Sine { mean: 0.35 * b, amplitude: 0.12 * b, frequency_hz: 0.5 };
+    let step =
+        |newtons| Stretch { wanted: Wanted::Point(SetPoint::Force(newtons)), ticks: 1_000, unjudged: 300 };
+    vec![Stretch { wanted: Wanted::Wave(sine), ticks: 2_600, unjudged: 300 }, step(0.45 * b), step(0.28 * b)]
 }
 
-/// Ticks of the sine, of each step, and at the beginning of each that are not judged.
-const TICKS: (u64, u64, u64) = (2_600, 1_000, 300);
+/// One force for a whole course of [`inching`], to and back, after a second in which it fills the muscle.
+fn steady(blocked: f64) -> Vec<Stretch> {
+    let point = SetPoint::Force(0.35 * blocked as f32);
+    vec![Stretch { wanted: Wanted::Point(point), ticks: 21_000, unjudged: 1_000 }]
+}
 
 /// What a user would have set: the regulator as it is identified on this bench.
 fn settings(bench: &BenchSpec, table: &MuscleTable, blocked: f64) -> Settings {
@@ -192,15 +214,14 @@ pub fn here(spec: &MuscleSpec, case: &Case, table: &MuscleTable) -> f64 {
     let bench = BenchSpec::laboratory(spec.clone(), 11);
     let with = closed_loop::forward(settings(&bench, table, case.blocked), FeedForward::Table);
     let mut control = Loop::start(&bench, &case.motion, table, with, Mode::Force);
-    let (wave, steps) = wanted(case.blocked);
     let mut judged = Vec::new();
-    control.wave(wave);
-    control.run(TICKS.2 as u32);
-    judged.extend(control.run((TICKS.0 - TICKS.2) as u32));
-    for step in steps {
-        control.point(SetPoint::Force(step));
-        control.run(TICKS.2 as u32);
-        judged.extend(control.run((TICKS.1 - TICKS.2) as u32));
+    for stretch in &case.asked {
+        match stretch.wanted {
+            Wanted::Wave(wave) => control.wave(wave),
+            Wanted::Point(point) => control.point(point),
+        };
+        control.run(stretch.unjudged as u32);
+        judged.extend(control.run((stretch.ticks - stretch.unjudged) as u32));
     }
     100.0 * closed_loop::rms(&judged, |tick| tick.force) / case.blocked
 }
@@ -213,13 +234,6 @@ pub fn here(spec: &MuscleSpec, case: &Case, table: &MuscleTable) -> f64 {
 /// # Panics
 /// When the board refuses or stops.
 pub fn in_emulator(spec: &MuscleSpec, case: &Case, tables: &[&MuscleTable]) -> Result<Vec<f64>, Skipped> {
-    let (wave, steps) = wanted(case.blocked);
-    let mut stretches = vec![Stretch { wanted: Wanted::Wave(wave), ticks: TICKS.0, unjudged: TICKS.2 }];
-    stretches.extend(steps.map(|newtons| Stretch {
-        wanted: Wanted::Point(SetPoint::Force(newtons)),
-        ticks: TICKS.1,
-        unjudged: TICKS.2,
-    }));
     tables
         .iter()
         .map(|table| {
@@ -236,7 +250,7 @@ pub fn in_emulator(spec: &MuscleSpec, case: &Case, tables: &[&MuscleTable]) -> R
                 tracking::compare(FeedForward::Table, 0.0, 0.0)(s);
                 (s.regulator, s.limits) = (with.regulator, with.limits);
             });
-            let samples = tracking::run(&mut client, Mode::Force, &stretches);
+            let samples = tracking::run(&mut client, Mode::Force, &case.asked);
             Ok(100.0 * tracking::rms(&samples, tracking::force) / case.blocked)
         })
         .collect()

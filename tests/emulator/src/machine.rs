@@ -1,7 +1,7 @@
 //! One emulated board.
 
-use std::io::{self, Read};
-use std::net::{TcpListener, TcpStream};
+use std::io::Read;
+use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
@@ -10,7 +10,9 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use host::device::{Client, Patience, Port};
-use host::emulated::{end, guarded};
+use host::emulated::qemu::{Line, board, end};
+use host::emulated::wire::{Wire, accept, listener};
+use object::{Object, ObjectSymbol};
 use virtual_bench::lockstep::{self, Station};
 
 use crate::debugger::Debugger;
@@ -87,6 +89,30 @@ pub fn log_image() -> Result<PathBuf, Skipped> {
     Ok(built(&["--log", "mps2-an386"], "mps2-an386-log.elf", &ONCE))
 }
 
+/// The controller's image whose control loop interrupts the other tasks.
+///
+/// # Errors
+/// [`Skipped`] when the emulator is left out.
+///
+/// # Panics
+/// With the reason when it cannot be built.
+pub fn preempting_image() -> Result<PathBuf, Skipped> {
+    static ONCE: OnceLock<Result<(), String>> = OnceLock::new();
+    available()?;
+    Ok(built(&["--preempting", "mps2-an386"], "mps2-an386-preempting.elf", &ONCE))
+}
+
+/// Where a static of an image lies.
+///
+/// # Panics
+/// When it has none of that name.
+pub fn address_of(image: &Path, name: &str) -> u32 {
+    let bytes = std::fs::read(image).expect("an image");
+    let elf = object::File::parse(&*bytes).expect("an image");
+    let symbol = elf.symbols().find(|symbol| symbol.name() == Ok(name));
+    u32::try_from(symbol.unwrap_or_else(|| panic!("no static is called {name}")).address()).expect("32 bits")
+}
+
 /// The image that counts instructions.
 ///
 /// # Errors
@@ -151,36 +177,15 @@ pub struct Machine {
     benches: Vec<JoinHandle<()>>,
 }
 
-fn listener() -> (TcpListener, u16) {
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a port of this machine");
-    let port = listener.local_addr().expect("its address").port();
-    (listener, port)
-}
-
-/// Waits for QEMU to connect, and notices when it has ended instead.
-fn accept(listener: &TcpListener, child: &mut Child) -> TcpStream {
-    listener.set_nonblocking(true).expect("a listener");
-    let deadline = Instant::now() + Duration::from_secs(20);
-    loop {
-        match listener.accept() {
-            Ok((stream, _)) => {
-                stream.set_nonblocking(false).expect("a stream");
-                stream.set_nodelay(true).expect("a stream");
-                return stream;
-            }
-            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
-            Err(error) => panic!("cannot accept: {error}"),
+/// A line that QEMU has opened, or what QEMU said instead.
+fn opened<T>(child: &mut Child, open: impl FnOnce(&mut Child) -> Result<T, String>) -> T {
+    open(child).unwrap_or_else(|why| {
+        let mut text = String::new();
+        if let (Ok(Some(_)), Some(stderr)) = (child.try_wait(), child.stderr.as_mut()) {
+            let _ = stderr.read_to_string(&mut text);
         }
-        if let Ok(Some(status)) = child.try_wait() {
-            let mut text = String::new();
-            if let Some(stderr) = child.stderr.as_mut() {
-                let _ = stderr.read_to_string(&mut text);
-            }
-            panic!("QEMU ended at once ({status}): {text}");
-        }
-        assert!(Instant::now() < deadline, "QEMU does not connect within 20 s");
-        thread::sleep(Duration::from_millis(2));
-    }
+        panic!("{why} {text}");
+    })
 }
 
 impl Machine {
@@ -206,37 +211,39 @@ impl Machine {
         Ok(Self::start_image(&log_image()?, folder, options))
     }
 
+    /// The same with the image whose control loop interrupts the other tasks.
+    ///
+    /// # Errors
+    /// [`Skipped`] when the emulator is left out.
+    ///
+    /// # Panics
+    /// With the reason when the board cannot be started.
+    pub fn start_preempting(folder: &Path, options: Options) -> Result<Self, Skipped> {
+        Ok(Self::start_image(&preempting_image()?, folder, options))
+    }
+
     fn start_image(image: &Path, folder: &Path, options: Options) -> Self {
-        let (link, link_port) = listener();
-        let mut command = guarded("qemu-system-arm").expect("QEMU starts");
-        command
-            .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"])
-            .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
-            .arg(image)
-            .args(["-chardev", &format!("socket,id=link,host=127.0.0.1,port={link_port},nodelay=on")])
-            .args(["-serial", "chardev:link"]);
-        // QEMU opens this port itself; it was free a moment ago.
-        let debugger = options.debugged.then(|| listener().1);
-        if let Some(port) = debugger {
-            command.args(["-gdb", &format!("tcp:127.0.0.1:{port},server=on,wait=off")]);
-        }
+        let (link, link_port) = listener().expect("a port of this machine");
+        let mut lines = vec![Line::Port(link_port)];
         let mut plugged = Vec::new();
-        for (number, station) in [options.first, options.second].into_iter().enumerate() {
+        static NUMBER: AtomicU32 = AtomicU32::new(0);
+        for station in [options.first, options.second] {
             match station {
                 Some(station) => {
-                    let (bench, port) = listener();
-                    command
-                        .args([
-                            "-chardev",
-                            &format!("socket,id=bench{number},host=127.0.0.1,port={port},nodelay=on"),
-                        ])
-                        .args(["-serial", &format!("chardev:bench{number}")]);
+                    // A board may be started again in the same folder.
+                    let name = format!("bench{}", NUMBER.fetch_add(1, Ordering::Relaxed));
+                    let bench = Wire::new(folder, &name).expect("a line");
+                    lines.push(bench.line());
                     plugged.push((bench, station));
                 }
-                None => {
-                    command.args(["-serial", "null"]);
-                }
+                None => lines.push(Line::Open),
             }
+        }
+        let mut command = board(image, &lines).expect("QEMU starts");
+        // QEMU opens this port itself; it was free a moment ago.
+        let debugger = options.debugged.then(|| listener().expect("a port of this machine").1);
+        if let Some(port) = debugger {
+            command.args(["-gdb", &format!("tcp:127.0.0.1:{port},server=on,wait=off")]);
         }
         let mut child = command
             .current_dir(folder)
@@ -244,14 +251,14 @@ impl Machine {
             .stderr(Stdio::piped())
             .spawn()
             .expect("QEMU starts");
-        let link = accept(&link, &mut child);
+        let link = opened(&mut child, |child| accept(&link, child));
         let benches = plugged
             .into_iter()
             .map(|(bench, mut station)| {
-                let mut stream = accept(&bench, &mut child);
+                let mut ends = opened(&mut child, |child| bench.open(child));
                 thread::spawn(move || {
                     // The emulator's end is the end of the bench; how it ended is the test's to judge.
-                    let _ = lockstep::serve(&mut stream, station.as_mut());
+                    let _ = lockstep::serve(&mut ends, station.as_mut());
                 })
             })
             .collect();
