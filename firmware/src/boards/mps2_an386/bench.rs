@@ -6,6 +6,7 @@
 
 use embassy_futures::poll_once;
 use embassy_futures::select::{Either, select};
+use embassy_futures::yield_now;
 use embassy_time::{Duration, Instant, Timer};
 use embedded_io_async::{Read, Write};
 use firmware::board::{Command, Inputs, Outputs, Plant, Readings};
@@ -140,6 +141,8 @@ impl Bench {
         watchdog::feed();
         let request = self.request(command, asked);
         let Ok(()) = Sender(self.uart).write_all(&request).await;
+        // A quick bench has answered by now, and the loop would go on without end: the other tasks have their turn in every tick.
+        yield_now().await;
         let patience = if self.started { PATIENCE } else { FIRST_PATIENCE };
         match select(self.wait(), Timer::after(patience)).await {
             Either::First(said) => {
