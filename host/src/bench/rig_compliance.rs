@@ -1,10 +1,10 @@
 //! The frame gives under load: the muscle is shorter than the stroke says by `F/K`.
 //!
 //! ```text
-//! F_add = (1/K) · [∂F/∂x · F + k_F F_quasi (s − z)/c]        dz = dx/(c k_F F_quasi), within ±1
+//! F_add = (1/K) · [∂F/∂x · F/(1 − c ∂F/∂x) + k_F F_quasi (s − z)/c]        dz = dx/(c k_F F_quasi), within ±1
 //! ```
-//! `x` is the contraction stroke, `∂F/∂x` negative, `F` the base model's force, N; `1/K`, m/N. First order: while `|∂F/∂x|/K` is well below
-//! one. At a turn the friction has to change by `2 k_F F` before the strands slide back; a frame that gives takes that change as travel,
+//! `x` is the contraction stroke, `∂F/∂x` negative, `F` the base model's force, N; `1/K`, m/N. The frame gives by the force that is left
+//! once it has given, hence the denominator. At a turn the friction has to change by `2 k_F F` before the strands slide back; a frame that gives takes that change as travel,
 //! so that the jump becomes a ramp: `c`, m/N, is the give by which it does, the same `1/K` where nothing else gives. A stretching braid
 //! looks the same in free tables but for the turns: measure with a rigid bar in the muscle's place.
 
@@ -27,7 +27,7 @@ impl Effect for RigCompliance {
         alternatives: false,
         start: Start::Branch,
         fading: &[],
-        equation: "F = (1/K)·[∂F/∂x·F + k_F·F_quasi·(s − z)/c], dz = dx/(c·k_F·F_quasi) within ±1",
+        equation: "F = (1/K)·[∂F/∂x·F/(1 − c·∂F/∂x) + k_F·F_quasi·(s − z)/c], dz = dx/(c·k_F·F_quasi) within ±1",
         summary: "The test frame bends, so the muscle is a little shorter than the stroke sensor says.",
         source: "first-order sensitivity of the base model; frames of 0.5 to 50 N/µm",
     };
@@ -53,7 +53,8 @@ impl Effect for RigCompliance {
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
         let turning = if context.speed == T::ZERO { T::ZERO } else { context.direction - memory[0] };
         let late = context.friction * context.quasi * turning / give(parameters);
-        parameters[0] * (context.slope() * context.force() + late)
+        let given = context.force() / (T::ONE - give(parameters) * context.slope()).max(T::ONE);
+        parameters[0] * (context.slope() * given + late)
     }
 }
 

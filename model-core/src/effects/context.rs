@@ -145,12 +145,19 @@ impl<T: Scalar> Context<T> {
         self.rubbed(self.area)
     }
 
-    /// What the memories of load are driven by, N: the elastic force and Gaylord's, of a muscle that pulls. A slack one carries
+    /// What the bladder's stress takes from the pull of its gas, N, negative: the elastic polynomial and the deadband's `−P0 g`, as
+    /// `P0` is what stretches the bladder out to its braid. How a fit shares it between the two does not matter here.
+    #[inline]
+    pub fn bladder(&self) -> T {
+        self.quasi - self.pressure * self.area
+    }
+
+    /// What the memories of load are driven by, N: the bladder's and Gaylord's, of a muscle that pulls. A slack one carries
     /// neither: its bladder does not press on the braid, and the braid buckles instead of straining it.
     #[inline]
     pub fn loads(&self) -> (T, T) {
-        let gaylord = self.gaylord.max(T::ZERO);
-        (self.elastic.max(-gaylord), gaylord)
+        let gas = (self.pressure * self.area).max(T::ZERO);
+        (self.bladder().max(-gas), self.gaylord.max(T::ZERO))
     }
 
     /// `c_1`, m²: the elastic force per pascal of a linear wall, `(V_B/L) ε_z − t L² ε_x/(2πN²R)`; negative in contraction.

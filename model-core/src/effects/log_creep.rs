@@ -12,7 +12,7 @@
 //!
 //! | amplitude | drive `u` | tells |
 //! | --- | --- | --- |
-//! | `relaxing_part_per_decade` | `F_el` where the muscle pulls, N | stress fades in proportion to the bladder's stress |
+//! | `relaxing_part_per_decade` | [`F_b`](Context::bladder) where the muscle pulls, N | stress fades in proportion to the bladder's stress |
 //! | `strain_modulus_per_decade`, Pa | `c_1 = (V_B/L) ε_z − t L² ε_x/(2πN²R)`, m² | stress fades in proportion to strain, whatever the pressure |
 //! | `yielding_part_per_decade` | `F_quasi` where the muscle pulls, N | the pull itself yields: braid, ends and wall give under load, also at constant length |
 //!
@@ -61,7 +61,7 @@ impl Effect for LogCreep {
             Spectrum::slot(0, 3),
             Spectrum::slot(0, 4),
         ],
-        equation: "F = (1 − s·k_F)·[a·Σq_i(F_el) + E_c·Σq_i(c_1) − a_F·Σ(u − q_i)(F_quasi)], τ_i = τ_0·(1, 10, … 10⁴)",
+        equation: "F = (1 − s·k_F)·[a·Σq_i(F_b) + E_c·Σq_i(c_1) − a_F·Σ(u − q_i)(F_quasi)], τ_i = τ_0·(1, 10, … 10⁴)",
         summary: "At constant length and pressure the force creeps, as much in each tenfold of time, and remembers earlier runs.",
         source: "S. M. Clarke, F. Elias, E. M. Terentjev, European Physical Journal E 2 (2000) 335–341, doi 10.1007/s101890050015; W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     };

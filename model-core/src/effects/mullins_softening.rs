@@ -1,10 +1,10 @@
 //! The first stretch of rubber is stiffer than all later ones up to the same strain (Ogden and Roxburgh's pseudo-elasticity).
 //!
 //! ```text
-//! F_add = −(1 − s k_F) a · erf[(W_m − W)/(m + β W_m)] · F_el        W = λ_x² + λ_z² + 1/(λ_x λ_z)² − 3,  λ = 1 + ε
+//! F_add = −(1 − s k_F) a · erf[(W_m − W)/(m + β W_m)] · F_b        W = λ_x² + λ_z² + 1/(λ_x λ_z)² − 3,  λ = 1 + ε
 //! ```
-//! `a = 1/r` is the largest loss of elastic force; `W` the neo-Hookean strain energy in units of half the shear modulus, `W_m` the largest so
-//! far, `m` and `β` how soon the softening sets in. On a first stretch (`W = W_m`) nothing is added; on the way back and on every later
+//! `F_b` is the bladder's part of the pull ([`Context::bladder`]), `a = 1/r` its largest loss; `W` the neo-Hookean strain energy in units of
+//! half the shear modulus, `W_m` the largest so far, `m` and `β` how soon the softening sets in. On a first stretch (`W = W_m`) nothing is added; on the way back and on every later
 //! stroke below `W_m` the bladder resists less. Return to a lower strain softens no further. The memory must outlive a power
 //! cycle, and a muscle worked before the recording has a `W_m` nobody recorded. Rest heals little of it, and this law nothing.
 //! The error function is Abramowitz and Stegun's 7.1.27, within 5·10⁻⁴.
@@ -29,7 +29,7 @@ impl Effect for MullinsSoftening {
         alternatives: false,
         start: Start::Virgin,
         fading: &[],
-        equation: "F = −(1 − s·k_F)·a·erf[(W_m − W)/(m + β·W_m)]·F_el",
+        equation: "F = −(1 − s·k_F)·a·erf[(W_m − W)/(m + β·W_m)]·F_b",
         summary: "The first stroke into new strain breaks bonds in the rubber; every later stroke meets less resistance.",
         source: "R. W. Ogden and D. G. Roxburgh, Proc. R. Soc. A 455 (1999) 2861–2877, doi 10.1098/rspa.1999.0431",
     };
@@ -43,7 +43,7 @@ impl Effect for MullinsSoftening {
         let most = memory[0];
         let below = (most - energy(context)).max(T::ZERO);
         let width = (parameters[1] + parameters[2] * most).max(T::from_f32(1.0e-6));
-        -context.rubbed(parameters[0] * rising(below / width) * context.elastic)
+        -context.rubbed(parameters[0] * rising(below / width) * context.bladder())
     }
 }
 

@@ -7,7 +7,7 @@
 //!
 //! | amplitude | drive `u` | tells |
 //! | --- | --- | --- |
-//! | `relaxing_part` | `F_el` where the muscle pulls, N | stress fades in proportion to the bladder's stress |
+//! | `relaxing_part` | [`F_b`](Context::bladder) where the muscle pulls, N | stress fades in proportion to the bladder's stress |
 //! | `strain_modulus`, Pa | `c_1 = (V_B/L) ε_z − t L² ε_x/(2πN²R)`, m² | stress fades in proportion to strain, whatever the pressure |
 //! | `settling_part` | `−F_G(P′, L)` where the muscle pulls, N | the pull follows the pressure late: braid and wall settle under load, also at constant length |
 //!
@@ -38,7 +38,7 @@ impl Effect for StressRelaxation {
         alternatives: true,
         start: Start::Settled,
         fading: &[Solid::slot(0, 0)],
-        equation: "F = (1 − s·k_F)·[g·q(F_el) + E_v·q(c_1) − g_P·q(F_G)], dq/dt = du/dt − q/τ",
+        equation: "F = (1 − s·k_F)·[g·q(F_b) + E_v·q(c_1) − g_P·q(F_G)], dq/dt = du/dt − q/τ",
         summary: "After each change of length or pressure the force fades towards its final value, as rubber does.",
         source: "W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     };

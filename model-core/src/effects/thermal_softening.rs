@@ -2,11 +2,11 @@
 //!
 //! ```text
 //! dw/dt = (power − w)/τ,   power = s F_quasi dx/dt
-//! F_add = −(1 − s k_F) (a_w w + a_T θ) F_el + (b_w w + b_T θ) s k_F F_quasi
+//! F_add = −(1 − s k_F) (a_w w + a_T θ) F_b + (b_w w + b_T θ) s k_F F_quasi
 //! ```
 //! `θ`, K, is the measured temperature less that of the first reading (columns of zeros where none is measured). Without a thermometer
 //! the muscle is taken to warm with the mean power `w`, W, that it exchanges with its load, over the thermal time `τ`, s (5 to 30
-//! minutes). `a` softens the elastic force and `b` the friction, per watt or per kelvin. Entropic rubber stiffens by 0.34 %/K
+//! minutes). `a` softens the bladder's part of the pull, `F_b` ([`Context::bladder`]), and `b` the friction, per watt or per kelvin. Entropic rubber stiffens by 0.34 %/K
 //! (`a_T = −0.0034`); filled rubber near its transition softens. Recovers at rest with the same `τ`, unlike wear.
 
 use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
@@ -31,7 +31,7 @@ impl Effect for ThermalSoftening {
         alternatives: true,
         start: Start::Settled,
         fading: &[0],
-        equation: "F = −(1 − s·k_F)·(a_w·w + a_T·θ)·F_el + (b_w·w + b_T·θ)·s·k_F·F_quasi, τ·dw/dt = s·F_quasi·dx/dt − w",
+        equation: "F = −(1 − s·k_F)·(a_w·w + a_T·θ)·F_b + (b_w·w + b_T·θ)·s·k_F·F_quasi, τ·dw/dt = s·F_quasi·dx/dt − w",
         summary: "Work warms the muscle, which changes the stiffness of its rubber; rest cools it again.",
         source: "M. Doumit and S. Pardoel, Mechanical Systems and Signal Processing 91 (2017) 93–110; L. R. G. Treloar, The Physics of Rubber Elasticity, 1975",
     };
@@ -68,6 +68,6 @@ impl Effect for ThermalSoftening {
         let warmth = if context.temperature > T::ZERO { context.temperature - memory[5] } else { T::ZERO };
         let friction = context.direction * context.friction * context.quasi;
         (parameters[1] * work + parameters[3] * warmth) * friction
-            - context.rubbed((parameters[0] * work + parameters[2] * warmth) * context.elastic)
+            - context.rubbed((parameters[0] * work + parameters[2] * warmth) * context.bladder())
     }
 }
