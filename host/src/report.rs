@@ -28,6 +28,7 @@ mod colour;
 mod figure;
 mod html;
 mod legend;
+mod letters;
 mod markdown;
 mod marks;
 mod numbers;

@@ -7,6 +7,7 @@ use model_core::units::Length;
 
 use super::effect_page::place;
 use super::effect_trace::Demonstration;
+use super::letters::letters;
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
 use crate::bench::Candidate;
 use crate::diagnose::verdict::{Diagnosis, Missing, Verdict};
@@ -138,6 +139,7 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
     ));
     if let Some(candidate) = candidate {
         section.listing(candidate.info().equation);
+        section.table(letters(candidate.info().equation));
     }
     let mut table =
         Table::new("Its parameters, in SI units", &["parameter", "value", "± (95 %)", "unit", "remark"]);

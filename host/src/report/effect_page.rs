@@ -6,6 +6,7 @@ use model_core::effects::{Info, Link, Role, Start};
 use model_core::table::TableError;
 
 use super::effect_trace::{Demonstration, Trace, likeness};
+use super::letters::letters;
 use super::{Page, Section, Table, figures};
 use crate::bench::Candidate;
 
@@ -102,6 +103,7 @@ pub fn page(trace: &Trace, figure: &super::Figure, all: &[(Trace, super::Figure)
     let mut what = Section::new("What it is").summarised();
     what.text(format!("It acts on {}. {}", place(info.link), whose(trace.candidate)));
     what.listing(info.equation);
+    what.table(letters(info.equation));
     what.table(parameters(trace));
     what.text(memory(info));
     page.push(what);
@@ -141,14 +143,16 @@ pub fn chapter(trace: &Trace, figure: &super::Figure, all: &[(Trace, super::Figu
         whose(trace.candidate),
         info.equation
     );
-    let table = parameters(trace);
-    let _ = writeln!(text, "| {} |", table.head.join(" | "));
-    let _ = writeln!(text, "|{}", " --- |".repeat(table.head.len()));
-    for row in &table.rows {
-        let cells: Vec<String> = row.iter().map(|c| super::rich::markdown(c)).collect();
-        let _ = writeln!(text, "| {} |", cells.join(" | "));
+    for table in [letters(info.equation), parameters(trace)] {
+        let _ = writeln!(text, "| {} |", table.head.join(" | "));
+        let _ = writeln!(text, "|{}", " --- |".repeat(table.head.len()));
+        for row in &table.rows {
+            let cells: Vec<String> = row.iter().map(|c| super::rich::markdown(c)).collect();
+            let _ = writeln!(text, "| {} |", cells.join(" | "));
+        }
+        text.push('\n');
     }
-    let _ = write!(text, "\n{}\n\n", memory(info));
+    let _ = write!(text, "{}\n\n", memory(info));
     if trace.force.iter().all(|f| *f == 0.0) {
         text.push_str("The demonstration does not excite it: it adds nothing there.\n");
     } else {

@@ -31,7 +31,7 @@ impl Effect for BreakawayFriction {
         alternatives: true,
         start: Start::Known,
         fading: &[],
-        equation: "F = −s·(m·(ΔF_s + κ·|F_quasi|) + κ_h·|F_quasi|)·(1 − exp(−t_rest/τ_s))·exp(−d/δ)",
+        equation: "F = −s·(m·(ΔF_s + κ·|F_quasi|) + κ_h·|F_quasi|)·(1 − exp(−t_rest/τ_s))·exp(−d_rest/δ)",
         summary: "After a rest the muscle sticks: the first bit of motion needs an extra force that grows with the length of the rest.",
         source: "B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083–1138, doi 10.1016/0005-1098(94)90209-7",
     };

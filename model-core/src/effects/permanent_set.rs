@@ -1,10 +1,10 @@
 //! Working stretches the muscle for good: its rest length grows by `δ` in the course of its life.
 //!
 //! ```text
-//! F_add = ∂F/∂x · [δ (1 − e^(−s/s_0)) + δ_l (1 − e^(−I/I_0))]
+//! F_add = ∂F/∂x · [δ (1 − e^(−ℓ/ℓ_0)) + δ_l (1 − e^(−I/I_0))]
 //! ```
-//! `δ` and `δ_l`, m, are the final sets of two laws to choose from: driven by the path `s` that the strands have slid (in rest lengths; a
-//! full cycle of 15 % contraction is 0.3) over `s_0`, or by the load's impulse `I = ∫|F_quasi| dt`, N·s, over `I_0`. At the same active length a
+//! `δ` and `δ_l`, m, are the final sets of two laws to choose from: driven by the path `ℓ` that the strands have slid (in rest lengths; a
+//! full cycle of 15 % contraction is 0.3) over `ℓ_0`, or by the load's impulse `I = ∫|F_quasi| dt`, N·s, over `I_0`. At the same active length a
 //! muscle with a longer rest length is contracted further and pulls less. First order in `δ`.
 
 use super::{
@@ -32,7 +32,7 @@ impl Effect for PermanentSet {
         alternatives: true,
         start: Start::Virgin,
         fading: &[],
-        equation: "F = ∂F/∂x·[δ·(1 − exp(−s/s_0)) + δ_l·(1 − exp(−I/I_0))]",
+        equation: "F = ∂F/∂x·[δ·(1 − exp(−ℓ/ℓ_0)) + δ_l·(1 − exp(−I/I_0))]",
         summary: "Working stretches the muscle for good by a fraction of a per cent, mostly in its early life.",
         source: "change of rest length in early life, 0.1 to 1 %; E. G. Hocking, thesis, University of Maryland (2012): run-in over the first tests",
     };

@@ -1,7 +1,7 @@
 //! A standard linear solid beside the muscle: part of every change of stress fades with time constant `τ`.
 //!
 //! ```text
-//! dq/dt = du/dt − q/τ        F_add = (1 − s k_F) g · q
+//! dq/dt = du/dt − q/τ        F_add = (1 − s k_F) a · q
 //! ```
 //! Three drives, three laws (their amplitudes may be tried singly):
 //!
@@ -38,7 +38,7 @@ impl Effect for StressRelaxation {
         alternatives: true,
         start: Start::Settled,
         fading: &[Solid::slot(0, 0)],
-        equation: "F = (1 − s·k_F)·[g·q(F_b) + E_v·q(c_1) − g_P·q(F_G)], dq/dt = du/dt − q/τ",
+        equation: "F = (1 − s·k_F)·[a·q(F_b) + E_v·q(c_1) − g_P·q(F_G)], dq/dt = du/dt − q/τ",
         summary: "After each change of length or pressure the force fades towards its final value, as rubber does.",
         source: "W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     };
