@@ -12,7 +12,7 @@ use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::{Muscle, MuscleSpec};
 use virtual_bench::physics::{Ageing, Relaxation, Seal, Viscous};
-use virtual_bench::plant::{Motion, PlantStation};
+use virtual_bench::plant::{Motion, Plant, PlantStation};
 use virtual_bench::presets;
 use virtual_bench::recording::Columns;
 
@@ -241,8 +241,11 @@ pub fn in_emulator(spec: &MuscleSpec, case: &Case, tables: &[&MuscleTable]) -> R
             let folder = Folder::new();
             let bench = BenchSpec::laboratory(spec.clone(), 11);
             let with = settings(&bench, table, case.blocked);
-            let station = Watched::new(PlantStation::new(bench, vec![case.motion.clone()], 1e-3));
-            let options = crate::Options { first: Some(Box::new(station)), ..crate::Options::default() };
+            let start = Plant::new(&bench, &case.motion);
+            let waiting = Motion::Held { stroke_mm: 1e3 * start.truth().stroke };
+            let station = Watched::new(PlantStation::new(bench, vec![waiting], 1e-3));
+            let options =
+                crate::Options { first: Some(Box::new(station.clone())), ..crate::Options::default() };
             let machine = Machine::start(folder.path(), options)?;
             let mut client = machine.client();
             upload(&mut client, Side::Agonist, table);
@@ -250,6 +253,8 @@ pub fn in_emulator(spec: &MuscleSpec, case: &Case, tables: &[&MuscleTable]) -> R
                 tracking::compare(FeedForward::Table, 0.0, 0.0)(s);
                 (s.regulator, s.limits) = (with.regulator, with.limits);
             });
+            // Motion and course begin together, on a muscle that has not waited, however long all this took.
+            station.with(|bench| *bench.plant() = start);
             let samples = tracking::run(&mut client, Mode::Force, &case.asked);
             Ok(100.0 * tracking::rms(&samples, tracking::force) / case.blocked)
         })

@@ -37,7 +37,8 @@ fn main() -> io::Result<()> {
          Written by `cargo run --release -p emulator-tests --bin diagnosed`; nothing here is typed by hand.\n\n\
          In each row a muscle of the virtual bench conceals an effect. It is recorded by protocol D, fitted plainly and diagnosed \
          (`host diagnose -o`). The controller's image in QEMU then follows a force, a sine of 0.5 Hz and two steps, by feed-forward \
-         alone while the bench moves the muscle: with the plain table, with the diagnosed one, and, for what can be had at best, \
+         alone while the bench moves the muscle; what grows during a rest is tried on one force, while the bench rests a second and \
+         a half and moves by two hundredths of the free stroke within a second, eight times to and fro: with the plain table, with the diagnosed one, and, for what can be had at best, \
          on the same muscle without the effect with a plain table of its own. Force errors are root mean square by the load \
          cell, in % of blocked force.\n\n\
          | concealed | muscle | named (probability) | error on the recordings, plain → diagnosed, N | control, plain table, % | control, \
