@@ -9,6 +9,7 @@ use model_core::units::Length;
 use super::kinematics::{Thresholds, kinematics, white_noise};
 use super::linear::{median, quantile};
 use crate::error::Result;
+use crate::fit::screen::{self, Clip};
 use crate::progress::Progress;
 use crate::recording::{Campaign, UNKNOWN_PAUSE};
 
@@ -159,6 +160,9 @@ fn spikes(series: &[f64]) -> Vec<bool> {
         .collect()
 }
 
+/// A reading that is repeated as an end of the sensor's range is under load beyond this share of the largest.
+const END_UNDER_LOAD: f64 = 0.02;
+
 /// Prepares a campaign. The result depends on the data alone.
 ///
 /// # Errors
@@ -192,6 +196,22 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
     let mut piece_number = 0_u32;
     let mut largest = f64::NEG_INFINITY;
     let mut spiked = 0;
+    // A vented muscle may well read exactly nothing: only an end under load is one of the sensor's.
+    let (low, high) = screen::clip(campaign);
+    let strongest = campaign
+        .recordings
+        .iter()
+        .filter_map(|r| r.force.as_deref())
+        .flatten()
+        .fold(0.0, |s: f64, f| s.max(f.abs()));
+    let ends: Vec<Clip> =
+        [low, high].into_iter().flatten().filter(|c| c.force.abs() > END_UNDER_LOAD * strongest).collect();
+    for end in &ends {
+        rows.remarks.push(format!(
+            "{} readings are exactly {:.2} N: the force sensor stands at the end of its range there, and they were left out",
+            end.rows, end.force
+        ));
+    }
     for (index, recording) in campaign.recordings.iter().enumerate() {
         rows.names.push(recording.name.clone());
         let force = recording.require_force()?;
@@ -247,7 +267,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
                 count += 1.0;
                 if spike[j] {
                     spiked += 1;
-                } else {
+                } else if ends.iter().all(|end| force[j] != end.force) {
                     force_sum += force[j];
                     good += 1.0;
                 }

@@ -104,6 +104,19 @@ fn correlated_noise_is_not_named() {
 }
 
 #[test]
+fn the_end_of_the_sensors_range_is_no_physics() {
+    let mut campaign = recorded(loops(&[0.2]), 5, coloured(0.3, 2.0), |_, _, _| 0.0);
+    let forces = || campaign.recordings.iter().flat_map(|r| r.force.clone().unwrap_or_default());
+    let end = 0.8 * forces().fold(0.0, f64::max);
+    for r in &mut campaign.recordings {
+        r.force.iter_mut().flatten().for_each(|f| *f = f.min(end));
+    }
+    let d = ask(&campaign);
+    assert_eq!(d.verdict, Verdict::Consistent, "{:?}", names(&d));
+    assert!(d.remarks.iter().any(|r| r.contains("end of its range")), "{:?}", d.remarks);
+}
+
+#[test]
 fn wandering_noise_and_outliers_are_not_named() {
     for seed in 10..13 {
         let wander = |r: &mut Random, s: &mut [f64; 2]| {

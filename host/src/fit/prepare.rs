@@ -55,7 +55,7 @@ impl Prepared {
             contractions.check(stroke / braid.rest_length())?;
         }
         let max_pressure = muscle.max_pressure_kPa.map_or(points.pressure.high, |kpa| kpa * 1e3);
-        let clips = screen::clip(campaign, &points);
+        let clips = screen::clip(campaign);
         let outliers = despike(campaign, &mut points);
         let mut prepared = Self {
             pressures: pressures(&points, max_pressure),

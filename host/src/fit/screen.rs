@@ -2,7 +2,6 @@
 
 use crate::recording::Campaign;
 
-use super::points::Points;
 
 /// Whether a point takes part in the fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,31 +47,22 @@ pub struct Clip {
 /// Looks for the end of the force sensor's range. A converter that clips repeats one exact value; readings of a free sensor
 /// near its smallest value scatter over several.
 #[must_use]
-pub fn clip(campaign: &Campaign, points: &Points) -> (Option<Clip>, Option<Clip>) {
-    let count = |value: f64| {
-        campaign
-            .recordings
-            .iter()
-            .filter_map(|r| r.force.as_deref())
-            .flatten()
-            .filter(|f| **f == value)
-            .count()
-    };
+pub fn clip(campaign: &Campaign) -> (Option<Clip>, Option<Clip>) {
+    let readings = || campaign.recordings.iter().filter_map(|r| r.force.as_deref()).flatten().copied();
+    let count = |value: f64| readings().filter(|f| *f == value).count();
+    let (low, high) =
+        readings().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), f| (low.min(f), high.max(f)));
     let ends = |value: f64, side: f64| {
         let rows = count(value);
-        if rows < 30.max(points.rows / 300) {
+        if rows < 30.max(campaign.samples() / 300) {
             return None;
         }
         // The next distinct reading: at a free end it is about as frequent as the last one.
-        let next = campaign
-            .recordings
-            .iter()
-            .filter_map(|r| r.force.as_deref())
-            .flatten()
-            .filter(|f| side * (**f - value) > 0.0)
+        let next = readings()
+            .filter(|f| side * (f - value) > 0.0)
             .fold(f64::INFINITY, |best, f| best.min(side * (f - value)));
         let neighbours = if next.is_finite() { count(value + side * next) } else { 0 };
-        (rows > 3 * neighbours && points.force.span() > 0.0).then_some(Clip { force: value, rows })
+        (rows > 3 * neighbours && high > low).then_some(Clip { force: value, rows })
     };
-    (ends(points.force.low, 1.0), ends(points.force.high, -1.0))
+    (ends(low, 1.0), ends(high, -1.0))
 }
