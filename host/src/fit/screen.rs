@@ -2,7 +2,6 @@
 
 use crate::recording::Campaign;
 
-
 /// Whether a point takes part in the fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Use {
