@@ -166,6 +166,38 @@ fn a_loose_joint_holds_still_for_its_width_after_a_turn() {
 }
 
 #[test]
+fn what_pressure_turns_at_held_length_turns_behind_a_loose_joint_too() {
+    let width = 0.2e-3;
+    let muscle = muscle();
+    let at = |stroke: f64, speed: f64, direction: f64, kpa: f64| {
+        muscle.context(
+            &Motion { stroke, speed, direction, ..Motion::default() },
+            Pressure::from_kilopascals(kpa),
+        )
+    };
+    // Shortened by a millimetre, held while the pressure falls and rises again, then lengthened by a little less than the play.
+    let mut contexts: Vec<Context<f64>> =
+        (0..=100).map(|i| at(1e-5 * f64::from(i), 1e-3, 1.0, 400.0)).collect();
+    contexts
+        .extend([(-1.0, 350.0), (-1.0, 300.0), (1.0, 350.0), (1.0, 400.0)].map(|(d, p)| at(1e-3, 0.0, d, p)));
+    contexts.push(at(0.9e-3, -1e-3, -1.0, 400.0));
+    let column = &columns("backlash", &[width, 0.05], &contexts)[0];
+    let friction = |row: usize| {
+        let c = &contexts[row];
+        let place = if row <= 104 { -0.5 * width } else { 0.5 * width - 0.1e-3 };
+        (column[row] - c.slope() * place) / (c.friction * c.quasi)
+    };
+    for row in 100..=104 {
+        assert!(friction(row).abs() < 1e-9, "row {row}: held, friction is the model's: {}", friction(row));
+    }
+    assert!(
+        (friction(105) + 2.0).abs() < 1e-9,
+        "turned within the play it is still the old one: {}",
+        friction(105)
+    );
+}
+
+#[test]
 fn a_filtered_cell_rounds_the_jump_at_a_turn() {
     let turned = |direction: f64, dt: f64| Context {
         direction,

@@ -35,7 +35,7 @@ impl Effect for Backlash {
     };
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
-        // memory: [play(x) − x, last stroke, seen, direction of the muscle behind the play]
+        // memory: [play(x) − x, last stroke, seen, direction of the muscle behind the play, last direction]
         let half = (parameters[1] * T::from_f32(0.5)).max(T::ZERO);
         let moved = if memory[2] == T::ZERO { T::ZERO } else { context.stroke - memory[1] };
         let behind = memory[0] - moved;
@@ -46,9 +46,13 @@ impl Effect for Backlash {
             memory[3] = drawn + (memory[3] - drawn) * decay((behind - memory[0]) / over);
         } else if memory[3] == T::ZERO {
             memory[3] = context.direction;
+        } else if context.speed == T::ZERO && memory[2] != T::ZERO {
+            // What turns friction at held length is pressure, which the muscle feels behind a loose joint as well.
+            memory[3] = (memory[3] + context.direction - memory[4]).clamp(-T::ONE, T::ONE);
         }
         memory[1] = context.stroke;
         memory[2] = T::ONE;
+        memory[4] = context.direction;
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
