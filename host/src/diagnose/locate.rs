@@ -270,10 +270,16 @@ pub(crate) fn block_ranges(rows: &Rows) -> Vec<(usize, usize)> {
 
 fn words(name: &str, from: f64, to: f64, share: f64, part: f64) -> String {
     let range = |scale: f64, unit: &str, digits: usize| {
+        let number = |value: f64| {
+            let text = format!("{:.digits$}", value * scale);
+            // What is rounded to nothing has no sign.
+            let nothing = text.trim_start_matches(['-', '0', '.']).is_empty();
+            text.trim_start_matches(|c| c == '-' && nothing).to_owned()
+        };
         if (from - to).abs() < 1e-12 {
-            format!("{:.digits$}{unit}", from * scale)
+            format!("{}{unit}", number(from))
         } else {
-            format!("{:.digits$} to {:.digits$}{unit}", from * scale, to * scale)
+            format!("{} to {}{unit}", number(from), number(to))
         }
     };
     let place = match name {
@@ -307,4 +313,18 @@ fn words(name: &str, from: f64, to: f64, share: f64, part: f64) -> String {
         _ => range(1.0, "", 3),
     };
     format!("{:.0} % of the misfit sits {place}, in {:.0} % of the rows", share * 100.0, part * 100.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::words;
+
+    #[test]
+    fn a_region_that_begins_at_nothing_has_no_sign_there() {
+        assert_eq!(
+            words("force", -0.04, 13.1, 0.39, 0.17),
+            "39 % of the misfit sits where the muscle pulls 0.0 to 13.1 N, in 17 % of the rows"
+        );
+        assert!(words("force", -0.06, 13.1, 0.39, 0.17).contains("-0.1 to 13.1 N"));
+    }
 }
