@@ -4,9 +4,10 @@
 //! F_add = (1/K) · [∂F/∂x · F/(1 − c ∂F/∂x) + k_F F_quasi (s − z)/c]        dz = dx/(c k_F F_quasi), within ±1
 //! ```
 //! `x` is the contraction stroke, `∂F/∂x` negative, `F` the base model's force, N; `1/K`, m/N. The frame gives by the force that is left
-//! once it has given, hence the denominator. At a turn the friction has to change by `2 k_F F` before the strands slide back; a frame that gives takes that change as travel,
-//! so that the jump becomes a ramp: `c`, m/N, is the give by which it does, the same `1/K` where nothing else gives. A stretching braid
-//! looks the same in free tables but for the turns: measure with a rigid bar in the muscle's place.
+//! once it has given, hence the denominator. At a turn the friction has to change by `2 k_F F` before the strands slide back; a frame
+//! that gives takes that change as travel, so that the jump becomes a ramp: `c`, m/N, is the give by which it does, the same `1/K` where
+//! nothing else gives. A stretching braid looks the same in free tables but for the turns: measure with a rigid bar in the muscle's
+//! place.
 
 use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
 use model_core::scalar::Scalar;

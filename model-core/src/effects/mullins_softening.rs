@@ -4,9 +4,10 @@
 //! F_add = −(1 − s k_F) a · erf[(W_m − W)/(m + β W_m)] · F_b        W = λ_x² + λ_z² + 1/(λ_x λ_z)² − 3,  λ = 1 + ε
 //! ```
 //! `F_b` is the bladder's part of the pull ([`Context::bladder`]), `a = 1/r` its largest loss; `W` the neo-Hookean strain energy in units of
-//! half the shear modulus, `W_m` the largest so far, `m` and `β` how soon the softening sets in. On a first stretch (`W = W_m`) nothing is added; on the way back and on every later
-//! stroke below `W_m` the bladder resists less. Return to a lower strain softens no further. The memory must outlive a power
-//! cycle, and a muscle worked before the recording has a `W_m` nobody recorded. Rest heals little of it, and this law nothing.
+//! half the shear modulus, `W_m` the largest so far, `m` and `β` how soon the softening sets in. On a first stretch (`W = W_m`) nothing is
+//! added; on the way back and on every later stroke below `W_m` the bladder resists less. Return to a lower strain softens no further. The
+//! memory must outlive a power cycle, and a muscle worked before the recording has a `W_m` nobody recorded. Rest heals little of it, and
+//! this law nothing.
 //! The error function is Abramowitz and Stegun's 7.1.27, within 5·10⁻⁴.
 
 use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
