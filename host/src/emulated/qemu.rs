@@ -67,9 +67,17 @@ pub fn end(child: &mut Child) {
 
 /// The bench's end of its line, which is not read before the next tick is due. What the board asks byte by byte has come by then, and
 /// wakes nobody eighteen times.
-struct Paced {
+pub struct Paced {
     ends: Ends,
     pace: Pace,
+}
+
+impl Paced {
+    /// So many device seconds in a second at most; infinite: as fast as it goes.
+    #[must_use]
+    pub fn new(ends: Ends, speed: f64) -> Self {
+        Self { ends, pace: Pace::new(speed) }
+    }
 }
 
 impl Read for Paced {
@@ -137,7 +145,7 @@ impl Qemu {
         let address = Address::Tcp { host: "127.0.0.1".into(), port: relay.port() };
         qemu.relay = Some(relay.between(link));
         thread::spawn(move || {
-            let mut line = Paced { ends, pace: Pace::new(speed) };
+            let mut line = Paced::new(ends, speed);
             // It ends with the emulator: then the line closes.
             let _ = lockstep::serve(&mut line, &mut stand);
         });

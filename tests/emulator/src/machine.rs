@@ -10,7 +10,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use host::device::{Client, Patience, Port};
-use host::emulated::qemu::{Line, board, end};
+use host::emulated::qemu::{Line, Paced, board, end};
 use host::emulated::wire::{Wire, accept, listener};
 use object::{Object, ObjectSymbol};
 use virtual_bench::lockstep::{self, Station};
@@ -166,6 +166,8 @@ pub struct Options {
     pub second: Option<Box<dyn Station + Send>>,
     /// Whether a debugger may be attached.
     pub debugged: bool,
+    /// Device seconds in a second at most; none: as fast as it goes.
+    pub speed: Option<f64>,
 }
 
 /// A running board.
@@ -255,10 +257,11 @@ impl Machine {
         let benches = plugged
             .into_iter()
             .map(|(bench, mut station)| {
-                let mut ends = opened(&mut child, |child| bench.open(child));
+                let ends = opened(&mut child, |child| bench.open(child));
+                let mut line = Paced::new(ends, options.speed.unwrap_or(f64::INFINITY));
                 thread::spawn(move || {
                     // The emulator's end is the end of the bench; how it ended is the test's to judge.
-                    let _ = lockstep::serve(&mut ends, station.as_mut());
+                    let _ = lockstep::serve(&mut line, station.as_mut());
                 })
             })
             .collect();

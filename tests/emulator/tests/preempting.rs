@@ -26,7 +26,9 @@ fn answers_are_whole_while_control_steps_interrupt_their_making() {
     let folder = Folder::new();
     let bench = BenchSpec::laboratory(presets::miniature(), 3);
     let station = PlantStation::new(bench, vec![Motion::Held { stroke_mm: 0.8 }], 1e-3);
-    let options = Options { first: Some(Box::new(station)), debugged: true, ..Options::default() };
+    // A bench that answers at once would leave the tasks below the loop no time at all.
+    let options =
+        Options { first: Some(Box::new(station)), debugged: true, speed: Some(1.0), ..Options::default() };
     let Ok(mut machine) = Machine::start_preempting(folder.path(), options) else { return };
     let image = machine::preempting_image().expect("it has just been started");
     let counter = machine::address_of(&image, "PREEMPTED");
@@ -41,6 +43,8 @@ fn answers_are_whole_while_control_steps_interrupt_their_making() {
     let table = table::example();
     let muscle = Muscle::<f32>::build(&table).expect("a valid table");
     upload(&mut client, Side::Agonist, &table);
+    // However long this process has to wait for a busy machine.
+    tracking::set(&mut client, |settings| settings.watch.autonomous = true);
     let info = client.call::<GetInfo>(&()).expect("its limits");
     let settings = client.call::<GetSettings>(&()).expect("its settings");
     tracking::start(&mut client, Mode::Force);

@@ -137,7 +137,8 @@ fn of_a_joint() -> Result<u32, Skipped> {
     let spec = presets::contractile();
     let joint: Arc<Mutex<Joint>> = Arc::new(Mutex::new(pair::elbow(&spec)));
     let [first, second] = joint::Side::both(&joint);
-    let options = Options { first: Some(Box::new(first)), second: Some(Box::new(second)), debugged: true };
+    let options =
+        Options { first: Some(Box::new(first)), second: Some(Box::new(second)), debugged: true, speed: None };
     let machine = Machine::start(folder.path(), options)?;
     let mut client = machine.client();
     let table = fitting::fitted(&spec);
