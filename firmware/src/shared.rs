@@ -48,8 +48,15 @@ impl Drop for Entered<'_> {
             ManuallyDrop::drop(&mut self.controller);
             critical_section::release(self.restore);
         }
+        #[cfg(feature = "preempting")]
+        LEFT.signal(());
     }
 }
+
+/// That a task has left the controller: for a board that lets its loop interrupt at that very moment, when whatever should have been
+/// taken out of it at once and was not shows.
+#[cfg(feature = "preempting")]
+pub static LEFT: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
 type Waiting = Channel<CriticalSectionRawMutex, Spoken, WAITING>;
 

@@ -4,14 +4,15 @@
 //! | --- | --- |
 //! | sensor out of range, no readings, over-pressure, over-stroke, over-force, over-speed | `debounce_ticks` in a row (default 2), so the command changes within 3 ms |
 //! | sensor stuck | `stuck_ticks` of bit-equal readings while the command moved by 20 kPa |
-//! | sensor noisy | `noisy_jumps` jumps within 256 ticks |
+//! | sensor noisy | the last of `noisy_jumps` jumps within 256 ticks |
 //! | sensors disagree | `disagree_ticks` of table and load cell apart by `disagree_n` |
 //! | pressure not following | `follow_ticks` of pressure and regulator's model apart by `follow_pa` |
 //! | set-point silence | `silence_ticks` without one |
 //! | host silence | `host_silence_ticks` without a whole frame, while running and not `autonomous` |
 //! | loop overrun | `overrun_ticks` missed in a row |
 //!
-//! Over-speed looks at the filtered speed (time constant 20 ms of the motion tracker).
+//! Over-speed looks at the filtered speed (time constant 20 ms of the motion tracker). Jumps are forgotten by slices of 64 ticks, so that
+//! no more than 320 ticks are ever looked back on.
 
 use model_core::link::messages::{Fault, Sensor};
 use model_core::link::settings::{SensorWatch, Settings};
@@ -45,17 +46,38 @@ impl InARow {
 
 /// The change of command that a live sensor cannot ignore, Pa.
 const EXCITED_PA: f32 = 20e3;
-/// Ticks in which jumps are counted.
-const JUMP_WINDOW: u16 = 256;
+/// Ticks of a slice of time, at whose end the oldest of four whole ones is forgotten.
+const SLICE: u8 = 64;
+
+/// Jumps within the last four to five slices. Any 256 ticks lie within them, wherever a slice ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Jumps {
+    now: u8,
+    /// A byte for each of four whole slices.
+    before: u32,
+}
+
+impl Jumps {
+    fn count(&mut self) -> u32 {
+        self.now += 1;
+        // Two bytes at once: all four together may come to more than one of them holds.
+        let pairs = (self.before & 0x00FF_00FF) + (self.before >> 8 & 0x00FF_00FF);
+        u32::from(self.now) + (pairs >> 16) + (pairs & 0xFFFF)
+    }
+
+    fn next_slice(&mut self) {
+        self.before = self.before << 8 | u32::from(self.now);
+        self.now = 0;
+    }
+}
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct OneSensor {
     out: InARow,
-    last: Option<f32>,
     same: u16,
+    last: f32,
     command_at_change: f32,
-    jumps: u16,
-    window: u16,
+    jumps: Jumps,
 }
 
 impl OneSensor {
@@ -66,6 +88,7 @@ impl OneSensor {
         settings: &Settings,
         value: f32,
         command_pa: f32,
+        first: bool,
     ) -> Option<Finding> {
         if !watch.fitted {
             return None;
@@ -76,21 +99,14 @@ impl OneSensor {
         if self.out.count(outside, settings.watch.debounce_ticks) {
             return found(Fault::SensorRange, value, if value < watch.low { watch.low } else { watch.high });
         }
-        let last = self.last.replace(value);
-        let Some(last) = last else {
+        let last = core::mem::replace(&mut self.last, value);
+        if first {
             self.command_at_change = command_pa;
             return None;
-        };
-        self.window += 1;
-        if (value - last).abs() > watch.jump {
-            self.jumps += 1;
-            if self.jumps >= settings.watch.noisy_jumps.max(1) {
-                return found(Fault::SensorNoisy, value, watch.jump);
-            }
         }
-        if self.window >= JUMP_WINDOW {
-            self.window = 0;
-            self.jumps = 0;
+        let enough = u32::from(settings.watch.noisy_jumps.max(1));
+        if (value - last).abs() > watch.jump && self.jumps.count() >= enough {
+            return found(Fault::SensorNoisy, value, watch.jump);
         }
         if value != last {
             self.same = 0;
@@ -119,6 +135,8 @@ pub struct SideWatch {
     disagree: InARow,
     low: InARow,
     high: InARow,
+    /// Ticks of the slice in which jumps are being counted, none before the first readings.
+    slice: u8,
 }
 
 /// What one muscle's watches look at.
@@ -156,6 +174,14 @@ impl SideWatch {
         let command_pa = if seen.command.vent { 0.0 } else { seen.command.pressure_pa };
 
         // Every count is kept up each tick, whatever another finds.
+        let first = self.slice == 0;
+        if self.slice == SLICE {
+            self.slice = 0;
+            for sensor in [&mut self.pressure, &mut self.stroke, &mut self.force] {
+                sensor.jumps.next_slice();
+            }
+        }
+        self.slice += 1;
         let over_pressure =
             self.over_pressure.count(fits_pressure && pressure > limits.pressure_pa, watch.debounce_ticks);
         let out_of_stroke = now.stroke_m < limits.stroke_min_m || now.stroke_m > limits.stroke_max_m;
@@ -171,9 +197,9 @@ impl SideWatch {
         let low = self.low.count(fits_pressure && gap < -watch.follow_pa, watch.follow_ticks);
         let high = self.high.count(fits_pressure && gap > watch.follow_pa, watch.follow_ticks);
         let sensors = [
-            self.pressure.check(Sensor::Pressure, &settings.pressure, settings, pressure, command_pa),
-            self.stroke.check(Sensor::Stroke, &settings.stroke, settings, now.stroke_m, command_pa),
-            self.force.check(Sensor::Force, &settings.force, settings, now.force_n, command_pa),
+            self.pressure.check(Sensor::Pressure, &settings.pressure, settings, pressure, command_pa, first),
+            self.stroke.check(Sensor::Stroke, &settings.stroke, settings, now.stroke_m, command_pa, first),
+            self.force.check(Sensor::Force, &settings.force, settings, now.force_n, command_pa, first),
         ];
 
         if let Some(finding) = sensors.into_iter().flatten().next() {
@@ -283,6 +309,42 @@ mod tests {
             let (ticks, finding) = first(with(change), &Settings::default()).expect("noticed");
             assert_eq!(finding.fault, fault);
             assert!(ticks <= 100 + within, "{fault:?} after {ticks}");
+        }
+    }
+
+    /// A cell whose contact loosens for a tick, from `first` on so many times, so many ticks apart: two jumps each.
+    fn loose(first: usize, times: usize, apart: usize) -> Option<usize> {
+        let spikes = with(move |_, readings, tick| {
+            let since = tick.wrapping_sub(first);
+            if since < times * apart && since.is_multiple_of(apart) {
+                readings.force_n += 2_000.0;
+            }
+        });
+        let mut settings = Settings::default();
+        settings.force.jump = 1_000.0;
+        settings.limits.force_n = 1e9;
+        first_noisy(spikes, &settings)
+    }
+
+    fn first_noisy(ticks: impl IntoIterator<Item = Seen>, settings: &Settings) -> Option<usize> {
+        let (at, finding) = first(ticks, settings)?;
+        assert_eq!((finding.fault, finding.sensor), (Fault::SensorNoisy, Some(Sensor::Force)));
+        Some(at - 101)
+    }
+
+    #[test]
+    fn a_loose_contact_is_noticed_at_its_eighth_jump_whenever_it_begins() {
+        for begin in 0..130 {
+            // The eighth jump is the return from the fourth time.
+            for apart in [2, 7, 40, 84] {
+                assert_eq!(
+                    loose(begin, 4, apart),
+                    Some(begin + 3 * apart + 1),
+                    "from {begin}, {apart} apart"
+                );
+            }
+            assert_eq!(loose(begin, 3, 2), None, "six jumps are forgiven");
+            assert_eq!(loose(begin, 30, 107), None, "and so are those that lie further apart than 320 ticks");
         }
     }
 

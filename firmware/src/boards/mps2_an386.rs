@@ -145,7 +145,7 @@ fn start_interrupts() {
 async fn control(shared: &'static Shared) {
     let benches = Benches::new(Bench::new(&BENCH), Bench::new(&SECOND_BENCH));
     #[cfg(feature = "preempting")]
-    let benches = preempting::Counted(benches);
+    let benches = preempting::Inconvenient::new(benches);
     let mut benches = benches;
     tasks::control(&mut benches, shared).await
 }

@@ -172,7 +172,7 @@ mod supply {
         }
     }
 
-    /// Watches the supply at 2.7 V.
+    /// Watches the supply at 2.8 V.
     pub fn watch() {
         // SAFETY: bit 28 clocks the power controller; PVDE and PLS = 6 switch its detector on. Both registers are always
         // mapped, and nothing else changes them after the clocks are set up.
@@ -190,11 +190,15 @@ mod supply {
     }
 }
 
-/// Opens the dump valve whatever state the program is in.
+/// Opens the dump valve and asks the regulator for no pressure, which would go on filling against it, whatever state the program is in.
 fn dump() {
     const GPIOB_BSRR: *mut u32 = 0x4002_0418 as *mut u32;
-    // SAFETY: a write-only register; bit 21 sets PB5 low and nothing else.
-    unsafe { GPIOB_BSRR.write_volatile(1 << (16 + 5)) };
+    const DAC_DHR12R1: *mut u32 = 0x4000_7408 as *mut u32;
+    // SAFETY: a write-only register, whose bit 21 sets PB5 low and nothing else, and the code of the converter on PA4.
+    unsafe {
+        GPIOB_BSRR.write_volatile(1 << (16 + 5));
+        DAC_DHR12R1.write_volatile(0);
+    }
 }
 
 /// Converters, valve and clock of the control loop.

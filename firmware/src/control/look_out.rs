@@ -17,7 +17,7 @@ impl Controller {
         };
         let mut found = None;
         for side in Side::ALL {
-            if !(side == Side::Agonist || self.mode == Mode::Pair) {
+            if !self.uses(side) {
                 continue;
             }
             let actuator = &mut self.sides[side.index()];
