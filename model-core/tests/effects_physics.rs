@@ -403,7 +403,7 @@ fn set_by_load_grows_with_its_impulse() {
 
 #[test]
 fn a_late_pressure_costs_flow_times_resistance() {
-    let mut alone = Alone::new("pressure-lag", &[1e9, 0.1, 0.2]);
+    let mut alone = Alone::new("pressure-lag", &[1e9, 0.1, 0.0, 0.2]);
     alone.at(moment());
     // 10 mm/s with 1 cm² draw 1 cm³/s; 1e9 Pa·s/m³ cost 1 kPa of 1e-4 N/Pa. 20 kPa/s for 0.1 s cost 2 kPa.
     let moving = Context { dt: 0.1, speed: 0.01, pressure_rate: 20e3, ..moment() };
@@ -415,6 +415,20 @@ fn a_late_pressure_costs_flow_times_resistance() {
     let dwell = Context { dt: 1e-9, ..moment() };
     close(alone.at(dwell), -0.3, 2e-3);
     close(alone.at(Context { dt: 0.2, ..moment() }), -0.3 * (-1.0_f64).exp(), 2e-2);
+}
+
+#[test]
+fn a_muscle_that_fills_by_mass_loses_what_the_gas_law_asks_for() {
+    let mut alone = Alone::new("pressure-lag", &[0.0, 0.0, 0.1, 0.2]);
+    let moving = Context { dt: 0.1, speed: 0.01, pressure: 200e3, pressure_rate: 20e3, ..moment() };
+    for _ in 0..100 {
+        alone.at(moving);
+    }
+    // d(p V)/dt over the volume at rest, a tenth of a second of it.
+    let volume = |radius: f64, length: f64| std::f64::consts::PI * radius * radius * length;
+    let (now, rest) = (volume(moving.radius, moving.length), volume(moving.rest_radius, moving.rest_length));
+    let lost = 0.1 * (now * 20e3 + (200e3 + 101_325.0) * moving.area * 0.01) / rest;
+    close(alone.at(moving), -lost * moving.area, 1e-6 * lost * moving.area);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use super::baselines::{self, Kind};
 use super::candidates::{self, library};
 use super::frequency;
 use super::given;
-use super::held_out::{HELPS, held_out};
+use super::held_out::{HELPS, Unseen};
 use super::known::Known;
 use super::linear::energy;
 use super::locate::{block_ranges, locate};
@@ -432,13 +432,10 @@ fn confirmed(
 fn keep_what_helps(found: &mut Found, rows: &mut Rows, library: &[candidates::Candidate]) -> HeldOut {
     let sigma = found.noise.sigma;
     loop {
-        let with = held_out(rows, found.full.kind, &found.traces, sigma);
+        let unseen = Unseen::new(rows, found.full.kind, &found.traces);
+        let with = unseen.held_out(&found.traces, sigma);
         let Some(fewer) = found.traces.len().checked_sub(1) else { return with };
-        let before = if fewer == 0 {
-            with.rms_before_N
-        } else {
-            held_out(rows, found.full.kind, &found.traces[..fewer], sigma).rms_after_N
-        };
+        let before = if fewer == 0 { with.rms_before_N } else { unseen.error(&found.traces[..fewer]) };
         // An effect that takes a third of what is above the noise lowers the whole by more than this.
         if with.rms_after_N < HELPS * before {
             return with;

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::baselines::{self, Kind};
 use super::candidates::{Candidate, Ground, Trial};
 use super::evidence::Scale;
-use super::held_out::{HELPS, held_out};
+use super::held_out::{HELPS, Unseen};
 use super::linear::energy;
 use super::rows::Rows;
 use super::search::{MAX_NAMED, search};
@@ -109,7 +109,7 @@ pub(super) fn fitted(
         taken.trial = trial;
         taken.rms = found.full.rms(rows);
     }
-    let held = held_out(rows, found.full.kind, &found.traces, scale.sigma);
+    let held = Unseen::new(rows, found.full.kind, &found.traces).held_out(&found.traces, scale.sigma);
     (found, held)
 }
 
@@ -129,6 +129,7 @@ fn forced(index: usize, ground: &Ground<'_>, library: &[Candidate], rows: &Rows)
 
 /// Marks the names as given, and says what the recordings say of each.
 pub(super) fn judge(missing: &mut [Missing], found: &Found, rows: &Rows, held: &HeldOut) {
+    let unseen_rows = Unseen::new(rows, found.full.kind, &found.traces);
     for (i, (m, taken)) in missing.iter_mut().zip(&found.taken).enumerate() {
         let trial = &taken.trial;
         let sized = trial.amplitudes.iter().any(|a| *a != 0.0);
@@ -136,11 +137,7 @@ pub(super) fn judge(missing: &mut [Missing], found: &Found, rows: &Rows, held: &
             >= if taken.p <= select::FAMILY_ALPHA { select::LEAST_SCORE } else { select::LEAST_ALONE };
         let mut others = found.traces.clone();
         others.remove(i);
-        let without = if others.is_empty() {
-            held.rms_before_N
-        } else {
-            held_out(rows, found.full.kind, &others, found.noise.sigma).rms_after_N
-        };
+        let without = if others.is_empty() { held.rms_before_N } else { unseen_rows.error(&others) };
         let helps = held.rms_after_N < HELPS * without;
         let unseen = format!("unseen rows go from {without:.3} to {:.3} N with it", held.rms_after_N);
         m.given = true;

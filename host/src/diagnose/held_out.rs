@@ -1,11 +1,13 @@
 //! The improvement on rows that the fit had not seen: whole pressures, recordings, cycles or stretches of time, never random
 //! rows of the same stroke.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use super::baselines::{self, Kind};
+use super::linear::energy;
 use super::rows::Rows;
 use super::verdict::HeldOut;
 
@@ -38,10 +40,13 @@ fn split(words: &'static str, rows: &Rows, key: &dyn Fn(usize) -> u32) -> Split 
     Split { words, group, groups }
 }
 
+fn stride(rows: &Rows) -> usize {
+    rows.len().div_ceil(ROWS).max(1)
+}
+
 /// Every n-th row, with columns over them.
 pub(super) fn thin(rows: &Rows, traces: &[Vec<f64>]) -> (Rows, Vec<Vec<f64>>) {
-    let stride = rows.len().div_ceil(ROWS).max(1);
-    let keep: Vec<usize> = (0..rows.len()).step_by(stride).collect();
+    let keep: Vec<usize> = (0..rows.len()).step_by(stride(rows)).collect();
     let pick = |v: &Vec<f64>| keep.iter().map(|i| v[*i]).collect::<Vec<f64>>();
     let pick_u = |v: &Vec<u32>| keep.iter().map(|i| v[*i]).collect::<Vec<u32>>();
     let thinned = Rows {
@@ -88,6 +93,13 @@ fn claimed(rows: &Rows) -> Vec<bool> {
         .collect()
 }
 
+/// The strokes that the fitted rows hold. Beyond them a polynomial promises nothing, whatever stands beside it.
+fn strokes(rows: &Rows) -> RangeInclusive<f64> {
+    let fitted =
+        || rows.contexts.iter().zip(&rows.root_weight).filter(|(_, w)| **w > 0.0).map(|(c, _)| c.stroke);
+    fitted().fold(f64::INFINITY, f64::min)..=fitted().fold(f64::NEG_INFINITY, f64::max)
+}
+
 /// Sums of squares on rows that the fit did not see: on the sure rows, and with those about the turns.
 fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> [f64; 2] {
     let claimed = claimed(rows);
@@ -103,11 +115,13 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> [f64
                     *w = 0.0;
                 }
             }
+            let reach = strokes(&blind);
             let fitted = baselines::fit(&blind, kind, traces);
             let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
             for i in 0..rows.len() {
                 // Where friction rests was fitted: nothing predicts it.
-                if split.group[i] == *g && rows.sign[i] != 0.0 && claimed[i] && rows.rest[i] == 0 {
+                let within = reach.contains(&rows.contexts[i].stroke);
+                if split.group[i] == *g && within && rows.sign[i] != 0.0 && claimed[i] && rows.rest[i] == 0 {
                     let square = fitted.raw_residual[i].powi(2);
                     if square.is_finite() {
                         sums[1] += square;
@@ -129,59 +143,109 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> [f64
     })
 }
 
-/// Held-out error with and without the effects, by the strictest split that the recordings allow.
-pub(crate) fn held_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], noise: f64) -> HeldOut {
-    // Directions with a prior are made for the pressures they were fitted to; a pressure left out asks for one bladder, where
-    // there is one.
-    let kind = match kind {
-        Kind::Flexible(m) => Kind::Flexible(m.min(4)),
-        Kind::Soft(give) if give.elastic > ONE_BLADDER * strongest(rows) => Kind::Flexible(4),
-        Kind::Soft(_) | Kind::Stiff => Kind::Stiff,
-    };
-    let (thin, traces) = thin(rows, traces);
-    let by_pressure = split("each pressure predicted from the others", &thin, &|i| thin.level[i]);
+/// A trace of which one group holds more than this share cannot be learnt from the others.
+const SEEN_ONCE: f64 = 0.8;
+/// Parts of the whole stroke, which are then left out by fours.
+const PARTS: f64 = 24.0;
+
+/// Whether what the base leaves of an effect's trace sits in one group.
+fn seen_once(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> bool {
+    let base = baselines::fit(rows, kind, &[]);
+    baselines::projected(traces, &rows.root_weight, &base.span).iter().any(|trace| {
+        let of = |g: &u32| {
+            trace.iter().zip(&split.group).filter(|(_, h)| *h == g).map(|(v, _)| v * v).sum::<f64>()
+        };
+        split.groups.iter().map(of).fold(0.0, f64::max) > SEEN_ONCE * energy(trace)
+    })
+}
+
+/// The strictest split that recordings allow.
+fn strictest(rows: &Rows, kind: Kind) -> Split {
+    let by_pressure = split("each pressure predicted from the others", rows, &|i| rows.level[i]);
     let by_stroke =
-        split("every fourth cycle predicted from the others, in turn", &thin, &|i| thin.block[i] / 2 % 4);
-    let by_recording = split("each recording predicted from the others", &thin, &|i| thin.recording[i]);
+        split("every fourth cycle predicted from the others, in turn", rows, &|i| rows.block[i] / 2 % 4);
+    let by_recording = split("each recording predicted from the others", rows, &|i| rows.recording[i]);
     let by_run =
-        split("every tenth recording predicted from the others, in turn", &thin, &|i| thin.recording[i] % 10);
-    let quarter = thin.blocks.div_ceil(4).max(1) as u32;
+        split("every tenth recording predicted from the others, in turn", rows, &|i| rows.recording[i] % 10);
+    let quarter = rows.blocks.div_ceil(4).max(1) as u32;
     let by_time =
-        split("each quarter of the time predicted from the rest", &thin, &|i| thin.block[i] / quarter);
+        split("each quarter of the time predicted from the rest", rows, &|i| rows.block[i] / quarter);
     // A pressure left out needs a baseline that reaches over pressures.
-    let chosen = if rows.isometric && rows.names.len() >= 4 {
+    if rows.isometric && rows.names.len() >= 4 {
         by_run
     } else if kind.reaches_over_pressures() && by_pressure.groups.len() >= 3 {
         by_pressure
-    } else if thin.blocks >= 16 {
+    } else if rows.blocks >= 16 {
         by_stroke
-    } else if (2..=10).contains(&by_recording.groups.len()) && thin.levels.len() < 2 {
+    } else if (2..=10).contains(&by_recording.groups.len()) && rows.levels.len() < 2 {
         by_recording
     } else {
         by_time
-    };
-    if chosen.groups.len() < 2 {
-        let fitted = baselines::fit(&thin, kind, &traces);
-        let bare = baselines::fit(&thin, kind, &[]);
-        let (before, after) = (bare.rms(&thin), fitted.rms(&thin));
-        return HeldOut {
-            split: "none: there is nothing that could be left out, so these are errors on the rows fitted"
-                .into(),
-            rms_before_N: before,
-            rms_after_N: after,
-            noise_N: noise,
-            with_turns_before_N: before,
-            with_turns_after_N: after,
-        };
     }
-    let before = left_out(&thin, kind, &[], &chosen);
-    let after = if traces.is_empty() { before } else { left_out(&thin, kind, &traces, &chosen) };
-    HeldOut {
-        split: chosen.words.into(),
-        rms_before_N: before[0],
-        rms_after_N: after[0],
-        noise_N: noise,
-        with_turns_before_N: before[1],
-        with_turns_after_N: after[1],
+}
+
+/// How rows are left out, and what predicts them from the rest.
+pub(super) struct Unseen {
+    rows: Rows,
+    stride: usize,
+    kind: Kind,
+    split: Split,
+}
+
+impl Unseen {
+    /// For effects of these traces, by the strictest split that the recordings allow.
+    pub(super) fn new(rows: &Rows, kind: Kind, traces: &[Vec<f64>]) -> Self {
+        // Directions with a prior are made for the pressures they were fitted to; a pressure left out asks for one bladder, where
+        // there is one.
+        let kind = match kind {
+            Kind::Flexible(m) => Kind::Flexible(m.min(4)),
+            Kind::Soft(give) if give.elastic > ONE_BLADDER * strongest(rows) => Kind::Flexible(4),
+            Kind::Soft(_) | Kind::Stiff => Kind::Stiff,
+        };
+        let (thin, traces) = thin(rows, traces);
+        let mut split = strictest(&thin, kind);
+        if !thin.isometric && split.groups.len() > 1 && seen_once(&thin, kind, &traces, &split) {
+            // What a virgin muscle's first stroke alone shows no other stroke can foretell.
+            let strokes = strokes(&thin);
+            let part = (strokes.end() - strokes.start()) / PARTS;
+            let of = |i: usize| ((thin.contexts[i].stroke - strokes.start()) / part).max(0.0) as u32 % 4;
+            split =
+                self::split("every fourth part of the stroke predicted from the others, in turn", &thin, &of);
+        }
+        Self { rows: thin, stride: stride(rows), kind, split }
+    }
+
+    /// The error on rows that were left out, with effects of these traces: on the sure rows, and with those about the turns, N.
+    fn errors(&self, traces: &[Vec<f64>]) -> [f64; 2] {
+        let traces: Vec<Vec<f64>> =
+            traces.iter().map(|t| t.iter().step_by(self.stride).copied().collect()).collect();
+        if self.split.groups.len() < 2 {
+            return [baselines::fit(&self.rows, self.kind, &traces).rms(&self.rows); 2];
+        }
+        left_out(&self.rows, self.kind, &traces, &self.split)
+    }
+
+    /// The error on the sure rows that were left out, with effects of these traces, N.
+    pub(super) fn error(&self, traces: &[Vec<f64>]) -> f64 {
+        self.errors(traces)[0]
+    }
+
+    /// The error without effects and with them.
+    pub(super) fn held_out(&self, traces: &[Vec<f64>], noise: f64) -> HeldOut {
+        let before = self.errors(&[]);
+        let after = if traces.is_empty() { before } else { self.errors(traces) };
+        let words = if self.split.groups.len() < 2 {
+            "none: there is nothing that could be left out, so these are errors on the rows fitted"
+        } else {
+            self.split.words
+        };
+        HeldOut {
+            split: words.into(),
+            rms_before_N: before[0],
+            rms_after_N: after[0],
+            noise_N: noise,
+            with_turns_before_N: before[1],
+            with_turns_after_N: after[1],
+        }
     }
 }

@@ -8,7 +8,7 @@ use model_core::effects::MEMORY;
 use super::answer::Asked;
 use super::baselines::{self, Baseline, Kind};
 use super::candidates::{Candidate, place_in_words};
-use super::held_out::held_out;
+use super::held_out::Unseen;
 use super::locate::locate;
 use super::rows::{self, Rows};
 use super::verdict::{Considered, Missing, ParameterValue, PathStep, Verdict};
@@ -151,7 +151,7 @@ impl Known {
         };
         diagnosis.path.splice(0..0, self.named.iter().map(step));
         diagnosis.misfit_rms_N = baselines::fit(&rows, Kind::Flexible(4), &[]).rms(&rows);
-        let unseen = held_out(&rows, kind, &[], diagnosis.noise_N);
+        let unseen = Unseen::new(&rows, kind, &[]).held_out(&[], diagnosis.noise_N);
         diagnosis.held_out.rms_before_N = unseen.rms_before_N;
         diagnosis.held_out.with_turns_before_N = unseen.with_turns_before_N;
         if diagnosis.verdict == Verdict::Consistent {

@@ -6,6 +6,9 @@ use std::collections::BTreeMap;
 use super::linear::{Random, energy, median, quantile};
 use super::rows::Rows;
 
+/// Contractions that differ by less are one held length.
+const SAME_LENGTH: f64 = 1e-3;
+
 /// The noise of the rows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Noise {
@@ -19,7 +22,33 @@ pub(crate) struct Noise {
     pub independent: f64,
 }
 
-/// Pure error from repeats: the same level, direction and contraction in successive cycles.
+/// The how manieth recording of its held length each row belongs to, from 1.
+fn runs(rows: &Rows) -> Vec<u32> {
+    let mut places: Vec<(f64, u32)> = Vec::new();
+    let (mut last, mut run) = (None, 0);
+    let mut of_row = Vec::with_capacity(rows.len());
+    for (recording, context) in rows.recording.iter().zip(&rows.contexts) {
+        if last != Some(*recording) {
+            last = Some(*recording);
+            let here = |p: &&mut (f64, u32)| (p.0 - context.contraction).abs() < SAME_LENGTH;
+            run = match places.iter_mut().find(here) {
+                Some(place) => {
+                    place.1 += 1;
+                    place.1
+                }
+                None => {
+                    places.push((context.contraction, 1));
+                    1
+                }
+            };
+        }
+        of_row.push(run);
+    }
+    of_row
+}
+
+/// Pure error from repeats: the same level, direction and contraction in successive cycles, or in successive recordings of one held
+/// length.
 fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
     #[derive(Default, Clone, Copy)]
     struct Cell {
@@ -37,6 +66,7 @@ fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
         });
     let top = rows.contexts.iter().map(|c| c.pressure).fold(1.0, f64::max);
     let width = ((range.1 - range.0) / 25.0).max(1e-6);
+    let runs = runs(rows);
     let mut cells: BTreeMap<(u32, i8, i32, i32, u32), Cell> = BTreeMap::new();
     for i in 0..rows.len() {
         let c = &rows.contexts[i];
@@ -48,8 +78,8 @@ fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
             } else {
                 (c.speed.abs().ln() * 1.5).round() as i32
             };
-            let turn = if rows.isometric { rows.recording[i] } else { rows.cycle[i] };
             let bin = (c.contraction / width).round() as i32;
+            let turn = if rows.isometric { runs[i] } else { rows.cycle[i] };
             let cell = cells.entry((rows.level[i], rows.sign[i] as i8, bin, speed, turn)).or_default();
             cell.sum += residual[i];
             cell.squares += residual[i] * residual[i];

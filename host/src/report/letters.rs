@@ -3,13 +3,14 @@
 use super::Table;
 
 /// Letters that mean the same in every equation; what an equation defines itself is left to it, and parameters to their table.
-const LETTERS: [(&str, &str); 35] = [
+const LETTERS: [(&str, &str); 38] = [
     ("F_quasi", "pull of the base model without friction, N"),
     ("F_b", "what the bladder takes from the pull: the base model's without friction less P·g, N"),
     ("F_G", "Gaylord's force of the effective pressure, P′·g, N"),
     ("k_F", "friction factor of the table at this pressure"),
     ("s", "direction: +1 while shortening, −1 while lengthening, held at rest"),
     ("P", "pressure at the sensor, Pa"),
+    ("P_a", "pressure of the air outside, 101.3 kPa"),
     ("P′", "effective pressure, P − P0, Pa"),
     ("dP", "change of the pressure; with dt its rate, Pa/s"),
     ("g", "pull per pascal of the cylinder, (3L² − B²)/(4πN²), m²"),
@@ -24,6 +25,8 @@ const LETTERS: [(&str, &str); 35] = [
     ("L0", "rest length, m"),
     ("R", "radius, m"),
     ("R0", "radius at rest length, m"),
+    ("V", "volume of the cylinder, πR²L, m³"),
+    ("V_0", "volume at rest length, m³"),
     ("B", "length of one fibre of the braid, m"),
     ("N", "turns of a fibre"),
     ("t_B", "thickness of the bladder's wall, m"),
