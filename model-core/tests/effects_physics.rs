@@ -306,11 +306,18 @@ fn speed_and_pressure_laws() {
     let moving = Context { speed: 4e-3, direction: 1.0, pressure: 2e5, quasi: 50.0, ..moment() };
     close(Alone::new("viscous-damping", &[100.0, 1e-3]).at(moving), -(100.0 + 200.0) * 4e-3, 1e-12);
     close(Alone::new("rate-power", &[0.01, 0.5]).at(moving), -0.01 * 50.0 * 2.0, 1e-12);
-    let mut coulomb = Alone::new("coulomb-friction", &[3.0]);
+    let mut coulomb = Alone::new("coulomb-friction", &[3.0, 0.0]);
     // At held length the pressure turns the braid's friction, not a guide's.
     assert_eq!(coulomb.at(Context { direction: -1.0, ..moment() }), 0.0);
     close(coulomb.at(Context { direction: -1.0, speed: -1e-3, ..moment() }), 3.0, 0.0);
     close(coulomb.at(Context { direction: 1.0, ..moment() }), 3.0, 0.0);
+    // Found at rest a centimetre further in, it came there by shortening.
+    let mut moved = Alone::new("coulomb-friction", &[3.0, 0.0]);
+    moved.at(Context { stroke: 0.0, resting: 1.0, ..moment() });
+    close(moved.at(Context { stroke: 0.01, resting: 1.0, direction: -1.0, ..moment() }), -3.0, 0.0);
+    // Strands that rub follow the pressure.
+    let mut strands = Alone::new("coulomb-friction", &[0.0, 3.0]);
+    close(strands.at(Context { resting: 1.0, direction: -1.0, ..moment() }), 3.0, 0.0);
     let area = core::f64::consts::PI * 25e-6;
     close(Alone::new("pressure-friction", &[0.1, 0.0]).at(moving), -0.1 * 2e5 * area, 1e-12);
     let unchanging = Alone::new("pressure-friction", &[0.0, 0.1]).at(Context { rest_radius: 4e-3, ..moving });

@@ -29,8 +29,8 @@ impl Effect for Misalignment {
     };
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
-        // memory: [direction of the stroke]
-        stroke_direction(context, &mut memory[0]);
+        // memory: the direction of the stroke
+        stroke_direction(context, memory, 0);
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {

@@ -101,7 +101,7 @@ fn strokes(rows: &Rows) -> RangeInclusive<f64> {
 }
 
 /// Sums of squares on rows that the fit did not see: on the sure rows, and with those about the turns.
-fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> [f64; 2] {
+fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split, tares: bool) -> [f64; 2] {
     let claimed = claimed(rows);
     rows.progress.stage("predicting what was left out", split.groups.len() as u64);
     let parts: Vec<([f64; 2], [f64; 2])> = split
@@ -121,7 +121,8 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> [f64
             for i in 0..rows.len() {
                 // Where friction rests was fitted: nothing predicts it.
                 let within = reach.contains(&rows.contexts[i].stroke);
-                if split.group[i] == *g && within && rows.sign[i] != 0.0 && claimed[i] && rows.rest[i] == 0 {
+                let judged = if rows.vented[i] { tares } else { rows.sign[i] != 0.0 && rows.rest[i] == 0 };
+                if split.group[i] == *g && within && judged && claimed[i] {
                     let square = fitted.raw_residual[i].powi(2);
                     if square.is_finite() {
                         sums[1] += square;
@@ -161,7 +162,11 @@ fn seen_once(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> boo
 
 /// The strictest split that recordings allow.
 fn strictest(rows: &Rows, kind: Kind) -> Split {
-    let by_pressure = split("each pressure predicted from the others", rows, &|i| rows.level[i]);
+    // The vented stretches say by themselves what a load cell reads without a muscle: half of them from the other half.
+    let vented: Vec<usize> = (0..rows.len()).filter(|i| rows.vented[*i]).collect();
+    let tare = |i: usize| (vented.partition_point(|v| *v < i) * 4 / vented.len().max(1)) as u32 % 2;
+    let pressure = |i: usize| if rows.vented[i] { rows.levels.len() as u32 + tare(i) } else { rows.level[i] };
+    let by_pressure = split("each pressure predicted from the others", rows, &pressure);
     let by_stroke =
         split("every fourth cycle predicted from the others, in turn", rows, &|i| rows.block[i] / 2 % 4);
     let by_recording = split("each recording predicted from the others", rows, &|i| rows.recording[i]);
@@ -173,7 +178,9 @@ fn strictest(rows: &Rows, kind: Kind) -> Split {
     // A pressure left out needs a baseline that reaches over pressures.
     if rows.isometric && rows.names.len() >= 4 {
         by_run
-    } else if kind.reaches_over_pressures() && by_pressure.groups.len() >= 3 {
+    } else if kind.reaches_over_pressures()
+        && by_pressure.groups.iter().filter(|g| (**g as usize) < rows.levels.len()).count() >= 3
+    {
         by_pressure
     } else if rows.blocks >= 16 {
         by_stroke
@@ -190,6 +197,8 @@ pub(super) struct Unseen {
     stride: usize,
     kind: Kind,
     split: Split,
+    /// Whether the effects are read of a vented muscle, too.
+    tares: bool,
 }
 
 impl Unseen {
@@ -203,6 +212,8 @@ impl Unseen {
             Kind::Soft(_) | Kind::Stiff => Kind::Stiff,
         };
         let (thin, traces) = thin(rows, traces);
+        let shows = |t: &Vec<f64>| t.iter().zip(&thin.vented).any(|(force, vented)| *vented && *force != 0.0);
+        let tares = traces.iter().any(shows);
         let mut split = strictest(&thin, kind);
         if !thin.isometric && split.groups.len() > 1 && seen_once(&thin, kind, &traces, &split) {
             // What a virgin muscle's first stroke alone shows no other stroke can foretell.
@@ -212,7 +223,7 @@ impl Unseen {
             split =
                 self::split("every fourth part of the stroke predicted from the others, in turn", &thin, &of);
         }
-        Self { rows: thin, stride: stride(rows), kind, split }
+        Self { rows: thin, stride: stride(rows), kind, split, tares }
     }
 
     /// The error on rows that were left out, with effects of these traces: on the sure rows, and with those about the turns, N.
@@ -222,7 +233,7 @@ impl Unseen {
         if self.split.groups.len() < 2 {
             return [baselines::fit(&self.rows, self.kind, &traces).rms(&self.rows); 2];
         }
-        left_out(&self.rows, self.kind, &traces, &self.split)
+        left_out(&self.rows, self.kind, &traces, &self.split, self.tares)
     }
 
     /// The error on the sure rows that were left out, with effects of these traces, N.

@@ -116,7 +116,9 @@ pub(crate) fn considered(
             let hidden = (t.size > 0.0 && t.peak > 0.0).then(|| {
                 let detectable =
                     3.5 * sigma / (found.noise.independent.max(4.0)).sqrt() / t.visible.max(1e-12).sqrt();
-                let by_noise = detectable * t.peak / t.size;
+                // What moves the force by less than the model's own inexactness is not named either.
+                let nameable = select::OWN_INEXACTNESS * blocked / t.visible.max(1e-12).sqrt();
+                let by_noise = detectable.max(nameable) * t.peak / t.size;
                 let least =
                     if t.beyond_tables < select::CONCEALED { select::STATIC_PEAK * blocked } else { 0.0 };
                 by_noise.max(least)

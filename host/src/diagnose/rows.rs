@@ -191,6 +191,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
             r.stroke.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(*s), h.max(*s)));
         !(high - low > 3.0 * thresholds.stroke.max(stroke_noise))
     });
+    let mut readable: Vec<f64> = Vec::new();
     let mut clock = 0.0;
     let mut turns_before = 0_u32;
     let mut piece_number = 0_u32;
@@ -336,7 +337,9 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
             let on_ramp = k.on_ramp[i] && !rows.isometric;
             let judged = k.sure[i] && (rows.isometric || !k.ramped[i] || on_ramp);
             rows.on_ramp.push(on_ramp);
-            rows.root_weight.push(if good > 0.0 && judged { (good / per_row as f64).sqrt() } else { 0.0 });
+            let read = (good / per_row as f64).sqrt();
+            readable.push(if k.held[i] { read } else { 0.0 });
+            rows.root_weight.push(if judged { read } else { 0.0 });
             rows.recording.push(index as u32);
             rows.block.push(piece_number);
             rows.cycle.push(recording.cycle.as_ref().map_or(0, |c| c[i]));
@@ -358,10 +361,41 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
         ));
     }
     levels(&mut rows, pressures);
-    mark_vented(&mut rows);
+    mark_vented(&mut rows, &readable);
     merge_blocks(&mut rows);
     number_cycles(&mut rows);
+    blur(&mut rows);
     Ok(rows)
+}
+
+/// Force and stroke are read together to this part of a row's time at best.
+const TOGETHER: f64 = 0.25;
+/// A stroke's steepest part changes the force from row to row by so many times what its middle does.
+const STEEP: f64 = 3.0;
+/// A misfit of this share of the largest force is no matter.
+const NO_MATTER: f64 = 1e-3;
+
+/// Where the force runs from one branch to the other within a few rows, each of them says as little as the moment of its reading is
+/// known.
+fn blur(rows: &mut Rows) {
+    let strongest = rows.force.iter().copied().fold(0.0, f64::max);
+    let step = |i: usize| (rows.force[i + 1] - rows.force[i]).abs();
+    let n = rows.len();
+    let mut weights = rows.root_weight.clone();
+    let mut from = 0;
+    for i in 1..=n {
+        if i < n && rows.block[i] == rows.block[from] && rows.recording[i] == rows.recording[from] {
+            continue;
+        }
+        let mut steps: Vec<f64> = (from..i - 1).map(step).collect();
+        let usual = if steps.is_empty() { 0.0 } else { median(&mut steps) };
+        for j in from + 1..i.saturating_sub(1) {
+            let excess = (step(j - 1).max(step(j)) - STEEP * usual).max(0.0);
+            weights[j] /= (1.0 + (TOGETHER * excess / (NO_MATTER * strongest)).powi(2)).sqrt();
+        }
+        from = i;
+    }
+    rows.root_weight = weights;
 }
 
 /// Pressure levels: blocks of nearly constant pressure, clustered; without them up to eight quantiles of the pressure.
@@ -420,13 +454,22 @@ fn levels(rows: &mut Rows, range: (f64, f64)) {
     rows.level = rows.contexts.iter().map(|c| nearest(c.pressure)).collect();
 }
 
+/// A muscle is at its rest length to this part of it.
+const SLACK: f64 = 2e-3;
+
 /// Rows without pressure worth the name: the muscle cannot pull, so what is read comes from the bench.
-fn mark_vented(rows: &mut Rows) {
+/// Which way friction would act does not matter there: `readable` weights count while the length is held.
+fn mark_vented(rows: &mut Rows, readable: &[f64]) {
     let highest = rows.contexts.iter().map(|c| c.pressure).fold(0.0, f64::max);
     let limit = (0.02 * highest).min(8e3);
     rows.vented = rows.contexts.iter().map(|c| c.pressure < limit).collect();
     if rows.vented.iter().all(|v| *v) {
         rows.vented.fill(false);
+    }
+    for i in (0..rows.len()).filter(|i| rows.vented[*i]) {
+        // Stretched beyond its rest length even a vented muscle pulls.
+        let slack = rows.contexts[i].contraction >= -SLACK;
+        rows.root_weight[i] = if slack { rows.root_weight[i].max(readable[i]) } else { rows.root_weight[i] };
     }
     rows.levels.retain(|l| *l >= limit || highest <= limit);
     if rows.levels.is_empty() {

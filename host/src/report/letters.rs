@@ -3,12 +3,13 @@
 use super::Table;
 
 /// Letters that mean the same in every equation; what an equation defines itself is left to it, and parameters to their table.
-const LETTERS: [(&str, &str); 38] = [
+const LETTERS: [(&str, &str); 39] = [
     ("F_quasi", "pull of the base model without friction, N"),
     ("F_b", "what the bladder takes from the pull: the base model's without friction less P·g, N"),
     ("F_G", "Gaylord's force of the effective pressure, P′·g, N"),
     ("k_F", "friction factor of the table at this pressure"),
     ("s", "direction: +1 while shortening, −1 while lengthening, held at rest"),
+    ("s_x", "direction in which the stroke last went; filling and emptying do not turn it"),
     ("P", "pressure at the sensor, Pa"),
     ("P_a", "pressure of the air outside, 101.3 kPa"),
     ("P′", "effective pressure, P − P0, Pa"),

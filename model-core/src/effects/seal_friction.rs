@@ -1,9 +1,9 @@
 //! Friction of a push-rod's seal or guide: a constant part, and one that the pressure presses on, both higher when slow.
 //!
 //! ```text
-//! F_add = −s [F_0 + A_s (p_0 + P)] (1 + (k − 1) e^(−|v|/v_s))
+//! F_add = −s_x [F_0 + A_s (p_0 + P)] (1 + (k − 1) e^(−|v|/v_s))
 //! ```
-//! `s` is the direction in which the stroke last went; `F_0`, N, comes from the seal's interference fit; `A_s = μ_s π d w`, m², is the seal's rubbing area times its coefficient,
+//! `s_x` is the direction in which the stroke last went; `F_0`, N, comes from the seal's interference fit; `A_s = μ_s π d w`, m², is the seal's rubbing area times its coefficient,
 //! `p_0 = 101.3 kPa`; `k` the ratio of breakaway to running friction and `v_s`, m/s, the speed over which it falls off. Below 1 to
 //! 5 mm/s real seals stick and slip, which a mean force describes only on average.
 
@@ -28,14 +28,14 @@ impl Effect for SealFriction {
         alternatives: false,
         start: Start::Branch,
         fading: &[],
-        equation: "F = −s·[F_0 + A_s·(p_0 + P)]·(1 + (k−1)·exp(−|v|/v_s))",
+        equation: "F = −s_x·[F_0 + A_s·(p_0 + P)]·(1 + (k−1)·exp(−|v|/v_s))",
         summary: "The seal around a push-rod rubs, the more the higher the pressure, and most when slow.",
         source: "B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083–1138, doi 10.1016/0005-1098(94)90209-7",
     };
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
-        // memory: [direction of the stroke]
-        stroke_direction(context, &mut memory[0]);
+        // memory: the direction of the stroke
+        stroke_direction(context, memory, 0);
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {

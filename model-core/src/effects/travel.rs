@@ -38,15 +38,22 @@ impl BraidTravel {
     }
 }
 
-/// Which way the stroke last went, in one slot of a memory: +1 shortening, −1 lengthening, 0 unknown.
+/// Which way the stroke last went, in three slots of a memory from `at`: +1 shortening, −1 lengthening, 0 unknown; the stroke; seen.
 ///
 /// A guide or a seal at held length does not slide when the pressure changes, as the strands of the braid do: the direction that
-/// [`Context::direction`] takes from filling and emptying is not theirs.
-pub fn stroke_direction<T: Scalar>(context: &Context<T>, way: &mut T) {
+/// [`Context::direction`] takes from filling and emptying is not theirs. A muscle that rests elsewhere than where it was last seen
+/// went there on the straight way.
+pub fn stroke_direction<T: Scalar>(context: &Context<T>, memory: &mut Memory<T>, at: usize) {
+    let seen = memory[at + 2] != T::ZERO;
+    let moved = context.stroke - memory[at + 1];
+    memory[at + 1] = context.stroke;
+    memory[at + 2] = T::ONE;
     // Slower than a ten-thousandth of its length in a second the muscle rests.
     let moving =
         context.resting == T::ZERO && context.speed.abs() > context.rest_length * T::from_f32(1.0e-4);
     if moving && context.direction != T::ZERO {
-        *way = context.direction;
+        memory[at] = context.direction;
+    } else if !moving && seen && moved.abs() > context.rest_length * T::from_f32(1.0e-3) {
+        memory[at] = if moved > T::ZERO { T::ONE } else { -T::ONE };
     }
 }
