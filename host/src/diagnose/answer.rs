@@ -17,7 +17,9 @@ use super::rest;
 use super::rows::{self, Rows};
 use super::search::search;
 use super::select::{self, Found};
-use super::verdict::{Considered, Diagnosis, HeldOut, PathStep, Region, Trace, Unexplained, Verdict};
+use super::verdict::{
+    Considered, Diagnosis, HeldOut, Missing, PathStep, Region, Trace, Unexplained, Verdict,
+};
 use crate::bench::Candidate as Law;
 use crate::checks::Checks;
 use crate::error::{Code, Error, Result};
@@ -130,6 +132,7 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
     if !options.given.is_empty() {
         given::judge(&mut missing, &found, &rows, &held);
     }
+    remarks.extend(missing.iter().filter_map(beyond_instruments));
     let explained: f64 = if found.above > 0.0 && !missing.is_empty() {
         ((energy(&found.bare.residual) - energy(&found.full.residual)) / found.above).clamp(0.0, 1.0)
     } else {
@@ -210,6 +213,22 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
         trace: trace(&rows, &found),
     };
     Ok(Asked { diagnosis, kind: found.full.kind })
+}
+
+/// Gains and offsets that a wrong description of the muscle imitates.
+const LIKE_A_DESCRIPTION: [&str; 5] =
+    ["force-gain", "gauge-gain", "displacement-offset", "braid-elasticity", "tip-effect"];
+
+/// What to look at before a fault of that size is believed.
+fn beyond_instruments(m: &Missing) -> Option<String> {
+    let beyond = m.parameters.iter().any(|p| p.outside_known_range && p.value != 0.0);
+    (beyond && LIKE_A_DESCRIPTION.contains(&m.effect.as_str())).then(|| {
+        format!(
+            "{} of this size is more than anybody has met: look first at the muscle's description (diameter, braid angle, rest length, \
+             wall) and at the units; a wrong one looks like this",
+            m.effect
+        )
+    })
 }
 
 /// What to say where the tables differ between pressures more than a bladder does, and nothing can be named for it.

@@ -152,8 +152,11 @@ impl Known {
         diagnosis.path.splice(0..0, self.named.iter().map(step));
         diagnosis.misfit_rms_N = baselines::fit(&rows, Kind::Flexible(4), &[]).rms(&rows);
         let unseen = Unseen::new(&rows, kind, &[]).held_out(&[], diagnosis.noise_N);
-        diagnosis.held_out.rms_before_N = unseen.rms_before_N;
-        diagnosis.held_out.with_turns_before_N = unseen.with_turns_before_N;
+        // What is named may have asked for another split; its errors are not to be compared with this one's.
+        if unseen.split == diagnosis.held_out.split {
+            diagnosis.held_out.rms_before_N = unseen.rms_before_N;
+            diagnosis.held_out.with_turns_before_N = unseen.with_turns_before_N;
+        }
         if diagnosis.verdict == Verdict::Consistent {
             diagnosis.verdict = Verdict::Explained;
             if rows.len() == freed_rows.len() {

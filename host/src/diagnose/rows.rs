@@ -390,7 +390,7 @@ fn blur(rows: &mut Rows) {
         let mut steps: Vec<f64> = (from..i - 1).map(step).collect();
         let usual = if steps.is_empty() { 0.0 } else { median(&mut steps) };
         for j in from + 1..i.saturating_sub(1) {
-            let excess = (step(j - 1).max(step(j)) - STEEP * usual).max(0.0);
+            let excess = (step(j - 1).min(step(j)) - STEEP * usual).max(0.0);
             weights[j] /= (1.0 + (TOGETHER * excess / (NO_MATTER * strongest)).powi(2)).sqrt();
         }
         from = i;

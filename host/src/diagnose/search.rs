@@ -193,7 +193,8 @@ impl<'a> Search<'a> {
         // What lives in a few strokes can never give a large sum over blocks in units of its scatter: six strokes that all agree
         // happen by chance once in 64. There the likelihood counts, whose independent rows are those that the residual's own
         // correlation leaves.
-        let significant = winner.score >= if p <= FAMILY_ALPHA { LEAST_SCORE } else { LEAST_ALONE };
+        let by_blocks = p <= FAMILY_ALPHA;
+        let significant = winner.score >= if by_blocks { LEAST_SCORE } else { LEAST_ALONE };
         let of_rest = self.of_rest(winner);
         let worth = if self.chosen.is_empty() {
             of_rest >= FIRST_OF_ALL
@@ -203,7 +204,13 @@ impl<'a> Search<'a> {
         // A wall at the end of the stroke is high and narrow.
         let narrow = winner.peak >= NARROW_PEAK * self.blocked && winner.score >= 2.0 * LEAST_ALONE;
         let moved = (winner.gain.max(winner.relief) / self.scale.weight).sqrt();
-        significant && worth && moved >= if narrow { 0.4 } else { 1.0 } * OWN_INEXACTNESS * self.blocked
+        // A few readings that come a sample late at a turn make a likelihood of any size, and move little.
+        let least = match (by_blocks, narrow) {
+            (true, true) => 0.4,
+            (true, false) => 1.0,
+            (false, _) => 2.0,
+        };
+        significant && worth && moved >= least * OWN_INEXACTNESS * self.blocked
     }
 
     /// Fits everything together with it, and keeps it if it then still does what it promised; else it is barred.
