@@ -64,9 +64,14 @@ impl Candidate {
         if shown { 0.0 } else { LAW_ERROR }
     }
 
-    /// Whether its force is read even when the muscle is vented and slack.
-    fn seen_vented(&self) -> bool {
-        matches!(self.name(), "force-offset" | "force-drift" | "cross-talk" | "gravity")
+    /// Whether the force of an amplitude is read even when the muscle is vented and slack. A guide or a rod's seal that stuck holds
+    /// what it held; strands that no pressure holds together do not rub.
+    fn seen_vented(&self, amplitude: usize) -> bool {
+        match self.name() {
+            "force-offset" | "force-drift" | "cross-talk" | "gravity" | "seal-friction" => true,
+            "coulomb-friction" => amplitude == 0,
+            _ => false,
+        }
     }
 
     /// The grid of shapes that is looked at first.
@@ -132,8 +137,8 @@ impl Candidate {
     pub(crate) fn columns(&self, shapes: &[f64], rows: &Rows) -> Vec<Vec<f64>> {
         let mut memory = [0.0; MEMORY];
         let mut columns = self.law.columns(&rows.contexts, shapes, &mut memory);
-        let vented_too = self.seen_vented();
-        for column in &mut columns {
+        for (amplitude, column) in columns.iter_mut().enumerate() {
+            let vented_too = self.seen_vented(amplitude);
             for (value, vented) in column.iter_mut().zip(&rows.vented) {
                 if (*vented && !vented_too) || !value.is_finite() {
                     *value = 0.0;
