@@ -203,8 +203,9 @@ impl<'a> Search<'a> {
         };
         // A wall at the end of the stroke is high and narrow.
         let narrow = winner.peak >= NARROW_PEAK * self.blocked && winner.score >= 2.0 * LEAST_ALONE;
-        let moved = (winner.gain.max(winner.relief) / self.scale.weight).sqrt();
         // A few readings that come a sample late at a turn make a likelihood of any size, and move little.
+        let relief = if by_blocks { winner.relief } else { 0.0 };
+        let moved = (winner.gain.max(relief) / self.scale.weight).sqrt();
         let least = match (by_blocks, narrow) {
             (true, true) => 0.4,
             (true, false) => 1.0,
