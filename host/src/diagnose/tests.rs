@@ -129,6 +129,53 @@ fn wandering_noise_and_outliers_are_not_named() {
     }
 }
 
+/// The force of another row, `late` samples before.
+fn delayed(mut campaign: Campaign, late: impl Fn(usize) -> usize) -> Campaign {
+    for r in &mut campaign.recordings {
+        let Some(force) = &mut r.force else { continue };
+        *force = (0..force.len()).map(|i| force[i.saturating_sub(late(i))]).collect();
+    }
+    campaign
+}
+
+#[test]
+fn a_reading_now_and_then_late_at_a_turn_is_no_physics() {
+    for seed in 20..23 {
+        let plain = recorded(loops(&[0.2]), seed, coloured(0.1, 2.0), |_, _, _| 0.0);
+        let d = ask(&delayed(plain, |i| usize::from(i % 7 == 0)));
+        assert_eq!(d.verdict, Verdict::Consistent, "seed {seed}: {:?}", names(&d));
+    }
+}
+
+#[test]
+fn a_cell_two_samples_late_is_told_from_a_loose_joint() {
+    let d = ask(&delayed(recorded(loops(&[0.2]), 4, coloured(0.1, 2.0), |_, _, _| 0.0), |_| 2));
+    assert_eq!(names(&d).first(), Some(&"sensor-delay"), "{:?}", names(&d));
+}
+
+#[test]
+fn tares_in_files_of_their_own_show_the_cells_zero() {
+    let mut campaign = recorded(loops(&[0.2]), 6, coloured(0.1, 2.0), |_, _, _| 4.0);
+    let tare = |name: &str| {
+        let mut r = campaign.recordings[0].clone();
+        r.name = name.into();
+        let n = 200;
+        r.time = (0..n).map(|i| 0.1 * f64::from(i)).collect();
+        r.pressure = vec![0.0; n as usize];
+        r.stroke = vec![0.0; n as usize];
+        r.force = Some((0..n).map(|i| 4.0 + 0.05 * f64::from(i % 3 - 1)).collect());
+        (r.direction, r.cycle, r.temperature) = (None, None, None);
+        r
+    };
+    let (before, after) = (tare("before"), tare("after"));
+    campaign.recordings.insert(0, before);
+    campaign.recordings.push(after);
+    let d = ask(&campaign);
+    let first = d.missing.first().expect("a zero");
+    assert!(["force-offset", "gravity"].contains(&first.effect.as_str()), "{:?}", names(&d));
+    assert!((first.parameters[0].value.abs() - 4.0).abs() < 0.5, "{:?}", first.parameters);
+}
+
 #[test]
 fn constant_friction_is_found_with_its_size() {
     let d = ask(&recorded(loops(&[0.1, 0.4]), 3, coloured(0.1, 2.0), |_, sign, _| -4.0 * sign));
