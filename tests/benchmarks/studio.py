@@ -64,7 +64,7 @@ REPORT = """
     const gaps = sorted(s.gaps), draws = sorted(s.draws), late = sorted(s.late);
     return {pictures: draws.length, gap50: at(gaps, .5), gap99: at(gaps, .99), gap_most: at(gaps, 1), draw50: at(draws, .5), draw99: at(draws, .99),
       late50: at(late, .5), late_most: at(late, 1), stalls: gaps.filter((g) => g > 100).length, long: s.long.length, long_most: Math.max(0, ...s.long),
-      samples: s.samples, missing: s.missing, lost: state.lost, running: document.getElementById("state").textContent,
+      samples: s.samples, missing: s.missing, lost: state.lost, fault: state.fault, running: document.getElementById("state").textContent,
       heap: performance.memory.usedJSHeapSize / 1e6};
 """
 
@@ -91,7 +91,7 @@ def watch(page, pid, minutes):
             "load {load:.1f}".format(**row),
             flush=True,
         )
-        assert row["running"].startswith("running"), f"the controller is no longer running: {row['running']}"
+        assert row["running"].startswith("running"), f"the controller is no longer running: {row['running']}; {row['fault'] or 'no fault'}"
     return rows
 
 

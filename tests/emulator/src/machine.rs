@@ -170,6 +170,15 @@ pub struct Options {
     pub speed: Option<f64>,
 }
 
+/// How long a test waits for an answer: a machine that is busy may take longer than a person would wait, and a board that is dead never
+/// answers.
+pub const PATIENCE: Patience = Patience {
+    answer: Duration::from_secs(5),
+    slow_answer: Duration::from_secs(60),
+    tries: 12,
+    noisy_tries: 60,
+};
+
 /// A running board.
 #[derive(Debug)]
 pub struct Machine {
@@ -276,20 +285,13 @@ impl Machine {
         self.link.try_clone().expect("a handle")
     }
 
-    /// The host's own client on the link, and the error when the board does not say hello.
-    ///
-    /// # Errors
-    /// As [`Client::connect`].
-    pub fn try_client(&self) -> host::error::Result<Client> {
-        Client::connect(Port::from_tcp(self.link())?, Patience::default())
-    }
-
     /// The host's own client on the link.
     ///
     /// # Panics
     /// When the board does not say hello.
     pub fn client(&self) -> Client {
-        self.try_client().expect("the board says hello")
+        let port = Port::from_tcp(self.link()).expect("a handle");
+        Client::connect(port, PATIENCE).expect("the board says hello")
     }
 
     /// Stops the processor for a debugger.

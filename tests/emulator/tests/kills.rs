@@ -1,11 +1,11 @@
 //! The plug is pulled at random moments of an upload: the old table or the new one is there, whole, every time.
 
 use std::io::Write;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use emulator_tests::machine::Folder;
 use emulator_tests::{Machine, Options, image_of, upload};
-use host::device::{Client, tables};
+use host::device::tables;
 use model_core::check;
 use model_core::link::endpoints::{BeginTable, CommitTable, Endpoint, SendTablePiece};
 use model_core::link::frame::{Header, Kind, MAX_WIRE, encode};
@@ -39,17 +39,6 @@ fn requests(image: &[u8]) -> Vec<u8> {
     wire
 }
 
-/// The device once it says hello: a machine that is busy may take longer than a person would wait, a device that is dead never does.
-fn awake(machine: &Machine) -> Client {
-    let begun = Instant::now();
-    loop {
-        match machine.try_client() {
-            Ok(client) => return client,
-            Err(error) => assert!(begun.elapsed() < Duration::from_secs(60), "after a kill: {error}"),
-        }
-    }
-}
-
 /// The plug is pulled within these times of the upload's first byte, in turn, µs.
 const LONGEST_US: [u64; 4] = [3_000, 12_000, 60_000, 250_000];
 
@@ -67,7 +56,7 @@ fn a_plug_pulled_at_any_moment_leaves_a_whole_table() {
     for n in 1..=kills {
         let Ok(machine) = Machine::start(folder.path(), Options::default()) else { return };
         // The device is awake once it says hello.
-        drop(awake(&machine));
+        drop(machine.client());
         let next = image_of(&numbered(n));
         machine.link().write_all(&requests(&next)).expect("the line takes it");
         // From before the first byte to after the commit, however busy the machine that emulates the board is.
@@ -75,7 +64,7 @@ fn a_plug_pulled_at_any_moment_leaves_a_whole_table() {
         std::thread::sleep(Duration::from_micros(random.random_range(0..longest)));
         machine.kill();
         let Ok(machine) = Machine::start(folder.path(), Options::default()) else { return };
-        let there = tables::read(&mut awake(&machine), Side::Agonist).expect("it reads").expect("a table");
+        let there = tables::read(&mut machine.client(), Side::Agonist).expect("it reads").expect("a table");
         if there == next {
             new += 1;
         } else {

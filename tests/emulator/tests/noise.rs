@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use emulator_tests::joint::{self, Joint};
 use emulator_tests::line::{self, Line};
-use emulator_tests::machine::Folder;
+use emulator_tests::machine::{Folder, PATIENCE};
 use emulator_tests::{Machine, Options, Watched, image_of, tracking, upload};
 use host::device::{Client, Patience, Port, Topic, tables};
 use model_core::link::endpoints::{Endpoint, GetStatus, SetTelemetry, SetTo};
@@ -45,7 +45,10 @@ fn flipped_bits_cost_repeats_and_nothing_else() {
     let options = Options { first: Some(Box::new(station.clone())), ..Options::default() };
     let Ok(machine) = Machine::start(folder.path(), options) else { return };
     // Without lead a command is what was asked for.
-    tracking::set(&mut machine.client(), |settings| settings.regulator.lead = 0.0);
+    tracking::set(&mut machine.client(), |settings| {
+        settings.regulator.lead = 0.0;
+        settings.watch.autonomous = true;
+    });
     let mut sent = Vec::new();
     eprintln!("| bit error rate | upload, s | repeats | bad frames at the host | at the device |");
     for (n, rate) in [1e-6, 1e-5, 1e-4, 1e-3].into_iter().enumerate() {
@@ -192,7 +195,7 @@ fn telemetry_of_two_muscles_at_1_khz_and_commands_beside_it_fit_a_line_of_1_mbau
     });
     let line = Line::tcp(&machine, line::clean(), count);
     let port = Port::open(&line.address().parse().expect("an address")).expect("the line is open");
-    let mut client = Client::connect(port, Patience::default()).expect("it says hello");
+    let mut client = Client::connect(port, PATIENCE).expect("it says hello");
     tracking::start(&mut client, Mode::Pair);
     let reset = |line: &mut Backlog| *line = Backlog { last: clock.periods(), ..Backlog::default() };
     reset(&mut backlog.lock().unwrap_or_else(PoisonError::into_inner));

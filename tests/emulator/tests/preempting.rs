@@ -43,11 +43,9 @@ fn answers_are_whole_while_control_steps_interrupt_their_making() {
     let table = table::example();
     let muscle = Muscle::<f32>::build(&table).expect("a valid table");
     upload(&mut client, Side::Agonist, &table);
-    // However long this process has to wait for a busy machine.
-    tracking::set(&mut client, |settings| settings.watch.autonomous = true);
+    tracking::start(&mut client, Mode::Force);
     let info = client.call::<GetInfo>(&()).expect("its limits");
     let settings = client.call::<GetSettings>(&()).expect("its settings");
-    tracking::start(&mut client, Mode::Force);
     let wave = Reference::Sine { mean: 45.0, amplitude: 20.0, frequency_hz: 2.0 };
     let began = client.call::<SetReference>(&wave).expect("a wave");
     let points = (0..16).map(|n| Point { pressure_pa: 30e3 + 35e3 * n as f32, stroke_m: 1e-3 }).collect();
