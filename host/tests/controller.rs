@@ -134,6 +134,10 @@ fn a_run_is_a_recording_that_the_readers_of_recordings_read() {
     assert!(
         predicted.status.success() && String::from_utf8_lossy(&predicted.stdout).contains("pam-predict/1")
     );
+    assert!(side["saturated_ticks"].is_u64(), "{side}");
+    // Seven times what this muscle can do.
+    let said = bench.done(&["run", "--force", "1000", "--seconds", "0.5"]);
+    assert!(said.contains("of 0.50 s what was asked was out of reach"), "{said}");
 }
 
 #[test]

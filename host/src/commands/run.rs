@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Args, ValueEnum};
-use model_core::link::endpoints::{GetInfo, GetSettings, SetSettings};
+use model_core::link::endpoints::{GetInfo, GetSettings, GetStatus, SetSettings};
 use model_core::link::settings::{FeedForward, Joint};
 use serde_json::{Value, json};
 
@@ -126,6 +126,7 @@ impl Arguments {
         let mut recorder = begin(&self.output, &about, console)?;
         let plan = Plan { quantity, course, seconds: self.seconds, every_ticks };
         let mut errors = Errors::new(client.call::<GetSettings>(&())?.joint);
+        let saturated_before = client.call::<GetStatus>(&())?.saturated_ticks;
         let progress = Progress::new(console, "run");
         progress.total(self.seconds.map_or(0, |s| (s * 1e3) as u64));
         let mut start = None;
@@ -147,6 +148,12 @@ impl Arguments {
         about["samples"] = json!(errors.samples);
         about["tracking_rms"] = json!(errors.rms(quantity));
         about["losses"] = about_losses(losses);
+        let saturated = match &outcome {
+            Ok(_) => client.call::<GetStatus>(&()).ok(),
+            Err(_) => None,
+        }
+        .map(|status| status.saturated_ticks.wrapping_sub(saturated_before));
+        about["saturated_ticks"] = json!(saturated);
         about["ended_by"] = json!(match &outcome {
             Ok(Ending::Done) => "time".to_owned(),
             Ok(Ending::Stopped) => "interrupt".to_owned(),
@@ -159,6 +166,16 @@ impl Arguments {
         if losses.samples > 0 {
             console
                 .warning(format!("{} samples were lost on the way, in {} gaps", losses.samples, losses.gaps));
+        }
+        let lasted = errors.samples as f64 * f64::from(every_ticks);
+        // A step asks for more than can be had for a moment, and is none the worse for it.
+        if let Some(saturated) = saturated.map(f64::from).filter(|&saturated| saturated > 0.1 * lasted) {
+            console.warning(format!(
+                "for {:.2} of {:.2} s what was asked was out of reach: more than the muscle can do there at the highest pressure \
+                 allowed, or less than at none",
+                saturated.min(lasted) / ticks,
+                lasted / ticks
+            ));
         }
         if ending == Ending::Stopped {
             console.note("interrupted; the muscle is vented");

@@ -19,11 +19,12 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
     let board = Board::from_code(hello.board).map_or("unknown board", Board::name);
     if !json {
         console.result(format!(
-            "{board}, release {major}.{minor}.{patch}, serial {}, {} starts\n\
+            "{board}, release {major}.{minor}.{patch}, serial {}, {} start{}\n\
              link version {} (this program {LINK_VERSION}), schema {:016x} (this program {SCHEMA_HASH:016x})\n\
              table format {}, store format {}, {} muscle{}",
             recorder::serial(&hello),
             hello.starts,
+            if hello.starts == 1 { "" } else { "s" },
             hello.link_version,
             hello.schema_hash,
             hello.table_format,
