@@ -57,11 +57,15 @@ impl Candidate {
             .collect()
     }
 
+    /// Whether a vented muscle shows it by itself: a weight, or an offset.
+    pub(crate) fn shown_vented(&self, rows: &Rows) -> bool {
+        matches!(self.name(), "force-offset" | "gravity") && rows.vented.contains(&true)
+    }
+
     /// How inexact its law is, as a share of its trace. A weight or an offset is what it is where a vented muscle shows it; elsewhere it
     /// is judged by how friction scales with the pull, and that law is no more exact than others.
     fn law_error(&self, rows: &Rows) -> f64 {
-        let shown = matches!(self.name(), "force-offset" | "gravity") && rows.vented.contains(&true);
-        if shown { 0.0 } else { LAW_ERROR }
+        if self.shown_vented(rows) { 0.0 } else { LAW_ERROR }
     }
 
     /// Whether the force of an amplitude is read even when the muscle is vented and slack. A guide or a rod's seal that stuck holds

@@ -142,7 +142,11 @@ impl Known {
             given: given.contains(&Law::Bench(j.measured.fault)),
             ..missing(j, share * j.peak * j.peak / all.max(1e-300))
         });
-        diagnosis.missing.splice(0..0, entries);
+        for entry in entries {
+            // What moves the force most is said first, whoever found it.
+            let at = diagnosis.missing.iter().position(|m| m.peak_N < entry.peak_N);
+            diagnosis.missing.insert(at.unwrap_or(diagnosis.missing.len()), entry);
+        }
         let step = |j: &Judged| PathStep {
             effect: j.measured.fault.info().name.into(),
             rms_N: is.sqrt(),

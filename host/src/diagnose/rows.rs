@@ -1,5 +1,6 @@
 //! The rows that everything else works on: block averages of the recordings that keep turns, with the motion in each.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use model_core::braid::Braid;
@@ -454,6 +455,39 @@ fn levels(rows: &mut Rows, range: (f64, f64)) {
     rows.level = rows.contexts.iter().map(|c| nearest(c.pressure)).collect();
 }
 
+/// The stretches of rows in which a muscle stays vented.
+fn tares(rows: &Rows) -> impl Iterator<Item = Range<usize>> + '_ {
+    let mut from = 0;
+    let together = |i: usize| (rows.vented[i], rows.recording[i]);
+    (1..=rows.len()).filter_map(move |i| {
+        if i < rows.len() && together(i) == together(from) {
+            return None;
+        }
+        let stretch = from..i;
+        from = i;
+        rows.vented[stretch.start].then_some(stretch)
+    })
+}
+
+/// Zeros differ by this part of themselves at most.
+const SAME_ZERO: f64 = 0.15;
+
+/// Whether all tares read the same, within each and from one to the next. What does not is partly the muscle's: a bladder that still
+/// remembers, a length that is not what it was, a guide that stuck.
+fn zeros_agree<'a>(tares: impl Iterator<Item = &'a [f64]>) -> bool {
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+    let (mut least, mut most, mut doubt) = (f64::INFINITY, f64::NEG_INFINITY, 0.0_f64);
+    for force in tares.filter(|f| f.len() >= 6) {
+        let third = force.len() / 3;
+        let ends = [mean(&force[..third]), mean(&force[force.len() - third..])];
+        let steps: f64 = force.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum();
+        doubt = doubt.max((steps / (2 * (force.len() - 1) * third) as f64).sqrt());
+        least = ends.iter().fold(least, |l, e| l.min(*e));
+        most = ends.iter().fold(most, |m, e| m.max(*e));
+    }
+    most - least <= SAME_ZERO * most.abs().max(least.abs()) + 6.0 * doubt
+}
+
 /// A muscle is at its rest length to this part of it.
 const SLACK: f64 = 2e-3;
 
@@ -466,10 +500,13 @@ fn mark_vented(rows: &mut Rows, readable: &[f64]) {
     if rows.vented.iter().all(|v| *v) {
         rows.vented.fill(false);
     }
-    for i in (0..rows.len()).filter(|i| rows.vented[*i]) {
-        // Stretched beyond its rest length even a vented muscle pulls.
-        let slack = rows.contexts[i].contraction >= -SLACK;
-        rows.root_weight[i] = if slack { rows.root_weight[i].max(readable[i]) } else { rows.root_weight[i] };
+    if zeros_agree(tares(rows).map(|tare| &rows.force[tare])) {
+        for i in (0..rows.len()).filter(|i| rows.vented[*i]) {
+            // Stretched beyond its rest length even a vented muscle pulls.
+            if rows.contexts[i].contraction >= -SLACK {
+                rows.root_weight[i] = rows.root_weight[i].max(readable[i]);
+            }
+        }
     }
     rows.levels.retain(|l| *l >= limit || highest <= limit);
     if rows.levels.is_empty() {

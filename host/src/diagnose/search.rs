@@ -206,7 +206,8 @@ impl<'a> Search<'a> {
         // A few readings that come a sample late at a turn make a likelihood of any size, and move little.
         let relief = if by_blocks { winner.relief } else { 0.0 };
         let moved = (winner.gain.max(relief) / self.scale.weight).sqrt();
-        let least = match (by_blocks, narrow) {
+        let shown = self.library[winner.candidate].shown_vented(self.rows);
+        let least = match (by_blocks || shown, narrow) {
             (true, true) => 0.4,
             (true, false) => 1.0,
             (false, _) => 2.0,
