@@ -1,7 +1,7 @@
-//! Friction of constant size: `F_add = −s_x · F_c − s · F_b`.
+//! Friction of constant size: `F_add = −s_x · F_c − s · F_s`.
 //!
 //! `s_x` is the direction in which the stroke last went (a change of pressure at held length does not turn it: what rubs is a guide or
-//! a fitting), `F_c` the friction force, N. Where the strands of the braid rub, `F_b`, N, their direction `s` follows filling and
+//! a fitting), `F_c` the friction force, N. Where the strands of the braid rub, `F_s`, N, their direction `s` follows filling and
 //! emptying as well; only rests with a change of pressure tell the two apart. It differs from the table's own friction, which is
 //! proportional to the muscle's force: it is still there where the force is zero, and shows in the tables as
 //! `k_F(P) ≈ a + b/P`. McKibben muscles have been reported with a hysteresis of 5–10 N that does not depend on speed.
@@ -27,7 +27,7 @@ impl Effect for CoulombFriction {
         alternatives: true,
         start: Start::Branch,
         fading: &[],
-        equation: "F = −s_x·F_c − s·F_b",
+        equation: "F = −s_x·F_c − s·F_s",
         summary: "A friction force of constant size opposes every motion, whatever the muscle pulls.",
         source: "C.-P. Chou and B. Hannaford, IEEE Trans. Robotics and Automation 12 (1996) 90–102, doi 10.1109/70.481753",
     };
