@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use crate::counted::counted;
 use crate::error::{Code, Error, Result};
 use crate::recording::Recording;
 
@@ -90,7 +91,7 @@ impl Comparison {
     /// Lines for a terminal.
     #[must_use]
     pub fn to_text(&self) -> String {
-        let mut text = format!("{} rows over {:.3} s, B − A\n", self.rows, self.overlap);
+        let mut text = format!("{} over {:.3} s, B − A\n", counted(self.rows, "row"), self.overlap);
         text += &format!("{:<18}{:>12}{:>12}{:>12}{:>10}\n", "", "rms", "mean", "largest", "at s");
         for c in &self.columns {
             let name = format!("{}, {}", c.name, c.unit);

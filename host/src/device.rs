@@ -17,6 +17,7 @@ mod address;
 mod client;
 pub mod course;
 pub mod difference;
+mod heard;
 pub mod log_table;
 mod port;
 #[cfg(feature = "probe")]

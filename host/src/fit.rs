@@ -99,6 +99,7 @@ pub mod weights;
 
 use crate::error::Result;
 use crate::muscle_description::MuscleDescription;
+use crate::progress::Progress;
 use crate::recording::Campaign;
 
 /// What the user may choose.
@@ -137,10 +138,24 @@ impl Default for Options {
 /// [`crate::error::Code::FitUnderdetermined`] where the recordings cannot give a table at all, and
 /// [`crate::error::Code::CallInvalid`] for options out of range.
 pub fn fit(campaign: &Campaign, muscle: &MuscleDescription, options: &Options) -> Result<result::Fit> {
-    let prepared = prepared::Prepared::new(campaign, muscle, options)?;
-    let mut fitted = result::Fit::of(prepared, campaign, muscle, options)?;
+    watched(campaign, muscle, options, &Progress::silent())
+}
+
+/// The same, and tells what is being done. Only what goes by equal steps tells the time that is left.
+///
+/// # Errors
+/// As [`fit`].
+pub fn watched(
+    campaign: &Campaign,
+    muscle: &MuscleDescription,
+    options: &Options,
+    progress: &Progress,
+) -> Result<result::Fit> {
+    let prepared = prepared::Prepared::new(campaign, muscle, options, progress)?;
+    let mut fitted = result::Fit::of(prepared, campaign, muscle, options, progress)?;
     if options.physical {
-        let free = fit(campaign, muscle, &Options { physical: false, ..options.clone() })?.summary;
+        let free = Options { physical: false, ..options.clone() };
+        let free = watched(campaign, muscle, &free, progress)?.summary;
         fitted.summary.physical = Some(summary::PhysicalCost {
             free_mean_error_pct: free.mean_error_pct,
             free_max_error_pct: free.max_error_pct,

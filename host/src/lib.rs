@@ -7,6 +7,7 @@ pub mod cli;
 pub mod commands;
 pub mod compare;
 pub mod console;
+pub mod counted;
 pub mod demo;
 pub mod device;
 pub mod diagnose;

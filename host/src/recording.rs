@@ -16,6 +16,7 @@ mod follow;
 mod hdf5;
 mod head;
 pub mod import;
+mod line;
 mod matlab;
 mod mcap;
 mod noise;

@@ -28,7 +28,7 @@ mod colour;
 mod figure;
 mod html;
 mod legend;
-mod letters;
+pub mod letters;
 mod markdown;
 mod marks;
 mod numbers;

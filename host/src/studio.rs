@@ -9,4 +9,5 @@
 
 pub mod keeper;
 pub mod server;
+mod told;
 pub mod workshop;

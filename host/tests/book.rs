@@ -3,9 +3,10 @@
 //! In a ```` ```console ```` block a line that begins with `$ ` is run by `sh` in a folder of the page's own; the lines after it are
 //! what it prints. `…` alone on a line stands for any lines. Numbers may differ somewhat, for they belong to a seed and
 //! a version; words may not. ```` ```toml file=NAME ```` writes a file first. Between `<!-- begin NAME -->` and `<!-- end -->` stands a
-//! table that the source makes.
+//! table that the source makes. A line `<!-- picture FILE -->` before an image says which file of that folder the image is.
 //!
-//! Did this fail after a change that was meant? Run `BOOK=overwrite cargo test -p host --test book`, and read the difference.
+//! Did this fail after a change that was meant? Run `BOOK=overwrite cargo test -p host --test book`, and read the difference. With
+//! `BOOK_PAGE=diagnosis.md` only that page is looked at.
 
 #![cfg(unix)]
 
@@ -127,6 +128,9 @@ fn check(page: &Path, text: &str) -> (String, Vec<String>) {
     let mut i = 0;
     while i < lines.len() {
         out.push(lines[i].clone());
+        if let Some(made) = lines[i].strip_prefix("<!-- picture ").and_then(|l| l.strip_suffix(" -->")) {
+            wrong.extend(picture(page, &folder.join(made), lines.get(i + 1).map_or("", String::as_str)));
+        }
         let Some(info) = lines[i].strip_prefix("```").filter(|info| !info.is_empty()) else {
             i += 1;
             continue;
@@ -172,12 +176,50 @@ fn check(page: &Path, text: &str) -> (String, Vec<String>) {
     (out.join("\n") + "\n", wrong)
 }
 
+/// A picture that a command of the page has made, beside the one that the page shows in its next line: the same lettering, with
+/// numbers as in a listing. `BOOK=overwrite` takes it over.
+fn picture(page: &Path, made: &Path, shown: &str) -> Option<String> {
+    let target =
+        shown.rsplit_once("](").and_then(|(_, t)| t.strip_suffix(')')).expect("an image in the next line");
+    let kept = page.parent().expect("a folder").join(target);
+    let fresh = fs::read_to_string(made).unwrap_or_else(|e| panic!("{}: {e}", made.display()));
+    if overwrite() {
+        fs::create_dir_all(kept.parent().expect("a folder")).expect("a folder");
+        fs::write(&kept, fresh).expect("written");
+        return None;
+    }
+    let old = fs::read_to_string(&kept).unwrap_or_default();
+    let (old, new) = (lettering(&old), lettering(&fresh));
+    let same = old.len() == new.len() && old.iter().zip(&new).all(|(a, b)| alike(a, b));
+    (!same).then(|| format!("{}: the picture {target} is not what the command draws", page.display()))
+}
+
+/// Everything that can be read in a picture: titles, axes, legends.
+fn lettering(svg: &str) -> Vec<&str> {
+    svg.split('<')
+        .filter_map(|piece| piece.split_once('>'))
+        .map(|(_, text)| text.trim())
+        .filter(|t| !t.is_empty())
+        .collect()
+}
+
+fn overwrite() -> bool {
+    std::env::var("BOOK").is_ok_and(|v| v == "overwrite")
+}
+
 /// Tables that the source makes.
 fn generated(name: &str) -> Option<String> {
     match name {
         "endpoints" => {
-            let rows = endpoints::TABLE.iter().map(|r| format!("| {} | `{}` |\n", r.id, r.name));
-            Some(format!("| number | endpoint |\n| ---: | --- |\n{}", rows.collect::<String>()))
+            let of = |name: &str| if name == "()" { "–".to_owned() } else { format!("`{name}`") };
+            let rows = endpoints::TABLE.iter().map(|r| {
+                let (asked, answered) = (of(r.request), of(r.response));
+                format!("| {} | `{}` | {asked} | {answered} | {} |\n", r.id, r.name, r.what.trim())
+            });
+            Some(format!(
+                "| number | endpoint | request | response | what it does |\n| ---: | --- | --- | --- | --- |\n{}",
+                rows.collect::<String>()
+            ))
         }
         "codes" => {
             let rows = Code::ALL.iter().map(|c| {
@@ -216,13 +258,13 @@ fn with_tables(text: &str) -> String {
 
 #[test]
 fn every_command_of_the_book_prints_what_it_says() {
-    let overwrite = std::env::var("BOOK").is_ok_and(|v| v == "overwrite");
     let mut wrong = Vec::new();
-    for page in pages() {
+    let only = std::env::var("BOOK_PAGE").unwrap_or_default();
+    for page in pages().into_iter().filter(|p| only.is_empty() || p.ends_with(&only)) {
         let text = fs::read_to_string(&page).expect("a page");
         let (checked, differences) = check(&page, &text);
         let fresh = with_tables(&checked);
-        if overwrite {
+        if overwrite() {
             if fresh != text {
                 fs::write(&page, fresh).expect("written");
             }

@@ -40,6 +40,51 @@ fn every_command_has_help_with_an_example() {
 }
 
 #[test]
+fn every_command_with_a_result_gives_it_as_json_too() {
+    fn look(command: &clap::Command, path: &str, poor: &mut Vec<String>) {
+        let subs: Vec<_> = command.get_subcommands().collect();
+        if subs.is_empty() && command.get_arguments().all(|a| a.get_id() != "json") {
+            poor.push(path.to_owned());
+        }
+        for sub in subs {
+            look(sub, &format!("{path} {}", sub.get_name()), poor);
+        }
+    }
+    let mut poor = Vec::new();
+    look(&host::cli::Cli::command(), "host", &mut poor);
+    // A conversation, a shell's script and pages for `man` are none.
+    assert_eq!(poor, ["host new", "host completions", "host man"]);
+}
+
+#[test]
+fn every_json_names_its_schema() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let rows: String = (0..12).map(|i| format!("{i},300,{0},{1}\n", 0.1 * f64::from(i), 50 - i)).collect();
+    write("a.csv", &format!("time_s,pressure_kPa,displacement_mm,force_N\n{rows}"));
+    let table =
+        host::table_file::TableFile { table: model_core::table::example(), about: Default::default() };
+    table.write(folder.path().join("t.pam")).unwrap();
+    for (call, schema) in [
+        ("effects --json", "pam-effects/1"),
+        ("effects backlash --json", "pam-effect/1"),
+        ("settings --json", "pam-settings/1"),
+        ("table show t.pam --json", "pam-table/1"),
+        ("table check t.pam --json", "pam-check/1"),
+        ("table export t.pam -o t.h --json", "pam-export/1"),
+        ("predict --quiet --table t.pam a.csv --json -", "pam-predict/1"),
+        ("compare a.csv a.csv --json", "pam-compare/1"),
+        ("device list --json", "pam-ports/1"),
+        ("emulate --quiet --on native --seconds 0.01 --json", "pam-emulate/1"),
+    ] {
+        let (status, said) = host(folder.path(), &call.split(' ').collect::<Vec<_>>(), None);
+        let value: serde_json::Value =
+            serde_json::from_str(&said).unwrap_or_else(|e| panic!("{call}: {e}: {said}"));
+        assert_eq!((status, value["schema"].as_str()), (0, Some(schema)), "{call}: {said}");
+    }
+}
+
+#[test]
 fn there_is_a_manual_page_for_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let (status, said) = host(folder.path(), &["man", "-o", "man1"], None);

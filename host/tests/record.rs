@@ -159,7 +159,7 @@ fn a_cable_that_is_pulled_ends_the_recording_at_a_whole_row() {
     let output = child.wait_with_output().unwrap();
     let told = said(&output);
     assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(told.contains("error[device::") && told.contains("samples until then are in run.csv"), "{told}");
+    assert!(told.contains("error[device::") && told.contains(" until then in run.csv"), "{told}");
     let (a, b) = (read(&folder.path().join("run.csv")), read(&folder.path().join("run.mcap")));
     assert!(a.len() > 100 && a.len() == b.len(), "{} and {}", a.len(), b.len());
     let text = std::fs::read_to_string(folder.path().join("run.csv")).unwrap();

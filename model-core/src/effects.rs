@@ -171,6 +171,8 @@ pub enum Role {
 /// One parameter of an effect, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
+    /// What the effect's equation calls it.
+    pub letter: &'static str,
     /// Its name, as in the effect's documentation.
     pub name: &'static str,
     /// Its SI unit, or an empty string.
@@ -185,12 +187,24 @@ pub struct Parameter {
 
 impl Parameter {
     /// A parameter that the force is proportional to.
-    pub const fn amplitude(name: &'static str, unit: &'static str, low: f64, high: f64) -> Self {
-        Self { name, unit, low, high, role: Role::Amplitude }
+    pub const fn amplitude(
+        letter: &'static str,
+        name: &'static str,
+        unit: &'static str,
+        low: f64,
+        high: f64,
+    ) -> Self {
+        Self { letter, name, unit, low, high, role: Role::Amplitude }
     }
     /// A parameter that shapes the force.
-    pub const fn shape(name: &'static str, unit: &'static str, low: f64, high: f64) -> Self {
-        Self { name, unit, low, high, role: Role::Shape }
+    pub const fn shape(
+        letter: &'static str,
+        name: &'static str,
+        unit: &'static str,
+        low: f64,
+        high: f64,
+    ) -> Self {
+        Self { letter, name, unit, low, high, role: Role::Shape }
     }
 }
 

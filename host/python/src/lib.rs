@@ -6,6 +6,7 @@ use std::ffi::CString;
 use std::path::PathBuf;
 
 use host::band::{ForceBand, HALF_95};
+use host::counted::counted;
 use host::diagnose as diagnosis;
 use host::error::{Code, Error};
 use host::fit::Options;
@@ -231,7 +232,7 @@ impl Recording {
     }
 
     fn __repr__(&self) -> String {
-        format!("Recording({:?}, {} rows, {:.1} s)", self.0.name, self.0.len(), self.0.duration())
+        format!("Recording({:?}, {}, {:.1} s)", self.0.name, counted(self.0.len(), "row"), self.0.duration())
     }
 }
 
@@ -264,7 +265,7 @@ impl Campaign {
     }
 
     fn __repr__(&self) -> String {
-        format!("Campaign({} recordings, {} rows)", self.0.recordings.len(), self.0.samples())
+        format!("Campaign({}, {})", counted(self.0.recordings.len(), "recording"), counted(self.0.samples(), "row"))
     }
 }
 
@@ -339,7 +340,7 @@ impl Prediction {
     fn __repr__(&self) -> String {
         let rms = self.0.rms.map_or(String::new(), |r| format!(", rms {r:.3} N"));
         let band = self.0.bands.as_ref().map_or(String::new(), |b| format!(", ± {:.3} N", b.mean));
-        format!("Prediction({} rows{rms}{band})", self.0.force.len())
+        format!("Prediction({}{rms}{band})", counted(self.0.force.len(), "row"))
     }
 }
 

@@ -1,12 +1,12 @@
 //! Play between the stroke sensor and the muscle: after a turn the sensor moves and the muscle does not.
 //!
 //! ```text
-//! F_add = κ · [∂F/∂x · (play_{b/2}(x) − x) + k_F F_quasi (s − s_play)]
+//! F_add = κ · [∂F/∂x · (y − x) + k_F F_quasi (s − s_y)]        y = play_{b/2}(x)
 //! ```
-//! `b`, m, is the width of the play, `play` its output: it stands still until the stroke has gone back by `b`. `κ` (dimensionless) is 1 for a joint
+//! `b`, m, is the width of the play, `y` its output: it stands still until the stroke has gone back by `b`. `κ` (dimensionless) is 1 for a joint
 //! that is free over all of `b`, less if it is tight at times. A preloaded joint has none. The side on which the play begins is
 //! unknown until the first turn. While the joint is
-//! loose the muscle rests, and its friction keeps the direction `s_play` of its own last motion; once it is drawn along again, that turns
+//! loose the muscle rests, and its friction keeps the direction `s_y` of its own last motion; once it is drawn along again, that turns
 //! over a travel of `η b`, as the joint does not bear all at once and the braid gives a little before it slides.
 
 use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start, decay};
@@ -20,16 +20,16 @@ impl Effect for Backlash {
         name: "backlash",
         link: Link::LoadPath,
         parameters: &[
-            Parameter::amplitude("free_part", "", 0.1, 1.2),
-            Parameter::shape("width", "m", 5.0e-6, 2.0e-3),
-            Parameter::shape("softness", "", 0.02, 0.5),
+            Parameter::amplitude("κ", "free_part", "", 0.1, 1.2),
+            Parameter::shape("b", "width", "m", 5.0e-6, 2.0e-3),
+            Parameter::shape("η", "softness", "", 0.02, 0.5),
         ],
         depends_on_pressure: true,
         persistent: false,
         alternatives: false,
         start: Start::Branch,
         fading: &[],
-        equation: "F = κ·[∂F/∂x·(play_b(x) − x) + k_F·F_quasi·(s − s_play)], ds_play = (s − s_play)·|d play|/(η·b)",
+        equation: "F = κ·[∂F/∂x·(y − x) + k_F·F_quasi·(s − s_y)], y = play of x, b wide, ds_y = (s − s_y)·|dy|/(η·b)",
         summary: "A loose joint lets the sensor move before the muscle does, after every turn.",
         source: "play operator; sensitivity of the base model",
     };

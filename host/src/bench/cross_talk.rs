@@ -12,7 +12,7 @@ impl Effect for CrossTalk {
     const INFO: Info = Info {
         name: "cross-talk",
         link: Link::Reading,
-        parameters: &[Parameter::amplitude("thrust_area", "m²", -5.0e-5, 5.0e-5)],
+        parameters: &[Parameter::amplitude("c", "thrust_area", "m²", -5.0e-5, 5.0e-5)],
         depends_on_pressure: true,
         persistent: false,
         alternatives: false,

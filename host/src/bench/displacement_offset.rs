@@ -12,7 +12,7 @@ impl Effect for DisplacementOffset {
     const INFO: Info = Info {
         name: "displacement-offset",
         link: Link::Reading,
-        parameters: &[Parameter::amplitude("offset", "m", -3.0e-3, 3.0e-3)],
+        parameters: &[Parameter::amplitude("δ", "offset", "m", -3.0e-3, 3.0e-3)],
         depends_on_pressure: true,
         persistent: false,
         alternatives: false,

@@ -13,8 +13,8 @@ impl Effect for ForceGain {
         name: "force-gain",
         link: Link::Reading,
         parameters: &[
-            Parameter::amplitude("gain_missing", "", -0.05, 0.05),
-            Parameter::amplitude("curvature", "1/N", -1.0e-3, 1.0e-3),
+            Parameter::amplitude("γ", "gain_missing", "", -0.05, 0.05),
+            Parameter::amplitude("γ_2", "curvature", "1/N", -1.0e-3, 1.0e-3),
         ],
         depends_on_pressure: true,
         persistent: false,

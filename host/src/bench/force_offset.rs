@@ -12,7 +12,7 @@ impl Effect for ForceOffset {
     const INFO: Info = Info {
         name: "force-offset",
         link: Link::Reading,
-        parameters: &[Parameter::amplitude("offset", "N", -50.0, 50.0)],
+        parameters: &[Parameter::amplitude("b", "offset", "N", -50.0, 50.0)],
         depends_on_pressure: false,
         persistent: false,
         alternatives: false,

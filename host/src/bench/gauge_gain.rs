@@ -14,8 +14,8 @@ impl Effect for GaugeGain {
         name: "gauge-gain",
         link: Link::Air,
         parameters: &[
-            Parameter::amplitude("gain_missing", "", -0.05, 0.05),
-            Parameter::amplitude("curvature", "1/Pa", -1.0e-7, 1.0e-7),
+            Parameter::amplitude("γ", "gain_missing", "", -0.05, 0.05),
+            Parameter::amplitude("γ_2", "curvature", "1/Pa", -1.0e-7, 1.0e-7),
         ],
         depends_on_pressure: true,
         persistent: false,

@@ -13,7 +13,7 @@ impl Effect for GaugeOffset {
     const INFO: Info = Info {
         name: "gauge-offset",
         link: Link::Air,
-        parameters: &[Parameter::amplitude("pressure_missing", "Pa", -1.0e4, 1.0e4)],
+        parameters: &[Parameter::amplitude("δ", "pressure_missing", "Pa", -1.0e4, 1.0e4)],
         depends_on_pressure: false,
         persistent: false,
         alternatives: false,

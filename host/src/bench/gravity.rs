@@ -14,8 +14,8 @@ impl Effect for Gravity {
         name: "gravity",
         link: Link::LoadPath,
         parameters: &[
-            Parameter::amplitude("mass", "kg", -5.0, 5.0),
-            Parameter::amplitude("mass_per_length", "kg/m", -5.0, 5.0),
+            Parameter::amplitude("m", "mass", "kg", -5.0, 5.0),
+            Parameter::amplitude("ρ", "mass_per_length", "kg/m", -5.0, 5.0),
         ],
         depends_on_pressure: false,
         persistent: false,

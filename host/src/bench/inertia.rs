@@ -12,7 +12,7 @@ impl Effect for Inertia {
     const INFO: Info = Info {
         name: "inertia",
         link: Link::LoadPath,
-        parameters: &[Parameter::amplitude("mass", "kg", 0.02, 5.0)],
+        parameters: &[Parameter::amplitude("m", "mass", "kg", 0.02, 5.0)],
         depends_on_pressure: false,
         persistent: false,
         alternatives: false,

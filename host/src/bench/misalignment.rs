@@ -15,8 +15,8 @@ impl Effect for Misalignment {
         name: "misalignment",
         link: Link::LoadPath,
         parameters: &[
-            Parameter::amplitude("gain_loss", "", 1.0e-5, 0.02),
-            Parameter::amplitude("side_friction", "", 2.0e-4, 0.05),
+            Parameter::amplitude("a", "gain_loss", "", 1.0e-5, 0.02),
+            Parameter::amplitude("b", "side_friction", "", 2.0e-4, 0.05),
         ],
         depends_on_pressure: true,
         persistent: false,

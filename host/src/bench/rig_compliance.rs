@@ -20,8 +20,8 @@ impl Effect for RigCompliance {
         name: "rig-compliance",
         link: Link::LoadPath,
         parameters: &[
-            Parameter::amplitude("compliance", "m/N", 1.0e-8, 2.0e-4),
-            Parameter::shape("compliance_at_turns", "m/N", 1.0e-8, 2.0e-4),
+            Parameter::amplitude("1/K", "compliance", "m/N", 1.0e-8, 2.0e-4),
+            Parameter::shape("c", "compliance_at_turns", "m/N", 1.0e-8, 2.0e-4),
         ],
         depends_on_pressure: true,
         persistent: false,

@@ -1,7 +1,7 @@
 //! The force reading is late against stroke and pressure.
 //!
 //! ```text
-//! F_add = −δ (∂F/∂x v + g (1 − s k_F) dP/dt)    or    F_add = −κ (F − LP_τ(F))    or    F_add = −κ_d (F − LP⁴_{τ/4}(F))
+//! F_add = −δ (∂F/∂x v + g (1 − s k_F) dP/dt)    or    F_add = −κ (F − LP_τ(F))    or    F_add = −κ_d (F − D_τ(F)),  D_τ = LP⁴_{τ/4}
 //! ```
 //! `δ`, s, a skew between the channels, to first order and away from turns (negative: the stroke is the late one); or a first-order filter
 //! of time constant `τ`, s, in the force channel, `κ = 1` for the whole, which also rounds the jumps at turns; or a delay by `τ` behind a
@@ -26,17 +26,17 @@ impl Effect for SensorDelay {
         name: "sensor-delay",
         link: Link::Reading,
         parameters: &[
-            Parameter::amplitude("skew", "s", -0.3, 0.3),
-            Parameter::amplitude("filtered_part", "", 0.1, 1.2),
-            Parameter::amplitude("delayed_part", "", 0.1, 1.2),
-            Parameter::shape("filter_time", "s", 1.0e-3, 0.5),
+            Parameter::amplitude("δ", "skew", "s", -0.3, 0.3),
+            Parameter::amplitude("κ", "filtered_part", "", 0.1, 1.2),
+            Parameter::amplitude("κ_d", "delayed_part", "", 0.1, 1.2),
+            Parameter::shape("τ", "filter_time", "s", 1.0e-3, 0.5),
         ],
         depends_on_pressure: true,
         persistent: false,
         alternatives: true,
         start: Start::Settled,
         fading: &[],
-        equation: "F = −δ·(∂F/∂x·v + g·(1 − s·k_F)·dP/dt), or F = −κ·(F − LP_τ(F)), or F = −κ_d·(F − LP⁴_{τ/4}(F))",
+        equation: "F = −δ·(∂F/∂x·v + g·(1 − s·k_F)·dP/dt), or F = −κ·(F − LP_τ(F)), or F = −κ_d·(F − D_τ(F))",
         summary: "The force channel is late against the other channels.",
         source: "first-order filter or skew; 1 to 100 ms are usual",
     };

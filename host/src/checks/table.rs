@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::counted::counted;
 use crate::error::{Code, Error, Result};
 use crate::file_kind::FileKind;
 use crate::recording::{Named, Quantity, named};
@@ -70,7 +71,7 @@ impl Table {
         let table = Self { file: file.to_owned(), columns };
         let rows = table.columns.first().map_or(0, |c| c.2.len());
         if rows < FEWEST {
-            return Err(table.poor(format!("{rows} rows, of which at least {FEWEST} are needed")));
+            return Err(table.poor(format!("{}, and at least {FEWEST} are needed", counted(rows, "row"))));
         }
         Ok(table)
     }

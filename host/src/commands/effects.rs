@@ -1,5 +1,6 @@
 //! `host effects`: what a diagnosis can find, explained.
 
+use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -9,6 +10,7 @@ use crate::bench::Candidate;
 use crate::console::Console;
 use crate::error::{Code, Error, Result};
 use crate::output::write_whole;
+use crate::report::letters::letters;
 use crate::report::{effect_page, rich};
 
 /// Arguments of `host effects`.
@@ -127,15 +129,22 @@ fn explain(candidate: Candidate) -> String {
         "of the muscle: goes into the table and to the controller"
     };
     let mut text = format!(
-        "{}\n  {}\n\n  acts on {}\n  {whose}\n  {}\n\n",
+        "{}\n  {}\n\n  acts on {}\n  {whose}\n\n  {}\n\n",
         info.name,
         info.summary,
         effect_page::place(info.link),
         rich::plain(info.equation)
     );
     for p in info.parameters {
-        text += format!("  {:24} {} to {} {}", p.name, p.low, p.high, p.unit).trim_end();
-        text.push('\n');
+        let _ = writeln!(
+            text,
+            "{}",
+            format!("  {:8} {:24} {} to {} {}", p.letter, p.name, p.low, p.high, p.unit).trim_end()
+        );
+    }
+    text.push('\n');
+    for letter in &letters(info).rows {
+        let _ = writeln!(text, "  {:8} {}", letter[0], letter[1]);
     }
     text + &format!("\n  source: {}", info.source)
 }
@@ -146,17 +155,21 @@ fn to_json(candidate: Candidate) -> serde_json::Value {
         .parameters
         .iter()
         .map(|p| {
-            json!({ "name": p.name, "unit": p.unit, "low": p.low, "high": p.high,
+            json!({ "name": p.name, "letter": p.letter, "unit": p.unit, "low": p.low, "high": p.high,
             "amplitude": p.role == model_core::effects::Role::Amplitude })
         })
         .collect();
+    let letters: serde_json::Map<_, _> =
+        letters(info).rows.into_iter().map(|r| (r[0].clone(), json!(r[1]))).collect();
     json!({
+        "schema": "pam-effect/1",
         "effect": info.name,
         "place": effect_page::place(info.link),
         "bench": candidate.is_bench(),
         "summary": info.summary,
         "equation": info.equation,
         "parameters": parameters,
+        "letters": letters,
         "source": info.source,
     })
 }

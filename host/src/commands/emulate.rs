@@ -4,6 +4,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use serde_json::json;
 
 use super::run::{interrupts, positive};
 use crate::console::Console;
@@ -27,6 +28,9 @@ pub struct Arguments {
     /// How long, s [default: until Ctrl-C].
     #[arg(short, long, value_name = "S", allow_negative_numbers = true)]
     seconds: Option<f64>,
+    /// Print the first line as JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 impl Arguments {
@@ -43,7 +47,12 @@ impl Arguments {
         };
         let interrupted = interrupts()?;
         let emulated = Emulated::start(Stand::swinging(muscle(&self.muscle)?), only, 1.0)?;
-        console.result(emulated.address());
+        if self.json {
+            let (port, words) = (emulated.address().to_string(), emulated.words());
+            console.result(json!({ "schema": "pam-emulate/1", "port": port, "controller": words }));
+        } else {
+            console.result(emulated.address());
+        }
         console.note(format!("{}; Ctrl-C ends it", emulated.words()));
         console.note(format!("next: host device info --port {}", emulated.address()));
         let begun = Instant::now();

@@ -8,10 +8,12 @@ use clap::Args;
 use super::recordings::Recordings;
 use super::reports::Reports;
 use crate::console::Console;
+use crate::counted::counted;
 use crate::error::{Code, Error, Result};
-use crate::fit::{Options, fit};
+use crate::fit::{self, Options};
 use crate::muscle_description::MuscleDescription;
 use crate::output::write_whole;
+use crate::progress::Progress;
 use crate::recording::Reader;
 use crate::report::fit_page;
 use crate::table_file::{self, TableFile};
@@ -75,7 +77,11 @@ impl Arguments {
         // Whoever asks for JSON is a program, or will look at that.
         let watched = if self.json.is_some() { Console::silent() } else { console.clone() };
         let campaign = self.recordings.read_watched(Reader::of(&muscle), &watched)?;
-        console.detail(format!("read {} rows in {:.3} s", campaign.samples(), start.elapsed().as_secs_f64()));
+        console.detail(format!(
+            "read {} in {:.3} s",
+            counted(campaign.samples(), "row"),
+            start.elapsed().as_secs_f64()
+        ));
         let started = Instant::now();
         let options = Options {
             order: usize::from(self.order),
@@ -89,7 +95,8 @@ impl Arguments {
         let files = self.recordings.files.clone();
         let (fitted, hashes) = std::thread::scope(|scope| {
             let hashes = scope.spawn(|| files.iter().map(table_file::sha256).collect::<Result<Vec<_>>>());
-            let fitted = fit(&campaign, &muscle, &options);
+            let progress = Progress::new(&watched, "fitting");
+            let fitted = fit::watched(&campaign, &muscle, &options, &progress);
             (fitted, hashes.join())
         });
         let fitted = fitted?;

@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::recordings::Recordings;
 use crate::console::Console;
+use crate::counted::counted;
 use crate::error::{Code, Error, Result};
 use crate::output::write_whole;
 use crate::predict::{predict_with_bands, to_csv};
@@ -87,7 +88,7 @@ impl Arguments {
                 });
                 format!(", force ± {:.3} N{inside}", bands.mean)
             });
-            console.note(format!("{}: {} rows, {rms}{band}", recording.name, recording.len()));
+            console.note(format!("{}: {}, {rms}{band}", recording.name, counted(recording.len(), "row")));
         }
         if self.output.is_none() && self.json.is_none() {
             console.detail("nothing is written: give -o or --json");

@@ -12,6 +12,7 @@ use serde_json::json;
 use super::port::PortOption;
 use super::run::{begin, end, interrupts, positive};
 use crate::console::Console;
+use crate::counted::counted;
 use crate::device::recorder::{Recorder, about_losses, about_start, rescue};
 use crate::device::{Client, Topic, words};
 use crate::error::{Code, Error, Result};
@@ -111,20 +112,23 @@ impl Arguments {
         if let Err(error) = &watched
             && kept.is_ok()
         {
-            console.note(format!("{rows} samples until then are in {}", output[0].display()));
+            console.note(format!("{} until then in {}", counted(rows, "sample"), output[0].display()));
             console.detail(error.to_string());
         }
         watched?;
         kept?;
         quiet?.map_err(|refusal| words::refused("telemetry", refusal))?;
         if losses.samples > 0 {
-            console
-                .warning(format!("{} samples were lost on the way, in {} gaps", losses.samples, losses.gaps));
+            console.warning(format!(
+                "{} lost on the way, in {}",
+                counted(losses.samples, "sample"),
+                counted(losses.gaps, "gap")
+            ));
         }
         console.result(if self.json {
             format!("{about:#}")
         } else {
-            format!("{rows} samples in {}, {} lost", output[0].display(), losses.samples)
+            format!("{} in {}, {} lost", counted(rows, "sample"), output[0].display(), losses.samples)
         });
         Ok(())
     }

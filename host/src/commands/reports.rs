@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::console::Console;
+use crate::counted::counted;
 use crate::error::Result;
 use crate::output::write_whole;
 use crate::report::Page;
@@ -42,7 +43,7 @@ impl Reports {
         }
         if let Some(folder) = &self.figures {
             let files = page.write_parts(folder)?;
-            console.detail(format!("{} files in {}", files.len(), folder.display()));
+            console.detail(format!("{} in {}", counted(files.len(), "file"), folder.display()));
         }
         Ok(())
     }

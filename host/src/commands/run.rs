@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 
 use super::port::PortOption;
 use crate::console::Console;
+use crate::counted::counted;
 use crate::device::course::{Course, Quantity};
 use crate::device::recorder::{Recorder, about_losses, about_start};
 use crate::device::run::{Ending, Plan, run, vent};
@@ -164,8 +165,11 @@ impl Arguments {
         let ending = outcome?;
         let kept = kept?;
         if losses.samples > 0 {
-            console
-                .warning(format!("{} samples were lost on the way, in {} gaps", losses.samples, losses.gaps));
+            console.warning(format!(
+                "{} lost on the way, in {}",
+                counted(losses.samples, "sample"),
+                counted(losses.gaps, "gap")
+            ));
         }
         let lasted = errors.samples as f64 * f64::from(every_ticks);
         // A step asks for more than can be had for a moment, and is none the worse for it.
@@ -187,7 +191,7 @@ impl Arguments {
             let rms = errors
                 .rms(quantity)
                 .map_or(String::new(), |r| format!(", tracking error {r:.3} {} rms", quantity.unit()));
-            console.result(format!("{} samples{name}{rms}; vented", errors.samples));
+            console.result(format!("{}{name}{rms}; vented", counted(errors.samples, "sample")));
         }
         Ok(())
     }
@@ -273,7 +277,7 @@ pub(super) fn begin(files: &[PathBuf], about: &Value, console: &Console) -> Resu
 /// Ends it.
 pub(super) fn end(recorder: Recorder, about: &Value, console: &Console) -> Result<PathBuf> {
     if recorder.skipped() > 0 {
-        console.warning(format!("{} samples without numbers were left out", recorder.skipped()));
+        console.warning(format!("{} without numbers left out", counted(recorder.skipped(), "sample")));
     }
     recorder.finish(about)
 }

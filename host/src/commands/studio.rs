@@ -30,6 +30,9 @@ pub struct Arguments {
     /// The folder for recordings and tables.
     #[arg(short, long, value_name = "FOLDER", default_value = "pam-studio")]
     output: PathBuf,
+    /// Print the address as JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 impl Arguments {
@@ -50,7 +53,11 @@ impl Arguments {
         })
         .map_err(|e| Error::new(Code::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
         let ready = |address: &str| {
-            console.result(format!("open {address}"));
+            if self.json {
+                console.result(serde_json::json!({ "schema": "pam-studio/1", "address": address }));
+            } else {
+                console.result(format!("open {address}"));
+            }
             console.note("Ctrl-C here, or closing the last page, vents and disarms the controller");
         };
         serve(self.web_port, self.output, first, ready, async {

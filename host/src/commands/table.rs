@@ -7,7 +7,8 @@ use model_core::muscle::Muscle;
 use serde_json::{Value, json};
 
 use crate::console::Console;
-use crate::error::Result;
+use crate::counted::counted;
+use crate::error::{Code, Error, Result};
 use crate::output::write_whole;
 use crate::table_export::{self, Format};
 use crate::table_file::TableFile;
@@ -50,6 +51,9 @@ struct Export {
     /// The form; by default what the output's name ends in.
     #[arg(long, value_enum)]
     format: Option<Format>,
+    /// Print JSON on what was written.
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -77,7 +81,9 @@ impl Arguments {
                 let table = TableFile::read(&file.table)?;
                 let remarks = remarks(&table);
                 if file.json {
-                    console.result(pretty(&json!({ "valid": true, "remarks": remarks })));
+                    console.result(pretty(
+                        &json!({ "schema": "pam-check/1", "valid": true, "remarks": remarks }),
+                    ));
                 } else {
                     console.result(format!("{}: valid", file.table.display()));
                     for remark in remarks {
@@ -86,6 +92,13 @@ impl Arguments {
                 }
             }
             Action::Export(export) => {
+                if export.json && export.output.as_os_str() == "-" {
+                    return Err(Error::new(
+                        Code::CallInvalid,
+                        "both the table and the JSON would go to standard output",
+                    )
+                    .help("`--format json -o -` gives the table as JSON"));
+                }
                 let table = TableFile::read(&export.table)?;
                 let format = match export.format {
                     Some(format) => format,
@@ -98,6 +111,12 @@ impl Arguments {
                     Format::Matlab => table_export::matlab(&table),
                 };
                 write_whole(&export.output, &bytes)?;
+                if export.json {
+                    let (table, output) =
+                        (export.table.display().to_string(), export.output.display().to_string());
+                    let told = json!({ "schema": "pam-export/1", "table": table, "output": output, "bytes": bytes.len() });
+                    console.result(pretty(&told));
+                }
             }
         }
         Ok(())
@@ -268,8 +287,12 @@ fn to_text(file: &TableFile) -> String {
         text += &format!("; {left_out:.3} % mean at pressures left out");
     }
     for s in &a.sources {
-        text +=
-            &format!("\nfrom {} ({} rows, sha256 {})", s.path, s.samples, s.sha256.get(..16).unwrap_or(""));
+        text += &format!(
+            "\nfrom {} ({}, sha256 {})",
+            s.path,
+            counted(s.samples, "row"),
+            s.sha256.get(..16).unwrap_or("")
+        );
     }
     for w in &a.fit.warnings {
         text += &format!("\nwarning: {w}");

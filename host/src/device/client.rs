@@ -5,10 +5,11 @@ use std::time::{Duration, Instant};
 
 use model_core::link::endpoints::{EVENT, Endpoint, GetStatus, LOG, TELEMETRY};
 use model_core::link::frame::{Accumulator, Header, Kind, MAX_BODY, MAX_WIRE, encode, encode_bytes};
-use model_core::link::hello::{self, Board, Hello};
+use model_core::link::hello::{self, Hello};
 use model_core::link::messages::{Event, Refusal, Telemetry};
 use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 
+use super::heard::{Heard, lost, version_error};
 use super::{Address, Port, words};
 use crate::error::{Code, Error, Result};
 
@@ -396,86 +397,4 @@ impl Client {
         }
         Ok(answers)
     }
-}
-
-/// What came before any hello, to tell a silent line from a foreign peer.
-#[derive(Default)]
-struct Heard {
-    bytes: usize,
-    frames: usize,
-    echoes: usize,
-    first: Vec<u8>,
-}
-
-impl Heard {
-    fn take(&mut self, bytes: &[u8]) {
-        self.bytes += bytes.len();
-        let room = 32usize.saturating_sub(self.first.len());
-        self.first.extend_from_slice(&bytes[..bytes.len().min(room)]);
-    }
-
-    fn error(&self, port: &Port) -> Error {
-        if self.bytes == 0 {
-            return Error::new(Code::DeviceSilent, "nothing answers on this port")
-                .value(port.name())
-                .help("is the controller powered, flashed, and is this its port? `host device list` shows the ports here");
-        }
-        if self.echoes > 0 {
-            return Error::new(Code::DeviceForeign, "the line only sends back what it is sent")
-                .value(port.name())
-                .help("are transmit and receive joined, or is a terminal program on the other end?");
-        }
-        if self.frames > 0 {
-            return Error::new(Code::DeviceSilent, "a controller is there, but it does not answer hello")
-                .value(port.name())
-                .help("is another program talking to it? close it, or restart the controller");
-        }
-        let shown = String::from_utf8_lossy(&self.first);
-        let printable = shown.chars().filter(|c| c.is_ascii_graphic() || c.is_ascii_whitespace()).count();
-        let begins = if printable * 2 > shown.chars().count() {
-            format!("`{}`", shown.trim().chars().flat_map(char::escape_debug).collect::<String>())
-        } else {
-            self.first.iter().take(12).map(|b| format!("{b:02x}")).collect::<Vec<_>>().join(" ")
-        };
-        Error::new(
-            Code::DeviceForeign,
-            format!(
-                "something answers here, but it is not a controller of this project: it sent {} bytes that begin {begins}",
-                self.bytes
-            ),
-        )
-        .value(port.name())
-        .help("is it the right port? if it is the right board, flash it first: host flash --firmware ELF --chip CHIP")
-    }
-}
-
-fn lost(port: &Port, reason: &std::io::Error) -> Error {
-    Error::new(Code::DeviceSilent, format!("the connection to the device is gone: {reason}"))
-        .value(port.name())
-        .help("look at cable and supply, then try again; a running controller without its host stops itself within a second, unless it was set otherwise")
-}
-
-fn version_error(port: &Port, hello: &Hello) -> Error {
-    let (major, minor, patch) = hello.release;
-    let ours = env!("CARGO_PKG_VERSION");
-    let older = match hello.link_version.cmp(&LINK_VERSION) {
-        std::cmp::Ordering::Less => "the device is older: flash the firmware of this release onto it",
-        std::cmp::Ordering::Greater => "the device is newer: update this program",
-        std::cmp::Ordering::Equal => {
-            "they were built from different sources: build and flash both from the same release"
-        }
-    };
-    Error::new(
-        Code::DeviceVersion,
-        format!(
-            "the device ({}, release {major}.{minor}.{patch}) speaks link version {} with schema {:016x}; this program ({ours}) \
-             speaks version {LINK_VERSION} with schema {:016x}",
-            Board::from_code(hello.board).map_or("unknown board", Board::name),
-            hello.link_version,
-            hello.schema_hash,
-            SCHEMA_HASH
-        ),
-    )
-    .value(port.name())
-    .help(older)
 }

@@ -23,6 +23,7 @@ pub use part::rescue;
 use self::mcap::Encoder;
 use self::part::{Part, part_of};
 use super::words;
+use crate::counted::counted;
 use crate::error::{Code, Error, Result};
 use crate::output::write_whole;
 
@@ -239,7 +240,8 @@ impl Recorder {
         match (trouble, paths.into_iter().next()) {
             (None, Some(first)) => Ok(first),
             (Some(error), _) => {
-                Err(error.help(format!("{} rows until then are in it; make room and go on", self.rows)))
+                Err(error
+                    .help(format!("{} until then in it; make room and go on", counted(self.rows, "row"))))
             }
             (None, None) => {
                 Err(Error::new(Code::FileUnwritable, "the recording has no file").file(&self.side))

@@ -6,10 +6,11 @@ use super::Options;
 use super::errors::{chunks, errors};
 use super::prepared::Prepared;
 use super::smoothing;
+use crate::progress::Progress;
 
 /// Each tested pressure predicted from the others by refitting without it, its smoothing chosen anew. Per group, the mean
 /// error.
-pub(super) fn left_out(prepared: &Prepared, options: &Options) -> Vec<Option<f64>> {
+pub(super) fn left_out(prepared: &Prepared, options: &Options, progress: &Progress) -> Vec<Option<f64>> {
     let groups = prepared.design.groups;
     let used: Vec<bool> = {
         let mut used = vec![false; groups];
@@ -21,10 +22,12 @@ pub(super) fn left_out(prepared: &Prepared, options: &Options) -> Vec<Option<f64
     if used.iter().filter(|u| **u).count() < 2 {
         return vec![None; groups];
     }
+    progress.stage("predicting each pressure from the others", groups as u64);
     (0..groups)
         .into_par_iter()
         .map(|g| {
             if !used[g] {
+                progress.step();
                 return None;
             }
             let weights: Vec<f64> = prepared
@@ -49,6 +52,7 @@ pub(super) fn left_out(prepared: &Prepared, options: &Options) -> Vec<Option<f64
             prepared.design.solve(&mut parameters, &weights, &penalty, 6);
             let residuals = prepared.design.residuals(&parameters);
             let chunks = chunks(prepared, &residuals, |group| group as usize == g);
+            progress.step();
             (!chunks.is_empty()).then(|| errors(&chunks, |_| true).mean)
         })
         .collect()

@@ -3,9 +3,11 @@
 use model_core::braid::Geometry;
 use model_core::table::MAX_ORDER;
 
+use crate::counted::counted;
 use crate::error::{Code, Error, Result};
 use crate::muscle_description::MuscleDescription;
 use crate::possible::Contractions;
+use crate::progress::Progress;
 use crate::recording::Campaign;
 use crate::recording::segment::Motion;
 
@@ -24,7 +26,12 @@ impl Prepared {
     ///
     /// # Errors
     /// [`Code::FitUnderdetermined`], [`Code::CallInvalid`], or a recording without force.
-    pub fn new(campaign: &Campaign, muscle: &MuscleDescription, options: &Options) -> Result<Self> {
+    pub fn new(
+        campaign: &Campaign,
+        muscle: &MuscleDescription,
+        options: &Options,
+        progress: &Progress,
+    ) -> Result<Self> {
         if !(1..=MAX_ORDER).contains(&options.order) {
             return Err(Error::new(
                 Code::CallInvalid,
@@ -35,12 +42,13 @@ impl Prepared {
         for recording in &campaign.recordings {
             recording.require_force()?;
         }
+        progress.stage("finding strokes and turns", 0);
         let mut points = points(campaign, &Motion::of_campaign(campaign));
         let distinct = points.list.len();
         if points.rows < 3 || distinct < 3 {
             return Err(Error::new(
                 Code::FitUnderdetermined,
-                format!("{} rows cannot determine a muscle's table", points.rows),
+                format!("{} cannot determine a muscle's table", counted(points.rows, "row")),
             )
             .help("record at least one slow stroke there and back at one pressure"));
         }
@@ -90,7 +98,7 @@ impl Prepared {
         prepared.screen_by_itself();
         prepared.shift = vec![0.0; prepared.points.list.len()];
         prepared.design = prepared.build_design(options.order);
-        prepared.find(options);
+        prepared.find(options, progress);
         Ok(prepared)
     }
 
@@ -113,7 +121,8 @@ impl Prepared {
     }
 
     /// The whole search, from a start that knows nothing.
-    fn find(&mut self, options: &Options) {
+    fn find(&mut self, options: &Options, progress: &Progress) {
+        progress.stage("solving for all pressures", 0);
         if options.fit_geometry || options.fit_lengths {
             // With the dimensions open, a few lengths leave P0 open too: a muscle begins to pull at a small share of its
             // working pressure.
@@ -133,6 +142,7 @@ impl Prepared {
             self.solve(Smoothing::START, 6);
         }
         if options.fit_geometry || options.fit_lengths {
+            progress.stage("searching for the dimensions", 0);
             self.adjust(options);
             // With the right dimensions slackness shows where it is.
             self.find_slack();
@@ -140,6 +150,7 @@ impl Prepared {
             self.weigh();
             self.adjust(options);
         }
+        progress.stage("choosing how much curves bend", 0);
         self.find_outliers();
         self.weigh();
         self.solve(Smoothing::START, 4);

@@ -6,6 +6,7 @@ use model_core::units::{Force, Length, Pressure};
 
 use crate::error::{Code, Error, Result};
 use crate::muscle_description::{Kind, MuscleDescription};
+use crate::progress::Progress;
 use crate::recording::Campaign;
 use crate::table_file::Uncertainty;
 
@@ -49,7 +50,9 @@ impl Fit {
         campaign: &Campaign,
         muscle: &MuscleDescription,
         options: &Options,
+        progress: &Progress,
     ) -> Result<Self> {
+        progress.stage("leaving out stretches, for the intervals", 0);
         let table = table(&prepared, muscle)?;
         let data = prepared.design.normal(&prepared.parameters, &prepared.weights);
         let penalty = prepared.design.penalty(&data, prepared.smoothing.elastic, prepared.smoothing.friction);
@@ -57,7 +60,8 @@ impl Fit {
         let table_root = uncertainty::of_table(&prepared, &uncertain.root, &prepared.pressures.nodes);
         let residuals = table_residuals(&prepared, &table)?;
         let chunks = chunks(&prepared, &residuals, |_| true);
-        let left_out = left_out(&prepared, options);
+        let left_out = left_out(&prepared, options, progress);
+        progress.stage("comparing the models", 0);
         let midline = midline(&prepared);
         let modulus = muscle.young_modulus_MPa.map(|e| e * 1e6);
         let models = models::side_by_side(&prepared, &midline, modulus);

@@ -3,6 +3,8 @@
 use super::prepared::Prepared;
 use super::screen::Use;
 
+use crate::counted::counted;
+
 /// A mean error beyond this, percent, is no misfit of a muscle: something else is wrong.
 const NO_MUSCLE: f64 = 10.0;
 
@@ -141,8 +143,8 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
     }
     if !prepared.outliers.is_empty() {
         out.push(format!(
-            "{} readings of the force jump out of the rest and are not fitted; they are listed under `outliers`",
-            prepared.outliers.len()
+            "{} of the force out of line with the rest and not fitted, listed under `outliers`",
+            counted(prepared.outliers.len(), "reading")
         ));
     }
     for a in prepared.adjusted.iter().filter(|a| a.at_bound) {

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use super::decimal;
+use super::line::{Cells, is_blank, trim_end};
 
 /// How a text file is cut into cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -251,7 +252,7 @@ fn row(
     width: usize,
     out: &mut Parsed,
 ) -> Result<(), CellError> {
-    let mut cells = Cells { line, at: Some(0), dialect };
+    let mut cells = Cells::of(line, dialect);
     let mut index = 0;
     let mut next = 0;
     while let Some(target) = wanted.get(next) {
@@ -294,7 +295,7 @@ fn open_quote(line: &[u8]) -> CellError {
 }
 
 fn wrong_width(line: &[u8], dialect: Dialect, expected: usize) -> CellError {
-    let mut cells = Cells { line, at: Some(0), dialect };
+    let mut cells = Cells::of(line, dialect);
     let mut found = 0;
     while cells.at.is_some() {
         if cells.skip().is_err() {
@@ -330,136 +331,4 @@ fn explain(mut cells: Cells<'_>, width: usize, index: usize) -> CellError {
 
 fn lossy(line: &[u8]) -> String {
     String::from_utf8_lossy(&line[..line.len().min(200)]).into_owned()
-}
-
-fn is_blank(byte: u8) -> bool {
-    byte == b' ' || byte == b'\t'
-}
-
-/// A line without its carriage return.
-fn trim_end(line: &[u8]) -> &[u8] {
-    line.strip_suffix(b"\r").unwrap_or(line)
-}
-
-/// A place in a line, cell by cell; `at` is `None` behind the last cell.
-#[derive(Clone, Copy)]
-pub(super) struct Cells<'a> {
-    line: &'a [u8],
-    at: Option<usize>,
-    dialect: Dialect,
-}
-
-impl<'a> Cells<'a> {
-    /// All cells of a line as text; used for headers.
-    pub fn split(line: &'a [u8], dialect: Dialect) -> Result<Vec<String>, ()> {
-        let mut cells = Self { line: trim_end(line), at: Some(0), dialect };
-        let mut all = Vec::new();
-        while cells.at.is_some() {
-            all.push(cells.text()?.trim().to_owned());
-        }
-        Ok(all)
-    }
-
-    #[inline]
-    fn blanks(&self, mut at: usize) -> usize {
-        while let Some(b) = self.line.get(at)
-            && is_blank(*b)
-            && (*b != self.dialect.delimiter || self.dialect.delimiter == b' ')
-        {
-            at += 1;
-        }
-        at
-    }
-
-    /// Behind a cell that ends at `at`: the start of the next one, or `None` if something else stands there.
-    #[inline]
-    fn after(&self, at: usize) -> Option<Option<usize>> {
-        match self.line.get(at) {
-            None => Some(None),
-            Some(b) if *b == self.dialect.delimiter => Some(Some(at + 1)),
-            Some(_) => {
-                let end = self.blanks(at);
-                match self.line.get(end) {
-                    None => Some(None),
-                    Some(b) if *b == self.dialect.delimiter => Some(Some(end + 1)),
-                    Some(_) if self.dialect.delimiter == b' ' && end > at => Some(Some(end)),
-                    Some(_) => None,
-                }
-            }
-        }
-    }
-
-    #[inline]
-    fn number(&mut self) -> Option<f64> {
-        let start = self.blanks(self.at?);
-        if self.dialect.decimal_comma || self.line.get(start) == Some(&b'"') {
-            let text = self.text().ok()?;
-            let text = text.trim();
-            let (value, used) = if self.dialect.decimal_comma {
-                // A point would be a separator of thousands, whose meaning we do not guess.
-                if text.contains('.') {
-                    return None;
-                }
-                decimal::prefix(text.replace(',', ".").as_bytes())?
-            } else {
-                decimal::prefix(text.as_bytes())?
-            };
-            return (used == text.len() && value.is_finite()).then_some(value);
-        }
-        let (value, used) = decimal::prefix(&self.line[start..])?;
-        self.at = self.end_of_blank_run(self.after(start + used)?);
-        value.is_finite().then_some(value)
-    }
-
-    /// With blanks as delimiter, blanks at the end of a line do not open another cell.
-    #[inline]
-    fn end_of_blank_run(&self, at: Option<usize>) -> Option<usize> {
-        if self.dialect.delimiter != b' ' {
-            return at;
-        }
-        at.map(|a| self.blanks(a)).filter(|a| *a < self.line.len())
-    }
-
-    fn text(&mut self) -> Result<std::borrow::Cow<'a, str>, ()> {
-        let Some(at) = self.at else { return Ok("".into()) };
-        let start = self.blanks(at);
-        if self.line.get(start) == Some(&b'"') {
-            return self.quoted(start + 1);
-        }
-        let rest = &self.line[start.min(self.line.len())..];
-        let end = if self.dialect.delimiter == b' ' {
-            rest.iter().position(|b| is_blank(*b))
-        } else {
-            memchr::memchr(self.dialect.delimiter, rest)
-        };
-        let cell = &rest[..end.unwrap_or(rest.len())];
-        self.at = self.end_of_blank_run(end.map(|e| start + e + 1));
-        Ok(String::from_utf8_lossy(cell))
-    }
-
-    fn quoted(&mut self, start: usize) -> Result<std::borrow::Cow<'a, str>, ()> {
-        let mut text = Vec::new();
-        let mut at = start;
-        loop {
-            let end = at + memchr::memchr(b'"', &self.line[at..]).ok_or(())?;
-            text.extend_from_slice(&self.line[at..end]);
-            if self.line.get(end + 1) == Some(&b'"') {
-                text.push(b'"');
-                at = end + 2;
-                continue;
-            }
-            self.at = self.end_of_blank_run(self.after(end + 1).ok_or(())?);
-            return Ok(String::from_utf8_lossy(&text).into_owned().into());
-        }
-    }
-
-    #[inline]
-    fn skip(&mut self) -> Result<(), ()> {
-        let Some(at) = self.at else { return Ok(()) };
-        if self.dialect.delimiter == b' ' || self.line.get(self.blanks(at)) == Some(&b'"') {
-            return self.text().map(|_| ());
-        }
-        self.at = memchr::memchr(self.dialect.delimiter, &self.line[at..]).map(|n| at + n + 1);
-        Ok(())
-    }
 }

@@ -1,7 +1,8 @@
 //! The beginning of a text file: what separates its cells, what its columns are called, where its rows begin.
 
-use super::cells::{Cells, Dialect};
+use super::cells::Dialect;
 use super::import::{Decimal, Import};
+use super::line::Cells;
 use super::quantity::{Named, named};
 use crate::error::{Code, Error, Result};
 

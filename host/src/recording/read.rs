@@ -7,14 +7,16 @@ use std::sync::Arc;
 use super::assemble::{Job, LookupTable, assemble};
 use super::blocks::{BlockError, Blocks, Rows, RowsError, read_rows};
 use super::campaign::Campaign;
-use super::cells::{Cells, Dialect, Fault, LineError};
+use super::cells::{Dialect, Fault, LineError};
 use super::columns::Recording;
 use super::container::{self, Container};
 use super::head::Head;
 use super::import::{Decimal, Import, Value, pattern as pattern_of};
+use super::line::Cells;
 use super::plan::{Context, Plan, plan};
 use super::sheet::select;
 use super::source;
+use crate::counted::counted;
 use crate::error::{Code, Error, Result};
 use crate::file_kind::FileKind;
 use crate::muscle_description::MuscleDescription;
@@ -269,7 +271,7 @@ fn rows_error(error: RowsError, head: &Head, import: &Import) -> Error {
             Error::new(Code::RecordingNotANumber, "not a number").help(help)
         }
         Fault::Width { found, expected } => {
-            let cells = if *found == 1 { "1 cell".to_owned() } else { format!("{found} cells") };
+            let cells = counted(found, "cell");
             let help = if *found == 2 * expected && separator == "commas" {
                 "this looks like decimal commas; write decimals with a point, or use an import description"
                     .to_owned()

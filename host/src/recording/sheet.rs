@@ -2,6 +2,7 @@
 
 use super::blocks::Rows;
 use super::cells::{Want, Wanted, Words};
+use crate::counted::counted;
 use crate::error::{Code, Error, Result};
 
 /// The columns of one file, in its order.
@@ -80,7 +81,7 @@ pub(super) fn select(sheet: &Sheet, wanted: &[Wanted]) -> Result<Rows> {
             Some((n, first)) if n != count => {
                 return Err(Error::new(
                     Code::RecordingWrongWidth,
-                    format!("`{name}` has {count} rows and `{first}` has {n}"),
+                    format!("`{name}` has {} and `{first}` has {n}", counted(count, "row")),
                 )
                 .help("all columns of a recording are equally long"));
             }

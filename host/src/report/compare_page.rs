@@ -2,6 +2,7 @@
 
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
 use crate::compare::{Column, Comparison};
+use crate::counted::counted;
 use crate::recording::Recording;
 
 /// The page of a comparison of `b` with `a`.
@@ -33,7 +34,7 @@ pub fn page(a: &Recording, b: &Recording, found: &Comparison) -> Page {
     for (letter, r) in [("A", a), ("B", b)] {
         page.origin(
             format!("recording {letter}"),
-            format!("{}, {} rows, {} s", r.source.display(), r.len(), fixed(r.duration(), 1)),
+            format!("{}, {}, {} s", r.source.display(), counted(r.len(), "row"), fixed(r.duration(), 1)),
         );
     }
     page.origin("made by", format!("host {}", env!("CARGO_PKG_VERSION")));
@@ -79,7 +80,11 @@ fn verdict(a: &Recording, b: &Recording, found: &Comparison) -> String {
 
 fn numbers(found: &Comparison) -> Section {
     let mut section = Section::new("In numbers").summarised();
-    let caption = format!("B − A over {} rows in {} s", fixed(found.rows as f64, 0), fixed(found.overlap, 1));
+    let caption = format!(
+        "B − A over {} in {} s",
+        counted(fixed(found.rows as f64, 0), "row"),
+        fixed(found.overlap, 1)
+    );
     let mut table = Table::new(caption, &["quantity", "rms", "mean", "largest", "at s"]);
     for c in &found.columns {
         table.row([

@@ -139,15 +139,20 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
     ));
     if let Some(candidate) = candidate {
         section.listing(candidate.info().equation);
-        section.table(letters(candidate.info().equation));
+        section.table(letters(candidate.info()));
     }
-    let mut table =
-        Table::new("Its parameters, in SI units", &["parameter", "value", "± (95 %)", "unit", "remark"]);
+    let mut table = Table::new(
+        "Its parameters, in SI units",
+        &["letter", "parameter", "value", "± (95 %)", "unit", "remark"],
+    );
     for p in &m.parameters {
         let std = p.std.map_or("not determined".into(), |s| figures(1.96 * s, 2));
         let unit = if p.unit.is_empty() { "–".to_owned() } else { p.unit.clone() };
         let remark = if p.outside_known_range { "outside the range known from the literature" } else { "" };
-        table.row([p.name.clone(), figures(p.value, 3), std, unit, remark.into()]);
+        let letter = candidate
+            .and_then(|c| c.info().parameters.iter().find(|i| i.name == p.name))
+            .map_or("–", |i| i.letter);
+        table.row([letter.to_owned(), p.name.clone(), figures(p.value, 3), std, unit, remark.into()]);
     }
     section.table(table);
     section.text(if m.given {

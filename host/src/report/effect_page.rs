@@ -81,7 +81,7 @@ fn memory(info: &Info) -> &'static str {
 fn parameters(trace: &Trace) -> Table {
     let mut table = Table::new(
         "Parameters in SI units, their plausible range, and the value in the picture",
-        &["parameter", "unit", "from", "to", "drawn with", "what it does"],
+        &["letter", "parameter", "unit", "from", "to", "drawn with", "what it does"],
     );
     for (p, value) in trace.candidate.info().parameters.iter().zip(&trace.parameters) {
         let role = match p.role {
@@ -90,7 +90,7 @@ fn parameters(trace: &Trace) -> Table {
         };
         let unit = if p.unit.is_empty() { "–" } else { p.unit };
         let numbers = [p.low, p.high, *value].map(|v| figures(v, 2));
-        table.row([p.name, unit, &numbers[0], &numbers[1], &numbers[2], role]);
+        table.row([p.letter, p.name, unit, &numbers[0], &numbers[1], &numbers[2], role]);
     }
     table
 }
@@ -103,7 +103,7 @@ pub fn page(trace: &Trace, figure: &super::Figure, all: &[(Trace, super::Figure)
     let mut what = Section::new("What it is").summarised();
     what.text(format!("It acts on {}. {}", place(info.link), whose(trace.candidate)));
     what.listing(info.equation);
-    what.table(letters(info.equation));
+    what.table(letters(info));
     what.table(parameters(trace));
     what.text(memory(info));
     page.push(what);
@@ -136,14 +136,15 @@ fn alike(trace: &Trace, all: &[(Trace, super::Figure)]) -> String {
 pub fn chapter(trace: &Trace, figure: &super::Figure, all: &[(Trace, super::Figure)]) -> String {
     let info = trace.candidate.info();
     let mut text = format!(
-        "# {}\n\n{}\n\nIt acts on {}. {}\n\n```text\n{}\n```\n\n",
+        "# {}\n\n{}\n\nIt acts on {}. {}\n\n```text,equation\n{}\n```\n\n",
         info.name,
         info.summary,
         place(info.link),
         whose(trace.candidate),
         info.equation
     );
-    for table in [letters(info.equation), parameters(trace)] {
+    for table in [letters(info), parameters(trace)] {
+        let _ = writeln!(text, "{}:\n", table.caption);
         let _ = writeln!(text, "| {} |", table.head.join(" | "));
         let _ = writeln!(text, "|{}", " --- |".repeat(table.head.len()));
         for row in &table.rows {

@@ -9,6 +9,7 @@ mod residuals;
 mod view;
 
 use super::{Page, Section, Tone, figures, fixed};
+use crate::counted::counted;
 use crate::fit::Options;
 use crate::fit::result::Fit;
 use crate::recording::Campaign;
@@ -27,9 +28,9 @@ pub fn page(fit: &Fit, campaign: &Campaign, options: &Options) -> Page {
     let mut page = Page::new(
         format!("Fit of {}", s.muscle),
         format!(
-            "{} rows of {} recordings, order M = {}{}",
+            "{} rows of {}, order M = {}{}",
             fixed(s.samples as f64, 0),
-            campaign.recordings.len(),
+            counted(campaign.recordings.len(), "recording"),
             options.order,
             if options.tip_correction { ", tip correction" } else { "" }
         ),

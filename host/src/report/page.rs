@@ -1,6 +1,7 @@
 //! A report as plain values: what it says, in which order. [`Page::html`] and [`Page::markdown`] give it a form.
 
 use super::figure::Figure;
+use crate::counted::counted;
 use crate::recording::Campaign;
 
 /// How a fact or a notice is meant.
@@ -219,7 +220,7 @@ impl Page {
     /// Adds a line for every recording that the report is made from.
     pub fn recordings(&mut self, campaign: &Campaign) {
         for recording in &campaign.recordings {
-            self.origin(&recording.name, format!("{} rows", recording.len()));
+            self.origin(&recording.name, counted(recording.len(), "row"));
         }
     }
 

@@ -26,6 +26,8 @@ use crate::emulated::{Emulated, Kind, Stand};
 use crate::error::{Code, Error, Result};
 use crate::table_file::TableFile;
 
+use super::told::{batch, credible, tell};
+
 /// What the page may ask of the controller.
 #[derive(Debug)]
 pub enum Order {
@@ -126,11 +128,6 @@ pub fn keep(orders: &Receiver<Asked>, say: &broadcast::Sender<String>) {
         let _ = vent(&mut now.client);
         let _ = now.end_recording();
     }
-}
-
-fn tell(say: &broadcast::Sender<String>, level: &str, error: &Error) {
-    let _ = say
-        .send(json!({ "k": "e", "level": level, "text": error.cause(), "help": error.advice() }).to_string());
 }
 
 fn report(connected: Option<&mut Connected>, say: &broadcast::Sender<String>) {
@@ -393,47 +390,4 @@ impl Connected {
         about["ended_by"] = json!("the page");
         recorder.finish(&about).map(Some)
     }
-}
-
-/// Between what each fitted sensor can read, and the unit, by the names and in the units of [`batch`].
-fn credible(settings: &Settings) -> Value {
-    let sensors = [
-        ("F", &settings.force, 1.0, "N"),
-        ("P", &settings.pressure, 1e-3, "kPa"),
-        ("x", &settings.stroke, 1e3, "mm"),
-    ];
-    sensors
-        .into_iter()
-        .filter(|(_, watch, ..)| watch.fitted)
-        .map(|(name, watch, scale, unit)| {
-            let end = |v: f32| (f64::from(v) * scale * 1e3).round() / 1e3;
-            (name.to_owned(), json!([end(watch.low), end(watch.high), unit]))
-        })
-        .collect::<serde_json::Map<_, _>>()
-        .into()
-}
-
-/// Samples as columns: times in s, forces in N, pressures in kPa, strokes in mm.
-fn batch(samples: &[Telemetry]) -> String {
-    let side = |pick: &dyn Fn(&model_core::link::messages::SideSample) -> f64, digits: f64| -> Vec<f64> {
-        let rounded = |v: f64| (v * digits).round() / digits;
-        samples.iter().map(|s| s.sides.first().map_or(0.0, |x| rounded(pick(x)))).collect()
-    };
-    let scale = match samples.last().map(|s| s.mode) {
-        Some(model_core::link::messages::Mode::Pressure) => 1e-3,
-        Some(model_core::link::messages::Mode::Stroke) => 1e3,
-        _ => 1.0,
-    };
-    json!({
-        "k": "t",
-        "t": samples.iter().map(|s| s.time_us as f64 * 1e-6).collect::<Vec<_>>(),
-        "F": side(&|s| f64::from(s.force_n), 1e3),
-        "P": side(&|s| f64::from(s.pressure_pa) * 1e-3, 1e2),
-        "x": side(&|s| f64::from(s.stroke_m) * 1e3, 1e4),
-        "c": side(&|s| f64::from(s.command_pa) * 1e-3, 1e2),
-        "m": side(&|s| f64::from(s.model_n), 1e3),
-        "a": samples.iter().map(|s| f64::from(s.asked) * scale).collect::<Vec<_>>(),
-        "mode": samples.last().map(|s| words::mode(s.mode)),
-    })
-    .to_string()
 }

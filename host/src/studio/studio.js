@@ -22,6 +22,7 @@ async function send(path, body) {
   message(value ? value.error + (value.at ? "\nat " + value.at : "") + (value.help ? "\n→ " + value.help : "") : "refused");
   return null;
 }
+const counted = (number, one) => `${number} ${one}${number === 1 ? "" : "s"}`;
 const order = (what, more = {}) => send("/api/order", JSON.stringify({ do: what, ...more }));
 
 // Live.
@@ -107,7 +108,7 @@ function show(s) {
   $("mishap-label").hidden = !s.emulated;
   on("record", s.connected); on("mishap", !!s.emulated); on("set", s.connected); on("show", s.connected); on("difference", s.connected);
   if (!s.connected) on("flash", false);
-  $("record").firstChild.textContent = s.recording === null || s.recording === undefined ? "Record " : `Stop (${s.recording} rows) `;
+  $("record").firstChild.textContent = s.recording === null || s.recording === undefined ? "Record " : `Stop (${counted(s.recording, "row")}) `;
 }
 show({ connected: false });
 
@@ -168,7 +169,7 @@ function recordings(r) {
 async function view(number) {
   const r = await order("curves", { number });
   if (!r) return;
-  $("view-figure").hidden = false; $("view-title").textContent = `${r.name}: ${r.rows} rows, ${r.F ? "force (N)" : "pressure (kPa)"} over time (s)`;
+  $("view-figure").hidden = false; $("view-title").textContent = `${r.name}: ${counted(r.rows, "row")}, ${r.F ? "force (N)" : "pressure (kPa)"} over time (s)`;
   const y = r.F || r.P;
   picture("p-view", (axes) => { axes.begin(...extent(r.t), ...extent(y)); axes.line(r.t, y, "--s0", 1.2); axes.end(); });
 }
@@ -193,7 +194,7 @@ $("files").addEventListener("change", async () => {
   for (const file of $("files").files) { const r = await send("/api/recording?name=" + encodeURIComponent(file.name), file); if (r) recordings(r); }
   $("files").value = "";
 });
-click("example", async () => { message("recording on the virtual bench …"); const r = await order("example", { muscle: $("bench").value }); if (r) { recordings(r); message(r.recordings.length + " recordings loaded"); } });
+click("example", async () => { message("recording on the virtual bench …"); const r = await order("example", { muscle: $("bench").value }); if (r) { recordings(r); message(counted(r.recordings.length, "recording") + " loaded"); } });
 const text = (id, value) => { $(id).hidden = false; $(id).textContent = value; };
 const report = (id, name) => { $(id).hidden = false; $(id).firstChild.href = `/report/${name}?token=${token}`; };
 click("compare", compare);

@@ -24,7 +24,7 @@ impl Effect for BraidElasticity {
     const INFO: Info = Info {
         name: "braid-elasticity",
         link: Link::Braid,
-        parameters: &[Parameter::amplitude("fibre_compliance", "1/N", 1.0e-7, 1.0e-3)],
+        parameters: &[Parameter::amplitude("c", "fibre_compliance", "1/N", 1.0e-7, 1.0e-3)],
         depends_on_pressure: true,
         persistent: false,
         alternatives: false,

@@ -19,9 +19,9 @@ impl Effect for ContactLoss {
         name: "contact-loss",
         link: Link::Braid,
         parameters: &[
-            Parameter::amplitude("missing_part", "", 0.1, 1.5),
-            Parameter::amplitude("deadband_growth", "Pa", 1.0e3, 3.0e5),
-            Parameter::shape("contact_pressure", "Pa", 3.0e3, 1.0e6),
+            Parameter::amplitude("λ", "missing_part", "", 0.1, 1.5),
+            Parameter::amplitude("p_1", "deadband_growth", "Pa", 1.0e3, 3.0e5),
+            Parameter::shape("p_c", "contact_pressure", "Pa", 3.0e3, 1.0e6),
         ],
         depends_on_pressure: true,
         persistent: false,

@@ -19,8 +19,8 @@ impl Effect for CoulombFriction {
         name: "coulomb-friction",
         link: Link::Friction,
         parameters: &[
-            Parameter::amplitude("friction_force", "N", 0.05, 20.0),
-            Parameter::amplitude("strand_friction", "N", 0.05, 20.0),
+            Parameter::amplitude("F_c", "friction_force", "N", 0.05, 20.0),
+            Parameter::amplitude("F_s", "strand_friction", "N", 0.05, 20.0),
         ],
         depends_on_pressure: false,
         persistent: false,

@@ -25,9 +25,9 @@ impl Effect for CyclicSoftening {
         name: "cyclic-softening",
         link: Link::Bladder,
         parameters: &[
-            Parameter::amplitude("loss", "", 0.003, 0.4),
-            Parameter::shape("path", "", 0.1, 300.0),
-            Parameter::shape("order", "", 1.0, 10.0),
+            Parameter::amplitude("b", "loss", "", 0.003, 0.4),
+            Parameter::shape("ℓ_0", "path", "", 0.1, 300.0),
+            Parameter::shape("m", "order", "", 1.0, 10.0),
         ],
         depends_on_pressure: true,
         persistent: true,

@@ -17,8 +17,8 @@ impl Effect for EndSlip {
         name: "end-slip",
         link: Link::Braid,
         parameters: &[
-            Parameter::amplitude("slip", "m", -5.0e-3, 5.0e-3),
-            Parameter::shape("slip_time", "s", 0.0, 1.0e5),
+            Parameter::amplitude("δ", "slip", "m", -5.0e-3, 5.0e-3),
+            Parameter::shape("t_s", "slip_time", "s", 0.0, 1.0e5),
         ],
         depends_on_pressure: true,
         persistent: true,

@@ -14,7 +14,7 @@ impl Effect for FrictionAsymmetry {
     const INFO: Info = Info {
         name: "friction-asymmetry",
         link: Link::Friction,
-        parameters: &[Parameter::amplitude("factor_difference", "", -0.2, 0.2)],
+        parameters: &[Parameter::amplitude("Δk", "factor_difference", "", -0.2, 0.2)],
         depends_on_pressure: true,
         persistent: false,
         alternatives: false,

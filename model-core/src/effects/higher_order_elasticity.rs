@@ -19,9 +19,9 @@ impl Effect for HigherOrderElasticity {
         name: "higher-order-elasticity",
         link: Link::Bladder,
         parameters: &[
-            Parameter::amplitude("next_modulus", "Pa", -1.0e8, 1.0e8),
-            Parameter::amplitude("second_next_modulus", "Pa", -1.0e9, 1.0e9),
-            Parameter::amplitude("shear_modulus", "Pa", -3.0e6, 3.0e6),
+            Parameter::amplitude("E_(M+1)", "next_modulus", "Pa", -1.0e8, 1.0e8),
+            Parameter::amplitude("E_(M+2)", "second_next_modulus", "Pa", -1.0e9, 1.0e9),
+            Parameter::amplitude("G", "shear_modulus", "Pa", -3.0e6, 3.0e6),
         ],
         depends_on_pressure: true,
         persistent: false,

@@ -14,7 +14,7 @@ impl Effect for Leak {
     const INFO: Info = Info {
         name: "leak",
         link: Link::Air,
-        parameters: &[Parameter::amplitude("lost_part", "", 1.0e-3, 0.2)],
+        parameters: &[Parameter::amplitude("λ", "lost_part", "", 1.0e-3, 0.2)],
         depends_on_pressure: true,
         persistent: false,
         alternatives: false,

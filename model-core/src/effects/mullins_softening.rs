@@ -21,9 +21,9 @@ impl Effect for MullinsSoftening {
         name: "mullins-softening",
         link: Link::Bladder,
         parameters: &[
-            Parameter::amplitude("largest_loss", "", 0.01, 0.7),
-            Parameter::shape("onset", "", 1.0e-3, 1.0),
-            Parameter::shape("onset_growth", "", 0.0, 1.0),
+            Parameter::amplitude("a", "largest_loss", "", 0.01, 0.7),
+            Parameter::shape("m", "onset", "", 1.0e-3, 1.0),
+            Parameter::shape("β", "onset_growth", "", 0.0, 1.0),
         ],
         depends_on_pressure: true,
         persistent: true,

@@ -2,10 +2,10 @@
 //!
 //! ```text
 //! dz_i = dξ/d_i, held within ±1        d_i = (δ/2) · (1, 1/2, 1/4, 1/8)
-//! F_add = (share · k_F |F_quasi| + F_d) (s − ¼ Σ z_i)
+//! F_add = (a · k_F |F_quasi| + F_d) (s − ¼ Σ z_i)
 //! ```
 //! `ξ` is the strands' travel (the stroke, or at held length what the pressure would have moved), m; `δ` the travel after a turn
-//! until all slide, m; `share` the part of the table's own friction that builds up so, `F_d`, N, a dry friction that does. Once all
+//! until all slide, m; `a` the part of the table's own friction that builds up so, `F_d`, N, a dry friction that does. Once all
 //! slide nothing is added: the base model's jump at the turn is what is taken back. Memory is bounded by one per element, and
 //! it has the loops' own memory: return to a turning point closes its loop.
 //! Before the first full travel the elements' state is unknown; they begin in the middle.
@@ -21,16 +21,16 @@ impl Effect for PreslidingHysteresis {
         name: "presliding-hysteresis",
         link: Link::Friction,
         parameters: &[
-            Parameter::amplitude("share_of_friction", "", 0.1, 1.5),
-            Parameter::amplitude("dry_friction", "N", 0.1, 20.0),
-            Parameter::shape("sliding_travel", "m", 2.0e-5, 1.0e-2),
+            Parameter::amplitude("a", "share_of_friction", "", 0.1, 1.5),
+            Parameter::amplitude("F_d", "dry_friction", "N", 0.1, 20.0),
+            Parameter::shape("δ", "sliding_travel", "m", 2.0e-5, 1.0e-2),
         ],
         depends_on_pressure: true,
         persistent: false,
         alternatives: true,
         start: Start::Branch,
         fading: &[],
-        equation: "F = (share·k_F·|F_quasi| + F_d)·(s − ¼·Σz_i), dz_i = dξ/d_i within ±1",
+        equation: "F = (a·k_F·|F_quasi| + F_d)·(s − ¼·Σz_i), dz_i = dξ/d_i within ±1, d_i = δ/2^i, i = 1…4",
         summary: "Just after a turn the strands stretch before they slide, so friction builds up over a distance instead of jumping.",
         source: "F. Al-Bender, V. Lampaert, J. Swevers, Chaos 14 (2004) 446–460, doi 10.1063/1.1741752 (generalized Maxwell slip); T. Vo-Minh et al., Mechatronics 20 (2010) 402–414 (for a pneumatic muscle)",
     };

@@ -17,8 +17,8 @@ impl Effect for PressureFriction {
         name: "pressure-friction",
         link: Link::Friction,
         parameters: &[
-            Parameter::amplitude("friction_coefficient", "", 0.002, 0.5),
-            Parameter::amplitude("constant_area_coefficient", "", 0.002, 0.5),
+            Parameter::amplitude("μ", "friction_coefficient", "", 0.002, 0.5),
+            Parameter::amplitude("μ_0", "constant_area_coefficient", "", 0.002, 0.5),
         ],
         depends_on_pressure: true,
         persistent: false,

@@ -14,8 +14,8 @@ impl Effect for RatePower {
         name: "rate-power",
         link: Link::Friction,
         parameters: &[
-            Parameter::amplitude("share_at_1_mm_per_s", "", 0.001, 0.2),
-            Parameter::shape("exponent", "", 0.1, 0.7),
+            Parameter::amplitude("c", "share_at_1_mm_per_s", "", 0.001, 0.2),
+            Parameter::shape("m", "exponent", "", 0.1, 0.7),
         ],
         depends_on_pressure: true,
         persistent: false,

@@ -1,10 +1,10 @@
 //! Friction of a push-rod's seal or guide: a constant part, and one that the pressure presses on, both higher when slow.
 //!
 //! ```text
-//! F_add = −s_x [F_0 + A_s (p_0 + P)] (1 + (k − 1) e^(−|v|/v_s))
+//! F_add = −s_x [F_0 + A_s (P_a + P)] (1 + (k − 1) e^(−|v|/v_s))
 //! ```
 //! `s_x` is the direction in which the stroke last went; `F_0`, N, comes from the seal's interference fit; `A_s = μ_s π d w`, m², is the seal's rubbing area times its coefficient,
-//! `p_0 = 101.3 kPa`; `k` the ratio of breakaway to running friction and `v_s`, m/s, the speed over which it falls off. Below 1 to
+//! `P_a = 101.3 kPa`; `k` the ratio of breakaway to running friction and `v_s`, m/s, the speed over which it falls off. Below 1 to
 //! 5 mm/s real seals stick and slip, which a mean force describes only on average.
 
 use super::{Context, Effect, Info, Link, Memory, Parameter, Start, decay, stroke_direction};
@@ -18,17 +18,17 @@ impl Effect for SealFriction {
         name: "seal-friction",
         link: Link::Friction,
         parameters: &[
-            Parameter::amplitude("fit_friction", "N", 0.2, 20.0),
-            Parameter::amplitude("rubbing_area", "m²", 5.0e-7, 1.0e-4),
-            Parameter::shape("breakaway_ratio", "", 1.0, 3.0),
-            Parameter::shape("falloff_speed", "m/s", 1.0e-4, 2.0e-2),
+            Parameter::amplitude("F_0", "fit_friction", "N", 0.2, 20.0),
+            Parameter::amplitude("A_s", "rubbing_area", "m²", 5.0e-7, 1.0e-4),
+            Parameter::shape("k", "breakaway_ratio", "", 1.0, 3.0),
+            Parameter::shape("v_s", "falloff_speed", "m/s", 1.0e-4, 2.0e-2),
         ],
         depends_on_pressure: true,
         persistent: false,
         alternatives: false,
         start: Start::Branch,
         fading: &[],
-        equation: "F = −s_x·[F_0 + A_s·(p_0 + P)]·(1 + (k−1)·exp(−|v|/v_s))",
+        equation: "F = −s_x·[F_0 + A_s·(P_a + P)]·(1 + (k−1)·exp(−|v|/v_s))",
         summary: "The seal around a push-rod rubs, the more the higher the pressure, and most when slow.",
         source: "B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083–1138, doi 10.1016/0005-1098(94)90209-7",
     };

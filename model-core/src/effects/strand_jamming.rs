@@ -14,8 +14,8 @@ impl Effect for StrandJamming {
         name: "strand-jamming",
         link: Link::Braid,
         parameters: &[
-            Parameter::amplitude("wall_stiffness", "N", 3.0e2, 1.0e7),
-            Parameter::shape("jamming_contraction", "", 0.02, 0.35),
+            Parameter::amplitude("k_j", "wall_stiffness", "N", 3.0e2, 1.0e7),
+            Parameter::shape("ε_j", "jamming_contraction", "", 0.02, 0.35),
         ],
         depends_on_pressure: true,
         persistent: false,

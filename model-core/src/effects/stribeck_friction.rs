@@ -15,9 +15,9 @@ impl Effect for StribeckFriction {
         name: "stribeck-friction",
         link: Link::Friction,
         parameters: &[
-            Parameter::amplitude("excess_friction", "N", 0.1, 20.0),
-            Parameter::amplitude("excess_factor", "", 0.002, 0.2),
-            Parameter::shape("falloff_speed", "m/s", 5.0e-5, 2.0e-2),
+            Parameter::amplitude("ΔF", "excess_friction", "N", 0.1, 20.0),
+            Parameter::amplitude("κ", "excess_factor", "", 0.002, 0.2),
+            Parameter::shape("v_s", "falloff_speed", "m/s", 5.0e-5, 2.0e-2),
         ],
         depends_on_pressure: true,
         persistent: false,

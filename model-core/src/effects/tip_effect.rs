@@ -21,8 +21,8 @@ impl Effect for TipEffect {
         name: "tip-effect",
         link: Link::Braid,
         parameters: &[
-            Parameter::amplitude("tip_factor", "", 0.1, 4.0),
-            Parameter::amplitude("taper_volume", "", 0.1, 8.0),
+            Parameter::amplitude("k_t", "tip_factor", "", 0.1, 4.0),
+            Parameter::amplitude("k_v", "taper_volume", "", 0.1, 8.0),
         ],
         depends_on_pressure: true,
         persistent: false,

@@ -16,8 +16,8 @@ impl Effect for ViscousDamping {
         name: "viscous-damping",
         link: Link::Friction,
         parameters: &[
-            Parameter::amplitude("damping", "N·s/m", 10.0, 1.0e5),
-            Parameter::amplitude("damping_per_pressure", "N·s/m/Pa", 1.0e-5, 0.2),
+            Parameter::amplitude("c", "damping", "N·s/m", 10.0, 1.0e5),
+            Parameter::amplitude("c_P", "damping_per_pressure", "N·s/m/Pa", 1.0e-5, 0.2),
         ],
         depends_on_pressure: true,
         persistent: false,

@@ -31,6 +31,12 @@ pub struct Row {
     pub id: u8,
     /// Name.
     pub name: &'static str,
+    /// Type of what is asked, one of [`messages`](super::messages) or [`settings`](super::settings).
+    pub request: &'static str,
+    /// Type of what is answered.
+    pub response: &'static str,
+    /// What it does, in Markdown.
+    pub what: &'static str,
     /// Hash of number, name, request and response.
     pub hash: u64,
 }
@@ -48,9 +54,9 @@ const fn mix(hash: u64, bytes: [u8; 8]) -> u64 {
 const FNV_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
 
 macro_rules! endpoints {
-    ($($(#[$doc:meta])* $id:literal $name:ident $marker:ident : $request:ty => $response:ty;)*) => {
+    ($($(#[doc = $doc:literal])* $id:literal $name:ident $marker:ident : $request:ty => $response:ty;)*) => {
         $(
-            $(#[$doc])*
+            $(#[doc = $doc])*
             #[derive(Clone, Copy, Debug)]
             pub struct $marker;
 
@@ -66,6 +72,9 @@ macro_rules! endpoints {
         pub const TABLE: &[Row] = &[$(Row {
             id: $id,
             name: stringify!($name),
+            request: stringify!($request),
+            response: stringify!($response),
+            what: concat!($($doc),*),
             hash: mix(
                 mix(mix(FNV_BASIS, [$id, 0, 0, 0, 0, 0, 0, 0]), hash_ty_path::<$request>(stringify!($name))),
                 hash_ty_path::<$response>(stringify!($name)),
@@ -75,7 +84,7 @@ macro_rules! endpoints {
         /// What a device must be able to answer: one function for each endpoint, which fills an answer that is there already.
         pub trait Service {
             $(
-                $(#[$doc])*
+                $(#[doc = $doc])*
                 fn $name(&mut self, request: &$request, answer: &mut $response) -> Result<(), Refusal>;
             )*
         }

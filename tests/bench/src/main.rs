@@ -176,7 +176,8 @@ impl Command {
                 write(&output, "protocol.toml", &protocol.to_toml()?)?;
                 write(&output, "truth.json", &serde_json::to_string_pretty(&built.truth(&levels))?)?;
                 let rows: usize = files.iter().map(|f| f.rows.len()).sum();
-                println!("{} files, {rows} rows in {}", files.len(), output.display());
+                let file = if files.len() == 1 { "file" } else { "files" };
+                println!("{} {file}, {rows} rows in {}", files.len(), output.display());
                 Ok(())
             }
             Self::Check { muscle: name, output, seed, cell_gain } => {

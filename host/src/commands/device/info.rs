@@ -7,6 +7,7 @@ use serde_json::json;
 
 use crate::commands::port::PortOption;
 use crate::console::Console;
+use crate::counted::counted;
 use crate::device::{Client, Patience, Port, recorder, words};
 use crate::error::Result;
 
@@ -19,12 +20,11 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
     let board = Board::from_code(hello.board).map_or("unknown board", Board::name);
     if !json {
         console.result(format!(
-            "{board}, release {major}.{minor}.{patch}, serial {}, {} start{}\n\
+            "{board}, release {major}.{minor}.{patch}, serial {}, {}\n\
              link version {} (this program {LINK_VERSION}), schema {:016x} (this program {SCHEMA_HASH:016x})\n\
              table format {}, store format {}, {} muscle{}",
             recorder::serial(&hello),
-            hello.starts,
-            if hello.starts == 1 { "" } else { "s" },
+            counted(hello.starts, "start"),
             hello.link_version,
             hello.schema_hash,
             hello.table_format,
@@ -62,7 +62,7 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
         return Ok(());
     }
     console.result(format!(
-        "{}{} in {} mode, {:.1} s and {} ticks at {} Hz since its start ({}), {} overruns",
+        "{}{} in {} mode, {:.1} s and {} ticks at {} Hz since its start ({}), {}",
         words::state(status.state),
         status.fault.map(|f| format!(" ({})", words::fault(f).cause)).unwrap_or_default(),
         words::mode(status.mode),
@@ -70,7 +70,7 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
         status.ticks,
         info.ticks_per_s,
         words::started_by(info.started_by),
-        status.overruns,
+        counted(status.overruns, "overrun"),
     ));
     for (number, table) in info.tables.iter().take(usize::from(info.muscles)).enumerate() {
         console.result(match table {

@@ -32,7 +32,7 @@ pub(super) fn run(json: bool, console: &Console) -> Result<()> {
         });
     }
     if json {
-        console.result(format!("{:#}", json!(rows)));
+        console.result(format!("{:#}", json!({ "schema": "pam-ports/1", "ports": rows })));
     } else if rows.is_empty() {
         console.result("there is no serial device; an emulated one is named tcp:HOST:PORT");
     } else {

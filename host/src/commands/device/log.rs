@@ -34,7 +34,7 @@ pub(super) struct Arguments {
 /// A line: device time where it is known, what kind, text, and what else a program wants to know.
 fn say(console: &Console, as_json: bool, time_s: Option<f64>, kind: &str, text: &str, more: Value) {
     if as_json {
-        let mut line = json!({ "time_s": time_s, "event": kind, "text": text });
+        let mut line = json!({ "schema": "pam-log/1", "time_s": time_s, "event": kind, "text": text });
         if let (Some(line), Value::Object(more)) = (line.as_object_mut(), more) {
             line.extend(more);
         }

@@ -59,7 +59,9 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         console.note("written and read back");
     }
     if arguments.json {
-        console.result(format!("{:#}", json!(now)));
+        let mut all = json!(now);
+        all["schema"] = json!("pam-device-settings/1");
+        console.result(format!("{all:#}"));
     } else {
         let text = toml::to_string(&now)
             .map_err(|e| Error::new(Code::DeviceVerify, format!("the settings cannot be printed: {e}")))?;

@@ -1,0 +1,58 @@
+//! What the page is told without asking: samples, faults, and between what its sensors can read.
+
+use model_core::link::messages::{Mode, SideSample, Telemetry};
+use model_core::link::settings::Settings;
+use serde_json::{Value, json};
+use tokio::sync::broadcast;
+
+use crate::device::words;
+use crate::error::Error;
+
+/// Something went wrong.
+pub(super) fn tell(say: &broadcast::Sender<String>, level: &str, error: &Error) {
+    let _ = say
+        .send(json!({ "k": "e", "level": level, "text": error.cause(), "help": error.advice() }).to_string());
+}
+
+/// Between what each fitted sensor can read, and the unit, by the names and in the units of [`batch`].
+pub(super) fn credible(settings: &Settings) -> Value {
+    let sensors = [
+        ("F", &settings.force, 1.0, "N"),
+        ("P", &settings.pressure, 1e-3, "kPa"),
+        ("x", &settings.stroke, 1e3, "mm"),
+    ];
+    sensors
+        .into_iter()
+        .filter(|(_, watch, ..)| watch.fitted)
+        .map(|(name, watch, scale, unit)| {
+            let end = |v: f32| (f64::from(v) * scale * 1e3).round() / 1e3;
+            (name.to_owned(), json!([end(watch.low), end(watch.high), unit]))
+        })
+        .collect::<serde_json::Map<_, _>>()
+        .into()
+}
+
+/// Samples as columns: times in s, forces in N, pressures in kPa, strokes in mm.
+pub(super) fn batch(samples: &[Telemetry]) -> String {
+    let side = |pick: &dyn Fn(&SideSample) -> f64, digits: f64| -> Vec<f64> {
+        let rounded = |v: f64| (v * digits).round() / digits;
+        samples.iter().map(|s| s.sides.first().map_or(0.0, |x| rounded(pick(x)))).collect()
+    };
+    let scale = match samples.last().map(|s| s.mode) {
+        Some(Mode::Pressure) => 1e-3,
+        Some(Mode::Stroke) => 1e3,
+        _ => 1.0,
+    };
+    json!({
+        "k": "t",
+        "t": samples.iter().map(|s| s.time_us as f64 * 1e-6).collect::<Vec<_>>(),
+        "F": side(&|s| f64::from(s.force_n), 1e3),
+        "P": side(&|s| f64::from(s.pressure_pa) * 1e-3, 1e2),
+        "x": side(&|s| f64::from(s.stroke_m) * 1e3, 1e4),
+        "c": side(&|s| f64::from(s.command_pa) * 1e-3, 1e2),
+        "m": side(&|s| f64::from(s.model_n), 1e3),
+        "a": samples.iter().map(|s| f64::from(s.asked) * scale).collect::<Vec<_>>(),
+        "mode": samples.last().map(|s| words::mode(s.mode)),
+    })
+    .to_string()
+}
