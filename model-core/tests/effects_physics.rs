@@ -427,7 +427,8 @@ fn a_late_pressure_costs_flow_times_resistance() {
 #[test]
 fn a_muscle_that_fills_by_mass_loses_what_the_gas_law_asks_for() {
     let mut alone = Alone::new("pressure-lag", &[0.0, 0.0, 0.1, 0.2]);
-    let moving = Context { dt: 0.1, speed: 0.01, pressure: 200e3, pressure_rate: 20e3, ..moment() };
+    let moving =
+        Context { dt: 0.1, speed: 0.01, pressure: 200e3, pressure_rate: 20e3, rest_radius: 4e-3, ..moment() };
     for _ in 0..100 {
         alone.at(moving);
     }

@@ -15,7 +15,7 @@ use crate::scalar::Scalar;
 
 /// `P_a`, Pa.
 const ATMOSPHERE: f32 = 101_325.0;
-/// The least volume, m³, that is divided by.
+/// The least volume over π, m³, that is divided by.
 const SMALLEST: f32 = 1.0e-12;
 
 type Line = Fading<1, 2>;
@@ -52,12 +52,14 @@ impl Effect for PressureLag {
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
         let (flow, rise) = (context.area * context.speed, context.pressure_rate);
         let (flow, rise) = (flow - Line::value(memory, 0, flow), rise - Line::value(memory, 1, rise));
-        let widened = context.radius * context.radius * context.length;
-        let rest = context.rest_radius * context.rest_radius * context.rest_length;
-        let drawn =
-            (context.pressure + T::from_f32(ATMOSPHERE)) * flow * T::from_f32(core::f32::consts::FRAC_1_PI);
-        let charged = (widened * rise + drawn) / rest.at_least(T::from_f32(SMALLEST));
-        let lost = parameters[0] * flow + parameters[1] * rise + parameters[2] * charged;
+        // π takes itself out of both volumes.
+        let volume = |radius: T, length: T| radius * radius * length;
+        let swollen = volume(context.radius, context.length) * rise
+            + (context.pressure + T::from_f32(ATMOSPHERE)) * flow * T::from_f32(core::f32::consts::FRAC_1_PI);
+        let lost = parameters[0] * flow
+            + parameters[1] * rise
+            + parameters[2] * swollen
+                / volume(context.rest_radius, context.rest_length).at_least(T::from_f32(SMALLEST));
         -context.pull_per_pressure() * lost
     }
 }

@@ -19,7 +19,7 @@ impl BraidTravel {
     pub const SLOTS: usize = 3;
 
     /// The travel since the last call, m, positive while shortening or filling; zero on the first.
-    #[inline]
+    #[inline(never)]
     pub fn step<T: Scalar>(context: &Context<T>, memory: &mut Memory<T>, at: usize) -> T {
         let seen = memory[at + 2] != T::ZERO;
         let moved = context.stroke - memory[at];
@@ -43,17 +43,19 @@ impl BraidTravel {
 /// A guide or a seal at held length does not slide when the pressure changes, as the strands of the braid do: the direction that
 /// [`Context::direction`] takes from filling and emptying is not theirs. A muscle that rests elsewhere than where it was last seen
 /// went there on the straight way.
+#[inline(never)]
 pub fn stroke_direction<T: Scalar>(context: &Context<T>, memory: &mut Memory<T>, at: usize) {
     let seen = memory[at + 2] != T::ZERO;
     let moved = context.stroke - memory[at + 1];
     memory[at + 1] = context.stroke;
     memory[at + 2] = T::ONE;
     // Slower than a ten-thousandth of its length in a second the muscle rests.
-    let moving =
-        context.resting == T::ZERO && context.speed.abs() > context.rest_length * T::from_f32(1.0e-4);
-    if moving && context.direction != T::ZERO {
-        memory[at] = context.direction;
-    } else if !moving && seen && moved.abs() > context.rest_length * T::from_f32(1.0e-3) {
+    let little = context.rest_length * T::from_f32(1.0e-4);
+    if context.resting == T::ZERO && context.speed.abs() > little {
+        if context.direction != T::ZERO {
+            memory[at] = context.direction;
+        }
+    } else if seen && moved.abs() > little * T::from_f32(10.0) {
         memory[at] = if moved > T::ZERO { T::ONE } else { -T::ONE };
     }
 }
