@@ -59,8 +59,11 @@ mod tests {
         output.read_to_end(&mut Vec::new()).unwrap();
         child.wait().unwrap();
         assert!(began.elapsed() < Duration::from_secs(20));
-        let status = guarded("sh").unwrap().args(["-c", "exit 7"]).status().unwrap();
-        assert_eq!(status.code(), Some(7));
+        let mut child = guarded("sh").unwrap().args(["-c", "exit 7"]).spawn().unwrap();
+        // Waiting would close the pipe first.
+        let pipe = child.stdin.take();
+        assert_eq!(child.wait().unwrap().code(), Some(7));
+        drop(pipe);
         assert!(guarded("no-such-program").is_err_and(|e| e.kind() == std::io::ErrorKind::NotFound));
     }
 }
