@@ -46,9 +46,10 @@ pub struct Model {
 /// Travel over which friction goes over, as a part of the tested contraction: some micrometres of a small muscle, some tens of a
 /// large one. What it is of one muscle only the effect `presliding-hysteresis` knows.
 const SLIDE: f32 = 2.0e-3;
-/// The part of the free motion that strands slip at held length. Half of what [`model_core::effects::BraidTravel`] takes: friction
-/// that goes over with the pressure asks for more pressure, and must not ask for more than what turned it.
-const SLIP: f32 = 0.025;
+/// The part of the free motion that strands slip at held length. No table has it, and muscles differ in it several times over; this is the
+/// middle of the virtual bench's. It is less than half of what [`model_core::effects::BraidTravel`] takes: friction that goes over with the
+/// pressure asks for more pressure, and must not ask for more than what turned it.
+const SLIP: f32 = 0.019;
 /// Play of the travel that turns friction, in distances: what noise of the stroke sensor passes is little beside a wish that moves.
 const PLAY: f32 = 0.05;
 /// The same play once a wish has stood still for [`CALM_S`]: no noise passes. What moves a muscle then is its load, however far, and
@@ -357,7 +358,8 @@ pub fn trim(force_loop: &ForceLoop, integral: &mut Integral, error_n: f32, cut: 
     (force_loop.proportional_pa_per_n * error_n + integral.value()).within(-limit, limit)
 }
 
-/// Wanted force of the stroke loop, N, for the stroke wanted now and the one that will be when a command acts.
+/// Wanted force of the stroke loop, N, for the stroke wanted now and the one that will be when a command acts. `cut` as in [`trim`]; the
+/// loop's own limits hold its integral as well.
 pub fn stroke_force(
     stroke_loop: &StrokeLoop,
     integral: &mut Integral,
@@ -367,11 +369,13 @@ pub fn stroke_force(
     cut: f32,
 ) -> f32 {
     let error = wanted_m - stroke_m;
-    integral.step(stroke_loop.integral_n_per_m_s * error, stroke_loop.force_limit_n, cut);
     let force = stroke_loop.load_n
         + stroke_loop.load_stiffness_n_per_m * coming_m
         + stroke_loop.proportional_n_per_m * error
         + integral.value()
         - stroke_loop.damping_n_s_per_m * speed_m_per_s;
-    force.within(0.0, stroke_loop.force_limit_n)
+    let limited = force.within(0.0, stroke_loop.force_limit_n);
+    let cut = if force == limited { cut } else { force - limited };
+    integral.step(stroke_loop.integral_n_per_m_s * error, stroke_loop.force_limit_n, cut);
+    limited
 }

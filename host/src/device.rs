@@ -22,6 +22,7 @@ pub mod log_table;
 mod port;
 #[cfg(feature = "probe")]
 pub mod probe;
+pub mod reach;
 pub mod recorder;
 pub mod regulator;
 pub mod run;

@@ -30,7 +30,10 @@ impl Bench {
         let emulated = Emulated::start(stand, Some(Kind::Native), 3.0).unwrap();
         let folder = std::env::temp_dir().join(format!("pam-controller-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
-        Self { emulated, mishap, folder }
+        let bench = Self { emulated, mishap, folder };
+        // Three times as fast as the clock, a program that waits for a busy machine is soon called silent; that is tried elsewhere.
+        bench.done(&["device", "settings", "--set", "watch.autonomous=true"]);
+        bench
     }
 
     fn host(&self, arguments: &[&str]) -> Output {
@@ -137,7 +140,23 @@ fn a_run_is_a_recording_that_the_readers_of_recordings_read() {
     assert!(side["saturated_ticks"].is_u64(), "{side}");
     // Seven times what this muscle can do.
     let said = bench.done(&["run", "--force", "1000", "--seconds", "0.5"]);
-    assert!(said.contains("of 0.50 s what was asked was out of reach"), "{said}");
+    assert!(
+        said.contains("of 0.50 s what was asked was out of reach: more than the muscle can pull"),
+        "{said}"
+    );
+    let said = bench.done(&["run", "--force=-200", "--seconds", "0.5"]);
+    assert!(said.contains("out of reach: less than it pulls there without pressure"), "{said}");
+    // A muscle that is tested at less than it is used at.
+    let mut table = model_core::table::example();
+    table.tested.pressure_high = Pressure::from_kilopascals(220.0);
+    TableFile { table, about: About::default() }.write(bench.folder.join("narrow.pam")).unwrap();
+    bench.done(&["flash", "narrow.pam"]);
+    let said = bench.done(&["run", "--force", "50", "--seconds", "0.5", "--json"]);
+    assert!(said.contains("beyond what its table was tested at (up to 220 kPa"), "{said}");
+    let told = serde_json::Deserializer::from_str(&said).into_iter::<serde_json::Value>().next();
+    let reach = told.unwrap().unwrap()["reach"].clone();
+    let seconds = |name: &str| reach[name].as_f64().unwrap();
+    assert!(seconds("outside_tested_s") > 0.3 && seconds("beyond_blocked_force_s") == 0.0, "{said}");
 }
 
 #[test]

@@ -68,7 +68,14 @@ impl Controller {
             let air = actuator.air();
             let driven =
                 actuator.regulator.step(TICK_S, wish, high, &air, &settings.regulator, &settings.limits);
-            actuator.cut = if driven.saturated { wish.pressure_pa - driven.wanted_pa } else { 0.0 };
+            actuator.cut = if !reached {
+                // The inverse has gone to the highest pressure, or to the lowest.
+                wish.pressure_pa - 0.5 * high
+            } else if driven.saturated {
+                wish.pressure_pa - driven.wanted_pa
+            } else {
+                0.0
+            };
             if !reached || driven.saturated {
                 self.saturated_ticks = self.saturated_ticks.saturating_add(1);
             }

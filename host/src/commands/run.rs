@@ -13,6 +13,7 @@ use super::port::PortOption;
 use crate::console::Console;
 use crate::counted::counted;
 use crate::device::course::{Course, Quantity};
+use crate::device::reach::Reached;
 use crate::device::recorder::{Recorder, about_losses, about_start};
 use crate::device::run::{Ending, Plan, run, vent};
 use crate::device::{Client, words};
@@ -130,12 +131,16 @@ impl Arguments {
         let saturated_before = client.call::<GetStatus>(&())?.saturated_ticks;
         let progress = Progress::new(console, "run");
         progress.total(self.seconds.map_or(0, |s| (s * 1e3) as u64));
+        let mut reached = if quantity == Quantity::Pressure { None } else { Reached::of(&mut client)? };
         let mut start = None;
         let outcome = run(
             &mut client,
             &plan,
             |sample| {
                 errors.add(quantity, sample);
+                if let Some(reached) = &mut reached {
+                    reached.add(quantity, sample);
+                }
                 progress.set((sample.time_us - *start.get_or_insert(sample.time_us)) / 1000);
                 match &mut recorder {
                     Some(recorder) => recorder.push(sample),
@@ -155,6 +160,8 @@ impl Arguments {
         }
         .map(|status| status.saturated_ticks.wrapping_sub(saturated_before));
         about["saturated_ticks"] = json!(saturated);
+        let per_s = ticks / f64::from(every_ticks);
+        about["reach"] = json!(reached.as_ref().map(|reached| reached.to_json(per_s)));
         about["ended_by"] = json!(match &outcome {
             Ok(Ending::Done) => "time".to_owned(),
             Ok(Ending::Stopped) => "interrupt".to_owned(),
@@ -174,12 +181,17 @@ impl Arguments {
         let lasted = errors.samples as f64 * f64::from(every_ticks);
         // A step asks for more than can be had for a moment, and is none the worse for it.
         if let Some(saturated) = saturated.map(f64::from).filter(|&saturated| saturated > 0.1 * lasted) {
+            let why = reached.as_ref().and_then(Reached::why).unwrap_or(
+                "more than the muscle can do there at the highest pressure allowed, or less than at none",
+            );
             console.warning(format!(
-                "for {:.2} of {:.2} s what was asked was out of reach: more than the muscle can do there at the highest pressure \
-                 allowed, or less than at none",
+                "for {:.2} of {:.2} s what was asked was out of reach: {why}",
                 saturated.min(lasted) / ticks,
                 lasted / ticks
             ));
+        }
+        if let Some(words) = reached.and_then(|reached| reached.extrapolated(per_s)) {
+            console.warning(words);
         }
         if ending == Ending::Stopped {
             console.note("interrupted; the muscle is vented");

@@ -4,6 +4,7 @@
 //! Nothing is skipped in silence: without a compiler for the target or without QEMU every test fails with the sentence
 //! that says what to run, unless `PAM_SKIP_EMULATOR=1` is set.
 
+pub mod bandwidth;
 pub mod closed_loop;
 pub mod debugger;
 pub mod diagnosed;

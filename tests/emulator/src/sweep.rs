@@ -165,7 +165,7 @@ impl Subject {
         f64::from(self.table.tested.contraction_high) * f64::from(self.table.geometry.rest_length.si())
     }
 
-    fn motion(&self, load: Load) -> Motion {
+    pub(crate) fn motion(&self, load: Load) -> Motion {
         let free_mm = self.free_stroke() * 1e3;
         match load {
             Load::Held => Motion::Held { stroke_mm: 0.2 * free_mm },
@@ -173,9 +173,9 @@ impl Subject {
                 Motion::Sine { mean_mm: 0.22 * free_mm, amplitude_mm: 0.12 * free_mm, frequency_hz: 0.3 }
             }
             Load::Spring => {
-                // Half of blocked force over a quarter of the free stroke, so that no wish is beyond the highest pressure; a
-                // natural frequency of 10 Hz and some damping.
-                let spring = 2.0 * self.blocked() / free_mm;
+                // Half of blocked force at three tenths of the free stroke, which is the most that is wished for and within reach of
+                // the highest pressure; a natural frequency of 10 Hz and some damping.
+                let spring = 1.5 * self.blocked() / free_mm;
                 let mass = spring * 1e3 / (2.0 * std::f64::consts::PI * 10.0_f64).powi(2);
                 let damper = 0.6 * (spring * 1e3 * mass).sqrt() * 1e-3;
                 Motion::Load { mass, spring, preload: 0.05 * self.blocked(), damper }
@@ -194,7 +194,7 @@ impl Subject {
         muscle.braid().posture(Length::from_metres(self.middle(load) as f32)).area
     }
 
-    fn settings(&self, law: Law, load: Load) -> Settings {
+    pub(crate) fn settings(&self, law: Law, load: Load) -> Settings {
         let base = self.regulator.settings(Settings::default());
         let fill = closed_loop::fill(&self.table, self.middle(load));
         let mut settings = match law {
@@ -228,7 +228,7 @@ impl Subject {
     }
 
     /// Mean and amplitude of what is asked for, N or m.
-    fn wish(&self, mode: Mode) -> (f32, f32) {
+    pub(crate) fn wish(&self, mode: Mode) -> (f32, f32) {
         match mode {
             Mode::Stroke => (0.2 * self.free_stroke() as f32, 0.1 * self.free_stroke() as f32),
             _ => (0.4 * self.blocked() as f32, 0.1 * self.blocked() as f32),

@@ -41,9 +41,14 @@ impl Task {
         f64::from(self.table.blocked_force.newtons())
     }
 
+    /// Free stroke at the highest pressure tested, m.
+    fn free_stroke(&self) -> f64 {
+        f64::from(self.table.tested.contraction_high) * f64::from(self.table.geometry.rest_length.si())
+    }
+
     /// Stroke about which the muscle is moved, m.
     fn middle(&self) -> f64 {
-        0.22 * f64::from(self.table.tested.contraction_high) * f64::from(self.table.geometry.rest_length.si())
+        0.22 * self.free_stroke()
     }
 
     fn slope(&self) -> f32 {
@@ -125,6 +130,51 @@ fn stroke_is_reached_against_a_spring_without_a_lasting_error() {
         // 3 % of the free stroke: friction lets the last tenths of a millimetre go in small slips.
         assert!(error < 0.1e-3, "{error}");
     }
+}
+
+/// Ticks until what is wanted is within a part of `scale` for good.
+fn settled(ticks: &[Tick], scale: f64, value: impl Fn(&Tick) -> f64) -> usize {
+    ticks.iter().rposition(|tick| (value(tick) - tick.asked).abs() > 0.03 * scale).map_or(0, |last| last + 1)
+}
+
+#[test]
+fn what_was_out_of_reach_for_long_winds_no_integrator_up() {
+    let task = Task::of(presets::miniature());
+    let bench = BenchSpec::laboratory(task.spec.clone(), 2);
+    let blocked = task.blocked();
+    let fill = closed_loop::fill(&task.table, task.middle());
+    let laws = [
+        ("table and trim", closed_loop::trimmed(task.base, task.slope()), 150),
+        ("PI alone", closed_loop::pi_alone(task.base, task.slope(), fill), 320),
+    ];
+    let held = Motion::Held { stroke_mm: task.middle() * 1e3 };
+    for (name, settings, most) in laws {
+        let back = |asked_before: f64| {
+            let mut control = Loop::start(&bench, &held, &task.table, task.settings(settings), Mode::Force);
+            control.point(SetPoint::Force(asked_before as f32));
+            control.run(3000);
+            let limited = control.controller.saturated_ticks();
+            control.point(SetPoint::Force(0.3 * blocked as f32));
+            (settled(&control.run(2000), blocked, |tick| tick.force), limited)
+        };
+        // Twice what the muscle can do, for three seconds; and a little less than it can.
+        let ((after_limit, limited), (after_reach, _)) = (back(2.0 * blocked), back(0.7 * blocked));
+        eprintln!("{name}: back in {after_limit} ticks from the limit, {after_reach} from within reach");
+        assert!(limited > 2500, "{limited} ticks out of reach");
+        // With an integrator that went on PI would need 346 and 439.
+        assert!(after_limit < most && after_reach < 200, "{name}: {after_limit} and {after_reach} ticks");
+    }
+    let load = Motion::Load { mass: 0.5, spring: 10.0, preload: 5.0, damper: 0.05 };
+    let back = |asked_before: f32| {
+        let mut control = Loop::start(&bench, &load, &task.table, Settings::default(), Mode::Stroke);
+        control.point(SetPoint::Stroke(asked_before));
+        control.run(3000);
+        control.point(SetPoint::Stroke(0.8e-3));
+        settled(&control.run(4000), task.free_stroke(), |tick| tick.stroke)
+    };
+    let (after_limit, after_reach) = (back(20e-3), back(1.6e-3));
+    eprintln!("stroke: back in {after_limit} ticks from the limit, {after_reach} from within reach");
+    assert!(after_limit < after_reach + 300, "{after_limit} and {after_reach} ticks");
 }
 
 #[test]

@@ -140,7 +140,12 @@ fn a_stroke_against_a_spring_and_a_force_from_a_file_are_followed_and_a_table_ro
     write(&stand.folder, "first.pam", table::example());
     write(&stand.folder, "mini.pam", fitted);
     stand.host(&["flash", "first.pam"]);
-    stand.host(&["flash", "mini.pam"]);
+    let flashed = json(&stand.host(&["flash", "mini.pam", "--restart", "--json"]));
+    assert!(flashed["written"] == true && flashed["confirmed_after_restart"] == true, "{flashed}");
+    assert!(flashed["difference"].is_object(), "{flashed}");
+    let backup = flashed["backup"].as_str().expect("what was there is kept");
+    let kept = TableFile::read(stand.folder.path().join(backup)).expect("a table");
+    assert_eq!(kept.table, table::example());
     let steps = ["run", "--stroke", "steps 0.8 1.6 hold=2", "--seconds", "4", "-o", "stroke.csv", "--json"];
     stand.host(&steps);
     let path = stand.folder.path().join("stroke.csv");

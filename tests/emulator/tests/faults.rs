@@ -7,10 +7,11 @@ use emulator_tests::machine::Folder;
 use emulator_tests::{Machine, Options, Watched, tracking, upload};
 use host::device::{Client, Topic};
 use model_core::link::endpoints::{
-    Arm, ClearFault, GetFaults, GetPastFault, GetStatus, SetTelemetry, SetTo, StartMode, Stop,
+    Arm, ClearFault, GetFaults, GetPastFault, GetStatus, SetReference, SetTelemetry, SetTo, StartMode, Stop,
 };
 use model_core::link::messages::{
-    Event, Fault, FaultReport, Mode, PastFault, Refusal, SetPoint, Side, Start, State, TelemetryRate,
+    Event, Fault, FaultReport, Mode, PastFault, Reference, Refusal, SetPoint, Side, Start, State,
+    TelemetryRate,
 };
 use model_core::link::settings::Settings;
 use model_core::table;
@@ -236,6 +237,31 @@ fn a_mode_without_its_table_is_a_fault_and_nothing_starts_by_itself() {
     assert_eq!(refused, Err(Refusal::WrongState(State::Disarmed)));
     pass(&station, 50);
     assert!(station.since(0).iter().all(|exchange| exchange.command == 0.0));
+}
+
+#[test]
+fn a_calculation_that_fails_vents_and_is_told_with_its_result() {
+    let folder = Folder::new();
+    let station = station();
+    let Some(machine) = board(&folder, &station) else { return };
+    let mut client = machine.client();
+    tracking::start(&mut client, Mode::Pressure);
+    client.call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 }).expect("quiet");
+    // Both are numbers, and their sum is none.
+    let wave = Reference::Sine { mean: 3.0e38, amplitude: 3.0e38, frequency_hz: 1.0 };
+    client.call::<SetReference>(&wave).expect("a wave");
+    let report = stopped(&mut client);
+    assert!(report.fault == Fault::NotANumber && report.value == f32::INFINITY, "{report:?}");
+    pass(&station, 5);
+    let commands = station.since(0);
+    assert!(commands.iter().all(|exchange| exchange.command.is_finite()));
+    assert_eq!(commands.last().map(|exchange| exchange.command), Some(0.0));
+    let latched = client.try_call::<Arm>(&()).expect("an answer");
+    assert_eq!(latched, Err(Refusal::Latched(Fault::NotANumber)));
+    // The air takes some lags of the regulator to leave.
+    pass(&station, 300);
+    client.call::<ClearFault>(&()).expect("it clears");
+    assert_eq!(client.call::<GetStatus>(&()).expect("a status").state, State::Disarmed);
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::io;
 use std::path::Path;
 
+use emulator_tests::bandwidth::Bandwidth;
 use emulator_tests::sweep::{COURSES, Course, LAWS, Law, Load, Still, Subject, in_qemu};
 use host::report::{Axis, Colour, Figure, Panel};
 use model_core::link::messages::Mode;
@@ -166,6 +167,20 @@ fn main() -> io::Result<()> {
             "| {} | {table:.2} | {trimmed:.2} | {feedback:.2} | {ratio:.1} |",
             subject.spec.name
         );
+    }
+    text.push_str(
+        "\n## Bandwidth\n\nForce at held length, a sine of 2 % of blocked force about 40 %: the frequency at which the true force's \
+         amplitude is 1/√2 of what is asked for, and the largest amplitude below it as a part of that. Sent tick by tick by a host.\n\n\
+         | muscle | table, Hz | largest | table + trim, Hz | largest | PI alone, Hz | largest |\n\
+         | --- | --- | --- | --- | --- | --- | --- |\n",
+    );
+    for subject in &subjects {
+        let _ = write!(text, "| {} |", subject.spec.name);
+        for law in [Law::Table, Law::Trimmed, Law::Feedback] {
+            let Bandwidth { hz, peak } = subject.bandwidth(law);
+            let _ = write!(text, " {hz:.0} | {peak:.2} |");
+        }
+        text.push('\n');
     }
     let mut emulated = String::new();
     for subject in &subjects {
