@@ -15,7 +15,7 @@ use std::cell::RefCell;
 
 use model_core::image;
 use model_core::link::endpoints::{GetSettings, SetSettings};
-use model_core::link::messages::{Side, Telemetry};
+use model_core::link::messages::{Reference, Side, Telemetry};
 use model_core::link::settings::{Regulator, Settings};
 use model_core::units::Length;
 
@@ -103,7 +103,13 @@ fn steps(client: &mut Client, low_pa: f64, high_pa: f64, stop: &dyn Fn() -> bool
     let mut stroke_m = 0.0;
     let plan = Plan {
         quantity: Quantity::Pressure,
-        course: Course::Steps { values: vec![low_pa as f32, high_pa as f32], hold_s: HOLD },
+        // The device makes them, so that each is as long as it should be however late this program is.
+        course: Course::Wave(Reference::Trapezoid {
+            low: low_pa as f32,
+            high: high_pa as f32,
+            ramp_s: 0.0,
+            hold_s: HOLD as f32,
+        }),
         seconds: Some(4.0 * HOLD),
         every_ticks: 1,
     };

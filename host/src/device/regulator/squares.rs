@@ -6,6 +6,8 @@ const SIZES: [f64; 9] = [200.0, 400.0, 500.0, 630.0, 800.0, 1_000.0, 1_400.0, 2_
 /// Seconds at each level of a square, and squares of each size.
 const LEVEL: f64 = 0.2;
 const COUNT: usize = 4;
+/// How long a command that a limit keeps from being reached is waited for, s.
+const PATIENCE: f64 = 1.0;
 /// Each size begins from the middle, come to from so far below that no regulator overlooks it, Pa: one that holds what it last
 /// answered to would take part of the square before.
 const FROM: f64 = 20e3;
@@ -20,9 +22,13 @@ pub(super) struct Search {
     /// Sizes below this are overlooked, from `high` on they are answered.
     low: usize,
     high: usize,
-    /// When this size began, s, and how many of its levels were asked for.
-    begun: Option<f64>,
+    /// How many levels of this size were asked for, the last of them, Pa, and when, s.
     asked: usize,
+    wanted: f64,
+    since: f64,
+    /// When the device's command came to it, s, and its last command, Pa.
+    seen: Option<f64>,
+    command: f64,
     /// Command and pressure, Pa, since then.
     samples: Vec<(f64, f64)>,
 }
@@ -30,7 +36,18 @@ pub(super) struct Search {
 impl Search {
     /// Around a command (Pa), for a regulator of a gain.
     pub(super) fn new(middle: f64, gain: f64) -> Self {
-        Self { middle, gain, low: 0, high: SIZES.len(), begun: None, asked: 0, samples: Vec::new() }
+        Self {
+            middle,
+            gain,
+            low: 0,
+            high: SIZES.len(),
+            asked: 0,
+            wanted: middle,
+            since: 0.0,
+            seen: None,
+            command: middle,
+            samples: Vec::new(),
+        }
     }
 
     /// The half width of the deadband, Pa, once it is known; `Some(None)` where not even the largest square was answered.
@@ -44,39 +61,46 @@ impl Search {
 
     /// Takes a sample of command and pressure, Pa.
     pub(super) fn take(&mut self, command: f64, pressure: f64) {
+        self.command = command;
         self.samples.push((command, pressure));
     }
 
-    /// The command that is wanted from a time (s) on, when it changes, Pa.
+    /// The command that is wanted from a time (s) on, when it changes, Pa. A level lasts from when the device is seen to command it: samples
+    /// that come late and together do not shorten it.
     pub(super) fn next(&mut self, time: f64) -> Option<f64> {
         if self.found().is_some() {
             return None;
         }
-        let begun = *self.begun.get_or_insert(time);
-        let mut level = ((time - begun) / LEVEL) as usize;
-        if level >= LEVELS {
+        if self.asked > 0 {
+            let there = (self.command - self.wanted).abs() < 1.0 || time - self.since > PATIENCE;
+            self.seen = self.seen.or(there.then_some(time));
+            if self.seen.is_none_or(|seen| time - seen < LEVEL) {
+                return None;
+            }
+        }
+        if self.asked == LEVELS {
             let middle = (self.low + self.high) / 2;
             if self.answer(SIZES[middle]) > 0.5 * self.gain * SIZES[middle] {
                 self.high = middle;
             } else {
                 self.low = middle + 1;
             }
-            (self.begun, self.asked, level) = (Some(time), 0, 0);
+            self.asked = 0;
             self.samples.clear();
             if self.found().is_some() {
                 return None;
             }
         }
-        (level >= self.asked).then(|| {
-            self.asked = level + 1;
-            let size = SIZES[(self.low + self.high) / 2];
-            match level {
-                0 => self.middle - FROM,
-                1 => self.middle,
-                n if n % 2 == 0 => self.middle + 0.5 * size,
-                _ => self.middle - 0.5 * size,
-            }
-        })
+        let size = SIZES[(self.low + self.high) / 2];
+        self.wanted = match self.asked {
+            0 => self.middle - FROM,
+            1 => self.middle,
+            n if n % 2 == 0 => self.middle + 0.5 * size,
+            _ => self.middle - 0.5 * size,
+        };
+        self.asked += 1;
+        (self.since, self.seen) = (time, None);
+        Some(self.wanted)
     }
 
     /// How far the pressure goes with squares of a size, Pa from top to bottom. Slow wander of the supply is taken out of each
@@ -102,8 +126,9 @@ impl Search {
 mod tests {
     use super::*;
 
-    /// A regulator of a deadband, its noise and its ripple, until the search has found something.
-    fn searched(band: f64) -> (Option<f64>, f64) {
+    /// A regulator of a deadband, its noise and its ripple, until the search has found something; `late` ticks come together, and what
+    /// is asked on them is commanded after them.
+    fn searched(band: f64, late: usize) -> (Option<f64>, f64) {
         let (gain, lag) = (1.02, 0.03);
         let mut seed = 7_u32;
         let mut noise = || {
@@ -112,15 +137,24 @@ mod tests {
         };
         let mut search = Search::new(175e3, gain);
         let (mut command, mut held, mut p, mut time) = (175e3_f64, 175e3, gain * 175e3, 0.0);
-        while search.found().is_none() && time < 60.0 {
-            if (command - held).abs() > band {
-                held = command;
+        let mut asked = command;
+        while search.found().is_none() && time < 120.0 {
+            let bunch: Vec<(f64, f64, f64)> = (0..late)
+                .map(|_| {
+                    if (command - held).abs() > band {
+                        held = command;
+                    }
+                    let ripple = 250.0 * (23.0_f64 * time).sin();
+                    p += (gain * held + ripple - p) * (1.0 - (-1e-3_f64 / lag).exp());
+                    time += 1e-3;
+                    (time, command, p + noise())
+                })
+                .collect();
+            for (time, command, p) in bunch {
+                search.take(command, p);
+                asked = search.next(time).unwrap_or(asked);
             }
-            let ripple = 250.0 * (23.0_f64 * time).sin();
-            p += (gain * held + ripple - p) * (1.0 - (-1e-3_f64 / lag).exp());
-            search.take(command, p + noise());
-            command = search.next(time).unwrap_or(command);
-            time += 1e-3;
+            command = asked;
         }
         (search.found().expect("within a minute"), time)
     }
@@ -128,12 +162,20 @@ mod tests {
     #[test]
     fn a_deadband_is_found_between_two_sizes_within_ten_seconds() {
         for (band, low, high) in [(300.0, 250.0, 315.0), (450.0, 400.0, 500.0), (900.0, 700.0, 1_000.0)] {
-            let (half, seconds) = searched(band);
+            let (half, seconds) = searched(band, 1);
             let half = half.expect("one was answered");
             assert!((low..=high).contains(&half), "{half} Pa for {band} Pa");
             assert!(seconds < 10.0, "{seconds} s");
         }
-        assert_eq!(searched(0.0).0, Some(0.0));
-        assert_eq!(searched(5e3).0, None);
+        assert_eq!(searched(0.0, 1).0, Some(0.0));
+        assert_eq!(searched(5e3, 1).0, None);
+    }
+
+    #[test]
+    fn samples_that_come_late_and_together_show_the_same() {
+        for late in [150, 450, 1_700] {
+            let half = searched(450.0, late).0.expect("one was answered");
+            assert!((400.0..=500.0).contains(&half), "{half} Pa with {late} samples at once");
+        }
     }
 }
