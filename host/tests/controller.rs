@@ -191,6 +191,63 @@ fn a_broken_load_cell_stops_a_run_in_words_and_the_rows_until_then_are_kept() {
     assert!(said.contains("sensor-range"), "{said}");
 }
 
+/// What a trace of a loop that a broken wire stopped shows, by the headings of its columns.
+fn traced(bench: &Bench, variables: &str) -> serde_json::Value {
+    bench.done(&["device", "trace", "--trigger", "until-fault", "--variables", variables]);
+    let mishap = std::sync::Arc::clone(&bench.mishap);
+    let breaks = std::thread::spawn(move || {
+        std::thread::sleep(std::time::Duration::from_millis(900));
+        mishap.store(Mishap::LoadCell as u8, Ordering::Relaxed);
+    });
+    bench.refused(&["run", "--force", "40", "--seconds", "30"]);
+    breaks.join().unwrap();
+    let said = bench.done(&["device", "trace", "--read", "--json"]);
+    bench.mishap.store(0, Ordering::Relaxed);
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    bench.done(&["device", "faults", "--clear"]);
+    serde_json::Deserializer::from_str(&said).into_iter().next().unwrap().unwrap()
+}
+
+#[test]
+fn every_variable_of_the_loop_is_traced_and_they_fit_together() {
+    let bench = Bench::start("trace");
+    bench.table("mini.pam", 76.5);
+    bench.done(&["flash", "mini.pam"]);
+    let own = "pressure,stroke,force,speed,direction,asked,wanted-force,feed-forward,trim,wanted-pressure,command,model-pressure,\
+               model-force,state,step-time";
+    let trace = traced(&bench, own);
+    let columns = trace["columns"].as_object().unwrap();
+    let records = trace["records"].as_u64().unwrap() as usize;
+    assert!(columns.len() == 16 && records >= 30, "{trace}");
+    let column = |name: &str| -> Vec<f64> {
+        let list = columns.get(name).unwrap_or_else(|| panic!("no {name} in {trace}"));
+        list.as_array().unwrap().iter().map(|cell| cell.as_f64().unwrap_or(f64::NAN)).collect()
+    };
+    let (time, state) = (column("time_s"), column("state"));
+    assert!(
+        time.windows(2).all(|pair| (pair[1] - pair[0] - 1e-3).abs() < 1e-6),
+        "one record a tick: {time:?}"
+    );
+    assert!(state.iter().all(|state| *state == 2.0), "running up to the fault: {state:?}");
+    // The fault is noticed at the second bad reading of the load cell.
+    assert!(!(0.0..1e3).contains(column("force_N").last().unwrap()), "{:?}", column("force_N"));
+    let last = records - 4;
+    let at = |name: &str| column(name)[last];
+    assert_eq!((at("asked"), at("wanted_force_N")), (40.0, 40.0));
+    let near = |a: &str, b: f64, within: f64| assert!((at(a) - b).abs() < within, "{a}: {} and {b}", at(a));
+    near("wanted_pressure_Pa", at("feed_forward_Pa") + at("trim_Pa"), 5.0);
+    near("model_pressure_Pa", at("pressure_Pa"), 20e3);
+    near("command_Pa", at("pressure_Pa"), 60e3);
+    // The table is an example of this kind of muscle, not a fit of this one.
+    near("model_force_N", at("force_N"), 25.0);
+    // Moved at 0.5 Hz by 0.2 mm about 0.6 mm: at most 0.63 mm/s.
+    near("stroke_m", 0.6e-3, 0.25e-3);
+    near("speed_m_per_s", 0.0, 1.5e-3);
+    assert!(at("direction").abs() <= 1.0 && at("step_time_us") >= 0.0);
+    let second = traced(&bench, "second-pressure,second-stroke,second-force,second-command");
+    assert_eq!(second["columns"].as_object().unwrap().len(), 5, "{second}");
+}
+
 #[test]
 fn settings_are_read_back_and_wrong_ones_refused_by_name() {
     let bench = Bench::start("settings");

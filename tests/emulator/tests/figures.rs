@@ -1,6 +1,8 @@
 //! Instructions per call and memory of the images, with bounds on both sides: an improvement is committed on purpose.
 
 use emulator_tests::figures::{self, memory};
+use emulator_tests::machine;
+use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
 
 #[test]
 fn instruction_counts_stay_where_they_are() {
@@ -8,8 +10,8 @@ fn instruction_counts_stay_where_they_are() {
     eprintln!("{}", figures::markdown(&counted));
     let of = |name: &str| counted.iter().find(|figure| figure.name == name).expect("counted");
     let (force, inverse, direct, step) = (of("force"), of("inverse"), of("direct-port"), of("step"));
-    assert!((100.0..150.0).contains(&force.mean), "force: {force:?}");
-    assert!((200.0..350.0).contains(&inverse.mean), "inverse: {inverse:?}");
+    assert!(force.mean > 100.0 && force.worst <= 150.0, "force: {force:?}");
+    assert!(inverse.mean > 200.0 && inverse.worst <= 350.0, "inverse: {inverse:?}");
     assert!(
         direct.mean > 5.0 * force.mean,
         "the direct port is {:.1} times the force",
@@ -45,4 +47,28 @@ fn both_images_fit_their_flash_and_their_memory() {
         assert!(size.flash <= memory::FLASH && size.flash > memory::FLASH / 2, "{size:?}");
         assert!(size.memory(stack) <= memory::RAM, "{size:?} with {stack} bytes of stack");
     }
+}
+
+#[test]
+fn roots_are_taken_in_hardware_and_nothing_is_computed_in_double() {
+    let Ok(image) = machine::image() else { return };
+    let bytes = std::fs::read(image).expect("an image");
+    let elf = object::File::parse(&*bytes).expect("an image");
+    // VSQRT.F32, encoding T1 of the ARMv7-M architecture's manual: 1110 1110 1D11 0001, Vd 1010 11M0 Vm.
+    let roots: usize = elf
+        .sections()
+        .filter(|section| section.kind() == SectionKind::Text)
+        .map(|section| {
+            let code = section.data().expect("code");
+            let halfword = |at: usize| u16::from_le_bytes([code[at], code[at + 1]]);
+            let is_root =
+                |at: &usize| halfword(*at) & 0xFFBF == 0xEEB1 && halfword(at + 2) & 0x0FD0 == 0x0AC0;
+            (0..code.len().saturating_sub(3)).step_by(2).filter(is_root).count()
+        })
+        .sum();
+    assert!(roots >= 1, "no root in hardware");
+    let software = ["sqrt", "__aeabi_dadd", "__aeabi_dmul", "__aeabi_ddiv"];
+    let found =
+        elf.symbols().find(|s| s.name().is_ok_and(|name| software.iter().any(|bad| name.contains(bad))));
+    assert!(found.is_none(), "{:?}", found.map(|symbol| symbol.name().map(str::to_owned)));
 }

@@ -170,7 +170,9 @@ fn main() -> io::Result<()> {
     }
     text.push_str(
         "\n## Bandwidth\n\nForce at held length, a sine of 2 % of blocked force about 40 %: the frequency at which the true force's \
-         amplitude is 1/√2 of what is asked for, and the largest amplitude below it as a part of that. Sent tick by tick by a host.\n\n\
+         amplitude is 1/√2 of what is asked for, and the largest amplitude below it as a part of that. Sent tick by tick by a host. So small a wave is \
+         mostly friction; what of it comes through enlarged is friction's compensation, which goes over with the measured pressure and \
+         is late near the end of the band.\n\n\
          | muscle | table, Hz | largest | table + trim, Hz | largest | PI alone, Hz | largest |\n\
          | --- | --- | --- | --- | --- | --- | --- |\n",
     );
