@@ -4,7 +4,7 @@ Arrays are SI throughout: s, Pa (gauge), m, N, K. Whatever is wrong raises PamEr
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Literal, final
 
 import numpy as np
@@ -91,6 +91,8 @@ class Campaign:
     def warnings(self) -> list[str]:
         """What was noticed while reading."""
     def __len__(self) -> int: ...
+    def __getitem__(self, index: int) -> Recording: ...
+    def __iter__(self) -> Iterator[Recording]: ...
 
 @final
 class Prediction:

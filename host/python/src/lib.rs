@@ -21,7 +21,7 @@ use model_core::muscle::Muscle as Model;
 use model_core::units::{Length, Pressure};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::create_exception;
-use pyo3::exceptions::{PyUserWarning, PyValueError};
+use pyo3::exceptions::{PyIndexError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyModule, PyTuple};
 
@@ -262,6 +262,17 @@ impl Campaign {
 
     fn __len__(&self) -> usize {
         self.0.recordings.len()
+    }
+
+    /// One recording, from the end where the number is negative; so a campaign can be walked through, too.
+    fn __getitem__(&self, index: isize) -> PyResult<Recording> {
+        let count = self.0.recordings.len();
+        let from_start = if index < 0 { index.checked_add_unsigned(count) } else { Some(index) };
+        from_start
+            .and_then(|i| usize::try_from(i).ok())
+            .and_then(|i| self.0.recordings.get(i).cloned())
+            .map(Recording)
+            .ok_or_else(|| PyIndexError::new_err(format!("recording {index} of {count}")))
     }
 
     fn __repr__(&self) -> String {

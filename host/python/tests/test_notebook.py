@@ -37,6 +37,15 @@ def test_recordings_are_arrays_in_si():
     assert np.all(np.diff(first.time) > 0)
     assert 1e5 < np.median(first.pressure) < 1e6, "pascals"
     assert first.stroke.max() < 0.2 * muscle.rest_length, "metres"
+    assert [r.name for r in campaign] == [r.name for r in campaign.recordings]
+    assert campaign[-1].name == campaign.recordings[-1].name
+    for beyond in [len(campaign), -len(campaign) - 1]:
+        try:
+            campaign[beyond]
+        except IndexError as error:
+            assert str(len(campaign)) in str(error)
+        else:
+            raise AssertionError(f"recording {beyond} was given")
 
 
 def test_a_fit_predicts_a_pressure_it_has_not_seen():
