@@ -5,10 +5,12 @@
 
 Connect, load, fit, difference, flash, arm, follow, fault, clear, vent by key, compare, close the page; ten minutes of samples through
 the page's own code, with the memory and the time for a picture bounded; and who may ask at all. With a folder, every view is
-photographed in light and dark, wide and on a phone. An hour of live pictures is measured by tests/benchmarks/studio.py.
+photographed in light and dark, wide and on a phone; with BOOK=overwrite the book's picture of the page is taken anew. An hour of
+live pictures is measured by tests/benchmarks/studio.py.
 Needs chromium and chromedriver, nothing of Python beyond its own library.
 """
 
+import os
 import signal
 import sys
 import time
@@ -19,6 +21,7 @@ from browser import Browser, studio
 
 PROGRAM = sys.argv[1] if len(sys.argv) > 1 else "target/debug/host"
 SHOTS = sys.argv[2] if len(sys.argv) > 2 else None
+BOOK_PICTURE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../docs/src/pictures/studio.webp")
 
 
 COUNT = 0
@@ -82,6 +85,12 @@ def story(url, driver):
     assert "no table yet" in page.text("difference-text")
     page.click("flash")
     page.until("document.getElementById('message').textContent.includes('read back')")
+    page.click("difference")
+    page.until("!document.getElementById('flash').disabled")
+    page.js("document.getElementById('fit-text').hidden = true")
+    page.click("fit")
+    page.until("!document.getElementById('fit-text').hidden")
+    assert page.js("return document.getElementById('flash').disabled"), "a table is sent whose difference nobody has seen"
     passed("shows_the_difference_and_flashes")
     page.click("arm")
     page.state("armed")
@@ -89,7 +98,14 @@ def story(url, driver):
     page.click("follow")
     page.state("running")
     page.until("state.recording > 1000", 120)
+    # The newest values stand behind the curves' names, and what is asked at the quantity that is asked for.
+    page.until("/^measured [0-9.]+$/.test(document.querySelector('[data-of=F]').textContent)")
+    asked = page.js("return keys.filter((k) => k.of === 'a' && !k.place.hidden).map((k) => k.mode)")
+    assert asked == ["force"], asked
     page.shot(SHOTS, "running")
+    if os.environ.get("BOOK") == "overwrite":
+        page.until("state.recording > 11000", 240)
+        page.picture(BOOK_PICTURE, ".live")
     assert page.js("return state.lost") == 0
     drawn = page.js("return perf.frames")
     time.sleep(3)

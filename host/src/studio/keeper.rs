@@ -24,6 +24,7 @@ use crate::device::run::{Plan, Steps, vent};
 use crate::device::{Client, Topic, difference, tables, words};
 use crate::emulated::{Emulated, Kind, Stand};
 use crate::error::{Code, Error, Result};
+use crate::output::json_of;
 use crate::table_file::TableFile;
 
 use super::told::{batch, credible, tell};
@@ -315,8 +316,13 @@ impl Connected {
                 return Ok(json!({ "latched": faults.latched.as_ref().map(words::report) }));
             }
             Order::Clear => {
-                self.status = self.client.call_once::<ClearFault>(&())?;
+                let cleared = self.client.call_once::<ClearFault>(&());
+                self.status = self.client.call::<GetStatus>(&())?;
                 self.note_fault()?;
+                // What is wanted is that none is latched: one that is gone already is no failure.
+                if self.status.state == State::Fault {
+                    cleared?;
+                }
             }
             Order::Settings(changes) => return self.settings(&changes),
             Order::Mishap(code) => match &self.emulated {
@@ -356,7 +362,7 @@ impl Connected {
             }
         }
         self.settings = settings;
-        Ok(json!(settings))
+        Ok(json_of(&settings))
     }
 
     fn difference(&mut self, path: &std::path::Path) -> Result<Value> {

@@ -19,7 +19,7 @@ class Ring {
   push(batch, count) {
     for (const n of this.names) {
       const column = this.columns[n], values = batch[n];
-      for (let i = 0, at = this.at; i < count; i++) { column[at] = values[i]; if (++at === this.size) at = 0; }
+      for (let i = 0, at = this.at; i < count; i++) { column[at] = values[i] ?? NaN; if (++at === this.size) at = 0; }
     }
     this.at = (this.at + count) % this.size; this.length = Math.min(this.size, this.length + count); this.pushed += count;
   }
@@ -37,7 +37,8 @@ class Ring {
 
 // A ring's samples drawn together in stretches of time as long as one column of pixels: of each curve the least, the greatest, the
 // first and the last. Only samples that are new are looked at, so that a picture costs its width, not its window times the rate.
-// A sample that is infinite is a reading that its sensor cannot give: on which side it left is kept, and nothing else.
+// A sample that is infinite is a reading that its sensor cannot give: on which side it left is kept, and nothing else. One that is not a
+// number is none, and leaves a gap.
 class Stretches {
   constructor(ring) { this.ring = ring; this.step = 0; this.room = 0; }
   // Takes in what came since the last time; begins anew where the window, the width or the recording is another.
@@ -57,6 +58,7 @@ class Stretches {
         const c = this.curves[name], v = r.columns[name][i];
         if (begins) { c.least[slot] = Infinity; c.most[slot] = -Infinity; c.left[slot] = 0; }
         if (!(v >= c.least[slot] && v <= c.most[slot])) {
+          if (Number.isNaN(v)) continue;
           if (!Number.isFinite(v)) { c.left[slot] = v > 0 ? 1 : -1; continue; }
           if (c.least[slot] > c.most[slot]) c.first[slot] = v;
           if (v < c.least[slot]) c.least[slot] = v;

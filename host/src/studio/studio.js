@@ -94,6 +94,20 @@ function take(m) {
   else if (m.k === "e") message(m.text + (m.help ? "\n→ " + m.help : ""));
 }
 
+// Behind each curve's name its newest value, as often as a person can read it; what is asked belongs to one of the pictures.
+const DECIMALS = { F: 1, m: 1, P: 1, c: 1, x: 2, a: 1 };
+const keys = [...document.querySelectorAll("[data-of]")].map((place) => ({ place, word: place.textContent, ...place.dataset }));
+function readings() {
+  if (held) return;
+  for (const k of keys) {
+    const value = ring.length ? ring.last(k.of) : NaN, digits = k.mode === "stroke" ? 2 : DECIMALS[k.of];
+    k.place.hidden = k.mode !== undefined && k.mode !== mode;
+    k.place.textContent = Number.isFinite(value) ? `${k.word} ${value.toFixed(digits)}` : k.word;
+  }
+}
+readings();
+setInterval(readings, 250);
+
 setInterval(() => { $("rate").textContent = state.connected ? `${samples} samples/s, ${state.lost || 0} lost` : ""; samples = 0; }, 1000);
 
 function show(s) {
@@ -135,9 +149,11 @@ listen();
 const vent = () => order("vent");
 const click = (id, act) => $(id).addEventListener("click", act);
 click("vent", vent);
-click("connect", () => order("connect", { port: $("port").value }));
+// The difference that was shown is that of another table, or to another device: what is sent must have been seen.
+const unseen = () => { $("flash").disabled = true; $("difference-text").hidden = true; };
+click("connect", () => { unseen(); return order("connect", { port: $("port").value }); });
 click("disconnect", () => order("disconnect"));
-click("emulate", async () => { message("starting …"); const r = await order("emulate", { muscle: $("bench").value }); if (r) message("connected: " + r.controller); });
+click("emulate", async () => { unseen(); message("starting …"); const r = await order("emulate", { muscle: $("bench").value }); if (r) message("connected: " + r.controller); });
 $("mishap").addEventListener("change", () => order("mishap", { code: Number($("mishap").value) }));
 click("arm", () => order("arm"));
 click("follow", () => order("follow", { quantity: $("quantity").value, course: $("course").value }));
@@ -200,6 +216,7 @@ const report = (id, name) => { $(id).hidden = false; $(id).firstChild.href = `/r
 click("compare", compare);
 click("fit", async () => {
   message("fitting …");
+  unseen();
   const r = await order("fit", { muscle: $("muscle").value });
   if (!r) return;
   $("message").hidden = true; text("fit-text", r.text); report("fit-report", "fit"); $("lines-figure").hidden = false;

@@ -1,6 +1,6 @@
 //! What the page is told without asking: samples, faults, and between what its sensors can read.
 
-use model_core::link::messages::{Mode, SideSample, Telemetry};
+use model_core::link::messages::{Mode, SideSample, State, Telemetry};
 use model_core::link::settings::Settings;
 use serde_json::{Value, json};
 use tokio::sync::broadcast;
@@ -32,7 +32,8 @@ pub(super) fn credible(settings: &Settings) -> Value {
         .into()
 }
 
-/// Samples as columns: times in s, forces in N, pressures in kPa, strokes in mm.
+/// Samples as columns: times in s, forces in N, pressures in kPa, strokes in mm. What is asked, and the table's force, are null while
+/// the controller does not drive: nobody asks for anything, and of a vented muscle, which hangs slack, a table says nothing.
 pub(super) fn batch(samples: &[Telemetry]) -> String {
     let side = |pick: &dyn Fn(&SideSample) -> f64, digits: f64| -> Vec<f64> {
         let rounded = |v: f64| (v * digits).round() / digits;
@@ -43,6 +44,10 @@ pub(super) fn batch(samples: &[Telemetry]) -> String {
         Some(Mode::Stroke) => 1e3,
         _ => 1.0,
     };
+    let driven = |pick: &dyn Fn(&Telemetry) -> f64| -> Vec<Option<f64>> {
+        samples.iter().map(|s| (s.state == State::Running).then(|| pick(s))).collect()
+    };
+    let model = |s: &Telemetry| s.sides.first().map_or(0.0, |x| (f64::from(x.model_n) * 1e3).round() / 1e3);
     json!({
         "k": "t",
         "t": samples.iter().map(|s| s.time_us as f64 * 1e-6).collect::<Vec<_>>(),
@@ -50,8 +55,8 @@ pub(super) fn batch(samples: &[Telemetry]) -> String {
         "P": side(&|s| f64::from(s.pressure_pa) * 1e-3, 1e2),
         "x": side(&|s| f64::from(s.stroke_m) * 1e3, 1e4),
         "c": side(&|s| f64::from(s.command_pa) * 1e-3, 1e2),
-        "m": side(&|s| f64::from(s.model_n), 1e3),
-        "a": samples.iter().map(|s| f64::from(s.asked) * scale).collect::<Vec<_>>(),
+        "m": driven(&model),
+        "a": driven(&|s| f64::from(s.asked) * scale),
         "mode": samples.last().map(|s| words::mode(s.mode)),
     })
     .to_string()
