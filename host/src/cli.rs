@@ -14,10 +14,16 @@ use crate::settings::{all_settings, apply};
 /// Recordings of pneumatic artificial muscles to tables, tables to controllers.
 #[derive(Debug, Parser)]
 #[command(name = "host", version, about, propagate_version = true, arg_required_else_help = true)]
+// Longer lines than these nobody reads with ease; narrower terminals get theirs.
+#[command(max_term_width = 100)]
 #[command(after_help = "Examples:\n  \
+    host demo\n  \
+    host new -o mini.toml\n  \
     host fit --muscle mini.toml loops/*.csv -o mini.pam --report mini.html\n  \
-    host predict --table mini.pam new.csv -o predicted.csv\n  \
-    host table show mini.pam\n\n\
+    host diagnose --muscle mini.toml loops/*.csv --report why.html\n  \
+    host studio --emulate\n\n\
+    Results for programs: fit, evaluate, predict, diagnose and plan write JSON into the file behind --json (`-` is standard \
+    output); with all others --json stands alone, and they print it in place of words.\n\n\
     Exit status: 0 done, 1 the input or the device is at fault, 2 the call is at fault.")]
 pub struct Cli {
     #[command(flatten)]
@@ -58,22 +64,26 @@ enum Colours {
 /// Every sub-command. A new one is one file in `commands/` and one line here and in [`Command::run`].
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// The whole story on this machine, no hardware: record, fit, flash, track.
+    Demo(commands::demo::Arguments),
+    /// Describe a muscle by answering what to measure, with drawings.
+    New(commands::new::Arguments),
     /// Fit a muscle's table to recordings.
     Fit(commands::fit::Arguments),
     /// Score a fit on recordings that it has not seen.
     Evaluate(commands::evaluate::Arguments),
     /// Compute the force of a table on recordings, and score it.
     Predict(commands::predict::Arguments),
-    /// Say what the model leaves out of recordings: where, what, how sure, what to record next.
+    /// Say what the model leaves out: where, what, how sure, what to record next.
     Diagnose(commands::diagnose::Arguments),
+    /// Explain what the model leaves out, effect by effect.
+    Effects(commands::effects::Arguments),
     /// Say before recording what a planned protocol can and cannot tell apart.
     Plan(commands::plan::Arguments),
+    /// Two recordings, in numbers and in a picture.
+    Compare(commands::compare::Arguments),
     /// Show, check or export a table.
     Table(commands::table::Arguments),
-    /// The whole story on this machine, no hardware: record, fit, flash, track.
-    Demo(commands::demo::Arguments),
-    /// Describe a muscle by answering what to measure, with drawings.
-    New(commands::new::Arguments),
     /// Send a table to a controller, or program its chip.
     Flash(commands::flash::Arguments),
     /// Let a controller follow a course of force, pressure or stroke, and record it.
@@ -84,16 +94,12 @@ enum Command {
     Recover(commands::record::RecoverArguments),
     /// Vent the muscle and disarm the controller.
     Vent(commands::run::VentArguments),
-    /// A controller without hardware, for all commands that talk to one.
-    Emulate(commands::emulate::Arguments),
     /// The live view in the browser: connect, run, fit, flash, compare.
     Studio(commands::studio::Arguments),
-    /// Two recordings, in numbers and in a picture.
-    Compare(commands::compare::Arguments),
+    /// A controller without hardware, for all commands that talk to one.
+    Emulate(commands::emulate::Arguments),
     /// Ask a controller what it is, what it does and what went wrong; change its settings.
     Device(commands::device::Arguments),
-    /// Explain what the model leaves out, effect by effect.
-    Effects(commands::effects::Arguments),
     /// Show which settings files count here, and what they say.
     Settings(commands::settings::Arguments),
     /// Print a completion script for a shell.
@@ -105,24 +111,24 @@ enum Command {
 impl Command {
     fn run(self, console: &Console) -> Result<()> {
         match self {
+            Self::Demo(a) => a.run(console),
+            Self::New(a) => a.run(console),
             Self::Fit(a) => a.run(console),
             Self::Evaluate(a) => a.run(console),
             Self::Predict(a) => a.run(console),
             Self::Diagnose(a) => a.run(console),
+            Self::Effects(a) => a.run(console),
             Self::Plan(a) => a.run(console),
+            Self::Compare(a) => a.run(console),
             Self::Table(a) => a.run(console),
-            Self::Demo(a) => a.run(console),
-            Self::New(a) => a.run(console),
             Self::Flash(a) => a.run(console),
             Self::Run(a) => a.run(console),
             Self::Record(a) => a.run(console),
             Self::Recover(a) => a.run(console),
             Self::Vent(a) => a.run(console),
-            Self::Emulate(a) => a.run(console),
             Self::Studio(a) => a.run(console),
-            Self::Compare(a) => a.run(console),
+            Self::Emulate(a) => a.run(console),
             Self::Device(a) => a.run(console),
-            Self::Effects(a) => a.run(console),
             Self::Settings(a) => a.run(&Cli::command(), console),
             Self::Completions(a) => a.run(&mut Cli::command(), console),
             Self::Man(a) => a.run(built(), console),

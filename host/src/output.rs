@@ -5,12 +5,14 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Code, Error, Result};
+use crate::file_kind::FileKind;
 
 /// Writes a file under a temporary name beside `path`, then renames it: a reader sees the old file or the new one.
 /// A path of `-` is standard output.
 ///
 /// # Errors
-/// [`Code::FileUnwritable`]; what stood at `path` is untouched then.
+/// [`Code::FileUnwritable`], or [`Code::CallInvalid`] where a file of another kind stands there that no command makes again, such as a
+/// recording that was given behind `--json`; what stood at `path` is untouched then.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     if path == Path::new("-") {
         let mut out = std::io::stdout().lock();
@@ -25,6 +27,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     if fs::metadata(path).is_ok_and(|m| !m.is_file()) {
         return fs::write(path, bytes).map_err(|e| Error::unwritable(path, &e));
     }
+    keeps_its_kind(path, bytes)?;
     let mut temporary = PathBuf::from(path);
     temporary.set_file_name(format!(".{}.{}.part", name.to_string_lossy(), std::process::id()));
     let written = fs::File::create(&temporary)
@@ -32,8 +35,34 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
         .and_then(|()| fs::rename(&temporary, path));
     written.map_err(|e| {
         let _ = fs::remove_file(&temporary);
-        Error::unwritable(path, &e).help("check that the folder exists and may be written to")
+        Error::unwritable(path, &e)
     })
+}
+
+/// A value as JSON whose numbers of single precision have the digits that they were given: 0.03, not 0.029999999329447746.
+///
+/// ```
+/// assert_eq!(host::output::json_of(&[0.03_f32]).to_string(), "[0.03]");
+/// ```
+#[must_use]
+pub fn json_of(value: &impl serde::Serialize) -> serde_json::Value {
+    // Text is the one form in which a single-precision number is written by itself; as a `Value` it is widened first.
+    serde_json::to_string(value).ok().and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default()
+}
+
+/// Refuses to put a result where a recording, a table or a description stands: an option that takes a file was given another's.
+fn keeps_its_kind(path: &Path, bytes: &[u8]) -> Result<()> {
+    let (Some(there), fresh) = (FileKind::of_file(path), FileKind::of_bytes(bytes)) else { return Ok(()) };
+    if matches!(there, FileKind::Json | FileKind::Report) || fresh == Some(there) {
+        return Ok(());
+    }
+    let fresh = fresh.map_or("a result of another kind", FileKind::words);
+    Err(Error::new(
+        Code::CallInvalid,
+        format!("{} stands here, and {fresh} would take its place", there.words()),
+    )
+    .file(path)
+    .help("name another file to write; `host COMMAND --help` says which options take one"))
 }
 
 #[cfg(test)]
@@ -52,5 +81,22 @@ mod tests {
         assert_eq!(write_whole(&missing, b"x").expect_err("no folder").exit_status(), 1);
         assert_eq!(fs::read_dir(&folder).expect("a folder").count(), 1, "no temporary file stays");
         fs::remove_dir_all(&folder).expect("removed");
+    }
+
+    #[test]
+    fn nothing_of_another_kind_takes_the_place_of_a_recording() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("a.csv");
+        let recording = "time_s,pressure_kPa,displacement_mm,force_N\n0,300,0,50\n";
+        fs::write(&file, recording).expect("written");
+        let refused =
+            write_whole(&file, b"{ \"schema\": \"pam-fit/1\" }\n").expect_err("a recording stands there");
+        assert_eq!(refused.exit_status(), 2);
+        assert!(
+            refused.to_string().contains("a recording stands here, and the JSON of a result"),
+            "{refused}"
+        );
+        assert_eq!(fs::read_to_string(&file).expect("readable"), recording);
+        write_whole(&file, recording.replace("50", "51").as_bytes()).expect("a recording for a recording");
     }
 }

@@ -11,8 +11,12 @@ use crate::console::Console;
 const REDRAW: Duration = Duration::from_millis(100);
 /// Work that is done sooner shows no line at all: a flash on the screen tells nothing.
 const PATIENCE: Duration = Duration::from_millis(400);
-/// Width of the bar, characters.
-const BAR: u64 = 24;
+/// Width of the bar where the terminal has room for it, characters.
+const BAR: usize = 24;
+/// A bar narrower than this says nothing.
+const LEAST_BAR: usize = 6;
+/// Width of a terminal that does not say its own.
+const COLUMNS: usize = 80;
 
 /// What is being done now, and since when.
 #[derive(Debug)]
@@ -114,7 +118,10 @@ impl Progress {
         // Of several threads that find the line due, one draws it.
         if due && self.drawn.compare_exchange(last, now, Ordering::Relaxed, Ordering::Relaxed).is_ok() {
             let stage = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
-            let text = line(&stage.what, done, self.total.load(Ordering::Relaxed), stage.begun.elapsed());
+            let columns =
+                terminal_size::terminal_size_of(std::io::stderr()).map_or(COLUMNS, |(w, _)| w.0.into());
+            let total = self.total.load(Ordering::Relaxed);
+            let text = line(&stage.what, done, total, stage.begun.elapsed(), columns);
             // One write that clears behind itself: an empty line between two pictures is a flicker.
             let _ = std::io::stderr().lock().write_all(format!("\r{text}\u{1b}[K").as_bytes());
         }
@@ -141,22 +148,27 @@ impl Drop for Progress {
     }
 }
 
-/// The line: what, a bar, the share, and the time that is left if the rest goes as fast as what is done.
-fn line(what: &str, done: u64, total: u64, elapsed: Duration) -> String {
-    if total == 0 && done == 0 {
-        return format!("{what} …");
-    }
-    if total == 0 {
-        return format!("{what}  {done}  {}", span(elapsed));
-    }
-    let done = done.min(total);
-    let full = BAR * done / total;
-    let bar: String = (0..BAR).map(|i| if i < full { '█' } else { '░' }).collect();
-    let left = match done {
-        0 => String::new(),
-        _ => format!("  {} left", span(elapsed.mul_f64((total - done) as f64 / done as f64))),
+/// The line: what, a bar, the share, and the time that is left if the rest goes as fast as what is done. It stays within the columns of the
+/// terminal: one that goes on in a second line could not be drawn over.
+fn line(what: &str, done: u64, total: u64, elapsed: Duration, columns: usize) -> String {
+    let room = columns.saturating_sub(1);
+    let text = match (done, total) {
+        (0, 0) => format!("{what} …"),
+        (_, 0) => format!("{what}  {done}  {}", span(elapsed)),
+        _ => {
+            let done = done.min(total);
+            let left = match done {
+                0 => String::new(),
+                _ => format!("  {} left", span(elapsed.mul_f64((total - done) as f64 / done as f64))),
+            };
+            let share = format!("{:3} %{left}", 100 * done / total);
+            let wide = room.saturating_sub(what.chars().count() + 3 + share.chars().count()).min(BAR);
+            let full = (wide as f64 * done as f64 / total as f64) as usize;
+            let bar: String = (0..wide).map(|i| if i < full { '█' } else { '░' }).collect();
+            if wide < LEAST_BAR { format!("{what} {share}") } else { format!("{what}  {bar} {share}") }
+        }
     };
-    format!("{what}  {bar} {:3} %{left}", 100 * done / total)
+    text.chars().take(room).collect()
 }
 
 /// A time in the unit that a person would say.
@@ -175,14 +187,28 @@ mod tests {
 
     #[test]
     fn the_line_tells_share_and_remaining_time() {
-        let quarter = line("fit", 25, 100, Duration::from_secs(20));
+        let quarter = line("fit", 25, 100, Duration::from_secs(20), 80);
         assert_eq!(quarter, "fit  ██████░░░░░░░░░░░░░░░░░░  25 %  1 min 00 s left");
-        assert!(line("fit", 0, 100, Duration::from_secs(9)).ends_with("  0 %"));
+        assert!(line("fit", 0, 100, Duration::from_secs(9), 80).ends_with("  0 %"));
         // More steps than were said is a wrong total, not a share above one.
-        assert!(line("fit", 300, 100, Duration::from_secs(9)).ends_with("100 %  0 s left"));
-        assert_eq!(line("record", 1234, 0, Duration::from_secs(5)), "record  1234  5 s");
-        assert_eq!(line("weighing", 0, 0, Duration::from_secs(5)), "weighing …");
+        assert!(line("fit", 300, 100, Duration::from_secs(9), 80).ends_with("100 %  0 s left"));
+        assert_eq!(line("record", 1234, 0, Duration::from_secs(5), 80), "record  1234  5 s");
+        assert_eq!(line("weighing", 0, 0, Duration::from_secs(5), 80), "weighing …");
         assert_eq!(span(Duration::from_secs(7_260)), "2 h 01 min");
+    }
+
+    #[test]
+    fn the_line_stays_within_the_terminal() {
+        let what = "predicting each pressure from the others";
+        for columns in 0..120 {
+            for (done, total) in [(0, 0), (123_456, 0), (0, 10), (1, 2_000_000), (10, 10)] {
+                let text = line(what, done, total, Duration::from_secs(5), columns);
+                assert!(text.chars().count() < columns.max(1), "{columns}: {text}");
+            }
+        }
+        let narrow = line(what, 1, 2, Duration::from_secs(70), 74);
+        assert_eq!(narrow, "predicting each pressure from the others  ████░░░░  50 %  1 min 10 s left");
+        assert_eq!(line(what, 1, 2, Duration::from_secs(70), 64), format!("{what}  50 %  1 min 10 s left"));
     }
 
     #[test]

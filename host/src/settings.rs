@@ -26,7 +26,7 @@ use crate::toml_words::toml_error;
 pub const NAME: &str = "pam.toml";
 
 /// Options that must be meant each time they are used.
-const NEVER: [&str; 6] = ["force", "pressure", "stroke", "clear", "help", "version"];
+const NEVER: [&str; 8] = ["force", "pressure", "stroke", "angle", "replace", "clear", "help", "version"];
 
 /// One setting, found and understood.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -40,6 +40,40 @@ fn every_command_has_help_with_an_example() {
 }
 
 #[test]
+fn help_fits_the_terminal_and_its_examples_can_be_copied() {
+    fn look(command: &clap::Command, path: &[&str], wrong: &mut Vec<String>) {
+        // A wrapped example is two commands; a long one is continued on purpose.
+        let below = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+        wrong.extend(
+            below.lines().filter(|l| l.starts_with(' ') && l.chars().count() > 80).map(str::to_owned),
+        );
+        for (columns, most) in [("60", 60), ("80", 80), ("240", 100)] {
+            let output = Command::new(env!("CARGO_BIN_EXE_host"))
+                .args(path)
+                .arg("--help")
+                .env("COLUMNS", columns)
+                .env_remove("PAM_PORT")
+                .output()
+                .unwrap();
+            let text = String::from_utf8(output.stdout).unwrap();
+            let named =
+                |l: &str| l.starts_with("Usage:") || l.contains('<') && l.trim_start().starts_with('-');
+            wrong.extend(
+                text.lines()
+                    .filter(|l| l.chars().count() > most && !named(l))
+                    .map(|l| format!("{path:?} at {columns}: {l}")),
+            );
+        }
+        for sub in command.get_subcommands() {
+            look(sub, &[path, &[sub.get_name()]].concat(), wrong);
+        }
+    }
+    let mut wrong = Vec::new();
+    look(&host::cli::Cli::command(), &[], &mut wrong);
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
 fn every_command_with_a_result_gives_it_as_json_too() {
     fn look(command: &clap::Command, path: &str, poor: &mut Vec<String>) {
         let subs: Vec<_> = command.get_subcommands().collect();
@@ -165,7 +199,7 @@ fn commands_that_the_readme_and_the_help_show_are_understood() {
         std::fs::read_to_string(readme).unwrap().lines().map(str::to_owned).collect();
     fn helps(command: &clap::Command, lines: &mut Vec<String>) {
         let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
-        lines.extend(help.lines().map(|l| l.trim().to_owned()));
+        lines.extend(help.replace("\\\n", " ").lines().map(|l| l.trim().to_owned()));
         command.get_subcommands().for_each(|sub| helps(sub, lines));
     }
     helps(&host::cli::Cli::command(), &mut lines);

@@ -138,6 +138,18 @@ fn a_run_is_a_recording_that_the_readers_of_recordings_read() {
         predicted.status.success() && String::from_utf8_lossy(&predicted.stdout).contains("pam-predict/1")
     );
     assert!(side["saturated_ticks"].is_u64(), "{side}");
+    // The first second, in which the vented muscle fills, is told apart.
+    let rms = |key: &str| side[key].as_f64().unwrap();
+    assert!(rms("tracking_rms_after_1_s") < rms("tracking_rms"), "{side}");
+    // Numbers of single precision are written as such.
+    assert_eq!(side["device"]["settings"]["regulator"]["lag_s"].to_string(), "0.03");
+    // A second one of the same name is refused unless it is meant, and the first stays.
+    let again = ["run", "--pressure", "100", "--seconds", "0.2", "-o", "run.csv"];
+    let (status, said) = bench.refused(&again);
+    assert!(status == 2 && said.contains("--replace"), "{said}");
+    assert_eq!(Reader::new().file(&path).unwrap()[0].len(), recording.len());
+    bench.done(&[&again[..], &["--replace"]].concat());
+    assert!(Reader::new().file(&path).unwrap()[0].len() < recording.len());
     // Seven times what this muscle can do.
     let said = bench.done(&["run", "--force", "1000", "--seconds", "0.5"]);
     assert!(

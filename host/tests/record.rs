@@ -81,7 +81,7 @@ fn both_forms_hold_the_same_samples_and_say_how_they_were_made() {
     }
     // A second one of the same name is refused, and nothing happens to the first.
     let again = host(folder.path(), &["record", "--port", &port, "-o", "run.csv"]).output().unwrap();
-    assert!(again.status.code() == Some(2) && said(&again).contains("--force"), "{}", said(&again));
+    assert!(again.status.code() == Some(2) && said(&again).contains("--replace"), "{}", said(&again));
     assert_eq!(read(&csv).len(), a.len());
 }
 

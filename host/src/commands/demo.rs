@@ -29,8 +29,8 @@ use crate::table_file::{self, About, TableFile};
 /// Arguments of `host demo`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  host demo\n  host demo --muscle contractile -o /tmp/demo --json\n\n\
-    A muscle is recorded on the virtual bench and fitted; its table goes over the link into the controller (in QEMU where that\n\
-    is installed, else in this process); the controller follows a force while the bench moves the muscle, with the fitted table,\n\
+    A muscle is recorded on the virtual bench and fitted; its table goes over the link into the controller (in QEMU where that \
+    is installed, else in this process); the controller follows a force while the bench moves the muscle, with the fitted table, \
     with the plain Gaylord formula and without feed-forward. Everything stays in the folder, the page with the pictures too.")]
 pub struct Arguments {
     /// The muscle of the bench: mini, contractile, push or random:SEED.

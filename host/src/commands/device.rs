@@ -60,7 +60,8 @@ enum Action {
     /// Show, change, save or restore the settings.
     #[command(after_help = "Examples:\n  \
         host device settings > settings.toml\n  \
-        host device settings --set limits.pressure_pa=500e3 --set watch.silence_ticks=200\n  \
+        host device settings --set limits.pressure_pa=500e3 \\\n      \
+            --set watch.silence_ticks=200\n  \
         host device settings --from settings.toml")]
     Settings(settings::Arguments),
     /// Find the pressure regulator's gain, offset, lag, rate and deadband by steps, and keep them in the settings.

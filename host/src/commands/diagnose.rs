@@ -26,8 +26,9 @@ use crate::table_file::{self, TableFile};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     host diagnose --muscle mini.toml loops/*.csv\n  \
-    host diagnose --muscle mini.toml loops/*.csv --json answer.json -o corrected.pam --report answer.html\n  \
-    host diagnose --muscle mini.toml --with backlash,force-offset loops/*.csv -o corrected.pam")]
+    host diagnose --muscle mini.toml loops/*.csv -o corrected.pam \\\n      \
+        --report answer.html --json answer.json\n  \
+    host diagnose --muscle mini.toml loops/*.csv --with backlash,force-offset")]
 pub struct Arguments {
     /// The muscle's description.
     #[arg(long, value_name = "M.toml")]
@@ -48,8 +49,8 @@ pub struct Arguments {
     /// Write the table refitted beside the named effects; corrections of the bench stay apart in it.
     #[arg(short, long, value_name = "T2.pam")]
     output: Option<PathBuf>,
-    /// Write the answer as JSON; `-` is standard output.
-    #[arg(long, value_name = "F")]
+    /// Write the answer into a file as JSON; `-` is standard output.
+    #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     #[command(flatten)]
     reports: Reports,

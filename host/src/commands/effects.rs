@@ -8,7 +8,7 @@ use serde_json::json;
 
 use crate::bench::Candidate;
 use crate::console::Console;
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, nearest};
 use crate::output::write_whole;
 use crate::report::letters::letters;
 use crate::report::{effect_page, rich};
@@ -83,27 +83,11 @@ pub(super) fn named(name: &str) -> Result<Candidate> {
 }
 
 fn unknown(name: &str) -> Error {
-    let near = Candidate::all().map(Candidate::name).min_by_key(|known| distance(known, name));
+    let near = nearest(name, Candidate::all().map(Candidate::name));
     let help = near.map_or(String::new(), |n| format!("did you mean `{n}`? "));
     Error::new(Code::CallInvalid, "there is no such effect")
         .value(name)
         .help(format!("{help}`host effects` lists all"))
-}
-
-/// Levenshtein's distance, to suggest the name that was meant.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut before = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let substitute = before + usize::from(x != *y);
-            before = row[j + 1];
-            row[j + 1] = substitute.min(before + 1).min(row[j] + 1);
-        }
-    }
-    row[b.len()]
 }
 
 fn list(all: &[Candidate]) -> String {

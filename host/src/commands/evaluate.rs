@@ -22,9 +22,9 @@ use crate::recording::{Campaign, Reader};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     host evaluate --muscle mini.toml loops/*.csv\n  \
-    host evaluate --muscle short.toml --muscle long.toml --import festo.toml --fit-geometry --fit-lengths \\\n      \
-        --published bolen-10mm settled_points.csv\n\n\
-    Each run (or contraction) is left out in turn, the rest is fitted, and what was left out is scored. With several\n\
+    host evaluate --muscle short.toml --muscle long.toml --import festo.toml \\\n      \
+        --fit-geometry --fit-lengths --published bolen-10mm settled_points.csv\n\n\
+    Each run (or contraction) is left out in turn, the rest is fitted, and what was left out is scored. With several \
     muscles of one stock each is also predicted from the tables of the others, with an end effect that all lengths share.")]
 pub struct Arguments {
     /// A muscle's description; several, where the import description selects each muscle's rows.
@@ -36,7 +36,8 @@ pub struct Arguments {
     #[arg(long, value_enum, value_name = "WHAT", default_value_t = LeaveOut::Both)]
     leave_out: LeaveOut,
     /// Order M of the elastic polynomial.
-    #[arg(long, default_value_t = 4, value_name = "M", value_parser = clap::value_parser!(u8).range(1..=6))]
+    #[arg(long, default_value_t = 4, value_name = "M", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u8).range(1..=6))]
     order: u8,
     /// Find effective dimensions too, within bounds.
     #[arg(long)]
@@ -47,7 +48,7 @@ pub struct Arguments {
     /// A published formula to compare with.
     #[arg(long, value_name = "NAME")]
     published: Option<String>,
-    /// Where to write the figures as JSON; `-` is standard output.
+    /// Write the figures into a file as JSON; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -99,7 +100,10 @@ impl Arguments {
                 match scored {
                     Ok(held) => Some(held),
                     Err(e) => {
-                        console.warning(format!("{}: {e}", muscle.name));
+                        let told = failure.as_ref().is_some_and(|f| f.to_string() == e.to_string());
+                        if !told {
+                            console.warning(format!("{}: {e}", muscle.name));
+                        }
                         failure.get_or_insert(e);
                         None
                     }

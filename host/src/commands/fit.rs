@@ -22,8 +22,8 @@ use crate::table_file::{self, TableFile};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     host fit --muscle mini.toml loops/*.csv -o mini.pam --report mini.html\n  \
-    host fit --muscle festo.toml --import bench.toml run*.csv -o festo.pam --order 3\n\n\
-    Recordings: CSV or tab-separated text (also .gz and .zst), Parquet, MATLAB or HDF5, whose columns have their units behind\n\
+    host fit --muscle festo.toml --import bench.toml run*.csv -o festo.pam\n\n\
+    Recordings: CSV or tab-separated text (also .gz and .zst), Parquet, MATLAB or HDF5, whose columns have their units behind \
     the last underscore (time_s, pressure_kPa, displacement_mm, force_N); anything else comes in by --import.")]
 pub struct Arguments {
     /// The muscle's description.
@@ -34,13 +34,14 @@ pub struct Arguments {
     /// Where to write the table.
     #[arg(short, long, value_name = "TABLE.pam")]
     output: Option<PathBuf>,
-    /// Where to write the figures of the fit as JSON; `-` is standard output.
+    /// Write the figures of the fit into a file as JSON; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     #[command(flatten)]
     reports: Reports,
     /// Order M of the elastic polynomial.
-    #[arg(long, default_value_t = 4, value_name = "M", value_parser = clap::value_parser!(u8).range(1..=6))]
+    #[arg(long, default_value_t = 4, value_name = "M", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u8).range(1..=6))]
     order: u8,
     /// Let the load-bearing length be shortened by the rounded ends (L′ in place of L).
     #[arg(long)]

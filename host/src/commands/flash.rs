@@ -22,7 +22,7 @@ use crate::table_file::{About, TableFile, now_utc};
 #[command(after_help = "Examples:\n  \
     host flash mini.pam --port /dev/ttyACM0\n  \
     host flash mini.pam --port tcp:127.0.0.1:4321 --dry-run\n  \
-    host flash --firmware target/firmware/nucleo-f446re.elf --chip STM32F446RETx\n\n\
+    host flash --chip STM32F446RETx --firmware target/firmware/nucleo-f446re.elf\n\n\
     The table that the device has is kept in a file beside the new one before anything is written.")]
 pub struct Arguments {
     /// The table to send.

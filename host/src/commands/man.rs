@@ -57,7 +57,7 @@ fn closing(below: &str) -> String {
         } else if line.starts_with(' ') {
             page += &format!(".nf\n{escaped}\n.fi\n");
         } else {
-            page += if notes { "" } else { ".SH NOTES\n" };
+            page += if notes { ".PP\n" } else { ".SH NOTES\n" };
             notes = true;
             // A line that begins with a dot or an apostrophe would be an order to the formatter.
             page += &format!("\\&{escaped}\n");

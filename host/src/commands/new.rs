@@ -20,8 +20,8 @@ pub struct Arguments {
     #[arg(short, long, value_name = "MUSCLE.toml", default_value = "muscle.toml")]
     output: PathBuf,
     /// Replace a file that is there.
-    #[arg(long)]
-    force: bool,
+    #[arg(long, alias = "force")]
+    replace: bool,
 }
 
 const DRAWING: &str = r"
@@ -57,10 +57,10 @@ impl Arguments {
     /// # Errors
     /// [`Code::CallInvalid`] when the file is there already or the answers end early, [`Code::FileUnwritable`].
     pub fn run(self, console: &Console) -> Result<()> {
-        if !self.force && self.output.as_os_str() != "-" && self.output.exists() {
+        if !self.replace && self.output.as_os_str() != "-" && self.output.exists() {
             return Err(Error::new(Code::CallInvalid, "the file is there already")
                 .file(&self.output)
-                .help("name another one with -o, or replace it with --force"));
+                .help("name another one with -o, or replace it with --replace"));
         }
         // What cannot be written is better known before seven questions than after.
         let folder = self.output.parent().filter(|f| !f.as_os_str().is_empty());

@@ -23,8 +23,8 @@ pub struct Arguments {
     /// The planned protocol.
     #[arg(value_name = "PROTOCOL.toml")]
     protocol: PathBuf,
-    /// Write the matrix as JSON; `-` is standard output.
-    #[arg(long, value_name = "F")]
+    /// Write the matrix into a file as JSON; `-` is standard output.
+    #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
 

@@ -1,6 +1,6 @@
 //! `host predict`: a table's force on recordings.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
@@ -19,9 +19,9 @@ use crate::table_file::TableFile;
 #[command(after_help = "Examples:\n  \
     host predict --table mini.pam new.csv -o predicted.csv\n  \
     host predict --table mini.pam first.csv second.csv --json scores.json\n\n\
-    The column force_model_band_N is half the width of the 95 % interval of the table's own force (of its base model, where it\n\
-    carries effects); readings scatter beyond it by what the table does not describe.\n\
-    Several recordings are one history: effects with a memory run through them in order. The output is one table; with\n\
+    The column force_model_band_N is half the width of the 95 % interval of the table's own force (of its base model, where it \
+    carries effects); readings scatter beyond it by what the table does not describe.\n\n\
+    Several recordings are one history: effects with a memory run through them in order. The output is one table; with \
     several recordings its first column is `file`.")]
 pub struct Arguments {
     /// The table.
@@ -32,7 +32,7 @@ pub struct Arguments {
     /// Where to write the recordings with a column `force_model_N` added; `-` is standard output.
     #[arg(short, long, value_name = "OUT.csv")]
     output: Option<PathBuf>,
-    /// Where to write the scores as JSON; `-` is standard output.
+    /// Write the scores into a file as JSON; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -43,6 +43,16 @@ impl Arguments {
     /// # Errors
     /// What is wrong with the input, or an output that cannot be written.
     pub fn run(self, console: &Console) -> Result<()> {
+        if let Some(path) = &self.output
+            && self.recordings.files.iter().any(|f| same_file(f, path))
+        {
+            return Err(Error::new(
+                Code::CallInvalid,
+                "the output would take the place of a recording that is read",
+            )
+            .file(path)
+            .help("name another file behind -o"));
+        }
         let table = TableFile::read(&self.table)?;
         let rest_length = f64::from(table.table.geometry.rest_length.metres());
         let mut reader = Reader::with_rest_length(rest_length);
@@ -95,4 +105,9 @@ impl Arguments {
         }
         Ok(())
     }
+}
+
+/// Whether two paths lead to one file that is there.
+fn same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }

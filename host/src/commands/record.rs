@@ -10,7 +10,7 @@ use model_core::link::messages::TelemetryRate;
 use serde_json::json;
 
 use super::port::PortOption;
-use super::run::{begin, end, interrupts, positive};
+use super::run::{begin, end, interrupts, not_there, positive};
 use crate::console::Console;
 use crate::counted::counted;
 use crate::device::recorder::{Recorder, about_losses, about_start, rescue};
@@ -25,8 +25,8 @@ use crate::table_file::now_utc;
     host record --port /dev/ttyACM0\n  \
     host record --seconds 60 -o run.csv -o run.mcap\n  \
     host record --rate 100 --folder campaign\n\n\
-    It only watches: what the controller does, it goes on doing. Every 0.1 s goes to the disk; a program that is killed, a cable\n\
-    that is pulled or a disk that fills leaves everything until then. CSV and MCAP are read by `host fit` and all others;\n\
+    It only watches: what the controller does, it goes on doing. Every 0.1 s goes to the disk; a program that is killed, a cable \
+    that is pulled or a disk that fills leaves everything until then. CSV and MCAP are read by `host fit` and all others; \
     MCAP opens in the viewers of robotics. OUT.json says which versions, table and settings the controller had.")]
 pub struct Arguments {
     #[command(flatten)]
@@ -44,8 +44,8 @@ pub struct Arguments {
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
     /// Replace recordings of the same name.
-    #[arg(long)]
-    force: bool,
+    #[arg(long, alias = "force")]
+    replace: bool,
     /// Print what was recorded as JSON.
     #[arg(long)]
     json: bool,
@@ -73,13 +73,7 @@ impl Arguments {
         } else {
             self.output.clone()
         };
-        if let Some(there) = output.iter().find(|f| f.exists())
-            && !self.force
-        {
-            return Err(Error::new(Code::CallInvalid, "the recording is there already")
-                .file(there)
-                .help("name another one with -o, or replace it with --force"));
-        }
+        not_there(&output, self.replace)?;
         let interrupted = interrupts()?;
         let mut client = self.port.connect(console)?;
         let ticks = f64::from(client.call::<GetInfo>(&())?.ticks_per_s);
@@ -89,7 +83,8 @@ impl Arguments {
         let Some(mut recorder) = begin(&output, &about, console)? else {
             return Err(Error::new(Code::CallInvalid, "a recording needs a file"));
         };
-        console.note(format!("recording to {}; Ctrl-C ends it", output[0].display()));
+        let names = output.iter().map(|f| f.display().to_string()).collect::<Vec<_>>().join(" and ");
+        console.note(format!("recording to {names}; Ctrl-C ends it"));
         let progress = Progress::new(console, "record");
         progress.total(self.seconds.map_or(0, |s| (s * 1e3) as u64));
         let watched = watch(&mut client, every_ticks, self.seconds, &mut recorder, &progress, || {
@@ -112,7 +107,7 @@ impl Arguments {
         if let Err(error) = &watched
             && kept.is_ok()
         {
-            console.note(format!("{} until then in {}", counted(rows, "sample"), output[0].display()));
+            console.note(format!("{} until then in {names}", counted(rows, "sample")));
             console.detail(error.to_string());
         }
         watched?;
@@ -128,7 +123,7 @@ impl Arguments {
         console.result(if self.json {
             format!("{about:#}")
         } else {
-            format!("{} in {}, {} lost", counted(rows, "sample"), output[0].display(), losses.samples)
+            format!("{} in {names}, {} lost", counted(rows, "sample"), losses.samples)
         });
         Ok(())
     }
@@ -187,7 +182,7 @@ fn watch(
 #[command(
     arg_required_else_help = true,
     after_help = "Example:\n  host recover run.csv.part run.mcap.part\n\n\
-    A recording is named NAME.part while it grows. This takes away the sample that was being written when the program was\n\
+    A recording is named NAME.part while it grows. This takes away the sample that was being written when the program was \
     killed, ends the file and gives it its name. The next recording of the same name does so by itself."
 )]
 pub struct RecoverArguments {

@@ -24,13 +24,19 @@ use crate::progress::Progress;
 #[derive(Debug, Args)]
 #[command(arg_required_else_help = true)]
 #[command(after_help = "Examples:\n  \
-    host run --port /dev/ttyACM0 --force 'sine mean=60 amplitude=20 frequency=0.5' --seconds 10 -o run.csv\n  \
-    host run --port tcp:127.0.0.1:4321 --force 'steps 40 60 80 hold=2' --seconds 12 -o steps.csv\n  \
-    host run --port /dev/ttyACM0 --pressure 200 --seconds 5\n  \
-    host run --port /dev/ttyACM0 --stroke @course.csv --seconds 30 -o stroke.csv\n  \
-    host run --port /dev/ttyACM0 --angle 'sine mean=0 amplitude=5 frequency=0.5' --stiffness 12 --seconds 10\n\n\
-    Courses: VALUE | sine mean= amplitude= frequency= | steps V V … hold= | trapezoid low= high= ramp= hold= |\n  \
-    chirp mean= amplitude= from= to= duration= | @FILE.csv (time in s, value); frequencies in Hz, times in s.\n\
+    host run --pressure 200 --seconds 5\n  \
+    host run --port /dev/ttyACM0 --seconds 10 -o run.csv \\\n      \
+        --force 'sine mean=60 amplitude=20 frequency=0.5'\n  \
+    host run --force 'steps 40 60 80 hold=2' --seconds 12 -o steps.mcap\n  \
+    host run --stroke @course.csv --seconds 30 -o stroke.csv\n  \
+    host run --angle 'sine mean=0 amplitude=5 frequency=0.5' --stiffness 12\n\n\
+    Courses (frequencies in Hz, times in s):\n  \
+    VALUE\n  \
+    sine mean= amplitude= frequency=\n  \
+    steps V V … hold=\n  \
+    trapezoid low= high= ramp= hold=\n  \
+    chirp mean= amplitude= from= to= duration=\n  \
+    @FILE.csv    two columns: time in s, value\n\n\
     The recording is read back by `host fit` and `host predict`. At the end, on any error and on Ctrl-C the muscle is vented.")]
 pub struct Arguments {
     #[command(flatten)]
@@ -46,6 +52,9 @@ pub struct Arguments {
     /// The recording, as CSV or (by the ending .mcap) MCAP; may be given again for both. OUT.json says how it was made.
     #[arg(short, long, value_name = "OUT")]
     output: Vec<PathBuf>,
+    /// Replace a recording that is there.
+    #[arg(long)]
+    replace: bool,
     /// Samples per second, at most the controller's own rate [default: its own rate].
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
@@ -113,6 +122,7 @@ impl Arguments {
         if self.stiffness.is_some_and(|s| !(s >= 0.0 && s.is_finite())) {
             return Err(Error::new(Code::CallInvalid, "--stiffness must be zero or more"));
         }
+        not_there(&self.output, self.replace)?;
         let interrupted = interrupts()?;
         let mut client = self.port.connect(console)?;
         if let Some(source) = self.feed_forward {
@@ -151,8 +161,9 @@ impl Arguments {
         );
         drop(progress);
         let losses = client.losses();
-        about["samples"] = json!(errors.samples);
-        about["tracking_rms"] = json!(errors.rms(quantity));
+        about["samples"] = json!(errors.all.samples);
+        about["tracking_rms"] = json!(errors.all.rms(quantity));
+        about["tracking_rms_after_1_s"] = json!(errors.settled.rms(quantity));
         about["losses"] = about_losses(losses);
         let saturated = match &outcome {
             Ok(_) => client.call::<GetStatus>(&()).ok(),
@@ -178,7 +189,7 @@ impl Arguments {
                 counted(losses.gaps, "gap")
             ));
         }
-        let lasted = errors.samples as f64 * f64::from(every_ticks);
+        let lasted = errors.all.samples as f64 * f64::from(every_ticks);
         // A step asks for more than can be had for a moment, and is none the worse for it.
         if let Some(saturated) = saturated.map(f64::from).filter(|&saturated| saturated > 0.1 * lasted) {
             let why = reached.as_ref().and_then(Reached::why).unwrap_or(
@@ -200,26 +211,46 @@ impl Arguments {
             console.result(format!("{about:#}"));
         } else {
             let name = kept.map(|p| format!(" in {}", p.display())).unwrap_or_default();
-            let rms = errors
-                .rms(quantity)
-                .map_or(String::new(), |r| format!(", tracking error {r:.3} {} rms", quantity.unit()));
-            console.result(format!("{}{name}{rms}; vented", counted(errors.samples, "sample")));
+            let rms = errors.to_text(quantity);
+            console.result(format!("{}{name}{rms}; vented", counted(errors.all.samples, "sample")));
         }
         Ok(())
     }
 }
 
-/// How far what was measured stayed from what was asked.
+/// In its first second a vented muscle fills, whatever is asked, µs.
+const FILLING: u64 = 1_000_000;
+
+/// Errors squared and summed.
+#[derive(Debug, Default)]
+struct Squares {
+    samples: u64,
+    sum: f64,
+}
+
+impl Squares {
+    fn add(&mut self, error: f64) {
+        self.samples += 1;
+        self.sum += error * error;
+    }
+
+    fn rms(&self, quantity: Quantity) -> Option<f64> {
+        (self.samples > 0).then(|| (self.sum / self.samples as f64).sqrt() / quantity.scale())
+    }
+}
+
+/// How far what was measured stayed from what was asked: all the time, and after the muscle had filled.
 #[derive(Debug)]
 struct Errors {
     joint: Joint,
-    samples: u64,
-    squares: f64,
+    begun: Option<u64>,
+    all: Squares,
+    settled: Squares,
 }
 
 impl Errors {
     fn new(joint: Joint) -> Self {
-        Self { joint, samples: 0, squares: 0.0 }
+        Self { joint, begun: None, all: Squares::default(), settled: Squares::default() }
     }
 
     fn add(&mut self, quantity: Quantity, sample: &model_core::link::messages::Telemetry) {
@@ -235,13 +266,25 @@ impl Errors {
         };
         let error = f64::from(measured - sample.asked);
         if error.is_finite() {
-            self.samples += 1;
-            self.squares += error * error;
+            let begun = *self.begun.get_or_insert(sample.time_us);
+            self.all.add(error);
+            if sample.time_us.saturating_sub(begun) >= FILLING {
+                self.settled.add(error);
+            }
         }
     }
 
-    fn rms(&self, quantity: Quantity) -> Option<f64> {
-        (self.samples > 0).then(|| (self.squares / self.samples as f64).sqrt() / quantity.scale())
+    fn to_text(&self, quantity: Quantity) -> String {
+        let unit = quantity.unit();
+        match (self.all.rms(quantity), self.settled.rms(quantity)) {
+            (Some(all), Some(settled)) => {
+                format!(
+                    ", tracking error {settled:.3} {unit} rms after the first second, {all:.3} {unit} with it"
+                )
+            }
+            (Some(all), None) => format!(", tracking error {all:.3} {unit} rms"),
+            (None, _) => String::new(),
+        }
     }
 }
 
@@ -272,6 +315,17 @@ pub(super) fn positive<const N: usize>(options: [(&str, Option<f64>); N]) -> Res
         }
     }
     Ok(())
+}
+
+/// Refuses to record over what is there, unless that is meant.
+pub(super) fn not_there(files: &[PathBuf], replace: bool) -> Result<()> {
+    // A device such as /dev/null takes any number of recordings.
+    match files.iter().find(|f| f.is_file()) {
+        Some(there) if !replace => Err(Error::new(Code::CallInvalid, "the recording is there already")
+            .file(there)
+            .help("name another one with -o, or replace it with --replace")),
+        _ => Ok(()),
+    }
 }
 
 /// Begins a recording in the files that are named, if any are.

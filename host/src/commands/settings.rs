@@ -10,8 +10,8 @@ use crate::settings::{NAME, all_settings, files};
 /// Arguments of `host settings`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  host settings\n  host settings --example > pam.toml\n\n\
-    An option takes its value from the first of: the command line; the environment (PAM_PORT); the nearest pam.toml, here or in\n\
-    a folder above; pam/pam.toml in the user's configuration folder; the built-in default. PAM_SETTINGS names another file in\n\
+    An option takes its value from the first of: the command line; the environment (PAM_PORT); the nearest pam.toml, here or in \
+    a folder above; pam/pam.toml in the user's configuration folder; the built-in default. PAM_SETTINGS names another file in \
     place of both. Paths are taken from the folder of their file.")]
 pub struct Arguments {
     /// Print a file to begin with.

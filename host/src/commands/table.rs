@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::console::Console;
 use crate::counted::counted;
 use crate::error::{Code, Error, Result};
-use crate::output::write_whole;
+use crate::output::{json_of, write_whole};
 use crate::table_export::{self, Format};
 use crate::table_file::TableFile;
 
@@ -166,11 +166,11 @@ fn remarks(file: &TableFile) -> Vec<String> {
 
 fn to_json(file: &TableFile) -> Value {
     let t = &file.table;
-    let kpa = |p: f32| f64::from(p) / 1e3;
+    let kpa = |p: f32| json_of(&(p / 1e3));
     let nodes: Vec<Value> = (0..t.nodes.len())
         .map(|i| {
-            let e: Vec<f64> = t.elastic.iter().map(|c| f64::from(c[i]) / 1e6).collect();
-            json!({ "pressure_kPa": kpa(t.nodes[i]), "E_MPa": e, "k_F": t.friction[i] })
+            let e: Vec<f32> = t.elastic.iter().map(|c| c[i] / 1e6).collect();
+            json!({ "pressure_kPa": kpa(t.nodes[i]), "E_MPa": json_of(&e), "k_F": json_of(&t.friction[i]) })
         })
         .collect();
     let effects: Vec<Value> = t
@@ -182,14 +182,17 @@ fn to_json(file: &TableFile) -> Value {
                 .parameters
                 .iter()
                 .zip(&e.parameters)
-                .map(|(p, v)| json!({ "name": p.name, "value": v, "unit": p.unit }))
+                .map(|(p, v)| json!({ "name": p.name, "value": json_of(v), "unit": p.unit }))
                 .collect();
             json!({ "effect": info.name, "parameters": parameters })
         })
         .collect();
     let a = &file.about;
-    let corrections: Vec<Value> =
-        a.corrections.iter().map(|c| json!({ "effect": c.effect, "parameters": c.parameters })).collect();
+    let corrections: Vec<Value> = a
+        .corrections
+        .iter()
+        .map(|c| json!({ "effect": c.effect, "parameters": json_of(&c.parameters) }))
+        .collect();
     let sources: Vec<Value> = a
         .sources
         .iter()
@@ -201,19 +204,19 @@ fn to_json(file: &TableFile) -> Value {
         "date": a.date,
         "tool": a.tool,
         "kind": match t.kind { model_core::table::Kind::Contractile => "contractile", model_core::table::Kind::Push => "push" },
-        "rest_length_mm": t.geometry.rest_length.millimetres(),
-        "braid_angle_deg": t.geometry.braid_angle.degrees(),
-        "bladder_outer_diameter_mm": t.geometry.outer_diameter.millimetres(),
-        "bladder_wall_mm": t.geometry.wall.millimetres(),
+        "rest_length_mm": json_of(&t.geometry.rest_length.millimetres()),
+        "braid_angle_deg": json_of(&t.geometry.braid_angle.degrees()),
+        "bladder_outer_diameter_mm": json_of(&t.geometry.outer_diameter.millimetres()),
+        "bladder_wall_mm": json_of(&t.geometry.wall.millimetres()),
         "tip_correction": t.geometry.tip_correction,
         "order": t.order(),
-        "deadband_kPa": t.deadband.kilopascals(),
+        "deadband_kPa": json_of(&t.deadband.kilopascals()),
         "goes_slack": t.goes_slack,
-        "blocked_force_N": t.blocked_force.newtons(),
-        "max_pressure_kPa": t.max_pressure.kilopascals(),
+        "blocked_force_N": json_of(&t.blocked_force.newtons()),
+        "max_pressure_kPa": json_of(&t.max_pressure.kilopascals()),
         "tested": {
-            "pressure_kPa": [t.tested.pressure_low.kilopascals(), t.tested.pressure_high.kilopascals()],
-            "contraction": [t.tested.contraction_low, t.tested.contraction_high],
+            "pressure_kPa": json_of(&[t.tested.pressure_low.kilopascals(), t.tested.pressure_high.kilopascals()]),
+            "contraction": json_of(&[t.tested.contraction_low, t.tested.contraction_high]),
         },
         "pressures": nodes,
         "effects": effects,

@@ -66,7 +66,7 @@ pub fn page(story: &Story<'_>) -> Result<Page> {
     let mut tracking = Section::new("Force tracking").summarised();
     tracking.text(format!(
         "The controller is {}. The virtual bench moves the muscle all the while, one exchange a control tick, in lock-step. \
-         Each law runs the same tasks; the first {SETTLE} s of each run, in which the muscle fills, are shown and not judged.",
+         Each law runs the same tasks; what happens before {SETTLE} s, while the muscle fills, is shown and not judged.",
         story.controller
     ));
     let mut table = Table::new(

@@ -14,6 +14,7 @@ use std::path::Path;
 use model_core::link::messages::{Mode, Reference, SetPoint};
 
 use crate::error::{Code, Error, Result, nearest};
+use crate::file_kind::FileKind;
 
 /// What is controlled, and the unit that people write it in.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -238,7 +239,7 @@ impl Course {
 
     /// Two columns, time in seconds and value; a header line and `#` lines are passed over.
     fn from_file(path: &Path, quantity: Quantity) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::unreadable(path, &e))?;
+        let text = FileKind::Recording.read_text(path)?;
         let at = |line: usize, cause: &str| {
             Error::new(Code::RecordingNotANumber, cause)
                 .file(path)

@@ -4,6 +4,7 @@ use model_core::link::hello::{Board, Hello};
 use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 
 use super::Port;
+use crate::counted::counted;
 use crate::error::{Code, Error};
 
 /// What came before any hello, to tell a silent line from a foreign peer.
@@ -53,8 +54,8 @@ impl Heard {
         Error::new(
             Code::DeviceForeign,
             format!(
-                "something answers here, but it is not a controller of this project: it sent {} bytes that begin {begins}",
-                self.bytes
+                "something answers here, but it is not a controller of this project: it sent {}, beginning {begins}",
+                counted(self.bytes, "byte")
             ),
         )
         .value(port.name())

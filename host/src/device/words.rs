@@ -1,9 +1,11 @@
 //! What a device means, in words: its faults with their remedy, its refusals, its states.
 
+use model_core::link::endpoints::{ClearFault, Endpoint};
 use model_core::link::messages::{
     Fault, FaultReport, Field, Mode, Refusal, Sensor, Side, StartedBy, State, StoreFault, TableFault,
 };
 
+use crate::counted::counted;
 use crate::error::{Code, Error};
 
 /// A fault as a person reads it.
@@ -249,6 +251,7 @@ pub fn refused(request: &str, refusal: Refusal) -> Error {
         Refusal::WrongState(now) => (
             format!("it is {}", state(now)),
             match now {
+                State::Disarmed if request == ClearFault::NAME => "there is no fault to clear".to_owned(),
                 State::Disarmed => "arm it first".to_owned(),
                 State::Armed | State::Running => "stop it first: host vent --port PORT".to_owned(),
                 State::Fault => "see `host device faults`, then clear it with --clear".to_owned(),
@@ -319,7 +322,7 @@ fn table_refused(why: TableFault) -> Error {
         TableFault::NotBegun => "pieces came without a beginning".to_owned(),
         TableFault::Gap(there) => format!("a piece is missing behind byte {there}"),
         TableFault::TooLong(fits) => format!("it is longer than the {fits} bytes that the device keeps"),
-        TableFault::Incomplete(there) => format!("only {there} bytes arrived"),
+        TableFault::Incomplete(there) => format!("only {} arrived", counted(there, "byte")),
         TableFault::Check => "its check sum is wrong".to_owned(),
         TableFault::Version { found, known } => {
             format!("it has format version {found}, the device reads version {known}")

@@ -22,6 +22,7 @@ use super::verdict::{
 };
 use crate::bench::Candidate as Law;
 use crate::checks::Checks;
+use crate::counted::counted;
 use crate::error::{Code, Error, Result};
 use crate::progress::Progress;
 use crate::recording::Campaign;
@@ -308,14 +309,16 @@ fn blocked_force(rows: &Rows) -> f64 {
 fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<String> {
     let effective = rows.effective();
     if effective < FEWEST_ROWS {
+        let usable =
+            if effective == 0 { "no row".to_owned() } else { format!("only {}", counted(effective, "row")) };
         return Some(format!(
-            "only {effective} rows can be used (direction known, muscle not slack); {FEWEST_ROWS} is the least"
+            "{usable} can be used (direction known, muscle not slack); {FEWEST_ROWS} is the least"
         ));
     }
     if rows.blocks < FEWEST_BLOCKS {
         return Some(format!(
-            "only {} half-strokes: with fewer than {FEWEST_BLOCKS} chance and physics cannot be told apart",
-            rows.blocks
+            "only {}: with fewer than {FEWEST_BLOCKS} chance and physics cannot be told apart",
+            counted(rows.blocks, "half-stroke")
         ));
     }
     let judged = || rows.root_weight.iter().zip(&rows.contexts).filter(|(w, _)| **w > 0.0);

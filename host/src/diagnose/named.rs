@@ -59,9 +59,9 @@ pub(crate) fn missing(found: &Found, library: &[candidates::Candidate], rows: &R
                 )
             } else {
                 format!(
-                    "it lives in too few half-strokes for a test by whole blocks (p = {:.2}), but is e^{:.0} times as likely as chance",
+                    "it lives in too few half-strokes for a test by whole blocks (p = {:.2}), but is {} as likely as chance",
                     t.p,
-                    t.trial.score / 2.0
+                    times(t.trial.score / 2.0)
                 )
             };
             let why = format!(
@@ -156,4 +156,13 @@ pub(crate) fn considered(
             }
         })
         .collect()
+}
+
+/// A ratio by its logarithm, as a person says it: beyond a million nobody tells one from the next.
+fn times(logarithm: f64) -> String {
+    if logarithm < 1e6_f64.ln() {
+        format!("{:.0} times", logarithm.exp())
+    } else {
+        "more than a million times".to_owned()
+    }
 }

@@ -9,6 +9,7 @@ use model_core::units::Length;
 
 use super::kinematics::{Thresholds, kinematics, white_noise};
 use super::linear::{median, quantile};
+use crate::counted::counted;
 use crate::error::Result;
 use crate::fit::screen::{self, Clip};
 use crate::progress::Progress;
@@ -210,8 +211,9 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
         [low, high].into_iter().flatten().filter(|c| c.force.abs() > END_UNDER_LOAD * strongest).collect();
     for end in &ends {
         rows.remarks.push(format!(
-            "{} readings are exactly {:.2} N: the force sensor stands at the end of its range there, and they were left out",
-            end.rows, end.force
+            "left out: {} of exactly {:.2} N, where the force sensor stands at the end of its range",
+            counted(end.rows, "reading"),
+            end.force
         ));
     }
     for (index, recording) in campaign.recordings.iter().enumerate() {

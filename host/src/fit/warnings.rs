@@ -128,8 +128,9 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
     }
     let side = |name: &str, clip: &super::screen::Clip| {
         format!(
-            "{} rows read exactly {:.2} N: the force sensor stands at the {name} end of its range there; they are not fitted",
-            clip.rows, clip.force
+            "left out of the fit: {} of exactly {:.2} N, where the force sensor stands at the {name} end of its range",
+            counted(clip.rows, "row"),
+            clip.force
         )
     };
     out.extend(prepared.clips.0.iter().map(|c| side("lower", c)));

@@ -53,6 +53,15 @@ impl Campaign {
                 ));
             }
         }
+        for (i, a) in recordings.iter().enumerate() {
+            if let Some(b) = recordings[i + 1..].iter().find(|b| a.same_rows(b)) {
+                warnings.push(if a.name == b.name {
+                    format!("`{}` is given twice, and counts twice", a.name)
+                } else {
+                    format!("`{}` and `{}` hold the same rows, which count twice", a.name, b.name)
+                });
+            }
+        }
         Self { recordings, clock, warnings }
     }
 
@@ -97,6 +106,16 @@ mod tests {
         assert_eq!((campaign.clock, campaign.recordings[0].name.as_str()), (Clock::Separate, "b"));
         assert_eq!(campaign.pause_before(1), None);
         assert!(campaign.warnings.is_empty());
+    }
+
+    #[test]
+    fn a_recording_that_is_given_twice_is_told() {
+        let warned = |recordings| Campaign::new(recordings).warnings.join("; ");
+        assert_eq!(warned(vec![from("a", 0.0, 60.0), from("b", 0.0, 50.0)]), "");
+        let twice = warned(vec![from("a", 0.0, 60.0), from("b", 0.0, 50.0), from("a", 0.0, 60.0)]);
+        assert_eq!(twice, "`a` is given twice, and counts twice");
+        let copied = warned(vec![from("a", 0.0, 60.0), from("copy", 0.0, 60.0)]);
+        assert_eq!(copied, "`a` and `copy` hold the same rows, which count twice");
     }
 
     #[test]

@@ -50,6 +50,16 @@ impl Recording {
         self.time.is_empty()
     }
 
+    /// Whether two recordings were measured as one: the same numbers in every row, whatever they are called.
+    #[must_use]
+    pub fn same_rows(&self, other: &Self) -> bool {
+        !self.is_empty()
+            && self.time == other.time
+            && self.stroke == other.stroke
+            && self.pressure == other.pressure
+            && self.force == other.force
+    }
+
     /// Seconds from the first row to the last.
     #[must_use]
     pub fn duration(&self) -> f64 {

@@ -4,6 +4,7 @@ use super::cells::Dialect;
 use super::import::{Decimal, Import};
 use super::line::Cells;
 use super::quantity::{Named, named};
+use crate::counted::counted;
 use crate::error::{Code, Error, Result};
 
 /// The beginning of a text file: how it is cut, and what its columns are called.
@@ -28,7 +29,7 @@ impl Head {
         loop {
             let rest = &text[bytes..];
             if rest.is_empty() {
-                let cause = format!("the file ends within its first {lines} lines");
+                let cause = format!("the file ends within its first {}", counted(lines, "line"));
                 return Err(Error::new(Code::RecordingTooShort, cause)
                     .help("see skip_lines in the import description"));
             }

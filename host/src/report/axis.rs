@@ -145,6 +145,8 @@ pub(crate) fn log_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
     let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
     let decades = high.log10() - low.log10();
     let every = ((decades / wanted.max(2) as f64).ceil() as i32).max(1);
+    // One number alone gives no scale.
+    let alone = (first..=last).filter(|e| (low..=high).contains(&10f64.powi(*e))).count() < 2;
     let mut ticks = Vec::new();
     for exponent in first..=last {
         for mantissa in 1..10 {
@@ -154,7 +156,7 @@ pub(crate) fn log_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
             }
             let written = match mantissa {
                 1 => exponent.rem_euclid(every) == 0,
-                2 | 5 => decades < wanted as f64 / 2.6,
+                2 | 5 => alone || decades < wanted as f64 / 2.6,
                 _ => false,
             };
             if mantissa != 1 && every > 1 {
@@ -266,6 +268,8 @@ mod tests {
         assert_eq!(texts(&log_ticks(0.01, 100.0, 6)), ["0.01", "0.1", "1", "10", "100"]);
         assert_eq!(texts(&log_ticks(0.9, 12.0, 6)), ["1", "2", "5", "10"]);
         assert_eq!(texts(&log_ticks(1e-12, 1.0, 4)), ["10^{−12}", "10^{−9}", "10^{−6}", "0.001", "1"]);
+        // A single decade in a small panel: 1 alone would tell nobody what the others are.
+        assert_eq!(texts(&log_ticks(0.27, 6.0, 3)), ["0.5", "1", "2", "5"]);
         assert!(log_ticks(0.0, 1.0, 4).is_empty());
     }
 

@@ -10,6 +10,7 @@ use serde_json::json;
 use crate::commands::port::PortOption;
 use crate::console::Console;
 use crate::error::{Code, Error, Result, nearest};
+use crate::output::json_of;
 
 /// Arguments of `host device settings`.
 #[derive(Debug, Args)]
@@ -59,7 +60,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         console.note("written and read back");
     }
     if arguments.json {
-        let mut all = json!(now);
+        let mut all = json_of(&now);
         all["schema"] = json!("pam-device-settings/1");
         console.result(format!("{all:#}"));
     } else {

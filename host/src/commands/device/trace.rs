@@ -10,6 +10,7 @@ use serde_json::json;
 
 use crate::commands::port::PortOption;
 use crate::console::Console;
+use crate::counted::counted;
 use crate::device::Client;
 use crate::error::{Code, Error, Result, nearest};
 use crate::output::write_whole;
@@ -129,7 +130,11 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let columns = read_columns(&mut client, &trace, ticks_per_s)?;
     let text = if arguments.json { as_json(&trace, &columns) } else { as_csv(&columns) };
     write_whole(&arguments.output, text.as_bytes())?;
-    console.note(format!("{} records of {} variables", trace.records, trace.variables.len()));
+    console.note(format!(
+        "{} of {}",
+        counted(trace.records, "record"),
+        counted(trace.variables.len(), "variable")
+    ));
     Ok(())
 }
 

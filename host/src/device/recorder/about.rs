@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use crate::device::{Client, Losses};
 use crate::error::Result;
+use crate::output::json_of;
 use crate::table_file::now_utc;
 
 /// What is known when a recording begins: date, versions of host and device, tables, settings. `schema` names the kind of
@@ -44,7 +45,7 @@ pub fn about_device(hello: &Hello, info: &DeviceInfo, settings: &Settings) -> Va
         "tables": info.tables.iter().map(|t| t.map(|t| json!({
             "crc": format!("{:08x}", t.crc), "bytes": t.length, "generation": t.generation,
         }))).collect::<Vec<_>>(),
-        "settings": settings,
+        "settings": json_of(settings),
     })
 }
 

@@ -2,6 +2,7 @@
 
 use super::super::{Axis, Colour, Figure, Mark, Panel, Section, fixed};
 use super::view::{Banded, View};
+use crate::counted::counted;
 use crate::fit::basis::columns;
 
 /// At most this many small panels: more cannot be compared by eye.
@@ -101,8 +102,10 @@ fn loops(view: &View<'_>) -> Figure {
         panel
     });
     let more = view.levels.len().saturating_sub(PANELS);
-    let left =
-        if more > 0 { format!(" {more} pressures between them are left out here.") } else { String::new() };
+    let left = match more {
+        0 => String::new(),
+        n => format!(" Left out here: {} between them.", counted(n, "pressure")),
+    };
     Figure::multiples(
         "loops",
         "The full model on the loops",
