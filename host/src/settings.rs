@@ -183,8 +183,20 @@ impl Reading<'_> {
             let texts = self.texts(at, key, value.get_ref())?;
             let fits: Vec<Result<Vec<String>>> =
                 found.iter().map(|arg| self.values(at, key, arg, &texts)).collect();
-            // An option of one name may mean different things to two commands; the first that it suits is meant.
-            match fits.iter().zip(&found).find_map(|(fit, arg)| Some((fit.as_ref().ok()?, kind(arg)))) {
+            // An option of one name may mean different things to two commands, such as a file, a switch and a number. The kind of the
+            // value says which is meant, whatever the order of the commands; after that, the first that it suits.
+            let likely = match value.get_ref() {
+                DeValue::Boolean(_) => Kind::Flag,
+                DeValue::Integer(_) | DeValue::Float(_) => Kind::Other,
+                _ => Kind::Path,
+            };
+            let mut suited: Vec<(&Vec<String>, Kind)> = fits
+                .iter()
+                .zip(&found)
+                .filter_map(|(fit, arg)| Some((fit.as_ref().ok()?, kind(arg))))
+                .collect();
+            suited.sort_by_key(|(_, kind)| *kind != likely);
+            match suited.first().copied() {
                 Some((values, kind)) => out.push(Setting {
                     command: path.to_owned(),
                     option,
@@ -323,6 +335,8 @@ mod tests {
     fn command() -> Command {
         Command::new("host")
             .arg(Arg::new("quiet").long("quiet").action(ArgAction::SetTrue))
+            // Any text suits this one, and it comes first: a file is meant all the same.
+            .subcommand(Command::new("demo").arg(Arg::new("muscle").long("muscle").default_value("mini")))
             .subcommand(
                 Command::new("fit")
                     .arg(

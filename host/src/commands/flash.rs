@@ -201,7 +201,10 @@ impl Arguments {
 
 #[cfg(not(feature = "probe"))]
 fn program(firmware: &Path, _chip: &str, _console: &Console) -> Result<()> {
-    std::fs::metadata(firmware).map_err(|e| Error::unreadable(firmware, &e))?;
+    std::fs::metadata(firmware).map_err(|e| {
+        Error::unreadable(firmware, &e)
+            .help("`firmware/build BOARD` makes the image, in target/firmware of the checkout")
+    })?;
     Err(Error::new(Code::CallInvalid, "this program was built without debug probes").help(
         "build it with them: cargo build --release --package host --features probe; it takes a minute longer",
     ))
