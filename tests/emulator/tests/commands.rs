@@ -94,7 +94,11 @@ fn a_joint_takes_angle_and_stiffness_and_says_which_it_can_have() {
     drop(client);
     let ask = |course: &str, stiffness: &str, seconds: &str| {
         let run = ["run", "--angle", course, "--stiffness", stiffness, "--seconds", seconds, "--rate", "250"];
-        program::run(&stand.line, stand.folder.path(), &[&run[..], &["-o", "pair.csv", "--json"]].concat())
+        program::run(
+            &stand.line,
+            stand.folder.path(),
+            &[&run[..], &["-o", "pair.csv", "--replace", "--json"]].concat(),
+        )
     };
     let path = stand.folder.path().join("pair.csv");
     for (angle, wanted, seconds) in [("4", "120", "2"), ("-3", "240", "1.5")] {
