@@ -38,6 +38,7 @@ const CASES: &[Case] = &[
     // A broken wire vents within 3 ms.
     Case { fault: Fault::SensorRange, within: 3, settings: NONE, cause: |_, a| a.force = -1.0e6 },
     Case { fault: Fault::SensorRange, within: 3, settings: NONE, cause: |_, a| a.pressure = f32::NAN },
+    Case { fault: Fault::SensorRange, within: 3, settings: NONE, cause: |_, a| a.stroke = f32::NAN },
     Case { fault: Fault::OverPressure, within: 3, settings: NONE, cause: |_, a| a.pressure = 720e3 },
     Case { fault: Fault::OverStroke, within: 3, settings: NONE, cause: |_, a| a.stroke = 0.085 },
     Case {
