@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 use model_core::image;
+use model_core::link::endpoints::{GetSettings, SetSettings};
 use model_core::link::messages::Side;
 use serde_json::{Value, json};
 use virtual_bench::plant::Motion;
@@ -25,6 +26,9 @@ use crate::predict::predict;
 use crate::progress::Progress;
 use crate::recording::{Campaign, Reader};
 use crate::table_file::{self, About, TableFile};
+
+/// Device seconds in a second: nobody should wait for what a real controller would take.
+const SPEED: u32 = 4;
 
 /// Arguments of `host demo`.
 #[derive(Debug, Args)]
@@ -93,7 +97,7 @@ impl Arguments {
             Some("qemu") => Some(Kind::Qemu),
             _ => None,
         };
-        let emulated = Emulated::start(stand, only, 4.0)?;
+        let emulated = Emulated::start(stand, only, f64::from(SPEED))?;
         step(3, format!("controller started: {}", emulated.words()));
         let told =
             self.control(&emulated, &table, &made, step, console).map_err(|e| with_log(e, &emulated))?;
@@ -143,6 +147,10 @@ impl Arguments {
         console: &Console,
     ) -> Result<Told> {
         let mut client = Client::open(emulated.address())?;
+        // The watch counts device time, which goes so much faster, and twice as fast again after a pause of a busy machine.
+        let mut settings = client.call::<GetSettings>(&())?;
+        settings.watch.host_silence_ticks *= 2 * SPEED;
+        client.call_once::<SetSettings>(&settings)?;
         let mut buffer = [0; image::MAX_LEN];
         let image = image::write(&table.table, &mut buffer)
             .map_err(|e| Error::new(Code::TableInvalid, e.to_string()))?;
