@@ -132,7 +132,7 @@ def story(url, driver):
     page.click("compare")
     page.until("!document.getElementById('compare-figure').hidden")
     page.click("diagnose")
-    page.until("!document.getElementById('diagnosis').hidden", 120)
+    page.until("!document.getElementById('diagnosis').hidden", 600)
     page.shot(SHOTS, "recordings")
     passed("compares_recordings_and_diagnoses")
     page.js("document.activeElement.blur()")
