@@ -5,24 +5,22 @@ use std::sync::Arc;
 use model_core::braid::{Braid, Geometry};
 
 use super::baselines::{self, Kind};
-use super::candidates::{self, library};
+use super::candidates::library;
+use super::confirm::confirmed;
 use super::frequency;
 use super::given;
-use super::held_out::{HELPS, Unseen};
+use super::judgeable::{blocked_force, cannot_be_judged, no_judgement, what_can_be_judged};
 use super::known::Known;
 use super::linear::energy;
 use super::locate::{block_ranges, locate};
 use super::named::{considered, missing};
 use super::rest;
 use super::rows::{self, Rows};
-use super::search::search;
-use super::select::{self, Found};
-use super::verdict::{
-    Considered, Diagnosis, HeldOut, Missing, PathStep, Region, Trace, Unexplained, Verdict,
-};
+use super::select::Found;
+use super::tables::{in_the_tables, tables_as_evidence};
+use super::verdict::{Diagnosis, Missing, PathStep, Region, Trace, Unexplained, Verdict};
 use crate::bench::Candidate as Law;
 use crate::checks::Checks;
-use crate::counted::counted;
 use crate::error::{Code, Error, Result};
 use crate::progress::Progress;
 use crate::recording::Campaign;
@@ -49,13 +47,6 @@ pub(super) struct Asked {
 /// Lack of fit that the model admits beside the pure error of repeats, rms as a share of the blocked force: friction by its sign
 /// alone where contacts give a little before they slide, and what a bladder of four orders leaves.
 const INEXACTNESS: f64 = 1.5e-3;
-
-/// Fewest rows and half-strokes from which anything is judged.
-const FEWEST_ROWS: usize = 60;
-const FEWEST_BLOCKS: usize = 6;
-
-/// A gauge that never reads more than this, Pa, is dead or was never connected: vented, a muscle does not pull.
-const VENTED: f64 = 1e3;
 
 /// Finds out what the model leaves out of a campaign of recordings.
 ///
@@ -230,246 +221,6 @@ fn beyond_instruments(m: &Missing) -> Option<String> {
             m.effect
         )
     })
-}
-
-/// What to say where the tables differ between pressures more than a bladder does, and nothing can be named for it.
-fn in_the_tables(found: &Found, library: &[candidates::Candidate], concealed: f64, blocked: f64) -> String {
-    let mut able: Vec<&candidates::Trial> =
-        found.first_look.iter().filter(|t| t.score >= select::LEAST_SCORE).collect();
-    able.sort_by(|a, b| b.score.total_cmp(&a.score));
-    let names: Vec<&str> = able.iter().take(6).map(|t| library[t.candidate].name()).collect();
-    let which = if names.is_empty() {
-        "no effect of the library makes such a surface".to_owned()
-    } else {
-        format!(
-            "each of these would make such a surface: {}; none of them stands out enough to be named",
-            names.join(", ")
-        )
-    };
-    format!(
-        "one bladder does not serve all pressures: the tables take up {concealed:.2} N rms ({:.2} % of blocked force) that changes \
-         from pressure to pressure; {which}. Tested pressures are described well; between them and beyond, trust the tables less",
-        100.0 * concealed / blocked
-    )
-}
-
-/// What the fitted tables themselves betray: flexible tables swallow physics, and keep its pattern over pressure.
-fn tables_as_evidence(production: &baselines::Baseline, rows: &Rows) -> Vec<String> {
-    let mut remarks = Vec::new();
-    let levels = &rows.levels;
-    if !rows.steady || levels.len() < 4 {
-        return remarks;
-    }
-    let fit_to = |values: &[f64], of: &dyn Fn(f64) -> f64| -> Option<(f64, f64, f64)> {
-        let n = values.len() as f64;
-        let x: Vec<f64> = levels.iter().map(|p| of(*p)).collect();
-        let (mx, my) = (x.iter().sum::<f64>() / n, values.iter().sum::<f64>() / n);
-        let sxx: f64 = x.iter().map(|v| (v - mx).powi(2)).sum();
-        let sxy: f64 = x.iter().zip(values).map(|(a, b)| (a - mx) * (b - my)).sum();
-        let syy: f64 = values.iter().map(|v| (v - my).powi(2)).sum();
-        (sxx > 0.0 && syy > 0.0).then(|| (my - sxy / sxx * mx, sxy / sxx, sxy * sxy / (sxx * syy)))
-    };
-    let k_f = &production.friction_nodes;
-    if let (Some((a, b, by_inverse)), Some((_, _, straight))) =
-        (fit_to(k_f, &|p| 1.0 / p), fit_to(k_f, &|p| p))
-    {
-        let lowest = b / levels[0];
-        if by_inverse > 0.97 && by_inverse > straight + 0.02 && b > 0.0 && lowest > 0.5 * a.abs() {
-            remarks.push(format!(
-                "k_F(P) follows {a:.3} + {:.1} kPa/P: what a friction that does not scale with the force (dry, seal, viscous at one \
-                 speed) leaves in the tables",
-                b * 1e-3
-            ));
-        }
-    }
-    if let Some(e_1) = production.elastic_nodes.first()
-        && let Some((a, b, share)) = fit_to(e_1, &|p| p)
-    {
-        let change = b * (levels[levels.len() - 1] - levels[0]);
-        if share > 0.9 && change.abs() > 0.3 * a.abs() {
-            remarks.push(format!(
-                "E_1 {} in a straight line with pressure, by {:.0} % over the range: one bladder should not; ends that are not \
-                 cylinders, a braid that stretches, a gain or a slow change in the order of testing leave this",
-                if change > 0.0 { "rises" } else { "falls" },
-                100.0 * change.abs() / a.abs().max(1e-9)
-            ));
-        }
-    }
-    remarks
-}
-
-/// The scale of forces: what the highest pressure would give at rest length, or the largest force seen.
-fn blocked_force(rows: &Rows) -> f64 {
-    let strongest = rows.force.iter().copied().fold(0.0, f64::max);
-    let by_pressure = rows.contexts.iter().map(|c| c.pressure * c.area).fold(0.0, f64::max);
-    // An outlier must not set the scale.
-    if by_pressure > 0.0 { strongest.min(1.3 * by_pressure) } else { strongest }
-}
-
-fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<String> {
-    let effective = rows.effective();
-    if effective < FEWEST_ROWS {
-        let usable =
-            if effective == 0 { "no row".to_owned() } else { format!("only {}", counted(effective, "row")) };
-        return Some(format!(
-            "{usable} can be used (direction known, muscle not slack); {FEWEST_ROWS} is the least"
-        ));
-    }
-    if rows.blocks < FEWEST_BLOCKS {
-        return Some(format!(
-            "only {}: with fewer than {FEWEST_BLOCKS} chance and physics cannot be told apart",
-            counted(rows.blocks, "half-stroke")
-        ));
-    }
-    let judged = || rows.root_weight.iter().zip(&rows.contexts).filter(|(w, _)| **w > 0.0);
-    let highest = judged().map(|(_, c)| c.pressure).fold(f64::NEG_INFINITY, f64::max);
-    if highest <= VENTED {
-        return Some(format!(
-            "the pressure never rises above {:.1} kPa, where no muscle pulls: look at the gauge and at the unit",
-            highest * 1e-3
-        ));
-    }
-    let (lo, hi) = rows
-        .force
-        .iter()
-        .zip(&rows.root_weight)
-        .filter(|(_, w)| **w > 0.0)
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (f, _)| (l.min(*f), h.max(*f)));
-    if !(hi - lo > 1e-6 * blocked.abs().max(1e-9)) || !(blocked > 0.0) {
-        return Some("the force is constant or never pulls: there is nothing to explain".to_owned());
-    }
-    None
-}
-
-fn what_can_be_judged(rows: &Rows) -> Vec<String> {
-    let mut remarks = Vec::new();
-    if rows.isometric {
-        remarks.push(
-            "the length was held throughout: speed, viscous friction, inertia and first strokes cannot be judged".to_owned(),
-        );
-    }
-    if rows.levels.len() < 2 {
-        remarks.push(
-            "one pressure only: what scales with pressure cannot be told from what does not".to_owned(),
-        );
-    }
-    if !rows.has_temperature {
-        remarks.push("no temperature was recorded: warming shows only as a slow change".to_owned());
-    }
-    let moving = rows.sign.iter().filter(|s| **s > 0.0).count();
-    let back = rows.sign.iter().filter(|s| **s < 0.0).count();
-    if moving + back > 0 && moving.min(back) * 50 < rows.len() {
-        remarks.push("the muscle moves one way only: friction cannot be judged".to_owned());
-    }
-    if !rows.vented.iter().any(|v| *v) {
-        remarks.push(
-            "no vented stretch: an offset of the load cell cannot be told from the model's own surface"
-                .to_owned(),
-        );
-    }
-    remarks
-}
-
-fn no_judgement(
-    rows: &Rows,
-    options: &Options,
-    mut remarks: Vec<String>,
-    reason: String,
-    blocked: f64,
-) -> Diagnosis {
-    remarks.insert(0, format!("nothing can be judged: {reason}"));
-    let considered = library(rows)
-        .iter()
-        .map(|c| Considered {
-            effect: c.name().into(),
-            gain: 0.0,
-            why_not: "these recordings cannot show it".into(),
-            hidden_up_to_N: None,
-            checked: false,
-            visible: 0.0,
-        })
-        .collect();
-    Diagnosis {
-        schema: "pam-diagnose/1".into(),
-        muscle: options.muscle.clone(),
-        samples: rows.samples,
-        judged: false,
-        verdict: Verdict::Consistent,
-        noise_N: 0.0,
-        misfit_rms_N: 0.0,
-        r#where: Vec::new(),
-        missing: Vec::new(),
-        unexplained: Unexplained { share: 0.0, pattern: "none".into() },
-        held_out: HeldOut {
-            split: "none: nothing was fitted".into(),
-            rms_before_N: 0.0,
-            rms_after_N: 0.0,
-            noise_N: 0.0,
-            with_turns_before_N: 0.0,
-            with_turns_after_N: 0.0,
-        },
-        next_experiment: None,
-        considered,
-        path: Vec::new(),
-        blocked_force_N: if blocked.is_finite() { blocked } else { 0.0 },
-        noise_memory_s: 0.0,
-        remarks,
-        profiles: Vec::new(),
-        trace: Trace { time: Vec::new(), before: Vec::new(), after: Vec::new(), effects: Vec::new() },
-    }
-}
-
-/// So many first names may fail on unseen rows before none is named: where several laws fit the rows at hand alike, the one that
-/// fits them best need not be the one that holds on others.
-const MOST_REFUSED: usize = 3;
-
-/// What the search finds and unseen rows confirm, with the error on these rows.
-fn confirmed(
-    rows: &mut Rows,
-    library: &[candidates::Candidate],
-    blocked: f64,
-    step: f64,
-) -> (Found, HeldOut) {
-    let mut refused = Vec::new();
-    let mut remarks = Vec::new();
-    loop {
-        let mut found = search(rows, library, blocked, step, &refused);
-        let first = found.taken.first().map(|t| t.trial.candidate);
-        let held = keep_what_helps(&mut found, rows, library);
-        match first {
-            Some(candidate) if found.taken.is_empty() && refused.len() < MOST_REFUSED => {
-                refused.push(candidate);
-                remarks.append(&mut found.remarks);
-            }
-            _ => {
-                remarks.append(&mut found.remarks);
-                found.remarks = remarks;
-                return (found, held);
-            }
-        }
-    }
-}
-
-/// Drops effects, the last taken first, that do not improve rows which the fit had not seen; gives the error on these rows.
-fn keep_what_helps(found: &mut Found, rows: &mut Rows, library: &[candidates::Candidate]) -> HeldOut {
-    let sigma = found.noise.sigma;
-    loop {
-        let unseen = Unseen::new(rows, found.full.kind, &found.traces);
-        let with = unseen.held_out(&found.traces, sigma);
-        let Some(fewer) = found.traces.len().checked_sub(1) else { return with };
-        let before = if fewer == 0 { with.rms_before_N } else { unseen.error(&found.traces[..fewer]) };
-        // An effect that takes a third of what is above the noise lowers the whole by more than this.
-        if with.rms_after_N < HELPS * before {
-            return with;
-        }
-        let name = found.taken.last().map_or("", |t| library[t.trial.candidate].name());
-        found.remarks.push(format!(
-            "{name} fits these recordings but does not improve rows that the fit had not seen ({before:.3} N without it, {:.3} N with \
-             it): it is not named",
-            with.rms_after_N
-        ));
-        found.drop_last(rows, library);
-    }
 }
 
 /// Of the rows that are judged: elsewhere no residual is a misfit, and what an effect adds there is no one's claim.

@@ -8,30 +8,13 @@
 //! it, but is itself wrong where a real bladder is. Both are linear once `k_F` is linearised about the last iterate, so a fit
 //! is three or four orthogonal least-squares solutions.
 
-use model_core::spline;
+mod plan;
+mod reach;
 
-use rayon::prelude::*;
-
-use super::linear::{Basis, add_scaled, dot, energy, weighted};
-use super::rows::{ORDERS, Rows, YEOH};
-
-/// How much one bladder may differ between pressures, and how unsure a row is: what a soft baseline takes for granted.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Give {
-    /// Rms that the elastic surface may differ by from one pressure to the next, N.
-    pub elastic: f64,
-    /// The same of the friction, N.
-    pub friction: f64,
-    /// Standard deviation of a row by which a sum over rows is judged, N: noise times the root of how many rows are worth one.
-    pub row: f64,
-}
-
-impl Give {
-    /// Tables that are free at every pressure.
-    pub(crate) fn free(blocked: f64) -> Self {
-        Self { elastic: 1e3 * blocked, friction: 1e3 * blocked, row: 1e-3 * blocked }
-    }
-}
+use self::plan::{Part, Plan};
+pub(crate) use self::reach::{Give, Reach, cosine, keeps, projected};
+use super::linear::{Basis, energy, weighted};
+use super::rows::{ORDERS, Rows};
 
 /// Which baseline.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,60 +33,6 @@ impl Kind {
     pub(crate) fn reaches_over_pressures(self) -> bool {
         !matches!(self, Self::Flexible(_))
     }
-}
-
-/// What a baseline can express: fully (hard), within a prior (soft), and by effects fitted beside it.
-///
-/// In the soft directions a misfit is partly the bladder's own: the whitened space shrinks them by `keep`, so that inner products
-/// there are those of generalised least squares with the prior integrated out.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Reach {
-    /// Columns with free coefficients, weighted.
-    pub hard: Basis,
-    /// Unit directions of the flexible tables beyond, orthogonal to the hard ones.
-    pub soft: Vec<Vec<f64>>,
-    /// Whether a soft direction is friction's.
-    pub of_friction: Vec<bool>,
-    /// What remains of each soft direction.
-    pub keep: Vec<f64>,
-    /// The effects beside it, whitened.
-    pub chosen: Basis,
-    /// The effects beside it, freed of the hard columns only.
-    pub chosen_core: Vec<Vec<f64>>,
-}
-
-impl Reach {
-    /// Takes out of a weighted column what the baseline can express.
-    pub(crate) fn project_out(&self, v: &mut [f64]) {
-        self.whiten(v);
-        self.chosen.project_out(v);
-    }
-
-    /// The same without the effects.
-    fn whiten(&self, v: &mut [f64]) {
-        self.hard.project_out(v);
-        for (q, keep) in self.soft.iter().zip(&self.keep) {
-            let c = dot(q, v);
-            add_scaled(v, -(1.0 - keep) * c, q);
-        }
-    }
-
-    /// A column's components along the soft directions.
-    pub(crate) fn components(&self, v: &[f64]) -> Vec<f64> {
-        self.soft.iter().map(|q| dot(q, v)).collect()
-    }
-}
-
-/// Every column weighted and freed of what a baseline expresses.
-pub(crate) fn projected(columns: &[Vec<f64>], root_weight: &[f64], span: &Reach) -> Vec<Vec<f64>> {
-    columns
-        .par_iter()
-        .map(|c| {
-            let mut v = weighted(c, root_weight);
-            span.project_out(&mut v);
-            v
-        })
-        .collect()
 }
 
 /// A fitted baseline, with effects that were fitted beside it.
@@ -153,140 +82,6 @@ impl Baseline {
 pub(crate) fn measured_rms(rows: &Rows) -> f64 {
     let sum: f64 = rows.force.iter().zip(&rows.root_weight).map(|(f, w)| (f * w).powi(2)).sum();
     (sum / energy(&rows.root_weight).max(1e-12)).sqrt()
-}
-
-/// The cardinal functions of the natural spline on the levels, at pressure `p` (held at the ends).
-fn cardinal(levels: &[f64], cubics: &[[spline::Cubic<f64>; spline::MAX_PIECES]], p: f64, out: &mut [f64]) {
-    let places = spline::Nodes::<f64>::new(levels);
-    let piece = places.place(p);
-    for (o, c) in out.iter_mut().zip(cubics) {
-        *o = spline::value(&c[piece], p - places.origin(piece));
-    }
-}
-
-fn cardinal_cubics(levels: &[f64]) -> Vec<[spline::Cubic<f64>; spline::MAX_PIECES]> {
-    (0..levels.len())
-        .map(|j| {
-            let unit: Vec<f64> = (0..levels.len()).map(|i| f64::from(u8::from(i == j))).collect();
-            spline::Nodes::<f64>::pieces(levels, &unit)
-        })
-        .collect()
-}
-
-/// One column of a baseline.
-#[derive(Clone, Copy, Debug)]
-enum Part {
-    Deadband,
-    /// `E_k` over a function of pressure: order (from 0), function.
-    Elastic(usize, usize),
-    Yeoh(usize),
-    /// `k_F` over a function of pressure.
-    Friction(usize),
-    /// A scale of the effective area, and of its slope.
-    Area,
-    AreaSlope,
-    /// A settling of friction that is not quite exponential.
-    Settling,
-    /// How much of friction does not settle at rest: a friction that needs speed leaves a rest's gap half closed for another reason,
-    /// and what it leaves must not be taken for settling.
-    Unsettled,
-    /// Where in the gap between the branches friction rests over these rows: what a wandering pressure made of it nobody measured.
-    Rest(usize, usize),
-    /// How much further than at a turn of the stroke, or less far, friction turns while the pressure ramps at held length.
-    Ramping,
-}
-
-impl Part {
-    /// By how much friction's direction departs at a row from what the model holds, per unit of a part of this kind.
-    fn departure(self, rows: &Rows, i: usize) -> f64 {
-        match self {
-            Self::Unsettled => rows.unsettled[i],
-            Self::Rest(from, to) if (from..to).contains(&i) => 1.0,
-            Self::Ramping if rows.on_ramp[i] => rows.sign[i],
-            _ => 0.0,
-        }
-    }
-}
-
-/// The stretches of rows with the same number other than zero.
-fn rests(of: &[u32]) -> impl Iterator<Item = (usize, usize)> + '_ {
-    let mut from = 0;
-    of.chunk_by(|a, b| a == b).filter_map(move |stretch| {
-        let begun = from;
-        from += stretch.len();
-        (stretch[0] != 0).then_some((begun, from))
-    })
-}
-
-/// The columns of a baseline: those with free coefficients, those with a prior, and the functions of pressure in them.
-struct Plan {
-    hard: Vec<Part>,
-    soft: Vec<Part>,
-    functions: Vec<Vec<f64>>,
-}
-
-impl Plan {
-    fn new(rows: &Rows, kind: Kind) -> Self {
-        let n = rows.len();
-        let mut functions = Vec::new();
-        let cardinals = |functions: &mut Vec<Vec<f64>>| {
-            let levels = &rows.levels;
-            let cubics = cardinal_cubics(levels);
-            let first = functions.len();
-            functions.extend(vec![vec![0.0; n]; levels.len()]);
-            let mut at = vec![0.0; levels.len()];
-            for i in 0..n {
-                cardinal(levels, &cubics, rows.contexts[i].pressure, &mut at);
-                for (f, a) in functions[first..].iter_mut().zip(&at) {
-                    f[i] = *a;
-                }
-            }
-            first..first + levels.len()
-        };
-        let tables = |order: usize, over: std::ops::Range<usize>| {
-            let elastic = over.clone();
-            (0..order)
-                .flat_map(move |k| elastic.clone().map(move |f| Part::Elastic(k, f)))
-                .chain(over.map(Part::Friction))
-                .collect::<Vec<Part>>()
-        };
-        let mut hard: Vec<Part> = rests(&rows.rest).map(|(from, to)| Part::Rest(from, to)).collect();
-        hard.push(Part::Deadband);
-        let mut soft = Vec::new();
-        if let Kind::Flexible(order) = kind {
-            let over = cardinals(&mut functions);
-            hard.extend(tables(order.clamp(1, ORDERS), over));
-        } else {
-            let (lo, hi) =
-                (rows.levels.first().copied().unwrap_or(0.0), rows.levels.last().copied().unwrap_or(1.0));
-            let u = |p: f64| if hi > lo { (2.0 * (p - lo) / (hi - lo) - 1.0).clamp(-1.2, 1.2) } else { 0.0 };
-            for degree in 0..rows.levels.len().clamp(1, 3) {
-                functions.push(rows.contexts.iter().map(|c| u(c.pressure).powi(degree as i32)).collect());
-            }
-            hard.extend((0..ORDERS).map(|k| Part::Elastic(k, 0)));
-            hard.extend((0..YEOH).map(Part::Yeoh));
-            hard.extend((0..functions.len()).map(Part::Friction));
-            if matches!(kind, Kind::Soft(_)) && rows.levels.len() > 1 {
-                let over = cardinals(&mut functions);
-                soft = tables(4, over);
-            }
-        }
-        // At a few held lengths a tenth of a degree in the braid's angle, or a millimetre in the mounting, cannot be told from a
-        // scale of the effective area; where the muscle moves it shows in the shape and is held against the geometry.
-        if rows.isometric {
-            hard.extend([Part::Area, Part::AreaSlope]);
-        }
-        if rows.settling.iter().any(|s| *s != 0.0) {
-            hard.push(Part::Settling);
-        }
-        if rows.unsettled.iter().any(|u| *u != 0.0) {
-            hard.push(Part::Unsettled);
-        }
-        if rows.on_ramp.iter().any(|r| *r) {
-            hard.push(Part::Ramping);
-        }
-        Self { hard, soft, functions }
-    }
 }
 
 /// A soft direction must stand out from the others by this share of itself.
@@ -414,21 +209,6 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
     fitted
 }
 
-/// What remains of each soft direction, when the bladder may differ as much as `give` says.
-pub(crate) fn keeps(give: Give, of_friction: &[bool], weight: f64) -> Vec<f64> {
-    let friction = of_friction.iter().filter(|f| **f).count().max(1) as f64;
-    let elastic = of_friction.iter().filter(|f| !**f).count().max(1) as f64;
-    let noise = give.row * give.row;
-    of_friction
-        .iter()
-        .map(|f| {
-            let own =
-                weight * if *f { give.friction.powi(2) / friction } else { give.elastic.powi(2) / elastic };
-            (noise / (noise + own).max(1e-300)).sqrt()
-        })
-        .collect()
-}
-
 /// A baseline's forces at every row.
 struct Values {
     force: Vec<f64>,
@@ -523,10 +303,4 @@ pub(crate) fn into_contexts(rows: &mut Rows, fitted: &Baseline) {
         c.stiffness = live * fitted.stiffness[i];
         c.pressure_slope = c.area;
     }
-}
-
-/// Cosine of two columns after weighting and projection.
-pub(crate) fn cosine(a: &[f64], b: &[f64]) -> f64 {
-    let size = (energy(a) * energy(b)).sqrt();
-    if size > 0.0 { dot(a, b) / size } else { 0.0 }
 }

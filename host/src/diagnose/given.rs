@@ -4,13 +4,15 @@
 use rayon::prelude::*;
 
 use super::baselines::{self, Kind};
-use super::candidates::{Candidate, Ground, Trial};
+use super::candidates::Candidate;
 use super::evidence::Scale;
+use super::ground::Ground;
 use super::held_out::{HELPS, Unseen};
 use super::linear::energy;
 use super::rows::Rows;
 use super::search::{MAX_NAMED, search};
 use super::select::{self, Found, Taken, look, refit, rivals};
+use super::trial::Trial;
 use super::verdict::{HeldOut, Missing};
 use crate::bench::Candidate as Law;
 use crate::error::{Code, Error, Result};

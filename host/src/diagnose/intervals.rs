@@ -8,17 +8,18 @@
 //! ```
 //! where the first is the scatter of whole half-strokes' scores and the next three are jackknives over groups left out. The last is what a
 //! law is off by where another law of the same thing made the recordings: of 57 effects given by name (two development sets of trials) 35
-//! intervals of 95 % held the truth by half-strokes alone, 45 with the groups, 53 with both. A moment between two readings has no law, but is
-//! known no better than the time between them.
+//! intervals of 95 % held the truth by half-strokes alone, 45 with the groups, 53 with both. A moment has an interval [of its own](super::moment).
 
 use rayon::prelude::*;
 
 use super::baselines;
-use super::candidates::{self, Candidate, Trial};
+use super::candidates::Candidate;
 use super::held_out::thin;
 use super::linear::{dot, energy};
+use super::moment;
 use super::rows::Rows;
 use super::select::Found;
+use super::trial::{self, Trial};
 
 /// One free number of the named effects, with what the force changes by per unit of it.
 struct Tangent {
@@ -41,10 +42,10 @@ fn tangents(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<Tangent> {
                 tangents.push(Tangent { effect, parameter, column });
             }
         }
-        let value = |shapes: &[f64]| {
-            candidates::trace(&Trial { shapes: shapes.to_vec(), ..trial.clone() }, library, rows)
-        };
-        for (j, s) in trial.shapes.iter().enumerate() {
+        let value =
+            |shapes: &[f64]| trial::trace(&Trial { shapes: shapes.to_vec(), ..trial.clone() }, library, rows);
+        let moment = moment::place(candidate, trial);
+        for (j, s) in trial.shapes.iter().enumerate().filter(|(j, _)| moment != Some(*j)) {
             let h = 0.02 * s.abs().max(1e-9);
             let (mut up, mut down) = (trial.shapes.clone(), trial.shapes.clone());
             up[j] += h;
@@ -71,15 +72,16 @@ pub(crate) fn deviations(found: &Found, library: &[Candidate], rows: &Rows) -> V
         let Some(strokes) = by_strokes[i] else { continue };
         let trial = &found.taken[t.effect].trial;
         let value = trial.amplitudes.iter().chain(&trial.shapes).nth(t.parameter).copied().unwrap_or(0.0);
-        let named = library[trial.candidate].info.parameters.get(t.parameter);
-        let own = if named.is_some_and(|p| p.name == "slip_time") {
-            between_readings(value, rows)
-        } else {
-            (LAW * value).powi(2)
-        };
-        let variance = strokes.max(by_groups[i]) + own;
+        let variance = strokes.max(by_groups[i]) + (LAW * value).powi(2);
         if variance.is_finite() {
             result[t.effect][t.parameter] = Some(variance.sqrt());
+        }
+    }
+    for (deviations, taken) in result.iter_mut().zip(&found.taken) {
+        let trial = &taken.trial;
+        if let Some(shape) = moment::place(&library[trial.candidate], trial) {
+            deviations[trial.amplitudes.len() + shape] =
+                moment::deviation(found, taken, shape, library, rows);
         }
     }
     result
@@ -87,23 +89,6 @@ pub(crate) fn deviations(found: &Found, library: &[Candidate], rows: &Rows) -> V
 
 /// How far a parameter is off by its law's own inexactness, as a share of it.
 const LAW: f64 = 0.07;
-
-/// Variance of a moment that may be anywhere between the readings before and after it.
-fn between_readings(moment: f64, rows: &Rows) -> f64 {
-    let read = rows.contexts.iter().zip(&rows.root_weight).filter(|(_, w)| **w > 0.0).map(|(c, _)| c.time);
-    let (before, after) =
-        read.fold(
-            (f64::NEG_INFINITY, f64::INFINITY),
-            |(b, a), t| {
-                if t < moment { (b.max(t), a) } else { (b, a.min(t)) }
-            },
-        );
-    if !(before.is_finite() && after.is_finite()) {
-        return 0.0;
-    }
-    // Uniform between them, seen from where it was put.
-    (after - before).powi(2) / 12.0 + (0.5 * (before + after) - moment).powi(2)
-}
 
 /// Variances by the scatter of whole half-strokes: amplitudes exactly, shapes by their linearised traces.
 fn by_strokes(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<Option<f64>> {

@@ -4,6 +4,9 @@
 //! Turning points are found with a threshold above the stroke's noise (never by the sign of a smoothed speed), and the
 //! samples about each turn are marked as unsure.
 
+mod onset;
+
+use self::onset::{Leg, Motion, Onset, onset};
 use super::linear::median;
 
 /// What was found of one recording, row by row, SI units.
@@ -148,28 +151,21 @@ pub(crate) fn kinematics(
     let noise = white_noise(stroke);
     let turning = extremes(stroke, thresholds.stroke);
 
-    // When each stroke really began: back along its first slope to the extreme, so that a dwell at the turn keeps the
-    // direction before it.
-    let mut starts: Vec<(usize, f64, f64)> = Vec::new(); // row, direction, doubt in seconds
-    for (k, (extreme, direction)) in turning.iter().enumerate() {
-        let end = turning.get(k + 1).map_or(n, |t| t.0 + 1);
-        let gone = |j: usize| (stroke[j] - stroke[*extreme]) * direction;
-        let passed = (*extreme..end).find(|j| gone(*j) > thresholds.stroke).unwrap_or(end - 1);
-        let third =
-            (*extreme..passed).rev().find(|j| gone(*j) <= thresholds.stroke / 3.0).unwrap_or(*extreme);
-        let rate = (gone(passed) - gone(third)) / (time[passed] - time[third]).max(1e-12);
-        let onset = if rate > 0.0 { time[passed] - gone(passed) / rate } else { time[*extreme] };
-        let onset = onset.clamp(time[*extreme], time[passed]);
-        let row = (*extreme..=passed).find(|j| time[*j] >= onset).unwrap_or(passed);
-        let doubt = if rate > 0.0 { 2.0 * noise / rate } else { 0.0 };
-        starts.push((row, *direction, 1.6 * dt + doubt.min(5.0 * dt)));
-    }
+    let starts: Vec<Onset> = turning
+        .iter()
+        .enumerate()
+        .map(|(k, (extreme, direction))| {
+            let end = turning.get(k + 1).map_or(n, |t| t.0 + 1);
+            let leg = Leg { extreme: *extreme, end, direction: *direction };
+            onset(time, stroke, leg, Motion { dt, noise, threshold: thresholds.stroke })
+        })
+        .collect();
 
     // Rest: travel over a short window stays within what noise and drift can make.
     let mut fastest = f64::INFINITY;
     let mut moving: Vec<f64> = Vec::new();
     for w in starts.windows(2) {
-        let (a, b) = (w[0].0, w[1].0);
+        let (a, b) = (w[0].row, w[1].row);
         if time[b] > time[a] {
             moving.push((stroke[b] - stroke[a]).abs() / (time[b] - time[a]));
             fastest = fastest.min(time[b] - time[a]);
@@ -242,10 +238,10 @@ pub(crate) fn kinematics(
     for row in 0..n {
         let mut turned = false;
         let direction_before = direction;
-        if next < starts.len() && row >= starts[next].0 {
-            if starts[next].1 != direction {
+        if next < starts.len() && row >= starts[next].row {
+            if starts[next].direction != direction {
                 turned = true;
-                direction = starts[next].1;
+                direction = starts[next].direction;
             }
             next += 1;
         }
@@ -307,7 +303,7 @@ pub(crate) fn kinematics(
     mark_ramps_from_their_start(&mut k, pressure, 4.0 * white_noise(pressure), half + 2);
     k.pressure_rate = slopes(time, pressure, half, |_| (0, n));
     mark_steady_ramps(&mut k, time, pressure, thresholds.pressure);
-    for (row, _, doubt) in &starts {
+    for Onset { row, doubt, .. } in &starts {
         let at = time[*row];
         let mut j = *row;
         while j > 0 && at - time[j - 1] <= *doubt {

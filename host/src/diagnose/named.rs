@@ -2,7 +2,7 @@
 
 use super::advise::what_would_show;
 use super::calibration;
-use super::candidates::{self, place_in_words};
+use super::candidates::{Candidate, place_in_words};
 use super::intervals::deviations;
 use super::linear::energy;
 use super::rows::Rows;
@@ -15,7 +15,7 @@ use super::verdict::{Considered, Missing, ParameterValue};
 const AMONG: f64 = 0.15;
 
 /// The effects that were taken, with parameters and intervals, what they cannot be told from, and how probable they are.
-pub(crate) fn missing(found: &Found, library: &[candidates::Candidate], rows: &Rows) -> Vec<Missing> {
+pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<Missing> {
     let deviations = deviations(found, library, rows);
     let explained =
         ((energy(&found.bare.residual) - energy(&found.full.residual)) / found.above).clamp(0.0, 1.0);
@@ -96,7 +96,7 @@ const ABSURD: f64 = 0.5;
 /// The effects that were looked at and not named: what they would take, how large they could be unseen, and what would show them.
 pub(crate) fn considered(
     found: &Found,
-    library: &[candidates::Candidate],
+    library: &[Candidate],
     missing: &[Missing],
     sigma: f64,
     blocked: f64,

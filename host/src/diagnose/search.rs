@@ -3,8 +3,9 @@
 use std::ops::ControlFlow;
 
 use super::baselines::{self, Baseline, Give, Kind};
-use super::candidates::{Candidate, Ground, Trial};
+use super::candidates::Candidate;
 use super::evidence::Scale;
+use super::ground::Ground;
 use super::linear::energy;
 use super::noise::{self, Noise};
 use super::rows::Rows;
@@ -12,6 +13,7 @@ use super::select::{
     CONFUSABLE, FAMILY_ALPHA, FIRST_OF_ALL, Found, LEAST_ALONE, LEAST_SCORE, OWN_INEXACTNESS, Taken,
     best_of_each, look, refit, rivals, worth_naming,
 };
+use super::trial::Trial;
 
 /// At most so many effects are named.
 pub(crate) const MAX_NAMED: usize = 3;

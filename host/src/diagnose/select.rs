@@ -3,11 +3,13 @@
 use rayon::prelude::*;
 
 use super::baselines::{self, Baseline, Give, Kind, cosine};
-use super::candidates::{self, Candidate, Ground, Trial};
+use super::candidates::Candidate;
 use super::evidence::Scale;
+use super::ground::Ground;
 use super::linear::{Sign, add_scaled};
 use super::noise::{Noise, family_p};
 use super::rows::Rows;
+use super::trial::{self, Trial};
 
 /// The family-wise error that a name may have.
 pub(crate) const FAMILY_ALPHA: f64 = 0.01;
@@ -231,7 +233,7 @@ pub(crate) fn rivals(
     ground: &Ground<'_>,
     span: &baselines::Reach,
 ) -> Vec<(usize, f64, f64)> {
-    let mine = candidates::projected_trace(winner, library, rows, span);
+    let mine = trial::projected_trace(winner, library, rows, span);
     let numbers = |t: &Trial| (t.amplitudes.iter().filter(|a| **a != 0.0).count() + t.shapes.len()) as f64;
     let scale = &ground.scale;
     let noise_energy = scale.sigma * scale.sigma * scale.weight;
@@ -245,7 +247,7 @@ pub(crate) fn rivals(
             let (left, _) = ground.left_under(t, library, rows, winner.give);
             let worse = ((excess(left) + floor) / (excess(own_left) + floor)).ln();
             let weight = (-SHARPNESS * worse - PER_NUMBER * (numbers(t) - numbers(winner))).min(0.0).exp();
-            let c = cosine(&mine, &candidates::projected_trace(t, library, rows, span));
+            let c = cosine(&mine, &trial::projected_trace(t, library, rows, span));
             (t.candidate, weight, c)
         })
         .collect();
