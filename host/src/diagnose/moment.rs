@@ -25,6 +25,23 @@ pub(crate) fn place(candidate: &Candidate, trial: &Trial) -> Option<usize> {
     (0..trial.shapes.len()).find(|s| name(*s) == Some(MOMENT))
 }
 
+/// Where in the campaign a moment lies.
+pub(crate) fn in_words(moment: f64, rows: &Rows) -> String {
+    let name = |row: usize| &rows.names[rows.recording[row] as usize];
+    let after = rows.contexts.partition_point(|c| c.time < moment);
+    if after == 0 {
+        return format!("before {} began", name(0));
+    }
+    if after == rows.len() {
+        return format!("after the end of {}", name(after - 1));
+    }
+    if rows.recording[after] != rows.recording[after - 1] {
+        return format!("between {} and {}", name(after - 1), name(after));
+    }
+    let local = rows.local_time[after] - (rows.contexts[after].time - moment);
+    format!("in {}, {local:.1} s after its first reading", name(after))
+}
+
 /// The standard deviation that makes an interval of the moment's, s; none where the recordings do not determine it.
 pub(crate) fn deviation(
     found: &Found,

@@ -5,6 +5,7 @@ use super::calibration;
 use super::candidates::{Candidate, place_in_words};
 use super::intervals::deviations;
 use super::linear::energy;
+use super::moment;
 use super::rows::Rows;
 use super::select::{self, Found};
 use super::verdict::{Considered, Missing, ParameterValue};
@@ -64,10 +65,14 @@ pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<
                     times(t.trial.score / 2.0)
                 )
             };
-            let why = format!(
+            let mut why = format!(
                 "it takes {:.0} % of the misfit above noise with the base refitted; {chance}",
                 share * 100.0
             );
+            if let Some(shape) = moment::place(candidate, &t.trial) {
+                why.push_str("; it happened ");
+                why.push_str(&moment::in_words(t.trial.shapes[shape], rows));
+            }
             Missing {
                 effect: info.name.into(),
                 probability: calibration::probability(belief, explained),
@@ -140,7 +145,12 @@ pub(crate) fn considered(
             } else if *p > select::FAMILY_ALPHA && t.score < select::LEAST_SCORE {
                 format!("no more than chance gives over all effects looked at (p = {p:.2}); {could_be}")
             } else if missing.is_empty() && gain >= select::FIRST_OF_ALL {
-                format!("would take much of the misfit, but was not confirmed (see the remarks); {could_be}")
+                let refused = if found.remarks.iter().any(|r| r.contains(name)) {
+                    "was not confirmed (see the remarks)"
+                } else {
+                    "the misfit is so small that the model's own inexactness may make it"
+                };
+                format!("would take much of the misfit, but {refused}; {could_be}")
             } else if missing.is_empty() {
                 format!("takes too little of the misfit to be named; {could_be}")
             } else {

@@ -9,6 +9,7 @@
 use rayon::prelude::*;
 
 use super::baselines::{self, Baseline, Kind};
+use super::kinematics::white_noise;
 use super::linear::median;
 use super::rows::Rows;
 
@@ -26,12 +27,16 @@ const NEARBY: [[f64; 4]; 2] = [[0.7, 0.87, 1.15, 1.4], [0.9, 0.95, 1.05, 1.1]];
 const NO_LAW: f64 = 4.0;
 /// A change of the friction's direction that ends one rest and begins another.
 const LETS_GO: f64 = 0.1;
-/// A step of the force at rest that is so many times what the moving rows leave ends one as well …
+/// A step of the force at rest that is so many times the readings' own noise there ends one as well …
 const STEP: f64 = 6.0;
-/// … where this part of it happens between two rows: what relaxes or drifts takes longer.
+/// … where it is a good part of the gap between the branches …
+const PART_OF_GAP: f64 = 0.2;
+/// … and this part of it happens between two rows: what relaxes or drifts takes longer.
 const SHARP: f64 = 0.7;
 /// Rows each way over which the force before and after a step is taken.
 const BESIDE: usize = 5;
+/// Soon after a hold's beginning at least so many before it.
+const FEWEST_BEFORE: usize = 2;
 /// At most so many rests beyond one for each hold.
 const MOST_RESTS: u32 = 100;
 /// Another law than the model's must leave less than this share of what the rows at rest leave.
@@ -236,7 +241,7 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
             Some(law) => matches!(law, AtRest::Follows { .. }),
             None => held > NO_LAW * moved * weight_at(rows, &holds),
         };
-        let steps = steps(rows, &fitted, &holds, &chosen, moved.sqrt());
+        let steps = steps(rows, &fitted, &holds, &chosen);
         number_rests(rows, &holds, &chosen, &steps, doubted);
     }
     let law = law?;
@@ -270,18 +275,21 @@ fn steps(
     fitted: &Baseline,
     holds: &[(usize, usize)],
     directions: &[Vec<f64>],
-    noise: f64,
 ) -> Vec<Vec<bool>> {
     let middle = |part: &[f64]| median(&mut part.to_vec());
     let found = |((from, to), way): (&(usize, usize), &Vec<f64>)| {
         let left: Vec<f64> = (*from..*to).map(|i| left_of(rows, fitted, i, way[i - from])).collect();
+        let noise = white_noise(&left);
+        let gap = |i: usize| 2.0 * (fitted.quasi[from + i] * fitted.friction[from + i]).abs();
         let mut steps = vec![false; left.len()];
-        let mut last = 0;
-        for i in BESIDE..left.len().saturating_sub(BESIDE) {
-            let step = middle(&left[i + 1..=i + BESIDE]) - middle(&left[i - BESIDE..i]);
+        let mut last = None;
+        for i in FEWEST_BEFORE..left.len().saturating_sub(BESIDE) {
+            let step = middle(&left[i + 1..=i + BESIDE]) - middle(&left[i.saturating_sub(BESIDE)..i]);
             let sharp = (left[i + 1] - left[i - 1]) * step.signum() >= SHARP * step.abs();
-            if step.abs() > STEP * noise && sharp && i > last + BESIDE {
-                (steps[i], last) = (true, i);
+            let fresh = last.is_none_or(|l| i > l + BESIDE);
+            if step.abs() > (STEP * noise).max(PART_OF_GAP * gap(i)) && sharp && fresh {
+                steps[i] = true;
+                last = Some(i);
             }
         }
         steps
