@@ -39,6 +39,8 @@ const BESIDE: usize = 5;
 const FEWEST_BEFORE: usize = 2;
 /// At most so many rests beyond one for each hold.
 const MOST_RESTS: u32 = 100;
+/// From fewer moving rows nobody knows what friction and bladder are; however long the muscle rested beside.
+const FEWEST_MOVING: usize = 400;
 /// Another law than the model's must leave less than this share of what the rows at rest leave.
 const CLEARLY: f64 = 0.7;
 
@@ -190,7 +192,7 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
         for (from, to) in &holds {
             moving.root_weight[*from..*to].fill(0.0);
         }
-        if moving.effective() * 4 < rows.effective() {
+        if moving.effective() < FEWEST_MOVING {
             return None;
         }
     }
