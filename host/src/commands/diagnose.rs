@@ -144,7 +144,15 @@ impl Arguments {
         refitted.file.about.date = table_file::now_utc();
         refitted.file.about.sources = table_file::sources(campaign, files, hashes);
         refitted.file.write(path)?;
-        if refitted.rms_after < refitted.rms_before {
+        if let Some(reserve) = refitted.reserve {
+            answer.remarks.push(format!("{}: {reserve}", path.display()));
+        } else if let Some((plain, with)) = refitted.left_out.filter(|(plain, with)| with < plain) {
+            console.note(format!(
+                "{}: the table with the named effects predicts a pressure left out of the fit to {with:.2} % of blocked force, without \
+                 them to {plain:.2} %",
+                path.display()
+            ));
+        } else if refitted.rms_after < refitted.rms_before {
             console.note(format!(
                 "{}: the table with the named effects predicts these recordings to {:.3} N, without them to {:.3} N",
                 path.display(),

@@ -22,8 +22,12 @@ pub struct Refitted {
     pub rms_before: f64,
     /// Error of the refitted one, N.
     pub rms_after: f64,
-    /// What the fit warned of, and whether the effects were left out.
+    /// Mean error at a pressure left out of the fit, without and with the effects, % of blocked force; none of a single pressure.
+    pub left_out: Option<(f64, f64)>,
+    /// What the fit warned of.
     pub warnings: Vec<String>,
+    /// What is to be known of the effects in the table: that they were left out of it, or kept on the user's word alone.
+    pub reserve: Option<String>,
 }
 
 /// Rounds of fitting the table to the force without the effects.
@@ -31,8 +35,12 @@ const ROUNDS: usize = 3;
 /// A measured fault of the bench that tables had swallowed may cost them this factor on the same recordings.
 const SWALLOWED: f64 = 1.1;
 
-/// Fits the table anew beside the named effects. An effect is kept only where the recordings are then
-/// predicted better: a table must not get worse by a diagnosis; one that the user gave is kept in any case.
+/// Tables that share out between pressures what an effect explains follow the very recordings they were made from as closely as the
+/// effect does, or a little closer: where a pressure left out is predicted no worse, the effect may cost this factor.
+const FOLLOWED: f64 = 1.1;
+
+/// Fits the table anew beside the named effects. They are kept only where the recordings are then predicted better, or about as well
+/// and a pressure left out of the fit no worse: a table must not get worse by a diagnosis. What the user gave is kept in any case.
 ///
 /// # Errors
 /// Recordings that cannot be fitted.
@@ -48,13 +56,15 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
     };
     let bare = TableFile { table: plain.table.clone(), about: about(&plain, Vec::new()) };
     let before = predict(&bare, campaign)?.rms.unwrap_or(0.0);
+    let unseen = plain.summary.left_out_pressure_mean_error_pct;
     let mut warnings = plain.summary.warnings.clone();
     let (effects, corrections) = parts(diagnosis);
     let nothing = effects.is_empty() && corrections.is_empty();
     let given = diagnosis.missing.iter().any(|m| m.given);
     if nothing || (diagnosis.verdict == Verdict::Consistent && !given) {
-        return Ok(Refitted { file: bare, rms_before: before, rms_after: before, warnings });
+        return Ok(without_effects(bare, before, warnings, None));
     }
+    let mut left_out = None;
     let mut with = TableFile { table: plain.table.clone(), about: about(&plain, corrections.clone()) };
     with.table.effects = effects.iter().cloned().collect();
     for _ in 0..ROUNDS {
@@ -74,25 +84,38 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
         with.table = again.table.clone();
         with.table.effects = effects.iter().cloned().collect();
         with.about = about(&again, corrections.clone());
+        left_out = unseen.zip(again.summary.left_out_pressure_mean_error_pct);
+        warnings.clone_from(&again.summary.warnings);
     }
     let after = predict(&with, campaign)?.rms.unwrap_or(f64::INFINITY);
     // What a check has measured is there, even where tables would swallow it.
     let measured = diagnosis.missing.iter().all(|m| m.checked);
-    let better = if measured { after <= SWALLOWED * before } else { after < before };
-    if given && after >= before && with.table.check().is_ok() {
-        warnings.push(format!(
-            "with the effects that were given the recordings are predicted no better ({after:.3} N against {before:.3} N); the \
-             table was written with them all the same"
-        ));
-    } else if with.table.check().is_err() || !better {
-        warnings.push(format!(
-            "with the named effects the recordings are predicted no better ({after:.3} N against {before:.3} N): the table was \
-             written without them"
-        ));
-        return Ok(Refitted { file: bare, rms_before: before, rms_after: before, warnings });
+    let foretells = left_out.is_some_and(|(plain, with)| with <= plain);
+    let better =
+        after < before || measured && after <= SWALLOWED * before || foretells && after <= FOLLOWED * before;
+    let possible = with.table.check().is_ok();
+    let no_better = |verdict: &str| {
+        let unseen = left_out.map(|(plain, with)| {
+            format!("; a pressure left out of the fit to {with:.2} % against {plain:.2} % of blocked force")
+        });
+        format!(
+            "with the effects the table predicts these recordings no better ({after:.3} N against {before:.3} N{}): {verdict}",
+            unseen.unwrap_or_default()
+        )
+    };
+    let mut reserve = None;
+    if given && !better && possible {
+        reserve = Some(no_better("it was written with them all the same, as they were given"));
+    } else if !(better && possible) {
+        return Ok(without_effects(bare, before, warnings, Some(no_better("it was written without them"))));
     }
     remember(&mut with, campaign);
-    Ok(Refitted { file: with, rms_before: before, rms_after: after, warnings })
+    Ok(Refitted { file: with, rms_before: before, rms_after: after, left_out, warnings, reserve })
+}
+
+/// The plain table, as the result where no effect goes into it.
+fn without_effects(file: TableFile, rms: f64, warnings: Vec<String>, reserve: Option<String>) -> Refitted {
+    Refitted { file, rms_before: rms, rms_after: rms, left_out: None, warnings, reserve }
 }
 
 /// Leaves in each effect what the recordings left in the muscle, so that a controller takes over a muscle that was worked.
