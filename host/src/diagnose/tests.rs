@@ -4,22 +4,29 @@
 
 use model_core::braid::Geometry;
 use model_core::muscle::Muscle;
-use model_core::table;
+use model_core::table::{self, MuscleTable};
 
 use super::linear::Random;
 use super::planned::{Place, Protocol, Step, play};
 use super::summary::summary;
 use super::verdict::Verdict;
-use super::{Diagnosis, Options, diagnose};
+use super::{Diagnosis, Options, diagnose, model};
+use crate::fit::{Options as FitOptions, fit};
+use crate::muscle_description::{Kind, MuscleDescription};
+use crate::predict::predict;
 use crate::recording::{Campaign, Recording};
 
-fn muscle() -> Muscle<f64> {
+fn one_bladder() -> MuscleTable {
     let mut one_bladder = table::example();
     for curve in &mut one_bladder.elastic {
         let middle = curve[2];
         curve.iter_mut().for_each(|e| *e = middle);
     }
-    Muscle::build(&one_bladder).expect("the example table")
+    one_bladder
+}
+
+fn muscle() -> Muscle<f64> {
+    Muscle::build(&one_bladder()).expect("the example table")
 }
 
 fn geometry() -> Geometry {
@@ -28,6 +35,11 @@ fn geometry() -> Geometry {
 
 /// Classic loops: six pressures, three triangular cycles each, one or more speeds (mm/s).
 fn loops(speeds: &[f64]) -> Campaign {
+    loops_of(&muscle(), speeds)
+}
+
+/// The same of another muscle.
+fn loops_of(muscle: &Muscle<f64>, speeds: &[f64]) -> Campaign {
     let mut step = Vec::new();
     for p in [230.0, 290.0, 350.0, 410.0, 480.0, 550.0] {
         step.push(Step::Pressure { to_kpa: p, rate_kpa_s: Some(50.0), settle_s: 1.0 });
@@ -39,7 +51,7 @@ fn loops(speeds: &[f64]) -> Campaign {
         step.push(Step::EndFile);
     }
     let protocol = Protocol { name: "loops".into(), sample_hz: 10.0, step };
-    play(&protocol, &muscle()).expect("playable")
+    play(&protocol, muscle).expect("playable")
 }
 
 /// Puts friction of 8 %, an effect and noise on the forces. `effect` sees speed, direction and the friction-free force.
@@ -297,4 +309,49 @@ fn what_cannot_be_judged_is_said() {
     assert!(said(&one_pressure).contains("one pressure only"));
     assert!(said(&short).contains("nothing can be judged"));
     assert!(ask(&no_gap).missing.is_empty(), "a muscle without hysteresis lacks nothing");
+}
+
+/// A bladder that gives up a fifth of its modulus over the first strokes, tested in ascending pressures, and what it pulls afterwards. Every
+/// pressure has a bladder of its own then, which tables follow as well as the effect does.
+fn wearing() -> (Campaign, Campaign) {
+    let mut worn = one_bladder();
+    worn.elastic.iter_mut().flatten().for_each(|e| *e *= 0.8);
+    let worn = Muscle::build(&worn).expect("a softer bladder");
+    let with_noise = |campaign, seed| recorded(campaign, seed, coloured(0.1, 2.0), |_, _, _| 0.0);
+    let soft = with_noise(loops_of(&worn, &[0.2]), 3);
+    let mut wearing = with_noise(loops(&[0.2]), 3);
+    for (k, (now, soft)) in wearing.recordings.iter_mut().zip(&soft.recordings).enumerate() {
+        let (start, duration) = (now.time[0], now.duration());
+        let Recording { time, force: Some(force), .. } = now else { continue };
+        for (i, soft) in soft.force.iter().flatten().enumerate() {
+            let cycles = 3.0 * (k as f64 + (time[i] - start) / duration);
+            force[i] += (soft - force[i]) * (1.0 - (-cycles / 5.0).exp());
+        }
+    }
+    (wearing, with_noise(loops_of(&worn, &[0.2]), 4))
+}
+
+#[test]
+fn an_effect_that_tables_share_out_between_pressures_is_written_into_the_table() {
+    let (now, later) = wearing();
+    let diagnosis = ask(&now);
+    assert_eq!(names(&diagnosis), ["cyclic-softening"], "{}", summary(&diagnosis));
+    let of = geometry();
+    let muscle = MuscleDescription {
+        name: "test".into(),
+        kind: Kind::Contractile,
+        rest_length_mm: of.rest_length.metres() * 1e3,
+        braid_angle_deg: of.braid_angle.degrees(),
+        bladder_outer_diameter_mm: of.outer_diameter.metres() * 1e3,
+        bladder_wall_mm: of.wall.metres() * 1e3,
+        young_modulus_MPa: None,
+        max_pressure_kPa: None,
+        max_contraction: None,
+    };
+    let mut with = model::refit(&now, &muscle, &diagnosis).expect("a table").file;
+    assert_eq!(with.table.effects.len(), 1);
+    let after = predict(&with, &later).expect("forces").rms.expect("measured");
+    with.table = fit(&now, &muscle, &FitOptions::default()).expect("a table").table;
+    let before = predict(&with, &later).expect("forces").rms.expect("measured");
+    assert!(after < 0.6 * before, "{after:.3} N of the worn muscle with the effect, {before:.3} N without");
 }
