@@ -5,8 +5,9 @@
 use model_core::braid::Geometry;
 use model_core::muscle::Muscle;
 use model_core::table::{self, MuscleTable};
+use model_core::units::{Length, Pressure};
 
-use super::linear::Random;
+use super::linear::{Random, quantile};
 use super::planned::{Place, Protocol, Step, play};
 use super::summary::summary;
 use super::verdict::Verdict;
@@ -15,6 +16,7 @@ use crate::fit::{Options as FitOptions, fit};
 use crate::muscle_description::{Kind, MuscleDescription};
 use crate::predict::predict;
 use crate::recording::{Campaign, Recording};
+use crate::table_file::TableFile;
 
 fn one_bladder() -> MuscleTable {
     let mut one_bladder = table::example();
@@ -35,11 +37,6 @@ fn geometry() -> Geometry {
 
 /// Classic loops: six pressures, three triangular cycles each, one or more speeds (mm/s).
 fn loops(speeds: &[f64]) -> Campaign {
-    loops_of(&muscle(), speeds)
-}
-
-/// The same of another muscle.
-fn loops_of(muscle: &Muscle<f64>, speeds: &[f64]) -> Campaign {
     let mut step = Vec::new();
     for p in [230.0, 290.0, 350.0, 410.0, 480.0, 550.0] {
         step.push(Step::Pressure { to_kpa: p, rate_kpa_s: Some(50.0), settle_s: 1.0 });
@@ -51,7 +48,7 @@ fn loops_of(muscle: &Muscle<f64>, speeds: &[f64]) -> Campaign {
         step.push(Step::EndFile);
     }
     let protocol = Protocol { name: "loops".into(), sample_hz: 10.0, step };
-    play(&protocol, muscle).expect("playable")
+    play(&protocol, &muscle()).expect("playable")
 }
 
 /// Puts friction of 8 %, an effect and noise on the forces. `effect` sees speed, direction and the friction-free force.
@@ -316,19 +313,24 @@ fn what_cannot_be_judged_is_said() {
 fn wearing() -> (Campaign, Campaign) {
     let mut worn = one_bladder();
     worn.elastic.iter_mut().flatten().for_each(|e| *e *= 0.8);
-    let worn = Muscle::build(&worn).expect("a softer bladder");
-    let with_noise = |campaign, seed| recorded(campaign, seed, coloured(0.1, 2.0), |_, _, _| 0.0);
-    let soft = with_noise(loops_of(&worn, &[0.2]), 3);
-    let mut wearing = with_noise(loops(&[0.2]), 3);
-    for (k, (now, soft)) in wearing.recordings.iter_mut().zip(&soft.recordings).enumerate() {
+    let worn: Muscle<f64> = Muscle::build(&worn).expect("a softer bladder");
+    let softer = |r: &Recording, i: usize| {
+        worn.force(Pressure::from_pascals(r.pressure[i]), Length::from_metres(r.stroke[i]), 0.0).newtons()
+    };
+    let mut now = loops(&[0.2]);
+    let mut later = now.clone();
+    for (k, (now, later)) in now.recordings.iter_mut().zip(&mut later.recordings).enumerate() {
         let (start, duration) = (now.time[0], now.duration());
+        let soft: Vec<f64> = (0..now.len()).map(|i| softer(now, i)).collect();
         let Recording { time, force: Some(force), .. } = now else { continue };
-        for (i, soft) in soft.force.iter().flatten().enumerate() {
-            let cycles = 3.0 * (k as f64 + (time[i] - start) / duration);
-            force[i] += (soft - force[i]) * (1.0 - (-cycles / 5.0).exp());
+        for ((force, soft), time) in force.iter_mut().zip(&soft).zip(time) {
+            let cycles = 3.0 * (k as f64 + (*time - start) / duration);
+            *force += (soft - *force) * (1.0 - (-cycles / 5.0).exp());
         }
+        later.force = Some(soft);
     }
-    (wearing, with_noise(loops_of(&worn, &[0.2]), 4))
+    let with_noise = |campaign, seed| recorded(campaign, seed, coloured(0.1, 2.0), |_, _, _| 0.0);
+    (with_noise(now, 3), with_noise(later, 4))
 }
 
 #[test]
@@ -350,8 +352,22 @@ fn an_effect_that_tables_share_out_between_pressures_is_written_into_the_table()
     };
     let mut with = model::refit(&now, &muscle, &diagnosis).expect("a table").file;
     assert_eq!(with.table.effects.len(), 1);
-    let after = predict(&with, &later).expect("forces").rms.expect("measured");
+    // The worn muscle after all that it went through; the readings about each turn, a jump of friction, are not what this is about.
+    let history = Campaign::new(now.recordings.iter().chain(&later.recordings).cloned().collect());
+    let missed = |file: &TableFile| {
+        let predicted = predict(file, &history).expect("forces").recordings.split_off(now.recordings.len());
+        let mut off: Vec<f64> = predicted
+            .iter()
+            .zip(&later.recordings)
+            .flat_map(|(p, r)| p.force.iter().zip(r.force.iter().flatten()).map(|(p, f)| (p - f).abs()))
+            .collect();
+        quantile(&mut off, 0.8)
+    };
+    let after = missed(&with);
     with.table = fit(&now, &muscle, &FitOptions::default()).expect("a table").table;
-    let before = predict(&with, &later).expect("forces").rms.expect("measured");
-    assert!(after < 0.6 * before, "{after:.3} N of the worn muscle with the effect, {before:.3} N without");
+    let before = missed(&with);
+    assert!(
+        after < 0.6 * before,
+        "four fifths of the worn muscle's readings within {after:.3} N with the effect, {before:.3} N without"
+    );
 }
