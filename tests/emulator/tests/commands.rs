@@ -19,7 +19,7 @@ use model_core::table::{self, MuscleTable};
 use model_core::units::{Length, Pressure};
 use serde_json::Value;
 use virtual_bench::bench::BenchSpec;
-use virtual_bench::lockstep::Answer;
+use virtual_bench::lockstep::{Answer, Station as _};
 use virtual_bench::plant::{Motion, PlantStation};
 use virtual_bench::pneumatics::Pneumatics;
 use virtual_bench::presets;
@@ -308,9 +308,10 @@ fn the_log_of_the_image_is_decoded_beside_events() {
     assert!(refused.status.code() == Some(1) && said.contains("built without logs"), "{said}");
 }
 
-/// Rest length and, long after any upload is through, a stretch to 3 mm and back, of which the muscle's bladder remembers.
-fn stretched() -> Motion {
-    Motion::Path { points: vec![(0.0, 0.4), (20.0, 0.4), (20.5, 3.0), (21.0, 0.4)] }
+/// What the bench does with the muscle: it holds it, and, when asked for the second, stretches it, which its bladder remembers.
+fn held_and_stretched() -> Vec<Motion> {
+    let stretched = Motion::Path { points: vec![(0.0, 0.4), (2.0, 0.4), (2.5, 3.0), (3.0, 0.4)] };
+    vec![Motion::Held { stroke_mm: 0.4 }, stretched]
 }
 
 /// How much stronger the device thinks the muscle than its table without memory, N, in the last of so many samples.
@@ -334,11 +335,15 @@ fn softening(client: &mut host::device::Client, muscle: &Muscle<f32>, samples: u
 fn what_a_muscle_remembers_is_there_after_the_plug_was_pulled_and_can_be_forgotten() {
     let station = || {
         let bench = BenchSpec::laboratory(presets::miniature(), 7);
-        let station = PlantStation::new(bench, vec![stretched()], 1e-3);
-        Options { first: Some(Box::new(Watched::new(station))), ..Options::default() }
+        Watched::new(PlantStation::new(bench, held_and_stretched(), 1e-3))
+    };
+    let options = |station: &Watched<PlantStation>| Options {
+        first: Some(Box::new(station.clone())),
+        ..Options::default()
     };
     let folder = Folder::new();
-    let Ok(machine) = Machine::start(folder.path(), station()) else { return };
+    let bench = station();
+    let Ok(machine) = Machine::start(folder.path(), options(&bench)) else { return };
     let mut table = table::example();
     table.effects.clear();
     table.friction.iter_mut().for_each(|share| *share = 0.0);
@@ -348,9 +353,10 @@ fn what_a_muscle_remembers_is_there_after_the_plug_was_pulled_and_can_be_forgott
     let muscle = Muscle::<f32>::build(&plain).expect("a valid table");
     let mut client = machine.client();
     upload(&mut client, Side::Agonist, &table);
-    let run = |client: &mut host::device::Client, samples: usize| {
+    let run = |client: &mut Client, samples: usize, meanwhile: &dyn Fn()| {
         tracking::start(client, Mode::Pressure);
         client.call::<SetTo>(&SetPoint::Pressure(300e3)).expect("a set-point");
+        meanwhile();
         let soft = softening(client, &muscle, samples);
         client.call::<Stop>(&()).expect("it stops");
         client.call::<Disarm>(&()).expect("it disarms");
@@ -360,16 +366,20 @@ fn what_a_muscle_remembers_is_there_after_the_plug_was_pulled_and_can_be_forgott
         }
         soft
     };
-    let new = run(&mut client, 1_000);
-    let worked = run(&mut client, 22_000);
+    let nothing = || ();
+    let stretch = || {
+        bench.with(|station| station.reset(1));
+    };
+    let new = run(&mut client, 1_000, &nothing);
+    let worked = run(&mut client, 5_000, &stretch);
     eprintln!("stronger than without memory by {new:.3} N as new, by {worked:.3} N after the stretch");
     // A softer bladder resists the braid less, so the muscle pulls harder.
     assert!(worked > 1.0 && new.abs() < 0.05 * worked, "{new} N, {worked} N");
     drop(client);
     machine.kill();
-    let Ok(machine) = Machine::start(folder.path(), station()) else { return };
+    let Ok(machine) = Machine::start(folder.path(), options(&station())) else { return };
     let mut client = machine.client();
-    let again = run(&mut client, 1_000);
+    let again = run(&mut client, 1_000, &nothing);
     eprintln!("by {again:.3} N after the power cut");
     assert!((again - worked).abs() < 0.1 * worked.abs(), "{worked} N, after the power cut {again} N");
     drop(client);
@@ -377,6 +387,6 @@ fn what_a_muscle_remembers_is_there_after_the_plug_was_pulled_and_can_be_forgott
     program::done(&line, folder.path(), &["device", "forget", "--json"]);
     drop(line);
     let mut client = machine.client();
-    let forgotten = run(&mut client, 400);
+    let forgotten = run(&mut client, 400, &nothing);
     assert!(forgotten.abs() < 0.05 * worked, "{forgotten} N after it was forgotten");
 }
