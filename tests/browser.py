@@ -4,18 +4,16 @@ import base64
 import contextlib
 import json
 import os
+import re
 import signal
-import socket
 import subprocess
 import tempfile
 import time
 import urllib.request
 
 
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
+# How long to wait for what must happen, s: what has not by then never will, however busy the machine is.
+HOPELESS = 180
 
 
 def ended(program):
@@ -52,8 +50,7 @@ def studio(program, on=None, muscle="mini"):
 
     The studio's own controller runs in QEMU where that is there; `on` ("qemu", "native") has one in another process, connected to by
     its port."""
-    port = free_port()
-    running = [subprocess.Popen(["chromedriver", f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)]
+    running = [subprocess.Popen(["chromedriver", "--port=0"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)]
     with tempfile.TemporaryDirectory() as folder:
         try:
             which = ["--emulate", muscle]
@@ -62,7 +59,11 @@ def studio(program, on=None, muscle="mini"):
                 which = ["--port", running[-1].address()]
             running.append(Program(program, "studio", *which, "-o", folder))
             url = running[-1].address("open ")
-            time.sleep(2)
+            # It takes a port that is free, and says which; then it serves.
+            said = (re.search(r"successfully on port (\d+)", line) for line in running[0].stdout)
+            port = next((found[1] for found in said if found), None)
+            if not port:
+                raise SystemExit("chromedriver does not say its port")
             yield url, f"http://127.0.0.1:{port}", running[-1]
         finally:
             for one in reversed(running):
@@ -77,13 +78,14 @@ class Browser:
         arguments = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--window-size=" + size]
         arguments += ["--enable-precise-memory-info", "--js-flags=--expose-gc"]
         wanted = {"browserName": "chrome", "goog:chromeOptions": {"args": arguments}, "goog:loggingPrefs": {"browser": "ALL"}}
+        wanted["timeouts"] = {"script": 1000 * HOPELESS, "pageLoad": 1000 * HOPELESS}
         self.path = "/session/" + self.ask("POST", "/session", {"capabilities": {"alwaysMatch": wanted}})["sessionId"]
         self.ask("POST", self.path + "/url", {"url": url})
 
     def ask(self, method, path, body=None):
         data = None if body is None else json.dumps(body).encode()
         request = urllib.request.Request(self.driver + path, data=data, method=method, headers={"Content-Type": "application/json"})
-        return json.load(urllib.request.urlopen(request, timeout=90))["value"]
+        return json.load(urllib.request.urlopen(request, timeout=HOPELESS + 10))["value"]
 
     def js(self, text):
         return self.ask("POST", self.path + "/execute/sync", {"script": text, "args": []})
@@ -91,10 +93,18 @@ class Browser:
     def click(self, name):
         self.js(f"document.getElementById('{name}').click()")
 
+    def click_until(self, name, condition):
+        """Asks again as long as it is refused, for what is allowed only a while after its cause."""
+        end = time.time() + HOPELESS
+        while not self.js(f"return !!({condition})"):
+            assert time.time() < end, f"never came by {name}: {condition}; the page says: {self.text('message')}"
+            self.click(name)
+            time.sleep(0.5)
+
     def text(self, name):
         return self.js(f"return document.getElementById('{name}').textContent")
 
-    def until(self, condition, seconds=60):
+    def until(self, condition, seconds=HOPELESS):
         end = time.time() + seconds
         while time.time() < end:
             if self.js(f"return !!({condition})"):
@@ -102,7 +112,7 @@ class Browser:
             time.sleep(0.1)
         raise AssertionError(f"never came: {condition}; the page says: {self.text('message')}")
 
-    def state(self, wanted, seconds=30):
+    def state(self, wanted, seconds=HOPELESS):
         self.until(f"document.getElementById('state').textContent.startsWith('{wanted}')", seconds)
 
     def cdp(self, command, **parameters):

@@ -15,7 +15,7 @@ use crate::error::{Code, Error, Result};
 
 mod guard;
 pub mod qemu;
-mod relay;
+pub mod relay;
 pub mod wire;
 
 use qemu::Qemu;

@@ -5,6 +5,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 
 use host::device::recorder::side_file;
 use host::emulated::{Emulated, Kind, Mishap, Stand};
@@ -14,6 +15,16 @@ use model_core::units::Pressure;
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::plant::Motion;
 use virtual_bench::presets;
+
+/// How long to wait for what must happen: what has not by then never will.
+const HOPELESS: Duration = Duration::from_secs(120);
+/// Rows of a run after which its load cell breaks: the muscle is filled by then.
+const BREAKS_AFTER: usize = 2_000;
+
+/// Rows of a recording, finished or not.
+fn rows(file: &Path) -> usize {
+    std::fs::read(file).map_or(0, |text| text.iter().filter(|byte| **byte == b'\n').count().saturating_sub(1))
+}
 
 struct Bench {
     emulated: Emulated,
@@ -55,6 +66,30 @@ impl Bench {
     fn refused(&self, arguments: &[&str]) -> (i32, String) {
         let output = self.host(arguments);
         (output.status.code().unwrap(), String::from_utf8_lossy(&output.stderr).into_owned())
+    }
+
+    /// Follows a force until the load cell's wire breaks, and records it.
+    fn broken(&self, name: &str) -> (i32, String) {
+        let (part, mishap) = (self.folder.join(format!("{name}.part")), std::sync::Arc::clone(&self.mishap));
+        let breaks = std::thread::spawn(move || {
+            let end = Instant::now() + HOPELESS;
+            while rows(&part) < BREAKS_AFTER && Instant::now() < end {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            mishap.store(Mishap::LoadCell as u8, Ordering::Relaxed);
+        });
+        let ended = self.refused(&["run", "--force", "40", "--seconds", "1000", "-o", name, "--replace"]);
+        breaks.join().unwrap();
+        ended
+    }
+
+    /// Mends what was broken, and clears the fault once the device has seen that it is.
+    fn mend(&self) {
+        self.mishap.store(0, Ordering::Relaxed);
+        let end = Instant::now() + HOPELESS;
+        while let (1.., said) = self.refused(&["device", "faults", "--clear"]) {
+            assert!(said.contains("still there") && Instant::now() < end, "{said}");
+        }
     }
 
     fn table(&self, name: &str, deadband_kpa: f32) -> &Path {
@@ -176,13 +211,7 @@ fn a_broken_load_cell_stops_a_run_in_words_and_the_rows_until_then_are_kept() {
     let bench = Bench::start("fault");
     bench.table("mini.pam", 76.5);
     bench.done(&["flash", "mini.pam"]);
-    let mishap = std::sync::Arc::clone(&bench.mishap);
-    let breaks = std::thread::spawn(move || {
-        std::thread::sleep(std::time::Duration::from_millis(900));
-        mishap.store(Mishap::LoadCell as u8, Ordering::Relaxed);
-    });
-    let (status, said) = bench.refused(&["run", "--force", "40", "--seconds", "30", "-o", "broken.csv"]);
-    breaks.join().unwrap();
+    let (status, said) = bench.broken("broken.csv");
     assert_eq!(status, 1);
     assert!(
         said.contains("error[device::fault]")
@@ -190,14 +219,12 @@ fn a_broken_load_cell_stops_a_run_in_words_and_the_rows_until_then_are_kept() {
         "{said}"
     );
     assert!(said.contains("broken wire"), "the remedy is told: {said}");
-    assert!(bench.folder.join("broken.csv").exists());
+    assert!(rows(&bench.folder.join("broken.csv")) >= BREAKS_AFTER);
     let (status, said) = bench.refused(&["run", "--force", "40", "--seconds", "1"]);
     assert!(status == 1 && said.contains("load cell"), "a latched fault stays: {said}");
     let (status, said) = bench.refused(&["device", "faults", "--clear"]);
     assert!(status == 1 && said.contains("still there"), "{said}");
-    bench.mishap.store(0, Ordering::Relaxed);
-    std::thread::sleep(std::time::Duration::from_millis(300));
-    bench.done(&["device", "faults", "--clear"]);
+    bench.mend();
     bench.done(&["run", "--force", "40", "--seconds", "0.5"]);
     let said = bench.done(&["device", "faults", "--json"]);
     assert!(said.contains("sensor-range"), "{said}");
@@ -206,17 +233,9 @@ fn a_broken_load_cell_stops_a_run_in_words_and_the_rows_until_then_are_kept() {
 /// What a trace of a loop that a broken wire stopped shows, by the headings of its columns.
 fn traced(bench: &Bench, variables: &str) -> serde_json::Value {
     bench.done(&["device", "trace", "--trigger", "until-fault", "--variables", variables]);
-    let mishap = std::sync::Arc::clone(&bench.mishap);
-    let breaks = std::thread::spawn(move || {
-        std::thread::sleep(std::time::Duration::from_millis(900));
-        mishap.store(Mishap::LoadCell as u8, Ordering::Relaxed);
-    });
-    bench.refused(&["run", "--force", "40", "--seconds", "30"]);
-    breaks.join().unwrap();
+    bench.broken("traced.csv");
     let said = bench.done(&["device", "trace", "--read", "--json"]);
-    bench.mishap.store(0, Ordering::Relaxed);
-    std::thread::sleep(std::time::Duration::from_millis(300));
-    bench.done(&["device", "faults", "--clear"]);
+    bench.mend();
     serde_json::Deserializer::from_str(&said).into_iter().next().unwrap().unwrap()
 }
 

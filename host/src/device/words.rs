@@ -143,7 +143,12 @@ pub fn report(report: &FaultReport) -> String {
     };
     let sensor = report.sensor.map(|s| format!(" ({})", sensor_name(s))).unwrap_or_default();
     let side = if report.side == Side::Antagonist { " on the second muscle" } else { "" };
-    let judged = format!(": {} against {}", quantity(report.value, unit), quantity(report.limit, unit));
+    // A brown-out, or a table that is missing, is a matter of yes or no.
+    let judged = if (report.value, report.limit) == (0.0, 0.0) {
+        String::new()
+    } else {
+        format!(": {} against {}", quantity(report.value, unit), quantity(report.limit, unit))
+    };
     let last = &report.last;
     format!(
         "{}{sensor}{side}{judged}, {:.3} s after the start, while {} in {} mode; last readings {}, {}, {}",

@@ -41,7 +41,7 @@ impl Connection {
 
 /// A port, and the line behind it; the port closes when this is dropped or the line ends.
 #[derive(Debug)]
-pub(super) struct Relay {
+pub struct Relay {
     port: u16,
     waiting: Option<TcpListener>,
     connection: Arc<Connection>,
@@ -49,18 +49,23 @@ pub(super) struct Relay {
 
 impl Relay {
     /// A port without a line yet: who connects waits.
-    pub(super) fn listen() -> io::Result<Self> {
+    ///
+    /// # Errors
+    /// The system gives no port.
+    pub fn listen() -> io::Result<Self> {
         let (listener, port) = listener()?;
         Ok(Self { port, waiting: Some(listener), connection: Arc::default() })
     }
 
     /// Its port.
-    pub(super) fn port(&self) -> u16 {
+    #[must_use]
+    pub fn port(&self) -> u16 {
         self.port
     }
 
     /// Puts the line behind it.
-    pub(super) fn between(mut self, line: Ends) -> Self {
+    #[must_use]
+    pub fn between(mut self, line: Ends) -> Self {
         let Ends { reader, writer } = line;
         let port = self.port;
         let connection = Arc::clone(&self.connection);

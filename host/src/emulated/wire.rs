@@ -5,7 +5,7 @@
 //! room on the edges of one-byte pieces, holds some tens of milliseconds. Where there are no named pipes it is TCP.
 
 use std::io::{self, Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::TcpListener;
 use std::path::Path;
 use std::process::Child;
 use std::thread;
@@ -68,7 +68,8 @@ pub fn listener() -> io::Result<(TcpListener, u16)> {
 ///
 /// # Errors
 /// In words: it has ended, does not connect within 20 s, or the port is broken.
-pub fn accept(listener: &TcpListener, child: &mut Child) -> Result<TcpStream, String> {
+#[cfg(not(unix))]
+fn accept(listener: &TcpListener, child: &mut Child) -> Result<std::net::TcpStream, String> {
     let stream = until_there(child, || {
         listener.set_nonblocking(true)?;
         match listener.accept() {

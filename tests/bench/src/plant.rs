@@ -398,16 +398,24 @@ mod tests {
     }
 
     #[test]
-    fn a_minute_at_a_kilohertz_is_quick() {
+    fn a_tick_costs_little_more_than_the_forces_in_it() {
         let bench = BenchSpec::laboratory(presets::contractile(), 1);
         let motion = Motion::Sine { mean_mm: 10.0, amplitude_mm: 5.0, frequency_hz: 0.5 };
         let mut plant = Plant::new(&bench, &motion);
-        let start = std::time::Instant::now();
-        for _ in 0..60_000 {
-            plant.step(1e-3, 400e3);
+        let muscle = Muscle::new(presets::contractile());
+        let seconds = |work: &mut dyn FnMut(usize) -> f64| {
+            let start = std::time::Instant::now();
+            std::hint::black_box((0..2_000).map(work).sum::<f64>());
+            start.elapsed().as_secs_f64()
+        };
+        // A ratio, and the best of many rounds of each: other programs of the machine lengthen single ones.
+        let (mut tick, mut force) = (f64::INFINITY, f64::INFINITY);
+        for _ in 0..30 {
+            tick = tick.min(seconds(&mut |_| plant.step(1e-3, 400e3).force));
+            force = force.min(seconds(&mut |n| muscle.quasi_static(400e3, 1e-6 * n as f64)));
         }
-        let spent = start.elapsed().as_secs_f64();
-        assert!(spent < 3.0, "{spent} s");
+        eprintln!("a tick takes as long as {:.1} quasi-static forces", tick / force);
+        assert!(tick < 40.0 * force, "{tick} s and {force} s for two thousand");
     }
 
     #[test]

@@ -4,7 +4,8 @@
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::time::Duration;
+
+use crate::machine::HOPELESS;
 
 /// A connection to QEMU's stub. The processor stands still while it is open.
 #[derive(Debug)]
@@ -17,7 +18,7 @@ impl Debugger {
     /// When QEMU does not listen there.
     pub fn attach(port: u16) -> Self {
         let stream = TcpStream::connect(("127.0.0.1", port)).expect("QEMU's debugging port");
-        stream.set_read_timeout(Some(Duration::from_secs(5))).expect("a stream");
+        stream.set_read_timeout(Some(HOPELESS)).expect("a stream");
         // Many small packets, each of which waits for its answer.
         stream.set_nodelay(true).expect("a stream");
         let mut debugger = Self(stream);

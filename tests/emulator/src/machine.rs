@@ -11,7 +11,8 @@ use std::time::{Duration, Instant};
 
 use host::device::{Client, Patience, Port};
 use host::emulated::qemu::{Line, Paced, board, end};
-use host::emulated::wire::{Wire, accept, listener};
+use host::emulated::relay::Relay;
+use host::emulated::wire::{Wire, listener};
 use object::{Object, ObjectSymbol};
 use virtual_bench::lockstep::{self, Station};
 
@@ -179,11 +180,16 @@ pub const PATIENCE: Patience = Patience {
     noisy_tries: 60,
 };
 
+/// How long a test waits for what must happen: only so long that what has not happened by then never will, however busy the machine is.
+pub const HOPELESS: Duration = Duration::from_secs(120);
+
 /// A running board.
 #[derive(Debug)]
 pub struct Machine {
     child: Child,
     link: TcpStream,
+    /// What the board says goes through a pipe, which holds a second of telemetry while this process waits for its turn.
+    _relay: Relay,
     debugger: Option<u16>,
     benches: Vec<JoinHandle<()>>,
 }
@@ -234,16 +240,19 @@ impl Machine {
     }
 
     fn start_image(image: &Path, folder: &Path, options: Options) -> Self {
-        let (link, link_port) = listener().expect("a port of this machine");
-        let mut lines = vec![Line::Port(link_port)];
-        let mut plugged = Vec::new();
         static NUMBER: AtomicU32 = AtomicU32::new(0);
+        // A board may be started again in the same folder.
+        let wire = |what: &str| {
+            let name = format!("{what}{}", NUMBER.fetch_add(1, Ordering::Relaxed));
+            Wire::new(folder, &name).expect("a line")
+        };
+        let link = wire("link");
+        let mut lines = vec![link.line()];
+        let mut plugged = Vec::new();
         for station in [options.first, options.second] {
             match station {
                 Some(station) => {
-                    // A board may be started again in the same folder.
-                    let name = format!("bench{}", NUMBER.fetch_add(1, Ordering::Relaxed));
-                    let bench = Wire::new(folder, &name).expect("a line");
+                    let bench = wire("bench");
                     lines.push(bench.line());
                     plugged.push((bench, station));
                 }
@@ -262,7 +271,10 @@ impl Machine {
             .stderr(Stdio::piped())
             .spawn()
             .expect("QEMU starts");
-        let link = opened(&mut child, |child| accept(&link, child));
+        let link = opened(&mut child, |child| link.open(child));
+        let relay = Relay::listen().expect("a port of this machine").between(link);
+        let link = TcpStream::connect(("127.0.0.1", relay.port())).expect("the relay listens");
+        link.set_nodelay(true).expect("a stream");
         let benches = plugged
             .into_iter()
             .map(|(bench, mut station)| {
@@ -274,7 +286,7 @@ impl Machine {
                 })
             })
             .collect();
-        Self { child, link, debugger, benches }
+        Self { child, link, _relay: relay, debugger, benches }
     }
 
     /// The raw link. Every value is the same line: one reads what another did not.
@@ -292,6 +304,23 @@ impl Machine {
     pub fn client(&self) -> Client {
         let port = Port::from_tcp(self.link()).expect("a handle");
         Client::connect(port, PATIENCE).expect("the board says hello")
+    }
+
+    /// The host's own client on the link of a board that has restarted since it had started so often.
+    ///
+    /// # Panics
+    /// When it does not restart.
+    pub fn client_after(&mut self, starts: u32) -> Client {
+        let deadline = Instant::now() + HOPELESS;
+        loop {
+            assert!(self.is_running(), "the firmware has ended");
+            assert!(Instant::now() < deadline, "the board does not restart");
+            let client = self.client();
+            if client.hello().starts != starts {
+                return client;
+            }
+            thread::sleep(Duration::from_millis(20));
+        }
     }
 
     /// Stops the processor for a debugger.
@@ -317,21 +346,6 @@ impl Machine {
     /// Whether the board is still there; a panic of the firmware ends QEMU.
     pub fn is_running(&mut self) -> bool {
         matches!(self.child.try_wait(), Ok(None))
-    }
-
-    /// Waits for QEMU to end by itself and gives its exit status.
-    ///
-    /// # Panics
-    /// When it does not within `patience`.
-    pub fn wait(&mut self, patience: Duration) -> Option<i32> {
-        let deadline = Instant::now() + patience;
-        loop {
-            if let Ok(Some(status)) = self.child.try_wait() {
-                return status.code();
-            }
-            assert!(Instant::now() < deadline, "QEMU does not end");
-            thread::sleep(Duration::from_millis(5));
-        }
     }
 }
 

@@ -54,6 +54,16 @@ pub fn start_piped(line: &Line, folder: &Path, arguments: &[&str]) -> Child {
         .expect("the program starts")
 }
 
+/// Ends a command as Ctrl-C does.
+///
+/// # Panics
+/// When it is not there.
+#[cfg(unix)]
+pub fn interrupt(child: &Child) {
+    let id = i32::try_from(child.id()).ok().and_then(rustix::process::Pid::from_raw).expect("a process");
+    rustix::process::kill_process(id, rustix::process::Signal::INT).expect("it is there");
+}
+
 /// Starts a command and leaves it running.
 ///
 /// # Panics

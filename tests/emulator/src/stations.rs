@@ -1,8 +1,11 @@
 //! Benches that a test can look into and disturb while the board runs on them.
 
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use virtual_bench::lockstep::{Answer, Station};
+
+use crate::machine::HOPELESS;
 
 /// What a test does to the readings of a bench: called with the period's number and the answer, which it may change.
 pub type Disturbance = Box<dyn FnMut(u64, &mut Answer) + Send>;
@@ -59,6 +62,34 @@ impl<S> Watched<S> {
     /// What passed since a period.
     pub fn since(&self, period: usize) -> Vec<Exchange> {
         self.inner().exchanges.get(period..).unwrap_or_default().to_vec()
+    }
+
+    /// Lets the bench go on until something is so of its periods, however long the machine takes for them.
+    ///
+    /// # Panics
+    /// When the bench stands still: then it never will be.
+    pub fn until(&self, what: &str, so: impl Fn(usize) -> bool) {
+        let mut last = (self.periods(), Instant::now());
+        loop {
+            let now = self.periods();
+            if so(now) {
+                return;
+            }
+            if now != last.0 {
+                last = (now, Instant::now());
+            }
+            assert!(last.1.elapsed() < HOPELESS, "{what}: the bench stands still");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    /// Lets the bench go on for some periods.
+    ///
+    /// # Panics
+    /// When it stands still.
+    pub fn pass(&self, periods: usize) {
+        let until = self.periods() + periods;
+        self.until("some periods", |now| now >= until);
     }
 
     /// Looks at the bench itself.

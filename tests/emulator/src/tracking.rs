@@ -7,8 +7,28 @@ use model_core::link::endpoints::{
     Arm, ClearFault, Disarm, GetSettings, GetStatus, SetReference, SetSettings, SetTelemetry, SetTo,
     StartMode, Stop,
 };
-use model_core::link::messages::{Event, Mode, Reference, SetPoint, Start, State, Telemetry, TelemetryRate};
+use model_core::link::messages::{
+    Event, FaultReport, Mode, Reference, SetPoint, Start, State, Telemetry, TelemetryRate,
+};
 use model_core::link::settings::{FeedForward, Settings};
+
+use crate::machine::HOPELESS;
+
+/// Waits for the event of a fault.
+///
+/// # Panics
+/// When none is told.
+pub fn stopped(client: &mut Client) -> FaultReport {
+    let deadline = Instant::now() + HOPELESS;
+    while Instant::now() < deadline {
+        client.keep_alive().expect("the line is there");
+        let topic = client.topic(Duration::from_millis(50)).expect("the line is there");
+        if let Some(Topic::Event(Event::Fault(report))) = topic {
+            return report;
+        }
+    }
+    panic!("no fault was told");
+}
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,9 +73,9 @@ pub fn compare(feed_forward: FeedForward, proportional: f32, integral: f32) -> i
 /// The next sample, or the event that stopped the device.
 ///
 /// # Panics
-/// When nothing comes for ten seconds.
+/// When nothing comes any more.
 pub fn sample(client: &mut Client) -> Result<Telemetry, Event> {
-    let deadline = Instant::now() + Duration::from_secs(10);
+    let deadline = Instant::now() + HOPELESS;
     loop {
         client.keep_alive().expect("the line is there");
         match client.topic(Duration::from_millis(500)).expect("the line is there") {

@@ -6,13 +6,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use emulator_tests::line::{self, Line};
-use emulator_tests::machine::Folder;
+use emulator_tests::machine::{Folder, HOPELESS};
 use emulator_tests::{Machine, Options, Watched, program, tracking, upload};
-use host::device::{Client, Topic};
 use model_core::link::endpoints::{Arm, ClearFault, GetFaults, GetInfo, GetStatus, SetTo, StartMode};
-use model_core::link::messages::{
-    Event, Fault, FaultReport, Mode, Refusal, SetPoint, Side, Start, StartedBy, State,
-};
+use model_core::link::messages::{Fault, Mode, Refusal, SetPoint, Side, Start, StartedBy, State};
 use model_core::table;
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::plant::{Motion, PlantStation};
@@ -33,18 +30,6 @@ fn board(folder: &Folder, station: &Station, debugged: bool) -> Option<Machine> 
     Machine::start(folder.path(), options).ok()
 }
 
-/// Lets the plant go on until something is so.
-fn until(station: &Station, what: &str, so: impl Fn(usize) -> bool) {
-    let mut last = (station.periods(), Instant::now());
-    while !so(station.periods()) {
-        if station.periods() != last.0 {
-            last = (station.periods(), Instant::now());
-        }
-        assert!(last.1.elapsed() < Duration::from_secs(30), "{what}: the plant stands still");
-        std::thread::sleep(Duration::from_millis(2));
-    }
-}
-
 fn command(station: &Station) -> f32 {
     station.periods().checked_sub(1).map_or(0.0, |last| station.since(last)[0].command)
 }
@@ -53,10 +38,10 @@ fn command(station: &Station) -> f32 {
 fn killed_in_a_wave(station: &Station, line: &Line, folder: &Folder) {
     let wave = ["run", "--pressure", "sine mean=250 amplitude=50 frequency=1"];
     let mut child: Child = program::start(line, folder.path(), &wave);
-    until(station, "the wave", |_| command(station) > 150e3);
+    station.until("the wave", |_| command(station) > 150e3);
     let begun = station.periods();
     // It lives as long as the program does, silence or not.
-    until(station, "the wave goes on", |now| now > begun + 1_500);
+    station.until("the wave goes on", |now| now > begun + 1_500);
     assert!(command(station) > 150e3, "the wave was stopped while its host was alive");
     // SIGKILL: nothing of the program runs any more.
     child.kill().expect("it is killed");
@@ -73,19 +58,25 @@ fn a_host_that_is_killed_during_a_wave_of_the_devices_own_stops_it() {
     let counted = Box::new(move |_: &mut Vec<u8>| note.store(clock.periods(), Ordering::Relaxed));
     let line = Line::tcp(&machine, counted, line::clean());
     killed_in_a_wave(&station, &line, &folder);
+    let killed = station.periods();
+    station.until("the vent", |now| command(&station) == 0.0 || now > killed + 5_000);
+    let vented = station.periods();
+    station.until("it stays vented", |now| now > vented + 200);
     let last_heard = heard.load(Ordering::Relaxed);
-    until(&station, "the vent", |now| now > last_heard + 1_200);
     let after = station.since(last_heard);
     let vented = after.iter().position(|exchange| exchange.command == 0.0);
-    // A frame takes a few ticks to the board, whose own count begins when it is whole.
+    // The board's own count, which is told below, begins when the frame is there: a busy machine takes its time to bring it.
     assert!(
-        vented.is_some_and(|n| (1_000..1_060).contains(&n)),
+        vented.is_some_and(|n| (1_000..2_000).contains(&n)),
         "vents {vented:?} ticks after the last frame"
     );
     assert!(after[vented.unwrap_or(0)..].iter().all(|exchange| exchange.command == 0.0), "and stays vented");
     let said = program::done(&line, folder.path(), &["device", "faults", "--clear"]);
     assert!(said.contains("latched: nothing was heard from the host while running"), "{said}");
-    assert!(said.contains("against 1000 ticks") && said.contains("while running in pressure mode"), "{said}");
+    assert!(
+        said.contains("1001 ticks against 1000 ticks") && said.contains("while running in pressure mode"),
+        "{said}"
+    );
     assert!(said.contains("what to do: was the program ended"), "{said}");
     let said = program::done(&line, folder.path(), &["device", "info", "--json"]);
     assert!(said.contains("\"state\": \"disarmed\""), "{said}");
@@ -107,34 +98,26 @@ fn a_device_that_was_told_to_go_on_alone_does_and_holds_where_it_was_told_to_hol
     set(&["watch.autonomous=true"]);
     killed_in_a_wave(&station, &line, &folder);
     let killed = station.periods();
-    until(&station, "it goes on", |now| now > killed + 3_000);
+    station.until("it goes on", |now| now > killed + 3_000);
     assert!(station.since(killed + 100).iter().all(|exchange| exchange.command > 100e3), "it went on alone");
     program::done(&line, folder.path(), &["vent"]);
     let hold = format!("hold_on={}", 1_u32 << Fault::HostSilence.code());
-    set(&["watch.autonomous=false", "watch.host_silence_ticks=800", &hold]);
+    set(&["watch.autonomous=false", "watch.host_silence_ticks=1200", &hold]);
     killed_in_a_wave(&station, &line, &folder);
     let killed = station.periods();
-    until(&station, "it holds", |now| now > killed + 1_500);
-    let held = station.since(killed + 1_000);
-    assert!(held[0].command > 190e3 && held.iter().all(|exchange| exchange.command == held[0].command));
+    // A wave never asks for the same three hundred times.
+    let still = |now: usize| {
+        let last = station.since(now.saturating_sub(300));
+        last.iter().all(|exchange| exchange.command == last[0].command)
+    };
+    station.until("it holds", |now| now > killed + 300 && (still(now) || now > killed + 10_000));
+    let held = station.periods();
+    assert!(held > killed + 1_200, "it holds {} ticks after its host was killed", held - killed);
+    assert!(still(held) && command(&station) > 190e3, "it holds {} Pa", command(&station));
     program::done(&line, folder.path(), &["vent"]);
     let vented = station.periods();
-    until(&station, "it vents", |now| now > vented + 50);
+    station.until("it vents", |now| now > vented + 50);
     assert_eq!(command(&station), 0.0);
-}
-
-/// Waits for the event of a fault.
-fn stopped(client: &mut Client) -> FaultReport {
-    let deadline = Instant::now() + Duration::from_secs(30);
-    while Instant::now() < deadline {
-        client.keep_alive().expect("the line is there");
-        if let Some(Topic::Event(Event::Fault(report))) =
-            client.topic(Duration::from_millis(50)).expect("the line is there")
-        {
-            return report;
-        }
-    }
-    panic!("no fault was told");
 }
 
 /// A way for the air to break, and the pressure asked for after it broke.
@@ -142,7 +125,7 @@ struct Break {
     name: &'static str,
     fault: Fault,
     how: fn(&mut Pneumatics),
-    then_asked: f32,
+    then_asked: Option<f32>,
 }
 
 /// A regulator that no longer moves.
@@ -151,10 +134,20 @@ fn stands_still(air: &mut Pneumatics) {
 }
 
 const BREAKS: [Break; 4] = [
-    Break { name: "burst", fault: Fault::PressureNotRising, how: |air| air.leak = 5.0, then_asked: 250e3 },
-    Break { name: "leak", fault: Fault::PressureNotRising, how: |air| air.leak = 1.0, then_asked: 400e3 },
-    Break { name: "no supply", fault: Fault::PressureNotRising, how: stands_still, then_asked: 500e3 },
-    Break { name: "jammed valve", fault: Fault::PressureNotFalling, how: stands_still, then_asked: 20e3 },
+    Break { name: "burst", fault: Fault::PressureNotRising, how: |air| air.leak = 5.0, then_asked: None },
+    Break {
+        name: "leak",
+        fault: Fault::PressureNotRising,
+        how: |air| air.leak = 1.0,
+        then_asked: Some(400e3),
+    },
+    Break { name: "no supply", fault: Fault::PressureNotRising, how: stands_still, then_asked: Some(500e3) },
+    Break {
+        name: "jammed valve",
+        fault: Fault::PressureNotFalling,
+        how: stands_still,
+        then_asked: Some(20e3),
+    },
 ];
 
 #[test]
@@ -168,21 +161,27 @@ fn a_burst_a_leak_a_closed_supply_and_a_jammed_valve_are_noticed_on_the_plant_it
         tracking::start(&mut client, Mode::Pressure);
         client.call::<SetTo>(&SetPoint::Pressure(250e3)).expect("a set-point");
         let begun = station.periods();
-        until(&station, name, |now| now > begun + 400);
+        station.until(name, |now| now > begun + 400);
         let whole = station.with(|bench| *bench.plant().pneumatics());
         station.with(|bench| how(bench.plant().pneumatics()));
         let broken = station.periods();
-        client.call::<SetTo>(&SetPoint::Pressure(then_asked)).expect("a set-point");
-        let report = stopped(&mut client);
+        if let Some(pascals) = then_asked {
+            client.call::<SetTo>(&SetPoint::Pressure(pascals)).expect("a set-point");
+        }
+        let report = tracking::stopped(&mut client);
         let told = station.periods();
-        until(&station, name, |now| now > told + 5);
+        station.until(name, |now| now > told + 5);
+        let after = station.since(broken);
+        // Of an air that follows no change nothing is noticed before there is one; it takes a busy machine its time to ask for it.
+        let changed = after.iter().position(|exchange| (exchange.command - 250e3).abs() > 50e3);
+        let began = then_asked.map_or(0, |_| changed.expect("the command follows what is asked"));
         // The regulator's lead may command zero for a moment on the way down; venting stays.
-        let vented = station.since(broken).iter().rposition(|exchange| exchange.command > 0.0);
+        let vented = after[began..].iter().rposition(|exchange| exchange.command > 0.0);
         assert_eq!(report.fault, fault, "{name}: {report:?}");
         // 200 ticks of `follow_ticks`, and the time in which air and model part.
         assert!(vented.is_some_and(|n| (200..400).contains(&n)), "{name}: vents after {vented:?} ticks");
         station.with(|bench| *bench.plant().pneumatics() = whole);
-        until(&station, name, |now| now > told + 300);
+        station.until(name, |now| now > told + 300);
         client.call::<ClearFault>(&()).expect("it clears when the air is whole");
     }
 }
@@ -201,14 +200,14 @@ fn a_program_that_hangs_is_restarted_vented_and_says_so() {
     assert_eq!(client.call::<GetInfo>(&()).expect("its limits").started_by, StartedBy::Power);
     tracking::start(&mut client, Mode::Pressure);
     client.call::<SetTo>(&SetPoint::Pressure(250e3)).expect("a set-point");
-    until(&station, "it runs", |_| command(&station) > 200e3);
+    station.until("it runs", |_| command(&station) > 200e3);
     drop(client);
     let mut debugger = machine.debugger();
     let tasks = debugger.word(TASKS_VECTOR) & !1;
     debugger.patch(tasks, HANG);
     debugger.detach();
     // The bench is started anew by a board that starts, and so its record.
-    let deadline = Instant::now() + Duration::from_secs(20);
+    let deadline = Instant::now() + HOPELESS;
     while command(&station) > 0.0 {
         assert!(Instant::now() < deadline, "the watchdog does not bite");
         std::thread::sleep(Duration::from_millis(20));
@@ -221,7 +220,7 @@ fn a_program_that_hangs_is_restarted_vented_and_says_so() {
     // Nothing starts by itself, and nothing can be started before somebody has looked.
     assert_eq!(client.try_call::<Arm>(&()).expect("an answer"), Err(Refusal::Latched(Fault::Watchdog)));
     let begun = station.periods();
-    until(&station, "it stays vented", |now| now > begun + 500);
+    station.until("it stays vented", |now| now > begun + 500);
     assert!(station.since(0).iter().all(|exchange| exchange.command == 0.0));
     client.call::<ClearFault>(&()).expect("it clears");
     client.call::<Arm>(&()).expect("it arms");

@@ -1,9 +1,9 @@
 //! The commands of `host`, as a user types them, on the real image: modes, waves from a file, the trace, the log, the
 //! regulator, and what a muscle remembers.
 
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
 
 use emulator_tests::joint;
 use emulator_tests::line::{self, Line};
@@ -57,8 +57,9 @@ impl Stand {
         image: fn(&Path, Options) -> Result<Machine, emulator_tests::Skipped>,
     ) -> Option<Self> {
         let folder = Folder::new();
-        let machine = image(folder.path(), options).ok()?;
-        // The bench is faster than a watch, and a program that has to wait for a busy machine is not the subject here.
+        // No faster than a real board: what a program sends at its times comes later by as many ticks as it waits for a busy machine.
+        let machine = image(folder.path(), Options { speed: Some(1.0), ..options }).ok()?;
+        // A program that has to wait for longer than the watch is not the subject here.
         tracking::set(&mut machine.client(), |settings| settings.watch.autonomous = true);
         let line = Line::tcp(&machine, line::clean(), line::clean());
         Some(Self { folder, line, machine })
@@ -281,25 +282,33 @@ fn the_log_of_the_image_is_decoded_beside_events() {
     client.call::<Stop>(&()).expect("it stops, and stays armed");
     client.call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 }).expect("quiet");
     drop(client);
-    let arguments = ["device", "log", "--seconds", "4", "--json", "--elf", &elf];
-    let log = program::start_piped(&stand.line, stand.folder.path(), &arguments);
-    std::thread::sleep(Duration::from_millis(1_500));
+    let arguments = ["device", "log", "--seconds", "120", "--json", "--elf", &elf];
+    let mut log = program::start_piped(&stand.line, stand.folder.path(), &arguments);
+    let mut lines = BufReader::new(log.stdout.take().expect("its output")).lines();
+    let mut told = Vec::new();
+    // Everything up to a line that is waited for; the program ends after its two minutes where that never comes.
+    let mut until = |so: &dyn Fn(&Value) -> bool| {
+        while !told.iter().any(so) {
+            let line = lines.next().unwrap_or_else(|| panic!("it ends before that, after {told:?}"));
+            told.push(json(&line.expect("a line")));
+        }
+    };
+    until(&|line| line["event"] == "state" && line["state"] == "armed");
     station.disturb(|_, answer| answer.status |= Answer::SUPPLY_LOW);
-    let output = log.wait_with_output().expect("it ends");
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let lines: Vec<Value> = text.lines().map(json).collect();
-    let of = |kind: &str| lines.iter().filter(|line| line["event"] == kind).collect::<Vec<_>>();
-    assert!(of("state").iter().any(|line| line["state"] == "armed"), "{text}");
-    assert!(of("fault").iter().any(|line| line["fault"] == "brown-out"), "{text}");
-    let logged = of("log");
+    until(&|line| line["event"] == "fault" && line["fault"] == "brown-out");
     let fault = format!("fault {}", Fault::BrownOut.code());
-    assert!(
-        logged.iter().any(|line| line["level"] == "warn"
+    until(&|line| {
+        line["event"] == "log"
+            && line["level"] == "warn"
             && line["text"].as_str().is_some_and(|words| words.contains(&fault))
-            && line["time_s"].as_f64().is_some_and(|time| time > 0.1)),
-        "{text}"
-    );
+    });
+    // Events and log lines are of one clock.
+    let time =
+        |kind: &str| told.iter().find(|line| line["event"] == kind).map(|line| number(&line["time_s"]));
+    assert!(time("fault").is_some_and(|at| at > 0.0) && time("log") == time("fault"), "{told:?}");
+    program::interrupt(&log);
+    let status = log.wait().expect("it ends");
+    assert!(status.success(), "ended by the key for it: {status:?}");
     // An image without log lines is refused in words.
     let Ok(silent) = machine::image() else { return };
     let silent = silent.to_string_lossy().into_owned();

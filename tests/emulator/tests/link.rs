@@ -3,9 +3,9 @@
 use std::io::{Read, Write};
 use std::time::Duration;
 
-use emulator_tests::machine::Folder;
+use emulator_tests::machine::{Folder, PATIENCE};
 use emulator_tests::{Machine, Options, image_of, upload};
-use host::device::{Client, Patience, Port, tables};
+use host::device::{Client, Port, tables};
 use model_core::check;
 use model_core::link::endpoints::BeginTable;
 use model_core::link::endpoints::{
@@ -51,9 +51,8 @@ fn a_table_is_uploaded_read_back_rolled_back_and_there_after_a_restart() {
     let starts = client.hello().starts;
     client.call_once::<Restart>(&()).expect("it answers before it restarts");
     // QEMU keeps the line while the board starts again.
-    std::thread::sleep(Duration::from_millis(300));
-    assert!(machine.is_running(), "the firmware ended");
-    let mut client = machine.client();
+    drop(client);
+    let mut client = machine.client_after(starts);
     assert_eq!(client.hello().starts, starts + 1);
     assert_eq!(kept(&mut client), image_of(&first));
     // A plug that is pulled is no different.
@@ -123,8 +122,7 @@ fn garbage_on_the_line_costs_nothing_but_itself() {
     while link.read(&mut rest).is_ok_and(|count| count > 0) {}
     let port = Port::from_tcp(link).expect("a port");
     // A machine that emulates many boards at once takes its time over twenty thousand bytes.
-    let patience = Patience { answer: Duration::from_secs(3), ..Patience::default() };
-    let mut client = Client::connect(port, patience).expect("it says hello after garbage");
+    let mut client = Client::connect(port, PATIENCE).expect("it says hello after garbage");
     let status = client.call::<GetStatus>(&()).expect("a status");
     assert_eq!(status.state, State::Disarmed);
     assert!(status.frames_bad > 10, "{status:?}");

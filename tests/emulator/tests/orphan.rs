@@ -10,7 +10,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use emulator_tests::machine::{self, Folder};
+use emulator_tests::machine::{self, Folder, HOPELESS};
 use emulator_tests::program;
 
 /// Whether QEMU still has the link's line open: without waiting, a named pipe that nobody reads cannot be opened for writing.
@@ -43,9 +43,9 @@ fn qemu_ends_with_a_host_that_is_killed() {
     // The hard way: nothing of the program runs any more.
     host.kill().expect("it is there");
     host.wait().expect("it ends");
-    let deadline = Instant::now() + Duration::from_secs(10);
+    let deadline = Instant::now() + HOPELESS;
     while is_read(&pipe) {
-        assert!(Instant::now() < deadline, "QEMU still runs, ten seconds after its host was killed");
+        assert!(Instant::now() < deadline, "QEMU still runs, long after its host was killed");
         std::thread::sleep(Duration::from_millis(50));
     }
 }

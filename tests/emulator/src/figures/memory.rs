@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::process::Command;
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
 
 use model_core::effects::{EffectName, FittedEffect};
 use model_core::link::endpoints::{
@@ -106,7 +105,7 @@ fn of_one_muscle() -> Result<u32, Skipped> {
     let motion = Motion::Sine { mean_mm: 0.9, amplitude_mm: 0.6, frequency_hz: 0.3 };
     let station = PlantStation::new(bench, vec![motion], 1e-3);
     let options = Options { first: Some(Box::new(station)), debugged: true, ..Options::default() };
-    let machine = Machine::start(folder.path(), options)?;
+    let mut machine = Machine::start(folder.path(), options)?;
     let mut client = machine.client();
     let table = with_effects();
     for side in [Side::Agonist, Side::Agonist, Side::Antagonist] {
@@ -125,9 +124,10 @@ fn of_one_muscle() -> Result<u32, Skipped> {
     host::device::tables::read(&mut client, Side::Agonist).expect("it reads");
     client.call::<GetPastFault>(&PastFault { back: 0 }).expect("a log");
     client.call::<Forget>(&ForgetMemory { side: Side::Agonist }).expect("it forgets");
+    let starts = client.hello().starts;
     client.call_once::<Restart>(&()).expect("it answers before it restarts");
-    std::thread::sleep(Duration::from_millis(300));
-    machine.client().call::<GetInfo>(&()).expect("it started again");
+    drop(client);
+    machine.client_after(starts).call::<GetInfo>(&()).expect("it started again");
     Ok(reached(&machine))
 }
 
