@@ -102,7 +102,7 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ForceBand>) -> Resul
             })?;
         corrections.push((candidate, &c.parameters, Memory::<f64>::default()));
     }
-    let mut follower = Follower::default();
+    let mut follower = Follower::of(campaign);
     let plain = chain.is_empty() && corrections.is_empty();
     let mut recordings = Vec::with_capacity(campaign.recordings.len());
     let (mut square, mut rows) = (0.0, 0.0);

@@ -235,7 +235,7 @@ fn each_law_describes_the_bench_s_own_version_of_its_effect() {
         inject(name, &mut bench, blocked, stroke, top, speed, muscle.stretch(stroke));
         let campaign = Campaign::new(run(&bench, &protocol));
         let motions = Motion::of_campaign(&campaign);
-        let mut follower = Follower::default();
+        let mut follower = Follower::of(&campaign);
         let mut contexts: Vec<Context<f64>> = Vec::new();
         // The effect at the same measured pressure and stroke, at rows where the muscle pulls and does not just turn.
         let (mut rows, mut trace) = (Vec::new(), Vec::new());

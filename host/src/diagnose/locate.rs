@@ -284,7 +284,7 @@ fn words(name: &str, from: f64, to: f64, share: f64, part: f64) -> String {
     };
     let place = match name {
         "recording" => format!("in recording {}", range(1.0, "", 0)),
-        "time" => format!("from {} into the campaign", range(1.0, " s", 0)),
+        "time" => format!("from {} on the campaign's clock", range(1.0, " s", 0)),
         "cycle" => format!("in cycle {} at a pressure", range(1.0, "", 0)),
         "pressure" => format!("at {}", range(1e-3, " kPa", 0)),
         "contraction" => format!("at contractions of {}", range(100.0, " %", 2)),

@@ -16,6 +16,8 @@ use super::trial::{self, Trial};
 pub(crate) const MOMENT: &str = "slip_time";
 /// Once in twenty the likelihood ratio of the true moment falls by more.
 const ONCE_IN_TWENTY: f64 = 7.35;
+/// Moments, spread over the campaign, that are tried for a second top of the likelihood.
+const LOOKS: usize = 250;
 /// An interval of 95 % is so many standard deviations to either side.
 const DEVIATIONS: f64 = 1.96;
 
@@ -74,8 +76,13 @@ pub(crate) fn deviation(
     let least = left(moment);
     let row = least / found.noise.independent.max(1.0);
     let possible = |gap: usize| left(0.5 * (times[gap - 1] + times[gap])) - least < ONCE_IN_TWENTY * row;
-    let earliest = times[here - 1 - farthest(here - 1, |back| possible(here - back))];
-    let latest = times[here + farthest(gaps - here, |on| possible(here + on))];
+    // Where the likelihood has several tops, what lies beyond a dip is possible too: all of the campaign is looked over first.
+    let elsewhere: Vec<usize> =
+        (1..=gaps).step_by(gaps.div_ceil(LOOKS)).filter(|gap| possible(*gap)).collect();
+    let [first, last] = [elsewhere.first(), elsewhere.last()].map(|gap| gap.map_or(here, |gap| *gap));
+    let (first, last) = (first.min(here), last.max(here));
+    let earliest = times[first - 1 - farthest(first - 1, |back| possible(first - back))];
+    let latest = times[last + farthest(gaps - last, |on| possible(last + on))];
     let deviation = (latest - moment).max(moment - earliest).max(0.0) / DEVIATIONS;
     deviation.is_finite().then_some(deviation)
 }

@@ -229,7 +229,7 @@ pub fn free_stroke(muscle: &Muscle<f64>, pressure: f64) -> f64 {
 
 /// All moments of a campaign as effects see them on a muscle.
 pub fn moments(muscle: &Muscle<f64>, campaign: &Campaign) -> Vec<Context<f64>> {
-    let mut follower = Follower::default();
+    let mut follower = Follower::of(campaign);
     let mut all = Vec::with_capacity(campaign.samples());
     for (index, (recording, motion)) in
         campaign.recordings.iter().zip(Motion::of_campaign(campaign)).enumerate()

@@ -111,7 +111,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
             end.force
         )
     }));
-    let mut gathering = Gathering::begin(&mut rows, braid, thresholds, &ends);
+    let mut gathering = Gathering::begin(&mut rows, braid, thresholds, &ends, campaign.beginning());
     for (index, recording) in campaign.recordings.iter().enumerate() {
         gathering.add(recording, campaign.pause_before(index))?;
     }

@@ -2,6 +2,9 @@
 
 use super::Recording;
 
+/// A clock that shows more at the first reading was not started for the campaign, s (a day and some).
+const LONGEST_CLOCK: f64 = 1.0e5;
+
 /// How the times of different recordings relate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Clock {
@@ -71,6 +74,18 @@ impl Campaign {
         self.recordings.iter().map(Recording::len).sum()
     }
 
+    /// The first reading's moment on the clock on which effects are timed, s: the bench's own where all recordings share it and it counts
+    /// from a beginning of its own; a clock of the world's says nothing of the muscle, and readings count from the first then.
+    #[must_use]
+    pub fn beginning(&self) -> f64 {
+        let bench = if self.clock == Clock::Shared { self.first_time() } else { None };
+        bench.filter(|time| (0.0..LONGEST_CLOCK).contains(time)).unwrap_or(0.0)
+    }
+
+    fn first_time(&self) -> Option<f64> {
+        self.recordings.iter().find_map(|r| r.time.first().copied())
+    }
+
     /// Seconds between the end of the recording before `index` and its start; `None` when unknown.
     #[must_use]
     pub fn pause_before(&self, index: usize) -> Option<f64> {
@@ -123,5 +138,17 @@ mod tests {
         let campaign = Campaign::new(vec![from("a", 500.0, 600.0), from("b", 550.0, 650.0)]);
         assert_eq!(campaign.clock, Clock::Separate);
         assert_eq!(campaign.warnings.len(), 1);
+    }
+
+    #[test]
+    fn a_bench_s_clock_is_kept_and_a_clock_of_the_world_or_of_each_file_is_not() {
+        let beginning = |files: &[(f64, f64)]| {
+            Campaign::new(files.iter().map(|(start, end)| from("r", *start, *end)).collect()).beginning()
+        };
+        assert_eq!(beginning(&[(6.0, 25.0), (28.2, 71.9)]), 6.0);
+        assert_eq!(beginning(&[(0.5, 25.0), (0.4, 71.9)]), 0.0);
+        assert_eq!(beginning(&[(1.7e9, 1.7e9 + 25.0)]), 0.0);
+        assert_eq!(beginning(&[(-3.0, 25.0)]), 0.0);
+        assert_eq!(beginning(&[]), 0.0);
     }
 }

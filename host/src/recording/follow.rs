@@ -2,8 +2,8 @@
 
 use model_core::motion::Motion;
 
-use super::Recording;
 use super::segment::{self, Rates};
+use super::{Campaign, Recording};
 
 /// A pause that nobody recorded counts as this long, s.
 pub const UNKNOWN_PAUSE: f64 = 60.0;
@@ -17,6 +17,12 @@ pub struct Follower {
 }
 
 impl Follower {
+    /// Before the first recording of a campaign.
+    #[must_use]
+    pub fn of(campaign: &Campaign) -> Self {
+        Self { clock: campaign.beginning(), ..Self::default() }
+    }
+
     /// The motion in every row of the next recording. `pause` is the time since the recording before, where it is known.
     pub fn follow(
         &mut self,

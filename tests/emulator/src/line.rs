@@ -116,7 +116,9 @@ impl Line {
         line.0
     }
 
+    /// A line to a board that has started: a program does not wait as long for its hello as a busy machine may take to start it.
     fn begin(machine: &Machine, address: String, from_board: Passage) -> (Self, Near) {
+        drop(machine.client());
         let near: Near = Arc::default();
         let stop = Arc::new(AtomicBool::new(false));
         let board = machine.link();

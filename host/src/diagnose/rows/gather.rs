@@ -52,12 +52,13 @@ struct Average {
 }
 
 impl<'a> Gathering<'a> {
-    /// No row yet.
+    /// No row yet; the first reading is at `beginning` on the clock of the campaign, s.
     pub(super) fn begin(
         rows: &'a mut Rows,
         braid: &'a Braid<f64>,
         thresholds: Thresholds,
         ends: &'a [Clip],
+        beginning: f64,
     ) -> Self {
         let per_row = rows.samples.div_ceil(TARGET_ROWS).max(1);
         Self {
@@ -66,7 +67,7 @@ impl<'a> Gathering<'a> {
             thresholds,
             ends,
             per_row,
-            clock: 0.0,
+            clock: beginning,
             turns: 0,
             pieces: 0,
             largest: f64::NEG_INFINITY,
