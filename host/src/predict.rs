@@ -10,7 +10,7 @@ use std::fs;
 use model_core::effects::{Chain, Memory};
 use model_core::muscle::Muscle;
 use model_core::table::MuscleTable;
-use model_core::units::{Force, Length, Pressure};
+use model_core::units::{Length, Pressure};
 use rayon::prelude::*;
 
 use crate::band::{ForceBand, HALF_95};
@@ -134,12 +134,14 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ForceBand>) -> Resul
             for (i, motion) in motions.iter().enumerate() {
                 let context = muscle.context(motion, Pressure::from_pascals(recording.pressure[i]));
                 chain.step(&context);
-                let mut force = muscle.force_with(&chain, &context);
+                // What the muscle itself makes ends at slackness; what the bench adds to the reading does not.
+                let (mut pull, mut read) = (context.force() + chain.force(&context), 0.0);
                 for (candidate, parameters, memory) in &mut corrections {
                     candidate.step(parameters, &context, memory);
-                    force += Force::from_newtons(candidate.force(parameters, &context, memory));
+                    let part = candidate.force(parameters, &context, memory);
+                    *if candidate.acts_on_a_slack_muscle(0) { &mut read } else { &mut pull } += part;
                 }
-                forces.push(force.newtons());
+                forces.push(muscle.pull(pull).newtons() + read);
             }
             forces
         };

@@ -103,6 +103,17 @@ impl Candidate {
         matches!(self, Self::Bench(_))
     }
 
+    /// Whether the force of an amplitude is read even when the muscle is vented and slack. A guide or a rod's seal that stuck holds
+    /// what it held; strands that no pressure holds together do not rub.
+    #[must_use]
+    pub fn acts_on_a_slack_muscle(self, amplitude: usize) -> bool {
+        match self.name() {
+            "force-offset" | "force-drift" | "cross-talk" | "gravity" | "seal-friction" => true,
+            "coulomb-friction" => amplitude == 0,
+            _ => false,
+        }
+    }
+
     /// Lets time pass in its memory.
     pub fn step(self, parameters: &[f64], context: &Context<f64>, memory: &mut Memory<f64>) {
         match self {

@@ -16,6 +16,10 @@ type Filter = Fading<1, 1>;
 const ROW: usize = 4;
 /// Where they begin in the memory: whether anything was seen, the force, what each filter gives.
 const SEEN: usize = Filter::SLOTS;
+/// Behind them: which way the muscle went, where it was, how fast.
+const WAY: usize = SEEN + 2 + ROW;
+const STROKE: usize = WAY + 1;
+const SPEED: usize = WAY + 2;
 
 /// See the [module](self).
 pub(super) struct SensorDelay;
@@ -42,26 +46,22 @@ impl Effect for SensorDelay {
     };
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
-        Filter::step(memory, context.dt, &[parameters[3]], &[context.force()]);
-        let force = context.force();
-        if memory[SEEN] == T::ZERO {
-            memory[SEEN] = T::ONE;
-            memory[SEEN + 1..SEEN + 2 + ROW].fill(force);
-            return;
+        let time = parameters[3];
+        if context.dt >= (time * T::from_f64(20.0)).max(T::ONE) {
+            // Nobody knows how the force went over a pause; the reading has caught up with it since.
+            memory.fill(T::ZERO);
         }
-        let row = &mut memory[SEEN + 1..SEEN + 2 + ROW];
-        let mut input = (row[0], force);
-        row[0] = force;
-        let time = parameters[3].max(T::from_f32(1.0e-4)) / T::from_f64(ROW as f64);
-        let dt = context.dt.max(T::ZERO);
-        let kept = (-dt / time).exp();
-        // Exact where the input runs straight between two moments.
-        let mean = if dt > T::ZERO { (T::ONE - kept) * time / dt } else { T::ONE };
-        for output in &mut row[1..] {
-            let before = *output;
-            *output = kept * before + (T::ONE - mean) * input.1 + (mean - kept) * input.0;
-            input = (before, *output);
+        match turn(context, memory) {
+            Some(turn) => {
+                catch_up(memory, time, (context.dt - turn.since).max(T::ZERO), turn.before);
+                catch_up(memory, time, T::ZERO, turn.after);
+                catch_up(memory, time, turn.since, context.force());
+            }
+            None => catch_up(memory, time, context.dt, context.force()),
         }
+        memory[WAY] = context.direction;
+        memory[STROKE] = context.stroke;
+        memory[SPEED] = context.speed;
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
@@ -70,5 +70,53 @@ impl Effect for SensorDelay {
         let delayed =
             if memory[SEEN] == T::ZERO { T::ZERO } else { context.force() - memory[SEEN + 1 + ROW] };
         -(parameters[0] * rate + parameters[1] * filtered + parameters[2] * delayed)
+    }
+}
+
+/// A turn between the moment before and this one, where friction jumps.
+struct Turn<T> {
+    /// Time since, s.
+    since: T,
+    /// Forces on either side of it, N.
+    before: T,
+    after: T,
+}
+
+/// The turn since the last moment, if there was one: where the strokes before and after it, each going on at its speed, meet.
+fn turn<T: Scalar>(context: &Context<T>, memory: &Memory<T>) -> Option<Turn<T>> {
+    let came = memory[WAY];
+    let (speed, dt) = (memory[SPEED], context.dt);
+    let ways = came * context.direction < T::ZERO;
+    let speeds = speed * came > T::ZERO && context.speed * context.direction > T::ZERO;
+    if !(ways && speeds) {
+        return None;
+    }
+    let until = (context.stroke - memory[STROKE] - context.speed * dt) / (speed - context.speed);
+    let since = dt - until.max(T::ZERO).min(dt);
+    let pull = context.quasi - context.stiffness * context.speed * since;
+    let going = |way: T| pull * (T::ONE - context.friction * way);
+    Some(Turn { since, before: going(came), after: going(context.direction) })
+}
+
+/// Lets `dt` seconds pass in both kinds of filter, while the force ran straight to `force`.
+fn catch_up<T: Scalar>(memory: &mut Memory<T>, time: T, dt: T, force: T) {
+    Filter::step(memory, dt, &[time], &[force]);
+    if memory[SEEN] == T::ZERO {
+        memory[SEEN] = T::ONE;
+        memory[SEEN + 1..SEEN + 2 + ROW].fill(force);
+        return;
+    }
+    let row = &mut memory[SEEN + 1..SEEN + 2 + ROW];
+    let mut input = (row[0], force);
+    row[0] = force;
+    let time = time.max(T::from_f32(1.0e-4)) / T::from_f64(ROW as f64);
+    let dt = dt.max(T::ZERO);
+    let kept = (-dt / time).exp();
+    // Exact where the input runs straight between two moments.
+    let mean = if dt > T::ZERO { (T::ONE - kept) * time / dt } else { T::ONE };
+    for output in &mut row[1..] {
+        let before = *output;
+        *output = kept * before + (T::ONE - mean) * input.1 + (mean - kept) * input.0;
+        input = (before, *output);
     }
 }

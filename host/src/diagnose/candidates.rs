@@ -71,16 +71,6 @@ impl Candidate {
         if self.shown_vented(rows) { 0.0 } else { LAW_ERROR }
     }
 
-    /// Whether the force of an amplitude is read even when the muscle is vented and slack. A guide or a rod's seal that stuck holds
-    /// what it held; strands that no pressure holds together do not rub.
-    fn seen_vented(&self, amplitude: usize) -> bool {
-        match self.name() {
-            "force-offset" | "force-drift" | "cross-talk" | "gravity" | "seal-friction" => true,
-            "coulomb-friction" => amplitude == 0,
-            _ => false,
-        }
-    }
-
     /// The grid of shapes that is looked at first.
     pub(crate) fn grid(&self) -> Vec<Vec<f64>> {
         let shapes: Vec<Parameter> = self.shapes().collect();
@@ -145,7 +135,7 @@ impl Candidate {
         let mut memory = [0.0; MEMORY];
         let mut columns = self.law.columns(&rows.contexts, shapes, &mut memory);
         for (amplitude, column) in columns.iter_mut().enumerate() {
-            let vented_too = self.seen_vented(amplitude);
+            let vented_too = self.law.acts_on_a_slack_muscle(amplitude);
             for (value, vented) in column.iter_mut().zip(&rows.vented) {
                 if (*vented && !vented_too) || !value.is_finite() {
                     *value = 0.0;
