@@ -263,9 +263,11 @@ fn after_a_rest_it_sticks_the_longer_the_rest_and_lets_go_over_its_distance() {
         assert_eq!(force, 0.0, "nothing is added at rest");
         alone.at(Context { stroke: gone, hold_time: rest, direction: 1.0, speed: 1e-3, ..moment() })
     };
-    close(stuck(1e4, 0.0), -5.0, 1e-2);
-    close(stuck(10.0, 0.0), -5.0 * (1.0 - (-1.0_f64).exp()), 2e-3);
-    close(stuck(1e4, 0.2e-3), -5.0 * (-1.0_f64).exp(), 2e-3);
+    let aged = |age: f64| -5.0 * (age / 10.0).ln_1p();
+    close(stuck(10.0, 0.0), aged(10.0), 1e-6);
+    close(stuck(1e4, 0.0), aged(1e4), 1e-6);
+    // Over its distance a contact loses its age, not its grip.
+    close(stuck(1e4, 0.2e-3), aged(1e4 * (-1.0_f64).exp()), 1e-3);
     assert!(stuck(1.0, 0.0).abs() < stuck(10.0, 0.0).abs());
     assert!(stuck(100.0, 5e-3).abs() < 1e-6);
     // Back where it stood, but after a turn without a rest, nothing holds it.

@@ -9,9 +9,9 @@
 use rayon::prelude::*;
 
 use super::baselines::{self, Baseline, Kind};
-use super::kinematics::white_noise;
-use super::linear::median;
 use super::rows::Rows;
+
+mod steps;
 
 /// Settling times that are tried, s.
 const SETTLING: [f64; 8] = [0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 30.0, 100.0];
@@ -27,16 +27,6 @@ const NEARBY: [[f64; 4]; 2] = [[0.7, 0.87, 1.15, 1.4], [0.9, 0.95, 1.05, 1.1]];
 const NO_LAW: f64 = 4.0;
 /// A change of the friction's direction that ends one rest and begins another.
 const LETS_GO: f64 = 0.1;
-/// A step of the force at rest that is so many times the readings' own noise there ends one as well …
-const STEP: f64 = 6.0;
-/// … where it is a good part of the gap between the branches …
-const PART_OF_GAP: f64 = 0.2;
-/// … and this part of it happens between two rows: what relaxes or drifts takes longer.
-const SHARP: f64 = 0.7;
-/// Rows each way over which the force before and after a step is taken.
-const BESIDE: usize = 5;
-/// Soon after a hold's beginning at least so many before it.
-const FEWEST_BEFORE: usize = 2;
 /// At most so many rests beyond one for each hold.
 const MOST_RESTS: u32 = 100;
 /// From fewer moving rows nobody knows what friction and bladder are; however long the muscle rested beside.
@@ -243,7 +233,7 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
             Some(law) => matches!(law, AtRest::Follows { .. }),
             None => held > NO_LAW * moved * weight_at(rows, &holds),
         };
-        let steps = steps(rows, &fitted, &holds, &chosen);
+        let steps = steps::of(rows, &fitted, &holds, &chosen);
         number_rests(rows, &holds, &chosen, &steps, doubted);
     }
     let law = law?;
@@ -268,35 +258,6 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
 fn weight_at(rows: &Rows, holds: &[(usize, usize)]) -> f64 {
     let resting = holds.iter().flat_map(|(from, to)| *from..*to).filter(|i| !rows.on_ramp[*i]);
     resting.map(|i| rows.root_weight[i].powi(2)).sum()
-}
-
-/// Where the force steps while the length is held, hold by hold: static friction let go there, shaken by more than the pressure's
-/// samples show.
-fn steps(
-    rows: &Rows,
-    fitted: &Baseline,
-    holds: &[(usize, usize)],
-    directions: &[Vec<f64>],
-) -> Vec<Vec<bool>> {
-    let middle = |part: &[f64]| median(&mut part.to_vec());
-    let found = |((from, to), way): (&(usize, usize), &Vec<f64>)| {
-        let left: Vec<f64> = (*from..*to).map(|i| left_of(rows, fitted, i, way[i - from])).collect();
-        let noise = white_noise(&left);
-        let gap = |i: usize| 2.0 * (fitted.quasi[from + i] * fitted.friction[from + i]).abs();
-        let mut steps = vec![false; left.len()];
-        let mut last = None;
-        for i in FEWEST_BEFORE..left.len().saturating_sub(BESIDE) {
-            let step = middle(&left[i + 1..=i + BESIDE]) - middle(&left[i.saturating_sub(BESIDE)..i]);
-            let sharp = (left[i + 1] - left[i - 1]) * step.signum() >= SHARP * step.abs();
-            let fresh = last.is_none_or(|l| i > l + BESIDE);
-            if step.abs() > (STEP * noise).max(PART_OF_GAP * gap(i)) && sharp && fresh {
-                steps[i] = true;
-                last = Some(i);
-            }
-        }
-        steps
-    };
-    holds.iter().zip(directions).map(found).collect()
 }
 
 /// Static friction lets go by jumps too small and too quick for the pressure's samples to tell when: between those that a law sees or

@@ -1,13 +1,14 @@
 //! Static friction that has grown during a rest and is lost over the first tenths of a millimetre.
 //!
 //! ```text
-//! F_add = −s · (m (ΔF_s + κ |F_quasi|) + κ_h |F_quasi|) · (1 − e^(−t_rest/τ_s)) · e^(−d/δ)
+//! F_add = −s · (m (ΔF_s + κ |F_quasi|) + κ_h |F_quasi|) · ln(1 + θ/τ_s),   θ = t_rest · e^(−d/δ)
 //! ```
-//! `ΔF_s`, N, and `κ` (of the muscle's force, which presses the strands together) are the full excess: laws to choose from; `t_rest` how
-//! long the muscle rested, s, and `τ_s` how fast the excess grows; `d` the travel since the rest, m, and `δ` the distance over which it is
-//! lost. The memory notes where the muscle rested and how long; a turn without rest counts as a rest of no length. `m` is 1 in
-//! motion and 0 at rest: a static friction shows only once it is overcome. `κ_h` is for friction that changes during the rest itself:
-//! positive where contacts grip harder, negative where they creep and let the force go to the middle of the loop.
+//! Contacts grip harder with the logarithm of their age `θ`, s, which counts how long the muscle rested, `t_rest`, and is lost over the
+//! distance `δ` of travel `d` since, m; before `τ_s`, s, no ageing shows. `ΔF_s`, N, and `κ` (of the muscle's force, which presses the
+//! strands together) are the excess for each e-fold of age: laws to choose from. The memory notes where the muscle rested and how long; a
+//! turn without rest counts as a rest of no length. `m` is 1 in motion and 0 at rest: a static friction shows only once it is overcome.
+//! `κ_h` is for friction that changes during the rest itself: positive where contacts grip harder, negative where they creep and let the
+//! force go to the middle of the loop.
 
 use super::{Context, Effect, Info, Link, Memory, Parameter, Start, decay};
 use crate::scalar::Scalar;
@@ -20,9 +21,9 @@ impl Effect for BreakawayFriction {
         name: "breakaway-friction",
         link: Link::Friction,
         parameters: &[
-            Parameter::amplitude("ΔF_s", "excess_friction", "N", 0.05, 20.0),
-            Parameter::amplitude("κ", "excess_factor", "", 0.002, 0.2),
-            Parameter::amplitude("κ_h", "held_factor", "", -0.2, 0.2),
+            Parameter::amplitude("ΔF_s", "excess_friction", "N", 0.02, 10.0),
+            Parameter::amplitude("κ", "excess_factor", "", 0.001, 0.1),
+            Parameter::amplitude("κ_h", "held_factor", "", -0.1, 0.1),
             Parameter::shape("δ", "loss_distance", "m", 5.0e-6, 1.0e-3),
             Parameter::shape("τ_s", "growth_time", "s", 0.3, 100.0),
         ],
@@ -31,9 +32,9 @@ impl Effect for BreakawayFriction {
         alternatives: true,
         start: Start::Known,
         fading: &[],
-        equation: "F = −s·(m·(ΔF_s + κ·|F_quasi|) + κ_h·|F_quasi|)·(1 − exp(−t_rest/τ_s))·exp(−d_rest/δ)",
+        equation: "F = −s·(m·(ΔF_s + κ·|F_quasi|) + κ_h·|F_quasi|)·ln(1 + t_rest/τ_s·exp(−d_rest/δ))",
         summary: "After a rest the muscle sticks: the first bit of motion needs an extra force that grows with the length of the rest.",
-        source: "B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083–1138, doi 10.1016/0005-1098(94)90209-7",
+        source: "J. H. Dieterich, J. Geophys. Res. 84 (1979) 2161–2168, doi 10.1029/JB084iB05p02161",
     };
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
@@ -51,9 +52,9 @@ impl Effect for BreakawayFriction {
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
         let gone = (context.stroke - memory[0]) / parameters[3].max(T::from_f32(1.0e-6));
-        let grown = T::ONE - decay(memory[1] / parameters[4].max(T::from_f32(1.0e-3)));
+        let age = memory[1] / parameters[4].max(T::from_f32(1.0e-3)) * decay(gone);
         let pull = context.quasi.abs();
         let excess = memory[3] * (parameters[0] + parameters[1] * pull) + parameters[2] * pull;
-        -context.direction * excess * grown * decay(gone)
+        -context.direction * excess * age.ln_1p()
     }
 }
