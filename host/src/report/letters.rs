@@ -121,9 +121,9 @@ mod tests {
     use crate::bench::Candidate;
 
     /// Words, functions and running indices, which nobody takes for a quantity.
-    const WORDS: [&str; 17] = [
-        "exp", "max", "clamp", "erf", "play", "of", "each", "way", "wide", "within", "for", "or", "mm", "i",
-        "u", "du", "F",
+    const WORDS: [&str; 18] = [
+        "exp", "ln", "max", "clamp", "erf", "play", "of", "each", "way", "wide", "within", "for", "or", "mm",
+        "i", "u", "du", "F",
     ];
 
     #[test]
