@@ -152,6 +152,12 @@ class Browser:
         actions = [{"type": "keyDown", "value": value}, {"type": "keyUp", "value": value}]
         self.ask("POST", self.path + "/actions", {"actions": [{"type": "key", "id": "k", "actions": actions}]})
 
+    def over(self, selector):
+        """The pointer in the middle of an element."""
+        element = self.ask("POST", self.path + "/element", {"using": "css selector", "value": selector})
+        move = {"type": "pointerMove", "duration": 0, "x": 0, "y": 0, "origin": element}
+        self.ask("POST", self.path + "/actions", {"actions": [{"type": "pointer", "id": "p", "actions": [move]}]})
+
     def mishap(self, code):
         self.js(f"let s = document.getElementById('mishap'); s.value = '{code}'; s.dispatchEvent(new Event('change'))")
 

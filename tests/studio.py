@@ -86,6 +86,36 @@ def ten_minutes(page):
     passed(f"ten_minutes_of_samples_leave_nothing_behind ({found['grown'] / 1e3:.0f} kB, {found['picture']:.1f} ms a picture, {ratio:.2f} of ten times its strokes)")
 
 
+def reads_where_one_points(page):
+    value = "document.querySelector('[data-of=F]').textContent"
+    page.click("hold")
+    page.over("#p-force")
+    # The middle of the picture, by its geometry; the value there, by looking at every sample.
+    found = page.js("""const c = document.getElementById("p-force"), inner = c.clientWidth - LEFT - RIGHT, s = scopes[0];
+      const time = s.from + (c.clientWidth / 2 - LEFT) / inner * (s.to - s.from), pixel = (s.to - s.from) / inner;
+      const near = [...Array(ring.length).keys()].filter((i) => Math.abs(ring.get("t", i) - time) <= pixel).map((i) => "measured " + ring.get("F", i).toFixed(1));
+      return {time, pixel, near, told: parseFloat(document.getElementById("cursor-time").textContent.slice(3)),
+        line: getComputedStyle(c.nextElementSibling).display, text: c.getAttribute("aria-valuetext")}""")
+    assert abs(found["told"] - found["time"]) <= found["pixel"] + 1e-3 and found["line"] != "none", found
+    said = page.js("return " + value)
+    assert said in found["near"] and said in found["text"], (said, found)
+    time.sleep(0.6)
+    assert page.js("return " + value) == said, "a held picture's value changes"
+    if SHOTS:
+        page.shot(SHOTS, "cursor")
+        page.over("h1")
+        page.over("#p-force")
+    page.js("document.getElementById('p-force').focus()")
+    page.key("\ue012")
+    page.until(f"parseFloat(document.getElementById('cursor-time').textContent.slice(3)) < {found['told']} - {found['pixel']}")
+    page.js("document.activeElement.blur()")
+    assert page.text("cursor-time") == "", page.text("cursor-time")
+    page.over("h1")
+    page.click("hold")
+    page.until(f"{value} !== {json.dumps(said)}")
+    passed("reads_values_where_one_points_and_by_keys")
+
+
 def glimpse(url):
     """The controller's state, by looking for a moment without a page."""
     base, token = url.split("/?token=")
@@ -137,6 +167,7 @@ def story(url, driver):
     drawn = page.js("return perf.frames")
     page.until(f"perf.frames > {drawn} + 10")
     passed("follows_a_course_and_records_without_loss")
+    reads_where_one_points(page)
     page.mishap(1)
     page.until("!document.getElementById('fault').hidden")
     assert "load cell" in page.text("fault-text") and "What to do" in page.text("fault-text"), page.text("fault-text")

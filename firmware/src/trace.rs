@@ -13,6 +13,8 @@ enum Phase {
     Off,
     Waiting,
     Recording,
+    /// A fault has stopped the device: the tick that it is found in is the last.
+    Ending,
     Complete,
 }
 
@@ -96,17 +98,19 @@ impl Trace {
         }
     }
 
-    /// A fault stopped the device.
+    /// A fault stops the device in this tick.
     pub fn on_fault(&mut self) {
         if self.phase == Phase::Recording && self.trigger == Trigger::UntilFault {
-            self.phase = Phase::Complete;
+            self.phase = Phase::Ending;
         }
     }
 
     /// Takes one tick's variables; returns whether it just became full.
     pub fn sample(&mut self, tick: u64, value: impl Fn(Variable) -> f32) -> bool {
-        if self.phase != Phase::Recording {
-            return false;
+        match self.phase {
+            Phase::Recording => (),
+            Phase::Ending => self.phase = Phase::Complete,
+            Phase::Off | Phase::Waiting | Phase::Complete => return false,
         }
         if self.countdown > 0 {
             self.countdown -= 1;
@@ -225,13 +229,15 @@ mod tests {
             trace.sample(tick, value(tick));
         }
         trace.on_fault();
+        assert!(!info(&trace).complete, "the tick of the fault is still to come");
         trace.sample(1000, value(1000));
+        trace.sample(1001, value(1001));
         let all = read_all(&trace);
         let room = TRACE_CAPACITY / 3;
         assert_eq!(all.len(), room * 3);
-        assert_eq!(all[0], (1000 - room) as f32);
-        assert_eq!(info(&trace).first_tick, (1000 - room) as u64);
-        assert_eq!(all[all.len() - 3], 999.0);
+        assert_eq!(all[0], (1001 - room) as f32);
+        assert_eq!(info(&trace).first_tick, (1001 - room) as u64);
+        assert_eq!(all[all.len() - 3], 1000.0);
     }
 
     #[test]

@@ -259,7 +259,13 @@ fn every_variable_of_the_loop_is_traced_and_they_fit_together() {
         time.windows(2).all(|pair| (pair[1] - pair[0] - 1e-3).abs() < 1e-6),
         "one record a tick: {time:?}"
     );
-    assert!(state.iter().all(|state| *state == 2.0), "running up to the fault: {state:?}");
+    // The tick in which the fault is found is the last.
+    assert!(
+        state
+            .split_last()
+            .is_some_and(|(end, before)| *end == 3.0 && before.iter().all(|state| *state == 2.0)),
+        "{state:?}"
+    );
     // The fault is noticed at the second bad reading of the load cell.
     assert!(!(0.0..1e3).contains(column("force_N").last().unwrap()), "{:?}", column("force_N"));
     let last = records - 4;

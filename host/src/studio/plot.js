@@ -148,6 +148,7 @@ class Scope {
   constructor(canvas, ring, curves) { this.axes = new Axes(canvas); this.ring = ring; this.curves = curves; this.stretches = new Stretches(ring); }
   draw(seconds) {
     const s = this.stretches, end = this.ring.last("t"), x0 = Math.max(0, end - seconds), x1 = Math.max(end, seconds);
+    this.from = x0; this.to = x1; this.end = end;
     s.follow(seconds, Math.max(1, this.axes.canvas.clientWidth - LEFT - RIGHT));
     let low = Infinity, high = -Infinity;
     for (const [name] of this.curves) {

@@ -94,19 +94,50 @@ function take(m) {
   else if (m.k === "e") message(m.text + (m.help ? "\n→ " + m.help : ""));
 }
 
-// Behind each curve's name its newest value, as often as a person can read it; what is asked belongs to one of the pictures.
+// Where in the pictures over time values are read, as a part of their width: where the pointer is, or by the arrow keys.
+let cursor = null;
+const cursorTime = () => scopes[0].from + cursor * (scopes[0].to - scopes[0].from);
+// The sample that is read: at the cursor; without one the newest, or that at which the picture is held.
+const read = () => cursor === null && !held ? ring.length - 1 : Math.min(ring.since(cursor === null ? scopes[0].end : cursorTime()), ring.length - 1);
+
+// Behind each curve's name its value there, as often as a person can read it; what is asked belongs to one of the pictures.
 const DECIMALS = { F: 1, m: 1, P: 1, c: 1, x: 2, a: 1 };
 const keys = [...document.querySelectorAll("[data-of]")].map((place) => ({ place, word: place.textContent, ...place.dataset }));
 function readings() {
-  if (held) return;
+  const at = read();
+  $("cursor-time").textContent = cursor === null ? "" : `at ${cursorTime().toFixed(3)} s`;
   for (const k of keys) {
-    const value = ring.length ? ring.last(k.of) : NaN, digits = k.mode === "stroke" ? 2 : DECIMALS[k.of];
+    const value = at < 0 ? NaN : ring.get(k.of, at), digits = k.mode === "stroke" ? 2 : DECIMALS[k.of];
     k.place.hidden = k.mode !== undefined && k.mode !== mode;
     k.place.textContent = Number.isFinite(value) ? `${k.word} ${value.toFixed(digits)}` : k.word;
   }
 }
 readings();
 setInterval(readings, 250);
+
+function point(to) {
+  cursor = to === null || !ring.length ? null : Math.min(1, Math.max(0, to));
+  readings();
+  for (const { axes: { canvas } } of scopes) {
+    const line = canvas.nextElementSibling, values = [...canvas.closest("figure").querySelectorAll(".key:not([hidden])")];
+    line.hidden = cursor === null;
+    line.style.left = `${LEFT + cursor * (canvas.clientWidth - LEFT - RIGHT)}px`;
+    canvas.setAttribute("aria-valuenow", cursor === null ? 100 : Math.round(100 * cursor));
+    canvas.setAttribute("aria-valuetext", [$("cursor-time").textContent, ...values.map((v) => v.textContent)].join(" "));
+  }
+}
+for (const { axes: { canvas } } of scopes) {
+  const under = (event) => point((event.offsetX - LEFT) / (canvas.clientWidth - LEFT - RIGHT));
+  for (const moved of ["pointerdown", "pointermove"]) canvas.addEventListener(moved, under);
+  for (const left of ["pointerleave", "blur"]) canvas.addEventListener(left, () => point(null));
+  canvas.addEventListener("keydown", (event) => {
+    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (!step) return;
+    event.preventDefault();
+    point((cursor ?? 1) + step * (event.shiftKey ? 0.1 : 0.01));
+  });
+}
+point(null);
 
 setInterval(() => { $("rate").textContent = state.connected ? `${samples} samples/s, ${state.lost || 0} lost` : ""; samples = 0; }, 1000);
 
