@@ -66,12 +66,18 @@ def studio(program, on=None, muscle="mini"):
                 raise SystemExit("chromedriver does not say its port")
             yield url, f"http://127.0.0.1:{port}", running[-1]
         finally:
+            # A driver that ends leaves its browsers behind.
+            for page in list(Browser.open):
+                with contextlib.suppress(OSError):
+                    page.close()
             for one in reversed(running):
                 ended(one)
 
 
 class Browser:
     """A page under WebDriver."""
+
+    open = []
 
     def __init__(self, driver, url, size):
         self.driver = driver
@@ -80,6 +86,7 @@ class Browser:
         wanted = {"browserName": "chrome", "goog:chromeOptions": {"args": arguments}, "goog:loggingPrefs": {"browser": "ALL"}}
         wanted["timeouts"] = {"script": 1000 * HOPELESS, "pageLoad": 1000 * HOPELESS}
         self.path = "/session/" + self.ask("POST", "/session", {"capabilities": {"alwaysMatch": wanted}})["sessionId"]
+        Browser.open.append(self)
         self.ask("POST", self.path + "/url", {"url": url})
 
     def ask(self, method, path, body=None):
@@ -173,4 +180,5 @@ class Browser:
         self.until("document.getElementById('message').textContent.includes('read back')")
 
     def close(self):
+        Browser.open.remove(self)
         self.ask("DELETE", self.path)
