@@ -101,6 +101,13 @@ def reads_where_one_points(page):
     assert said in found["near"] and said in found["text"], (said, found)
     time.sleep(0.6)
     assert page.js("return " + value) == said, "a held picture's value changes"
+    # It follows the system's colours all the same.
+    picture = "document.getElementById('p-force').toDataURL()"
+    light = page.js("return " + picture)
+    page.cdp("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
+    page.until(f"{picture} !== {json.dumps(light)}")
+    page.cdp("Emulation.setEmulatedMedia", features=[])
+    page.until(f"{picture} === {json.dumps(light)}")
     if SHOTS:
         page.shot(SHOTS, "cursor")
         page.over("h1")

@@ -23,6 +23,12 @@ class Ring {
     }
     this.at = (this.at + count) % this.size; this.length = Math.min(this.size, this.length + count); this.pushed += count;
   }
+  // What it holds now, for a picture that is held.
+  copy() {
+    const other = new Ring(this.size, this.names);
+    for (const n of this.names) other.columns[n].set(this.columns[n]);
+    return Object.assign(other, { length: this.length, at: this.at, pushed: this.pushed });
+  }
   clear() { this.length = 0; this.at = 0; this.cleared++; }
   index(i) { return (this.at - this.length + i + this.size) % this.size; }
   get(name, i) { return this.columns[name][this.index(i)]; }
@@ -146,9 +152,11 @@ const LEFT = 46, RIGHT = 8;
 // mark, on the side to which it left; the axis is set by the other readings.
 class Scope {
   constructor(canvas, ring, curves) { this.axes = new Axes(canvas); this.ring = ring; this.curves = curves; this.stretches = new Stretches(ring); }
+  // Another ring from now on.
+  show(ring) { this.ring = ring; this.stretches = new Stretches(ring); }
   draw(seconds) {
     const s = this.stretches, end = this.ring.last("t"), x0 = Math.max(0, end - seconds), x1 = Math.max(end, seconds);
-    this.from = x0; this.to = x1; this.end = end;
+    this.from = x0; this.to = x1;
     s.follow(seconds, Math.max(1, this.axes.canvas.clientWidth - LEFT - RIGHT));
     let low = Infinity, high = -Infinity;
     for (const [name] of this.curves) {
@@ -179,6 +187,7 @@ class Scope {
 // window's edge: else every picture would show others, and the curve would shimmer.
 class Loop {
   constructor(canvas, ring, x, y, shade) { this.axes = new Axes(canvas); this.ring = ring; this.x = x; this.y = y; this.shade = shade; this.most = 2000; }
+  show(ring) { this.ring = ring; }
   draw(seconds) {
     const r = this.ring, xs = r.columns[this.x], ys = r.columns[this.y], from = r.since(r.last("t") - seconds);
     const every = Math.max(1, Math.ceil((r.length - from) / this.most)), oldest = r.pushed - r.length;

@@ -33,7 +33,8 @@ const scopes = [
   new Scope($("p-stroke"), ring, [["x", "--s0"]]),
 ];
 const loop = new Loop($("p-loop"), ring, "x", "F", "--s0");
-let held = false, fresh = false, mode = "", samples = 0, state = {};
+// What the pictures show: the ring, or what it held when they were held.
+let shown = ring, fresh = false, mode = "", samples = 0, state = {};
 
 // How long the last pictures took to draw and how far apart they were, in ms: rings again, so that they cannot grow.
 const perf = { frames: 0, draw: new Float64Array(512), gap: new Float64Array(512), last: 0 };
@@ -44,7 +45,7 @@ const APART = 24;
 
 function frame(now) {
   requestAnimationFrame(frame);
-  if (!fresh || held || now - perf.last < APART) return;
+  if (!fresh || shown !== ring || now - perf.last < APART) return;
   const begun = performance.now();
   draw();
   perf.draw[perf.frames % perf.draw.length] = performance.now() - begun;
@@ -66,7 +67,7 @@ requestAnimationFrame(frame);
 // Pictures that are drawn once are drawn again when the page's size or its colours change.
 const stills = new Map();
 function picture(canvas, paint) { stills.set(canvas, paint); paint(new Axes($(canvas))); }
-function redraw() { ink.clear(); fresh = ring.length > 0; for (const [canvas, paint] of stills) paint(new Axes($(canvas))); }
+function redraw() { ink.clear(); fresh = ring.length > 0; if (shown !== ring) draw(); point(cursor); for (const [canvas, paint] of stills) paint(new Axes($(canvas))); }
 addEventListener("resize", redraw);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 
@@ -97,8 +98,8 @@ function take(m) {
 // Where in the pictures over time values are read, as a part of their width: where the pointer is, or by the arrow keys.
 let cursor = null;
 const cursorTime = () => scopes[0].from + cursor * (scopes[0].to - scopes[0].from);
-// The sample that is read: at the cursor; without one the newest, or that at which the picture is held.
-const read = () => cursor === null && !held ? ring.length - 1 : Math.min(ring.since(cursor === null ? scopes[0].end : cursorTime()), ring.length - 1);
+// The sample that is read: at the cursor; without one the newest.
+const read = () => Math.min(cursor === null ? Infinity : shown.since(cursorTime()), shown.length - 1);
 
 // Behind each curve's name its value there, as often as a person can read it; what is asked belongs to one of the pictures.
 const DECIMALS = { F: 1, m: 1, P: 1, c: 1, x: 2, a: 1 };
@@ -107,7 +108,7 @@ function readings() {
   const at = read();
   $("cursor-time").textContent = cursor === null ? "" : `at ${cursorTime().toFixed(3)} s`;
   for (const k of keys) {
-    const value = at < 0 ? NaN : ring.get(k.of, at), digits = k.mode === "stroke" ? 2 : DECIMALS[k.of];
+    const value = at < 0 ? NaN : shown.get(k.of, at), digits = k.mode === "stroke" ? 2 : DECIMALS[k.of];
     k.place.hidden = k.mode !== undefined && k.mode !== mode;
     k.place.textContent = Number.isFinite(value) ? `${k.word} ${value.toFixed(digits)}` : k.word;
   }
@@ -116,7 +117,7 @@ readings();
 setInterval(readings, 250);
 
 function point(to) {
-  cursor = to === null || !ring.length ? null : Math.min(1, Math.max(0, to));
+  cursor = to === null || !shown.length ? null : Math.min(1, Math.max(0, to));
   readings();
   for (const { axes: { canvas } } of scopes) {
     const line = canvas.nextElementSibling, values = [...canvas.closest("figure").querySelectorAll(".key:not([hidden])")];
@@ -190,7 +191,13 @@ click("arm", () => order("arm"));
 click("follow", () => order("follow", { quantity: $("quantity").value, course: $("course").value }));
 click("record", async () => { if (typeof state.recording === "number") { const r = await order("end-record"); if (r) recordings(r); } else order("record"); });
 click("clear", () => order("clear"));
-click("hold", () => { held = !held; $("hold").firstChild.textContent = held ? "Go on " : "Hold picture "; });
+click("hold", () => {
+  shown = shown === ring ? ring.copy() : ring;
+  for (const picture of [...scopes, loop]) picture.show(shown);
+  $("hold").firstChild.textContent = shown === ring ? "Hold picture " : "Go on ";
+  redraw();
+});
+$("window").addEventListener("change", redraw);
 const settings = async (set) => { const r = await order("settings", { set }); if (r) { $("settings").hidden = false; $("settings").textContent = JSON.stringify(r, null, 1); if (set.length) message("written and read back"); } };
 click("set", () => settings([$("key").value + "=" + $("value").value]));
 click("show", () => settings([]));
