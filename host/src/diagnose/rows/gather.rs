@@ -5,7 +5,7 @@ use model_core::effects::Context;
 use model_core::units::Length;
 
 use super::{Rows, TARGET_ROWS, readings, sleeve};
-use crate::diagnose::kinematics::{Kinematics, Thresholds, kinematics};
+use crate::diagnose::kinematics::{Kinematics, Recorded, Thresholds, kinematics};
 use crate::error::Result;
 use crate::fit::screen::Clip;
 use crate::recording::{Recording, UNKNOWN_PAUSE};
@@ -94,14 +94,13 @@ impl<'a> Gathering<'a> {
         }
         self.rows.has_temperature &= recording.temperature.is_some();
         let before = pause.unwrap_or(UNKNOWN_PAUSE);
-        let k = kinematics(
-            &recording.time,
-            &recording.stroke,
-            &recording.pressure,
-            recording.direction.as_deref(),
-            before,
-            self.thresholds,
-        );
+        let recorded = Recorded {
+            time: &recording.time,
+            stroke: &recording.stroke,
+            pressure: &recording.pressure,
+            given: recording.direction.as_deref(),
+        };
+        let k = kinematics(recorded, before, self.thresholds);
         let spike = readings::spikes(force);
         let pause = if first { 0.0 } else { before };
         self.clock += pause;
