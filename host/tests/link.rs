@@ -17,7 +17,6 @@ fn connect(address: &Address) -> Result<Client, Error> {
         slow_answer: Duration::from_secs(10),
         tries: 3,
         noisy_tries: 6,
-        ..Patience::default()
     };
     Client::connect(Port::open(address)?, patience)
 }

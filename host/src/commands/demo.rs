@@ -171,10 +171,11 @@ impl Arguments {
         )?;
         found.keep(&mut client)?;
         console.note(format!(
-            "              found the regulator: gain {:.3}, lag {:.0} ms, line {:.1} ms, at most {:.1} MPa/s; both are inverted from here on",
+            "              found the regulator: gain {:.3}, lag {:.0} ms, line {:.1} ms, {} {:.1} MPa/s; lag and line are inverted from here on",
             found.gain,
             found.lag_s * 1e3,
             found.line_s * 1e3,
+            if found.rate_limited { "at most" } else { "seen at up to" },
             found.rate_pa_per_s * 1e-6
         ));
 
