@@ -145,6 +145,14 @@ impl Line {
         (Self { address, stop, threads: vec![reader], _kept: None }, near)
     }
 
+    /// Pulls the cable.
+    pub fn pull(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        for thread in self.threads.drain(..) {
+            let _ = thread.join();
+        }
+    }
+
     /// What `--port` takes.
     pub fn address(&self) -> &str {
         &self.address
@@ -172,9 +180,6 @@ fn carry(mut from: impl Read, board: &TcpStream, passage: &mut Passage, stop: &A
 
 impl Drop for Line {
     fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        for thread in self.threads.drain(..) {
-            let _ = thread.join();
-        }
+        self.pull();
     }
 }

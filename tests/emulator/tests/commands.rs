@@ -71,6 +71,13 @@ impl Stand {
         Self::start(Options { first: Some(Box::new(station)), ..Options::default() }, Machine::start)
     }
 
+    /// A serial device in place of the port.
+    fn over_serial(&mut self) {
+        // Two cables in one plug would take each other's bytes.
+        self.line.pull();
+        self.line = Line::serial(&self.machine, line::clean(), line::clean());
+    }
+
     fn host(&self, arguments: &[&str]) -> String {
         program::done(&self.line, self.folder.path(), arguments)
     }
@@ -195,7 +202,7 @@ fn a_stroke_against_a_spring_and_a_force_from_a_file_are_followed_and_a_table_ro
 #[test]
 fn a_trace_is_armed_filled_inside_the_loop_and_read_out_over_a_serial_device() {
     let Some(mut stand) = Stand::with_muscle(Motion::Held { stroke_mm: 0.5 }) else { return };
-    stand.line = Line::serial(&stand.machine, line::clean(), line::clean());
+    stand.over_serial();
     assert!(stand.line.address().starts_with("/dev/"));
     write(&stand.folder, "mini.pam", table::example());
     stand.host(&["flash", "mini.pam"]);
@@ -236,7 +243,7 @@ fn the_regulator_is_identified_kept_and_shown_over_a_serial_device() {
     let station = PlantStation::new(bench, vec![Motion::Held { stroke_mm: 0.3 }], 1e-3);
     let options = Options { first: Some(Box::new(station)), ..Options::default() };
     let Some(mut stand) = Stand::start(options, Machine::start) else { return };
-    stand.line = Line::serial(&stand.machine, line::clean(), line::clean());
+    stand.over_serial();
     // The table says how wide the muscle is at its stroke.
     write(&stand.folder, "mini.pam", fitting::fitted(&presets::miniature()));
     stand.host(&["flash", "mini.pam"]);
