@@ -35,7 +35,7 @@ const BOUNDS: [(&str, f64); 28] = [
     ("viscous-damping", 0.98),
     ("stribeck-friction", 0.85),
     ("rate-power", 0.88),
-    ("breakaway-friction", 0.80),
+    ("breakaway-friction", 0.88),
     ("presliding-hysteresis", 0.88),
     ("minor-loop-memory", 0.80),
     ("stress-relaxation", 0.85),
