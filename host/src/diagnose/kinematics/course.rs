@@ -18,22 +18,18 @@ pub(super) struct Course<'a> {
     rested: f64,
     /// A stand at the beginning goes on from the one before the recording, s.
     stood: f64,
-    hold: Option<Hold>,
+    /// Where the length began to be held, while it is.
+    hold: Option<usize>,
+    /// The pressure that the hold began with, Pa. One that begins with a turn goes on from the hold before: what the air did since then
+    /// has moved the friction as a ramp does.
+    hold_pressure: f64,
     /// The farthest that the pressure went in this direction, at held length, Pa.
     pressure_extreme: f64,
+    /// Whether the pressure has left the place where the hold began.
+    ramped: bool,
     /// Since when, and at what pressure, the braid has been still.
     still_from: usize,
     still_pressure: f64,
-}
-
-/// A stay at one length.
-#[derive(Clone, Copy)]
-struct Hold {
-    start: usize,
-    /// The pressure that it began with, Pa.
-    pressure: f64,
-    /// Whether the pressure has left it.
-    ramped: bool,
 }
 
 impl<'a> Course<'a> {
@@ -59,7 +55,9 @@ impl<'a> Course<'a> {
             rested,
             stood: rested,
             hold: None,
+            hold_pressure: pressure,
             pressure_extreme: pressure,
+            ramped: false,
             still_from: 0,
             still_pressure: pressure,
         }
@@ -71,11 +69,13 @@ impl<'a> Course<'a> {
         let held = k.held[row];
         let before = self.direction;
         let mut turned = self.turns_by_stroke(row);
-        if held && self.hold.is_none() {
-            self.hold = Some(Hold { start: row, pressure: pressure[row], ramped: false });
-            self.pressure_extreme = pressure[row];
-        }
         if held && !turned {
+            if self.hold.is_none() {
+                self.hold = Some(row);
+                self.hold_pressure = pressure[row];
+                self.pressure_extreme = pressure[row];
+                self.ramped = false;
+            }
             turned = self.turns_at_held_length(row);
         }
         if !held || turned || (pressure[row] - self.still_pressure).abs() > self.thresholds.pressure {
@@ -86,10 +86,11 @@ impl<'a> Course<'a> {
             self.turns += 1;
             self.turn_row = row;
         }
-        if let Some(hold) = self.hold.as_mut().filter(|_| held) {
-            hold.ramped |= (pressure[row] - hold.pressure).abs() > self.thresholds.pressure;
-            k.ramped[row] = hold.ramped;
-            self.rested = self.stood + time[row] - time[hold.start];
+        let left = (pressure[row] - self.hold_pressure).abs() > self.thresholds.pressure;
+        self.ramped = held && (self.ramped || left);
+        k.ramped[row] = self.ramped;
+        if held {
+            self.rested = self.stood + time[row] - time[*self.hold.get_or_insert(row)];
         } else {
             // The rest before a motion stays on record until it turns, or until the next hold.
             if self.hold.take().is_none() && turned && before != 0.0 {
