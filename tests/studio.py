@@ -93,7 +93,7 @@ def reads_where_one_points(page):
     # The middle of the picture, by its geometry; the value there, by looking at every sample.
     found = page.js("""const c = document.getElementById("p-force"), inner = c.clientWidth - LEFT - RIGHT, s = scopes[0];
       const time = s.from + (c.clientWidth / 2 - LEFT) / inner * (s.to - s.from), pixel = (s.to - s.from) / inner;
-      const near = [...Array(ring.length).keys()].filter((i) => Math.abs(ring.get("t", i) - time) <= pixel).map((i) => "measured " + ring.get("F", i).toFixed(1));
+      const near = [...Array(shown.length).keys()].filter((i) => Math.abs(shown.get("t", i) - time) <= pixel).map((i) => "measured " + shown.get("F", i).toFixed(1));
       return {time, pixel, near, told: parseFloat(document.getElementById("cursor-time").textContent.slice(3)),
         line: getComputedStyle(c.nextElementSibling).display, text: c.getAttribute("aria-valuetext")}""")
     assert abs(found["told"] - found["time"]) <= found["pixel"] + 1e-3 and found["line"] != "none", found
