@@ -1,7 +1,7 @@
 //! Known weights on the load cell: its scale, and what the line's pressure adds to it.
 
 use super::Measured;
-use super::regression::by_blocks;
+use super::regression::{by_blocks, with_reference};
 use super::table::{Table, stays};
 use crate::bench::BenchName;
 use crate::error::Result;
@@ -10,6 +10,9 @@ use crate::recording::Quantity;
 const CHECK: &str = "dead weights on the load cell";
 /// From this pressure on the line counts as under pressure, Pa.
 const PRESSED: f64 = 2e4;
+
+/// No weight is what is written on it: those of the workshop are wrong by up to this share (class M3 of OIML R 111).
+const WEIGHT_ERROR: f64 = 5e-4;
 
 /// Scale of the cell and thrust of the line.
 pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
@@ -34,18 +37,20 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
     }
     let Some(found) = by_blocks(&columns, &off, &block) else {
         return Err(table.poor(
-            "the weights do not tell a scale from a zero: hang at least three different ones, each for some seconds",
+            "the weights do not tell a scale from a zero, and how surely: hang at least three different ones, each for some seconds, all \
+             of them with the line under pressure too if the line was",
         ));
     };
     let gain = found.values[0];
+    let gain_std = with_reference(found.deviations[0], WEIGHT_ERROR * (1.0 + gain));
     let mut measured = vec![Measured {
         fault: BenchName::ForceGain,
         parameters: vec![gain, 0.0],
-        deviations: vec![Some(found.deviations[0]), None],
+        deviations: vec![Some(gain_std), None],
         words: format!(
             "the cell reads {:+.2} ± {:.2} % of the load",
             100.0 * gain,
-            200.0 * found.deviations[0]
+            200.0 * gain_std
         ),
         check: CHECK,
     }];

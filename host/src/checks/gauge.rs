@@ -1,11 +1,14 @@
 //! A reference gauge beside the bench's own: its scale. Its zero is a part of the dead band in every model, and stays there.
 
 use super::Measured;
-use super::regression::by_blocks;
+use super::regression::{by_blocks, with_reference};
 use super::table::{Table, stays};
 use crate::bench::BenchName;
 use crate::error::Result;
 use crate::recording::Quantity;
+
+/// The reference is wrong itself, by up to this share of its range (class 0.1 of EN 837-1).
+const REFERENCE_ERROR: f64 = 1e-3;
 
 /// Scale of the gauge.
 pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
@@ -19,7 +22,7 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
     };
     // The law counts what is missing: the muscle has (1 + γ) of what is read.
     let missing = 1.0 / (1.0 + found.values[0]) - 1.0;
-    let std = found.deviations[0] / (1.0 + found.values[0]).powi(2);
+    let std = with_reference(found.deviations[0], REFERENCE_ERROR) / (1.0 + found.values[0]).powi(2);
     Ok(vec![Measured {
         fault: BenchName::GaugeGain,
         parameters: vec![missing, 0.0],

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use super::baselines;
 use super::candidates::Candidate;
 use super::held_out::thin;
-use super::linear::{dot, energy};
+use super::linear::{Basis, dot, energy, solve_symmetric};
 use super::moment;
 use super::rows::Rows;
 use super::select::Found;
@@ -51,7 +51,11 @@ fn tangents(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<Tangent> {
             up[j] += h;
             down[j] -= h;
             let (up, down) = (value(&up), value(&down));
-            let column = up.iter().zip(&down).map(|(u, d)| (u - d) / (2.0 * h)).collect();
+            let column: Vec<f64> = up.iter().zip(&down).map(|(u, d)| (u - d) / (2.0 * h)).collect();
+            // Of laws to choose from, the others' shapes move nothing.
+            if column.iter().all(|c| *c == 0.0) {
+                continue;
+            }
             tangents.push(Tangent { effect, parameter: trial.amplitudes.len() + j, column });
         }
     }
@@ -90,6 +94,10 @@ pub(crate) fn deviations(found: &Found, library: &[Candidate], rows: &Rows) -> V
 /// How far a parameter is off by its law's own inexactness, as a share of it.
 const LAW: f64 = 0.07;
 
+/// A number whose change moves the force no further than this share of itself beyond what the base and the others before it could do is
+/// not told by the recordings; the others are then told for the value that it has.
+const TOLD: f64 = 1e-3;
+
 /// Variances by the scatter of whole half-strokes: amplitudes exactly, shapes by their linearised traces.
 fn by_strokes(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<Option<f64>> {
     // The bare baseline's span, not the full one's, which holds the amplitudes themselves.
@@ -97,16 +105,21 @@ fn by_strokes(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<Option<f6
     let columns: Vec<Vec<f64>> = tangents.iter().map(|t| t.column.clone()).collect();
     let z: Vec<Vec<f64>> = baselines::projected(&columns, &rows.root_weight, &base.span);
     let n = z.len();
+    let mut apart = Basis::default();
+    let told: Vec<bool> = z.iter().map(|z| apart.push_beyond(z.clone(), TOLD)).collect();
     let gram: Vec<Vec<f64>> = z.iter().map(|a| z.iter().map(|b| dot(a, b)).collect()).collect();
-    let all: Vec<usize> = (0..n).collect();
+    let kept: Vec<usize> = (0..n).filter(|i| told[*i]).collect();
     (0..n)
         .map(|i| {
-            // Row i of the inverse of the gram matrix, then the scatter of the blocks' scores along it.
+            if !told[i] {
+                return None;
+            }
+            // Its row of the inverse of the gram matrix, then the scatter of the blocks' scores along it.
             let unit: Vec<f64> = (0..n).map(|j| f64::from(u8::from(i == j))).collect();
-            let row = super::linear::solve_symmetric(&gram, &unit, &all)?;
+            let row = solve_symmetric(&gram, &unit, &kept)?;
             let mut per_block = vec![0.0; rows.blocks];
             for k in 0..rows.len() {
-                let influence: f64 = row.iter().zip(&z).map(|(r, z)| r * z[k]).sum();
+                let influence: f64 = row.iter().zip(&kept).map(|(r, j)| r * z[*j][k]).sum();
                 per_block[rows.block[k] as usize] += influence * found.full.residual[k];
             }
             let m = rows.blocks.max(2) as f64;
