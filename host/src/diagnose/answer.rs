@@ -141,9 +141,17 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
     if missing.is_empty() && concealed > INEXACTNESS * blocked {
         remarks.push(in_the_tables(&found, &library, concealed, blocked));
     }
+    let restless = missing.is_empty() && found.noise.has_a_reason(step, blocked);
+    if restless {
+        remarks.push(format!(
+            "{}; no instrument scatters like this, and no effect of the library explains it: look at the air supply, at the stroke \
+             sensor's counts and at whatever is loose, then record two strokes under the same conditions again",
+            found.noise.words(blocked)
+        ));
+    }
     let verdict = if missing.is_empty() {
-        // What beats in time is no noise, however well repeats seem to explain it.
-        let steady = beat.is_none_or(|l| l.share < 0.3);
+        // What beats in time is no noise, however well repeats seem to explain it; nor is what is larger than any instrument's.
+        let steady = beat.is_none_or(|l| l.share < 0.3) && !restless;
         if left <= own && steady { Verdict::Consistent } else { Verdict::Unexplained }
     } else if explained >= 0.8 || left <= own {
         Verdict::Explained
@@ -158,6 +166,7 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
     let pattern = match (&beat, left_regions.first()) {
         (Some(l), _) => format!("periodic in time, {:.2} Hz", l.hertz),
         (None, Some(r)) if left > own => r.words.clone(),
+        _ if restless => found.noise.words(blocked),
         _ => "none".to_owned(),
     };
     if let Some(l) = beat {

@@ -22,6 +22,30 @@ pub(crate) struct Noise {
     pub independent: f64,
 }
 
+/// Load cells and gauges scatter by less than this share of the blocked force.
+const OF_INSTRUMENTS: f64 = 5e-3;
+/// What an instrument scatters by itself is over within so many readings.
+const FEW_READINGS: f64 = 3.0;
+
+impl Noise {
+    /// Whether it is more, and lasts longer, than instruments scatter: then strokes under the same conditions differ for a reason.
+    /// `step` is the time between rows, s, `blocked` the blocked force, N.
+    pub(crate) fn has_a_reason(&self, step: f64, blocked: f64) -> bool {
+        self.sigma > OF_INSTRUMENTS * blocked && self.memory > FEW_READINGS * step
+    }
+
+    /// How strokes under the same conditions differ, in words.
+    pub(crate) fn words(&self, blocked: f64) -> String {
+        format!(
+            "what does not repeat: under the same conditions the force differs by {:.2} N ({:.1} % of blocked force), for about {:.1} s \
+             at a time",
+            self.sigma,
+            100.0 * self.sigma / blocked,
+            self.memory
+        )
+    }
+}
+
 /// The how manieth recording of its held length each row belongs to, from 1.
 fn runs(rows: &Rows) -> Vec<u32> {
     let mut places: Vec<(f64, u32)> = Vec::new();

@@ -113,6 +113,24 @@ fn correlated_noise_is_not_named() {
 }
 
 #[test]
+fn strokes_that_do_not_repeat_are_not_consistent() {
+    let strongest = |c: &Campaign| {
+        c.recordings.iter().filter_map(|r| r.force.as_deref()).flatten().copied().fold(0.0, f64::max)
+    };
+    let loops = loops(&[0.2]);
+    let largest = strongest(&loops);
+    for (share, verdict) in [(0.003, Verdict::Consistent), (0.01, Verdict::Unexplained)] {
+        let d = ask(&recorded(loops.clone(), 21, coloured(share * largest, 2.0), |_, _, _| 0.0));
+        assert_eq!((d.verdict, names(&d)), (verdict, vec![]), "{share}: {:?}", d.remarks);
+        let said = d.remarks.iter().any(|r| r.contains("does not repeat"));
+        assert_eq!(said, verdict == Verdict::Unexplained, "{share}");
+    }
+    // A sensor's own white noise is no physics, however coarse the sensor.
+    let d = ask(&recorded(loops, 22, |random, _| 0.01 * largest * random.normal(), |_, _, _| 0.0));
+    assert_eq!((d.verdict, names(&d)), (Verdict::Consistent, vec![]), "{:?}", d.remarks);
+}
+
+#[test]
 fn the_end_of_the_sensors_range_is_no_physics() {
     let mut campaign = recorded(loops(&[0.2]), 5, coloured(0.3, 2.0), |_, _, _| 0.0);
     let forces = || campaign.recordings.iter().flat_map(|r| r.force.clone().unwrap_or_default());
