@@ -87,6 +87,16 @@ impl Rows {
     pub(crate) fn len(&self) -> usize {
         self.force.len()
     }
+    /// Which blocks a recording begins with.
+    pub(crate) fn first_strokes(&self) -> Vec<bool> {
+        let mut first = vec![false; self.blocks];
+        for recording in 0..self.names.len() as u32 {
+            if let Some(row) = self.recording.iter().position(|r| *r == recording) {
+                first[self.block[row] as usize] = true;
+            }
+        }
+        first
+    }
     /// Rows that count.
     pub(crate) fn effective(&self) -> usize {
         self.root_weight.iter().filter(|w| **w > 0.0).count()

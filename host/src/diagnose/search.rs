@@ -2,6 +2,8 @@
 
 use std::ops::ControlFlow;
 
+use model_core::effects::{Link, Start};
+
 use super::baselines::{self, Baseline, Give, Kind};
 use super::candidates::Candidate;
 use super::evidence::Scale;
@@ -29,6 +31,8 @@ const SLOW: [&str; 4] = ["force-drift", "thermal-softening", "cyclic-softening",
 const FEWEST_INDEPENDENT: f64 = 8.0;
 /// So many candidates may fail when everything is fitted together before the search ends.
 const MOST_BARRED: usize = 4;
+/// What takes more than this share of its evidence from the first strokes of recordings lives there.
+const FIRST_STROKES: f64 = 0.7;
 /// With more rivals than this a name says nothing.
 const MOST_RIVALS: usize = 10;
 /// A trace as high as this share of the blocked force counts although few rows have it.
@@ -142,6 +146,15 @@ impl<'a> Search<'a> {
         if !self.is_enough(&winner, p[at]) {
             return ControlFlow::Break(());
         }
+        if let Some(memory) = self.found_itself_beside(&winner) {
+            self.remarks.push(format!(
+                "{} would take what is left in the first strokes of recordings, but there nobody knows what {memory} remembers of the time \
+                 before: not named",
+                self.library[winner.candidate].name(),
+            ));
+            self.barred.push(winner.candidate);
+            return ControlFlow::Continue(());
+        }
         let beside = Kind::Soft(winner.give);
         let metric = baselines::fit(self.rows, beside, &[]);
         let rivals = rivals(&winner, &best, self.library, self.rows, &ground, &metric.span);
@@ -181,6 +194,18 @@ impl<'a> Search<'a> {
         let best_of_all = best.iter().map(|t| t.score).fold(0.0, f64::max);
         let shadow = best_of_all > (winner.score + LEAST_ALONE).max(SHADOW * winner.score);
         (!self.chosen.is_empty() || !shadow).then_some(at)
+    }
+
+    /// The effect chosen whose memory has to find itself in the very strokes by which a law of friction would be named.
+    fn found_itself_beside(&self, winner: &Trial) -> Option<&'static str> {
+        let info = self.library[winner.candidate].info;
+        let of_friction = info.link == Link::Friction && !info.persistent;
+        let branch = |t: &&Trial| self.library[t.candidate].info.start == Start::Branch;
+        let memory = self.chosen.iter().find(branch).filter(|_| of_friction)?;
+        let first = self.rows.first_strokes();
+        let within: f64 = winner.scores.iter().zip(&first).filter(|(_, first)| **first).map(|(s, _)| s).sum();
+        (within > FIRST_STROKES * winner.scores.iter().sum::<f64>())
+            .then(|| self.library[memory.candidate].name())
     }
 
     /// The share it takes of what the bladder's own differences leave; or, for an effect that spares the bladder these
