@@ -96,7 +96,7 @@ fn turn<T: Scalar>(context: &Context<T>, memory: &Memory<T>) -> Option<Turn<T>> 
     let until = (context.stroke - memory[STROKE] - context.speed * dt) / (speed - context.speed);
     let since = dt - until.max(T::ZERO).min(dt);
     let pull = context.quasi - context.stiffness * context.speed * since;
-    let going = |way: T| pull * (T::ONE - context.friction * way);
+    let going = |way: T| Context { direction: way, ..*context }.rubbed(pull);
     Some(Turn { since, before: going(came), after: going(context.direction) })
 }
 

@@ -47,11 +47,7 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
         fault: BenchName::ForceGain,
         parameters: vec![gain, 0.0],
         deviations: vec![Some(gain_std), None],
-        words: format!(
-            "the cell reads {:+.2} ± {:.2} % of the load",
-            100.0 * gain,
-            200.0 * gain_std
-        ),
+        words: format!("the cell reads {:+.2} ± {:.2} % of the load", 100.0 * gain, 200.0 * gain_std),
         check: CHECK,
     }];
     if pressure.is_some() {

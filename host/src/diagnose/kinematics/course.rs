@@ -1,5 +1,8 @@
 //! The course of a motion, row by row: which way it goes, since when, and how long it rested.
 
+use std::iter::Peekable;
+use std::slice;
+
 use super::onset::Onset;
 use super::{Kinematics, Recorded, Thresholds};
 
@@ -8,8 +11,7 @@ pub(super) struct Course<'a> {
     recorded: &'a Recorded<'a>,
     thresholds: Thresholds,
     /// Turns of the stroke that are still to come.
-    ahead: std::slice::Iter<'a, Onset>,
-    next: Option<&'a Onset>,
+    ahead: Peekable<slice::Iter<'a, Onset>>,
     direction: f64,
     turn_row: usize,
     turns: u32,
@@ -40,14 +42,11 @@ impl<'a> Course<'a> {
         starts: &'a [Onset],
         rested: f64,
     ) -> Self {
-        let mut ahead = starts.iter();
-        let next = ahead.next();
         let pressure = recorded.pressure[0];
         Self {
             recorded,
             thresholds,
-            ahead,
-            next,
+            ahead: starts.iter().peekable(),
             direction: 0.0,
             turn_row: 0,
             turns: 0,
@@ -112,8 +111,7 @@ impl<'a> Course<'a> {
 
     /// Whether the stroke turns at this row.
     fn turns_by_stroke(&mut self, row: usize) -> bool {
-        let Some(onset) = self.next.filter(|onset| row >= onset.row) else { return false };
-        self.next = self.ahead.next();
+        let Some(onset) = self.ahead.next_if(|onset| row >= onset.row) else { return false };
         let turns = onset.direction != self.direction;
         self.direction = onset.direction;
         turns
