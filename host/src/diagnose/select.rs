@@ -6,7 +6,7 @@ use super::baselines::{self, Baseline, Give, Kind, cosine};
 use super::candidates::Candidate;
 use super::evidence::Scale;
 use super::ground::Ground;
-use super::linear::{Sign, add_scaled};
+use super::linear::{Sign, add_scaled, energy};
 use super::noise::{Noise, family_p};
 use super::rows::Rows;
 use super::trial::{self, Trial};
@@ -38,6 +38,8 @@ pub(crate) const LEAST_SCORE: f64 = 12.0;
 pub(crate) const LEAST_ALONE: f64 = 25.0;
 /// Throws of the coin behind a family-wise p.
 const THROWS: usize = 1999;
+/// A slope that leaves more than this times what the one before left is the worse.
+const WORSE: f64 = 1.25;
 /// How many candidates are refined in their shapes at every step.
 const REFINED: usize = 12;
 
@@ -155,42 +157,62 @@ fn forbid_cancelling(trials: &mut [Trial], blocked: f64) {
 }
 
 /// Refits the baseline with the effects of `trials` beside it, renewing what the effects see of the model.
+///
+/// A law of first order goes by the model's slope. Where the slope changes fast, that of the new baseline may serve it worse than the one
+/// by which the effect was found; then that one stays.
 pub(crate) fn refit(
     rows: &mut Rows,
     kind: Kind,
     trials: &mut [Trial],
     library: &[Candidate],
 ) -> (Baseline, Vec<Vec<f64>>) {
-    let mut fitted = None;
-    let mut traces = Vec::new();
-    for _ in 0..2 {
-        let mut columns = Vec::new();
-        let mut owner = Vec::new();
-        for (t, trial) in trials.iter().enumerate() {
-            for (k, column) in library[trial.candidate].columns(&trial.shapes, rows).into_iter().enumerate() {
-                if trial.amplitudes.get(k).is_some_and(|a| *a != 0.0) {
-                    columns.push(column);
-                    owner.push((t, k));
-                }
+    let seen = rows.contexts.clone();
+    let first = fitted_beside(rows, kind, trials, library);
+    baselines::into_contexts(rows, &first.0);
+    let found: Vec<Vec<f64>> = trials.iter().map(|t| t.amplitudes.clone()).collect();
+    let second = fitted_beside(rows, kind, trials, library);
+    if energy(&second.0.residual) <= WORSE * energy(&first.0.residual) {
+        baselines::into_contexts(rows, &second.0);
+        return second;
+    }
+    rows.contexts = seen;
+    for (trial, amplitudes) in trials.iter_mut().zip(found) {
+        trial.amplitudes = amplitudes;
+    }
+    first
+}
+
+/// The baseline with effects beside it as they see the model now, and their traces; the trials get their amplitudes.
+fn fitted_beside(
+    rows: &Rows,
+    kind: Kind,
+    trials: &mut [Trial],
+    library: &[Candidate],
+) -> (Baseline, Vec<Vec<f64>>) {
+    let mut columns = Vec::new();
+    let mut owner = Vec::new();
+    for (t, trial) in trials.iter().enumerate() {
+        for (k, column) in library[trial.candidate].columns(&trial.shapes, rows).into_iter().enumerate() {
+            if trial.amplitudes.get(k).is_some_and(|a| *a != 0.0) {
+                columns.push(column);
+                owner.push((t, k));
             }
         }
-        let with = baselines::fit(rows, kind, &columns);
-        traces = vec![vec![0.0; rows.len()]; trials.len()];
-        for (j, (t, k)) in owner.iter().enumerate() {
-            let sign = library[trials[*t].candidate].signs()[*k];
-            let a = with.amplitudes[j];
-            let allowed = match sign {
-                Sign::Free => a,
-                Sign::Positive => a.max(0.0),
-                Sign::Negative => a.min(0.0),
-            };
-            trials[*t].amplitudes[*k] = allowed;
-            add_scaled(&mut traces[*t], allowed, &columns[j]);
-        }
-        baselines::into_contexts(rows, &with);
-        fitted = Some(with);
     }
-    (fitted.unwrap_or_else(|| unreachable!("two rounds run")), traces)
+    let with = baselines::fit(rows, kind, &columns);
+    let mut traces = vec![vec![0.0; rows.len()]; trials.len()];
+    for (j, (t, k)) in owner.iter().enumerate() {
+        let sign = library[trials[*t].candidate].signs()[*k];
+        let a = with.amplitudes[j];
+        let allowed = match sign {
+            Sign::Free => a,
+            Sign::Positive => a.max(0.0),
+            Sign::Negative => a.min(0.0),
+        };
+        trials[*t].amplitudes[*k] = allowed;
+        add_scaled(&mut traces[*t], allowed, &columns[j]);
+    }
+    (with, traces)
 }
 
 /// Whether an effect may be named at all: what tables imitate has to be large, or to show beyond them.
