@@ -17,6 +17,7 @@ use crate::band::{ForceBand, HALF_95};
 use crate::bench::Candidate;
 use crate::error::{Code, Error, Result};
 use crate::possible::Contractions;
+use crate::recording::dropouts::Screened;
 use crate::recording::segment::Motion;
 use crate::recording::{Campaign, Follower, Recording};
 use crate::table_file::TableFile;
@@ -37,7 +38,7 @@ pub struct Prediction {
 pub struct Predicted {
     /// The force that the load cell would read, N, per row.
     pub force: Vec<f64>,
-    /// Root mean square of `F − F_model`, N; `None` without a force column.
+    /// Root mean square of `F − F_model` where the gauge did not fall out, N; `None` without a force column.
     pub rms: Option<f64>,
     /// How uncertain it is, where that was asked for and the table knows.
     pub bands: Option<Bands>,
@@ -55,7 +56,7 @@ pub struct Bands {
     pub inside: Option<f64>,
 }
 
-/// Runs a table over a campaign.
+/// Runs a table over a campaign. Where the gauge alone fell out ([`crate::recording::dropouts`]) the pressure is bridged.
 ///
 /// # Errors
 /// [`Code::TableInvalid`] where the table cannot be evaluated, or names a correction that this program does not know;
@@ -89,6 +90,8 @@ fn bands(band: &ForceBand, recording: &Recording, motion: &Motion, force: &[f64]
 }
 
 fn run(file: &TableFile, campaign: &Campaign, band: Option<&ForceBand>) -> Result<Prediction> {
+    let screened = Screened::of(campaign);
+    let campaign = screened.campaign.as_ref();
     let muscle =
         Muscle::<f64>::build(&file.table).map_err(|e| Error::new(Code::TableInvalid, e.to_string()))?;
     let mut chain = Chain::<f64>::new(&file.table.effects);
@@ -145,11 +148,14 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ForceBand>) -> Resul
             }
             forces
         };
+        let read = screened.read(index);
         let rms = recording.force.as_ref().map(|measured| {
-            let sum: f64 = measured.iter().zip(&force).map(|(f, m)| (f - m).powi(2)).sum();
+            let scored = measured.iter().zip(&force).zip(&read).filter(|(_, read)| **read);
+            let sum: f64 = scored.map(|((f, m), _)| (f - m).powi(2)).sum();
+            let count = read.iter().filter(|read| **read).count() as f64;
             square += sum;
-            rows += measured.len() as f64;
-            (sum / measured.len().max(1) as f64).sqrt()
+            rows += count;
+            (sum / count.max(1.0)).sqrt()
         });
         let bands = band.map(|band| bands(band, recording, &motion, &force));
         recordings.push(Predicted { force, rms, bands });
@@ -160,7 +166,8 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ForceBand>) -> Resul
         .iter()
         .flat_map(|r| r.pressure.iter().copied().zip(r.stroke.iter().copied()))
         .collect();
-    Ok(Prediction { recordings, rms, warnings: beyond(&file.table, &places) })
+    let warnings = screened.remark().into_iter().chain(beyond(&file.table, &places)).collect();
+    Ok(Prediction { recordings, rms, warnings })
 }
 
 /// The recording with the correction of its mounting, where the table knows the stroke that it was held at.

@@ -11,6 +11,7 @@ mod check;
 mod columns;
 mod container;
 mod decimal;
+pub mod dropouts;
 mod follow;
 #[cfg(feature = "hdf5")]
 mod hdf5;

@@ -6,9 +6,12 @@
 
 use std::f64::consts::PI;
 
+use host::diagnose::{self, diagnose};
 use host::fit::{Options, fit, result::Fit};
 use host::muscle_description::MuscleDescription;
+use host::predict::predict;
 use host::recording::{Campaign, Recording};
+use host::table_file::{About, TableFile};
 
 const REST: f64 = 39.16e-3;
 const DEADBAND: f64 = 76.5e3;
@@ -175,4 +178,39 @@ fn one_held_length_determines_no_deadband() {
     }
     let found = fit(&Campaign::new(vec![r]), &description(), &Options::default()).unwrap();
     assert!(found.summary.warnings.iter().any(|w| w.contains("one length")), "{:?}", found.summary.warnings);
+}
+
+/// Readings in another unit, and readings of a loose plug, change nothing but their own rows: in the table, in what it foretells, and in
+/// the answer of a diagnosis.
+#[test]
+fn a_gauge_that_falls_out_does_no_harm() {
+    let mut noise = Noise::new(6, 0.0);
+    let clean = SIX.map(|p| strokes(p, 3000, 100.0, 0.0, 0, (0.05, &mut noise)));
+    let mut spoiled = clean.clone();
+    spoiled[1].pressure[220..260].iter_mut().for_each(|p| *p /= 6.894_757);
+    for start in [300, 306, 320] {
+        spoiled[4].pressure[start..start + 3].fill(0.0);
+    }
+    let (clean, spoiled) = (Campaign::new(clean.to_vec()), Campaign::new(spoiled.to_vec()));
+    let found = fit(&spoiled, &description(), &Options::default()).unwrap();
+    assert_truth(&found, 400.0, 0.003);
+    assert_eq!(found.summary.rows.dropouts, 49);
+    assert_eq!(found.summary.pressures.len(), SIX.len(), "no level at which nobody tested");
+    let remark = |all: &[String]| all.iter().find(|w| w.contains("49 rows left out")).cloned();
+    let said = remark(&found.summary.warnings).unwrap();
+    assert!(said.contains("276 rows 221 to 260 (2.20 to 2.59 s) from 27"), "{said}");
+    assert!(said.contains("483 rows 301 to 303 (3.00 to 3.02 s) from 48"), "{said}");
+
+    let file = TableFile { table: found.table, about: About::default() };
+    let foretold = predict(&file, &spoiled).unwrap();
+    let rms = predict(&file, &clean).unwrap().rms.unwrap();
+    assert!((foretold.rms.unwrap() / rms - 1.0).abs() < 0.02, "{:?} N beside {rms} N", foretold.rms);
+    assert_eq!(remark(&foretold.warnings).as_ref(), Some(&said));
+
+    let answer =
+        |campaign| diagnose(campaign, &description().geometry(), &diagnose::Options::default()).unwrap();
+    let (with, without) = (answer(&spoiled), answer(&clean));
+    assert_eq!((with.verdict, with.missing.len()), (without.verdict, without.missing.len()));
+    assert!((with.misfit_rms_N / without.misfit_rms_N - 1.0).abs() < 0.05, "{} N", with.misfit_rms_N);
+    assert_eq!(remark(&with.remarks).as_ref(), Some(&said));
 }

@@ -10,6 +10,7 @@ use host::fit::other_length::unseen_length;
 use host::fit::points::points;
 use host::fit::{Options, fit};
 use host::muscle_description::MuscleDescription;
+use host::recording::dropouts::Screened;
 use host::recording::segment::Motion;
 use host::recording::{Campaign, Clock, Import, Reader};
 
@@ -43,7 +44,7 @@ fn every_muscle_of_2022_has_its_settled_points() {
         assert_eq!(campaign.clock, Clock::Separate);
         assert_eq!(campaign.warnings, Vec::<String>::new());
         assert!(campaign.recordings.iter().all(|r| r.held_stroke().is_some() && r.force.is_some()));
-        let spread = pressures(&points(&campaign, &Motion::of_campaign(&campaign)), 620e3);
+        let spread = pressures(&points(&Screened::of(&campaign), &Motion::of_campaign(&campaign)), 620e3);
         assert!(!spread.held, "{:?}", spread.levels);
         rows += campaign.samples();
     }

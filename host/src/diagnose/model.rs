@@ -11,6 +11,7 @@ use crate::fit::{Options as FitOptions, fit};
 use crate::muscle_description::MuscleDescription;
 use crate::predict::predict;
 use crate::recording::Campaign;
+use crate::recording::dropouts::Screened;
 use crate::table_file::{About, Correction, TableFile};
 
 /// A refitted table file and how well it does on the recordings.
@@ -121,7 +122,7 @@ fn without_effects(file: TableFile, rms: f64, warnings: Vec<String>, reserve: Op
 /// Leaves in each effect what the recordings left in the muscle, so that a controller takes over a muscle that was worked.
 fn remember(file: &mut TableFile, campaign: &Campaign) {
     let Ok(muscle) = Muscle::<f64>::build(&file.table) else { return };
-    let contexts = moments(&muscle, campaign);
+    let contexts = moments(&muscle, &Screened::of(campaign).campaign);
     for e in &mut file.table.effects {
         let parameters: Vec<f64> = e.parameters.iter().map(|p| f64::from(*p)).collect();
         let mut memory = [0.0; MEMORY];

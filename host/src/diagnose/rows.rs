@@ -20,6 +20,7 @@ use super::linear::quantile;
 use crate::counted::counted;
 use crate::error::Result;
 use crate::progress::Progress;
+use crate::recording::dropouts::Screened;
 use crate::recording::{Campaign, Recording};
 
 /// Rows aimed at: enough for every reversal, few enough for seconds.
@@ -108,6 +109,8 @@ impl Rows {
 /// # Errors
 /// A recording without force.
 pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
+    let screened = Screened::of(campaign);
+    let campaign = screened.campaign.as_ref();
     let pressures = range(campaign, |r| &r.pressure);
     let thresholds = thresholds(campaign, braid, pressures);
     let total = campaign.samples();
@@ -121,9 +124,10 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
             end.force
         )
     }));
+    rows.remarks.extend(screened.remark());
     let mut gathering = Gathering::begin(&mut rows, braid, thresholds, &ends, campaign.beginning());
     for (index, recording) in campaign.recordings.iter().enumerate() {
-        gathering.add(recording, campaign.pause_before(index))?;
+        gathering.add(recording, &screened.read(index), campaign.pause_before(index))?;
     }
     let (readable, spiked) = gathering.end();
     if spiked * 200 > total {

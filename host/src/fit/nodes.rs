@@ -122,6 +122,7 @@ fn guarded(tested: &[f64], max_pressure: f64) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::fit::points::points;
+    use crate::recording::dropouts::Screened;
     use crate::recording::segment::Motion;
     use crate::recording::{Campaign, Recording};
 
@@ -134,7 +135,10 @@ mod tests {
             pressure: pressures,
             ..Recording::default()
         };
-        points(&Campaign::new(vec![recording]), &[Motion { direction: vec![1; n], ..Motion::default() }])
+        points(
+            &Screened::of(&Campaign::new(vec![recording])),
+            &[Motion { direction: vec![1; n], ..Motion::default() }],
+        )
     }
 
     #[test]

@@ -21,7 +21,7 @@ pub fn despike(campaign: &Campaign, points: &mut Points) -> Vec<Outlier> {
     for index in 0..points.list.len() {
         let turns = points.beside_turn(index);
         let p = &mut points.list[index];
-        if p.rows < 3 || p.force_range.1 - p.force_range.0 < 6.0 * typical {
+        if p.dropout || p.rows < 3 || p.force_range.1 - p.force_range.0 < 6.0 * typical {
             continue;
         }
         let Some(force) = campaign.recordings.get(p.recording as usize).and_then(|r| r.force.as_ref()) else {

@@ -4,6 +4,7 @@
 //! pressure and stroke hardly change within. A piece ends where the direction turns, where stroke or pressure has moved on
 //! by a small share of their ranges, or where it holds enough rows. One pass, linear in rows; memory is that of the points.
 
+use crate::recording::dropouts::Screened;
 use crate::recording::segment::Motion;
 use crate::recording::{Campaign, Recording, white_noise};
 
@@ -32,6 +33,8 @@ pub struct Point {
     pub force_range: (f64, f64),
     /// Distance from the last turn, or from the recording's beginning, in shares of the ranges of stroke and pressure.
     pub since_turn: f64,
+    /// Whether the gauge fell out there: the pressure is bridged.
+    pub dropout: bool,
 }
 
 /// The smallest and the largest value of a column.
@@ -112,9 +115,11 @@ const PRESSURE_STEP: f64 = 1.0 / 100.0;
 /// as many points as rows.
 const NOISE_STEP: f64 = 6.0;
 
-/// Cuts a campaign into points. `motions` are those of its recordings; recordings without a force are passed over.
+/// Cuts a campaign into points; a dropout of the gauge shares none with what is beside it. `motions` are those of its recordings;
+/// recordings without a force are passed over.
 #[must_use]
-pub fn points(campaign: &Campaign, motions: &[Motion]) -> Points {
+pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
+    let campaign = screened.campaign.as_ref();
     let with_force = || campaign.recordings.iter().filter(|r| r.force.is_some());
     let rows: usize = with_force().map(Recording::len).sum();
     let pressure = Range::of(with_force().flat_map(|r| r.pressure.iter().copied()));
@@ -137,12 +142,16 @@ pub fn points(campaign: &Campaign, motions: &[Motion]) -> Points {
         // What the muscle did before is not recorded: a beginning is as good as a turn, and may be one.
         let mut turn = 0;
         let mut start = 0;
+        let mut dropouts = screened.of_recording(index).peekable();
         while start < n {
+            while dropouts.next_if(|d| d.end <= start).is_some() {}
+            let dropout = dropouts.peek().is_some_and(|d| d.start <= start);
+            let limit = dropouts.peek().map_or(n, |d| if dropout { d.end } else { d.start }).min(n);
             let direction = directions[start];
             let mut sums = [0.0; 4];
             let mut range = (f64::INFINITY, f64::NEG_INFINITY);
             let mut end = start;
-            while end < n
+            while end < limit
                 && directions[end] == direction
                 && ((end - start) as u32) < most_rows
                 && (x[end] - x[start]).abs() <= stroke_step
@@ -170,6 +179,7 @@ pub fn points(campaign: &Campaign, motions: &[Motion]) -> Points {
                 force,
                 force_range: range,
                 since_turn,
+                dropout,
             });
             if end < n && directions[end] != direction {
                 block += 1;
@@ -226,7 +236,7 @@ mod tests {
     #[test]
     fn many_rows_become_few_points_with_the_same_content() {
         let (campaign, motions) = loops(400_000);
-        let points = points(&campaign, &motions);
+        let points = points(&Screened::of(&campaign), &motions);
         assert!(points.list.len() < 30_000, "{}", points.list.len());
         assert_eq!(points.list.iter().map(|p| p.rows as usize).sum::<usize>(), 400_000);
         assert_eq!(points.blocks, 12);
@@ -241,21 +251,21 @@ mod tests {
     #[test]
     fn noise_of_the_stroke_makes_no_more_points() {
         let (mut campaign, motions) = loops(400_000);
-        let quiet = points(&campaign, &motions).list.len();
+        let quiet = points(&Screened::of(&campaign), &motions).list.len();
         let mut state = 1_u32;
         for x in &mut campaign.recordings[0].stroke {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             // Uniform over a step of the stroke on either side.
             *x += 6e-6 * (f64::from(state >> 8) / f64::from(1 << 23) - 1.0);
         }
-        let noisy = points(&campaign, &motions).list.len();
+        let noisy = points(&Screened::of(&campaign), &motions).list.len();
         assert!(noisy < quiet + quiet / 10, "{noisy} points instead of {quiet}");
     }
 
     #[test]
     fn distance_from_a_turn_starts_at_the_turn() {
         let (campaign, motions) = loops(6000);
-        let points = points(&campaign, &motions);
+        let points = points(&Screened::of(&campaign), &motions);
         let first = points.list.iter().position(|p| p.direction < 0.0).expect("a way back");
         assert!((points.list[first - 1].since_turn - 1.0).abs() < 0.01);
         assert!(points.list[first].since_turn < 0.01);

@@ -9,6 +9,7 @@ use crate::muscle_description::MuscleDescription;
 use crate::possible::Contractions;
 use crate::progress::Progress;
 use crate::recording::Campaign;
+use crate::recording::dropouts::Screened;
 use crate::recording::segment::Motion;
 
 use super::Options;
@@ -43,7 +44,9 @@ impl Prepared {
             recording.require_force()?;
         }
         progress.stage("finding strokes and turns", 0);
-        let mut points = points(campaign, &Motion::of_campaign(campaign));
+        let screened = Screened::of(campaign);
+        let campaign = screened.campaign.as_ref();
+        let mut points = points(&screened, &Motion::of_campaign(campaign));
         let distinct = points.list.len();
         if points.rows < 3 || distinct < 3 {
             return Err(Error::new(
@@ -93,7 +96,7 @@ impl Prepared {
             adjusted: Vec::new(),
             mountings: Vec::new(),
             shift: Vec::new(),
-            warnings: campaign.warnings.clone(),
+            warnings: campaign.warnings.iter().cloned().chain(screened.remark()).collect(),
         };
         prepared.screen_by_itself();
         prepared.shift = vec![0.0; prepared.points.list.len()];
@@ -112,7 +115,9 @@ impl Prepared {
         for (p, used) in self.points.list.iter().zip(&mut self.used) {
             let at =
                 |clip: &Option<Clip>, value: f64| clip.is_some_and(|c| (value - c.force).abs() <= tolerance);
-            if at(&self.clips.0, p.force_range.0) || at(&self.clips.1, p.force_range.1) {
+            if p.dropout {
+                *used = Use::Dropout;
+            } else if at(&self.clips.0, p.force_range.0) || at(&self.clips.1, p.force_range.1) {
                 *used = Use::Clipped;
             } else if p.direction == 0.0 && drop_unknown {
                 *used = Use::UnknownDirection;

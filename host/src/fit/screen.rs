@@ -17,6 +17,8 @@ pub enum Use {
     Clipped,
     /// A reading far beyond what the rest scatters.
     Outlier,
+    /// The gauge alone fell out: the pressure of these rows is bridged.
+    Dropout,
 }
 
 /// A reading that does not belong to the rest.

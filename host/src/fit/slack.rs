@@ -40,7 +40,7 @@ impl Prepared {
         for i in 0..self.used.len() {
             let e = self.design.evaluate(i, &self.parameters, &curves);
             if candidates[i] && e.force < floor - 0.03 * force {
-                if self.used[i] != Use::Clipped {
+                if !matches!(self.used[i], Use::Clipped | Use::Dropout) {
                     self.used[i] = Use::Slack;
                 }
                 slack += f64::from(self.points.list[i].rows);

@@ -119,6 +119,14 @@ pub struct RowUse {
     pub clipped: usize,
     /// Readings that do not belong.
     pub outliers: usize,
+    /// The gauge alone fell out; absent where it did not.
+    #[serde(skip_serializing_if = "nothing")]
+    pub dropouts: usize,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
+fn nothing(count: &usize) -> bool {
+    *count == 0
 }
 
 /// The errors without the demand that stress rise with strain: what that demand costs is the difference.
@@ -253,6 +261,7 @@ pub(super) fn summarise(
             Use::Slack => &mut rows.slack,
             Use::Clipped => &mut rows.clipped,
             Use::Outlier => &mut rows.outliers,
+            Use::Dropout => &mut rows.dropouts,
         } += n;
         if prepared.counts(i) {
             square += n as f64 * residuals[i] * residuals[i];

@@ -137,6 +137,7 @@ fn remarks(view: &View<'_>) -> Section {
         (rows.slack, "with the muscle slack"),
         (rows.clipped, "with the force sensor at the end of its range"),
         (rows.outliers, "that do not belong to the rest"),
+        (rows.dropouts, "in which the gauge alone fell out"),
     ];
     let told: Vec<String> = set_aside
         .iter()

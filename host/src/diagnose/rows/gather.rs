@@ -51,6 +51,14 @@ struct Average {
     good: f64,
 }
 
+/// The readings of a recording's force, whether each stands out alone, and whether the pressure beside it was read.
+#[derive(Clone, Copy)]
+struct Readings<'a> {
+    force: &'a [f64],
+    spike: &'a [bool],
+    read: &'a [bool],
+}
+
 impl<'a> Gathering<'a> {
     /// No row yet; the first reading is at `beginning` on the clock of the campaign, s.
     pub(super) fn begin(
@@ -81,11 +89,11 @@ impl<'a> Gathering<'a> {
         (self.readable, self.spiked)
     }
 
-    /// Appends a recording, `pause` seconds after the one before where that is known.
+    /// Appends a recording, `pause` seconds after the one before where that is known. What is not `read` of its pressure says nothing.
     ///
     /// # Errors
     /// A recording without force.
-    pub(super) fn add(&mut self, recording: &Recording, pause: Option<f64>) -> Result<()> {
+    pub(super) fn add(&mut self, recording: &Recording, read: &[bool], pause: Option<f64>) -> Result<()> {
         let first = self.rows.names.is_empty();
         self.rows.names.push(recording.name.clone());
         let force = recording.require_force()?;
@@ -102,6 +110,7 @@ impl<'a> Gathering<'a> {
         };
         let k = kinematics(recorded, before, self.thresholds);
         let spike = readings::spikes(force);
+        let readings = Readings { force, spike: &spike, read };
         let pause = if first { 0.0 } else { before };
         self.clock += pause;
         let start = recording.time[0];
@@ -114,7 +123,7 @@ impl<'a> Gathering<'a> {
                 piece = Some(k.piece[i]);
                 self.pieces += 1;
             }
-            let mean = self.average(recording, force, &k, &spike, i..j);
+            let mean = self.average(recording, &readings, &k, i..j);
             let dt = previous.map_or(pause, |p| mean.time - p);
             previous = Some(mean.time);
             self.push(&mean, &k, i, mean.time - start, dt);
@@ -142,9 +151,8 @@ impl<'a> Gathering<'a> {
     fn average(
         &mut self,
         recording: &Recording,
-        force: &[f64],
+        readings: &Readings<'_>,
         k: &Kinematics,
-        spike: &[bool],
         samples: std::ops::Range<usize>,
     ) -> Average {
         let count = samples.len() as f64;
@@ -163,7 +171,11 @@ impl<'a> Gathering<'a> {
             still: mean(&k.still),
             ..Average::default()
         };
-        for j in samples {
+        let Readings { force, spike, read } = *readings;
+        for j in samples.clone() {
+            if !read[j] {
+                continue;
+            }
             if spike[j] {
                 self.spiked += 1;
             } else if self.ends.iter().all(|end| force[j] != end.force) {
@@ -173,6 +185,9 @@ impl<'a> Gathering<'a> {
         }
         if average.good > 0.0 {
             average.force /= average.good;
+        } else if !read[samples.start] {
+            // It weighs nothing, yet what follows the force must not see it jump.
+            average.force = mean(force);
         }
         average
     }

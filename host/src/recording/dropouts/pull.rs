@@ -1,0 +1,170 @@
+//! What force the pressure makes in a campaign, and whether a force goes on while the pressure steps away.
+
+use std::ops::Range;
+
+use nalgebra::{SMatrix, SVector};
+
+use super::steps::Stretch;
+use crate::recording::{Campaign, Recording, white_noise};
+
+/// `F ≈ p (a0 + a1 u + a2 u² + a3 u³) + b0 + b1 u + b2 u² + b3 u³`, with pressure and stroke as shares of their ranges.
+const TERMS: usize = 8;
+/// Rows that are taken for it.
+const ROWS: usize = 20_000;
+/// Rounds in which rows are left out that lie further off than so many times the median.
+const ROUNDS: usize = 3;
+const FAR: f64 = 5.0;
+/// What the campaign leaves open is taken for nothing. Where only one pressure was tested the force is as good as proportional to it,
+/// which is the least that pressure can make: deadband and elasticity only take from it.
+const HELD: [f64; TERMS] = [1e-6, 1e-5, 1e-5, 1e-5, 1e-3, 1e-5, 1e-5, 1e-5];
+/// A muscle pulls from this share of the range of forces above the lowest.
+const PULLS: f64 = 0.05;
+/// The step must make this share of the range of forces, and so many standard deviations of a reading.
+const NOTICEABLE: (f64, f64) = (0.03, 25.0);
+/// The force goes on if it follows by less than this share.
+const FOLLOWS: f64 = 0.15;
+/// Before and after, the campaign's other readings make the force that is read up to this share of what the step would make: of two
+/// levels between which a gauge changes, the muscle's is the one that the force fits.
+const SUPPORTED: f64 = 0.3;
+/// How long after a stretch the force is watched: what follows late follows too. s, and rows at least.
+const LATE: (f64, usize) = (0.3, 2);
+/// Rows on either side from which the level is taken.
+const BESIDE: usize = 5;
+/// A force sensor that stands at the end of its range repeats one value in this share of the rows.
+const CLIPPED: f64 = 1.0 / 300.0;
+
+/// The force that pressure makes at each stroke, from the rows of a campaign that no step is near.
+#[derive(Debug, Clone)]
+pub(super) struct Pull {
+    terms: SVector<f64, TERMS>,
+    pressure: f64,
+    stroke: (f64, f64),
+    /// The lowest force, and the range above it, N.
+    floor: f64,
+    span: f64,
+    /// Where the force sensor ends, N.
+    ceiling: f64,
+}
+
+impl Pull {
+    /// `None` where too few rows are left that pull, or the force hardly changes.
+    pub(super) fn of(campaign: &Campaign, masks: &[Vec<Range<usize>>]) -> Option<Self> {
+        let total = campaign.samples();
+        let stride = (total / ROWS).max(1);
+        let mut rows: Vec<[f64; 3]> = Vec::with_capacity(total / stride + 1);
+        for (r, mask) in campaign.recordings.iter().zip(masks) {
+            let Some(force) = r.force.as_deref() else { continue };
+            let mut next = mask.iter().peekable();
+            for i in (0..r.len()).step_by(stride) {
+                while next.next_if(|m| m.end <= i).is_some() {}
+                if next.peek().is_none_or(|m| i < m.start) {
+                    rows.push([r.pressure[i], r.stroke[i], force[i]]);
+                }
+            }
+        }
+        let mut forces: Vec<f64> = rows.iter().map(|r| r[2]).collect();
+        forces.sort_unstable_by(f64::total_cmp);
+        let largest = forces.last().copied()?;
+        let at = |share: f64| forces[(share * (forces.len() - 1) as f64) as usize];
+        let (floor, top) = (at(0.002), at(0.998));
+        // Where the force hardly changes, as on a dead weight, no row lies above the lowest by a share of the largest.
+        let span = (top - floor).max(top.abs());
+        let at_largest = forces.iter().rev().take_while(|f| **f == largest).count();
+        let clipped = at_largest >= 5 && at_largest as f64 >= CLIPPED * forces.len() as f64;
+        rows.retain(|r| r[2] > floor + PULLS * span);
+        if rows.len() < 5 * TERMS {
+            return None;
+        }
+        let bounds = |k: usize| {
+            rows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), r| (l.min(r[k]), h.max(r[k])))
+        };
+        let ((lowest, highest), stroke) = (bounds(0), bounds(1));
+        let mut pull = Self {
+            terms: SVector::zeros(),
+            pressure: highest.abs().max(lowest.abs()).max(f64::MIN_POSITIVE),
+            stroke: (stroke.0, (stroke.1 - stroke.0).max(1e-9)),
+            floor,
+            span,
+            ceiling: if clipped { largest } else { f64::INFINITY },
+        };
+        pull.terms = pull.solved(&rows)?;
+        // What no step gave away, such as a wrong unit from the first row on, must not bend the surface.
+        for _ in 0..ROUNDS {
+            let off = |r: &[f64; 3]| (r[2] - pull.force(r[0], r[1])).abs();
+            let mut sizes: Vec<f64> = rows.iter().map(off).collect();
+            let middle = sizes.len() / 2;
+            let far = FAR * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+            let near: Vec<[f64; 3]> = rows.iter().copied().filter(|r| off(r) <= far).collect();
+            pull.terms = pull.solved(&near)?;
+        }
+        Some(pull)
+    }
+
+    /// The terms by least squares.
+    fn solved(&self, rows: &[[f64; 3]]) -> Option<SVector<f64, TERMS>> {
+        let (mut normal, mut moment) =
+            (SMatrix::<f64, TERMS, TERMS>::zeros(), SVector::<f64, TERMS>::zeros());
+        for [p, x, f] in rows {
+            let row = self.row(*p, *x);
+            normal += row * row.transpose();
+            moment += row * *f;
+        }
+        normal += SMatrix::from_diagonal(&(SVector::from(HELD) * rows.len() as f64));
+        Some(normal.cholesky()?.solve(&moment))
+    }
+
+    fn row(&self, pressure: f64, stroke: f64) -> SVector<f64, TERMS> {
+        let (p, u) = (pressure / self.pressure, (stroke - self.stroke.0) / self.stroke.1);
+        SVector::from([p, p * u, p * u * u, p * u.powi(3), 1.0, u, u * u, u.powi(3)])
+    }
+
+    /// N.
+    fn force(&self, pressure: f64, stroke: f64) -> f64 {
+        self.row(pressure, stroke).dot(&self.terms)
+    }
+
+    /// Whether the force goes on through a stretch, and for a while after, as if its steps of pressure had not been.
+    pub(super) fn goes_on(&self, stretch: &Stretch, r: &Recording, force: &[f64]) -> bool {
+        let Range { start, end } = stretch.rows;
+        let bridge = stretch.bridged(&r.time, &r.pressure);
+        let step = (r.pressure[start] - r.pressure[start - 1]).abs();
+        // What the surface leaves is the same before and after, up to friction that turns between.
+        let left = |i: usize| force[i] - self.force(r.pressure[i], r.stroke[i]);
+        let near = |a: usize, i: usize| (r.pressure[i] - r.pressure[a]).abs() <= 0.1 * step;
+        let before = (0..start).rev().take(BESIDE).take_while(|i| near(start - 1, *i)).map(left);
+        let after = (end..r.len()).take(BESIDE).take_while(|i| near(end, *i)).map(left);
+        let (before, after) = (mean(before), mean(after));
+        let (low, high) = (before.min(after), before.max(after));
+        let least = (NOTICEABLE.0 * self.span).max(NOTICEABLE.1 * white_noise(force));
+        let mut made = 0.0;
+        let undisturbed = |i: usize, pressure: f64, made: f64| {
+            let base = self.force(pressure, r.stroke[i]);
+            let off = (force[i] - base - high).max(base + low - force[i]).max(0.0);
+            off <= FOLLOWS * made && force[i] < self.ceiling
+        };
+        for (i, pressure) in stretch.rows.clone().zip(bridge) {
+            let base = self.force(pressure, r.stroke[i]) + 0.5 * (low + high);
+            let pushed = self.force(r.pressure[i], r.stroke[i]) - self.force(pressure, r.stroke[i]);
+            let change = r.pressure[i] - pressure;
+            made = (base + pushed).max(self.floor) - base;
+            if base < self.floor + PULLS * self.span
+                || made * change <= 0.0
+                || made.abs() < least
+                || low.abs().max(high.abs()) > SUPPORTED * made.abs()
+                || !undisturbed(i, pressure, made.abs())
+            {
+                return false;
+            }
+        }
+        let late = |i: &usize| r.time[*i] - r.time[end] <= LATE.0 || *i < end + LATE.1;
+        (end..r.len())
+            .take_while(late)
+            .take_while(|i| near(end, *i))
+            .all(|i| undisturbed(i, r.pressure[i], made.abs()))
+    }
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = values.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+    sum / f64::max(n, 1.0)
+}

@@ -1,0 +1,104 @@
+//! Where the pressure steps away and back, each within one reading.
+
+use std::ops::Range;
+
+use crate::recording::{Campaign, Recording, white_noise};
+
+/// The longest stretch that is looked at, s: what lasts longer is how the bench was driven.
+const LONGEST: f64 = 10.0;
+/// A step is at least this share of the campaign's highest pressure.
+const LEAST_STEP: f64 = 0.1;
+/// And of the reading before: a valve's kick at the gauge is less, and is over before a muscle behind a hose feels it.
+const LEAST_PART: f64 = 0.5;
+/// And at least so many standard deviations of a reading.
+const ABOVE_NOISE: f64 = 12.0;
+/// Within a stretch the pressure moves from reading to reading by no more than this share of the step.
+const STEADY: f64 = 0.1;
+/// The reading after differs from the reading before by no more than this share of the step.
+const BACK: f64 = 0.25;
+/// Two ratios are one up to this part.
+const SAME_FACTOR: f64 = 0.03;
+/// Where more of the rows than this lie between steps, steps are how the bench was driven.
+const RARE: f64 = 0.2;
+
+/// What counts as a step, Pa.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Scale {
+    step: f64,
+}
+
+impl Scale {
+    /// `None` where there is no pressure to speak of.
+    pub(super) fn of(campaign: &Campaign) -> Option<Self> {
+        let with_force = || campaign.recordings.iter().filter(|r| r.force.is_some());
+        let mut sizes: Vec<f64> = with_force().flat_map(|r| r.pressure.iter().map(|p| p.abs())).collect();
+        if sizes.is_empty() {
+            return None;
+        }
+        // Few readings at full scale must not set it.
+        let at = ((0.99 * sizes.len() as f64) as usize).min(sizes.len() - 1);
+        let highest = *sizes.select_nth_unstable_by(at, f64::total_cmp).1;
+        let noise = with_force().map(|r| white_noise(&r.pressure)).fold(0.0, f64::max);
+        let step = (LEAST_STEP * highest).max(ABOVE_NOISE * noise);
+        (step > 0.0).then_some(Self { step })
+    }
+}
+
+/// Rows at which the pressure has stepped since the row before, per recording.
+pub(super) fn edges(campaign: &Campaign, scale: &Scale) -> Vec<Vec<usize>> {
+    let of = |r: &Recording| {
+        let stepped = |i: &usize| (r.pressure[*i] - r.pressure[*i - 1]).abs() > scale.step;
+        (1..r.len()).filter(stepped).collect()
+    };
+    campaign.recordings.iter().map(|r| if r.force.is_some() { of(r) } else { Vec::new() }).collect()
+}
+
+/// Per recording the stretches that may be dropouts; `None` where there are none, or so many that they are the bench's way.
+pub(super) fn masked(campaign: &Campaign, edges: &[Vec<usize>]) -> Option<Vec<Vec<Range<usize>>>> {
+    let of = |(r, edges): (&Recording, &Vec<usize>)| -> Vec<Range<usize>> {
+        edges.iter().filter_map(|e| Stretch::from(*e, &r.time, &r.pressure)).map(|s| s.rows).collect()
+    };
+    let masks: Vec<_> = campaign.recordings.iter().zip(edges).map(of).collect();
+    let rows: usize = masks.iter().flatten().map(Range::len).sum();
+    (rows > 0 && rows as f64 <= RARE * campaign.samples() as f64).then_some(masks)
+}
+
+/// Rows between two steps that undo each other.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Stretch {
+    pub(super) rows: Range<usize>,
+    /// By what its readings are too small, where both steps say the same.
+    pub(super) factor: Option<f64>,
+}
+
+impl Stretch {
+    /// The stretch that begins at a step, if the pressure then keeps still until it steps back within some seconds.
+    pub(super) fn from(start: usize, time: &[f64], pressure: &[f64]) -> Option<Self> {
+        let (before, read) = (pressure[start - 1], pressure[start]);
+        let step = read - before;
+        if step.abs() < LEAST_PART * before.abs() {
+            return None;
+        }
+        let moves = |i: &usize| (pressure[*i] - pressure[*i - 1]).abs() > STEADY * step.abs();
+        let in_time = (start + 1..time.len()).take_while(|i| time[*i - 1] - time[start] <= LONGEST);
+        let end = in_time.into_iter().find(moves)?;
+        let (last, after) = (pressure[end - 1], pressure[end]);
+        if (after - last) * step >= 0.0 {
+            return None;
+        }
+        let ratios = (before / read, after / last);
+        let one = ratios.0 > 0.0 && ratios.1 > 0.0 && (ratios.0 / ratios.1).ln().abs() < SAME_FACTOR;
+        let factor = one.then(|| (ratios.0 * ratios.1).sqrt());
+        let back = (after - before).abs() <= BACK * step.abs();
+        (back || one).then_some(Self { rows: start..end, factor })
+    }
+
+    /// The pressure as it may have been in these rows, Pa.
+    pub(super) fn bridged(&self, time: &[f64], pressure: &[f64]) -> Vec<f64> {
+        let Range { start, end } = self.rows;
+        let (before, after) = (pressure[start - 1], pressure[end]);
+        let (from, span) = (time[start - 1], time[end] - time[start - 1]);
+        let line = |i: usize| before + (after - before) * (time[i] - from) / span;
+        self.rows.clone().map(|i| self.factor.map_or_else(|| line(i), |f| pressure[i] * f)).collect()
+    }
+}
