@@ -39,6 +39,44 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     })
 }
 
+/// Whether one of a call's results, each with the option that says where it goes, goes to standard output: words for people must not
+/// then.
+///
+/// ```
+/// use host::output::to_standard_output;
+/// use std::path::Path;
+/// let to = |path| Some(Path::new(path));
+/// assert!(to_standard_output(&[("-o", to("-")), ("--json", to("a.json"))])?);
+/// assert!(!to_standard_output(&[("-o", to("a.pam")), ("--json", None)])?);
+/// let refused = to_standard_output(&[("-o", to("-")), ("--json", to("-"))]).unwrap_err();
+/// assert_eq!(refused.exit_status(), 2);
+/// # Ok::<(), host::error::Error>(())
+/// ```
+///
+/// # Errors
+/// [`Code::CallInvalid`] where more than one would: nobody could take them apart.
+pub fn to_standard_output(results: &[(&str, Option<&Path>)]) -> Result<bool> {
+    let there: Vec<&str> =
+        results.iter().filter(|(_, path)| *path == Some(Path::new("-"))).map(|(option, _)| *option).collect();
+    if there.len() > 1 {
+        return Err(Error::new(
+            Code::CallInvalid,
+            format!(
+                "the results of {} would all go to standard output, one behind the other",
+                there.join(" and ")
+            ),
+        )
+        .help("let one of them be `-`, and name files for the others"));
+    }
+    Ok(!there.is_empty())
+}
+
+/// Where `--json` without a file puts its result, for [`to_standard_output`].
+#[must_use]
+pub fn printed(json: bool) -> Option<&'static Path> {
+    json.then_some(Path::new("-"))
+}
+
 /// A value as JSON whose numbers of single precision have the digits that they were given: 0.03, not 0.029999999329447746.
 ///
 /// ```

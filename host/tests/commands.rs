@@ -119,6 +119,35 @@ fn every_json_names_its_schema() {
 }
 
 #[test]
+fn two_results_do_not_share_standard_output() {
+    let folder = tempfile::tempdir().unwrap();
+    for call in [
+        "fit --muscle m.toml a.csv --json - -o -",
+        "fit --muscle m.toml a.csv --json - --report -",
+        "diagnose --muscle m.toml a.csv -o - --next -",
+        "diagnose --muscle m.toml a.csv --json - --report -",
+        "predict --table t.pam a.csv --json - -o -",
+        "compare a.csv b.csv --json --report -",
+        "effects backlash --json --report -",
+        "table export t.pam -o - --json",
+        "flash t.pam --port tcp:127.0.0.1:1 --backup - --json",
+    ] {
+        let (status, said) = host(folder.path(), &call.split(' ').collect::<Vec<_>>(), None);
+        assert!(status == 2 && said.contains("would all go to standard output"), "{call}: {status} {said}");
+    }
+    // One may, and then words for people are no part of it.
+    let output = Command::new(env!("CARGO_BIN_EXE_host"))
+        .args(["effects", "backlash", "--report", "-"])
+        .current_dir(folder.path())
+        .env_remove("PAM_SETTINGS")
+        .env("XDG_CONFIG_HOME", folder.path())
+        .output()
+        .unwrap();
+    let page = String::from_utf8(output.stdout).unwrap();
+    assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"), "{page:.200}");
+}
+
+#[test]
 fn there_is_a_manual_page_for_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let (status, said) = host(folder.path(), &["man", "-o", "man1"], None);

@@ -9,6 +9,7 @@ use super::reports::Reports;
 use crate::compare::compare;
 use crate::console::Console;
 use crate::error::{Code, Error, Result};
+use crate::output::{printed, to_standard_output};
 use crate::progress::Progress;
 use crate::recording::Reader;
 use crate::report::compare_page;
@@ -38,6 +39,7 @@ impl Arguments {
     /// # Errors
     /// Files that cannot be read or written, recordings without a common stretch.
     pub fn run(self, console: &Console) -> Result<()> {
+        let taken = to_standard_output(&[("--json", printed(self.json)), ("--report", self.reports.file())])?;
         // Whoever asks for JSON is a program.
         let watched = if self.json { Console::silent() } else { console.clone() };
         let progress = Arc::new(Progress::new(&watched, "reading"));
@@ -61,7 +63,13 @@ impl Arguments {
         drop(progress);
         let found = compare(&a, &b)?;
         self.reports.write(console, || compare_page::page(&a, &b, &found))?;
-        console.result(if self.json { format!("{:#}", found.to_json()) } else { found.to_text() });
+        if self.json {
+            console.result(format!("{:#}", found.to_json()));
+        } else if taken {
+            console.note(found.to_text());
+        } else {
+            console.result(found.to_text());
+        }
         Ok(())
     }
 }

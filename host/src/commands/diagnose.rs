@@ -15,7 +15,7 @@ use crate::console::Console;
 use crate::diagnose::{self, Options, advise, model, summary::summary};
 use crate::error::Result;
 use crate::muscle_description::MuscleDescription;
-use crate::output::write_whole;
+use crate::output::{to_standard_output, write_whole};
 use crate::predict::predict;
 use crate::progress::Progress;
 use crate::recording::Reader;
@@ -65,6 +65,12 @@ impl Arguments {
     /// # Errors
     /// Files that cannot be read or written, recordings without force.
     pub fn run(self, console: &Console) -> Result<()> {
+        let taken = to_standard_output(&[
+            ("-o", self.output.as_deref()),
+            ("--json", self.json.as_deref()),
+            ("--report", self.reports.file()),
+            ("--next", self.next.as_deref()),
+        ])?;
         let start = Instant::now();
         let given = self.with.iter().map(|name| effects::named(name.trim())).collect::<Result<Vec<_>>>()?;
         let muscle = MuscleDescription::read(&self.muscle)?;
@@ -113,7 +119,8 @@ impl Arguments {
         }
         self.reports.write(console, || diagnose_page::page(&answer, &geometry, &campaign))?;
         if self.json.as_deref() != Some(std::path::Path::new("-")) {
-            console.result(summary(&answer).trim_end());
+            let words = summary(&answer);
+            if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
         }
         console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));
         Ok(())

@@ -9,7 +9,7 @@ use serde_json::json;
 use crate::bench::Candidate;
 use crate::console::Console;
 use crate::error::{Code, Error, Result, nearest};
-use crate::output::write_whole;
+use crate::output::{printed, to_standard_output, write_whole};
 use crate::report::letters::letters;
 use crate::report::{effect_page, rich};
 
@@ -54,8 +54,12 @@ impl Arguments {
             return Ok(());
         };
         let candidate = named(name)?;
+        let taken =
+            to_standard_output(&[("--json", printed(self.json)), ("--report", self.report.as_deref())])?;
         if self.json {
             console.result(format!("{:#}", to_json(candidate)));
+        } else if taken {
+            console.note(explain(candidate));
         } else {
             console.result(explain(candidate));
         }

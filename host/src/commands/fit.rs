@@ -12,7 +12,7 @@ use crate::counted::counted;
 use crate::error::{Code, Error, Result};
 use crate::fit::{self, Options};
 use crate::muscle_description::MuscleDescription;
-use crate::output::write_whole;
+use crate::output::{to_standard_output, write_whole};
 use crate::progress::Progress;
 use crate::recording::Reader;
 use crate::report::fit_page;
@@ -73,6 +73,8 @@ impl Arguments {
                 .value(weight.to_string())
                 .help("1e-3 bends freely, 10 is nearly straight; leave the option out to have it chosen"));
         }
+        let table = ("-o", self.output.as_deref());
+        to_standard_output(&[table, ("--json", self.json.as_deref()), ("--report", self.reports.file())])?;
         let start = Instant::now();
         let muscle = MuscleDescription::read(&self.muscle)?;
         // Whoever asks for JSON is a program, or will look at that.

@@ -13,6 +13,7 @@ use super::port::{Muscle, PortOption};
 use crate::console::Console;
 use crate::device::{Client, difference, recorder, tables};
 use crate::error::{Code, Error, Result};
+use crate::output::{printed, to_standard_output, write_whole};
 use crate::progress::Progress;
 use crate::table_file::{About, TableFile, now_utc};
 
@@ -66,6 +67,7 @@ impl Arguments {
     }
 
     fn send(&self, path: &Path, console: &Console) -> Result<()> {
+        to_standard_output(&[("--backup", self.backup.as_deref()), ("--json", printed(self.json))])?;
         let file = TableFile::read(path)?;
         let mut buffer = [0; image::MAX_LEN];
         let image = image::write(&file.table, &mut buffer)
@@ -145,7 +147,7 @@ impl Arguments {
                     .backup
                     .clone()
                     .unwrap_or_else(|| path.with_extension(format!("{:08x}.image", check::of_image(before))));
-                crate::output::write_whole(&to, before)?;
+                write_whole(&to, before)?;
                 return Ok(json!(to.display().to_string()));
             }
         };

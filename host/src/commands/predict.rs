@@ -9,7 +9,7 @@ use super::recordings::Recordings;
 use crate::console::Console;
 use crate::counted::counted;
 use crate::error::{Code, Error, Result};
-use crate::output::write_whole;
+use crate::output::{to_standard_output, write_whole};
 use crate::predict::{predict_with_bands, to_csv};
 use crate::recording::Reader;
 use crate::table_file::TableFile;
@@ -43,6 +43,7 @@ impl Arguments {
     /// # Errors
     /// What is wrong with the input, or an output that cannot be written.
     pub fn run(self, console: &Console) -> Result<()> {
+        to_standard_output(&[("-o", self.output.as_deref()), ("--json", self.json.as_deref())])?;
         if let Some(path) = &self.output
             && self.recordings.files.iter().any(|f| same_file(f, path))
         {

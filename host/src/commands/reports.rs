@@ -1,6 +1,6 @@
 //! Where a command writes its report: the same options wherever there is one.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -26,6 +26,12 @@ impl Reports {
     #[must_use]
     pub fn wanted(&self) -> bool {
         self.report.is_some() || self.figures.is_some()
+    }
+
+    /// Where the report goes, if it is wanted.
+    #[must_use]
+    pub fn file(&self) -> Option<&Path> {
+        self.report.as_deref()
     }
 
     /// Writes what is wanted; `page` is called only then.

@@ -8,8 +8,8 @@ use serde_json::{Value, json};
 
 use crate::console::Console;
 use crate::counted::counted;
-use crate::error::{Code, Error, Result};
-use crate::output::{json_of, write_whole};
+use crate::error::Result;
+use crate::output::{json_of, printed, to_standard_output, write_whole};
 use crate::table_export::{self, Format};
 use crate::table_file::TableFile;
 
@@ -92,13 +92,8 @@ impl Arguments {
                 }
             }
             Action::Export(export) => {
-                if export.json && export.output.as_os_str() == "-" {
-                    return Err(Error::new(
-                        Code::CallInvalid,
-                        "both the table and the JSON would go to standard output",
-                    )
-                    .help("`--format json -o -` gives the table as JSON"));
-                }
+                to_standard_output(&[("-o", Some(&export.output)), ("--json", printed(export.json))])
+                    .map_err(|e| e.help("`--format json -o -` gives the table as JSON"))?;
                 let table = TableFile::read(&export.table)?;
                 let format = match export.format {
                     Some(format) => format,
