@@ -134,7 +134,7 @@ pub(crate) fn considered(
                 None => "at any size".to_owned(),
             };
             let could_be =
-                format!("it could be hidden in these recordings {size}; {} to know", what_would_show(name));
+                format!("it could be hidden in these recordings {size}; to know, {}", what_would_show(name));
             let unseen = hidden.is_none_or(|h| h > 0.01 * blocked);
             let why_not = if confusable.iter().any(|c| c.as_str() == name) {
                 "cannot be told from what is named".to_owned()

@@ -17,7 +17,7 @@ pub fn page(a: &Recording, b: &Recording, found: &Comparison) -> Page {
             page.fact(label, "the same", "at every row", Tone::Plain);
             continue;
         }
-        let note = format!("rms; {} on average, {} at most", signed(c.mean), figures(c.largest, 3));
+        let note = format!("rms; {} on average, {} at most", signed(c.mean, c.rms), figures(c.largest, 3));
         page.fact(label, format!("{} {}", figures(c.rms, 3), c.unit), note, Tone::Plain);
     }
     page.push(numbers(found));
@@ -50,7 +50,11 @@ fn named(letter: &str, one: &Recording, other: &Recording) -> String {
     }
 }
 
-fn signed(value: f64) -> String {
+/// A mean with its sign; nothing where it is none beside the root mean square.
+fn signed(value: f64, rms: f64) -> String {
+    if value.abs() < 1e-3 * rms {
+        return "0".to_owned();
+    }
     let sign = if value > 0.0 { "+" } else { "" };
     format!("{sign}{}", figures(value, 3))
 }
@@ -90,7 +94,7 @@ fn numbers(found: &Comparison) -> Section {
         table.row([
             format!("{}, {}", title(c.name), c.unit),
             figures(c.rms, 3),
-            signed(c.mean),
+            signed(c.mean, c.rms),
             figures(c.largest, 3),
             fixed(c.largest_at, 2),
         ]);

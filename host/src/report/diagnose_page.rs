@@ -51,6 +51,23 @@ fn names(d: &Diagnosis) -> String {
     }
 }
 
+/// Which of the names stand for several effects that the recordings cannot tell apart.
+fn in_doubt(d: &Diagnosis) -> String {
+    let open: Vec<String> = d
+        .missing
+        .iter()
+        .filter(|m| !m.confusable_with.is_empty() && !m.given)
+        .map(|m| format!("`{}` (right with {} %)", m.effect, fixed(100.0 * m.probability, 0)))
+        .collect();
+    if open.is_empty() {
+        return String::new();
+    }
+    format!(
+        " Instead of {} it could be others, which these recordings cannot tell apart.",
+        open.join(" and ")
+    )
+}
+
 fn percent(part: f64, whole: f64) -> String {
     if whole > 0.0 { figures(100.0 * part / whole, 2) } else { "–".into() }
 }
@@ -73,7 +90,7 @@ fn head(page: &mut Page, d: &Diagnosis) {
             "The model leaves something out that none of the known effects describes well enough to be named.".to_owned(),
         ),
     };
-    page.verdict(tone, words);
+    page.verdict(tone, words + &in_doubt(d));
     if !d.judged {
         return;
     }

@@ -84,19 +84,15 @@ pub(super) fn section(d: &Diagnosis) -> Section {
     let t = &d.trace;
     if t.time.len() > 1 {
         let [time, before, after, effects] = with_pauses(&t.time, [&t.time, &t.before, &t.after, &t.effects]);
-        let mut panel = Panel::new(Axis::new("time", "s"), Axis::new("residual", "N")).hair(
-            "plain model",
-            Colour::Series(1),
-            &time,
-            &before,
-        );
-        if !d.missing.is_empty() {
-            panel = panel.hair("with what was found", Colour::Series(2), &time, &after).line(
-                "what the found effects add",
-                Colour::Ink,
-                &time,
-                &effects,
-            );
+        let mut panel = Panel::new(Axis::new("time", "s"), Axis::new("residual", "N"));
+        let found = !d.missing.is_empty();
+        if found {
+            // Beneath, for it may be larger than what it explains.
+            panel = panel.hair("what the found effects add", Colour::Muted, &time, &effects);
+        }
+        panel = panel.hair("plain model", Colour::Series(1), &time, &before);
+        if found {
+            panel = panel.hair("with what was found", Colour::Series(2), &time, &after);
         }
         if let Some(r) = d.r#where.iter().find(|r| r.coordinate == "time") {
             panel = panel.region("here it sits", r.from, r.to);
@@ -107,7 +103,8 @@ pub(super) fn section(d: &Diagnosis) -> Section {
             if d.missing.is_empty() {
                 "The plain model's misfit: where it is a band of even width around zero, it is noise."
             } else {
-                "The plain model's misfit; the dark line is what the found effects make of it, and what remains should be noise."
+                "The plain model's misfit, and what remains of it with what was found: that should be noise. The grey line is what the \
+                 found effects add to the force; where it is larger than the misfit, the tables had taken up the rest."
             },
             panel,
         ));

@@ -83,9 +83,13 @@ fn each(view: &View<'_>) -> Figure {
 const DRAWN: [(&str, usize); 5] = [("gaylord", 6), ("linear", 1), ("m2", 2), ("m4", 3), ("yeoh", 4)];
 
 fn against_midline(view: &View<'_>) -> Figure {
-    let panels = view.some(PANELS).into_iter().map(|group| {
+    let panels = view.some(PANELS).into_iter().filter_map(|group| {
         let of: Vec<usize> =
             (0..view.fit.midline.len()).filter(|i| view.fit.midline[*i].group as usize == group).collect();
+        // A pressure without loops, such as that of a vented tare, has no mid-line.
+        if of.is_empty() {
+            return None;
+        }
         let x: Vec<f64> = of.iter().map(|i| 100.0 * view.fit.midline[*i].contraction).collect();
         let average: Vec<f64> = of.iter().map(|i| view.fit.midline[*i].force).collect();
         let mut panel = Panel::new(contraction_axis(), Axis::new("force F", "N"))
@@ -100,12 +104,8 @@ fn against_midline(view: &View<'_>) -> Figure {
         let strokes: Vec<f64> = of.iter().map(|i| view.fit.midline[*i].stroke).collect();
         let pressure = view.levels[group];
         let line = view.banded(pressure, &strokes, 0.0);
-        panel.band("95 % interval of the table", Colour::Series(0), &x, &line.low, &line.high).line(
-            "table",
-            Colour::Series(0),
-            &x,
-            &line.middle,
-        )
+        panel = panel.band("95 % interval of the table", Colour::Series(0), &x, &line.low, &line.high);
+        Some(panel.line("table", Colour::Series(0), &x, &line.middle))
     });
     Figure::multiples(
         "models",
