@@ -6,6 +6,8 @@ use crate::recording::{Campaign, Recording, white_noise};
 
 /// The longest stretch that is looked at, s: what lasts longer is how the bench was driven.
 const LONGEST: f64 = 10.0;
+/// About so many readings tell how high the pressure goes.
+const ROWS: usize = 100_000;
 /// A step is at least this share of the campaign's highest pressure.
 const LEAST_STEP: f64 = 0.1;
 /// And of the reading before: a valve's kick at the gauge is less, and is over before a muscle behind a hose feels it.
@@ -31,7 +33,9 @@ impl Scale {
     /// `None` where there is no pressure to speak of.
     pub(super) fn of(campaign: &Campaign) -> Option<Self> {
         let with_force = || campaign.recordings.iter().filter(|r| r.force.is_some());
-        let mut sizes: Vec<f64> = with_force().flat_map(|r| r.pressure.iter().map(|p| p.abs())).collect();
+        let stride = (campaign.samples() / ROWS).max(1);
+        let some = with_force().flat_map(|r| r.pressure.iter().step_by(stride));
+        let mut sizes: Vec<f64> = some.map(|p| p.abs()).collect();
         if sizes.is_empty() {
             return None;
         }
