@@ -261,7 +261,8 @@ fn weight_at(rows: &Rows, holds: &[(usize, usize)]) -> f64 {
 }
 
 /// Static friction lets go by jumps too small and too quick for the pressure's samples to tell when: between those that a law sees or
-/// the force itself shows, where friction rests is fitted; where no law is doubted, only after such a step.
+/// the force itself shows, where friction rests is fitted; where no law is doubted, only after such a step. A force that steps more often
+/// than that beats, and no friction lets go by it.
 fn number_rests(
     rows: &mut Rows,
     holds: &[(usize, usize)],
@@ -269,7 +270,10 @@ fn number_rests(
     steps: &[Vec<bool>],
     doubted: bool,
 ) {
+    let stepped = steps.iter().flatten().filter(|step| **step).count();
+    let lets_go = stepped <= MOST_RESTS as usize;
     let mut jump = LETS_GO;
+    // A direction lies within ±1: no change of it is a jump at last.
     loop {
         let mut number = 0;
         for (((from, to), way), steps) in holds.iter().zip(directions).zip(steps) {
@@ -277,7 +281,7 @@ fn number_rests(
             number += u32::from(doubted);
             let mut since = way[0];
             for i in *from..*to {
-                if (doubted && (way[i - from] - since).abs() > jump) || steps[i - from] {
+                if (doubted && (way[i - from] - since).abs() > jump) || (lets_go && steps[i - from]) {
                     since = way[i - from];
                     number += 1;
                     known = false;

@@ -131,6 +131,33 @@ fn strokes_that_do_not_repeat_are_not_consistent() {
 }
 
 #[test]
+fn a_force_that_beats_while_the_length_is_held_gets_an_answer() {
+    let mut step = Vec::new();
+    for p in [230.0, 350.0, 480.0] {
+        step.push(Step::Pressure { to_kpa: p, rate_kpa_s: Some(50.0), settle_s: 1.0 });
+        step.push(Step::File { name: format!("{p:.0}kPa") });
+        let [up, down] = [0.9, 0.1].map(|free| Place { free: Some(free), ..Place::default() });
+        for _ in 0..3 {
+            step.push(Step::Move { to: up, speed_mm_s: 0.2 });
+            step.push(Step::Hold { seconds: 40.0 });
+            step.push(Step::Move { to: down, speed_mm_s: 0.2 });
+            step.push(Step::Hold { seconds: 40.0 });
+        }
+        step.push(Step::EndFile);
+    }
+    let held = play(&Protocol { name: "held".into(), sample_hz: 10.0, step }, &muscle()).expect("playable");
+    let mut beating = recorded(held, 23, coloured(0.02, 0.2), |_, _, _| 0.0);
+    for r in &mut beating.recordings {
+        let Recording { time, force: Some(force), .. } = r else { continue };
+        for (f, t) in force.iter_mut().zip(time.iter()) {
+            *f += if t.rem_euclid(4.0) < 2.0 { 5.0 } else { -5.0 };
+        }
+    }
+    let d = ask(&beating);
+    assert_eq!((d.verdict, names(&d)), (Verdict::Unexplained, vec![]), "{:?}", d.unexplained);
+}
+
+#[test]
 fn the_end_of_the_sensors_range_is_no_physics() {
     let mut campaign = recorded(loops(&[0.2]), 5, coloured(0.3, 2.0), |_, _, _| 0.0);
     let forces = || campaign.recordings.iter().flat_map(|r| r.force.clone().unwrap_or_default());
