@@ -270,8 +270,9 @@ fn number_rests(
     steps: &[Vec<bool>],
     doubted: bool,
 ) {
+    let most = MOST_RESTS as usize + holds.len();
     let stepped = steps.iter().flatten().filter(|step| **step).count();
-    let lets_go = stepped <= MOST_RESTS as usize;
+    let lets_go = stepped + if doubted { holds.len() } else { 0 } <= most;
     let mut jump = LETS_GO;
     // A direction lies within ±1: no change of it is a jump at last.
     loop {
@@ -289,7 +290,7 @@ fn number_rests(
                 rows.rest[i] = if known || rows.on_ramp[i] { 0 } else { number };
             }
         }
-        if number <= MOST_RESTS + holds.len() as u32 {
+        if number as usize <= most {
             return;
         }
         jump *= 2.0;
