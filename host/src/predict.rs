@@ -38,7 +38,8 @@ pub struct Prediction {
 pub struct Predicted {
     /// The force that the load cell would read, N, per row.
     pub force: Vec<f64>,
-    /// Root mean square of `F − F_model` where the gauge did not fall out, N; `None` without a force column.
+    /// Root mean square of `F − F_model` where it was read rightly, N; `None` without a force column, and where the
+    /// whole recording is in another unit than the rest ([`crate::recording::other_unit`]).
     pub rms: Option<f64>,
     /// How uncertain it is, where that was asked for and the table knows.
     pub bands: Option<Bands>,
@@ -56,7 +57,7 @@ pub struct Bands {
     pub inside: Option<f64>,
 }
 
-/// Runs a table over a campaign. Where the gauge alone fell out ([`crate::recording::dropouts`]) the pressure is bridged.
+/// Runs a table over a campaign. What was read wrongly ([`crate::recording::dropouts`]) is bridged.
 ///
 /// # Errors
 /// [`Code::TableInvalid`] where the table cannot be evaluated, or names a correction that this program does not know;
@@ -149,7 +150,8 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ForceBand>) -> Resul
             forces
         };
         let read = screened.read(index);
-        let rms = recording.force.as_ref().map(|measured| {
+        let measured = recording.force.as_ref().filter(|_| read.contains(&true));
+        let rms = measured.map(|measured| {
             let scored = measured.iter().zip(&force).zip(&read).filter(|(_, read)| **read);
             let sum: f64 = scored.map(|((f, m), _)| (f - m).powi(2)).sum();
             let count = read.iter().filter(|read| **read).count() as f64;

@@ -21,6 +21,7 @@ mod line;
 mod matlab;
 mod mcap;
 mod noise;
+pub mod other_unit;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod plan;

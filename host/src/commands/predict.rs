@@ -92,9 +92,10 @@ impl Arguments {
             write_whole(path, format!("{text}\n").as_bytes())?;
         }
         for (recording, p) in campaign.recordings.iter().zip(&prediction.recordings) {
-            let rms = p.rms.map_or("no force to compare with".to_owned(), |r| format!("rms {r:.3} N"));
+            let unscored = if recording.force.is_some() { "not scored" } else { "no force to compare with" };
+            let rms = p.rms.map_or(unscored.to_owned(), |r| format!("rms {r:.3} N"));
             let band = p.bands.as_ref().map_or(String::new(), |bands| {
-                let inside = bands.inside.map_or(String::new(), |share| {
+                let inside = bands.inside.filter(|_| p.rms.is_some()).map_or(String::new(), |share| {
                     format!(", {:.1} % of the readings inside their 95 % band", 100.0 * share)
                 });
                 format!(", force ± {:.3} N{inside}", bands.mean)

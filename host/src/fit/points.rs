@@ -116,11 +116,12 @@ const PRESSURE_STEP: f64 = 1.0 / 100.0;
 const NOISE_STEP: f64 = 6.0;
 
 /// Cuts a campaign into points; a dropout of the gauge shares none with what is beside it. `motions` are those of its recordings;
-/// recordings without a force are passed over.
+/// recordings without a force, and those in another unit than the rest, are passed over.
 #[must_use]
 pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
     let campaign = screened.campaign.as_ref();
-    let with_force = || campaign.recordings.iter().filter(|r| r.force.is_some());
+    let taken = |index: usize| campaign.recordings[index].force.is_some() && !screened.stands_apart(index);
+    let with_force = || (0..campaign.recordings.len()).filter(|i| taken(*i)).map(|i| &campaign.recordings[i]);
     let rows: usize = with_force().map(Recording::len).sum();
     let pressure = Range::of(with_force().flat_map(|r| r.pressure.iter().copied()));
     let stroke = Range::of(with_force().flat_map(|r| r.stroke.iter().copied()));
@@ -135,7 +136,8 @@ pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
     let mut list: Vec<Point> = Vec::with_capacity(rows.min(2 * AIM));
     let mut block = 0_u32;
     for (index, recording) in campaign.recordings.iter().enumerate() {
-        let (Some(f), Some(motion)) = (&recording.force, motions.get(index)) else { continue };
+        let force = recording.force.as_ref().filter(|_| taken(index));
+        let (Some(f), Some(motion)) = (force, motions.get(index)) else { continue };
         let directions = &motion.direction;
         let (p, x, t) = (&recording.pressure, &recording.stroke, &recording.time);
         let n = recording.len().min(directions.len());

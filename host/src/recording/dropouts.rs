@@ -12,10 +12,11 @@ mod steps;
 use std::borrow::Cow;
 use std::ops::Range;
 
+use super::other_unit::{Apart, standing_apart};
 use super::{Campaign, Recording};
 use crate::counted::counted;
 use pull::Pull;
-use steps::{Scale, Stretch, edges, masked};
+use steps::{Scale, Stretch, edges, masked, stretches};
 
 /// A stretch of readings of the pressure that are not the muscle's.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,20 +25,22 @@ pub struct Dropout {
     pub recording: usize,
     /// Its rows there, from 0.
     pub rows: Range<usize>,
-    /// The last reading before, Pa.
-    pub before: f64,
+    /// The last reading before, or the first one behind where it begins the recording, Pa.
+    pub beside: f64,
     /// The first reading of the stretch, Pa.
     pub read: f64,
     /// By what every reading of the stretch is too small, where it is one factor: that of before and of after agree.
     pub factor: Option<f64>,
 }
 
-/// A campaign with the pressure bridged where the gauge fell out, and where that is.
+/// A campaign with what was read wrongly made good as well as can be: good enough to follow the motion; no evidence.
 #[derive(Debug, Clone)]
 pub struct Screened<'a> {
-    /// As it was read, but for the pressure of the dropouts: the reading times their factor, or the line from the reading before to
-    /// the reading after. Good enough to follow the motion; no evidence.
+    /// As it was read, but for the mistake in recordings that stand apart, and for the pressure of the dropouts: the reading times
+    /// their factor, or the line from the reading before to the reading after.
     pub campaign: Cow<'a, Campaign>,
+    /// Whole recordings in another unit than the rest, in order.
+    pub apart: Vec<Apart>,
     /// In order.
     pub dropouts: Vec<Dropout>,
 }
@@ -51,8 +54,12 @@ impl<'a> Screened<'a> {
     /// Looks a campaign over. Recordings without a force are passed over: nothing tells a dropout from a real step there.
     #[must_use]
     pub fn of(campaign: &'a Campaign) -> Self {
-        let dropouts = find(campaign);
+        let apart = standing_apart(campaign);
         let mut campaign = Cow::Borrowed(campaign);
+        for a in &apart {
+            a.mistake.mend(&mut campaign.to_mut().recordings[a.recording]);
+        }
+        let dropouts = find(&campaign);
         if !dropouts.is_empty() {
             let bridged = campaign.to_mut();
             for d in &dropouts {
@@ -62,33 +69,57 @@ impl<'a> Screened<'a> {
                 recording.pressure[d.rows.clone()].copy_from_slice(&bridge);
             }
         }
-        Self { campaign, dropouts }
+        Self { campaign, apart, dropouts }
     }
 
-    /// The stretches of one recording, in order.
+    /// Whether a whole recording is in another unit than the rest.
+    #[must_use]
+    pub fn stands_apart(&self, index: usize) -> bool {
+        self.apart.iter().any(|a| a.recording == index)
+    }
+
+    /// The stretches of one recording in which the gauge fell out, in order.
     pub fn of_recording(&self, index: usize) -> impl Iterator<Item = Range<usize>> + '_ {
         self.dropouts.iter().filter(move |d| d.recording == index).map(|d| d.rows.clone())
     }
 
-    /// Row by row of a recording, whether its pressure was read.
+    /// Row by row of a recording, whether it was read rightly.
     #[must_use]
     pub fn read(&self, index: usize) -> Vec<bool> {
-        let mut read = vec![true; self.campaign.recordings.get(index).map_or(0, Recording::len)];
+        let right = !self.stands_apart(index);
+        let mut read = vec![right; self.campaign.recordings.get(index).map_or(0, Recording::len)];
         for rows in self.of_recording(index) {
             read[rows].fill(false);
         }
         read
     }
 
-    /// Rows that fell out.
+    /// Rows in which the gauge fell out.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.dropouts.iter().map(|d| d.rows.len()).sum()
     }
 
-    /// What there is to say: where, from what to what, the likely cause, and what to do; `None` where nothing fell out.
+    /// What there is to say: where, from what to what, the likely cause, and what to do; `None` where all was read rightly.
     #[must_use]
     pub fn remark(&self) -> Option<String> {
+        let apart = self.apart.iter().take(TOLD).map(|a| self.told_apart(a));
+        let more = self.apart.len().checked_sub(TOLD + 1).map(|n| format!("so do {} more", n + 1));
+        let parts: Vec<String> = apart.chain(more).chain(self.remark_on_dropouts()).collect();
+        (!parts.is_empty()).then(|| parts.join(". "))
+    }
+
+    fn told_apart(&self, a: &Apart) -> String {
+        let r = &self.campaign.recordings[a.recording];
+        format!(
+            "`{}` stands apart from the other recordings, and its {} left out: {}",
+            r.name,
+            if r.len() == 1 { "row is".to_owned() } else { format!("{} are", counted(r.len(), "row")) },
+            a.told()
+        )
+    }
+
+    fn remark_on_dropouts(&self) -> Option<String> {
         let first = self.dropouts.first()?;
         let mut places: Vec<String> = self.dropouts.iter().take(TOLD).map(|d| self.place(d)).collect();
         if self.dropouts.len() > TOLD {
@@ -98,7 +129,7 @@ impl<'a> Screened<'a> {
         let ratio = units[0].filter(|first| units.iter().all(|u| *u == Some(*first)));
         let cause = match ratio {
             Some(unit) => format!("the ratio is that of {unit}: mend the unit where the readings are logged"),
-            None if first.read.abs() <= NOTHING * first.before.abs() => {
+            None if first.read.abs() <= NOTHING * first.beside.abs() => {
                 "look at the gauge's plug and cable".to_owned()
             }
             None => "look at the gauge, its plug and its cable".to_owned(),
@@ -123,7 +154,7 @@ impl<'a> Screened<'a> {
         } else {
             format!("rows {} to {} ({:.2} to {:.2} s)", row(first), row(last), r.time[first], r.time[last])
         };
-        format!("{} {place} from {} to {} kPa{share}", r.name, kpa(d.before), kpa(d.read))
+        format!("{} {place} from {} to {} kPa{share}", r.name, kpa(d.beside), kpa(d.read))
     }
 }
 
@@ -159,18 +190,17 @@ fn find(campaign: &Campaign) -> Vec<Dropout> {
         let r = &campaign.recordings[recording];
         let Some(force) = r.force.as_deref() else { continue };
         let mut free = 0;
-        for &edge in edges {
+        for stretch in stretches(edges, &r.time, &r.pressure) {
             // The way back of one is not the way out of the next.
-            if edge < free {
+            if stretch.rows.start < free {
                 continue;
             }
-            let Some(stretch) = Stretch::from(edge, &r.time, &r.pressure) else { continue };
             if pull.goes_on(&stretch, r, force) {
                 free = stretch.rows.end + 1;
                 found.push(Dropout {
                     recording,
-                    before: r.pressure[edge - 1],
-                    read: r.pressure[edge],
+                    beside: stretch.beside(&r.pressure),
+                    read: r.pressure[stretch.rows.start],
                     factor: stretch.factor,
                     rows: stretch.rows,
                 });

@@ -127,14 +127,18 @@ impl Pull {
     pub(super) fn goes_on(&self, stretch: &Stretch, r: &Recording, force: &[f64]) -> bool {
         let Range { start, end } = stretch.rows;
         let bridge = stretch.bridged(&r.time, &r.pressure);
-        let step = (r.pressure[start] - r.pressure[start - 1]).abs();
+        let inside = if start > 0 { start } else { end - 1 };
+        let step = (r.pressure[inside] - stretch.beside(&r.pressure)).abs();
         // What the surface leaves is the same before and after, up to friction that turns between.
         let left = |i: usize| force[i] - self.force(r.pressure[i], r.stroke[i]);
         let near = |a: usize, i: usize| (r.pressure[i] - r.pressure[a]).abs() <= 0.1 * step;
         let before = (0..start).rev().take(BESIDE).take_while(|i| near(start - 1, *i)).map(left);
         let after = (end..r.len()).take(BESIDE).take_while(|i| near(end, *i)).map(left);
-        let (before, after) = (mean(before), mean(after));
-        let (low, high) = (before.min(after), before.max(after));
+        let (low, high) = match (mean(before), mean(after)) {
+            (Some(before), Some(after)) => (before.min(after), before.max(after)),
+            (Some(one), None) | (None, Some(one)) => (one, one),
+            (None, None) => return false,
+        };
         let least = (NOTICEABLE.0 * self.span).max(NOTICEABLE.1 * white_noise(force));
         let mut made = 0.0;
         let undisturbed = |i: usize, pressure: f64, made: f64| {
@@ -164,7 +168,8 @@ impl Pull {
     }
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
+/// `None` of nothing.
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (sum, n) = values.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
-    sum / f64::max(n, 1.0)
+    (n > 0.0).then(|| sum / n)
 }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::unit;
 use crate::recording::{Campaign, Recording, white_noise};
 
 /// The longest stretch that is looked at, s: what lasts longer is how the bench was driven.
@@ -20,6 +21,9 @@ const STEADY: f64 = 0.1;
 const BACK: f64 = 0.25;
 /// Two ratios are one up to this part.
 const SAME_FACTOR: f64 = 0.03;
+/// A stretch at an end of the recording, which steps only once, lasts at least this long, s: a muscle behind a hose follows later than
+/// its gauge, and a recording may end before it does.
+const SHORTEST_AT_END: f64 = 1.0;
 /// Where more of the rows than this lie between steps, steps are how the bench was driven.
 const RARE: f64 = 0.2;
 
@@ -60,14 +64,22 @@ pub(super) fn edges(campaign: &Campaign, scale: &Scale) -> Vec<Vec<usize>> {
 /// Per recording the stretches that may be dropouts; `None` where there are none, or so many that they are the bench's way.
 pub(super) fn masked(campaign: &Campaign, edges: &[Vec<usize>]) -> Option<Vec<Vec<Range<usize>>>> {
     let of = |(r, edges): (&Recording, &Vec<usize>)| -> Vec<Range<usize>> {
-        edges.iter().filter_map(|e| Stretch::from(*e, &r.time, &r.pressure)).map(|s| s.rows).collect()
+        stretches(edges, &r.time, &r.pressure).map(|s| s.rows).collect()
     };
     let masks: Vec<_> = campaign.recordings.iter().zip(edges).map(of).collect();
     let rows: usize = masks.iter().flatten().map(Range::len).sum();
     (rows > 0 && rows as f64 <= RARE * campaign.samples() as f64).then_some(masks)
 }
 
-/// Rows between two steps that undo each other.
+/// What may be dropouts of one recording, in order: before its first step, from a step to the one that undoes it, behind its last.
+pub(super) fn stretches(edges: &[usize], time: &[f64], pressure: &[f64]) -> impl Iterator<Item = Stretch> {
+    let first = edges.first().and_then(|e| Stretch::until(*e, time, pressure));
+    let between = edges.iter().filter_map(|e| Stretch::from(*e, time, pressure));
+    let last = edges.last().and_then(|e| Stretch::since(*e, time, pressure));
+    first.into_iter().chain(between).chain(last)
+}
+
+/// Rows between two steps that undo each other, or between a step and an end of the recording.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stretch {
     pub(super) rows: Range<usize>,
@@ -97,12 +109,46 @@ impl Stretch {
         (back || one).then_some(Self { rows: start..end, factor })
     }
 
+    /// The rows from the first one on to a step.
+    fn until(end: usize, time: &[f64], pressure: &[f64]) -> Option<Self> {
+        Self::at_end(0..end, pressure[end], pressure[end - 1], time, pressure)
+    }
+
+    /// The rows from a step to the last one.
+    fn since(start: usize, time: &[f64], pressure: &[f64]) -> Option<Self> {
+        Self::at_end(start..pressure.len(), pressure[start - 1], pressure[start], time, pressure)
+    }
+
+    /// Rows at an end of the recording, if they keep still for a while; `beside` is the reading across their step from `read`, Pa.
+    fn at_end(rows: Range<usize>, beside: f64, read: f64, time: &[f64], pressure: &[f64]) -> Option<Self> {
+        let step = (read - beside).abs();
+        let seconds = time[rows.end - 1] - time[rows.start];
+        let moves = |w: &[f64]| (w[1] - w[0]).abs() > STEADY * step;
+        let possible = step >= LEAST_PART * beside.abs()
+            && (SHORTEST_AT_END..=LONGEST).contains(&seconds)
+            && !pressure[rows.clone()].windows(2).any(moves);
+        let ratio = beside / read;
+        let factor = (ratio > 0.0 && unit(ratio).is_some()).then_some(ratio);
+        possible.then_some(Self { rows, factor })
+    }
+
+    /// The reading before the stretch, or behind it where it begins the recording, Pa.
+    pub(super) fn beside(&self, pressure: &[f64]) -> f64 {
+        let before = self.rows.start.checked_sub(1);
+        before.or((self.rows.end < pressure.len()).then_some(self.rows.end)).map_or(0.0, |i| pressure[i])
+    }
+
     /// The pressure as it may have been in these rows, Pa.
     pub(super) fn bridged(&self, time: &[f64], pressure: &[f64]) -> Vec<f64> {
         let Range { start, end } = self.rows;
-        let (before, after) = (pressure[start - 1], pressure[end]);
-        let (from, span) = (time[start - 1], time[end] - time[start - 1]);
-        let line = |i: usize| before + (after - before) * (time[i] - from) / span;
+        let line = |i: usize| {
+            if start == 0 || end == pressure.len() {
+                return self.beside(pressure);
+            }
+            let (before, after) = (pressure[start - 1], pressure[end]);
+            let (from, span) = (time[start - 1], time[end] - time[start - 1]);
+            before + (after - before) * (time[i] - from) / span
+        };
         self.rows.clone().map(|i| self.factor.map_or_else(|| line(i), |f| pressure[i] * f)).collect()
     }
 }

@@ -175,3 +175,27 @@ fn ratios_of_units_are_told_apart() {
         assert_eq!(unit(factor), said, "{factor}");
     }
 }
+
+#[test]
+fn a_gauge_that_is_dead_at_the_beginning_or_the_end_is_found() {
+    let clean = recorded(120.0, 0.15, |_| 300e3, as_read);
+    for rows in [0..60, 2340..2400] {
+        let dead = spoiled(clean.clone(), rows.clone(), |_| 0.0);
+        assert_eq!(found(dead), vec![rows.clone()]);
+        let campaign = Campaign::new(vec![spoiled(clean.clone(), rows.clone(), |p| p / PSI)]);
+        let screened = Screened::of(&campaign);
+        let bridged = &screened.campaign.recordings[0].pressure[rows];
+        assert!(bridged.iter().all(|p| (p / 300e3 - 1.0).abs() < 0.01), "bridged by the unit's ratio");
+    }
+}
+
+#[test]
+fn a_muscle_that_is_filled_first_and_vented_last_is_none() {
+    let worked = |t: f64| if (5.0..115.0).contains(&t) { 300e3 } else { 0.0 };
+    for late in [0.05, 0.2, 0.5] {
+        assert_eq!(found(recorded(120.0, 0.15, worked, behind_a_hose(late))), [], "{late} s late");
+    }
+    // The recording ends before the muscle behind its hose is empty.
+    let cut = |t: f64| if t < 119.2 { 300e3 } else { 0.0 };
+    assert_eq!(found(recorded(120.0, 0.15, cut, behind_a_hose(1.0))), []);
+}
