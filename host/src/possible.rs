@@ -83,7 +83,7 @@ impl Contractions {
             )
             .help(format!(
                 "contraction is (L0 − L)/L0 and lies between {:.3} (braid pulled straight) and about 0.4: check the rest length, \
-                 the sign of the displacement and its zero",
+                 the sign of the displacement (positive = \"extension\" in an import description turns it round) and its zero",
                 -self.taut
             )));
         }

@@ -19,7 +19,7 @@ use crate::error::{Code, Error, Result};
 use crate::possible::Contractions;
 use crate::recording::dropouts::Screened;
 use crate::recording::segment::Motion;
-use crate::recording::{Campaign, Follower, Recording};
+use crate::recording::{Campaign, Follower, Recording, has_decimal_commas};
 use crate::table_file::TableFile;
 
 /// What a table says of a campaign.
@@ -213,7 +213,7 @@ pub fn beyond(table: &MuscleTable, places: &[(f64, f64)]) -> Vec<String> {
 /// `file`. Where the prediction has bands, a last column `force_model_band_N` is half the width of the force's 95 % interval.
 ///
 /// Where all files are plain text with one header their cells are kept as they are, other columns included. Recordings
-/// that came in by an import description, or from other containers, are written in the usual columns instead.
+/// that came in by an import description, with decimal commas, or from other containers, are written in the usual columns instead.
 #[must_use]
 pub fn to_csv(campaign: &Campaign, prediction: &Prediction, imported: bool) -> Vec<u8> {
     let verbatim = if imported { None } else { verbatim(campaign, prediction) };
@@ -244,7 +244,11 @@ fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
             Some(_) => {}
         }
         let rows: Vec<&str> = lines.collect();
-        if rows.len() != predicted.force.len() {
+        // Points among decimal commas are no table.
+        let commas = rows
+            .first()
+            .is_some_and(|r| delimiter != ',' && has_decimal_commas(r.as_bytes(), delimiter as u8));
+        if commas || rows.len() != predicted.force.len() {
             return None;
         }
         for (i, (row, force)) in rows.iter().zip(&predicted.force).enumerate() {

@@ -35,6 +35,7 @@ mod zero;
 pub use campaign::{Campaign, Clock};
 pub use columns::Recording;
 pub use follow::{Follower, UNKNOWN_PAUSE};
+pub(crate) use head::has_decimal_commas;
 pub use import::Import;
 pub use noise::white_noise;
 pub use quantity::{Named, Quantity, Unit, named};

@@ -9,8 +9,8 @@ use std::f64::consts::PI;
 use host::diagnose::{self, diagnose};
 use host::fit::{Options, fit, result::Fit};
 use host::muscle_description::MuscleDescription;
-use host::predict::predict;
-use host::recording::{Campaign, Recording};
+use host::predict::{predict, to_csv};
+use host::recording::{Campaign, Reader, Recording};
 use host::table_file::{About, TableFile};
 
 const REST: f64 = 39.16e-3;
@@ -213,4 +213,83 @@ fn a_gauge_that_falls_out_does_no_harm() {
     assert_eq!((with.verdict, with.missing.len()), (without.verdict, without.missing.len()));
     assert!((with.misfit_rms_N / without.misfit_rms_N - 1.0).abs() < 0.05, "{} N", with.misfit_rms_N);
     assert_eq!(remark(&with.remarks).as_ref(), Some(&said));
+}
+
+/// A whole recording in psi under a heading in kPa: told, left out, and the rest as good as ever, in the fit, in what a table foretells
+/// and in a diagnosis.
+#[test]
+fn a_recording_in_another_unit_does_no_harm() {
+    let mut noise = Noise::new(7, 0.0);
+    let clean = SIX.map(|p| strokes(p, 3000, 100.0, 0.0, 0, (0.05, &mut noise)));
+    let mut recordings = clean.clone();
+    recordings[3].pressure.iter_mut().for_each(|p| *p /= 6.894_757);
+    let (clean, campaign) = (Campaign::new(clean.to_vec()), Campaign::new(recordings.to_vec()));
+    let found = fit(&campaign, &description(), &Options::default()).unwrap();
+    assert_truth(&found, 300.0, 0.003);
+    assert_eq!((found.summary.pressures.len(), found.summary.samples), (SIX.len() - 1, 15_000));
+    let remark = |all: &[String]| all.iter().find(|w| w.contains("the ratio of psi to kPa")).cloned();
+    let said = remark(&found.summary.warnings).unwrap();
+
+    let file = TableFile { table: found.table, about: About::default() };
+    let (foretold, rms) = (predict(&file, &campaign).unwrap(), predict(&file, &clean).unwrap().rms.unwrap());
+    assert!(foretold.recordings[3].rms.is_none(), "not scored");
+    assert!((foretold.rms.unwrap() / rms - 1.0).abs() < 0.1, "{:?} N beside {rms} N", foretold.rms);
+    assert_eq!(remark(&foretold.warnings).as_ref(), Some(&said));
+
+    let answer = diagnose(&campaign, &description().geometry(), &diagnose::Options::default()).unwrap();
+    assert_eq!((answer.missing.len(), remark(&answer.remarks)), (0, Some(said)));
+}
+
+/// A campaign that is wrong throughout cannot stand apart from itself; its fit says what it looks like.
+#[test]
+fn absolute_pressure_and_a_force_of_the_other_sign_are_told() {
+    let told = |spoil: &dyn Fn(&mut Recording), word: &str| {
+        let mut noise = Noise::new(8, 0.0);
+        let mut recordings = SIX.map(|p| strokes(p, 3000, 100.0, 0.0, 0, (0.05, &mut noise))).to_vec();
+        recordings.iter_mut().for_each(spoil);
+        let found = fit(&Campaign::new(recordings), &description(), &Options::default()).unwrap();
+        found.summary.warnings.iter().any(|w| w.contains(word))
+    };
+    let absolute = "absolute pressure";
+    assert!(told(&|r| r.pressure.iter_mut().for_each(|p| *p += 101_325.0), absolute));
+    assert!(!told(&|_| (), absolute));
+    let sign = "positive as the muscle pulls";
+    assert!(told(&|r| r.force.iter_mut().flatten().for_each(|f| *f = -*f), sign));
+    assert!(!told(&|_| (), sign));
+}
+
+/// What no braid can do is told with the recording and the moment.
+#[test]
+fn a_stroke_of_the_other_sign_is_told_with_its_place() {
+    let mut noise = Noise::new(9, 0.0);
+    let mut recordings = SIX.map(|p| strokes(p, 3000, 100.0, 0.0, 0, (0.05, &mut noise))).to_vec();
+    for r in &mut recordings {
+        r.source = format!("{}.csv", r.name).into();
+    }
+    recordings[2].stroke.iter_mut().for_each(|x| *x = -*x);
+    let error = fit(&Campaign::new(recordings.clone()), &description(), &Options::default()).unwrap_err();
+    let place = format!("{}.csv", recordings[2].name);
+    assert!(error.to_string().contains(&place) && error.to_string().contains(" mm at "), "{error}");
+    assert!(error.advice().unwrap().contains("positive = \"extension\""), "{error:?}");
+}
+
+/// With decimal commas the output of a prediction is a table as well: no points among them.
+#[test]
+fn a_prediction_of_a_recording_with_decimal_commas_can_be_read_again() {
+    let mut noise = Noise::new(10, 0.0);
+    let recordings = SIX.map(|p| strokes(p, 3000, 100.0, 0.0, 0, (0.05, &mut noise)));
+    let table = fit(&Campaign::new(recordings.to_vec()), &description(), &Options::default()).unwrap().table;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("european.csv");
+    let rows = (0..40).map(|i| format!("0,{i:02};300,5;0,{i:02};40,25\n"));
+    let text = "time_s;pressure_kPa;displacement_mm;force_N\n".to_owned() + &rows.collect::<String>();
+    std::fs::write(&path, text).unwrap();
+    let campaign = Reader::new().campaign([&path]).unwrap();
+    let foretold = predict(&TableFile { table, about: About::default() }, &campaign).unwrap();
+    std::fs::write(&path, to_csv(&campaign, &foretold, false)).unwrap();
+    let again = Reader::new().file(&path).unwrap().remove(0);
+    assert_eq!((again.pressure[7], again.force.unwrap()[7]), (300.5e3, 40.25));
+    let written = std::fs::read_to_string(&path).unwrap();
+    let columns = written.lines().map(|l| l.split(',').count()).collect::<std::collections::HashSet<_>>();
+    assert_eq!(columns.into_iter().collect::<Vec<_>>(), [5], "{written}");
 }

@@ -38,8 +38,17 @@ fn every_bad_input_is_told_with_place_and_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let with_header =
         |header: &str| [header.as_bytes(), b"\n", &table(20, |_| None)[HEADER.len()..]].concat();
-    let utf16: Vec<u8> =
-        [0xff, 0xfe].into_iter().chain(table(20, |_| None).into_iter().flat_map(|b| [b, 0])).collect();
+    let utf16: Vec<u8> = table(20, |_| None).into_iter().flat_map(|b| [b, 0]).collect();
+    let clock_of_whole_seconds = String::from_utf8(table(40, |_| None)).unwrap();
+    let clock_of_whole_seconds = HEADER.to_owned()
+        + &clock_of_whole_seconds
+            .lines()
+            .skip(1)
+            .map(|l| {
+                let (time, rest) = l.split_once(',').unwrap();
+                format!("{},{rest}\n", time.split('.').next().unwrap())
+            })
+            .collect::<String>();
     let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
     gzip.write_all(&table(4000, |_| None)).unwrap();
     let gzip = gzip.finish().unwrap();
@@ -75,8 +84,13 @@ fn every_bad_input_is_told_with_place_and_remedy() {
         ("length", with_header("time_s,pressure_kPa,length_mm,force_N")),
         ("no-header", table(20, |_| None)[HEADER.len()..].to_vec()),
         ("bars", String::from_utf8(table(20, |_| None)).unwrap().replace(',', "|").into_bytes()),
-        ("utf16", utf16.clone()),
-        ("utf16-no-mark", utf16[2..].to_vec()),
+        ("utf16-no-mark", utf16),
+        ("date", line_12("2026-03-01 10:00:01,300,0.1,50")),
+        ("time-of-day", line_12("10:00:01.5,300,0.1,50")),
+        ("thousands", line_12("1.0,\"1,300.5\",0.1,50")),
+        ("row-twice", line_12("0.9,300,0.09,50")),
+        ("coarse-clock", clock_of_whole_seconds.into_bytes()),
+        ("header-below", [b"Bench 5\nOperator: Jo\n\n", &table(20, |_| None)[..]].concat()),
         ("binary", (0..20_000u32).flat_map(|i| (i.wrapping_mul(2_654_435_761)).to_le_bytes()).collect()),
         ("zip", b"PK\x03\x04rest of a spreadsheet".to_vec()),
         ("one-line", vec![b'7'; 9 << 20]),

@@ -9,15 +9,17 @@ use super::reports::Reports;
 use crate::compare::compare;
 use crate::console::Console;
 use crate::error::{Code, Error, Result};
+use crate::muscle_description::MuscleDescription;
 use crate::output::{printed, to_standard_output};
 use crate::progress::Progress;
-use crate::recording::Reader;
+use crate::recording::{Import, Reader};
 use crate::report::compare_page;
 
 /// Arguments of `host compare`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  host compare before.csv after.csv\n  host compare a.csv b.csv --report difference.html --json"
+    after_help = "Examples:\n  host compare before.csv after.csv\n  host compare a.csv b.csv --report difference.html --json\n  \
+    host compare --muscle mini.toml --import bench.toml a.txt b.txt"
 )]
 pub struct Arguments {
     /// The first recording.
@@ -26,6 +28,12 @@ pub struct Arguments {
     /// The second recording.
     #[arg(value_name = "B.csv")]
     b: PathBuf,
+    /// The muscle's description, where files give lengths or contractions in place of a stroke.
+    #[arg(long, value_name = "MUSCLE.toml")]
+    muscle: Option<PathBuf>,
+    /// How to read files that are not in the usual form: an import description.
+    #[arg(long, value_name = "IMPORT.toml")]
+    import: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -45,8 +53,10 @@ impl Arguments {
         let progress = Arc::new(Progress::new(&watched, "reading"));
         let sizes = [&self.a, &self.b].into_iter().filter_map(|f| std::fs::metadata(f).ok());
         progress.total(sizes.map(|m| m.len()).sum());
+        let muscle = self.muscle.as_ref().map(MuscleDescription::read).transpose()?;
+        let import = self.import.as_ref().map(Import::read).transpose()?;
         let one = |path: &PathBuf| {
-            let mut reader = Reader::new();
+            let mut reader = muscle.as_ref().map_or_else(Reader::new, Reader::of).import(import.as_ref());
             reader.progress = Some(Arc::clone(&progress));
             let mut all = reader.file(path)?;
             if all.len() == 1 {

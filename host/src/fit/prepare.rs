@@ -62,8 +62,18 @@ impl Prepared {
         let geometry = Geometry { tip_correction: options.tip_correction, ..muscle.geometry() };
         let braid = geometry.build().map_err(|e| Error::new(Code::MuscleInvalid, e.to_string()))?;
         let contractions = Contractions::of(&braid);
-        for stroke in [points.stroke.low, points.stroke.high] {
-            contractions.check(stroke / braid.rest_length())?;
+        let ends = [f64::total_cmp, |a: &f64, b: &f64| b.total_cmp(a)];
+        for point in
+            ends.iter().filter_map(|order| points.list.iter().min_by(|a, b| order(&a.stroke, &b.stroke)))
+        {
+            contractions.check(point.stroke / braid.rest_length()).map_err(|e| {
+                let recording = &campaign.recordings[point.recording as usize];
+                e.file(&recording.source).value(format!(
+                    "{:.2} mm at {:.2} s",
+                    point.stroke * 1e3,
+                    point.time
+                ))
+            })?;
         }
         let max_pressure = muscle.max_pressure_kPa.map_or(points.pressure.high, |kpa| kpa * 1e3);
         let clips = screen::clip(campaign);

@@ -8,11 +8,25 @@ use crate::counted::counted;
 /// A mean error beyond this, percent, is no misfit of a muscle: something else is wrong.
 const NO_MUSCLE: f64 = 10.0;
 
+/// A force that goes so many times further below zero than above has the wrong sign.
+const WRONG_SIGN: f64 = 3.0;
+/// One standard atmosphere, Pa: a gauge of absolute pressure never reads much less.
+const ATMOSPHERE: f64 = 101_325.0;
+
 /// Everything worth saying. `mean_error` is that of all mid-lines by eq. 24, `left_out` the error of each pressure predicted from the
 /// others; both in percent.
 #[must_use]
 pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) -> Vec<String> {
     let mut out = prepared.warnings.clone();
+    let force = &prepared.points.force;
+    if -force.low > WRONG_SIGN * force.high {
+        out.push(format!(
+            "the force goes down to {:.1} N and up to {:.1} N only: it is positive as the muscle pulls; turn its sign round, with \
+             scale = -1 in an import description",
+            force.low,
+            force.high.max(0.0)
+        ));
+    }
     if mean_error > NO_MUSCLE {
         out.push(format!(
             "the table does not describe these recordings: it is off by {mean_error:.0} % of the blocked force on average; check the \
@@ -21,20 +35,20 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
     }
     let design = &prepared.design;
     let points = &prepared.points;
-    let rows = |wanted: Use| -> f64 {
+    let rows = |wanted: Use| -> usize {
         points
             .list
             .iter()
             .zip(&prepared.used)
             .filter(|(_, u)| **u == wanted)
-            .map(|(p, _)| f64::from(p.rows))
+            .map(|(p, _)| p.rows as usize)
             .sum()
     };
     let fitted = rows(Use::Fitted);
     let unknowns = design.layout().len();
-    if points.rows < 200 || fitted < 5.0 * unknowns as f64 {
+    if points.rows < 200 || fitted < 5 * unknowns {
         out.push(format!(
-            "{fitted:.0} rows are fitted for {unknowns} unknowns: the penalty on bending decides much of the table; record more"
+            "{fitted} rows are fitted for {unknowns} unknowns: the penalty on bending decides much of the table; record more"
         ));
     }
     match prepared.pressures.levels.len() {
@@ -125,6 +139,13 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
              sign of the force",
             p0 / 1e3
         ));
+    } else if p0 > ATMOSPHERE && points.pressure.low > 0.9 * ATMOSPHERE {
+        out.push(format!(
+            "the deadband comes out at {:.0} kPa and no pressure below {:.0} kPa was read: if the gauge reads absolute pressure, take \
+             one atmosphere off (101.3 kPa), with an offset in an import description",
+            p0 / 1e3,
+            points.pressure.low / 1e3
+        ));
     }
     let side = |name: &str, clip: &super::screen::Clip| {
         format!(
@@ -135,11 +156,12 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
     };
     out.extend(prepared.clips.0.iter().map(|c| side("lower", c)));
     out.extend(prepared.clips.1.iter().map(|c| side("upper", c)));
-    if prepared.goes_slack {
+    let slack = rows(Use::Slack);
+    if slack > 0 {
         out.push(format!(
-            "the muscle is slack in {:.0} rows: the force stays near zero where the model would push; they are not fitted, and \
-             the table stops at zero force",
-            rows(Use::Slack)
+            "the muscle is slack in {}: the force stays near zero where the model would push; this is not fitted, and the \
+             table stops at zero force",
+            counted(slack, "row")
         ));
     }
     if !prepared.outliers.is_empty() {
@@ -163,7 +185,7 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
             undetermined.join(", ")
         ));
     }
-    let aside = rows(Use::NearTurn);
+    let aside = rows(Use::NearTurn) as f64;
     if aside > 0.3 * points.rows as f64 {
         out.push(format!(
             "{:.0} % of the rows lie just after a turn of motion and are not fitted: strokes are short against the way that \

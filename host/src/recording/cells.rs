@@ -163,8 +163,9 @@ pub(super) fn parse(
         let end = memchr::memchr(b'\n', rest).unwrap_or(rest.len());
         let line = trim_end(&rest[..end]);
         rest = rest.get(end + 1..).unwrap_or_default();
-        let skip =
-            line.first().is_none_or(|b| Some(*b) == dialect.comment) || line.iter().all(|b| is_blank(*b));
+        // A blank row of a spreadsheet is a line of delimiters.
+        let skip = line.first().is_none_or(|b| Some(*b) == dialect.comment)
+            || line.iter().all(|b| is_blank(*b) || *b == dialect.delimiter);
         if !skip {
             row(line, dialect, wanted, width, &mut out).map_err(|(cell, value, fault)| {
                 Box::new(LineError { line: out.lines, cell, value, fault })

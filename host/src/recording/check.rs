@@ -10,17 +10,32 @@ fn millimetres(metres: f64) -> f64 {
     if micrometres.is_finite() { micrometres / 1e3 } else { metres * 1e3 }
 }
 
+/// Where more than one row in so many repeats the time of the one before, it is the clock's way.
+const COARSE: usize = 20;
+
 /// The checks that a single cell does not show.
 pub(super) fn check(recording: &Recording, line_of_row: &dyn Fn(usize) -> u64) -> Result<()> {
     let line = |i: usize| line_of_row(recording.rows.as_ref().map_or(i, |r| r[i] as usize));
     if let Some(i) = recording.time.windows(2).position(|w| w[1] <= w[0]) {
         let (before, after) = (recording.time[i], recording.time[i + 1]);
         let cause = if after == before { "time stands still" } else { "time goes backwards" };
+        let repeated = recording.time.windows(2).filter(|w| w[1] == w[0]).count();
+        let twice = after == before
+            && recording.pressure[i] == recording.pressure[i + 1]
+            && recording.stroke[i] == recording.stroke[i + 1]
+            && recording.force.as_ref().is_none_or(|f| f[i] == f[i + 1]);
+        let help = if repeated * COARSE > recording.len() {
+            "the clock is coarser than the rows are apart: log more digits, or give sample_interval_s in an import description"
+        } else if twice {
+            "the row is there twice: leave one of them out"
+        } else {
+            "time must strictly increase within a file; if several runs are in one file, split it (split_by)"
+        };
         return Err(Error::new(Code::RecordingTimeOrder, cause)
             .line(line(i + 1))
             .column("time")
             .value(format!("{after} s after {before} s"))
-            .help("time must strictly increase within a file; if several runs are in one file, split it (split_by)"));
+            .help(help));
     }
     for (i, p) in recording.pressure.iter().enumerate() {
         possible::pressure(*p).map_err(|e| e.line(line(i)))?;

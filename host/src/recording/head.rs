@@ -33,7 +33,7 @@ impl Head {
                 return Err(Error::new(Code::RecordingTooShort, cause)
                     .help("see skip_lines in the import description"));
             }
-            let end = memchr::memchr(b'\n', rest).map_or(rest.len(), |e| e + 1);
+            let end = line_end(rest);
             let line = rest[..end].trim_ascii_end();
             let remarked = line.first().is_some_and(|b| Some(*b) == comment);
             // Spreadsheets tell each other the delimiter in a first line of its own.
@@ -52,13 +52,12 @@ impl Head {
             }
             let line = if line.contains(&b'\r') { Err(mac_lines()) } else { Ok(line) }?;
             let delimiter = import.delimiter()?.or(told).unwrap_or_else(|| guess_delimiter(line, import));
-            let next = rest[end..].split(|b| *b == b'\n').find(|l| !l.trim_ascii().is_empty());
-            let dialect = Dialect {
-                delimiter,
-                comment,
-                decimal_comma: import.decimal == Decimal::Comma
-                    || delimiter != b',' && has_decimal_commas(next.unwrap_or_default(), delimiter),
+            let with_row = |rows: &[u8]| {
+                let row = rows.split(|b| *b == b'\n').find(|l| !l.trim_ascii().is_empty());
+                let commas = delimiter != b',' && has_decimal_commas(row.unwrap_or_default(), delimiter);
+                Dialect { delimiter, comment, decimal_comma: import.decimal == Decimal::Comma || commas }
             };
+            let dialect = with_row(&rest[end..]);
             let split = |line: &[u8]| {
                 Cells::split(line, dialect).map_err(|()| {
                     Error::new(Code::RecordingWrongWidth, "a quotation mark is not closed").line(lines + 1)
@@ -84,7 +83,14 @@ impl Head {
                          or describe the columns by number in an import description (--import)",
                     ));
             }
-            return Ok(Self { dialect, names: cells, preamble: bytes, bytes: bytes + end, lines: lines + 1 });
+            let (bytes_here, below) = (bytes + end, &text[bytes + end..]);
+            let units = &below[..line_end(below)];
+            if let Some(names) = with_units(&cells, &split(units.trim_ascii_end())?) {
+                let (bytes, lines) = (bytes_here + units.len(), lines + 2);
+                let dialect = with_row(&below[units.len()..]);
+                return Ok(Self { dialect, names, preamble: bytes_here - end, bytes, lines });
+            }
+            return Ok(Self { dialect, names: cells, preamble: bytes, bytes: bytes_here, lines: lines + 1 });
         }
     }
 
@@ -92,6 +98,29 @@ impl Head {
     pub fn average_line(&self, rest: &[u8]) -> Option<u64> {
         (rest.len() < 65_536).then_some(rest.len() as u64)
     }
+}
+
+/// Bytes of the first line with its end.
+fn line_end(text: &[u8]) -> usize {
+    memchr::memchr(b'\n', text).map_or(text.len(), |e| e + 1)
+}
+
+/// The names with the units that test machines write into a row of their own below the header, in brackets or without; `None` where
+/// the row below is none of units.
+fn with_units(names: &[String], below: &[String]) -> Option<Vec<String>> {
+    let bare = |unit: &str| unit.trim_matches(['(', ')', '[', ']', ' ']).to_owned();
+    let joined: Vec<String> = names
+        .iter()
+        .zip(below)
+        .map(|(name, unit)| {
+            let with = format!("{name} [{}]", bare(unit));
+            let gained = !matches!(named(name), Named::Known(..)) && matches!(named(&with), Named::Known(..));
+            if gained { with } else { name.clone() }
+        })
+        .collect();
+    let gained = joined.iter().zip(names).filter(|(j, n)| j != n).count();
+    let numbers = below.iter().any(|cell| cell.parse::<f64>().is_ok());
+    (names.len() == below.len() && gained >= 2 && !numbers).then_some(joined)
 }
 
 fn mac_lines() -> Error {
@@ -111,7 +140,7 @@ fn guess_delimiter(line: &[u8], import: &Import) -> u8 {
 }
 
 /// Whether a row's cells are numbers with decimal commas. `207,000` may be either; `0,207`, `1207,5` and `20,7` may not.
-fn has_decimal_commas(row: &[u8], delimiter: u8) -> bool {
+pub(crate) fn has_decimal_commas(row: &[u8], delimiter: u8) -> bool {
     let decimal = |cell: &[u8]| {
         let cell: Vec<u8> = cell.iter().copied().filter(|b| !b" \"+-".contains(b)).collect();
         let mut parts = cell.split(|b| *b == b',');
@@ -155,6 +184,13 @@ mod tests {
             format!("# bench 2\n{}\n{}", names(","), rows(",", false, "\n")),
             format!("# {}\n{}", names(" "), rows(" ", false, "\n")),
             format!("Time [s],Pressure (kPa),Displacement [mm], Force_N\n{}", rows(",", false, "\n")),
+            format!(
+                "Time\tPressure\tDisplacement\tForce\r\n(s)\t(kPa)\t(mm)\t(N)\r\n{}",
+                rows("\t", false, "\r\n")
+            ),
+            format!("time;pressure;displacement;force\ns;kPa;mm;N\n{}", rows(";", true, "\n")),
+            format!("{}\n{},,,\n , ,,\n", names(","), rows(",", false, "\n")),
+            format!("{},Temperature [\u{b0}C]\n{}", names(","), rows(",", false, ",21.5\n")),
         ];
         let folder = tempfile::tempdir().expect("a folder");
         let read = |n: usize, text: &str| {
@@ -162,6 +198,15 @@ mod tests {
             std::fs::write(&path, text).expect("a file");
             Reader::new().file(&path).unwrap_or_else(|e| panic!("{text}: {e}")).remove(0)
         };
+        let spreadsheet = format!("\u{feff}{}\r\n{}", names("\t"), rows("\t", true, "\r\n"));
+        let utf16 =
+            |bytes: fn(u16) -> [u8; 2]| spreadsheet.encode_utf16().flat_map(bytes).collect::<Vec<u8>>();
+        for (n, bytes) in [utf16(u16::to_le_bytes), utf16(u16::to_be_bytes)].iter().enumerate() {
+            let path = folder.path().join(format!("unicode{n}.txt"));
+            std::fs::write(&path, bytes).expect("a file");
+            let recording = Reader::new().file(&path).unwrap_or_else(|e| panic!("{e}")).remove(0);
+            assert!((recording.stroke[19] - 2.875e-3).abs() < 1e-12 && recording.len() == 20);
+        }
         for (n, form) in forms.iter().enumerate() {
             let recording = read(n, form);
             assert_eq!(recording.len(), 20, "{form}");

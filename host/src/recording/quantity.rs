@@ -141,7 +141,8 @@ pub enum Named {
 }
 
 /// A header's name in its usual form, quantity and unit parted by the last underscore: `Force [N]`, `Force (N)` and `Force_N` are
-/// `force_N`. The letters of a unit stay as they are, since `mPa` is not `MPa`.
+/// `force_N`. The letters of a unit stay as they are, since `mPa` is not `MPa`; `°C` (whatever a program without UTF-8 made of its first
+/// sign) and `degC` are `C`.
 pub(super) fn usual_name(header: &str) -> String {
     let header = header.trim();
     let bracketed = [('[', ']'), ('(', ')')].into_iter().find_map(|(open, close)| {
@@ -154,6 +155,8 @@ pub(super) fn usual_name(header: &str) -> String {
         None if header.eq_ignore_ascii_case(Quantity::PressureCommand.name()) => (header, ""),
         None => header.rsplit_once('_').unwrap_or((header, "")),
     };
+    let degrees = unit.trim_start_matches(['°', 'º', '\u{fffd}']);
+    let unit = degrees.strip_prefix("deg").map_or(degrees, str::trim_start);
     let base = base.to_lowercase().replace(' ', "_");
     if unit.is_empty() || unit == "-" { base } else { format!("{base}_{unit}") }
 }
@@ -164,6 +167,7 @@ pub(super) fn usual_name(header: &str) -> String {
 /// use host::recording::{Named, Quantity, named};
 /// assert!(matches!(named("pressure_command_kPa"), Named::Known(Quantity::PressureCommand, u) if u.scale == 1e3));
 /// assert_eq!(named("Force [lbf]"), named("force_lbf"));
+/// assert_eq!(named("Temperature [°C]"), named("temperature_C"));
 /// assert_eq!(named("pressure_mmHg"), Named::UnknownUnit(Quantity::Pressure));
 /// assert_eq!(named("pressure_sd_kPa"), Named::Other);
 /// ```

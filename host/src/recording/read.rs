@@ -14,6 +14,7 @@ use super::head::Head;
 use super::import::{Decimal, Import, Value, pattern as pattern_of};
 use super::line::Cells;
 use super::plan::{Context, Plan, plan};
+use super::quantity::{Named, named};
 use super::sheet::select;
 use super::source;
 use crate::counted::counted;
@@ -39,6 +40,8 @@ pub struct Reader<'a> {
     pub progress: Option<Arc<Progress>>,
 }
 
+/// Lines below what was taken for the header among which the header itself is looked for.
+const LOOKED_BELOW: usize = 100;
 /// Fewer rows than this are no recording of a muscle, but a mistake.
 const MIN_ROWS: usize = 10;
 
@@ -140,7 +143,16 @@ impl<'a> Reader<'a> {
         let average = head.average_line(rest);
         blocks.put_back(rest);
         let preamble = String::from_utf8_lossy(&text[..head.preamble]);
-        let layout = self.layout(path, &head.names, &description, &preamble)?;
+        let layout = self.layout(path, &head.names, &description, &preamble).map_err(|e| {
+            let below = if self.import.is_none() { header_below(text, &head) } else { None };
+            match below {
+                Some(line) if e.code() == Code::RecordingMissingColumn => e.help(format!(
+                    "line {line} looks like the header: give skip_lines = {} in an import description (--import)",
+                    line - 1
+                )),
+                _ => e,
+            }
+        })?;
         let rows =
             read_rows(blocks, head.dialect, &layout.plan.wanted, head.names.len(), source.size.or(average))
                 .map_err(|e| rows_error(e, &head, &description))?;
@@ -214,6 +226,17 @@ impl<'a> Reader<'a> {
     }
 }
 
+/// The first of the next lines, counted from 1, that names columns as a header does: above it a program may have told other things.
+fn header_below(text: &[u8], head: &Head) -> Option<u64> {
+    let names = |line: &[u8]| {
+        let line = String::from_utf8_lossy(line);
+        let known = |n: &str| matches!(named(n.trim().trim_matches('"')), Named::Known(..));
+        line.split([',', ';', '\t']).filter(|n| known(n)).count()
+    };
+    let below = text[head.bytes..].split(|b| *b == b'\n').take(LOOKED_BELOW);
+    below.zip(head.lines + 1..).find_map(|(line, number)| (names(line) >= 2).then_some(number))
+}
+
 /// What is read of one file.
 struct Layout {
     plan: Plan,
@@ -259,7 +282,13 @@ fn rows_error(error: RowsError, head: &Head, import: &Import) -> Error {
         Fault::NotANumber => {
             let comma =
                 value.contains(',') && value.chars().all(|c| c.is_ascii_digit() || ",.-+ ".contains(c));
-            let help = if comma && !head.dialect.decimal_comma {
+            let of_a_clock = value.contains(':') || value.matches(['-', '/']).count() == 2;
+            let help = if of_a_clock && value.starts_with(|c: char| c.is_ascii_digit()) {
+                "dates and times of day are not read: write seconds or milliseconds from some beginning (in a spreadsheet \
+                 =(A2-A$2)*86400), or give sample_interval_s in an import description"
+            } else if value.contains(',') && value.contains('.') {
+                "write numbers without signs between thousands"
+            } else if comma && !head.dialect.decimal_comma {
                 "decimals are written with a point; for decimal commas use an import description with decimal = \"comma\""
             } else if head.dialect.decimal_comma && value.contains('.') && import.decimal == Decimal::Comma {
                 "the import description says that decimals are written with a comma"
