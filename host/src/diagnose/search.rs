@@ -33,6 +33,8 @@ const FEWEST_INDEPENDENT: f64 = 8.0;
 const MOST_BARRED: usize = 4;
 /// What takes more than this share of its evidence from the first strokes of recordings lives there.
 const FIRST_STROKES: f64 = 0.7;
+/// A rival of this weight explains what the winner explains.
+const ALIKE: f64 = 0.5;
 /// With more rivals than this a name says nothing.
 const MOST_RIVALS: usize = 10;
 /// A trace as high as this share of the blocked force counts although few rows have it.
@@ -139,13 +141,13 @@ impl<'a> Search<'a> {
             self.first_look = Some((best.clone(), p.clone()));
         }
         let Some(at) = self.winner(&best, &ground) else { return ControlFlow::Break(()) };
-        let winner = best[at].clone();
         if self.chosen.is_empty() {
-            self.above = self.above_noise(winner.before);
+            self.above = self.above_noise(best[at].before);
         }
-        if !self.is_enough(&winner, p[at]) {
+        if !self.is_enough(&best[at], p[at]) {
             return ControlFlow::Break(());
         }
+        let winner = self.within_the_known(&best[at], &best, &ground);
         if let Some(memory) = self.found_itself_beside(&winner) {
             self.remarks.push(format!(
                 "{} would take what is left in the first strokes of recordings, but there nobody knows what {memory} remembers of the time \
@@ -174,26 +176,40 @@ impl<'a> Search<'a> {
         ControlFlow::Continue(())
     }
 
+    /// Whether a candidate may be judged at all.
+    fn is_open(&self, t: &Trial, ground: &Ground<'_>) -> bool {
+        let rival = |k: &Taken| k.rivals.iter().any(|r| r.0 == t.candidate && r.1 > CONFUSABLE);
+        t.gain > 0.0
+            && !self.chosen.iter().any(|c| c.candidate == t.candidate)
+            && !self.barred.contains(&t.candidate)
+            && !self.taken.iter().any(rival)
+            && worth_naming(t, self.library, self.rows, ground)
+    }
+
     /// Which of the best of each candidate is to be judged.
     fn winner(&self, best: &[Trial], ground: &Ground<'_>) -> Option<usize> {
-        let rival = |t: &Trial| {
-            self.taken.iter().any(|k| k.rivals.iter().any(|r| r.0 == t.candidate && r.1 > CONFUSABLE))
-        };
-        let (at, winner) = best
-            .iter()
-            .enumerate()
-            .filter(|(_, t)| {
-                t.gain > 0.0
-                    && !self.chosen.iter().any(|c| c.candidate == t.candidate)
-                    && !self.barred.contains(&t.candidate)
-                    && !rival(t)
-                    && worth_naming(t, self.library, self.rows, ground)
-            })
-            .max_by(|a, b| a.1.score.total_cmp(&b.1.score))?;
+        let open = best.iter().enumerate().filter(|(_, t)| self.is_open(t, ground));
+        let (at, winner) = open.max_by(|a, b| a.1.score.total_cmp(&b.1.score))?;
         // Where something that tables imitate explains far more, naming the next best would be naming a shadow of it.
         let best_of_all = best.iter().map(|t| t.score).fold(0.0, f64::max);
         let shadow = best_of_all > (winner.score + LEAST_ALONE).max(SHADOW * winner.score);
         (!self.chosen.is_empty() || !shadow).then_some(at)
+    }
+
+    /// The winner; or, where it explains the misfit only at the edge of what is known of it, the best that explains the same within what
+    /// is known. That there is something to explain has been shown by the winner: its score stands.
+    fn within_the_known(&self, winner: &Trial, best: &[Trial], ground: &Ground<'_>) -> Trial {
+        let known = |t: &Trial| self.library[t.candidate].keeps_within_the_known(t);
+        if known(winner) {
+            return winner.clone();
+        }
+        let metric = baselines::fit(self.rows, Kind::Soft(winner.give), &[]);
+        let rivals = rivals(winner, best, self.library, self.rows, ground, &metric.span);
+        let alike = |t: &Trial| rivals.iter().any(|r| r.0 == t.candidate && r.1 >= ALIKE);
+        best.iter()
+            .filter(|t| known(t) && alike(t) && self.is_open(t, ground))
+            .max_by(|a, b| a.score.total_cmp(&b.score))
+            .map_or_else(|| winner.clone(), |t| Trial { score: winner.score.max(t.score), ..t.clone() })
     }
 
     /// The effect chosen whose memory has to find itself in the very strokes by which a law of friction would be named.

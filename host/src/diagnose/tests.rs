@@ -208,6 +208,17 @@ fn a_cell_two_samples_late_is_told_from_a_loose_joint() {
 }
 
 #[test]
+fn an_unknown_zero_is_not_called_a_lag_that_nobody_has_seen() {
+    // At one speed a settling of most of the pull within 0.3 s would take the misfit as well.
+    for (speed, offset) in [(1.0, 4.0), (1.0, 8.0), (3.0, 8.0)] {
+        let d = ask(&recorded(loops(&[speed]), 5, coloured(0.1, 2.0), |_, _, _| offset));
+        assert_eq!(names(&d), ["force-offset"], "{offset} N at {speed} mm/s");
+        let found = d.missing[0].parameters[0].value;
+        assert!((found - offset).abs() < 0.1 * offset, "{found} N for {offset} N at {speed} mm/s");
+    }
+}
+
+#[test]
 fn tares_in_files_of_their_own_show_the_cells_zero() {
     let mut campaign = recorded(loops(&[0.2]), 6, coloured(0.1, 2.0), |_, _, _| 4.0);
     let tare = |name: &str| {

@@ -10,7 +10,7 @@ use super::{Kinematics, Recorded, Thresholds};
 pub(super) struct Course<'a> {
     recorded: &'a Recorded<'a>,
     thresholds: Thresholds,
-    /// Turns of the stroke that are still to come.
+    /// Beginnings of strokes that are still to come.
     ahead: Peekable<slice::Iter<'a, Onset>>,
     direction: f64,
     turn_row: usize,

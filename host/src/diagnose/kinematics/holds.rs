@@ -14,15 +14,48 @@ pub(super) struct Holds {
     pub raw_speed: Vec<f64>,
 }
 
-/// A motion's typical speed, m/s: the middle one of its half-strokes.
+/// Parts of a half-stroke between which its pace is compared, at most …
+const PARTS: usize = 10;
+/// … of at least so many rows each, on average.
+const ROWS_PER_PART: usize = 3;
+/// A part that takes so many times what the middle one takes has a hold in it. The ends of a sine take three times as long.
+const DWELL: f64 = 10.0;
+
+/// A motion's typical speed, m/s: that of the half-stroke in the middle by way gone, holds on its way left out. A frame that gives while the
+/// force changes makes many half-strokes, none of which goes far.
 fn typical_speed(time: &[f64], stroke: &[f64], starts: &[Onset]) -> f64 {
-    let mut moving: Vec<f64> = starts
+    let mut paces: Vec<(f64, f64)> = starts
         .windows(2)
-        .map(|w| (w[0].row, w[1].row))
-        .filter(|(a, b)| time[*b] > time[*a])
-        .map(|(a, b)| (stroke[b] - stroke[a]).abs() / (time[b] - time[a]))
+        .map(|w| w[0].row..w[1].row + 1)
+        .filter(|rows| time[rows.end - 1] > time[rows.start])
+        .map(|rows| pace(&time[rows.clone()], &stroke[rows]))
         .collect();
-    median(&mut moving)
+    paces.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * paces.iter().map(|(_, way)| way).sum::<f64>();
+    let mut gone = 0.0;
+    let middle = paces.iter().find(|(_, way)| {
+        gone += way;
+        gone >= half
+    });
+    middle.map_or(0.0, |(speed, _)| *speed)
+}
+
+/// The speed of one half-stroke, m/s, without the holds on its way, which is m long.
+fn pace(time: &[f64], stroke: &[f64]) -> (f64, f64) {
+    let last = time.len() - 1;
+    let way = stroke[last] - stroke[0];
+    let parts = (time.len() / ROWS_PER_PART).clamp(1, PARTS);
+    let reached = |part: usize| {
+        let level = way.abs() * part as f64 / parts as f64;
+        let passed = |x: &f64| (x - stroke[0]) * way.signum() >= level;
+        if part == parts { last } else { stroke.iter().position(passed).unwrap_or(last) }
+    };
+    let at: Vec<f64> = (0..=parts).map(|part| time[reached(part)]).collect();
+    let taken: Vec<f64> = at.windows(2).map(|w| w[1] - w[0]).collect();
+    let middle = median(&mut taken.clone());
+    let moving: f64 =
+        taken.iter().map(|t| if *t > DWELL * middle && middle > 0.0 { middle } else { *t }).sum();
+    (way.abs() / moving, way.abs())
 }
 
 /// Finds where travel over a short window stays within what noise and drift can make. `dt`, s, is the usual time between rows, `noise`, m,

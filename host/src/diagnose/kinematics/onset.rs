@@ -50,8 +50,10 @@ pub(super) fn onset(time: &[f64], stroke: &[f64], leg: Leg, motion: Motion) -> O
     let straight = if rate > 0.0 { time[passed] - gone(passed) / rate } else { time[extreme] };
     let mut began = straight;
     let mut doubt = if rate > 0.0 { (2.0 * noise / rate).min(MOST_ROWS * dt) } else { 0.0 };
-    // The last row at the extreme, as far as its noise lets one see.
-    let at_rest = (extreme..passed).rev().find(|j| gone(*j) <= CLEAR * noise).unwrap_or(extreme);
+    // The last row at rest, as far as its noise lets one see: the farthest of m readings stands √(2 ln m) deviations off their level.
+    let farthest = (2.0 * ((passed - extreme).max(1) as f64).ln()).sqrt();
+    let clear = CLEAR.max(1.0 + farthest) * noise;
+    let at_rest = (extreme..passed).rev().find(|j| gone(*j) <= clear).unwrap_or(extreme);
     if rate > 0.0 && time[at_rest] + dt < straight && gone(third) > 0.0 {
         let (near, far) = (gone(third).sqrt(), gone(passed).sqrt());
         let curved = time[passed] - (time[passed] - time[third]) * far / (far - near);
@@ -61,6 +63,30 @@ pub(super) fn onset(time: &[f64], stroke: &[f64], leg: Leg, motion: Motion) -> O
     let began = began.clamp(time[extreme], time[passed]);
     let row = (extreme..=passed).find(|j| time[*j] >= began).unwrap_or(passed);
     Onset { row, direction, doubt: 1.6 * dt + doubt }
+}
+
+/// Strokes that go on after a hold the way they went before it. The pressure may have turned the friction meanwhile.
+pub(super) fn resumed(
+    time: &[f64],
+    stroke: &[f64],
+    held: &[bool],
+    starts: &[Onset],
+    motion: Motion,
+) -> Vec<Onset> {
+    let mut found = Vec::new();
+    for row in 1..held.len() {
+        let next = starts.partition_point(|o| o.row <= row);
+        if !held[row - 1] || held[row] || next == 0 {
+            continue;
+        }
+        let direction = starts[next - 1].direction;
+        let until = starts.get(next).map_or(held.len(), |o| o.row);
+        let end = (row..until).find(|j| held[*j]).unwrap_or(until);
+        if (row..end).any(|j| (stroke[j] - stroke[row]) * direction > motion.threshold) {
+            found.push(onset(time, stroke, Leg { extreme: row, end, direction }, motion));
+        }
+    }
+    found
 }
 
 #[cfg(test)]
