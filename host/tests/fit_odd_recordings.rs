@@ -258,6 +258,18 @@ fn absolute_pressure_and_a_force_of_the_other_sign_are_told() {
     assert!(!told(&|_| (), sign));
 }
 
+/// Where no table comes out, the error says by how much force and pressure disagree with the braid.
+#[test]
+fn a_campaign_in_another_unit_throughout_is_told_by_how_much() {
+    let mut noise = Noise::new(11, 0.0);
+    let mut recordings = SIX.map(|p| strokes(p, 3000, 100.0, 0.0, 0, (0.05, &mut noise))).to_vec();
+    recordings.iter_mut().for_each(|r| r.pressure.iter_mut().for_each(|p| *p /= 100.0));
+    let error = fit(&Campaign::new(recordings), &description(), &Options::default()).unwrap_err();
+    let advice = error.advice().unwrap();
+    let times: f64 = advice.split_whitespace().find_map(|w| w.parse().ok()).unwrap();
+    assert!((30.0..110.0).contains(&times) && advice.contains("what this braid makes"), "{advice}");
+}
+
 /// What no braid can do is told with the recording and the moment.
 #[test]
 fn a_stroke_of_the_other_sign_is_told_with_its_place() {

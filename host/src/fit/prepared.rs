@@ -8,7 +8,7 @@ use super::design::{Bin, Design, Layout, Row};
 use super::dimensions::{Adjusted, Mounting};
 use super::linear::dot;
 use super::nodes::Pressures;
-use super::points::{Point, Points};
+use super::points::{Point, Points, median};
 use super::screen::{Clip, Outlier, Use};
 use super::smoothing::Smoothing;
 
@@ -120,6 +120,18 @@ impl Prepared {
     pub fn fine_pressure(&self, pressure: f64) -> u32 {
         let range = self.points.pressure;
         if self.pressures.held { 0 } else { ((pressure - range.low) / range.span().max(1.0) * 100.0) as u32 }
+    }
+
+    /// The force where it is more than half of the largest, as a share of what the braid alone makes of the pressure (`P g`); the median.
+    #[must_use]
+    pub fn share_of_braid(&self) -> Option<f64> {
+        let shares =
+            self.points.list.iter().filter(|p| p.force > 0.5 * self.points.force.high).filter_map(|p| {
+                let of_braid = p.pressure * columns(&self.braid, p.stroke).area;
+                (of_braid > 0.0).then(|| p.force / of_braid)
+            });
+        let mut shares: Vec<f64> = shares.collect();
+        (!shares.is_empty()).then(|| median(&mut shares))
     }
 
     /// Whether a point counts in errors: it took part, and the muscle was not slack.

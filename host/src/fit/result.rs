@@ -63,7 +63,7 @@ impl Fit {
         let left_out = left_out(&prepared, options, progress);
         progress.stage("comparing the models", 0);
         let midline = midline(&prepared);
-        let modulus = muscle.young_modulus_MPa.map(|e| e * 1e6);
+        let modulus = muscle.young_modulus();
         let models = models::side_by_side(&prepared, &midline, modulus);
         let mut summary =
             summarise(&prepared, &table, campaign, muscle, &uncertain, &residuals, &chunks, &left_out);
@@ -93,11 +93,21 @@ impl Fit {
     }
 }
 
+/// What a muscle pulls where it pulls most, as a share of what its braid alone makes of the pressure; deadband and elasticity take from it.
+const POSSIBLE: (f64, f64) = (0.2, 2.0);
+
 /// The table's numbers from the solution, checked.
 fn table(prepared: &Prepared, muscle: &MuscleDescription) -> Result<MuscleTable> {
     let unusable = |what: &str| {
-        Error::new(Code::FitUnderdetermined, format!("the recordings lead to no usable table: {what}"))
-            .help("check the muscle's dimensions and the recording's units; a longer stroke or more pressures determine more")
+        let share = prepared.share_of_braid();
+        let units = share.filter(|s| !(POSSIBLE.0..POSSIBLE.1).contains(s)).map(|s| {
+            let times = if s > 0.1 { format!("{s:.1} times") } else { format!("{s:.1e} times") };
+            format!("the force is {times} what this braid makes of the pressure that was read: ")
+        });
+        Error::new(Code::FitUnderdetermined, format!("the recordings lead to no usable table: {what}")).help(format!(
+            "{}check the muscle's dimensions and the recording's units; a longer stroke or more pressures determine more",
+            units.unwrap_or_default()
+        ))
     };
     let nodes = &prepared.pressures.nodes;
     let at: Vec<(Vec<f64>, f64)> = nodes.iter().map(|p| prepared.curves_at(*p)).collect();

@@ -18,6 +18,26 @@ const ATMOSPHERE: f64 = 101_325.0;
 #[must_use]
 pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) -> Vec<String> {
     let mut out = prepared.warnings.clone();
+    agreement(prepared, mean_error, &mut out);
+    amount(prepared, &mut out);
+    lengths(prepared, &mut out);
+    friction(prepared, &mut out);
+    deadband(prepared, &mut out);
+    set_aside(prepared, &mut out);
+    dimensions(prepared, &mut out);
+    turns(prepared, &mut out);
+    between_pressures(left_out, &mut out);
+    out
+}
+
+/// Rows that were used so.
+fn rows(prepared: &Prepared, wanted: Use) -> usize {
+    let used = prepared.points.list.iter().zip(&prepared.used);
+    used.filter(|(_, u)| **u == wanted).map(|(p, _)| p.rows as usize).sum()
+}
+
+/// Whether this is a muscle at all.
+fn agreement(prepared: &Prepared, mean_error: f64, out: &mut Vec<String>) {
     let force = &prepared.points.force;
     if -force.low > WRONG_SIGN * force.high {
         out.push(format!(
@@ -33,20 +53,13 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
              units of force and pressure, the sign of the displacement, and the muscle's dimensions"
         ));
     }
-    let design = &prepared.design;
-    let points = &prepared.points;
-    let rows = |wanted: Use| -> usize {
-        points
-            .list
-            .iter()
-            .zip(&prepared.used)
-            .filter(|(_, u)| **u == wanted)
-            .map(|(p, _)| p.rows as usize)
-            .sum()
-    };
-    let fitted = rows(Use::Fitted);
-    let unknowns = design.layout().len();
-    if points.rows < 200 || fitted < 5 * unknowns {
+}
+
+/// How many rows and pressures there are.
+fn amount(prepared: &Prepared, out: &mut Vec<String>) {
+    let fitted = rows(prepared, Use::Fitted);
+    let unknowns = prepared.design.layout().len();
+    if prepared.points.rows < 200 || fitted < 5 * unknowns {
         out.push(format!(
             "{fitted} rows are fitted for {unknowns} unknowns: the penalty on bending decides much of the table; record more"
         ));
@@ -60,6 +73,11 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
         2 => out.push("only two pressures were tested: curves over pressure are straight lines between them".into()),
         _ => {}
     }
+}
+
+/// Which lengths there are, and what they determine of the elasticity.
+fn lengths(prepared: &Prepared, out: &mut Vec<String>) {
+    let (design, points) = (&prepared.design, &prepared.points);
     let l0 = prepared.braid.rest_length();
     let (low, high) = (points.stroke.low / l0, points.stroke.high / l0);
     let order = design.orthonormal.order;
@@ -99,6 +117,11 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
             design.orthonormal.condition
         ));
     }
+}
+
+/// Whether there is friction, and whether it may be what it is.
+fn friction(prepared: &Prepared, out: &mut Vec<String>) {
+    let (design, points) = (&prepared.design, &prepared.points);
     if !design.friction {
         let known = points.list.iter().any(|p| p.direction != 0.0);
         out.push(if known {
@@ -126,6 +149,11 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
             ));
         }
     }
+}
+
+/// Where the deadband cannot be what it is.
+fn deadband(prepared: &Prepared, out: &mut Vec<String>) {
+    let points = &prepared.points;
     let p0 = prepared.deadband();
     if p0 < 0.0 {
         out.push(format!(
@@ -147,6 +175,10 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
             points.pressure.low / 1e3
         ));
     }
+}
+
+/// What was not fitted: the ends of the force sensor, a slack muscle, odd readings.
+fn set_aside(prepared: &Prepared, out: &mut Vec<String>) {
     let side = |name: &str, clip: &super::screen::Clip| {
         format!(
             "left out of the fit: {} of exactly {:.2} N, where the force sensor stands at the {name} end of its range",
@@ -156,7 +188,7 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
     };
     out.extend(prepared.clips.0.iter().map(|c| side("lower", c)));
     out.extend(prepared.clips.1.iter().map(|c| side("upper", c)));
-    let slack = rows(Use::Slack);
+    let slack = rows(prepared, Use::Slack);
     if slack > 0 {
         out.push(format!(
             "the muscle is slack in {}: the force stays near zero where the model would push; this is not fitted, and the \
@@ -170,6 +202,10 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
             counted(prepared.outliers.len(), "reading")
         ));
     }
+}
+
+/// Effective dimensions that were found at their bounds, or hardly.
+fn dimensions(prepared: &Prepared, out: &mut Vec<String>) {
     for a in prepared.adjusted.iter().filter(|a| a.at_bound) {
         out.push(format!(
             "{} stopped at its bound of {:.2} {}: either it was measured wrongly by more than is plausible, or it stands in for \
@@ -185,7 +221,12 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
             undetermined.join(", ")
         ));
     }
-    let aside = rows(Use::NearTurn) as f64;
+}
+
+/// How much lies just after turns.
+fn turns(prepared: &Prepared, out: &mut Vec<String>) {
+    let points = &prepared.points;
+    let aside = rows(prepared, Use::NearTurn) as f64;
     if aside > 0.3 * points.rows as f64 {
         out.push(format!(
             "{:.0} % of the rows lie just after a turn of motion and are not fitted: strokes are short against the way that \
@@ -193,6 +234,10 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
             100.0 * aside / points.rows as f64
         ));
     }
+}
+
+/// How well pressures between those that were tested are known.
+fn between_pressures(left_out: &[Option<f64>], out: &mut Vec<String>) {
     let errors: Vec<f64> = left_out.iter().copied().flatten().collect();
     if let Some(worst) = errors.iter().copied().reduce(f64::max)
         && worst > 5.0
@@ -201,5 +246,4 @@ pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) 
             "a pressure predicted from the others is off by {worst:.1} % of blocked force: test more pressures between"
         ));
     }
-    out
 }

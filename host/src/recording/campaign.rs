@@ -56,6 +56,7 @@ impl Campaign {
                 ));
             }
         }
+        warnings.extend(other_clock(&recordings));
         for (i, a) in recordings.iter().enumerate() {
             if let Some(b) = recordings[i + 1..].iter().find(|b| a.same_rows(b)) {
                 warnings.push(if a.name == b.name {
@@ -97,6 +98,37 @@ impl Campaign {
     }
 }
 
+/// A recording whose time is in another unit than that of the others, told: its rows are a thousand times as far apart, or as close, and
+/// the muscle moves as far from row to row as theirs does.
+fn other_clock(recordings: &[Recording]) -> Option<String> {
+    if recordings.len() < 3 {
+        return None;
+    }
+    let a_row = |r: &Recording| {
+        let steps = r.len().saturating_sub(1).max(1) as f64;
+        let way: f64 = r.stroke.windows(2).map(|w| (w[1] - w[0]).abs()).sum();
+        (r.duration() / steps, way / steps)
+    };
+    let rows: Vec<(f64, f64)> = recordings.iter().map(a_row).collect();
+    let middle = |of: &dyn Fn(&(f64, f64)) -> f64| median(rows.iter().map(of).collect());
+    let (interval, way) = (middle(&|r| r.0), middle(&|r| r.1));
+    let odd = |(time, moved): &(f64, f64)| {
+        let thousand = [1e3, 1e-3].iter().any(|f| (time / interval / f - 1.0).abs() < 0.02);
+        thousand && (0.5..2.0).contains(&(moved / way))
+    };
+    let i = rows.iter().position(odd)?;
+    Some(format!(
+        "the rows of `{}` are {:.4} s apart, those of the others {:.4} s, and the muscle moves as far from row to row: its time seems to be in \
+         another unit; put the one that was logged into the column's name",
+        recordings[i].name, rows[i].0, interval
+    ))
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -131,6 +163,27 @@ mod tests {
         assert_eq!(twice, "`a` is given twice, and counts twice");
         let copied = warned(vec![from("a", 0.0, 60.0), from("copy", 0.0, 60.0)]);
         assert_eq!(copied, "`a` and `copy` hold the same rows, which count twice");
+    }
+
+    #[test]
+    fn milliseconds_under_a_heading_in_seconds_are_told() {
+        let loops = |name: &str, start: f64, interval: f64, way: f64| Recording {
+            name: name.into(),
+            time: (0..100).map(|i| start + interval * f64::from(i)).collect(),
+            stroke: (0..100).map(|i| way * f64::from(i % 20)).collect(),
+            ..Recording::default()
+        };
+        let told = |interval: f64, way: f64| {
+            let files = [("a", 0.0, 0.1, 1e-4), ("b", 20.0, interval, way), ("c", 1e6, 0.1, 1e-4)];
+            Campaign::new(files.map(|(n, s, i, w)| loops(n, s, i, w)).to_vec()).warnings.join("; ")
+        };
+        let said = told(100.0, 1e-4);
+        assert!(said.contains("`b` are 100.0000 s apart, those of the others 0.1000 s"), "{said}");
+        assert!(told(1e-4, 1e-4).contains("another unit"));
+        // A logger that was set to another rate sees the same motion.
+        assert_eq!(told(1e-4, 1e-7), "");
+        assert_eq!(told(0.1, 1e-4), "");
+        assert_eq!(told(10.0, 1e-4), "");
     }
 
     #[test]
