@@ -1,3 +1,4 @@
+use super::mistake::ATMOSPHERE;
 use super::*;
 
 const PSI: f64 = 6.894_757;

@@ -1,0 +1,164 @@
+//! What force most recordings of a campaign make of pressure and stroke, and how far one of them is off.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::mistake::{Mistake, mistakes};
+use super::{Apart, Sample};
+
+/// A muscle pulls from this share of the campaign's usual largest force.
+const PULLS: f64 = 0.05;
+/// A recording is far off if a fifth of its rows are further off than this share of that force…
+pub(super) const FAR_OFF: f64 = 0.12;
+/// …and so many times further than with the mistake made good.
+const BETTER: f64 = 3.0;
+/// Another mistake that leaves less than so many times as much may be the one as well.
+const AS_GOOD: f64 = 1.5;
+/// It is among the others then: within this share of the usual largest force, or so many times as far off as they are among themselves.
+const AMONG: (f64, f64) = (0.02, 2.0);
+/// But never further than this share.
+const AMONG_AT_MOST: f64 = 0.15;
+/// The force that the others make of it changes by this share from the lowest fifth of its rows to the highest.
+const CHANGES: f64 = 0.1;
+/// The others were at a stroke if one of their rows is nearer than this share of their range.
+const NEAR: f64 = 0.03;
+/// And at a pressure if it is no further than this factor beyond theirs.
+const BEYOND: f64 = 1.6;
+
+/// A row: pressure in Pa, stroke in m, force in N.
+pub(super) type Row = [f64; 3];
+
+/// `F ≈ p (a0 + a1 u + a2 u² + a3 u³) + b0 + b1 u + b2 u² + b3 u³`, with pressure and stroke as shares of their ranges.
+const TERMS: usize = 8;
+/// What the rows leave open is taken for nothing.
+const HELD: f64 = 1e-6;
+/// Rounds in which rows are left out that lie further off than so many times the median.
+const ROUNDS: usize = 4;
+const FAR: f64 = 5.0;
+
+/// What force pressure and stroke make in the recordings that agree.
+pub(super) struct Agreed {
+    terms: SVector<f64, TERMS>,
+    /// Lowest and highest, Pa.
+    pressure: (f64, f64),
+    /// Lowest, and the range above it, m.
+    stroke: (f64, f64),
+    /// The strokes that there are, sorted, m.
+    strokes: Vec<f64>,
+    /// The usual largest force, N.
+    largest: f64,
+    /// How far four fifths of their own rows are off at most, a share of that.
+    scatter: f64,
+}
+
+impl Agreed {
+    /// Of some recordings, where they pull; `None` where that is too little.
+    pub(super) fn on<'a>(samples: impl Iterator<Item = &'a Sample>, largest: f64) -> Option<Self> {
+        let pulls = |r: &Row| r[2].abs() > PULLS * largest;
+        let rows: Vec<Row> = samples.flat_map(|s| &s.rows).copied().filter(pulls).collect();
+        if rows.len() < 5 * TERMS {
+            return None;
+        }
+        let bounds = |k: usize| {
+            let mut all: Vec<f64> = rows.iter().map(|r| r[k]).collect();
+            all.sort_unstable_by(f64::total_cmp);
+            // Rows that few share must not set the scale.
+            (all[all.len() / 100], all[all.len() - 1 - all.len() / 100], all)
+        };
+        let ((low, high, _), (short, long, strokes)) = (bounds(0), bounds(1));
+        if high <= 0.0 {
+            return None;
+        }
+        let mut agreed = Self {
+            terms: SVector::zeros(),
+            pressure: (low, high),
+            stroke: (short, (long - short).max(1e-9)),
+            strokes,
+            largest,
+            scatter: 0.0,
+        };
+        let mut kept = rows.clone();
+        for _ in 0..ROUNDS {
+            agreed.terms = agreed.solved(&kept)?;
+            let off = |r: &Row| (r[2] - agreed.force(r[0], r[1])).abs();
+            let mut sizes: Vec<f64> = rows.iter().map(off).collect();
+            let middle = sizes.len() / 2;
+            let far = FAR * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+            kept = rows.iter().copied().filter(|r| off(r) <= far).collect();
+        }
+        agreed.scatter = agreed.off(&rows, None)?;
+        Some(agreed)
+    }
+
+    fn solved(&self, rows: &[Row]) -> Option<SVector<f64, TERMS>> {
+        let (mut normal, mut moment) =
+            (SMatrix::<f64, TERMS, TERMS>::zeros(), SVector::<f64, TERMS>::zeros());
+        for [p, x, f] in rows {
+            let row = self.row(*p, *x);
+            normal += row * row.transpose();
+            moment += row * *f;
+        }
+        normal += SMatrix::identity() * (HELD * rows.len() as f64);
+        Some(normal.cholesky()?.solve(&moment))
+    }
+
+    /// Beyond the strokes that there are it goes on as at their end.
+    fn row(&self, pressure: f64, stroke: f64) -> SVector<f64, TERMS> {
+        let p = pressure / self.pressure.1;
+        let u = ((stroke - self.stroke.0) / self.stroke.1).clamp(0.0, 1.0);
+        SVector::from([p, p * u, p * u * u, p * u.powi(3), 1.0, u, u * u, u.powi(3)])
+    }
+
+    /// N.
+    fn force(&self, pressure: f64, stroke: f64) -> f64 {
+        self.row(pressure, stroke).dot(&self.terms)
+    }
+
+    /// Whether there are rows about such a stroke and pressure.
+    fn know(&self, pressure: f64, stroke: f64) -> bool {
+        let next = self.strokes.partition_point(|x| *x < stroke);
+        let near = |i: usize| self.strokes.get(i).is_some_and(|x| (x - stroke).abs() <= NEAR * self.stroke.1);
+        let within = pressure <= BEYOND * self.pressure.1 && pressure >= self.pressure.0 / BEYOND;
+        within && (near(next) || next > 0 && near(next - 1))
+    }
+
+    /// Whether a recording that does not agree would with one mistake made good.
+    pub(super) fn judge(&self, sample: &Sample) -> Option<Apart> {
+        let as_read = self.off(&sample.rows, None).filter(|off| *off >= FAR_OFF)?;
+        let tried = mistakes(&sample.rows).filter_map(|m| Some((self.off(&sample.rows, Some(&m))?, m)));
+        let mut tried: Vec<(f64, Mistake)> = tried.collect();
+        tried.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let (left, mistake) = tried.first().copied()?;
+        let among = AMONG.0.max(AMONG.1 * self.scatter);
+        let next = tried.get(1).filter(|(next, _)| *next < AS_GOOD * left);
+        (left <= among.min(AMONG_AT_MOST) && as_read >= BETTER * left).then(|| Apart {
+            recording: sample.recording,
+            mistake,
+            or: next.map(|(_, m)| *m),
+        })
+    }
+
+    /// How far four fifths of a recording's rows are off at most, a share of the usual largest force; a slack muscle pulls nothing.
+    /// With a mistake made good `None` where the others do not know most of the rows, or the force that they make of it hardly changes.
+    pub(super) fn off(&self, rows: &[Row], mistake: Option<&Mistake>) -> Option<f64> {
+        let rows: Vec<Row> = rows.iter().map(|r| mistake.map_or(*r, |m| m.of_row(*r))).collect();
+        let known = rows.iter().filter(|r| self.know(r[0], r[1])).count();
+        if mistake.is_some() && 4 * known < 3 * rows.len() {
+            return None;
+        }
+        let quantile = |values: &mut Vec<f64>, fifths: usize| {
+            let at = values.len() * fifths / 5;
+            *values.select_nth_unstable_by(at, f64::total_cmp).1 / self.largest
+        };
+        let four_fifths = |values: &mut Vec<f64>| quantile(values, 4);
+        let fifth = |values: &mut Vec<f64>| quantile(values, 1);
+        let (mut made, mut sizes) = (Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len()));
+        for [p, x, f] in &rows {
+            let force = self.force(*p, *x).max(0.0);
+            made.push(force);
+            sizes.push((f - force).abs());
+        }
+        // A dead load cell reads what any muscle makes of no pressure, and one level fits many units: the force must change.
+        let telling = mistake.is_none() || four_fifths(&mut made) - fifth(&mut made) >= CHANGES;
+        telling.then(|| four_fifths(&mut sizes))
+    }
+}

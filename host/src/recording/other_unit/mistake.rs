@@ -1,0 +1,160 @@
+//! Known mistakes in a column of a recording, and what makes them good.
+
+use super::Row;
+use crate::recording::Recording;
+
+/// The column that a mistake is in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Column {
+    /// The gauge's.
+    Pressure,
+    /// The stroke's.
+    Stroke,
+    /// The load cell's.
+    Force,
+}
+
+impl Column {
+    /// As it is called.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pressure => "pressure",
+            Self::Stroke => "stroke",
+            Self::Force => "force",
+        }
+    }
+}
+
+/// How a column came to read what it reads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Wrong {
+    /// A unit: the true reading is this many times the one that was read, and the ratio is that of the units named.
+    Unit(f64, &'static str),
+    /// Its sign.
+    Sign,
+    /// It is counted from the other end of the stroke, which comes to the sum of its smallest and its largest reading, m.
+    OtherEnd(f64),
+    /// It counts from vacuum and is so many Pa too much; negative where the others do.
+    Absolute(f64),
+}
+
+/// A mistake in one column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mistake {
+    /// Which.
+    pub column: Column,
+    /// What.
+    pub wrong: Wrong,
+}
+
+impl Mistake {
+    /// The true reading of its column.
+    #[must_use]
+    pub fn made_good(&self, read: f64) -> f64 {
+        match self.wrong {
+            Wrong::Unit(factor, _) => read * factor,
+            Wrong::Sign => -read,
+            Wrong::OtherEnd(sum) => sum - read,
+            Wrong::Absolute(atmosphere) => read - atmosphere,
+        }
+    }
+
+    pub(super) fn of_row(&self, mut row: Row) -> Row {
+        let k = match self.column {
+            Column::Pressure => 0,
+            Column::Stroke => 1,
+            Column::Force => 2,
+        };
+        row[k] = self.made_good(row[k]);
+        row
+    }
+
+    /// Makes it good in a whole recording.
+    pub(in crate::recording) fn mend(&self, recording: &mut Recording) {
+        let column = match self.column {
+            Column::Pressure => Some(&mut recording.pressure),
+            Column::Stroke => Some(&mut recording.stroke),
+            Column::Force => recording.force.as_mut(),
+        };
+        column.into_iter().flatten().for_each(|v| *v = self.made_good(*v));
+    }
+
+    pub(super) fn told(&self) -> String {
+        let column = self.column.name();
+        match self.wrong {
+            Wrong::Unit(factor, units) => {
+                let ratio = |r: f64| format!("{r:.2}").trim_end_matches('0').trim_end_matches('.').to_owned();
+                let times = if factor > 1.0 {
+                    format!("{} times", ratio(factor))
+                } else {
+                    format!("1/{} of", ratio(1.0 / factor))
+                };
+                format!(
+                    "its {column} would fit theirs at {times} what was read, the ratio of {units}: put the unit that was logged into the \
+                     column's name"
+                )
+            }
+            Wrong::Sign => format!(
+                "its {column} would fit theirs with the other sign: mend the sign, or give scale = -1 in an import description"
+            ),
+            Wrong::OtherEnd(_) => format!(
+                "its {column} would fit theirs counted from the other end: positive is a muscle that shortens; mend it, or give \
+                 positive = \"extension\" in an import description"
+            ),
+            Wrong::Absolute(atmosphere) if atmosphere > 0.0 => format!(
+                "its {column} would fit theirs less one atmosphere: gauge pressure is wanted, not absolute; take 101.3 kPa off, or give \
+                 an offset in an import description"
+            ),
+            Wrong::Absolute(_) => format!(
+                "its {column} would fit theirs with one atmosphere more: theirs seems to be absolute; gauge pressure is wanted, take \
+                 101.3 kPa off there, or give an offset in an import description"
+            ),
+        }
+    }
+}
+
+/// One standard atmosphere, Pa.
+pub(super) const ATMOSPHERE: f64 = 101_325.0;
+/// Ratios of units that laboratories mix up: the unit read as another, and by what its readings are too small then.
+const PRESSURES: [(f64, &str); 6] = [
+    (6.894_757, "psi to kPa"),
+    (10.0, "MPa to bar, or kPa to mbar"),
+    (14.503_77, "bar to psi"),
+    (100.0, "bar to kPa"),
+    (145.037_7, "MPa to psi"),
+    (1000.0, "MPa to kPa, or kPa to Pa"),
+];
+const STROKES: [(f64, &str); 4] = [
+    (10.0, "cm to mm"),
+    (25.4, "inches to millimetres"),
+    (39.370_08, "metres to inches"),
+    (1000.0, "m to mm, or mm to µm"),
+];
+const FORCES: [(f64, &str); 4] = [
+    (4.448_222, "lbf to N"),
+    (9.806_65, "kgf to N"),
+    (224.808_9, "kN to lbf"),
+    (1000.0, "kN to N, or N to mN"),
+];
+
+/// All that is tried of a recording.
+pub(super) fn mistakes(rows: &[Row]) -> impl Iterator<Item = Mistake> {
+    let scaled = |column: Column, ratios: &'static [(f64, &'static str)]| {
+        ratios.iter().flat_map(move |(ratio, units)| {
+            [*ratio, 1.0 / ratio].map(|factor| Mistake { column, wrong: Wrong::Unit(factor, units) })
+        })
+    };
+    let (low, high) =
+        rows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), r| (l.min(r[1]), h.max(r[1])));
+    let shifted = [
+        Mistake { column: Column::Force, wrong: Wrong::Sign },
+        Mistake { column: Column::Stroke, wrong: Wrong::OtherEnd(low + high) },
+        Mistake { column: Column::Pressure, wrong: Wrong::Absolute(ATMOSPHERE) },
+        Mistake { column: Column::Pressure, wrong: Wrong::Absolute(-ATMOSPHERE) },
+    ];
+    scaled(Column::Pressure, &PRESSURES)
+        .chain(scaled(Column::Stroke, &STROKES))
+        .chain(scaled(Column::Force, &FORCES))
+        .chain(shifted)
+}
