@@ -98,8 +98,14 @@ function take(m) {
 // Where in the pictures over time values are read, as a part of their width: where the pointer is, or by the arrow keys.
 let cursor = null;
 const cursorTime = () => scopes[0].from + cursor * (scopes[0].to - scopes[0].from);
-// The sample that is read: at the cursor; without one the newest.
-const read = () => Math.min(cursor === null ? Infinity : shown.since(cursorTime()), shown.length - 1);
+// The sample that is read: the first from the cursor on, without a cursor the newest; none (-1) more than a pixel before the first sample
+// or after the last, where nothing is drawn.
+function read() {
+  if (cursor === null || !shown.length) return shown.length - 1;
+  const { from, to, axes: { canvas } } = scopes[0], pixel = (to - from) / (canvas.clientWidth - LEFT - RIGHT), time = cursorTime();
+  if (time < shown.get("t", 0) - pixel || time > shown.last("t") + pixel) return -1;
+  return Math.min(shown.since(time), shown.length - 1);
+}
 
 // Behind each curve's name its value there, as often as a person can read it; what is asked belongs to one of the pictures.
 const DECIMALS = { F: 1, m: 1, P: 1, c: 1, x: 2, a: 1 };
