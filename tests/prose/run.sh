@@ -77,4 +77,4 @@ if [ "${status:-0}" -gt 1 ] || ! node -e 'JSON.parse(require("fs").readFileSync(
     echo "tests/prose/run.sh: the linter failed" >&2
     exit 3
 fi
-node "$here/findings.mjs" "$work/findings.json" "$here/sample.md" "$extracted"
+node "$here/findings.mjs" "$work/findings.json" "$here/sample.md" "$extracted" "$sources"

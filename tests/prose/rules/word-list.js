@@ -34,6 +34,8 @@ module.exports = function (context) {
         [Syntax.Str](node) {
             if (inside(node)) return;
             const text = getSource(node).replace(/\s/g, " ");
+            // Error codes are names that scripts use, and the titles of their pages.
+            if (/^[a-z]+::[a-z-]+$/.test(text)) return;
             for (const { source, term } of entries) {
                 for (const match of text.matchAll(new RegExp(source, "gi"))) {
                     const range = [match.index, match.index + match[0].length];
