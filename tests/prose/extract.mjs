@@ -1,6 +1,7 @@
-// Writes the prose of Rust sources as Markdown with the same line numbers: comments, and string literals that are sentences.
+// Writes the prose of sources as Markdown with the same line numbers: of Rust, comments, and string literals that are sentences; of
+// Python, shell, and TOML, comments.
 //
-//     node extract.mjs FOLDER FILE.rs…
+//     node extract.mjs FOLDER FILE…
 //
 // A string counts as prose if it has at least four words of letters and no mark of another language (markup, code, a path).
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
@@ -73,9 +74,19 @@ function markdown(text) {
     return lines.map((l) => l.replace(/^#+ /, "")).join("\n");
 }
 
+/// Comments after a `#` at the beginning of a line.
+function remarks(text) {
+    return text
+        .split("\n")
+        .map((line) => /^\s*#(?!!)\s?(.*)$/.exec(line)?.[1] ?? "")
+        .map((line) => (/^ {2,}/.test(line) ? "" : line))
+        .join("\n");
+}
+
 const [folder, ...files] = process.argv.slice(2);
 for (const file of files) {
     const target = join(folder, `${file}.md`);
     mkdirSync(dirname(target), { recursive: true });
-    writeFileSync(target, markdown(readFileSync(file, "utf8")));
+    const text = readFileSync(file, "utf8");
+    writeFileSync(target, file.endsWith(".rs") ? markdown(text) : remarks(text));
 }

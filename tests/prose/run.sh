@@ -3,8 +3,8 @@
 # project's own word list (words.tsv).
 #
 #     bash tests/prose/run.sh              # hand-written pages
-#     bash tests/prose/run.sh --sources    # and messages, help, comments of the Rust sources, and the pages made from them
-#     bash tests/prose/run.sh FILE…        # these files only: Markdown or Rust
+#     bash tests/prose/run.sh --sources    # and messages, help, comments of the sources, and the pages made from them
+#     bash tests/prose/run.sh FILE…        # these files only
 #
 # Installs the pinned versions (package-lock.json) into target/prose on the first run. Exit status: 0 no findings, 1 findings,
 # 3 the linter cannot be installed.
@@ -38,15 +38,15 @@ if ! cmp -s "$here/package-lock.json" "$work/installed.json"; then
     cp "$here/package-lock.json" "$work/installed.json"
 fi
 
-# Rust files become Markdown files with the same line numbers.
+# Sources become Markdown files with the same line numbers.
 extracted=$work/sources
 rm -rf "$extracted"
 markdown=()
-rust=()
+code=()
 if [ ${#files[@]} -gt 0 ]; then
     for file in "${files[@]}"; do
         case $file in
-            *.rs) rust+=("$file") ;;
+            *.rs | *.py | *.sh | *.toml) code+=("$file") ;;
             *) markdown+=("$file") ;;
         esac
     done
@@ -56,11 +56,11 @@ else
         if [ $sources = yes ] || ! grep -qF "$generated" <<<"$file"; then markdown+=("$file"); fi
     done < <(git ls-files --cached --others --exclude-standard 'docs/src/*.md' '*README.md' CHANGELOG.md CONTRIBUTING.md SECURITY.md | sort -u)
     if [ $sources = yes ]; then
-        while IFS= read -r file; do rust+=("$file"); done < <(git ls-files --cached --others --exclude-standard '*.rs' | sort -u)
+        while IFS= read -r file; do code+=("$file"); done < <(git ls-files --cached --others --exclude-standard '*.rs' '*.py' '*.sh' '*.toml' | sort -u)
     fi
 fi
-if [ ${#rust[@]} -gt 0 ]; then
-    node "$here/extract.mjs" "$extracted" "${rust[@]}"
+if [ ${#code[@]} -gt 0 ]; then
+    node "$here/extract.mjs" "$extracted" "${code[@]}"
     while IFS= read -r file; do markdown+=("$file"); done < <(find "$extracted" -name '*.md' | sort)
 fi
 if [ ${#markdown[@]} -eq 0 ]; then
