@@ -3,7 +3,7 @@
 #
 #     bash tests/all.sh --quick    # format, language, unit tests of the libraries: up to 3 minutes on 2 cores after the first build
 #     bash tests/all.sh            # the whole suite: up to 25 minutes
-#     bash tests/all.sh --long     # the whole suite, then the long tests
+#     bash tests/all.sh --long     # the whole suite, the long tests, and the coverage
 #
 #     --lint                       # with any tier: Clippy, documentation, licences of the dependencies
 #
@@ -116,6 +116,11 @@ fi
 if [ $tier = long ]; then
     step "long tests" env PAM_LONG=1 cargo test --workspace --release --locked --no-fail-fast \
         --test kills --test closed_loop --test commands
+    if has cargo-llvm-cov; then
+        step "coverage" bash tests/coverage.sh
+    else
+        say "skipped: coverage: cargo install --locked cargo-llvm-cov"
+    fi
 fi
 
 if [ $lint = yes ]; then
