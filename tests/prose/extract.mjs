@@ -1,5 +1,5 @@
-// Writes the prose of sources as Markdown with the same line numbers: of Rust, comments, and string literals that are sentences; of
-// Python, shell, and TOML, comments.
+// Writes the prose of sources as Markdown with the same line numbers: of Rust and JavaScript, comments, and string literals that are
+// sentences; of HTML, text; of Python, shell, and TOML, comments.
 //
 //     node extract.mjs FOLDER FILE…
 //
@@ -83,10 +83,20 @@ function remarks(text) {
         .join("\n");
 }
 
+/// Text between the tags of a page.
+function visible(text) {
+    const blank = (piece) => piece.replace(/[^\n]/g, " ");
+    return text.replace(/<(script|style)[\s\S]*?<\/\1>|<!--[\s\S]*?-->|<[^>]*>/g, blank).replace(/^ +/gm, "");
+}
+
+function extracted(file, text) {
+    if (/\.(rs|js|mjs)$/.test(file)) return markdown(text);
+    return file.endsWith(".html") ? visible(text) : remarks(text);
+}
+
 const [folder, ...files] = process.argv.slice(2);
 for (const file of files) {
     const target = join(folder, `${file}.md`);
     mkdirSync(dirname(target), { recursive: true });
-    const text = readFileSync(file, "utf8");
-    writeFileSync(target, file.endsWith(".rs") ? markdown(text) : remarks(text));
+    writeFileSync(target, extracted(file, readFileSync(file, "utf8")));
 }

@@ -46,7 +46,7 @@ code=()
 if [ ${#files[@]} -gt 0 ]; then
     for file in "${files[@]}"; do
         case $file in
-            *.rs | *.py | *.sh | *.toml) code+=("$file") ;;
+            *.rs | *.js | *.mjs | *.html | *.py | *.sh | *.toml) code+=("$file") ;;
             *) markdown+=("$file") ;;
         esac
     done
@@ -56,7 +56,7 @@ else
         if [ $sources = yes ] || ! grep -qF "$generated" <<<"$file"; then markdown+=("$file"); fi
     done < <(git ls-files --cached --others --exclude-standard 'docs/src/*.md' '*README.md' CHANGELOG.md CONTRIBUTING.md SECURITY.md | sort -u)
     if [ $sources = yes ]; then
-        while IFS= read -r file; do code+=("$file"); done < <(git ls-files --cached --others --exclude-standard '*.rs' '*.py' '*.sh' '*.toml' | sort -u)
+        while IFS= read -r file; do code+=("$file"); done < <(git ls-files --cached --others --exclude-standard '*.rs' '*.js' '*.mjs' 'host/*.html' '*.py' '*.sh' '*.toml' | sort -u)
     fi
 fi
 if [ ${#code[@]} -gt 0 ]; then

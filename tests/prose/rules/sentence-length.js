@@ -8,7 +8,7 @@ module.exports = function (context) {
     const { Syntax, RuleError, report, getSource, locator } = context;
     return {
         [Syntax.Paragraph](node) {
-            // Lines of a paragraph are joined, and what stands in code counts as one word of the same length.
+            // Lines of a paragraph are joined, and code counts as one word of the same length.
             const text = getSource(node)
                 .replace(/`[^`]*`/g, (code) => "x".repeat(code.length))
                 .replace(/\]\([^)]*\)/g, (target) => "x".repeat(target.length))
