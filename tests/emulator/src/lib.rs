@@ -22,10 +22,10 @@ pub mod tracking;
 pub use machine::{Machine, Options, Skipped};
 pub use stations::Watched;
 
-use host::device::Client;
 use model_core::image;
 use model_core::link::messages::Side;
 use model_core::table::MuscleTable;
+use pam_device::Client;
 
 /// The bytes of a table.
 ///
@@ -41,5 +41,5 @@ pub fn image_of(table: &MuscleTable) -> Vec<u8> {
 /// # Panics
 /// When the device refuses it.
 pub fn upload(client: &mut Client, side: Side, table: &MuscleTable) {
-    host::device::tables::write(client, side, &image_of(table), |_| ()).expect("the table is taken");
+    pam_device::tables::write(client, side, &image_of(table), |_| ()).expect("the table is taken");
 }
