@@ -98,6 +98,9 @@ fi
 if require "language of the pages" npm nodejs npm; then
     step "language of the pages" language
 fi
+if require "picture of the crates" python3 python3; then
+    step "picture of the crates" python3 tests/crates.py --check
+fi
 
 if [ $tier = quick ]; then
     step "unit tests" cargo test --workspace --locked --no-fail-fast --lib
