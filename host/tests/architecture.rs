@@ -1,4 +1,5 @@
-//! The import directions between the crates, as the manifests state them, and the files that the architecture page names.
+//! The import directions between the crates, as the manifests state them, and the files that the architecture page
+//! (`docs/src/design.md`) names.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -99,7 +100,7 @@ fn the_bindings_link_no_server_no_port_and_no_firmware() {
 
 #[test]
 fn every_file_that_the_architecture_page_names_exists() {
-    let page = fs::read_to_string(root().join("docs/src/architecture.md")).expect("the page");
+    let page = fs::read_to_string(root().join("docs/src/design.md")).expect("the page");
     let named: Vec<&str> = page.split('`').skip(1).step_by(2).filter(|t| t.contains('/')).collect();
     assert!(named.len() > 20, "{named:?}");
     for path in named {
