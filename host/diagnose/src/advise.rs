@@ -5,6 +5,13 @@ use model_core::muscle::Muscle;
 use rayon::prelude::*;
 
 use super::baselines::cosine;
+use super::criteria::baseline::TABLE_ORDER;
+use super::criteria::candidates::INVISIBLE;
+use super::criteria::planning::{
+    EXPECTED_NOISE, INDISTINGUISHABLE, MENU_PRESSURES, PLAN_POWERS, PROTOCOL_ROWS, RIVAL_GRID,
+    RIVAL_GRID_SEVERAL, SLOW_STROKE, WORTHWHILE_DIFFERENCE,
+};
+use super::criteria::rows::VENTED_SHARE;
 use super::linear::{Basis, add_scaled, energy};
 use super::planned::{Place, Protocol, Step, free_stroke, moments, play};
 use super::verdict::{Diagnosis, NextExperiment};
@@ -36,8 +43,8 @@ fn settable(value: f64) -> f64 {
 
 /// Recordings that tell effects apart, cheapest first, for a muscle and its pressures (Pa).
 fn menu(muscle: &Muscle<f64>, low: f64, high: f64) -> Vec<Item> {
-    let levels = [0.35 * high + 0.65 * low, 0.9 * high + 0.1 * low].map(|p| settable(p * 1e-3));
-    let slow = settable((free_stroke(muscle, high) * 1e3 / 27.0).max(1e-3));
+    let levels = MENU_PRESSURES.map(|part| settable((part * high + (1.0 - part) * low) * 1e-3));
+    let slow = settable((free_stroke(muscle, high) * 1e3 / SLOW_STROKE).max(1e-3));
     let set = |p: f64| Step::Pressure { to_kpa: p, rate_kpa_s: Some(50.0), settle_s: 2.0 };
     let loops = |part: f64, speed: f64, count: u32| Step::Cycles {
         to: Place { free: Some(part), ..Place::default() },
@@ -126,9 +133,9 @@ fn menu(muscle: &Muscle<f64>, low: f64, high: f64) -> Vec<Item> {
 fn tables(contexts: &[Context<f64>]) -> Basis {
     let top = contexts.iter().map(|c| c.pressure).fold(1.0, f64::max);
     let mut columns: Vec<Vec<f64>> = Vec::new();
-    for degree in 0..3 {
+    for degree in 0..PLAN_POWERS {
         let over = |c: &Context<f64>| (c.pressure / top).powi(degree);
-        for order in 1..=4 {
+        for order in 1..=TABLE_ORDER as i32 {
             columns.push(
                 contexts
                     .iter()
@@ -145,7 +152,7 @@ fn tables(contexts: &[Context<f64>]) -> Basis {
     columns.push(contexts.iter().map(|c| c.area).collect());
     for column in &mut columns {
         for (v, c) in column.iter_mut().zip(contexts) {
-            if c.pressure < 0.02 * top {
+            if c.pressure < VENTED_SHARE * top {
                 *v = 0.0;
             }
         }
@@ -263,7 +270,9 @@ pub fn next_experiment(
             for rival in &rivals {
                 let span = pam_fit::bench::Span::of(&contexts)?;
                 let mut best = f64::INFINITY;
-                for shape in rival.grid(if rival.shapes().len() < 2 { 5 } else { 3 }, &span) {
+                for shape in
+                    rival.grid(if rival.shapes().len() < 2 { RIVAL_GRID } else { RIVAL_GRID_SEVERAL }, &span)
+                {
                     let mut with = basis.clone();
                     for c in rival.columns(&contexts, &shape, &mut [0.0; MEMORY]) {
                         if c.iter().all(|v| v.is_finite()) {
@@ -284,7 +293,7 @@ pub fn next_experiment(
     let mut separates = vec![first.effect.clone()];
     separates.extend(first.confusable_with.iter().cloned());
     Ok(best.map(|(_, difference, protocol, words)| {
-        let floor = 0.3 * diagnosis.noise_N.max(1e-3 * diagnosis.blocked_force_N);
+        let floor = WORTHWHILE_DIFFERENCE * diagnosis.noise_N.max(EXPECTED_NOISE * diagnosis.blocked_force_N);
         let words = match bench_block(&separates) {
             Some(block) if difference < floor => format!("no motion tells these apart; {block}"),
             Some(block) => format!("{words}; besides, {block}"),
@@ -312,7 +321,7 @@ pub struct Isolability {
 pub fn isolability(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Vec<Isolability>> {
     let campaign = play(protocol, muscle)?;
     let contexts = moments(muscle, &campaign);
-    let stride = contexts.len().div_ceil(12_000).max(1);
+    let stride = contexts.len().div_ceil(PROTOCOL_ROWS).max(1);
     let keep: Vec<usize> = (0..contexts.len()).step_by(stride).collect();
     let thin: Vec<Context<f64>> = keep.iter().map(|i| contexts[*i]).collect();
     let basis = tables(&thin);
@@ -343,9 +352,9 @@ pub fn isolability(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Vec<Isol
         .enumerate()
         .map(|(i, law)| {
             let mut not_told_from: Vec<(String, f64)> = (0..laws.len())
-                .filter(|j| *j != i && traces[i].0 > 1e-5 && traces[*j].0 > 1e-5)
+                .filter(|j| *j != i && traces[i].0 > INVISIBLE && traces[*j].0 > INVISIBLE)
                 .map(|j| (laws[j].name().to_owned(), cosine(&traces[i].1, &traces[j].1).abs()))
-                .filter(|(_, c)| *c > 0.9)
+                .filter(|(_, c)| *c > INDISTINGUISHABLE)
                 .collect();
             not_told_from.sort_by(|a, b| b.1.total_cmp(&a.1));
             Isolability { effect: law.name().to_owned(), visible: traces[i].0, not_told_from }

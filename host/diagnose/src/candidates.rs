@@ -2,18 +2,14 @@
 
 use model_core::effects::{Info, Link, MEMORY, Parameter, Role};
 
+use super::criteria::candidates::{
+    CHANGE_POINTS, LAW_ERROR, LOGARITHMIC_RANGE, LOW_END, RANGE_OVERSHOOT, SHAPE_GRID,
+};
 use super::linear::Sign;
 use super::moment;
 use super::rows::Rows;
 use super::trial::Trial;
 use pam_fit::bench::{Candidate as Law, Span};
-
-/// Moments at which something may have happened that are looked at first.
-const MOMENTS: usize = 40;
-/// A shape in this first part of its range stands at the low end.
-const LOW_END: f64 = 1e-3;
-/// How inexact a law is, as a share of its trace: first order in sensitivities, shapes from another muscle.
-const LAW_ERROR: f64 = 0.03;
 
 /// One member of the library.
 #[derive(Clone, Copy, Debug)]
@@ -78,15 +74,15 @@ impl Candidate {
     pub(crate) fn grid(&self) -> Vec<Vec<f64>> {
         let shapes: Vec<Parameter> = self.shapes().collect();
         let points = match shapes.len() {
-            0 | 1 => 9,
-            2 => 5,
-            3 => 4,
-            _ => 3,
+            0 | 1 => SHAPE_GRID[0],
+            2 => SHAPE_GRID[1],
+            3 => SHAPE_GRID[2],
+            _ => SHAPE_GRID[3],
         };
         let mut grid = vec![Vec::new()];
         for p in shapes {
             // A moment cannot be found by walking from a far one: the trace changes where it lies, not how large it is.
-            let points = if p.name == moment::MOMENT { MOMENTS } else { points };
+            let points = if p.name == moment::MOMENT { CHANGE_POINTS } else { points };
             let axis: Vec<f64> = (0..points).map(|i| place(&p, (i as f64 + 0.5) / points as f64)).collect();
             grid = grid
                 .into_iter()
@@ -108,7 +104,7 @@ impl Candidate {
         for (i, p) in self.shapes().enumerate() {
             for sign in [-1.0, 1.0] {
                 let u = unplace(&p, center[i]) + sign * step;
-                if (-0.02..=1.02).contains(&u) {
+                if (-RANGE_OVERSHOOT..=1.0 + RANGE_OVERSHOOT).contains(&u) {
                     let mut moved = center.to_vec();
                     moved[i] = place(&p, u.clamp(0.0, 1.0));
                     near.push(moved);
@@ -160,7 +156,7 @@ impl Candidate {
 
 /// The value at a share of a parameter's range; by its logarithm where it spans decades.
 fn place(p: &Parameter, u: f64) -> f64 {
-    if p.low > 0.0 && p.high > 4.0 * p.low {
+    if p.low > 0.0 && p.high > LOGARITHMIC_RANGE * p.low {
         (p.low.ln() + u * (p.high / p.low).ln()).exp()
     } else {
         p.low + u * (p.high - p.low)
@@ -168,7 +164,7 @@ fn place(p: &Parameter, u: f64) -> f64 {
 }
 
 fn unplace(p: &Parameter, value: f64) -> f64 {
-    if p.low > 0.0 && p.high > 4.0 * p.low {
+    if p.low > 0.0 && p.high > LOGARITHMIC_RANGE * p.low {
         (value / p.low).ln() / (p.high / p.low).ln()
     } else {
         (value - p.low) / (p.high - p.low).max(1e-300)

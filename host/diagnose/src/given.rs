@@ -5,13 +5,16 @@ use rayon::prelude::*;
 
 use super::baselines::{self, Kind};
 use super::candidates::Candidate;
+use super::criteria::candidates::LEAST_SIGMA;
+use super::criteria::selection::{FAMILY_ALPHA, LEAST_EXCESS, LEAST_SCORE, LEAST_SCORE_ALONE, MAX_NAMED};
+use super::criteria::uncertainty::HELD_OUT_LEAVES;
 use super::evidence::Scale;
 use super::ground::Ground;
-use super::held_out::{HELPS, Unseen};
+use super::held_out::Unseen;
 use super::linear::energy;
 use super::rows::Rows;
-use super::search::{MAX_NAMED, search};
-use super::select::{self, Found, Taken, look, refit, rivals};
+use super::search::search;
+use super::select::{Found, Taken, look, refit, rivals};
 use super::trial::Trial;
 use super::verdict::{HeldOut, Missing};
 use pam_data::error::{DataCode, Error, Result};
@@ -65,7 +68,7 @@ pub(super) fn fitted(
     let scale = Scale {
         weight,
         independent: found.noise.independent.max(rows.blocks as f64),
-        sigma: found.noise.sigma.max(1e-6 * blocked),
+        sigma: found.noise.sigma.max(LEAST_SIGMA * blocked),
         blocked,
     };
     let noise_energy = scale.sigma * scale.sigma * weight;
@@ -87,7 +90,7 @@ pub(super) fn fitted(
         let mut rivals = rivals(&trial, &best, library, rows, &ground, &metric.span);
         rivals.retain(|r| !given.contains(&r.0));
         if chosen.is_empty() {
-            found.above = (trial.before - noise_energy).max(0.02 * trial.before).max(1e-12);
+            found.above = (trial.before - noise_energy).max(LEAST_EXCESS * trial.before).max(1e-12);
         }
         let share = trial.gain / found.above;
         chosen.push(trial.clone());
@@ -135,12 +138,11 @@ pub(super) fn judge(missing: &mut [Missing], found: &Found, rows: &Rows, held: &
     for (i, (m, taken)) in missing.iter_mut().zip(&found.taken).enumerate() {
         let trial = &taken.trial;
         let sized = trial.amplitudes.iter().any(|a| *a != 0.0);
-        let likely = trial.score
-            >= if taken.p <= select::FAMILY_ALPHA { select::LEAST_SCORE } else { select::LEAST_ALONE };
+        let likely = trial.score >= if taken.p <= FAMILY_ALPHA { LEAST_SCORE } else { LEAST_SCORE_ALONE };
         let mut others = found.traces.clone();
         others.remove(i);
         let without = if others.is_empty() { held.rms_before_N } else { unseen_rows.error(&others) };
-        let helps = held.rms_after_N < HELPS * without;
+        let helps = held.rms_after_N < HELD_OUT_LEAVES * without;
         let unseen = format!("unseen rows go from {without:.3} to {:.3} N with it", held.rms_after_N);
         m.given = true;
         m.probability = 1.0;
