@@ -1,6 +1,6 @@
 //! The cheapest next recording that would tell confusable effects apart, and the matrix of what a planned protocol can tell.
 
-use model_core::effects::{Context, MEMORY};
+use model_core::effects::{BenchCheck, Context, Experiment, Imitates, MEMORY};
 use model_core::muscle::Muscle;
 use rayon::prelude::*;
 
@@ -177,66 +177,61 @@ fn trace(law: Candidate, shape: &[f64], amplitudes: &[f64], contexts: &[Context<
 
 /// Blocks of the menu that need the bench, not the muscle: they split what no motion can.
 fn bench_block(names: &[String]) -> Option<&'static str> {
-    let has = |n: &str| names.iter().any(|x| x == n);
-    if has("rig-compliance") || has("backlash") {
-        Some(
-            "put a rigid bar in the muscle's place and load it once: it shows what the frame and its joints give",
-        )
-    } else if has("force-gain") || has("cross-talk") || has("misalignment") {
-        Some("hang dead weights on the load cell, with and without pressure in the line")
-    } else if has("gauge-gain") || has("leak") {
-        Some("compare the gauge with a reference at three pressures, and close the valve for a minute")
-    } else if has("displacement-offset") || has("permanent-set") || has("end-slip") {
-        Some("measure the vented length with a calliper before and after")
-    } else if has("gravity") || has("force-offset") {
-        Some("weigh the muscle, and record the vented load cell before and after")
-    } else if has("tip-effect") || has("braid-elasticity") {
-        Some("photograph the ends and measure the diameter at three pressures")
-    } else {
-        None
-    }
+    let check = |name: &String| Candidate::from_name(name).and_then(|law| law.traits().check);
+    names.iter().filter_map(check).min().map(|check| match check {
+        BenchCheck::RigidBar => {
+            "put a rigid bar in the muscle's place and load it once: it shows what the frame and its joints give"
+        }
+        BenchCheck::DeadWeights => {
+            "hang dead weights on the load cell, with and without pressure in the line"
+        }
+        BenchCheck::ReferenceGauge => {
+            "compare the gauge with a reference at three pressures, and close the valve for a minute"
+        }
+        BenchCheck::VentedLength => "measure the vented length with a calliper before and after",
+        BenchCheck::Weighing => "weigh the muscle, and record the vented load cell before and after",
+        BenchCheck::EndsAndDiameter => "photograph the ends and measure the diameter at three pressures",
+    })
 }
 
 /// What to do so that an effect would show which recordings like these conceal.
 pub(crate) fn what_would_show(effect: &str) -> &'static str {
-    match effect {
-        "force-offset" | "force-drift" => "record the vented load cell before, between and after",
-        "gravity" => "weigh the muscle and its fittings, or turn the bench by a right angle",
-        "gauge-offset" | "gauge-gain" | "leak" => {
-            "compare the gauge with a reference, vented and at three pressures"
-        }
-        "force-gain" | "cross-talk" | "misalignment" => {
+    experiment(Candidate::from_name(effect).map_or(Experiment::Varied, |law| law.traits().shown_by))
+}
+
+/// An experiment in words.
+pub(crate) fn experiment(experiment: Experiment) -> &'static str {
+    match experiment {
+        Experiment::VentedReadings => "record the vented load cell before, between and after",
+        Experiment::Weighing => "weigh the muscle and its fittings, or turn the bench by a right angle",
+        Experiment::ReferenceGauge => "compare the gauge with a reference, vented and at three pressures",
+        Experiment::DeadWeights => {
             "hang dead weights on the load cell, with and without pressure in the line"
         }
-        "rig-compliance" | "backlash" => "put a rigid bar in the muscle's place and load it once",
-        "displacement-offset" | "permanent-set" | "end-slip" => {
-            "measure the vented length with a calliper before and after"
-        }
-        "tip-effect" | "braid-elasticity" => {
+        Experiment::RigidBar => "put a rigid bar in the muscle's place and load it once",
+        Experiment::VentedLength => "measure the vented length with a calliper before and after",
+        Experiment::EndsAndDiameter => {
             "photograph the ends and measure the diameter at three pressures, or test two lengths of the same stock"
         }
-        "contact-loss" | "pressure-sensor-lag" => {
-            "record slow ramps of pressure from zero at three held lengths"
-        }
-        "breakaway-friction" => "record rests of 1, 10 and 100 s at one place, sampled at 100 Hz or faster",
-        "presliding-hysteresis" | "minor-loop-memory" => "record nested small loops at two speeds",
-        "viscous-damping" | "rate-power" | "stribeck-friction" | "sensor-delay" | "pressure-lag"
-        | "inertia" => "record loops at four speeds over two decades",
-        "coulomb-friction" | "pressure-friction" | "seal-friction" => {
+        Experiment::PressureRamps => "record slow ramps of pressure from zero at three held lengths",
+        Experiment::Rests => "record rests of 1, 10 and 100 s at one place, sampled at 100 Hz or faster",
+        Experiment::NestedLoops => "record nested small loops at two speeds",
+        Experiment::Speeds => "record loops at four speeds over two decades",
+        Experiment::PressuresAndRamps => {
             "record loops at four pressures and slow ramps of pressure at held lengths"
         }
-        "friction-asymmetry" => {
+        Experiment::RestsFromBothSides => {
             "rest at one place reached from both sides: the gap closes to the true middle"
         }
-        "stress-relaxation" | "log-creep" => {
-            "hold the length for 100 s at two pressures, reached from both sides"
-        }
-        "mullins-softening" => "record a new specimen's first strokes, and the same again after a day",
-        "cyclic-softening" | "thermal-softening" => {
+        Experiment::LongHolds => "hold the length for 100 s at two pressures, reached from both sides",
+        Experiment::FirstStrokes => "record a new specimen's first strokes, and the same again after a day",
+        Experiment::RepeatsAfterRest => {
             "repeat the first loops at the end, and again after half an hour of vented rest"
         }
-        "strand-jamming" => "go to the very end of the free stroke",
-        _ => "record at several speeds, with rests, and the first pressure once more at the end",
+        Experiment::EndOfStroke => "go to the very end of the free stroke",
+        Experiment::Varied => {
+            "record at several speeds, with rests, and the first pressure once more at the end"
+        }
     }
 }
 
@@ -326,7 +321,8 @@ pub fn isolability(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Vec<Isol
     let thin: Vec<Context<f64>> = keep.iter().map(|i| contexts[*i]).collect();
     let basis = tables(&thin);
     let span = pam_fit::bench::Span::of(&contexts);
-    let laws: Vec<Candidate> = Candidate::all().filter(|l| l.name() != "higher-order-elasticity").collect();
+    let laws: Vec<Candidate> =
+        Candidate::all().filter(|l| l.traits().imitates != Some(Imitates::ElasticOrders)).collect();
     let traces: Vec<(f64, Vec<f64>)> = laws
         .par_iter()
         .map(|law| {

@@ -1,6 +1,7 @@
 //! From a campaign to the answer.
 
 use model_core::braid::{Braid, Geometry};
+use model_core::effects::Imitates;
 
 use super::baselines::{self, Kind};
 use super::candidates::library;
@@ -40,6 +41,19 @@ pub struct Options {
     pub given: Vec<Law>,
     /// Who watches how far it has come; nobody by default.
     pub progress: SharedProgress,
+    /// Effects beyond the catalogue, whose equations a test brings.
+    #[cfg(test)]
+    pub(crate) added: Vec<super::candidates::Law>,
+}
+
+impl Options {
+    /// Laws beyond the catalogue.
+    pub(super) fn added(&self) -> Vec<super::candidates::Law> {
+        #[cfg(test)]
+        return self.added.clone();
+        #[cfg(not(test))]
+        Vec::new()
+    }
 }
 
 /// An answer, and the baseline that it was given with.
@@ -106,9 +120,10 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
         return unjudged(no_judgement(&rows, options, remarks, reason, blocked));
     }
     remarks.extend(tables_as_evidence(&production, &rows));
-    let library: Vec<_> = library(&rows).into_iter().filter(|c| !known.settles(c, &options.given)).collect();
+    let library: Vec<_> =
+        library(&rows, &options.added()).into_iter().filter(|c| !known.settles(c, &options.given)).collect();
     let asked: Vec<usize> =
-        options.given.iter().filter_map(|law| library.iter().position(|c| c.law == *law)).collect();
+        options.given.iter().filter_map(|law| library.iter().position(|c| c.is(*law))).collect();
     let (found, held) = if options.given.is_empty() {
         confirmed(&mut rows, &library, blocked, step)
     } else {
@@ -216,14 +231,11 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
     Ok(Asked { diagnosis, kind: found.full.kind })
 }
 
-/// Gains and offsets that a wrong description of the muscle imitates.
-const LIKE_A_DESCRIPTION: [&str; 5] =
-    ["force-gain", "gauge-gain", "displacement-offset", "braid-elasticity", "tip-effect"];
-
 /// What to look at before a fault of that size is believed.
 fn beyond_instruments(m: &Missing) -> Option<String> {
     let beyond = m.parameters.iter().any(|p| p.outside_known_range && p.value != 0.0);
-    (beyond && LIKE_A_DESCRIPTION.contains(&m.effect.as_str())).then(|| {
+    let imitates = Law::from_name(&m.effect).and_then(|law| law.traits().imitates);
+    (beyond && imitates == Some(Imitates::Description)).then(|| {
         format!(
             "{} of this size is more than anybody has met: look first at the muscle's description (diameter, braid angle, rest length, \
              wall) and at the units; a wrong one looks like this",

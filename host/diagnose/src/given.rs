@@ -1,6 +1,7 @@
 //! Effects that the user knows to be there: fitted with the base by the same steps as names that are found, whatever the evidence; and
 //! what the recordings themselves say of them.
 
+use model_core::effects::Imitates;
 use rayon::prelude::*;
 
 use super::baselines::{self, Kind};
@@ -30,22 +31,24 @@ pub(super) fn check(given: &[Law]) -> Result<()> {
         );
     }
     for (i, law) in given.iter().enumerate() {
-        match law.name() {
-            "gauge-offset" => {
+        match law.traits().imitates {
+            Some(Imitates::Deadband) => {
                 return refused(
-                    "`gauge-offset` cannot be given: it is the deadband, which is fitted in any case".into(),
+                    format!(
+                        "`{}` cannot be given: it is the deadband, which is fitted in any case",
+                        law.name()
+                    ),
                     "leave it out",
                 );
             }
-            "higher-order-elasticity" => {
+            Some(Imitates::ElasticOrders) => {
                 return refused(
-                    "`higher-order-elasticity` cannot be given: it is offered before any effect is weighed"
-                        .into(),
+                    format!("`{}` cannot be given: it is offered before any effect is weighed", law.name()),
                     "leave it out, or fit with `host fit --order`",
                 );
             }
-            name if given[..i].contains(law) => {
-                return refused(format!("`{name}` is given twice"), "give each effect once");
+            _ if given[..i].contains(law) => {
+                return refused(format!("`{}` is given twice", law.name()), "give each effect once");
             }
             _ => {}
         }

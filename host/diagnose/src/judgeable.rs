@@ -89,7 +89,7 @@ pub(super) fn no_judgement(
     blocked: f64,
 ) -> Diagnosis {
     remarks.insert(0, format!("nothing can be judged: {reason}"));
-    let considered = library(rows)
+    let considered = library(rows, &options.added())
         .iter()
         .map(|c| Considered {
             effect: c.name().into(),

@@ -89,8 +89,8 @@ impl Known {
     ///
     /// What the user gives as known is fitted even where a check found nothing of it that matters.
     pub(super) fn settles(&self, candidate: &Candidate, given: &[Law]) -> bool {
-        let is = |j: &Judged| Law::Bench(j.measured.fault) == candidate.law;
-        self.named.iter().any(is) || (!given.contains(&candidate.law) && self.absent.iter().any(is))
+        let is = |j: &Judged| candidate.is(Law::Bench(j.measured.fault));
+        self.named.iter().any(is) || (!given.iter().any(|g| candidate.is(*g)) && self.absent.iter().any(is))
     }
 
     /// Enters what is known into the answer that was given without it.

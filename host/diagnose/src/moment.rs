@@ -7,19 +7,18 @@
 
 use super::baselines;
 use super::candidates::Candidate;
+use model_core::effects::Axis;
+
 use super::criteria::uncertainty::{CHANGE_POINT_RATIO, CHANGE_POINT_SCAN, NORMAL_95};
 use super::linear::{add_scaled, dot, energy};
 use super::rows::Rows;
 use super::select::{Found, Taken};
 use super::trial::{self, Trial};
 
-/// The name of a shape that is a moment.
-pub(crate) const MOMENT: &str = "slip_time";
-
 /// Where in an effect's shapes its moment stands, if it has one.
 pub(crate) fn place(candidate: &Candidate, trial: &Trial) -> Option<usize> {
-    let name = |shape: usize| candidate.info.parameters.get(trial.amplitudes.len() + shape).map(|p| p.name);
-    (0..trial.shapes.len()).find(|s| name(*s) == Some(MOMENT))
+    let axis = |shape: usize| candidate.info.parameters.get(trial.amplitudes.len() + shape).map(|p| p.axis);
+    (0..trial.shapes.len()).find(|s| axis(*s) == Some(Axis::Time))
 }
 
 /// Where in the campaign a moment lies.

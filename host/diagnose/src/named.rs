@@ -1,6 +1,6 @@
 //! The names: what was taken and how sure that is; what was looked at and why it was not taken.
 
-use super::advise::what_would_show;
+use super::advise::experiment;
 use super::calibration;
 use super::candidates::{Candidate, place_in_words};
 use super::criteria::judgement::{ABSURD_SIZE, DETECTION, DETECTION_ROWS, RELEVANT_SIZE};
@@ -130,8 +130,10 @@ pub(crate) fn considered(
                 Some(h) => format!("up to {h:.2} N"),
                 None => "at any size".to_owned(),
             };
-            let could_be =
-                format!("it could be hidden in these recordings {size}; to know, {}", what_would_show(name));
+            let could_be = format!(
+                "it could be hidden in these recordings {size}; to know, {}",
+                experiment(library[t.candidate].traits.shown_by)
+            );
             let unseen = hidden.is_none_or(|h| h > RELEVANT_SIZE * blocked);
             let why_not = if confusable.iter().any(|c| c.as_str() == name) {
                 "cannot be told from what is named".to_owned()

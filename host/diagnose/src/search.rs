@@ -21,9 +21,6 @@ use super::rows::{ORDERS, Rows};
 use super::select::{Found, Taken, best_of_each, look, refit, rivals, worth_naming};
 use super::trial::Trial;
 
-/// Laws that are little more than a slow course of time, which a reading that wanders imitates best.
-const SLOW: [&str; 4] = ["force-drift", "thermal-softening", "cyclic-softening", "permanent-set"];
-
 /// Searches for what is missing. Candidates in `refused` are looked at and may be rivals, but are not taken.
 pub(crate) fn search(
     rows: &mut Rows,
@@ -257,7 +254,8 @@ impl<'a> Search<'a> {
         let left = noise::estimate(self.rows, &with.residual, self.step);
         let independent = left.independent.max(FEWEST_INDEPENDENT);
         let score = winner.score * (independent / self.scale.independent).min(1.0);
-        let least = if SLOW.contains(&name) { LEAST_SCORE_ALONE } else { LEAST_SCORE };
+        let slow = self.library[winner.candidate].traits.slow;
+        let least = if slow { LEAST_SCORE_ALONE } else { LEAST_SCORE };
         if !kept || score < least {
             self.chosen.pop();
             self.rows.contexts = seen;
