@@ -31,6 +31,7 @@ mod baselines;
 mod calibration;
 mod candidates;
 mod confirm;
+pub mod criteria;
 mod evidence;
 mod frequency;
 mod given;
