@@ -227,6 +227,7 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
         remarks,
         profiles,
         trace: trace(&rows, &found),
+        history: None,
     };
     Ok(Asked { diagnosis, kind: found.full.kind })
 }

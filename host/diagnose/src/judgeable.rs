@@ -127,5 +127,6 @@ pub(super) fn no_judgement(
         remarks,
         profiles: Vec::new(),
         trace: Trace { time: Vec::new(), before: Vec::new(), after: Vec::new(), effects: Vec::new() },
+        history: None,
     }
 }

@@ -4,6 +4,7 @@ use model_core::effects::{FittedEffect, MEMORY};
 use model_core::muscle::Muscle;
 
 use super::criteria::judgement::{CHECKED_COST, PREDICTIVE_COST, REFIT_ROUNDS};
+use super::history;
 use super::planned::moments;
 use super::verdict::{Diagnosis, Verdict};
 use pam_data::error::Result;
@@ -133,6 +134,8 @@ fn parts(diagnosis: &Diagnosis) -> (Vec<FittedEffect>, Vec<Correction>) {
     for m in &diagnosis.missing {
         let values: Vec<f64> = m.parameters.iter().map(|p| p.value).collect();
         match Candidate::from_name(&m.effect) {
+            // The memory found by the history layer has another law than the catalogue's effect of that name.
+            Some(Candidate::Muscle(_)) if history::is_from_history(m) => {}
             Some(Candidate::Muscle(effect)) => {
                 effects.push(FittedEffect::new(effect, &values));
             }
