@@ -7,13 +7,14 @@ use rayon::prelude::*;
 use super::baselines::cosine;
 use super::linear::{Basis, add_scaled, energy};
 use super::planned::{Place, Protocol, Step, free_stroke, moments, play};
+use super::experiment::{Motion, Proposal, bench_check};
 use super::verdict::{Diagnosis, NextExperiment};
 use pam_data::error::Result;
 use pam_fit::bench::Candidate;
 
 /// One entry of the menu: what it is, what it costs, its protocol.
 struct Item {
-    words: &'static str,
+    motion: Motion,
     minutes: f64,
     protocol: Protocol,
 }
@@ -103,19 +104,19 @@ fn menu(muscle: &Muscle<f64>, low: f64, high: f64) -> Vec<Item> {
     }));
     vec![
         Item {
-            words: "loops at speeds 0.3, 1, 4 and 16 times the slow one, at two pressures",
+            motion: Motion::Speeds,
             minutes: 8.0,
             protocol: speeds,
         },
         Item {
-            words: "rests of 1, 10 and 100 s at one place, reached from both sides, at two pressures",
+            motion: Motion::Dwells,
             minutes: 10.0,
             protocol: dwells,
         },
-        Item { words: "nested small loops at two speeds, at two pressures", minutes: 6.0, protocol: nested },
-        Item { words: "slow ramps of pressure at three held lengths", minutes: 9.0, protocol: ramps },
+        Item { motion: Motion::NestedLoops, minutes: 6.0, protocol: nested },
+        Item { motion: Motion::PressureRamps, minutes: 9.0, protocol: ramps },
         Item {
-            words: "the same loops before and after half an hour of vented rest, with the load cell's zero before and after",
+            motion: Motion::Rest,
             minutes: 38.0,
             protocol: rest,
         },
@@ -168,71 +169,6 @@ fn trace(law: Candidate, shape: &[f64], amplitudes: &[f64], contexts: &[Context<
     sum
 }
 
-/// Blocks of the menu that need the bench, not the muscle: they split what no motion can.
-fn bench_block(names: &[String]) -> Option<&'static str> {
-    let has = |n: &str| names.iter().any(|x| x == n);
-    if has("rig-compliance") || has("backlash") {
-        Some(
-            "put a rigid bar in the muscle's place and load it once: it shows what the frame and its joints give",
-        )
-    } else if has("force-gain") || has("cross-talk") || has("misalignment") {
-        Some("hang dead weights on the load cell, with and without pressure in the line")
-    } else if has("gauge-gain") || has("leak") {
-        Some("compare the gauge with a reference at three pressures, and close the valve for a minute")
-    } else if has("displacement-offset") || has("permanent-set") || has("end-slip") {
-        Some("measure the vented length with a calliper before and after")
-    } else if has("gravity") || has("force-offset") {
-        Some("weigh the muscle, and record the vented load cell before and after")
-    } else if has("tip-effect") || has("braid-elasticity") {
-        Some("photograph the ends and measure the diameter at three pressures")
-    } else {
-        None
-    }
-}
-
-/// What to do so that an effect would show which recordings like these conceal.
-pub(crate) fn what_would_show(effect: &str) -> &'static str {
-    match effect {
-        "force-offset" | "force-drift" => "record the vented load cell before, between and after",
-        "gravity" => "weigh the muscle and its fittings, or turn the bench by a right angle",
-        "gauge-offset" | "gauge-gain" | "leak" => {
-            "compare the gauge with a reference, vented and at three pressures"
-        }
-        "force-gain" | "cross-talk" | "misalignment" => {
-            "hang dead weights on the load cell, with and without pressure in the line"
-        }
-        "rig-compliance" | "backlash" => "put a rigid bar in the muscle's place and load it once",
-        "displacement-offset" | "permanent-set" | "end-slip" => {
-            "measure the vented length with a calliper before and after"
-        }
-        "tip-effect" | "braid-elasticity" => {
-            "photograph the ends and measure the diameter at three pressures, or test two lengths of the same stock"
-        }
-        "contact-loss" | "pressure-sensor-lag" => {
-            "record slow ramps of pressure from zero at three held lengths"
-        }
-        "breakaway-friction" => "record rests of 1, 10 and 100 s at one place, sampled at 100 Hz or faster",
-        "presliding-hysteresis" | "minor-loop-memory" => "record nested small loops at two speeds",
-        "viscous-damping" | "rate-power" | "stribeck-friction" | "sensor-delay" | "pressure-lag"
-        | "inertia" => "record loops at four speeds over two decades",
-        "coulomb-friction" | "pressure-friction" | "seal-friction" => {
-            "record loops at four pressures and slow ramps of pressure at held lengths"
-        }
-        "friction-asymmetry" => {
-            "rest at one place reached from both sides: the gap closes to the true middle"
-        }
-        "stress-relaxation" | "log-creep" => {
-            "hold the length for 100 s at two pressures, reached from both sides"
-        }
-        "mullins-softening" => "record a new specimen's first strokes, and the same again after a day",
-        "cyclic-softening" | "thermal-softening" => {
-            "repeat the first loops at the end, and again after half an hour of vented rest"
-        }
-        "strand-jamming" => "go to the very end of the free stroke",
-        _ => "record at several speeds, with rests, and the first pressure once more at the end",
-    }
-}
-
 /// The recording of the menu in which the named effect and those it is confused with differ most for its cost.
 ///
 /// # Errors
@@ -251,7 +187,7 @@ pub fn next_experiment(
         first.confusable_with.iter().filter_map(|n| Candidate::from_name(n)).collect();
     let values: Vec<f64> = first.parameters.iter().map(|p| p.value).collect();
     let (amplitudes, shape) = values.split_at(law.amplitudes().len().min(values.len()));
-    let tried: Vec<Option<(f64, f64, String, &'static str)>> = menu(muscle, low, high)
+    let tried: Vec<Option<(f64, f64, String, Motion)>> = menu(muscle, low, high)
         .par_iter()
         .map(|item| {
             let campaign = play(&item.protocol, muscle).ok()?;
@@ -277,20 +213,17 @@ pub fn next_experiment(
                 least = least.min(best);
             }
             let text = item.protocol.to_toml().ok()?;
-            Some((least / item.minutes.sqrt(), least, text, item.words))
+            Some((least / item.minutes.sqrt(), least, text, item.motion))
         })
         .collect();
     let best = tried.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0));
     let mut separates = vec![first.effect.clone()];
     separates.extend(first.confusable_with.iter().cloned());
-    Ok(best.map(|(_, difference, protocol, words)| {
+    Ok(best.map(|(_, difference, protocol, motion)| {
         let floor = 0.3 * diagnosis.noise_N.max(1e-3 * diagnosis.blocked_force_N);
-        let words = match bench_block(&separates) {
-            Some(block) if difference < floor => format!("no motion tells these apart; {block}"),
-            Some(block) => format!("{words}; besides, {block}"),
-            None => words.to_owned(),
-        };
-        NextExperiment { separates, protocol, expected_difference_N: difference, words }
+        let check = bench_check(&separates);
+        let proposal = Proposal { motion, check, motion_separates: check.is_none() || !(difference < floor) };
+        NextExperiment { separates, protocol, expected_difference_N: difference, proposal }
     }))
 }
 

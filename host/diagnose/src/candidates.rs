@@ -1,6 +1,6 @@
 //! The library of effects as columns: each candidate evaluated over the rows, per amplitude, on a grid of its shapes.
 
-use model_core::effects::{Info, Link, MEMORY, Parameter, Role};
+use model_core::effects::{Info, MEMORY, Parameter, Role};
 
 use super::linear::Sign;
 use super::moment;
@@ -187,17 +187,4 @@ pub(crate) fn library(rows: &Rows) -> Vec<Candidate> {
         .filter(|law| !matches!(law.name(), "gauge-offset" | "higher-order-elasticity"))
         .map(|law| Candidate { law, info: law.info(), span })
         .collect()
-}
-
-/// Where an effect acts, in words.
-pub(crate) fn place_in_words(link: Link) -> &'static str {
-    match link {
-        Link::Air => "the air: the pressure at the muscle",
-        Link::Braid => "the braid and the muscle's shape",
-        Link::Bladder => "the bladder's elasticity",
-        Link::Memory => "the bladder's memory",
-        Link::Friction => "friction",
-        Link::LoadPath => "the load path between muscle and load cell",
-        Link::Reading => "the sensors' readings",
-    }
 }

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::linear::{Random, energy, median, quantile};
+use super::remark::Scatter;
 use super::rows::Rows;
 
 /// Contractions that differ by less are one held length.
@@ -34,15 +35,9 @@ impl Noise {
         self.sigma > OF_INSTRUMENTS * blocked && self.memory > FEW_READINGS * step
     }
 
-    /// How strokes under the same conditions differ, in words.
-    pub(crate) fn words(&self, blocked: f64) -> String {
-        format!(
-            "what does not repeat: under the same conditions the force differs by {:.2} N ({:.1} % of blocked force), for about {:.1} s \
-             at a time",
-            self.sigma,
-            100.0 * self.sigma / blocked,
-            self.memory
-        )
+    /// How strokes under the same conditions differ.
+    pub(crate) fn scatter(&self, blocked: f64) -> Scatter {
+        Scatter { sigma: self.sigma, share: self.sigma / blocked, memory: self.memory }
     }
 }
 
