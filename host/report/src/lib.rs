@@ -21,24 +21,27 @@ pub mod diagnose_page;
 pub mod effect_page;
 pub mod effect_trace;
 pub mod fit_page;
-pub mod rich;
+pub mod inline_markup;
+
+pub mod document;
+pub mod wording;
 
 mod axis;
 mod colour;
 mod figure;
 mod html;
 mod legend;
-pub mod letters;
+pub mod symbols;
 mod markdown;
 mod marks;
 mod numbers;
 mod page;
-mod paper;
-mod parts;
+mod canvas;
+mod export;
 mod svg;
-mod thin;
+mod downsample;
 
 pub use axis::{Axis, Scale, figures, fixed};
 pub use colour::Colour;
-pub use figure::{Figure, Layer, Look, Mark, Panel};
+pub use figure::{Figure, Layer, Style, Mark, Panel};
 pub use page::{Block, Fact, Page, Section, Table, Tone};
