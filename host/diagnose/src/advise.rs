@@ -1,6 +1,6 @@
 //! The cheapest next recording that would tell confusable effects apart, and the matrix of what a planned protocol can tell.
 
-use model_core::effects::{BenchCheck, Context, Experiment, Imitates, MEMORY};
+use model_core::effects::{Context, Imitates, MEMORY};
 use model_core::muscle::Muscle;
 use rayon::prelude::*;
 
@@ -12,6 +12,7 @@ use super::criteria::planning::{
     RIVAL_GRID_SEVERAL, SLOW_STROKE, WORTHWHILE_DIFFERENCE,
 };
 use super::criteria::rows::VENTED_SHARE;
+use super::experiment::{Motion, Proposal, bench_check};
 use super::linear::{Basis, add_scaled, energy};
 use super::planned::{Place, Protocol, Step, free_stroke, moments, play};
 use super::verdict::{Diagnosis, NextExperiment};
@@ -20,7 +21,7 @@ use pam_fit::bench::Candidate;
 
 /// One entry of the menu: what it is, what it costs, its protocol.
 struct Item {
-    words: &'static str,
+    motion: Motion,
     minutes: f64,
     protocol: Protocol,
 }
@@ -109,23 +110,11 @@ fn menu(muscle: &Muscle<f64>, low: f64, high: f64) -> Vec<Item> {
         other => other,
     }));
     vec![
-        Item {
-            words: "loops at speeds 0.3, 1, 4 and 16 times the slow one, at two pressures",
-            minutes: 8.0,
-            protocol: speeds,
-        },
-        Item {
-            words: "rests of 1, 10 and 100 s at one place, reached from both sides, at two pressures",
-            minutes: 10.0,
-            protocol: dwells,
-        },
-        Item { words: "nested small loops at two speeds, at two pressures", minutes: 6.0, protocol: nested },
-        Item { words: "slow ramps of pressure at three held lengths", minutes: 9.0, protocol: ramps },
-        Item {
-            words: "the same loops before and after half an hour of vented rest, with the load cell's zero before and after",
-            minutes: 38.0,
-            protocol: rest,
-        },
+        Item { motion: Motion::Speeds, minutes: 8.0, protocol: speeds },
+        Item { motion: Motion::Dwells, minutes: 10.0, protocol: dwells },
+        Item { motion: Motion::NestedLoops, minutes: 6.0, protocol: nested },
+        Item { motion: Motion::PressureRamps, minutes: 9.0, protocol: ramps },
+        Item { motion: Motion::Rest, minutes: 38.0, protocol: rest },
     ]
 }
 
@@ -175,66 +164,6 @@ fn trace(law: Candidate, shape: &[f64], amplitudes: &[f64], contexts: &[Context<
     sum
 }
 
-/// Blocks of the menu that need the bench, not the muscle: they split what no motion can.
-fn bench_block(names: &[String]) -> Option<&'static str> {
-    let check = |name: &String| Candidate::from_name(name).and_then(|law| law.traits().check);
-    names.iter().filter_map(check).min().map(|check| match check {
-        BenchCheck::RigidBar => {
-            "put a rigid bar in the muscle's place and load it once: it shows what the frame and its joints give"
-        }
-        BenchCheck::DeadWeights => {
-            "hang dead weights on the load cell, with and without pressure in the line"
-        }
-        BenchCheck::ReferenceGauge => {
-            "compare the gauge with a reference at three pressures, and close the valve for a minute"
-        }
-        BenchCheck::VentedLength => "measure the vented length with a calliper before and after",
-        BenchCheck::Weighing => "weigh the muscle, and record the vented load cell before and after",
-        BenchCheck::EndsAndDiameter => "photograph the ends and measure the diameter at three pressures",
-    })
-}
-
-/// What to do so that an effect would show which recordings like these conceal.
-pub(crate) fn what_would_show(effect: &str) -> &'static str {
-    experiment(Candidate::from_name(effect).map_or(Experiment::Varied, |law| law.traits().shown_by))
-}
-
-/// An experiment in words.
-pub(crate) fn experiment(experiment: Experiment) -> &'static str {
-    match experiment {
-        Experiment::VentedReadings => "record the vented load cell before, between and after",
-        Experiment::Weighing => "weigh the muscle and its fittings, or turn the bench by a right angle",
-        Experiment::ReferenceGauge => "compare the gauge with a reference, vented and at three pressures",
-        Experiment::DeadWeights => {
-            "hang dead weights on the load cell, with and without pressure in the line"
-        }
-        Experiment::RigidBar => "put a rigid bar in the muscle's place and load it once",
-        Experiment::VentedLength => "measure the vented length with a calliper before and after",
-        Experiment::EndsAndDiameter => {
-            "photograph the ends and measure the diameter at three pressures, or test two lengths of the same stock"
-        }
-        Experiment::PressureRamps => "record slow ramps of pressure from zero at three held lengths",
-        Experiment::Rests => "record rests of 1, 10 and 100 s at one place, sampled at 100 Hz or faster",
-        Experiment::NestedLoops => "record nested small loops at two speeds",
-        Experiment::Speeds => "record loops at four speeds over two decades",
-        Experiment::PressuresAndRamps => {
-            "record loops at four pressures and slow ramps of pressure at held lengths"
-        }
-        Experiment::RestsFromBothSides => {
-            "rest at one place reached from both sides: the gap closes to the true middle"
-        }
-        Experiment::LongHolds => "hold the length for 100 s at two pressures, reached from both sides",
-        Experiment::FirstStrokes => "record a new specimen's first strokes, and the same again after a day",
-        Experiment::RepeatsAfterRest => {
-            "repeat the first loops at the end, and again after half an hour of vented rest"
-        }
-        Experiment::EndOfStroke => "go to the very end of the free stroke",
-        Experiment::Varied => {
-            "record at several speeds, with rests, and the first pressure once more at the end"
-        }
-    }
-}
-
 /// The recording of the menu in which the named effect and those it is confused with differ most for its cost.
 ///
 /// # Errors
@@ -253,7 +182,7 @@ pub fn next_experiment(
         first.confusable_with.iter().filter_map(|n| Candidate::from_name(n)).collect();
     let values: Vec<f64> = first.parameters.iter().map(|p| p.value).collect();
     let (amplitudes, shape) = values.split_at(law.amplitudes().len().min(values.len()));
-    let tried: Vec<Option<(f64, f64, String, &'static str)>> = menu(muscle, low, high)
+    let tried: Vec<Option<(f64, f64, String, Motion)>> = menu(muscle, low, high)
         .par_iter()
         .map(|item| {
             let campaign = play(&item.protocol, muscle).ok()?;
@@ -281,20 +210,17 @@ pub fn next_experiment(
                 least = least.min(best);
             }
             let text = item.protocol.to_toml().ok()?;
-            Some((least / item.minutes.sqrt(), least, text, item.words))
+            Some((least / item.minutes.sqrt(), least, text, item.motion))
         })
         .collect();
     let best = tried.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0));
     let mut separates = vec![first.effect.clone()];
     separates.extend(first.confusable_with.iter().cloned());
-    Ok(best.map(|(_, difference, protocol, words)| {
+    Ok(best.map(|(_, difference, protocol, motion)| {
         let floor = WORTHWHILE_DIFFERENCE * diagnosis.noise_N.max(EXPECTED_NOISE * diagnosis.blocked_force_N);
-        let words = match bench_block(&separates) {
-            Some(block) if difference < floor => format!("no motion tells these apart; {block}"),
-            Some(block) => format!("{words}; besides, {block}"),
-            None => words.to_owned(),
-        };
-        NextExperiment { separates, protocol, expected_difference_N: difference, words }
+        let check = bench_check(&separates);
+        let proposal = Proposal { motion, check, motion_separates: check.is_none() || !(difference < floor) };
+        NextExperiment { separates, protocol, expected_difference_N: difference, proposal }
     }))
 }
 

@@ -19,11 +19,12 @@ use super::known::Known;
 use super::linear::energy;
 use super::locate::{block_ranges, locate};
 use super::named::{considered, missing};
+use super::remark::{Remark, Unjudgeable};
 use super::rest;
 use super::rows::{self, Rows};
 use super::select::Found;
 use super::tables::{in_the_tables, tables_as_evidence};
-use super::verdict::{Diagnosis, Missing, PathStep, Region, Trace, Unexplained, Verdict};
+use super::verdict::{Diagnosis, Missing, Outcome, PathStep, Pattern, Region, Trace, Unexplained, Verdict};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::progress::SharedProgress;
 use pam_data::recording::Campaign;
@@ -97,26 +98,20 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
         slack += baselines::mask_slack(&mut rows, &fitted);
     }
     if slack * SLACK_MENTIONED > rows.len() {
-        remarks.push(format!(
-            "in {:.0} % of the rows the muscle hangs slack; they say nothing about its force and were left out",
-            100.0 * slack as f64 / rows.len() as f64
-        ));
+        remarks.push(Remark::Slack(slack as f64 / rows.len() as f64));
     }
     if let Some(reason) = cannot_be_judged(&rows, blocked) {
         return unjudged(no_judgement(&rows, options, remarks, reason, blocked));
     }
     if let Some(law) = rest::settle_friction(&mut rows) {
-        remarks.push(law.words());
+        remarks.push(Remark::FrictionAtRest(law.into()));
     }
     // The model as it was: four orders, tables free over pressure.
     let production = baselines::fit(&rows, Kind::Flexible(TABLE_ORDER), &[]);
     let misfit = production.rms(&rows);
     let measured = baselines::measured_rms(&rows);
     if !(misfit < measured) {
-        let reason = format!(
-            "the model of this muscle misses the force by {misfit:.3} N, and all that was measured is {measured:.3} N: look at the \
-             muscle's description and at the units before anything else"
-        );
+        let reason = Unjudgeable::WrongModel { misfit, measured };
         return unjudged(no_judgement(&rows, options, remarks, reason, blocked));
     }
     remarks.extend(tables_as_evidence(&production, &rows));
@@ -132,7 +127,7 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
     remarks.extend(found.remarks.iter().cloned());
     let sigma = found.noise.sigma;
     if !found.noise.from_repeats {
-        remarks.push("no stroke is repeated under the same conditions: the noise is what the most flexible model leaves".to_owned());
+        remarks.push(Remark::NoRepeats);
     }
 
     let mut missing = missing(&found, &library, &rows);
@@ -158,11 +153,7 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
     }
     let restless = missing.is_empty() && found.noise.has_a_reason(step, blocked);
     if restless {
-        remarks.push(format!(
-            "{}; no instrument scatters like this, and no effect of the library explains it: look at the air supply, at the stroke \
-             sensor's counts and at whatever is loose, then record two strokes under the same conditions again",
-            found.noise.words(blocked)
-        ));
+        remarks.push(Remark::NotRepeatable(found.noise.scatter(blocked)));
     }
     let verdict = if missing.is_empty() {
         // What beats in time is no noise, however well repeats seem to explain it; nor is what is larger than any instrument's.
@@ -179,10 +170,10 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
     let (left_regions, _) = locate(&rows, &found.full.residual, &found.full.residual, sigma, 8);
     let share = if verdict == Verdict::Consistent { 0.0 } else { 1.0 - explained };
     let pattern = match (&beat, left_regions.first()) {
-        (Some(l), _) => format!("periodic in time, {:.2} Hz", l.hertz),
-        (None, Some(r)) if left > own => r.words.clone(),
-        _ if restless => found.noise.words(blocked),
-        _ => "none".to_owned(),
+        (Some(l), _) => Pattern::Periodic(l.hertz),
+        (None, Some(r)) if left > own => Pattern::Region(Box::new(r.clone())),
+        _ if restless => Pattern::NotRepeatable(found.noise.scatter(blocked)),
+        _ => Pattern::None,
     };
     if let Some(l) = beat {
         regions.push(Region {
@@ -193,7 +184,6 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
             rows: 1.0,
             p: l.p,
             unit: "Hz".into(),
-            words: format!("{:.0} % of the misfit repeats in time with {:.2} Hz", 100.0 * l.share, l.hertz),
         });
     }
     let considered = considered(&found, &library, &missing, sigma, blocked);
@@ -208,11 +198,9 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
         })
         .collect();
     let diagnosis = Diagnosis {
-        schema: "pam-diagnose/1".into(),
         muscle: options.muscle.clone(),
         samples: rows.samples,
-        judged: true,
-        verdict,
+        outcome: Outcome::Judged(verdict),
         noise_N: sigma,
         misfit_rms_N: misfit,
         r#where: if verdict == Verdict::Consistent { Vec::new() } else { regions },
@@ -233,16 +221,10 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
 }
 
 /// What to look at before a fault of that size is believed.
-fn beyond_instruments(m: &Missing) -> Option<String> {
+fn beyond_instruments(m: &Missing) -> Option<Remark> {
     let beyond = m.parameters.iter().any(|p| p.outside_known_range && p.value != 0.0);
     let imitates = Law::from_name(&m.effect).and_then(|law| law.traits().imitates);
-    (beyond && imitates == Some(Imitates::Description)).then(|| {
-        format!(
-            "{} of this size is more than anybody has met: look first at the muscle's description (diameter, braid angle, rest length, \
-             wall) and at the units; a wrong one looks like this",
-            m.effect
-        )
-    })
+    (beyond && imitates == Some(Imitates::Description)).then(|| Remark::CheckDescription(m.effect.clone()))
 }
 
 /// Of the rows that are judged: elsewhere no residual is a misfit, and what an effect adds there is no one's claim.

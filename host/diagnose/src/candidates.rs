@@ -1,6 +1,6 @@
 //! The library of effects as columns: each candidate evaluated over the rows, per amplitude, on a grid of its shapes.
 
-use model_core::effects::{Axis, Context, Imitates, Info, Link, MEMORY, Parameter, Role, Traits, Vented};
+use model_core::effects::{Axis, Context, Imitates, Info, MEMORY, Parameter, Role, Traits, Vented};
 
 use super::criteria::candidates::{
     CHANGE_POINTS, LAW_ERROR, LOGARITHMIC_RANGE, LOW_END, RANGE_OVERSHOOT, SHAPE_GRID,
@@ -229,17 +229,4 @@ pub(crate) fn library(rows: &Rows, added: &[Law]) -> Vec<Candidate> {
         .map(|law| Candidate { law, info: law.info(), traits: law.traits(), span })
         .filter(|c| !matches!(c.traits.imitates, Some(Imitates::Deadband | Imitates::ElasticOrders)))
         .collect()
-}
-
-/// Where an effect acts, in words.
-pub(crate) fn place_in_words(link: Link) -> &'static str {
-    match link {
-        Link::Air => "the air: the pressure at the muscle",
-        Link::Braid => "the braid and the muscle's shape",
-        Link::Bladder => "the bladder's elasticity",
-        Link::Memory => "the bladder's memory",
-        Link::Friction => "friction",
-        Link::LoadPath => "the load path between muscle and load cell",
-        Link::Reading => "the sensors' readings",
-    }
 }

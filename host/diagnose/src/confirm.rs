@@ -4,6 +4,7 @@ use super::candidates::Candidate;
 use super::criteria::selection::MOST_REFUSED;
 use super::criteria::uncertainty::HELD_OUT_LEAVES;
 use super::held_out::Unseen;
+use super::remark::{Refusal, Remark};
 use super::rows::Rows;
 use super::search::search;
 use super::select::Found;
@@ -44,11 +45,10 @@ fn keep_what_helps(found: &mut Found, rows: &mut Rows, library: &[Candidate]) ->
             return with;
         }
         let name = found.taken.last().map_or("", |t| library[t.trial.candidate].name());
-        found.remarks.push(format!(
-            "{name} fits these recordings but does not improve rows that the fit had not seen ({before:.3} N without it, {:.3} N with \
-             it): it is not named",
-            with.rms_after_N
-        ));
+        found.remarks.push(Remark::Refused {
+            effect: name.to_owned(),
+            why: Refusal::NotConfirmed { without: before, with: with.rms_after_N },
+        });
         found.drop_last(rows, library);
     }
 }

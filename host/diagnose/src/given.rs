@@ -17,7 +17,8 @@ use super::rows::Rows;
 use super::search::search;
 use super::select::{Found, Taken, look, refit, rivals};
 use super::trial::Trial;
-use super::verdict::{HeldOut, Missing};
+use super::verdict::{HeldOut, Missing, Why};
+use super::why::UnseenError;
 use pam_data::error::{DataCode, Error, Result};
 use pam_fit::bench::Candidate as Law;
 
@@ -146,7 +147,7 @@ pub(super) fn judge(missing: &mut [Missing], found: &Found, rows: &Rows, held: &
         others.remove(i);
         let without = if others.is_empty() { held.rms_before_N } else { unseen_rows.error(&others) };
         let helps = held.rms_after_N < HELD_OUT_LEAVES * without;
-        let unseen = format!("unseen rows go from {without:.3} to {:.3} N with it", held.rms_after_N);
+        let unseen = UnseenError { without, with: held.rms_after_N };
         m.given = true;
         m.probability = 1.0;
         m.supported = sized && likely && helps;
@@ -158,17 +159,13 @@ pub(super) fn judge(missing: &mut [Missing], found: &Found, rows: &Rows, held: &
             m.peak_N = 0.0;
         }
         m.why = if !sized {
-            "it was given; the recordings give it no size: they do not show it, or contradict it".to_owned()
-        } else if m.supported {
-            format!("it was given, and the recordings support it: {}; {unseen}", m.why)
+            Why::GivenWithoutSize
+        } else if let (true, Why::Found(evidence)) = (m.supported, &m.why) {
+            Why::GivenSupported(evidence.clone(), unseen)
         } else if likely {
-            format!("it was given; the recordings do not support it: {unseen}")
+            Why::GivenNoImprovement(unseen)
         } else {
-            format!(
-                "it was given; the recordings do not support it: it takes {:.0} % of the misfit above noise, which is not more than \
-                 chance or the tables could; {unseen}",
-                100.0 * m.share_explained
-            )
+            Why::GivenNoEvidence { share: m.share_explained, unseen }
         };
     }
 }

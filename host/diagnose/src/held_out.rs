@@ -14,26 +14,26 @@ use super::criteria::uncertainty::{
 };
 use super::linear::energy;
 use super::rows::Rows;
-use super::verdict::HeldOut;
+use super::verdict::{HeldOut, Split};
 
 fn strongest(rows: &Rows) -> f64 {
     rows.force.iter().copied().fold(0.0, f64::max)
 }
 
 /// How rows are put into groups that are left out one at a time.
-struct Split {
-    words: &'static str,
+struct Groups {
+    split: Split,
     group: Vec<u32>,
     groups: Vec<u32>,
 }
 
-fn split(words: &'static str, rows: &Rows, key: &dyn Fn(usize) -> u32) -> Split {
+fn split(split: Split, rows: &Rows, key: &dyn Fn(usize) -> u32) -> Groups {
     let group: Vec<u32> = (0..rows.len()).map(key).collect();
     let mut groups: Vec<u32> =
         group.iter().zip(&rows.root_weight).filter(|(_, w)| **w > 0.0).map(|(g, _)| *g).collect();
     groups.sort_unstable();
     groups.dedup();
-    Split { words, group, groups }
+    Groups { split, group, groups }
 }
 
 fn stride(rows: &Rows) -> usize {
@@ -97,7 +97,7 @@ fn strokes(rows: &Rows) -> RangeInclusive<f64> {
 }
 
 /// Sums of squares on rows that the fit did not see: on the sure rows, and with those about the turns.
-fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split, tares: bool) -> [f64; 2] {
+fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Groups, tares: bool) -> [f64; 2] {
     let claimed = claimed(rows);
     rows.progress.stage("predicting what was left out", split.groups.len() as u64);
     let parts: Vec<([f64; 2], [f64; 2])> = split
@@ -141,7 +141,7 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split, tares: 
 }
 
 /// Whether what the base leaves of an effect's trace sits in one group.
-fn seen_once(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> bool {
+fn seen_once(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Groups) -> bool {
     let base = baselines::fit(rows, kind, &[]);
     baselines::projected(traces, &rows.root_weight, &base.span).iter().any(|trace| {
         let of = |g: &u32| {
@@ -152,21 +152,17 @@ fn seen_once(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> boo
 }
 
 /// The strictest split that recordings allow.
-fn strictest(rows: &Rows, kind: Kind) -> Split {
+fn strictest(rows: &Rows, kind: Kind) -> Groups {
     // The vented stretches say by themselves what a load cell reads without a muscle: half of them from the other half.
     let vented: Vec<usize> = (0..rows.len()).filter(|i| rows.vented[*i]).collect();
     let tare = |i: usize| (vented.partition_point(|v| *v < i) * 4 / vented.len().max(1)) as u32 % 2;
     let pressure = |i: usize| if rows.vented[i] { rows.levels.len() as u32 + tare(i) } else { rows.level[i] };
-    let by_pressure = split("each pressure predicted from the others", rows, &pressure);
-    let by_stroke =
-        split("every fourth cycle predicted from the others, in turn", rows, &|i| rows.block[i] / 2 % FOLDS);
-    let by_recording = split("each recording predicted from the others", rows, &|i| rows.recording[i]);
-    let by_run = split("every tenth recording predicted from the others, in turn", rows, &|i| {
-        rows.recording[i] % RECORDING_FOLDS
-    });
+    let by_pressure = split(Split::Pressures, rows, &pressure);
+    let by_stroke = split(Split::Cycles, rows, &|i| rows.block[i] / 2 % FOLDS);
+    let by_recording = split(Split::Recordings, rows, &|i| rows.recording[i]);
+    let by_run = split(Split::TenthRecordings, rows, &|i| rows.recording[i] % RECORDING_FOLDS);
     let quarter = rows.blocks.div_ceil(FOLDS as usize).max(1) as u32;
-    let by_time =
-        split("each quarter of the time predicted from the rest", rows, &|i| rows.block[i] / quarter);
+    let by_time = split(Split::Quarters, rows, &|i| rows.block[i] / quarter);
     // A pressure left out needs a baseline that reaches over pressures.
     if rows.isometric && rows.names.len() >= FEWEST_RECORDINGS {
         by_run
@@ -189,7 +185,7 @@ pub(super) struct Unseen {
     rows: Rows,
     stride: usize,
     kind: Kind,
-    split: Split,
+    split: Groups,
     /// Whether the effects are read of a vented muscle, too.
     tares: bool,
 }
@@ -213,8 +209,7 @@ impl Unseen {
             let strokes = strokes(&thin);
             let part = (strokes.end() - strokes.start()) / STROKE_PARTS;
             let of = |i: usize| ((thin.contexts[i].stroke - strokes.start()) / part).max(0.0) as u32 % FOLDS;
-            split =
-                self::split("every fourth part of the stroke predicted from the others, in turn", &thin, &of);
+            split = self::split(Split::StrokeParts, &thin, &of);
         }
         Self { rows: thin, stride: stride(rows), kind, split, tares }
     }
@@ -238,13 +233,9 @@ impl Unseen {
     pub(super) fn held_out(&self, traces: &[Vec<f64>], noise: f64) -> HeldOut {
         let before = self.errors(&[]);
         let after = if traces.is_empty() { before } else { self.errors(traces) };
-        let words = if self.split.groups.len() < 2 {
-            "none: there is nothing that could be left out, so these are errors on the rows fitted"
-        } else {
-            self.split.words
-        };
+        let split = if self.split.groups.len() < 2 { Split::NothingLeftOut } else { self.split.split };
         HeldOut {
-            split: words.into(),
+            split,
             rms_before_N: before[0],
             rms_after_N: after[0],
             noise_N: noise,

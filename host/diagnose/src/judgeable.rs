@@ -5,9 +5,9 @@ use super::candidates::library;
 use super::criteria::judgement::{
     CONSTANT_FORCE, DEAD_GAUGE, FEWEST_BLOCKS, FEWEST_ROWS, FORCE_SCALE, ONE_WAY_ROWS,
 };
+use super::remark::{Remark, Unjudgeable};
 use super::rows::Rows;
-use super::verdict::{Considered, Diagnosis, HeldOut, Trace, Unexplained, Verdict};
-use pam_data::counted::counted;
+use super::verdict::{Considered, Diagnosis, HeldOut, Outcome, Pattern, Split, Trace, Unexplained, WhyNot};
 
 /// The scale of forces: what the highest pressure would give at rest length, or the largest force seen.
 pub(super) fn blocked_force(rows: &Rows) -> f64 {
@@ -17,28 +17,18 @@ pub(super) fn blocked_force(rows: &Rows) -> f64 {
     if by_pressure > 0.0 { strongest.min(FORCE_SCALE * by_pressure) } else { strongest }
 }
 
-pub(super) fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<String> {
+pub(super) fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<Unjudgeable> {
     let effective = rows.effective();
     if effective < FEWEST_ROWS {
-        let usable =
-            if effective == 0 { "no row".to_owned() } else { format!("only {}", counted(effective, "row")) };
-        return Some(format!(
-            "{usable} can be used (direction known, muscle not slack); {FEWEST_ROWS} is the least"
-        ));
+        return Some(Unjudgeable::FewRows { usable: effective, least: FEWEST_ROWS });
     }
     if rows.blocks < FEWEST_BLOCKS {
-        return Some(format!(
-            "only {}: with fewer than {FEWEST_BLOCKS} chance and physics cannot be told apart",
-            counted(rows.blocks, "half-stroke")
-        ));
+        return Some(Unjudgeable::FewStrokes { found: rows.blocks, least: FEWEST_BLOCKS });
     }
     let judged = || rows.root_weight.iter().zip(&rows.contexts).filter(|(w, _)| **w > 0.0);
     let highest = judged().map(|(_, c)| c.pressure).fold(f64::NEG_INFINITY, f64::max);
     if highest <= DEAD_GAUGE {
-        return Some(format!(
-            "the pressure never rises above {:.1} kPa, where no muscle pulls: look at the gauge and at the unit",
-            highest * 1e-3
-        ));
+        return Some(Unjudgeable::NoPressure { highest });
     }
     let (lo, hi) = rows
         .force
@@ -47,36 +37,29 @@ pub(super) fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<String> {
         .filter(|(_, w)| **w > 0.0)
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (f, _)| (l.min(*f), h.max(*f)));
     if !(hi - lo > CONSTANT_FORCE * blocked.abs().max(1e-9)) || !(blocked > 0.0) {
-        return Some("the force is constant or never pulls: there is nothing to explain".to_owned());
+        return Some(Unjudgeable::NoForce);
     }
     None
 }
 
-pub(super) fn what_can_be_judged(rows: &Rows) -> Vec<String> {
+pub(super) fn what_can_be_judged(rows: &Rows) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if rows.isometric {
-        remarks.push(
-            "the length was held throughout: speed, viscous friction, inertia and first strokes cannot be judged".to_owned(),
-        );
+        remarks.push(Remark::HeldLength);
     }
     if rows.levels.len() < 2 {
-        remarks.push(
-            "one pressure only: what scales with pressure cannot be told from what does not".to_owned(),
-        );
+        remarks.push(Remark::OnePressure);
     }
     if !rows.has_temperature {
-        remarks.push("no temperature was recorded: warming shows only as a slow change".to_owned());
+        remarks.push(Remark::NoTemperature);
     }
     let moving = rows.sign.iter().filter(|s| **s > 0.0).count();
     let back = rows.sign.iter().filter(|s| **s < 0.0).count();
     if moving + back > 0 && moving.min(back) * ONE_WAY_ROWS < rows.len() {
-        remarks.push("the muscle moves one way only: friction cannot be judged".to_owned());
+        remarks.push(Remark::OneDirection);
     }
     if !rows.vented.iter().any(|v| *v) {
-        remarks.push(
-            "no vented stretch: an offset of the load cell cannot be told from the model's own surface"
-                .to_owned(),
-        );
+        remarks.push(Remark::NoVentedRows);
     }
     remarks
 }
@@ -84,35 +67,33 @@ pub(super) fn what_can_be_judged(rows: &Rows) -> Vec<String> {
 pub(super) fn no_judgement(
     rows: &Rows,
     options: &Options,
-    mut remarks: Vec<String>,
-    reason: String,
+    mut remarks: Vec<Remark>,
+    reason: Unjudgeable,
     blocked: f64,
 ) -> Diagnosis {
-    remarks.insert(0, format!("nothing can be judged: {reason}"));
+    remarks.insert(0, Remark::NotJudged(reason.clone()));
     let considered = library(rows, &options.added())
         .iter()
         .map(|c| Considered {
             effect: c.name().into(),
             gain: 0.0,
-            why_not: "these recordings cannot show it".into(),
+            why_not: WhyNot::NotJudged,
             hidden_up_to_N: None,
             checked: false,
             visible: 0.0,
         })
         .collect();
     Diagnosis {
-        schema: "pam-diagnose/1".into(),
         muscle: options.muscle.clone(),
         samples: rows.samples,
-        judged: false,
-        verdict: Verdict::Consistent,
+        outcome: Outcome::NotJudged(reason),
         noise_N: 0.0,
         misfit_rms_N: 0.0,
         r#where: Vec::new(),
         missing: Vec::new(),
-        unexplained: Unexplained { share: 0.0, pattern: "none".into() },
+        unexplained: Unexplained { share: 0.0, pattern: Pattern::None },
         held_out: HeldOut {
-            split: "none: nothing was fitted".into(),
+            split: Split::NothingFitted,
             rms_before_N: 0.0,
             rms_after_N: 0.0,
             noise_N: 0.0,

@@ -7,13 +7,13 @@ use model_core::effects::MEMORY;
 
 use super::answer::Asked;
 use super::baselines::{self, Baseline, Kind};
-use super::candidates::{Candidate, place_in_words};
+use super::candidates::Candidate;
 use super::criteria::baseline::TABLE_ORDER;
 use super::criteria::judgement::{CHECK_DEVIATIONS, CHECK_RESOLUTION, CHECKED_PROBABILITY, MATERIAL_FAULT};
 use super::held_out::Unseen;
 use super::locate::locate;
 use super::rows::{self, Rows};
-use super::verdict::{Considered, Missing, ParameterValue, PathStep, Verdict};
+use super::verdict::{Considered, Missing, Outcome, ParameterValue, PathStep, Remark, Verdict, Why, WhyNot};
 use pam_data::error::Result;
 use pam_data::recording::Campaign;
 use pam_fit::bench::{BenchName, Candidate as Law};
@@ -106,21 +106,21 @@ impl Known {
             diagnosis.considered.push(Considered {
                 effect: j.measured.fault.info().name.into(),
                 gain: 0.0,
-                why_not: format!(
-                    "measured with {}: {}; no more than {:.2} N here",
-                    j.measured.check, j.measured.words, j.at_most
-                ),
+                why_not: WhyNot::Measured {
+                    check: j.measured.check.to_string(),
+                    value: j.measured.words.to_string(),
+                },
                 hidden_up_to_N: Some(j.at_most),
                 checked: true,
                 visible: 1.0,
             });
         }
-        if !diagnosis.judged {
+        if !diagnosis.judged() {
             // What the bench does is known all the same; what it does to these recordings is not.
-            let words = self
-                .named
-                .iter()
-                .map(|j| format!("measured with {}: {}", j.measured.check, j.measured.words));
+            let words = self.named.iter().map(|j| Remark::Measured {
+                check: j.measured.check.to_string(),
+                value: j.measured.words.to_string(),
+            });
             diagnosis.remarks.extend(words);
             return Ok(diagnosis);
         }
@@ -158,8 +158,8 @@ impl Known {
             diagnosis.held_out.rms_before_N = unseen.rms_before_N;
             diagnosis.held_out.with_turns_before_N = unseen.with_turns_before_N;
         }
-        if diagnosis.verdict == Verdict::Consistent {
-            diagnosis.verdict = Verdict::Explained;
+        if diagnosis.verdict() == Verdict::Consistent {
+            diagnosis.outcome = Outcome::Judged(Verdict::Explained);
             if rows.len() == freed_rows.len() {
                 (diagnosis.r#where, diagnosis.profiles) =
                     locate(&rows, &before.residual, &after.residual, diagnosis.noise_N, 7);
@@ -211,7 +211,7 @@ fn missing(judged: &Judged, share: f64) -> Missing {
         share_explained: share,
         parameters,
         confusable_with: Vec::new(),
-        place: place_in_words(info.link).into(),
+        place: info.link,
         correction: true,
         checked: true,
         given: false,
@@ -220,6 +220,6 @@ fn missing(judged: &Judged, share: f64) -> Missing {
         source: info.source.into(),
         peak_N: *peak,
         p: chance(measured),
-        why: format!("measured with {}: {}", measured.check, measured.words),
+        why: Why::Measured { check: measured.check.to_string(), value: measured.words.to_string() },
     }
 }

@@ -21,8 +21,9 @@
 //! | `held_out` | the improvement on rows that the fit had not seen |
 //! | [`model`] | the table refitted beside the named effects |
 //! | [`advise`], [`planned`] | the recording that would tell; what a planned protocol can tell |
-//! | [`verdict`] | the answer as values and JSON |
-//! | [`summary`] | the answer in words |
+//! | [`verdict`], [`outcome`], [`remark`], [`why`], [`why_not`], [`experiment`], [`reserve`] | the answer as values |
+//!
+//! There are no sentences here: the report writes them.
 //!
 //! Everything is computed in a fixed order with fixed seeds: the same recordings give the same answer on any number of threads.
 
@@ -34,6 +35,7 @@ mod candidates;
 mod confirm;
 pub mod criteria;
 mod evidence;
+pub mod experiment;
 mod frequency;
 mod given;
 mod ground;
@@ -49,17 +51,21 @@ pub mod model;
 mod moment;
 mod named;
 mod noise;
+pub mod outcome;
 pub mod planned;
+pub mod remark;
+pub mod reserve;
 mod rest;
 mod rows;
 mod search;
 mod select;
-pub mod summary;
 mod tables;
 #[cfg(test)]
 mod tests;
 mod trial;
 pub mod verdict;
+pub mod why;
+pub mod why_not;
 
 pub use answer::{Options, diagnose};
 pub use verdict::Diagnosis;

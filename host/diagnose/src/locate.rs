@@ -4,7 +4,6 @@ use super::criteria::location::{
     BINS, DISCRETE_BINS, MOST_REGIONS, REGION_ALPHA, REGION_ROWS, REGION_SHUFFLES, REGION_SMOOTHING,
     REGION_VARIANCE, SMOOTHED_NOISE, SMOOTHED_NOISE_MOST,
 };
-use super::criteria::planning::NEW_CONTRACTION;
 use super::criteria::rows::MOST_LEVELS;
 use super::linear::{Random, energy};
 use super::rows::Rows;
@@ -235,7 +234,6 @@ pub(crate) fn locate(
             rows: part,
             p: (f64::from(as_good) + 1.0) / (REGION_SHUFFLES as f64 + 1.0),
             unit: c.unit.into(),
-            words: words(c.name, from, to, share, part),
         });
     }
     let strength = |r: &Region| (r.share - r.rows) / (r.rows * (1.0 - r.rows)).max(REGION_VARIANCE).sqrt();
@@ -268,65 +266,4 @@ pub(crate) fn block_ranges(rows: &Rows) -> Vec<(usize, usize)> {
         }
     }
     ranges
-}
-
-fn words(name: &str, from: f64, to: f64, share: f64, part: f64) -> String {
-    let range = |scale: f64, unit: &str, digits: usize| {
-        let number = |value: f64| {
-            let text = format!("{:.digits$}", value * scale);
-            // What is rounded to nothing has no sign.
-            let nothing = text.trim_start_matches(['-', '0', '.']).is_empty();
-            text.trim_start_matches(|c| c == '-' && nothing).to_owned()
-        };
-        if (from - to).abs() < 1e-12 {
-            format!("{}{unit}", number(from))
-        } else {
-            format!("{} to {}{unit}", number(from), number(to))
-        }
-    };
-    let place = match name {
-        "recording" => format!("in recording {}", range(1.0, "", 0)),
-        "time" => format!("from {} on the campaign's clock", range(1.0, " s", 0)),
-        "cycle" => format!("in cycle {} at a pressure", range(1.0, "", 0)),
-        "pressure" => format!("at {}", range(1e-3, " kPa", 0)),
-        "contraction" => format!("at contractions of {}", range(100.0, " %", 2)),
-        "direction" => {
-            if from > 0.0 {
-                "while shortening".to_owned()
-            } else if to < 0.0 {
-                "while lengthening".to_owned()
-            } else {
-                "in both directions".to_owned()
-            }
-        }
-        "speed" => format!("at speeds of {}", range(1e3, " mm/s", 2)),
-        "acceleration" => format!("at accelerations of {}", range(1e3, " mm/s²", 1)),
-        "force" => format!("where the muscle pulls {}", range(1.0, " N", 1)),
-        "pressure-rate" => format!("where the pressure changes by {}", range(1e-3, " kPa/s", 2)),
-        "since-reversal" => format!("{} after a turn", range(1.0, " s", 2)),
-        "hold-time" => format!("after a rest of {}", range(1.0, " s", 1)),
-        "largest-contraction-so-far" if to >= -NEW_CONTRACTION => {
-            "where the muscle is as short as never before".to_owned()
-        }
-        "largest-contraction-so-far" => {
-            format!("{} short of the largest contraction so far", range(-100.0, " %", 2))
-        }
-        "temperature" => format!("at {}", range(1.0, " K", 1)),
-        _ => range(1.0, "", 3),
-    };
-    format!("{:.0} % of the misfit sits {place}, in {:.0} % of the rows", share * 100.0, part * 100.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::words;
-
-    #[test]
-    fn a_region_that_begins_at_nothing_has_no_sign_there() {
-        assert_eq!(
-            words("force", -0.04, 13.1, 0.39, 0.17),
-            "39 % of the misfit sits where the muscle pulls 0.0 to 13.1 N, in 17 % of the rows"
-        );
-        assert!(words("force", -0.06, 13.1, 0.39, 0.17).contains("-0.1 to 13.1 N"));
-    }
 }

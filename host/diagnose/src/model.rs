@@ -6,6 +6,7 @@ use model_core::muscle::Muscle;
 use super::criteria::judgement::{CHECKED_COST, PREDICTIVE_COST, REFIT_ROUNDS};
 use super::history;
 use super::planned::moments;
+use super::reserve::Reserve;
 use super::verdict::{Diagnosis, Verdict};
 use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
@@ -30,7 +31,7 @@ pub struct Refitted {
     /// What the fit warned of.
     pub warnings: Vec<String>,
     /// What is to be known of the effects in the table: that they were left out of it, or kept on the user's word alone.
-    pub reserve: Option<String>,
+    pub reserve: Option<Reserve>,
 }
 
 /// Fits the table anew beside the named effects. They are kept only where the recordings are then predicted better, or about as well
@@ -55,7 +56,7 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
     let (effects, corrections) = parts(diagnosis);
     let nothing = effects.is_empty() && corrections.is_empty();
     let given = diagnosis.missing.iter().any(|m| m.given);
-    if nothing || (diagnosis.verdict == Verdict::Consistent && !given) {
+    if nothing || (diagnosis.verdict() == Verdict::Consistent && !given) {
         return Ok(without_effects(bare, before, warnings, None));
     }
     let mut left_out = None;
@@ -89,27 +90,19 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
         || measured && after <= CHECKED_COST * before
         || foretells && after <= PREDICTIVE_COST * before;
     let possible = with.table.check().is_ok();
-    let no_better = |verdict: &str| {
-        let unseen = left_out.map(|(plain, with)| {
-            format!("; a pressure left out of the fit to {with:.2} % against {plain:.2} % of blocked force")
-        });
-        format!(
-            "with the effects the table predicts these recordings no better ({after:.3} N against {before:.3} N{}): {verdict}",
-            unseen.unwrap_or_default()
-        )
-    };
+    let no_better = |kept: bool| Reserve { kept, with: after, without: before, left_out };
     let mut reserve = None;
     if given && !better && possible {
-        reserve = Some(no_better("it was written with them all the same, as they were given"));
+        reserve = Some(no_better(true));
     } else if !(better && possible) {
-        return Ok(without_effects(bare, before, warnings, Some(no_better("it was written without them"))));
+        return Ok(without_effects(bare, before, warnings, Some(no_better(false))));
     }
     remember(&mut with, campaign);
     Ok(Refitted { file: with, rms_before: before, rms_after: after, left_out, warnings, reserve })
 }
 
 /// The plain table, as the result where no effect goes into it.
-fn without_effects(file: TableFile, rms: f64, warnings: Vec<String>, reserve: Option<String>) -> Refitted {
+fn without_effects(file: TableFile, rms: f64, warnings: Vec<String>, reserve: Option<Reserve>) -> Refitted {
     Refitted { file, rms_before: rms, rms_after: rms, left_out: None, warnings, reserve }
 }
 

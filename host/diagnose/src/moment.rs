@@ -14,6 +14,7 @@ use super::linear::{add_scaled, dot, energy};
 use super::rows::Rows;
 use super::select::{Found, Taken};
 use super::trial::{self, Trial};
+use super::why::Moment;
 
 /// Where in an effect's shapes its moment stands, if it has one.
 pub(crate) fn place(candidate: &Candidate, trial: &Trial) -> Option<usize> {
@@ -22,20 +23,20 @@ pub(crate) fn place(candidate: &Candidate, trial: &Trial) -> Option<usize> {
 }
 
 /// Where in the campaign a moment lies.
-pub(crate) fn in_words(moment: f64, rows: &Rows) -> String {
-    let name = |row: usize| &rows.names[rows.recording[row] as usize];
+pub(crate) fn of(moment: f64, rows: &Rows) -> Moment {
+    let name = |row: usize| rows.names[rows.recording[row] as usize].clone();
     let after = rows.contexts.partition_point(|c| c.time < moment);
     if after == 0 {
-        return format!("before {} began", name(0));
+        return Moment::Before(name(0));
     }
     if after == rows.len() {
-        return format!("after the end of {}", name(after - 1));
+        return Moment::After(name(after - 1));
     }
     if rows.recording[after] != rows.recording[after - 1] {
-        return format!("between {} and {}", name(after - 1), name(after));
+        return Moment::Between(name(after - 1), name(after));
     }
     let local = rows.local_time[after] - (rows.contexts[after].time - moment);
-    format!("in {}, {local:.1} s after its first reading", name(after))
+    Moment::In(name(after), local)
 }
 
 /// The standard deviation that makes an interval of the moment's, s; none where the recordings do not determine it.

@@ -1,8 +1,7 @@
 //! The names: what was taken and how sure that is; what was looked at and why it was not taken.
 
-use super::advise::experiment;
 use super::calibration;
-use super::candidates::{Candidate, place_in_words};
+use super::candidates::Candidate;
 use super::criteria::judgement::{ABSURD_SIZE, DETECTION, DETECTION_ROWS, RELEVANT_SIZE};
 use super::criteria::selection::{
     CONCEALED, FAMILY_ALPHA, LEAST_SCORE, LEAST_SHARE, MOST_REPORTED, REPORTED_RIVAL, SELECTION_FLOOR,
@@ -13,7 +12,8 @@ use super::linear::energy;
 use super::moment;
 use super::rows::Rows;
 use super::select::Found;
-use super::verdict::{Considered, Missing, ParameterValue};
+use super::verdict::{Considered, Missing, ParameterValue, Why, WhyNot};
+use super::why::{Chance, Evidence};
 
 /// The effects that were taken, with parameters and intervals, what they cannot be told from, and how probable they are.
 pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<Missing> {
@@ -53,26 +53,12 @@ pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<
                 .collect();
             let share = (explained * t.share / total).clamp(0.0, 1.0);
             let chance = if t.p <= FAMILY_ALPHA {
-                format!(
-                    "by chance over all {} effects and their shapes this would happen with p = {:.4}",
-                    library.len(),
-                    t.p
-                )
+                Chance::Tested { effects: library.len(), p: t.p }
             } else {
-                format!(
-                    "it lives in too few half-strokes for a test by whole blocks (p = {:.2}), but is {} as likely as chance",
-                    t.p,
-                    times(t.trial.score / 2.0)
-                )
+                Chance::FewStrokes { p: t.p, log_ratio: t.trial.score / 2.0 }
             };
-            let mut why = format!(
-                "it takes {:.0} % of the misfit above noise with the base refitted; {chance}",
-                share * 100.0
-            );
-            if let Some(shape) = moment::place(candidate, &t.trial) {
-                why.push_str("; it happened ");
-                why.push_str(&moment::in_words(t.trial.shapes[shape], rows));
-            }
+            let moment =
+                moment::place(candidate, &t.trial).map(|shape| moment::of(t.trial.shapes[shape], rows));
             Missing {
                 effect: info.name.into(),
                 probability: calibration::probability(belief, explained),
@@ -80,7 +66,7 @@ pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<
                 share_explained: share,
                 parameters,
                 confusable_with: confusable,
-                place: place_in_words(info.link).into(),
+                place: info.link,
                 correction: candidate.of_the_bench(),
                 checked: false,
                 given: false,
@@ -89,7 +75,7 @@ pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<
                 source: info.source.into(),
                 peak_N: t.trial.peak,
                 p: t.p,
-                why,
+                why: Why::Found(Evidence { share, chance, moment }),
             }
         })
         .collect()
@@ -126,34 +112,25 @@ pub(crate) fn considered(
                 by_noise.max(least)
             });
             let hidden = hidden.filter(|h| h.is_finite() && *h < ABSURD_SIZE * blocked);
-            let size = match hidden {
-                Some(h) => format!("up to {h:.2} N"),
-                None => "at any size".to_owned(),
-            };
-            let could_be = format!(
-                "it could be hidden in these recordings {size}; to know, {}",
-                experiment(library[t.candidate].traits.shown_by)
-            );
             let unseen = hidden.is_none_or(|h| h > RELEVANT_SIZE * blocked);
             let why_not = if confusable.iter().any(|c| c.as_str() == name) {
-                "cannot be told from what is named".to_owned()
+                WhyNot::Confusable
             } else if t.size <= 0.0 {
-                format!("these recordings do not excite it: {could_be}")
+                WhyNot::NotExcited
             } else if unseen && t.score < LEAST_SCORE {
-                could_be
+                WhyNot::Hidden
             } else if *p > FAMILY_ALPHA && t.score < LEAST_SCORE {
-                format!("no more than chance gives over all effects looked at (p = {p:.2}); {could_be}")
+                WhyNot::Chance(*p)
             } else if missing.is_empty() && gain >= LEAST_SHARE {
-                let refused = if found.remarks.iter().any(|r| r.contains(name)) {
-                    "was not confirmed (see the remarks)"
+                if found.remarks.iter().any(|r| r.refuses(name)) {
+                    WhyNot::Refused
                 } else {
-                    "the misfit is so small that the model's own inexactness may make it"
-                };
-                format!("would take much of the misfit, but {refused}; {could_be}")
+                    WhyNot::WithinInexactness
+                }
             } else if missing.is_empty() {
-                format!("takes too little of the misfit to be named; {could_be}")
+                WhyNot::TooLittle
             } else {
-                format!("explains less than what is named, and little besides it; {could_be}")
+                WhyNot::LessThanNamed
             };
             Considered {
                 effect: name.into(),
@@ -165,13 +142,4 @@ pub(crate) fn considered(
             }
         })
         .collect()
-}
-
-/// A ratio by its logarithm, as a person says it: beyond a million nobody tells one from the next.
-fn times(logarithm: f64) -> String {
-    if logarithm < 1e6_f64.ln() {
-        format!("{:.0} times", logarithm.exp())
-    } else {
-        "more than a million times".to_owned()
-    }
 }

@@ -8,6 +8,7 @@ use super::criteria::noise::{
     LONGEST_LAG, REPEAT_BINS, REPEAT_OUTLIERS, REPEAT_PRESSURE_BINS, REPEAT_SPEED_BINS, SAME_LENGTH,
 };
 use super::linear::{Random, energy, median, quantile};
+use super::remark::Scatter;
 use super::rows::Rows;
 
 /// The noise of the rows.
@@ -30,15 +31,9 @@ impl Noise {
         self.sigma > INSTRUMENT_NOISE * blocked && self.memory > INSTRUMENT_MEMORY * step
     }
 
-    /// How strokes under the same conditions differ, in words.
-    pub(crate) fn words(&self, blocked: f64) -> String {
-        format!(
-            "what does not repeat: under the same conditions the force differs by {:.2} N ({:.1} % of blocked force), for about {:.1} s \
-             at a time",
-            self.sigma,
-            100.0 * self.sigma / blocked,
-            self.memory
-        )
+    /// How strokes under the same conditions differ.
+    pub(crate) fn scatter(&self, blocked: f64) -> Scatter {
+        Scatter { sigma: self.sigma, share: self.sigma / blocked, memory: self.memory }
     }
 }
 

@@ -15,6 +15,7 @@ use super::criteria::rest_friction::{
     NO_LAW_RATIO, PRESSURE_SMOOTHING, REST_JUMP, REST_LAW_LEAVES, RESTING_AFTER, RESTING_ROWS,
     SETTLING_TIMES,
 };
+use super::remark::RestFriction;
 use super::rows::Rows;
 
 mod steps;
@@ -35,20 +36,11 @@ pub(crate) enum AtRest {
     },
 }
 
-impl AtRest {
-    /// In words.
-    pub(crate) fn words(self) -> String {
-        match self {
-            Self::Fades(time) => format!(
-                "while the length is held the gap between the branches closes within about {time:.1} s (the air's ripple shakes \
-                 friction out); the model holds it, so rows at rest are compared with a friction that settles"
-            ),
-            Self::Follows { carries, over, .. } => format!(
-                "while the length is held the pressure wanders and takes the friction with it (changes beyond ±{:.1} kPa, over about \
-                 {:.1} kPa); the model holds it, so rows at rest are compared with a friction that follows",
-                carries * 1e-3,
-                over * 1e-3
-            ),
+impl From<AtRest> for RestFriction {
+    fn from(law: AtRest) -> Self {
+        match law {
+            AtRest::Fades(time) => Self::Fades(time),
+            AtRest::Follows { carries, over, .. } => Self::Follows { carries, over },
         }
     }
 }

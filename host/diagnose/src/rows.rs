@@ -20,7 +20,7 @@ use super::criteria::motion::{
 use super::criteria::rows::SPIKES_MENTIONED;
 use super::kinematics::{Thresholds, white_noise};
 use super::linear::quantile;
-use pam_data::counted::counted;
+use super::remark::Remark;
 use pam_data::error::Result;
 use pam_data::progress::SharedProgress;
 use pam_data::recording::dropouts::Screened;
@@ -76,7 +76,7 @@ pub(crate) struct Rows {
     /// Raw samples behind the rows.
     pub samples: usize,
     /// Things worth saying about the data.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<Remark>,
     /// Whether temperature was measured throughout.
     pub has_temperature: bool,
     /// Whether the length never moved.
@@ -117,23 +117,15 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
     let mut rows = Rows { samples: total, has_temperature: total > 0, ..Rows::default() };
     rows.isometric = held(campaign, thresholds.stroke);
     let ends = readings::ends(campaign);
-    rows.remarks.extend(ends.iter().map(|end| {
-        format!(
-            "left out: {} of exactly {:.2} N, where the force sensor stands at the end of its range",
-            counted(end.rows, "reading"),
-            end.force
-        )
-    }));
-    rows.remarks.extend(screened.remark());
+    rows.remarks.extend(ends.iter().map(|end| Remark::SensorEnd { rows: end.rows, force: end.force }));
+    rows.remarks.extend(screened.remark().map(Remark::Screening));
     let mut gathering = Gathering::begin(&mut rows, braid, thresholds, &ends, campaign.beginning());
     for (index, recording) in campaign.recordings.iter().enumerate() {
         gathering.add(recording, &screened.read(index), campaign.pause_before(index))?;
     }
     let (readable, spiked) = gathering.end();
     if spiked * SPIKES_MENTIONED > total {
-        rows.remarks.push(format!(
-            "{spiked} of {total} force readings stand out alone and were left out as outliers"
-        ));
+        rows.remarks.push(Remark::Spikes { excluded: spiked, total });
     }
     levels::find(&mut rows, pressures);
     tares::mark_vented(&mut rows, &readable);

@@ -17,6 +17,7 @@ use super::evidence::Scale;
 use super::ground::Ground;
 use super::linear::energy;
 use super::noise::{self, Noise};
+use super::remark::{Refusal, Remark};
 use super::rows::{ORDERS, Rows};
 use super::select::{Found, Taken, best_of_each, look, refit, rivals, worth_naming};
 use super::trial::Trial;
@@ -59,7 +60,7 @@ struct Search<'a> {
     first_look: Option<(Vec<Trial>, Vec<f64>)>,
     /// Candidates that are not taken (again).
     barred: Vec<usize>,
-    remarks: Vec<String>,
+    remarks: Vec<Remark>,
 }
 
 impl<'a> Search<'a> {
@@ -130,27 +131,23 @@ impl<'a> Search<'a> {
         }
         let winner = self.within_the_known(&best[at], &best, &ground);
         if let Some(memory) = self.found_itself_beside(&winner) {
-            self.remarks.push(format!(
-                "{} would take what is left in the first strokes of recordings, but there nobody knows what {memory} remembers of the time \
-                 before: not named",
-                self.library[winner.candidate].name(),
-            ));
+            self.remarks.push(Remark::Refused {
+                effect: self.library[winner.candidate].name().to_owned(),
+                why: Refusal::UnknownMemory(memory.to_owned()),
+            });
             self.barred.push(winner.candidate);
             return ControlFlow::Continue(());
         }
         let beside = Kind::Soft(winner.give);
         let metric = baselines::fit(self.rows, beside, &[]);
         let rivals = rivals(&winner, &best, self.library, self.rows, &ground, &metric.span);
-        let open: Vec<&str> =
-            rivals.iter().filter(|r| r.1 > CONFUSABLE).map(|r| self.library[r.0].name()).collect();
+        let open: Vec<String> =
+            rivals.iter().filter(|r| r.1 > CONFUSABLE).map(|r| self.library[r.0].name().to_owned()).collect();
         if open.len() > MOST_RIVALS {
-            self.remarks.push(format!(
-                "{} would explain {:.0} % of the misfit, but so would, nearly as well, {}: these recordings cannot say which, so none \
-                 is named",
-                self.library[winner.candidate].name(),
-                100.0 * self.of_rest(&winner),
-                open.join(", ")
-            ));
+            self.remarks.push(Remark::Refused {
+                effect: self.library[winner.candidate].name().to_owned(),
+                why: Refusal::Rivals { share: self.of_rest(&winner), others: open },
+            });
             return ControlFlow::Break(());
         }
         self.take(winner, p[at], rivals, metric);
@@ -260,14 +257,10 @@ impl<'a> Search<'a> {
             self.chosen.pop();
             self.rows.contexts = seen;
             self.barred.push(winner.candidate);
-            self.remarks.push(format!(
-                "{name} would take much of the misfit, but {}: not named",
-                if kept {
-                    "so would a reading that wanders by itself as slowly as what it leaves"
-                } else {
-                    "keeps little of it when everything is fitted together"
-                }
-            ));
+            self.remarks.push(Remark::Refused {
+                effect: name.to_owned(),
+                why: if kept { Refusal::SlowDrift } else { Refusal::LostInRefit },
+            });
             return;
         }
         self.kind = beside;

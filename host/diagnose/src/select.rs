@@ -12,6 +12,7 @@ use super::evidence::Scale;
 use super::ground::Ground;
 use super::linear::{Sign, add_scaled, energy};
 use super::noise::{Noise, family_p};
+use super::remark::Remark;
 use super::rows::Rows;
 use super::trial::{self, Trial};
 
@@ -50,7 +51,7 @@ pub(crate) struct Found {
     /// The noise at the end.
     pub noise: Noise,
     /// Remarks.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<Remark>,
 }
 
 impl Found {

@@ -7,32 +7,21 @@ use super::criteria::judgement::{
     STRAIGHT_SHARE,
 };
 use super::criteria::selection::LEAST_SCORE;
+use super::remark::Remark;
 use super::rows::Rows;
 use super::select::Found;
 use super::trial::Trial;
 
 /// What to say where the tables differ between pressures more than a bladder does, and nothing can be named for it.
-pub(super) fn in_the_tables(found: &Found, library: &[Candidate], concealed: f64, blocked: f64) -> String {
+pub(super) fn in_the_tables(found: &Found, library: &[Candidate], concealed: f64, blocked: f64) -> Remark {
     let mut able: Vec<&Trial> = found.first_look.iter().filter(|t| t.score >= LEAST_SCORE).collect();
     able.sort_by(|a, b| b.score.total_cmp(&a.score));
-    let names: Vec<&str> = able.iter().take(MOST_LISTED).map(|t| library[t.candidate].name()).collect();
-    let which = if names.is_empty() {
-        "no effect of the library makes such a surface".to_owned()
-    } else {
-        format!(
-            "each of these would make such a surface: {}; none of them stands out enough to be named",
-            names.join(", ")
-        )
-    };
-    format!(
-        "one bladder does not serve all pressures: the tables take up {concealed:.2} N rms ({:.2} % of blocked force) that changes \
-         from pressure to pressure; {which}. Tested pressures are described well; between them and beyond, trust the tables less",
-        100.0 * concealed / blocked
-    )
+    let names = able.iter().take(MOST_LISTED).map(|t| library[t.candidate].name().to_owned());
+    Remark::Concealed { rms: concealed, share: concealed / blocked, candidates: names.collect() }
 }
 
 /// What the fitted tables themselves betray: flexible tables swallow physics, and keep its pattern over pressure.
-pub(super) fn tables_as_evidence(production: &Baseline, rows: &Rows) -> Vec<String> {
+pub(super) fn tables_as_evidence(production: &Baseline, rows: &Rows) -> Vec<Remark> {
     let mut remarks = Vec::new();
     let levels = &rows.levels;
     if !rows.steady || levels.len() < FEWEST_LEVELS_READ {
@@ -57,11 +46,7 @@ pub(super) fn tables_as_evidence(production: &Baseline, rows: &Rows) -> Vec<Stri
             && b > 0.0
             && lowest > INVERSE_PART * a.abs()
         {
-            remarks.push(format!(
-                "k_F(P) follows {a:.3} + {:.1} kPa/P: what a friction that does not scale with the force (dry, seal, viscous at one \
-                 speed) leaves in the tables",
-                b * 1e-3
-            ));
+            remarks.push(Remark::InverseFriction { constant: a, slope: b });
         }
     }
     if let Some(e_1) = production.elastic_nodes.first()
@@ -69,12 +54,7 @@ pub(super) fn tables_as_evidence(production: &Baseline, rows: &Rows) -> Vec<Stri
     {
         let change = b * (levels[levels.len() - 1] - levels[0]);
         if share > STRAIGHT_SHARE && change.abs() > STRAIGHT_CHANGE * a.abs() {
-            remarks.push(format!(
-                "E_1 {} in a straight line with pressure, by {:.0} % over the range: one bladder should not; ends that are not \
-                 cylinders, a braid that stretches, a gain or a slow change in the order of testing leave this",
-                if change > 0.0 { "rises" } else { "falls" },
-                100.0 * change.abs() / a.abs().max(1e-9)
-            ));
+            remarks.push(Remark::StraightElasticity(change / a.abs().max(1e-9)));
         }
     }
     remarks

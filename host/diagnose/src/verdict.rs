@@ -1,27 +1,19 @@
-//! The answer as plain values, and as JSON (`pam-diagnose/1`).
+//! The answer as plain values.
 
 // Field names carry their unit as the JSON does: N is not n.
 #![allow(non_snake_case)]
 
-use model_core::effects::Parameter;
+use model_core::effects::{Link, Parameter};
 use serde::Serialize;
 
-/// The judgement in one word.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// Nothing stands above the noise and the model's own stated inexactness.
-    Consistent,
-    /// What stood above is explained by the effects named.
-    Explained,
-    /// A part of it is.
-    PartlyExplained,
-    /// Something is left out that no effect of the library describes, or that cannot be told apart.
-    Unexplained,
-}
+pub use crate::experiment::Proposal;
+pub use crate::outcome::{Outcome, Pattern, Split, Verdict};
+pub use crate::remark::Remark;
+pub use crate::why::Why;
+pub use crate::why_not::WhyNot;
 
-/// Where the misfit's energy above the noise sits along one coordinate.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// Where the misfit's energy above the noise is concentrated along one coordinate.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Region {
     /// Its name, one of those in the interface.
     pub coordinate: String,
@@ -37,8 +29,6 @@ pub struct Region {
     pub p: f64,
     /// Unit of `from` and `to`.
     pub unit: String,
-    /// The region in words.
-    pub words: String,
 }
 
 /// One parameter of a named effect.
@@ -67,7 +57,7 @@ impl ParameterValue {
 }
 
 /// An effect that is missing from the model.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Missing {
     /// Its name in the catalogue.
     pub effect: String,
@@ -82,7 +72,7 @@ pub struct Missing {
     /// Effects that these data cannot tell from it.
     pub confusable_with: Vec<String>,
     /// Where it acts.
-    pub place: String,
+    pub place: Link,
     /// Whether it is the bench's: it corrects the data and never goes to a controller.
     pub correction: bool,
     /// Whether a check of the bench measured it, apart from the recordings.
@@ -100,23 +90,23 @@ pub struct Missing {
     /// Probability of having found as much by chance over all effects looked at, by whole blocks.
     pub p: f64,
     /// Why this one.
-    pub why: String,
+    pub why: Why,
 }
 
 /// What no named effect explains.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Unexplained {
     /// Share of the misfit's energy above noise.
     pub share: f64,
-    /// Its pattern in words.
-    pub pattern: String,
+    /// Its pattern.
+    pub pattern: Pattern,
 }
 
 /// The improvement on rows that the fit had not seen.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct HeldOut {
     /// How rows were held out.
-    pub split: String,
+    pub split: Split,
     /// Error of the model without the effects, N.
     pub rms_before_N: f64,
     /// Error with them, N.
@@ -129,8 +119,8 @@ pub struct HeldOut {
     pub with_turns_after_N: f64,
 }
 
-/// The recording that would tell.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// The recording that would separate confusable effects.
+#[derive(Clone, Debug, PartialEq)]
 pub struct NextExperiment {
     /// What it separates.
     pub separates: Vec<String>,
@@ -138,19 +128,19 @@ pub struct NextExperiment {
     pub protocol: String,
     /// Largest expected difference between the candidates, N.
     pub expected_difference_N: f64,
-    /// In words.
-    pub words: String,
+    /// What is proposed.
+    pub proposal: Proposal,
 }
 
-/// An effect that was looked at.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// An effect that was considered.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Considered {
     /// Its name.
     pub effect: String,
     /// Share of the misfit's energy above noise that it takes by itself.
     pub gain: f64,
     /// Why it is not named.
-    pub why_not: String,
+    pub why_not: WhyNot,
     /// The largest peak, N, at which it could be hidden in this recording; absent where the recording does not excite it.
     pub hidden_up_to_N: Option<f64>,
     /// Whether a check of the bench has said so, apart from the recordings.
@@ -203,19 +193,14 @@ pub struct Trace {
 }
 
 /// The whole diagnosis.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Diagnosis {
-    /// `pam-diagnose/1`.
-    pub schema: String,
     /// The muscle's name.
     pub muscle: String,
     /// Rows in the recordings.
     pub samples: usize,
-    /// Whether there was anything to judge. Where there was not (too few rows, a dead sensor) nothing was fitted, nothing stands
-    /// above anything, and the first of the remarks says why.
-    pub judged: bool,
-    /// The judgement.
-    pub verdict: Verdict,
+    /// The judgement. Where nothing could be judged (too few rows, a dead sensor), nothing was fitted.
+    pub outcome: Outcome,
     /// Noise, N.
     pub noise_N: f64,
     /// Misfit of the model as it was, N.
@@ -238,23 +223,29 @@ pub struct Diagnosis {
     pub blocked_force_N: f64,
     /// Correlation time of the noise, s.
     pub noise_memory_s: f64,
-    /// What can and cannot be judged from these recordings, in sentences.
-    pub remarks: Vec<String>,
+    /// What can and cannot be concluded from these recordings.
+    pub remarks: Vec<Remark>,
     /// For pictures.
     pub profiles: Vec<Profile>,
     /// For pictures.
     pub trace: Trace,
     /// What the muscle remembers over a campaign of isometric staircases; absent of other campaigns.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub history: Option<super::history::History>,
 }
 
 impl Diagnosis {
-    /// As JSON text.
-    ///
-    /// Every number is finite: what could not be computed is absent or zero before it comes here.
+    /// Whether there was anything to judge.
     #[must_use]
-    pub fn to_json(&self) -> String {
-        serde_json::to_string_pretty(self).unwrap_or_else(|_| "{}".to_owned())
+    pub fn judged(&self) -> bool {
+        matches!(self.outcome, Outcome::Judged(_))
+    }
+
+    /// The judgement; consistent where there was nothing to judge, for nothing stands above anything then.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        match self.outcome {
+            Outcome::Judged(verdict) => verdict,
+            Outcome::NotJudged(_) => Verdict::Consistent,
+        }
     }
 }

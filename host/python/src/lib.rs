@@ -607,7 +607,7 @@ fn diagnose<'py>(
     if let Some(path) = &report {
         write_report(&diagnose_page::page(&answer, &geometry, &campaign), path)?;
     }
-    loads(py, &answer.to_json())
+    loads(py, &pam_report::document::diagnosis_json(&answer))
 }
 
 /// Fit, predict and diagnose pneumatic artificial muscles.

@@ -7,10 +7,11 @@ use model_core::units::Length;
 
 use super::effect_page::place;
 use super::effect_trace::Demonstration;
-use super::letters::letters;
+use super::symbols::symbols;
+use super::wording;
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
 use pam_data::recording::Campaign;
-use pam_diagnose::verdict::{Diagnosis, Missing, Verdict};
+use pam_diagnose::verdict::{Diagnosis, Missing, Pattern, Verdict};
 use pam_fit::bench::Candidate;
 
 /// The page of a diagnosis. `geometry` is that of the muscle at rest, to say what a force means in pressure; `campaign` gives the
@@ -19,14 +20,14 @@ use pam_fit::bench::Candidate;
 pub fn page(d: &Diagnosis, geometry: &Geometry, campaign: &Campaign) -> Page {
     let mut page = Page::new(
         format!("Diagnosis of {}", d.muscle),
-        if d.judged {
+        if d.judged() {
             format!("{} rows, blocked force {} N", fixed(d.samples as f64, 0), figures(d.blocked_force_N, 3))
         } else {
             format!("{} rows", fixed(d.samples as f64, 0))
         },
     );
     head(&mut page, d);
-    page.push(wrong(d));
+    page.push(recommendation(d));
     page.push(located::section(d));
     for missing in &d.missing {
         page.push(what_it_is(d, missing));
@@ -42,30 +43,18 @@ pub fn page(d: &Diagnosis, geometry: &Geometry, campaign: &Campaign) -> Page {
     page
 }
 
-fn names(d: &Diagnosis) -> String {
-    let names: Vec<String> = d.missing.iter().map(|m| format!("`{}`", m.effect)).collect();
-    match names.split_last() {
-        Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
-        Some((last, _)) => last.clone(),
-        None => String::new(),
-    }
-}
-
 /// Which of the names stand for several effects that the recordings cannot tell apart.
 fn in_doubt(d: &Diagnosis) -> String {
     let open: Vec<String> = d
         .missing
         .iter()
         .filter(|m| !m.confusable_with.is_empty() && !m.given)
-        .map(|m| format!("`{}` (right with {} %)", m.effect, fixed(100.0 * m.probability, 0)))
+        .map(|m| format!("`{}` (probability {} %)", m.effect, fixed(100.0 * m.probability, 0)))
         .collect();
     if open.is_empty() {
         return String::new();
     }
-    format!(
-        " Instead of {} it could be others, which these recordings cannot tell apart.",
-        open.join(" and ")
-    )
+    format!(" These recordings do not distinguish {} from other effects, listed below.", open.join(" and "))
 }
 
 fn percent(part: f64, whole: f64) -> String {
@@ -73,99 +62,115 @@ fn percent(part: f64, whole: f64) -> String {
 }
 
 fn head(page: &mut Page, d: &Diagnosis) {
-    let (tone, words) = match d.verdict {
-        Verdict::Consistent if !d.judged => {
-            (Tone::Caution, "These recordings say nothing about the model: nothing could be judged.".to_owned())
-        }
-        Verdict::Consistent => (
-            Tone::Good,
-            "Model and recordings agree: nothing stands above the noise and the model's own inexactness.".to_owned(),
-        ),
-        Verdict::Explained => (Tone::Caution, format!("The model lacks {}, which explains what it misses.", names(d))),
-        Verdict::PartlyExplained => {
-            (Tone::Caution, format!("The model lacks {}, which explains a part of what it misses.", names(d)))
-        }
-        Verdict::Unexplained => (
-            Tone::Bad,
-            "The model leaves something out that none of the known effects describes well enough to be named.".to_owned(),
-        ),
+    let tone = match d.verdict() {
+        Verdict::Consistent if d.judged() => Tone::Good,
+        Verdict::Unexplained => Tone::Bad,
+        Verdict::Consistent | Verdict::Explained | Verdict::PartlyExplained => Tone::Caution,
     };
-    page.verdict(tone, words + &in_doubt(d));
-    if !d.judged {
+    page.verdict(tone, wording::verdict(d) + &in_doubt(d));
+    if !d.judged() {
         return;
     }
     page.fact(
-        "misfit of the plain model",
+        "error of the plain model",
         format!("{} N", figures(d.misfit_rms_N, 2)),
-        format!("{} % of blocked force", percent(d.misfit_rms_N, d.blocked_force_N)),
-        if d.verdict == Verdict::Consistent { Tone::Good } else { Tone::Caution },
+        format!("rms, {} % of blocked force", percent(d.misfit_rms_N, d.blocked_force_N)),
+        if d.verdict() == Verdict::Consistent { Tone::Good } else { Tone::Caution },
     );
-    page.fact("noise", format!("{} N", figures(d.noise_N, 2)), "no model can do better", Tone::Plain);
+    page.fact("noise", format!("{} N", figures(d.noise_N, 2)), "rms, the least possible error", Tone::Plain);
     if !d.missing.is_empty() {
         let h = &d.held_out;
         let better = h.rms_after_N < h.rms_before_N;
         page.fact(
-            "on unseen rows",
+            "error on held-out rows",
             format!("{} → {} N", figures(h.rms_before_N, 2), figures(h.rms_after_N, 2)),
-            "error before and after",
+            "rms, without and with the effects",
             if better { Tone::Good } else { Tone::Bad },
         );
     }
-    if d.verdict != Verdict::Consistent {
+    if d.verdict() != Verdict::Consistent {
         page.fact(
-            "left unexplained",
+            "unexplained",
             format!("{} %", fixed(100.0 * d.unexplained.share, 0)),
-            "of the misfit above noise",
+            "of the squared error above the noise",
             if d.unexplained.share < 0.2 { Tone::Good } else { Tone::Caution },
         );
     }
 }
 
-fn wrong(d: &Diagnosis) -> Section {
-    let mut section = Section::new(if d.judged { "What is wrong" } else { "Why" }).summarised();
-    if !d.judged {
-        section.list(d.remarks.iter().cloned());
-        return section;
+/// What to do now, and what limits the answer.
+fn recommendation(d: &Diagnosis) -> Section {
+    let mut section = Section::new("What to do").summarised();
+    let (bench, muscle): (Vec<&Missing>, Vec<&Missing>) = d.missing.iter().partition(|m| m.correction);
+    let names =
+        |all: &[&Missing]| wording::list(&all.iter().map(|m| format!("`{}`", m.effect)).collect::<Vec<_>>());
+    let mut steps = Vec::new();
+    if !d.judged() {
+        steps.push("Correct what the remarks name, and record again.".to_owned());
+    } else if d.missing.is_empty() && d.verdict() == Verdict::Consistent {
+        steps.push(
+            "Use the table of `host fit`: it describes these recordings within their noise.".to_owned(),
+        );
+    } else if d.missing.is_empty() {
+        steps.push(
+            "Use the table of `host fit`, with the error above. See below where the model is wrong."
+                .to_owned(),
+        );
     }
-    let relation = if d.noise_N > 0.0 { d.misfit_rms_N / d.noise_N } else { 0.0 };
-    section.text(format!(
-        "The plain model, with its tables free over pressure, misses the measured force by {} N (root mean square); the \
-         recordings themselves repeat to {} N{}.",
-        figures(d.misfit_rms_N, 2),
-        figures(d.noise_N, 2),
-        if relation > 1.3 {
-            format!(", so the misfit is {} times what chance gives", figures(relation, 2))
-        } else {
-            String::new()
-        }
-    ));
-    section.list(d.remarks.iter().cloned());
+    if let Some(n) = &d.next_experiment {
+        steps.push(format!(
+            "Record the next experiment: {}",
+            wording::sentence(&wording::proposal(&n.proposal))
+        ));
+    }
+    if !bench.is_empty() {
+        steps.push(format!(
+            "Correct the bench: {}. Until then `host diagnose … -o T2.pam` corrects the recordings.",
+            names(&bench)
+        ));
+    }
+    if !muscle.is_empty() {
+        steps.push(format!(
+            "Write a table with {} by `host diagnose … -o T2.pam`, and check it on new recordings.",
+            names(&muscle)
+        ));
+    }
+    section.list(steps);
+    let remarks: Vec<String> = d.remarks.iter().map(|r| wording::sentence(&wording::remark(r))).collect();
+    if !remarks.is_empty() {
+        section.text("Remarks on these recordings:");
+        section.list(remarks);
+    }
     section
 }
 
 fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
-    let mut section = Section::new(format!("What it is: {}", m.effect)).summarised();
+    let mut section = Section::new(format!("Effect: {}", m.effect)).summarised();
     section.text(m.summary.clone());
     let candidate = Candidate::from_name(&m.effect);
-    let whose = if m.correction { "It is the bench's, not the muscle's." } else { "It is the muscle's." };
-    let place = candidate.map_or(m.place.as_str(), |c| place(c.info().link));
+    let whose = if m.correction {
+        "It is an error of the bench, not of the muscle."
+    } else {
+        "It belongs to the muscle."
+    };
+    let place = place(m.place);
     section.text(format!(
-        "It acts on {place}. {whose} In these recordings it makes up to {} N, {} % of the blocked force.",
+        "It acts on {place}. {whose} Its largest force in these recordings is {} N, {} % of the blocked force.",
         figures(m.peak_N, 2),
         percent(m.peak_N, d.blocked_force_N)
     ));
     if let Some(candidate) = candidate {
         section.listing(candidate.info().equation);
-        section.table(letters(candidate.info()));
+        section.table(symbols(candidate.info()));
     }
     let mut table = Table::new(
-        "Its parameters, in SI units",
-        &["letter", "parameter", "value", "± (95 %)", "unit", "remark"],
+        "Parameters in SI units, with the half-width of the 95 % confidence interval",
+        &["symbol", "parameter", "value", "± (95 %)", "unit", "remark"],
     );
     for p in &m.parameters {
-        let std = p.std.map_or("not determined".into(), |s| figures(1.96 * s, 2));
+        let std = p.std.map_or("not identifiable".into(), |s| figures(wording::HALF_95 * s, 2));
         let unit = if p.unit.is_empty() { "–".to_owned() } else { p.unit.clone() };
-        let remark = if p.outside_known_range { "outside the range known from the literature" } else { "" };
+        let remark = if p.outside_known_range { "outside the published range" } else { "" };
         let letter = candidate
             .and_then(|c| c.info().parameters.iter().find(|i| i.name == p.name))
             .map_or("–", |i| i.letter);
@@ -173,11 +178,11 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
     }
     section.table(table);
     section.text(if m.given {
-        format!("*What the recordings say of it:* {}.", m.why)
+        format!("*Evidence:* {}.", wording::why(&m.why))
     } else {
         format!(
-            "*Why we think so:* {}. The name is right with a probability of {} %.",
-            m.why,
+            "*Evidence:* {}. Probability that the name is right: {} %.",
+            wording::why(&m.why),
             fixed(100.0 * m.probability, 0)
         )
     });
@@ -187,7 +192,7 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
         let trace = demonstration.run(candidate);
         if trace.force.iter().any(|f| *f != 0.0) {
             let mut figure = demonstration.figure(&trace);
-            figure.title = format!("What {} looks like on another muscle, by itself", m.effect);
+            figure.title = format!("{} alone, on an example muscle", m.effect);
             section.figure(figure);
         }
     }
@@ -196,21 +201,28 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
 }
 
 fn alternatives(d: &Diagnosis) -> Section {
-    let mut section = Section::new("What else it could be").summarised();
+    let mut section = Section::new("Alternatives").summarised();
     for m in &d.missing {
         if m.confusable_with.is_empty() {
-            section.text(format!("Nothing else in the catalogue leaves the same trace as `{}`.", m.effect));
+            section.text(format!(
+                "These recordings distinguish `{}` from all other effects of the library.",
+                m.effect
+            ));
         } else {
             let others: Vec<String> = m.confusable_with.iter().map(|c| format!("`{c}`")).collect();
-            section.text(format!("Instead of `{}` it could be {}.", m.effect, others.join(", ")));
+            section.text(format!(
+                "These recordings do not distinguish `{}` from {}.",
+                m.effect,
+                others.join(", ")
+            ));
         }
         let mut odds: Vec<(String, f64)> = vec![(m.effect.clone(), m.probability)];
         let others = m.confusable_with.iter().filter_map(|c| d.considered.iter().find(|k| k.effect == *c));
         odds.extend(others.map(|c| (c.effect.clone(), c.gain)));
         if odds.len() > 1 {
             let mut table = Table::new(
-                "How much of the misfit each would take by itself",
-                &["effect", "share of the misfit above noise (%)"],
+                "Share of the excess error that each explains alone",
+                &["effect", "share of the excess error (%)"],
             );
             for (i, (name, gain)) in odds.iter().enumerate() {
                 let share = if i == 0 { m.share_explained } else { *gain };
@@ -219,23 +231,22 @@ fn alternatives(d: &Diagnosis) -> Section {
             section.table(table);
         }
     }
-    if d.missing.is_empty() && d.verdict == Verdict::Unexplained {
+    if d.missing.is_empty() && d.verdict() == Verdict::Unexplained {
         section.text(
-            "No effect of the catalogue takes enough of the misfit to be named. A wrong name would be worse than none: it \
-             would put wrong physics into the controller.",
+            "No effect of the library explains enough of the excess error to be named. A wrong name would put wrong physics \
+             into the controller, so none is given.",
         );
     }
     section
 }
 
 fn controller(d: &Diagnosis, geometry: &Geometry) -> Section {
-    let mut section = Section::new("What it changes in the controller").summarised();
+    let mut section = Section::new("Changes in the controller").summarised();
     let area = geometry.build().ok().map(|b| b.posture(Length::ZERO).area).filter(|a| *a > 0.0);
     for m in &d.missing {
         if m.correction {
             section.text(format!(
-                "`{}`: nothing. It is an error of the bench; it is taken out of the recordings before the table is fitted, and the \
-                 controller is sent the muscle only.",
+                "`{}`: none. It is an error of the bench: the recordings are corrected for it before the table is fitted.",
                 m.effect
             ));
             continue;
@@ -255,65 +266,63 @@ fn controller(d: &Diagnosis, geometry: &Geometry) -> Section {
         text.push('.');
         if let Some(info) = Candidate::from_name(&m.effect).map(Candidate::info) {
             if info.persistent {
-                text += " It remembers: the controller keeps its memory over a power cycle.";
+                text += " It has a memory, which the controller keeps over a power cycle.";
             }
             if info.depends_on_pressure {
-                text +=
-                    " Its force depends on the pressure, so the controller solves for the pressure with it.";
+                text += " Its force depends on pressure, so the controller includes it when it solves for the pressure.";
             }
         }
         section.text(text);
     }
-    if d.missing.is_empty() && d.verdict != Verdict::Consistent {
-        section.text("Nothing: without a name nothing is added to the table.");
+    if d.missing.is_empty() && d.verdict() != Verdict::Consistent {
+        section.text("None: without a named effect nothing is added to the table.");
     }
     section
 }
 
 fn unseen(d: &Diagnosis) -> Section {
-    let mut section = Section::new("Before and after, on rows the fit had not seen").summarised();
+    let mut section = Section::new("Error on held-out rows").summarised();
     if d.missing.is_empty() {
         return section;
     }
     let h = &d.held_out;
-    section.text(format!("Held out: {}.", h.split));
-    let names = ["before", "after", "before, turns included", "after, turns included", "noise"];
+    section.text(format!("Held out: {}.", wording::split(h.split)));
+    let names = ["without", "with", "without, reversals included", "with, reversals included", "noise"];
     let values = [h.rms_before_N, h.rms_after_N, h.with_turns_before_N, h.with_turns_after_N, h.noise_N];
     let places: Vec<f64> = (0..names.len()).map(|i| i as f64).collect();
     let panel = Panel::new(
-        Axis::new("error on unseen rows, root mean square", "N").from_zero(),
+        Axis::new("error on held-out rows, rms", "N").from_zero(),
         Axis::names("", names.map(String::from).to_vec()),
     )
     .bars("", Colour::Series(0), &values, &places);
     section.figure(Figure::new(
         "unseen",
-        "Error on unseen rows",
-        "After should come close to the noise; no model can go below it.",
+        "Error on held-out rows without and with the named effects",
+        "The error with the effects should come close to the noise, the least possible error.",
         panel,
     ));
     if !(h.rms_after_N < h.rms_before_N) {
         section.notice(
             Tone::Bad,
-            "The effect does not help on unseen rows: do not use the table that carries it.",
+            "The effects do not reduce the error on held-out rows. Do not use a table with them.",
         );
     }
     section
 }
 
 fn remains(d: &Diagnosis) -> Section {
-    let mut section = Section::new("What remains").summarised();
-    if d.verdict != Verdict::Consistent {
+    let mut section = Section::new("Unexplained").summarised();
+    if d.verdict() != Verdict::Consistent {
         section.text(format!(
-            "{} % of the misfit above noise stays without a name{}.",
+            "{} % of the excess error is unexplained{}.",
             fixed(100.0 * d.unexplained.share, 0),
-            if d.unexplained.pattern == "none" {
-                ", without a pattern".to_owned()
-            } else {
-                format!("; its pattern: {}", d.unexplained.pattern)
+            match &d.unexplained.pattern {
+                Pattern::None => ", without a pattern".to_owned(),
+                pattern => format!(". Its pattern: {}", wording::pattern(pattern)),
             }
         ));
     }
-    if !d.judged {
+    if !d.judged() {
         return section;
     }
     let hidden: Vec<String> = d
@@ -327,7 +336,7 @@ fn remains(d: &Diagnosis) -> Section {
         .collect();
     if !hidden.is_empty() {
         section.text(format!(
-            "These recordings could hide, because the tables imitate it or nothing excites it: {}.",
+            "These recordings could hide these effects, because the tables imitate them or nothing excites them: {}.",
             hidden.join(", ")
         ));
     }
@@ -335,39 +344,33 @@ fn remains(d: &Diagnosis) -> Section {
 }
 
 fn next(d: &Diagnosis) -> Section {
-    let mut section = Section::new("What to record next").summarised();
+    let mut section = Section::new("Next experiment").summarised();
     if let Some(n) = &d.next_experiment {
         let separates: Vec<String> = n.separates.iter().map(|s| format!("`{s}`")).collect();
         section.text(format!(
-            "{}. It would tell {} apart, by up to {} N.",
-            sentence(&n.words),
+            "{} It separates {} by up to {} N.",
+            wording::sentence(&wording::proposal(&n.proposal)),
             separates.join(" and "),
             figures(n.expected_difference_N, 2)
         ));
         if !n.protocol.is_empty() {
             section.listing(n.protocol.clone());
         }
-    } else if d.judged && d.verdict == Verdict::Consistent {
-        section.text("Nothing more is needed for what these recordings cover.");
+    } else if d.judged() && d.verdict() == Verdict::Consistent {
+        section.text("None needed for the range that these recordings cover.");
     }
     section
 }
 
-/// Words as the beginning of a sentence, without its end.
-fn sentence(words: &str) -> String {
-    let mut letters = words.trim_end_matches('.').chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
-}
-
 fn looked_at(d: &Diagnosis) -> Section {
-    let mut section = Section::new("All that was looked at");
-    if !d.judged {
+    let mut section = Section::new("All effects considered");
+    if !d.judged() {
         return section;
     }
     if !d.path.is_empty() {
         let mut table = Table::new(
-            "Step by step: what was taken, and what came next",
-            &["taken", "misfit after it (N)", "chance (p)", "runners-up"],
+            "Forward selection",
+            &["selected", "residual after it (N)", "p (chance)", "next best"],
         );
         for step in &d.path {
             let rivals: Vec<String> =
@@ -383,9 +386,9 @@ fn looked_at(d: &Diagnosis) -> Section {
     }
     let mut considered: Vec<_> = d.considered.iter().collect();
     considered.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let mut table = Table::new("Effects that are not named, and why", &["effect", "gain (%)", "why not"]);
+    let mut table = Table::new("Effects not named", &["effect", "share explained alone (%)", "reason"]);
     for c in considered {
-        table.row([format!("`{}`", c.effect), fixed(100.0 * c.gain, 1), c.why_not.clone()]);
+        table.row([format!("`{}`", c.effect), fixed(100.0 * c.gain, 1), wording::why_not(c)]);
     }
     section.table(table);
     section

@@ -6,7 +6,7 @@ use model_core::effects::{Info, Link, Role, Start};
 use model_core::table::TableError;
 
 use super::effect_trace::{Demonstration, Trace, likeness};
-use super::letters::letters;
+use super::symbols::symbols;
 use super::{Page, Section, Table, figures};
 use pam_fit::bench::Candidate;
 
@@ -103,7 +103,7 @@ pub fn page(trace: &Trace, figure: &super::Figure, all: &[(Trace, super::Figure)
     let mut what = Section::new("What it is").summarised();
     what.text(format!("It acts on {}. {}", place(info.link), whose(trace.candidate)));
     what.listing(info.equation);
-    what.table(letters(info));
+    what.table(symbols(info));
     what.table(parameters(trace));
     what.text(memory(info));
     page.push(what);
@@ -143,12 +143,12 @@ pub fn chapter(trace: &Trace, figure: &super::Figure, all: &[(Trace, super::Figu
         whose(trace.candidate),
         info.equation
     );
-    for table in [letters(info), parameters(trace)] {
+    for table in [symbols(info), parameters(trace)] {
         let _ = writeln!(text, "{}:\n", table.caption);
         let _ = writeln!(text, "| {} |", table.head.join(" | "));
         let _ = writeln!(text, "|{}", " --- |".repeat(table.head.len()));
         for row in &table.rows {
-            let cells: Vec<String> = row.iter().map(|c| super::rich::markdown(c)).collect();
+            let cells: Vec<String> = row.iter().map(|c| super::inline_markup::markdown(c)).collect();
             let _ = writeln!(text, "| {} |", cells.join(" | "));
         }
         text.push('\n');
@@ -160,7 +160,7 @@ pub fn chapter(trace: &Trace, figure: &super::Figure, all: &[(Trace, super::Figu
         let _ = write!(text, "![{}]({}.svg)\n\n", figure.title, info.name);
         let _ = write!(text, "{}\n\n{}\n", figure.reading, alike(trace, all));
     }
-    let _ = write!(text, "\nSource: {}\n", super::rich::markdown(info.source));
+    let _ = write!(text, "\nSource: {}\n", super::inline_markup::markdown(info.source));
     text
 }
 
@@ -187,7 +187,7 @@ pub fn contents(all: &[(Trace, super::Figure)]) -> String {
             text,
             "| [{0}]({0}.md) | {whose} | {1} |",
             info.name,
-            super::rich::markdown(info.summary)
+            super::inline_markup::markdown(info.summary)
         );
     }
     text

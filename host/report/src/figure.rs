@@ -2,11 +2,11 @@
 
 use super::axis::{Axis, Scale};
 use super::colour::Colour;
-use super::rich;
+use super::inline_markup;
 
 /// How a mark looks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Look {
+pub enum Style {
     /// A line through the points in their order; it may turn back on itself.
     Line,
     /// A thin line behind others: measurements.
@@ -35,7 +35,7 @@ pub enum Mark {
         /// Ordinates; a value that is not finite breaks a line.
         y: Vec<f64>,
         /// How they are drawn.
-        look: Look,
+        style: Style,
     },
     /// The area between two curves over one abscissa: an interval.
     Band {
@@ -124,57 +124,57 @@ impl Panel {
         self
     }
 
-    fn series(self, name: impl Into<String>, colour: Colour, x: &[f64], y: &[f64], look: Look) -> Self {
+    fn series(self, name: impl Into<String>, colour: Colour, x: &[f64], y: &[f64], style: Style) -> Self {
         let n = x.len().min(y.len());
-        self.with(name, colour, Mark::Series { x: x[..n].to_vec(), y: y[..n].to_vec(), look })
+        self.with(name, colour, Mark::Series { x: x[..n].to_vec(), y: y[..n].to_vec(), style })
     }
 
     /// With a line.
     #[must_use]
     pub fn line(self, name: impl Into<String>, colour: Colour, x: &[f64], y: &[f64]) -> Self {
-        self.series(name, colour, x, y, Look::Line)
+        self.series(name, colour, x, y, Style::Line)
     }
 
     /// With a thin line, for measurements behind a model.
     #[must_use]
     pub fn hair(self, name: impl Into<String>, colour: Colour, x: &[f64], y: &[f64]) -> Self {
-        self.series(name, colour, x, y, Look::Hair)
+        self.series(name, colour, x, y, Style::Hair)
     }
 
     /// With a dashed line.
     #[must_use]
     pub fn dashes(self, name: impl Into<String>, colour: Colour, x: &[f64], y: &[f64]) -> Self {
-        self.series(name, colour, x, y, Look::Dashes)
+        self.series(name, colour, x, y, Style::Dashes)
     }
 
     /// With a line of steps.
     #[must_use]
     pub fn step(self, name: impl Into<String>, colour: Colour, x: &[f64], y: &[f64]) -> Self {
-        self.series(name, colour, x, y, Look::Step)
+        self.series(name, colour, x, y, Style::Step)
     }
 
     /// With dots.
     #[must_use]
     pub fn points(self, name: impl Into<String>, colour: Colour, x: &[f64], y: &[f64]) -> Self {
-        self.series(name, colour, x, y, Look::Points)
+        self.series(name, colour, x, y, Style::Points)
     }
 
     /// With open rings.
     #[must_use]
     pub fn rings(self, name: impl Into<String>, colour: Colour, x: &[f64], y: &[f64]) -> Self {
-        self.series(name, colour, x, y, Look::Rings)
+        self.series(name, colour, x, y, Style::Rings)
     }
 
     /// With crosses.
     #[must_use]
     pub fn crosses(self, name: impl Into<String>, colour: Colour, x: &[f64], y: &[f64]) -> Self {
-        self.series(name, colour, x, y, Look::Crosses)
+        self.series(name, colour, x, y, Style::Crosses)
     }
 
     /// With bars from zero.
     #[must_use]
     pub fn bars(self, name: impl Into<String>, colour: Colour, x: &[f64], y: &[f64]) -> Self {
-        self.series(name, colour, x, y, Look::Bars)
+        self.series(name, colour, x, y, Style::Bars)
     }
 
     /// With the area between two curves.
@@ -218,11 +218,11 @@ impl Panel {
         };
         for layer in &self.layers {
             match (&layer.mark, vertical) {
-                (Mark::Series { y, look: Look::Bars, .. }, true) => {
+                (Mark::Series { y, style: Style::Bars, .. }, true) => {
                     take(0.0);
                     y.iter().copied().for_each(&mut take);
                 }
-                (Mark::Series { x, look: Look::Bars, .. }, false) => {
+                (Mark::Series { x, style: Style::Bars, .. }, false) => {
                     let half = bar_half_width(x);
                     x.iter().for_each(|v| {
                         take(v - half);
@@ -316,12 +316,12 @@ impl Figure {
     /// All words of the picture without mark-up, for readers that cannot see it.
     pub(crate) fn description(&self) -> String {
         let names: Vec<String> =
-            self.legend().iter().map(|l| rich::plain(&l.name)).filter(|n| !n.is_empty()).collect();
+            self.legend().iter().map(|l| inline_markup::plain(&l.name)).filter(|n| !n.is_empty()).collect();
         let axes = self.panels.first().map_or(String::new(), |p| {
-            format!("{} against {}. ", rich::plain(&p.y.title()), rich::plain(&p.x.title()))
+            format!("{} against {}. ", inline_markup::plain(&p.y.title()), inline_markup::plain(&p.x.title()))
         });
         let shown = if names.is_empty() { String::new() } else { format!(" Shown: {}.", names.join(", ")) };
-        format!("{axes}{}{shown}", rich::plain(&self.reading))
+        format!("{axes}{}{shown}", inline_markup::plain(&self.reading))
     }
 
     /// Every named layer once, in order of first appearance.

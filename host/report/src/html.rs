@@ -5,8 +5,8 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::figure::Figure;
+use super::inline_markup;
 use super::page::{Block, Page, Section, Table, Tone};
-use super::rich;
 use super::svg::{self, Layout};
 
 const STYLE: &str = include_str!("page.css");
@@ -29,24 +29,24 @@ fn file(page: &Page) -> String {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
-                title { (rich::plain(&page.title)) " · " (rich::plain(&page.subtitle)) }
+                title { (inline_markup::plain(&page.title)) " · " (inline_markup::plain(&page.subtitle)) }
                 style id="figure-style" { (PreEscaped(svg::page_style())) }
                 style { (PreEscaped(STYLE)) }
             }
             body {
                 header {
-                    h1 { (rich::html(&page.title)) }
-                    @if !page.subtitle.is_empty() { p.subtitle { (rich::html(&page.subtitle)) } }
+                    h1 { (inline_markup::html(&page.title)) }
+                    @if !page.subtitle.is_empty() { p.subtitle { (inline_markup::html(&page.subtitle)) } }
                     @if let Some((tone, verdict)) = &page.verdict {
-                        p class={ "verdict " (class(*tone)) } { (rich::html(verdict)) }
+                        p class={ "verdict " (class(*tone)) } { (inline_markup::html(verdict)) }
                     }
                     @if !page.facts.is_empty() {
                         dl.facts {
                             @for fact in &page.facts {
                                 div class=(class(fact.tone)) {
-                                    dt { (rich::html(&fact.label)) }
-                                    dd.value { (rich::html(&fact.value)) }
-                                    @if !fact.note.is_empty() { dd.note { (rich::html(&fact.note)) } }
+                                    dt { (inline_markup::html(&fact.label)) }
+                                    dd.value { (inline_markup::html(&fact.value)) }
+                                    @if !fact.note.is_empty() { dd.note { (inline_markup::html(&fact.note)) } }
                                 }
                             }
                         }
@@ -54,7 +54,7 @@ fn file(page: &Page) -> String {
                     @if contents {
                         nav aria-label="Contents" {
                             @for (i, section) in page.sections.iter().enumerate() {
-                                a href={ "#part-" (i + 1) } { (rich::html(&section.title)) }
+                                a href={ "#part-" (i + 1) } { (inline_markup::html(&section.title)) }
                             }
                         }
                     }
@@ -67,8 +67,8 @@ fn file(page: &Page) -> String {
                         h2 { "Where this comes from" }
                         dl {
                             @for (what, value) in &page.origin {
-                                dt { (rich::html(what)) }
-                                dd { (rich::html(value)) }
+                                dt { (inline_markup::html(what)) }
+                                dd { (inline_markup::html(value)) }
                             }
                         }
                     }
@@ -92,12 +92,12 @@ fn class(tone: Tone) -> &'static str {
 fn section(number: usize, section: &Section) -> Markup {
     html! {
         section id={ "part-" (number) } {
-            h2 { (rich::html(&section.title)) }
+            h2 { (inline_markup::html(&section.title)) }
             @for block in &section.blocks {
                 @match block {
-                    Block::Text(text) => p { (rich::html(text)) },
-                    Block::Notice(tone, text) => p class={ "notice " (class(*tone)) } { (rich::html(text)) },
-                    Block::List(points) => ul { @for point in points { li { (rich::html(point)) } } },
+                    Block::Text(text) => p { (inline_markup::html(text)) },
+                    Block::Notice(tone, text) => p class={ "notice " (class(*tone)) } { (inline_markup::html(text)) },
+                    Block::List(points) => ul { @for point in points { li { (inline_markup::html(point)) } } },
                     Block::Figure(one) => (figure(one)),
                     Block::Table(one) => (table(one)),
                     // By keyboard, too, what is longer than its window can be scrolled.
@@ -113,11 +113,11 @@ fn figure(figure: &Figure) -> Markup {
     let numbers = figure.csv().replace("</", "<\\/");
     html! {
         figure id=(figure.id) {
-            h3 { (rich::html(&figure.title)) }
+            h3 { (inline_markup::html(&figure.title)) }
             div.wide { (PreEscaped(svg::inline(figure, Layout::Wide))) }
             div.narrow { (PreEscaped(svg::inline(figure, Layout::Narrow))) }
             figcaption {
-                (rich::html(&figure.reading))
+                (inline_markup::html(&figure.reading))
                 span.save hidden {
                     button type="button" data-save="svg" aria-label={ "Save the picture " (figure.id) " as SVG" } { "SVG" }
                     button type="button" data-save="csv" aria-label={ "Save the numbers of " (figure.id) " as CSV" } { "CSV" }
@@ -135,13 +135,13 @@ fn numeric(cell: &str) -> bool {
 
 fn table(table: &Table) -> Markup {
     html! {
-        div.scroll tabindex="0" role="region" aria-label=(rich::plain(&table.caption)) {
+        div.scroll tabindex="0" role="region" aria-label=(inline_markup::plain(&table.caption)) {
             table {
-                @if !table.caption.is_empty() { caption { (rich::html(&table.caption)) } }
+                @if !table.caption.is_empty() { caption { (inline_markup::html(&table.caption)) } }
                 thead {
                     tr {
                         @for (i, head) in table.head.iter().enumerate() {
-                            th scope="col" class=[right(table, i)] { (rich::html(head)) }
+                            th scope="col" class=[right(table, i)] { (inline_markup::html(head)) }
                         }
                     }
                 }
@@ -150,9 +150,9 @@ fn table(table: &Table) -> Markup {
                         tr {
                             @for (i, cell) in row.iter().enumerate() {
                                 @if i == 0 {
-                                    th scope="row" class=[right(table, i)] { (rich::html(cell)) }
+                                    th scope="row" class=[right(table, i)] { (inline_markup::html(cell)) }
                                 } @else {
-                                    td class=[right(table, i)] { (rich::html(cell)) }
+                                    td class=[right(table, i)] { (inline_markup::html(cell)) }
                                 }
                             }
                         }

@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 
 use super::axis::figures;
+use super::canvas::{FONT_SIZE, px, text};
 use super::colour::Colour;
-use super::figure::{Figure, Layer, Look, Mark};
+use super::figure::{Figure, Layer, Mark, Style};
+use super::inline_markup;
 use super::marks;
-use super::paper::{LETTER, px, text};
-use super::rich;
 
 const ROW: f64 = 20.0;
 const SWATCH: f64 = 22.0;
@@ -32,7 +32,7 @@ pub(crate) fn draw(figure: &Figure, width: f64) -> (String, f64) {
         at
     };
     for layer in shown {
-        let (a, b) = room(SWATCH + 6.0 + rich::width(&layer.name) * LETTER);
+        let (a, b) = room(SWATCH + 6.0 + inline_markup::width(&layer.name) * FONT_SIZE);
         swatch(&mut out, layer, a, b + 10.0);
         text(&mut out, a + SWATCH + 6.0, b + 14.0, "start", Colour::Ink, "", &layer.name);
     }
@@ -46,7 +46,7 @@ pub(crate) fn draw(figure: &Figure, width: f64) -> (String, f64) {
         let low = if both { figures(-largest, 2) } else { "0".into() };
         let high = figures(largest, 2);
         let bar = 90.0;
-        let words = [label.as_str(), &low, &high].map(|t| rich::width(t) * LETTER);
+        let words = [label.as_str(), &low, &high].map(|t| inline_markup::width(t) * FONT_SIZE);
         let (a, b) = room(words[0] + 10.0 + words[1] + 6.0 + bar + 6.0 + words[2]);
         text(&mut out, a, b + 14.0, "start", Colour::Ink, "", label);
         let start = a + words[0] + 10.0;
@@ -81,20 +81,20 @@ fn swatch(out: &mut String, layer: &Layer, x: f64, y: f64) {
     };
     let across = format!("M{} {}h{SWATCH}", px(x), px(y));
     let drawn = match &layer.mark {
-        Mark::Series { look, .. } => match look {
-            Look::Line | Look::Step => stroke("2.4", "", across),
-            Look::Hair => stroke("1.4", " stroke-opacity=\".8\"", across),
-            Look::Dashes => stroke("1.8", " stroke-dasharray=\"6 4\"", across),
-            Look::Points => stroke("6", " stroke-linecap=\"round\"", format!("M{} {}h0", px(middle), px(y))),
-            Look::Rings => format!(
+        Mark::Series { style, .. } => match style {
+            Style::Line | Style::Step => stroke("2.4", "", across),
+            Style::Hair => stroke("1.4", " stroke-opacity=\".8\"", across),
+            Style::Dashes => stroke("1.8", " stroke-dasharray=\"6 4\"", across),
+            Style::Points => stroke("6", " stroke-linecap=\"round\"", format!("M{} {}h0", px(middle), px(y))),
+            Style::Rings => format!(
                 "<circle class=\"S {class}\" stroke=\"{literal}\" stroke-width=\"1.6\" cx=\"{}\" cy=\"{}\" r=\"3.6\"/>",
                 px(middle),
                 px(y)
             ),
-            Look::Crosses => {
+            Style::Crosses => {
                 stroke("1.6", "", format!("M{} {}l7 7m0 -7l-7 7", px(middle - 3.5), px(y - 3.5)))
             }
-            Look::Bars => block(x, y, &class, &literal, ".85"),
+            Style::Bars => block(x, y, &class, &literal, ".85"),
         },
         Mark::Band { .. } => block(x, y, &class, &literal, ".22"),
         Mark::Region { .. } => block(x, y, &class, &literal, ".22"),

@@ -21,24 +21,27 @@ pub mod diagnose_page;
 pub mod effect_page;
 pub mod effect_trace;
 pub mod fit_page;
-pub mod rich;
+pub mod inline_markup;
+
+pub mod document;
+pub mod wording;
 
 mod axis;
+mod canvas;
 mod colour;
+mod downsample;
+mod export;
 mod figure;
 mod html;
 mod legend;
-pub mod letters;
 mod markdown;
 mod marks;
 mod numbers;
 mod page;
-mod paper;
-mod parts;
 mod svg;
-mod thin;
+pub mod symbols;
 
 pub use axis::{Axis, Scale, figures, fixed};
 pub use colour::Colour;
-pub use figure::{Figure, Layer, Look, Mark, Panel};
+pub use figure::{Figure, Layer, Mark, Panel, Style};
 pub use page::{Block, Fact, Page, Section, Table, Tone};

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
+use super::inline_markup;
 use super::page::{Block, Page, Table, Tone};
-use super::rich;
 
 impl Page {
     /// The summary as Markdown, for pasting.
@@ -15,27 +15,27 @@ impl Page {
 
 /// Title, verdict, facts, and the sections marked for the summary; pictures become one line.
 fn summary(page: &Page) -> String {
-    let mut out = format!("# {}\n", rich::markdown(&page.title));
+    let mut out = format!("# {}\n", inline_markup::markdown(&page.title));
     if !page.subtitle.is_empty() {
-        let _ = write!(out, "\n{}\n", rich::markdown(&page.subtitle));
+        let _ = write!(out, "\n{}\n", inline_markup::markdown(&page.subtitle));
     }
     if let Some((_, verdict)) = &page.verdict {
-        let _ = write!(out, "\n**{}**\n", rich::markdown(verdict));
+        let _ = write!(out, "\n**{}**\n", inline_markup::markdown(verdict));
     }
     if !page.facts.is_empty() {
         out.push_str("\n| | | |\n| --- | --- | --- |\n");
         for fact in &page.facts {
-            let cells = [&fact.label, &fact.value, &fact.note].map(|t| rich::markdown(t));
+            let cells = [&fact.label, &fact.value, &fact.note].map(|t| inline_markup::markdown(t));
             let _ = writeln!(out, "| {} | {} | {} |", cells[0], cells[1], cells[2]);
         }
     }
     for section in page.sections.iter().filter(|s| s.in_summary) {
-        let _ = write!(out, "\n## {}\n", rich::markdown(&section.title));
+        let _ = write!(out, "\n## {}\n", inline_markup::markdown(&section.title));
         for block in &section.blocks {
             out.push('\n');
             match block {
                 Block::Text(text) => {
-                    let _ = writeln!(out, "{}", rich::markdown(text));
+                    let _ = writeln!(out, "{}", inline_markup::markdown(text));
                 }
                 Block::Notice(tone, text) => {
                     let word = match tone {
@@ -43,16 +43,20 @@ fn summary(page: &Page) -> String {
                         Tone::Caution => "Caution",
                         Tone::Bad => "Wrong",
                     };
-                    let _ = writeln!(out, "> **{word}:** {}", rich::markdown(text));
+                    let _ = writeln!(out, "> **{word}:** {}", inline_markup::markdown(text));
                 }
                 Block::List(points) => {
                     for point in points {
-                        let _ = writeln!(out, "- {}", rich::markdown(point));
+                        let _ = writeln!(out, "- {}", inline_markup::markdown(point));
                     }
                 }
                 Block::Figure(figure) => {
-                    let _ =
-                        writeln!(out, "*Picture:* {} (`{}.svg`)", rich::markdown(&figure.title), figure.id);
+                    let _ = writeln!(
+                        out,
+                        "*Picture:* {} (`{}.svg`)",
+                        inline_markup::markdown(&figure.title),
+                        figure.id
+                    );
                 }
                 Block::Table(one) => table(&mut out, one),
                 Block::Listing(text) => {
@@ -66,7 +70,7 @@ fn summary(page: &Page) -> String {
 
 fn table(out: &mut String, table: &Table) {
     let line = |cells: &[String]| {
-        let cells: Vec<String> = cells.iter().map(|c| rich::markdown(c)).collect();
+        let cells: Vec<String> = cells.iter().map(|c| inline_markup::markdown(c)).collect();
         format!("| {} |\n", cells.join(" | "))
     };
     out.push_str(&line(&table.head));

@@ -2,15 +2,15 @@
 
 use std::fmt::Write as _;
 
-use super::figure::{Layer, Look, Mark, bar_half_width};
-use super::paper::{Frame, px};
-use super::thin;
+use super::canvas::{Frame, px};
+use super::downsample;
+use super::figure::{Layer, Mark, Style, bar_half_width};
 
 /// Which marks come first: regions and fields, then bands, then everything else.
 pub(crate) fn stage(mark: &Mark) -> u8 {
     match mark {
         Mark::Region { .. } | Mark::Heat { .. } => 0,
-        Mark::Band { .. } | Mark::Series { look: Look::Hair | Look::Bars, .. } => 1,
+        Mark::Band { .. } | Mark::Series { style: Style::Hair | Style::Bars, .. } => 1,
         _ => 2,
     }
 }
@@ -32,12 +32,12 @@ pub(crate) fn draw(out: &mut String, layer: &Layer, frame: &Frame) {
         }
     };
     match &layer.mark {
-        Mark::Series { x, y, look } => match look {
-            Look::Line => stroke(out, &line(frame, x, y), 2.0, ""),
-            Look::Hair => stroke(out, &line(frame, x, y), 1.1, " stroke-opacity=\".8\""),
-            Look::Dashes => stroke(out, &line(frame, x, y), 1.8, " stroke-dasharray=\"6 4\""),
-            Look::Step => stroke(out, &steps(frame, x, y), 1.8, ""),
-            Look::Points => {
+        Mark::Series { x, y, style } => match style {
+            Style::Line => stroke(out, &line(frame, x, y), 2.0, ""),
+            Style::Hair => stroke(out, &line(frame, x, y), 1.1, " stroke-opacity=\".8\""),
+            Style::Dashes => stroke(out, &line(frame, x, y), 1.8, " stroke-dasharray=\"6 4\""),
+            Style::Step => stroke(out, &steps(frame, x, y), 1.8, ""),
+            Style::Points => {
                 let kept = points(frame, x, y);
                 let (size, opacity) = match kept.len() {
                     0..=60 => (6.0, "1"),
@@ -47,7 +47,7 @@ pub(crate) fn draw(out: &mut String, layer: &Layer, frame: &Frame) {
                 let d: String = kept.iter().map(|(a, b)| format!("M{} {}h0", px(*a), px(*b))).collect();
                 stroke(out, &d, size, &format!(" stroke-linecap=\"round\" stroke-opacity=\"{opacity}\""));
             }
-            Look::Rings => {
+            Style::Rings => {
                 for (a, b) in points(frame, x, y) {
                     let _ = write!(
                         out,
@@ -57,12 +57,12 @@ pub(crate) fn draw(out: &mut String, layer: &Layer, frame: &Frame) {
                     );
                 }
             }
-            Look::Crosses => {
+            Style::Crosses => {
                 let cross = |(a, b): &(f64, f64)| format!("M{} {}l7 7m0 -7l-7 7", px(a - 3.5), px(b - 3.5));
                 let d: String = points(frame, x, y).iter().map(cross).collect();
                 stroke(out, &d, 1.6, "");
             }
-            Look::Bars => fill(out, &bars(frame, x, y), " fill-opacity=\".85\""),
+            Style::Bars => fill(out, &bars(frame, x, y), " fill-opacity=\".85\""),
         },
         Mark::Band { x, low, high } => {
             fill(out, &band(frame, x, low, high), " fill-opacity=\".18\"");
@@ -87,13 +87,13 @@ fn rising(x: &[f64]) -> bool {
 }
 
 /// The points of a series on the paper, thinned; a break is a pair that is not finite.
-fn on_paper(frame: &Frame, x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
+fn on_canvas(frame: &Frame, x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
     let xs: Vec<f64> = x.iter().map(|v| frame.x(*v)).collect();
     let ys: Vec<f64> = y.iter().map(|v| frame.y(*v)).collect();
     let kept = if rising(x) {
-        thin::extremes(&xs, &ys, frame.width as usize)
+        downsample::extremes(&xs, &ys, frame.width as usize)
     } else {
-        thin::triangles(&xs, &ys, (3.0 * frame.width) as usize)
+        downsample::triangles(&xs, &ys, (3.0 * frame.width) as usize)
     };
     // Far beyond the paper coordinates are cut, or a wild value makes the file useless to other programs.
     let near = |v: f64| if v.is_finite() { v.clamp(-1e5, 1e5) } else { f64::NAN };
@@ -102,10 +102,10 @@ fn on_paper(frame: &Frame, x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
 
 fn line(frame: &Frame, x: &[f64], y: &[f64]) -> String {
     let mut d = String::new();
-    let points = on_paper(frame, x, y);
+    let points = on_canvas(frame, x, y);
     let finite = |p: &(f64, f64)| p.0.is_finite() && p.1.is_finite();
     for part in points.chunk_by(|a, b| finite(a) == finite(b)).filter(|p| finite(&p[0])) {
-        path(&mut d, &thin::needed(part, 0.12));
+        path(&mut d, &downsample::needed(part, 0.12));
     }
     d
 }
@@ -130,7 +130,7 @@ fn path(d: &mut String, points: &[(f64, f64)]) {
 fn steps(frame: &Frame, x: &[f64], y: &[f64]) -> String {
     let mut d = String::new();
     let mut before: Option<f64> = None;
-    for (a, b) in on_paper(frame, x, y) {
+    for (a, b) in on_canvas(frame, x, y) {
         if !(a.is_finite() && b.is_finite()) {
             before = None;
             continue;
@@ -150,7 +150,7 @@ fn points(frame: &Frame, x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
     let ys: Vec<f64> = y.iter().map(|v| frame.y(*v)).collect();
     // More dots than that make a cloud, not a picture.
     let most = ((frame.width * frame.height / 70.0) as usize).clamp(300, 1_800);
-    let kept = thin::cells(&xs, &ys, 1.0, most);
+    let kept = downsample::cells(&xs, &ys, 1.0, most);
     kept.into_iter().map(|i| (xs[i], ys[i])).filter(|(a, b)| a.abs() < 1e5 && b.abs() < 1e5).collect()
 }
 
@@ -186,8 +186,8 @@ fn band(frame: &Frame, x: &[f64], low: &[f64], high: &[f64]) -> String {
     for part in rows.chunk_by(|a, b| finite(a) == finite(b)).filter(|p| finite(&p[0])) {
         let of = |v: &[f64]| part.iter().map(|i| v[*i]).collect::<Vec<f64>>();
         let (xs, lows, highs) = (of(x), of(low), of(high));
-        let mut edge = thin::needed(&on_paper(frame, &xs, &highs), 0.12);
-        edge.extend(thin::needed(&on_paper(frame, &xs, &lows), 0.12).into_iter().rev());
+        let mut edge = downsample::needed(&on_canvas(frame, &xs, &highs), 0.12);
+        edge.extend(downsample::needed(&on_canvas(frame, &xs, &lows), 0.12).into_iter().rev());
         path(&mut d, &edge);
         d.push('Z');
     }

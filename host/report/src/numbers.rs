@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::axis::{Axis, Scale};
 use super::figure::{Figure, Mark, Panel};
-use super::{rich, thin};
+use super::{downsample, inline_markup};
 
 /// The most rows of one layer that are written; longer series are thinned as they are for drawing.
 const MOST_ROWS: usize = 1_500;
@@ -25,7 +25,8 @@ fn csv(figure: &Figure) -> String {
     let mut head = None;
     for panel in &figure.panels {
         // Panels with other axes start a table of their own, after an empty line.
-        let (x, y) = (cell(&rich::plain(&panel.x.title())), cell(&rich::plain(&panel.y.title())));
+        let (x, y) =
+            (cell(&inline_markup::plain(&panel.x.title())), cell(&inline_markup::plain(&panel.y.title())));
         let wide = panel.layers.iter().any(|l| !matches!(l.mark, Mark::Series { .. } | Mark::Level(_)));
         let this = format!(
             "{}layer,{x},{y}{}\n",
@@ -45,9 +46,10 @@ fn csv(figure: &Figure) -> String {
 }
 
 fn rows(out: &mut String, panel: &Panel, several: bool, wide: bool) {
-    let title = if several { format!("{},", cell(&rich::plain(&panel.title))) } else { String::new() };
+    let title =
+        if several { format!("{},", cell(&inline_markup::plain(&panel.title))) } else { String::new() };
     for layer in &panel.layers {
-        let front = format!("{title}{}", cell(&rich::plain(&layer.name)));
+        let front = format!("{title}{}", cell(&inline_markup::plain(&layer.name)));
         let mut row = |x: &str, y: Option<f64>, ends: Option<(f64, f64)>| {
             let _ = write!(out, "{front},{x},{}", y.map_or(String::new(), number));
             if wide {
@@ -63,14 +65,14 @@ fn rows(out: &mut String, panel: &Panel, several: bool, wide: bool) {
         match &layer.mark {
             Mark::Series { x, y, .. } => {
                 let kept = if x.windows(2).all(|w| w[0] <= w[1]) {
-                    thin::extremes(x, y, MOST_ROWS / 4)
+                    downsample::extremes(x, y, MOST_ROWS / 4)
                 } else {
-                    thin::triangles(x, y, MOST_ROWS)
+                    downsample::triangles(x, y, MOST_ROWS)
                 };
                 kept.into_iter().for_each(|i| row(&abscissa(&panel.x, x[i]), Some(y[i]), None));
             }
             Mark::Band { x, low, high } | Mark::Intervals { x, low, high } => {
-                for i in thin::extremes(x, high, MOST_ROWS / 4) {
+                for i in downsample::extremes(x, high, MOST_ROWS / 4) {
                     row(&abscissa(&panel.x, x[i]), None, Some((low[i], high[i])));
                 }
             }
@@ -100,7 +102,7 @@ fn abscissa(axis: &Axis, value: f64) -> String {
     if let Scale::Names(names) = &axis.scale
         && let Some(name) = names.get(value.round().max(0.0) as usize)
     {
-        return cell(&rich::plain(name));
+        return cell(&inline_markup::plain(name));
     }
     number(value)
 }

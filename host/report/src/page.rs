@@ -63,7 +63,7 @@ impl Table {
     }
 }
 
-/// A part of a section. Texts may carry the mark-up of [`super::rich`].
+/// A part of a section. Texts may carry the mark-up of [`super::inline_markup`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum Block {
     /// A paragraph.

@@ -1,17 +1,17 @@
 //! Drawing a [`Figure`] as SVG: deterministic text, no fonts, no scripts, no outside resources.
 //!
-//! Every picture has two layouts, one for a page and one for a phone, since letters must not shrink with the screen.
+//! Every picture has two layouts, one for a page and one for a phone, since text must not shrink with the screen.
 //! The legend stands above the panels, where no data can be.
 
 use std::fmt::Write as _;
 
 use super::axis::{Scale, Tick, linear_ticks, log_ticks};
+use super::canvas::{FONT_SIZE, Frame, px, text};
 use super::colour::{self, Colour};
 use super::figure::{Figure, Panel};
+use super::inline_markup;
 use super::legend;
 use super::marks;
-use super::paper::{Frame, LETTER, px, text};
-use super::rich;
 
 /// For what width a picture is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -120,7 +120,7 @@ fn draw(figure: &Figure, layout: Layout, style: Option<&str>) -> String {
     let _ = write!(
         out,
         "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"fig\" viewBox=\"{0} {0} {1} {2}\" role=\"img\" \
-         aria-labelledby=\"{id}-t {id}-d\" font-family=\"sans-serif\" font-size=\"{LETTER}\" fill=\"none\"",
+         aria-labelledby=\"{id}-t {id}-d\" font-family=\"sans-serif\" font-size=\"{FONT_SIZE}\" fill=\"none\"",
         px(-margin),
         px(width + 2.0 * margin),
         px(height + 2.0 * margin)
@@ -132,8 +132,8 @@ fn draw(figure: &Figure, layout: Layout, style: Option<&str>) -> String {
     let _ = write!(
         out,
         "><title id=\"{id}-t\">{}</title><desc id=\"{id}-d\">{}</desc>",
-        rich::escape(&rich::plain(&figure.title)),
-        rich::escape(&figure.description())
+        inline_markup::escape(&inline_markup::plain(&figure.title)),
+        inline_markup::escape(&figure.description())
     );
     if let Some(style) = style {
         let _ = write!(
@@ -168,7 +168,7 @@ fn panel(
         _ => 330.0,
     };
     let y_ticks = ticks(&panel.y, y_ends, (height / 48.0) as usize);
-    let widest = y_ticks.iter().map(|t| rich::width(&t.text)).fold(0.0, f64::max) * LETTER;
+    let widest = y_ticks.iter().map(|t| inline_markup::width(&t.text)).fold(0.0, f64::max) * FONT_SIZE;
     let margin = (widest + 9.0).clamp(26.0, cell_width * 0.5);
     let mut head = 0.0;
     if !panel.title.is_empty() {
@@ -220,7 +220,7 @@ fn axes(out: &mut String, panel: &Panel, frame: &Frame, y_ticks: &[Tick]) -> f64
         let written = || ticks.iter().filter(|t| !t.text.is_empty());
         written().zip(written().skip(1)).any(|(a, b)| {
             let room = frame.x(b.at) - frame.x(a.at);
-            0.5 * (rich::width(&a.text) + rich::width(&b.text)) * LETTER + 8.0 > room
+            0.5 * (inline_markup::width(&a.text) + inline_markup::width(&b.text)) * FONT_SIZE + 8.0 > room
         })
     };
     while !named && wanted > 2 && crowded(&x_ticks) {
@@ -258,7 +258,7 @@ fn axes(out: &mut String, panel: &Panel, frame: &Frame, y_ticks: &[Tick]) -> f64
         text(out, frame.left - 7.0, y, "end", Colour::Ink, " opacity=\".82\"", &shortened(tick, frame.left));
     }
     let room = frame.width / x_ticks.len().max(1) as f64;
-    let widest = x_ticks.iter().map(|t| rich::width(&t.text)).fold(0.0, f64::max) * LETTER;
+    let widest = x_ticks.iter().map(|t| inline_markup::width(&t.text)).fold(0.0, f64::max) * FONT_SIZE;
     let slanted = named && widest > room - 6.0;
     for tick in x_ticks.iter().filter(|t| !t.text.is_empty()) {
         let x = frame.x(tick.at);
@@ -274,7 +274,7 @@ fn axes(out: &mut String, panel: &Panel, frame: &Frame, y_ticks: &[Tick]) -> f64
     let title = panel.x.title();
     if !title.is_empty() {
         // A title that is wider than its frame grows to the left: on the right the paper ends.
-        let half = 0.5 * rich::width(&title) * LETTER;
+        let half = 0.5 * inline_markup::width(&title) * FONT_SIZE;
         let middle = (frame.left + frame.width / 2.0).min(right + 8.0 - half).max(half);
         text(out, middle, bottom + below + 13.0, "middle", Colour::Ink, "", &title);
         below += 20.0;
@@ -284,11 +284,11 @@ fn axes(out: &mut String, panel: &Panel, frame: &Frame, y_ticks: &[Tick]) -> f64
 
 /// A name that would run off the paper is cut; its whole form stands in the numbers.
 fn shortened(tick: &Tick, room: f64) -> String {
-    let fits = |text: &str| rich::width(text) * LETTER <= room.max(40.0) - 6.0;
+    let fits = |text: &str| inline_markup::width(text) * FONT_SIZE <= room.max(40.0) - 6.0;
     if fits(&tick.text) {
         return tick.text.clone();
     }
-    let mut text = rich::plain(&tick.text);
+    let mut text = inline_markup::plain(&tick.text);
     while !text.is_empty() && !fits(&format!("{text}…")) {
         text.pop();
     }

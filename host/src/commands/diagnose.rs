@@ -16,14 +16,15 @@ use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::{to_standard_output, write_whole};
 use pam_data::progress::SharedProgress;
-use pam_diagnose::{Options, advise, model, summary::summary};
+use pam_diagnose::remark::Remark;
+use pam_diagnose::{Options, advise, model};
 use pam_fit::checks::Checks;
 use pam_fit::predict::predict;
 
 use crate::progress::ProgressLine;
 use pam_data::recording::Reader;
 use pam_fit::table_file::{self, TableFile};
-use pam_report::diagnose_page;
+use pam_report::{diagnose_page, document, wording};
 
 /// Arguments of `host diagnose`.
 #[derive(Debug, Args)]
@@ -98,7 +99,7 @@ impl Arguments {
         }
         let confusable = answer.missing.iter().any(|m| !m.confusable_with.is_empty());
         let refitted = (self.output.is_some() || confusable).then(|| {
-            options.progress.stage("fitting the table beside what was found", 0);
+            options.progress.stage("fitting the table with the named effects", 0);
             model::refit(&campaign, &muscle, &answer)
         });
         // The line of progress goes before anything else is said.
@@ -108,21 +109,21 @@ impl Arguments {
             Some(Ok(refitted)) => self.with_model(console, &campaign, refitted, &mut answer)?,
             // A table was asked for: then its absence is a failure. For advice alone it is not.
             Some(Err(e)) if self.output.is_some() => return Err(e),
-            Some(Err(e)) => answer.remarks.push(format!("no advice on the next recording: {e}")),
+            Some(Err(e)) => answer.remarks.push(Remark::NoAdvice(e.to_string())),
             None => {}
         }
         if let (Some(path), None) = (&self.next, &answer.next_experiment) {
             console.warning(format!(
-                "{} is not written: nothing was found that another recording would have to tell from something else",
+                "{} is not written: no named effect needs another recording to separate it from others",
                 path.display()
             ));
         }
         if let Some(path) = &self.json {
-            write_whole(path, (answer.to_json() + "\n").as_bytes())?;
+            write_whole(path, (document::diagnosis_json(&answer) + "\n").as_bytes())?;
         }
         self.reports.write(console, || diagnose_page::page(&answer, &geometry, &campaign))?;
         if self.json.as_deref() != Some(std::path::Path::new("-")) {
-            let words = summary(&answer);
+            let words = wording::summary(&answer);
             if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
         }
         console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));
@@ -155,16 +156,15 @@ impl Arguments {
         refitted.file.about.sources = table_file::sources(campaign, files, hashes);
         refitted.file.write(path)?;
         if let Some(reserve) = refitted.reserve {
-            answer.remarks.push(format!("{}: {reserve}", path.display()));
+            answer.remarks.push(Remark::Table { file: path.display().to_string(), reserve });
         } else if let Some((plain, with)) = refitted.left_out.filter(|(plain, with)| with < plain) {
             console.note(format!(
-                "{}: the table with the named effects predicts a pressure left out of the fit to {with:.2} % of blocked force, without \
-                 them to {plain:.2} %",
+                "{}: mean error at a pressure left out of the fit: {with:.2} % of blocked force with the named effects, {plain:.2} % without",
                 path.display()
             ));
         } else if refitted.rms_after < refitted.rms_before {
             console.note(format!(
-                "{}: the table with the named effects predicts these recordings to {:.3} N, without them to {:.3} N",
+                "{}: error on these recordings: {:.3} N rms with the named effects, {:.3} N without",
                 path.display(),
                 refitted.rms_after,
                 refitted.rms_before

@@ -10,8 +10,8 @@ use crate::console::Console;
 use pam_data::error::{DataCode, Error, Result, nearest};
 use pam_data::output::{printed, to_standard_output, write_whole};
 use pam_fit::bench::Candidate;
-use pam_report::letters::letters;
-use pam_report::{effect_page, rich};
+use pam_report::symbols::symbols;
+use pam_report::{effect_page, inline_markup};
 
 /// Arguments of `host effects`.
 #[derive(Debug, Args)]
@@ -121,7 +121,7 @@ fn explain(candidate: Candidate) -> String {
         info.name,
         info.summary,
         effect_page::place(info.link),
-        rich::plain(info.equation)
+        inline_markup::plain(info.equation)
     );
     for p in info.parameters {
         let _ = writeln!(
@@ -131,7 +131,7 @@ fn explain(candidate: Candidate) -> String {
         );
     }
     text.push('\n');
-    for letter in &letters(info).rows {
+    for letter in &symbols(info).rows {
         let _ = writeln!(text, "  {:8} {}", letter[0], letter[1]);
     }
     text + &format!("\n  source: {}", info.source)
@@ -148,7 +148,7 @@ fn to_json(candidate: Candidate) -> serde_json::Value {
         })
         .collect();
     let letters: serde_json::Map<_, _> =
-        letters(info).rows.into_iter().map(|r| (r[0].clone(), json!(r[1]))).collect();
+        symbols(info).rows.into_iter().map(|r| (r[0].clone(), json!(r[1]))).collect();
     json!({
         "schema": "pam-effect/1",
         "effect": info.name,

@@ -207,7 +207,7 @@ impl Workshop {
             &pam_diagnose::Options { muscle: muscle.name.clone(), ..Default::default() },
         )?;
         self.reports.insert("diagnosis", diagnose_page::page(&answer, &geometry, &campaign).html());
-        Ok(json!({ "text": pam_diagnose::summary::summary(&answer) }))
+        Ok(json!({ "text": pam_report::wording::summary(&answer) }))
     }
 
     /// The folder.

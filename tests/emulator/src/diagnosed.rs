@@ -173,7 +173,7 @@ pub fn tables(case: &Case) -> Tables {
         diagnosed: refitted.file.table.clone(),
         named: answer.missing.iter().map(|m| (m.effect.clone(), m.probability)).collect(),
         rms: (refitted.rms_before, refitted.rms_after),
-        remarks: answer.remarks,
+        remarks: answer.remarks.iter().map(pam_report::wording::remark).collect(),
     }
 }
 

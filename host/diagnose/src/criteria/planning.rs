@@ -24,6 +24,4 @@ criteria! {
     MENU_PRESSURES: ([f64; 2]) = [0.35, 0.9], "P_menu", "1", Judgement;
     /// Largest contraction that is searched for the free stroke, least and most.
     FREE_STROKE: ((f64, f64)) = (0.01, 0.6), "eps_free", "1", Judgement;
-    /// The muscle was never as short: within this contraction of the largest so far.
-    NEW_CONTRACTION: f64 = 1e-4, "d_eps", "1", Judgement;
 }

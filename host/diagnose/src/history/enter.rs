@@ -6,9 +6,9 @@ use super::criteria::LEAST_GAIN;
 use super::{Found, History, found};
 use crate::answer::{Options, diagnose as statically};
 use crate::baselines::{self, Kind};
-use crate::candidates::place_in_words;
+use crate::remark::Remark;
 use crate::rows;
-use crate::verdict::{Diagnosis, HeldOut, Missing, ParameterValue, Verdict};
+use crate::verdict::{Diagnosis, HeldOut, Missing, Outcome, ParameterValue, Split, Verdict, Why};
 use model_core::effects::EffectName;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
@@ -94,28 +94,18 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
     // What the search calls a memory in recordings freed of it is the rest of the same.
     diagnosis.missing.retain(|m| !NAMES.contains(&m.effect.as_str()));
     diagnosis.missing.insert(0, memory(&answer, peak));
-    let rest_agrees = !diagnosis.judged || matches!(diagnosis.verdict, Verdict::Consistent | Verdict::Explained);
+    let rest_agrees =
+        !diagnosis.judged() || matches!(diagnosis.verdict(), Verdict::Consistent | Verdict::Explained);
     let well = unseen.gain >= EXPLAINED || resolved;
     if !rest_agrees {
-        diagnosis.remarks.insert(
-            0,
-            format!(
-                "beside the memory the static model between mountings misses up to {:.2} N rms, and this part has no name: geometry, ends \
-                 and mounted lengths (by tape measure to 1 mm) are not told apart by one muscle",
-                diagnosis.misfit_rms_N
-            ),
-        );
+        diagnosis.remarks.insert(0, Remark::StaticMisfit(diagnosis.misfit_rms_N));
     }
-    diagnosis.verdict = if well && rest_agrees { Verdict::Explained } else { Verdict::PartlyExplained };
-    diagnosis.judged = true;
+    let verdict = if well && rest_agrees { Verdict::Explained } else { Verdict::PartlyExplained };
+    diagnosis.outcome = Outcome::Judged(verdict);
     diagnosis.unexplained.share = left;
     diagnosis.r#where.splice(0..0, regions);
     diagnosis.held_out = HeldOut {
-        split: format!(
-            "each of {} runs predicted from the other runs of this muscle; settled points, static curves for each mounting and direction \
-             before, the memory after",
-            answer.runs.len()
-        ),
+        split: Split::Runs(answer.runs.len()),
         rms_before_N: unseen.without_memory.rms_N,
         rms_after_N: unseen.with_memory.rms_N,
         noise_N: diagnosis.noise_N,
@@ -153,7 +143,7 @@ fn memory(history: &History, peak: f64) -> Missing {
         unit: "s".into(),
         outside_known_range: false,
     }));
-    let found: Vec<&str> = history.findings.iter().filter(|f| f.found).map(|f| f.words.as_str()).collect();
+    let found = history.findings.iter().filter(|f| f.found).map(|f| f.words.clone()).collect();
     Missing {
         effect: NAMES[0].into(),
         probability,
@@ -161,7 +151,7 @@ fn memory(history: &History, peak: f64) -> Missing {
         share_explained: history.unseen.gain.clamp(0.0, 1.0),
         parameters,
         confusable_with: vec![NAMES[1].into()],
-        place: place_in_words(EffectName::LogCreep.info().link).into(),
+        place: EffectName::LogCreep.info().link,
         correction: false,
         checked: false,
         given: false,
@@ -175,15 +165,13 @@ fn memory(history: &History, peak: f64) -> Missing {
             .into(),
         peak_N: peak,
         p: 0.05,
-        why: format!(
-            "unseen runs: {:.2} → {:.2} % of the largest force (rms), squared error less by {:.0} % ({:.0} % is the least); a single time \
-             constant leaves {:.2} times as much; {}",
-            history.unseen.without_memory.rms_pct,
-            history.unseen.with_memory.rms_pct,
-            100.0 * history.unseen.gain,
-            100.0 * LEAST_GAIN,
-            history.law.one_time_constant_ratio,
-            found.join("; ")
-        ),
+        why: Why::Memory {
+            without_pct: history.unseen.without_memory.rms_pct,
+            with_pct: history.unseen.with_memory.rms_pct,
+            gain: history.unseen.gain,
+            least_gain: LEAST_GAIN,
+            one_time_constant_ratio: history.law.one_time_constant_ratio,
+            findings: found,
+        },
     }
 }

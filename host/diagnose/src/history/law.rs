@@ -16,7 +16,8 @@ use rayon::prelude::*;
 
 use super::campaign::Points;
 use super::criteria::{
-    BALANCE_MOST, BALANCE_MOVES, BALANCE_START, LOADED, NEAR_BALANCE, PAUSES, RAMP, THRESHOLD_FROM, THRESHOLD_TO,
+    BALANCE_MOST, BALANCE_MOVES, BALANCE_START, LOADED, NEAR_BALANCE, PAUSES, RAMP, THRESHOLD_FROM,
+    THRESHOLD_TO,
 };
 use super::memory::Clockwork;
 use super::shift_fit::{self, ShiftFit};
@@ -135,7 +136,8 @@ impl<'a> Layer<'a> {
             columns.extend_from_slice(further);
             let fit = shift_fit::fit(p, &self.spline, use_point, &columns, theta.as_deref(), 4);
             let share = fit.theta[0];
-            let next = if share > 0.05 { (100.0 * fit.theta[1] / share).clamp(0.0, BALANCE_MOST) } else { 100.0 };
+            let next =
+                if share > 0.05 { (100.0 * fit.theta[1] / share).clamp(0.0, BALANCE_MOST) } else { 100.0 };
             let moved = (next - balance).abs();
             balance = next;
             theta = Some(fit.theta);
@@ -170,8 +172,7 @@ impl<'a> Layer<'a> {
         let choices: Vec<Choice> = (0..self.clocks.len())
             .flat_map(|pause| LOADED.iter().map(move |loaded| Choice { pause, loaded: *loaded }))
             .collect();
-        let fits: Vec<Law> =
-            choices.par_iter().map(|c| self.fit_at(use_point, *c, further, start)).collect();
+        let fits: Vec<Law> = choices.par_iter().map(|c| self.fit_at(use_point, *c, further, start)).collect();
         let first = Choice { pause: 0, loaded: 0.0 };
         fits.into_iter()
             .min_by(|a, b| a.squares.total_cmp(&b.squares))

@@ -38,20 +38,13 @@ pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Re
         .filter(|m| m.runs.len() > 1)
         .filter_map(|m| m.runs.first().copied())
         .collect();
-    let p_first = chance(points, &energy, true, share(&first) * all, |e| {
-        first.iter().map(|r| e[*r]).sum()
-    });
+    let p_first = chance(points, &energy, true, share(&first) * all, |e| first.iter().map(|r| e[*r]).sum());
     let rows = |runs: &[usize]| count(runs) / points.len() as f64;
     let told = |runs: &[usize], p: f64| share(runs) >= CONCENTRATED * rows(runs) && p <= SURE;
     let mut found = Vec::new();
     if told(&first, p_first) {
         let (share, rows) = (share(&first), rows(&first));
-        let words = format!(
-            "{:.0} % of the static error of unseen runs lies in the first run of a mounting, in {:.0} % of the points",
-            100.0 * share,
-            100.0 * rows
-        );
-        let region = |coordinate: &str, from: f64, to: f64, unit: &str, words: String| Region {
+        let region = |coordinate: &str, from: f64, to: f64, unit: &str| Region {
             coordinate: coordinate.into(),
             from,
             to,
@@ -59,13 +52,11 @@ pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Re
             rows,
             p: p_first,
             unit: unit.into(),
-            words,
         };
         let ends = first.iter().map(|r| points.runs[*r].points.1.saturating_sub(1));
         let end = ends.map(|i| since[i]).fold(0.0, f64::max);
-        found.push(region("run-in-mounting", 1.0, 1.0, "", words));
-        let words = format!("{:.0} % of it lies in the first {end:.0} s after a mounting", 100.0 * share);
-        found.push(region("time-since-mounting", 0.0, end, "s", words));
+        found.push(region("run-in-mounting", 1.0, 1.0, ""));
+        found.push(region("time-since-mounting", 0.0, end, "s"));
     }
     let own = |m: &usize| share(&points.mountings[*m].runs);
     let worst = (0..points.mountings.len()).max_by(|a, b| own(a).total_cmp(&own(b)));
@@ -77,12 +68,6 @@ pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Re
         };
         let p = chance(points, &energy, false, share(runs) * all, largest);
         if told(runs, p) {
-            let words = format!(
-                "{:.0} % of it lies in mounting {} (shortened by {:.1} mm)",
-                100.0 * share(runs),
-                m + 1,
-                1e3 * points.mountings[m].stroke
-            );
             let number = (m + 1) as f64;
             let (share, rows) = (share(runs), rows(runs));
             found.push(Region {
@@ -93,7 +78,6 @@ pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Re
                 rows,
                 p,
                 unit: String::new(),
-                words,
             });
         }
     }

@@ -66,7 +66,8 @@ pub(super) fn settled(recording: &Recording, force: &[f64]) -> (Vec<Point>, bool
             _ => {
                 points.extend(open.take().map(mean));
                 let [time, pressure] = [recording.time[i], recording.pressure[i]];
-                open = Some((pulse, Point { time, pressure, force: force[i], direction: directions[i] }, 1.0));
+                open =
+                    Some((pulse, Point { time, pressure, force: force[i], direction: directions[i] }, 1.0));
             }
         }
     }

@@ -37,7 +37,7 @@ fn an_effect_of_one_file_and_one_line_is_considered_and_found() {
     }
     assert_eq!(names(&ask(&rippled)).contains(&"stroke-ripple"), false, "the catalogue does not have it");
     let with = diagnosed(&rippled);
-    assert_eq!(names(&with).first(), Some(&"stroke-ripple"), "{}", summary(&with));
+    assert_eq!(names(&with).first(), Some(&"stroke-ripple"), "{:?}", with.missing);
     let [size, period] = [0, 1].map(|i| with.missing[0].parameters[i].value);
     assert!((size - 3.0).abs() < 0.3 && (period - 4.0e-3).abs() < 1e-4, "{size} N over {period} m");
 }

@@ -1,6 +1,6 @@
-//! Where the misfit sits: along each coordinate, and over time.
+//! Where the model is wrong: along each coordinate, and over time.
 
-use crate::{Axis, Colour, Figure, Mark, Panel, Section, figures};
+use crate::{Axis, Colour, Figure, Mark, Panel, Section, figures, wording};
 use pam_diagnose::verdict::{Diagnosis, Profile};
 use pam_fit::fit::points::median;
 
@@ -23,48 +23,49 @@ fn shown(profile: &Profile) -> (String, &'static str, f64, f64) {
     }
 }
 
-/// The ways of the muscle, in the order of their sign.
-const WAYS: [&str; 2] = ["lengthening", "shortening"];
+/// The directions of motion, in the order of their sign.
+const DIRECTIONS: [&str; 2] = ["lengthening", "shortening"];
 
-/// The misfit along one coordinate.
+/// The residual along one coordinate.
 fn along(d: &Diagnosis, p: &Profile) -> Panel {
     let (name, unit, scale, offset) = shown(p);
     let region = d.r#where.iter().find(|r| r.coordinate == p.coordinate);
-    let (axis, x, region): (Axis, Vec<f64>, _) = if p.coordinate == "direction" && p.at.len() == WAYS.len() {
-        // A sign is not a number to read off: two places with names.
-        let half = |sign: f64| if sign < 0.0 { 0.0 } else { 1.0 };
-        let places = (0..WAYS.len()).map(|i| i as f64).collect();
-        let region = region.map(|r| (half(r.from) - 0.5, half(r.to) + 0.5));
-        (Axis::names("", WAYS.map(String::from).to_vec()), places, region)
-    } else {
-        let region = region.map(|r| (scale * r.from + offset, scale * r.to + offset));
-        (Axis::new(name.clone(), unit), p.at.iter().map(|v| scale * v + offset).collect(), region)
-    };
-    let mut panel = Panel::new(axis, Axis::new("misfit", "N").from_zero())
+    let (axis, x, region): (Axis, Vec<f64>, _) =
+        if p.coordinate == "direction" && p.at.len() == DIRECTIONS.len() {
+            // A sign is not a number to read off: two places with names.
+            let half = |sign: f64| if sign < 0.0 { 0.0 } else { 1.0 };
+            let places = (0..DIRECTIONS.len()).map(|i| i as f64).collect();
+            let region = region.map(|r| (half(r.from) - 0.5, half(r.to) + 0.5));
+            (Axis::names("", DIRECTIONS.map(String::from).to_vec()), places, region)
+        } else {
+            let region = region.map(|r| (scale * r.from + offset, scale * r.to + offset));
+            (Axis::new(name.clone(), unit), p.at.iter().map(|v| scale * v + offset).collect(), region)
+        };
+    let mut panel = Panel::new(axis, Axis::new("residual", "N").from_zero())
         .titled(name)
-        .line("root mean square", Colour::Series(1), &x, &p.rms_before)
+        .line("rms", Colour::Series(1), &x, &p.rms_before)
         .dashes("mean", Colour::Series(0), &x, &p.mean_before);
     if !d.missing.is_empty() {
-        panel = panel.line("root mean square, explained", Colour::Series(2), &x, &p.rms_after);
+        panel = panel.line("rms, with the named effects", Colour::Series(2), &x, &p.rms_after);
     }
     if let Some((from, to)) = region {
-        panel = panel.region("here it sits", from, to);
+        panel = panel.region("concentrated here", from, to);
     }
     panel.with("noise", Colour::Muted, Mark::Level(d.noise_N))
 }
 
 /// The chapter: in words, along each coordinate, over time.
 pub(super) fn section(d: &Diagnosis) -> Section {
-    let mut section = Section::new("Where").summarised();
-    if !d.judged {
+    let mut section = Section::new("Where the model is wrong").summarised();
+    if !d.judged() {
         return section;
     }
     if d.r#where.is_empty() {
-        section.text(
-            "The misfit sits nowhere in particular: no part of any coordinate holds more than its share.",
-        );
+        section.text("The error is spread evenly: no region of any coordinate holds more than its share.");
     } else {
-        section.list(d.r#where.iter().take(5).map(|r| format!("{} (p = {})", r.words, figures(r.p, 2))));
+        section.list(
+            d.r#where.iter().take(5).map(|r| format!("{} (p = {})", wording::region(r), figures(r.p, 2))),
+        );
     }
     // The coordinates where it sits come first, then those that also were looked at.
     let rank =
@@ -75,9 +76,9 @@ pub(super) fn section(d: &Diagnosis) -> Section {
     if !panels.is_empty() {
         section.figure(Figure::multiples(
             "where",
-            "Misfit along each coordinate",
-            "Where the orange line rises far above the noise the model is wrong; the shaded part is the region that holds more \
-             than its share.",
+            "Residual along each coordinate",
+            "Where the orange line is far above the noise, the model is wrong. The shaded region holds more than its share of the \
+             excess error (the squared residual above the noise).",
             panels,
         ));
     }
@@ -88,23 +89,23 @@ pub(super) fn section(d: &Diagnosis) -> Section {
         let found = !d.missing.is_empty();
         if found {
             // Beneath, for it may be larger than what it explains.
-            panel = panel.hair("what the found effects add", Colour::Muted, &time, &effects);
+            panel = panel.hair("force of the named effects", Colour::Muted, &time, &effects);
         }
         panel = panel.hair("plain model", Colour::Series(1), &time, &before);
         if found {
-            panel = panel.hair("with what was found", Colour::Series(2), &time, &after);
+            panel = panel.hair("with the named effects", Colour::Series(2), &time, &after);
         }
         if let Some(r) = d.r#where.iter().find(|r| r.coordinate == "time") {
-            panel = panel.region("here it sits", r.from, r.to);
+            panel = panel.region("concentrated here", r.from, r.to);
         }
         section.figure(Figure::new(
             "misfit-time",
-            "Measured minus computed force over time",
+            "Residual over time: measured minus computed force",
             if d.missing.is_empty() {
-                "The plain model's misfit: where it is a band of even width around zero, it is noise."
+                "Residual of the plain model. A band of even width around zero is noise."
             } else {
-                "The plain model's misfit, and what remains of it with what was found: that should be noise. The grey line is what the \
-                 found effects add to the force; where it is larger than the misfit, the tables had taken up the rest."
+                "Residual of the plain model, and with the named effects: the latter should be noise. The grey line is the force of the \
+                 named effects; where it is larger than the residual, the tables had absorbed the rest."
             },
             panel,
         ));

@@ -1,12 +1,12 @@
-//! The paper that pictures are drawn on: coordinates, letters.
+//! The canvas that pictures are drawn on: coordinates and text.
 
 use std::fmt::Write as _;
 
 use super::colour::Colour;
-use super::rich;
+use super::inline_markup;
 
-/// Size of the letters on ticks and in legends, px.
-pub(crate) const LETTER: f64 = 12.0;
+/// Size of the text on ticks and in legends, px.
+pub(crate) const FONT_SIZE: f64 = 12.0;
 
 /// A coordinate, to a tenth of a pixel.
 pub(crate) fn px(value: f64) -> String {
@@ -63,6 +63,6 @@ pub(crate) fn text(out: &mut String, x: f64, y: f64, anchor: &str, colour: Colou
         if anchor == "start" { String::new() } else { format!(" text-anchor=\"{anchor}\"") },
         colour.class(),
         colour.literal(),
-        rich::svg(words)
+        inline_markup::svg(words)
     );
 }

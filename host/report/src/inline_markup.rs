@@ -99,7 +99,7 @@ fn kept_together(text: &str) -> String {
 /// As HTML.
 ///
 /// ```
-/// assert_eq!(pam_report::rich::html("P_{0} < 1").into_string(), "P<sub>0</sub> &lt; 1");
+/// assert_eq!(pam_report::inline_markup::html("P_{0} < 1").into_string(), "P<sub>0</sub> &lt; 1");
 /// ```
 #[must_use]
 pub fn html(text: &str) -> Markup {

@@ -1,17 +1,17 @@
-//! What the letters in an effect's equation mean.
+//! The symbols of an effect's equation.
 
 use model_core::effects::Info;
 
 use super::Table;
 
-/// Letters that mean the same in every equation. A parameter may have one of them; then it is the parameter.
-const LETTERS: [(&str, &str); 53] = [
+/// Symbols that mean the same in every equation. Where a parameter has one of them, it is the parameter.
+const SYMBOLS: [(&str, &str); 53] = [
     ("F_quasi", "pull of the base model without friction, N"),
-    ("F_b", "what the bladder takes from the pull: the base model's without friction less P·g, N"),
+    ("F_b", "elastic force of the bladder: the base model's without friction less P·g, N"),
     ("F_G", "Gaylord's force of the effective pressure, P′·g, N"),
     ("k_F", "friction factor of the table at this pressure"),
     ("s", "direction: +1 while shortening, −1 while lengthening, held at rest"),
-    ("s_x", "direction in which the stroke last went; filling and emptying do not turn it"),
+    ("s_x", "direction in which the stroke last moved; filling and emptying do not reverse it"),
     ("s_y", "direction in which the muscle behind the play last moved"),
     ("P", "pressure at the sensor, Pa"),
     ("P_a", "pressure of the air outside, 101.3 kPa"),
@@ -21,7 +21,7 @@ const LETTERS: [(&str, &str); 53] = [
     ("∂F/∂x", "slope of the base model's force over the stroke, negative, N/m"),
     ("x", "stroke, positive in contraction, m"),
     ("ΔL", "stroke, positive in contraction, m"),
-    ("y", "stroke that the muscle behind the play has, m"),
+    ("y", "stroke of the muscle behind the play, m"),
     ("v", "speed of the stroke, m/s"),
     ("ε", "contraction, the stroke over the rest length"),
     ("ε_x", "radial strain of the bladder"),
@@ -34,7 +34,7 @@ const LETTERS: [(&str, &str); 53] = [
     ("B", "length of one fibre of the braid, m"),
     ("N", "turns of a fibre"),
     ("t_B", "thickness of the bladder's wall, m"),
-    ("E", "modulus that the base model's elastic force has there, Pa"),
+    ("E", "modulus of the base model's elastic force there, Pa"),
     ("h", "pressure that the wall itself carries, Pa"),
     ("h′", "slope of h over the length, Pa/m"),
     ("c_1", "elastic force of a linear wall per pascal of its modulus, m²"),
@@ -48,23 +48,23 @@ const LETTERS: [(&str, &str); 53] = [
     ("ℓ", "travel of the strands since the muscle was new, in rest lengths"),
     ("I", "impulse of the load since the muscle was new, ∫|F_quasi|·dt, N·s"),
     ("d", "damage so far, from 0 to 1"),
-    ("q", "over-stress that the drive u leaves, which fades; u is what stands in the brackets behind it"),
-    ("q_i", "part i of the over-stress that the drive u leaves; u is what stands in the brackets behind it"),
-    ("z", "how far the friction has turned, from −1 to 1"),
-    ("z_i", "how far element i of the friction has turned, from −1 to 1"),
+    ("q", "decaying over-stress due to the drive u, the expression in the brackets behind it"),
+    ("q_i", "part i of the over-stress due to the drive u, the expression in the brackets behind it"),
+    ("z", "state of friction, from −1 to 1"),
+    ("z_i", "state of friction element i, from −1 to 1"),
     ("m", "1 in motion, 0 at rest"),
     ("w", "power that the muscle takes from its load, smoothed over τ, W"),
     ("θ", "temperature less that of the first reading, K"),
     ("t", "time, s"),
-    ("t_rest", "how long the muscle rested, s"),
+    ("t_rest", "duration of the rest, s"),
     ("d_rest", "travel since the rest, m"),
-    ("W", "how far the rubber is stretched, I₁ − 3"),
+    ("W", "stretch of the rubber, I₁ − 3"),
     ("W_m", "the largest W so far"),
-    ("LP_τ", "what a filter of first order with time constant τ makes of it"),
-    ("D_τ", "what four such filters in a row, each of τ/4, make of it: nearly a delay by τ"),
+    ("LP_τ", "first-order low-pass filter with time constant τ"),
+    ("D_τ", "four such filters in series, each of τ/4: close to a delay by τ"),
 ];
 
-/// The letters with their indices, without powers and numbers before them.
+/// The symbols with their indices, without powers and numbers before them.
 fn names(law: &str) -> Vec<String> {
     let mut names = vec![String::new()];
     let (mut index, mut last) = (false, ' ');
@@ -86,29 +86,29 @@ fn names(law: &str) -> Vec<String> {
         .collect()
 }
 
-/// Whether a letter, or a small change of it, stands among the names.
-fn stands(letter: &str, names: &[String]) -> bool {
+/// Whether a symbol, or a small change of it, is among the names.
+fn occurs(letter: &str, names: &[String]) -> bool {
     self::names(letter)
         .iter()
         .all(|part| names.iter().any(|n| n == part || n.strip_prefix('d') == Some(part)))
 }
 
-/// The letters of an effect's equation that are not its parameters.
+/// The symbols of an effect's equation that are not its parameters.
 #[must_use]
-pub fn letters(info: &Info) -> Table {
+pub fn symbols(info: &Info) -> Table {
     let mut table = Table::new(
-        "Letters of the equation; those of its parameters are below, and a d before a letter is its change",
-        &["letter", "what"],
+        "Symbols of the equation. Its parameters are below; a d before a symbol is its change",
+        &["symbol", "meaning"],
     );
     // The force on the left is the effect's; `F` again on the right is the base model's.
     let (_, law) = info.equation.split_once('=').unwrap_or(("", info.equation));
     let names = names(law);
-    table.row(["F", "what the effect adds to the force, N"]);
+    table.row(["F", "force that the effect adds, N"]);
     if names.iter().any(|n| n == "F") {
         table.row(["F on the right", "force of the base model with its friction, (1 − s·k_F)·F_quasi, N"]);
     }
-    for (letter, what) in LETTERS {
-        if stands(letter, &names) && info.parameters.iter().all(|p| p.letter != letter) {
+    for (letter, what) in SYMBOLS {
+        if occurs(letter, &names) && info.parameters.iter().all(|p| p.letter != letter) {
             table.row([letter, what]);
         }
     }
@@ -120,7 +120,7 @@ mod tests {
     use super::*;
     use pam_fit::bench::Candidate;
 
-    /// Words, functions and running indices, which nobody takes for a quantity.
+    /// Words, functions and running indices.
     const WORDS: [&str; 18] = [
         "exp", "ln", "max", "clamp", "erf", "play", "of", "each", "way", "wide", "within", "for", "or", "mm",
         "i", "u", "du", "F",
@@ -128,8 +128,8 @@ mod tests {
 
     #[test]
     fn every_letter_that_is_explained_stands_in_an_equation_where_it_is_no_parameter() {
-        for (letter, _) in LETTERS {
-            let used = Candidate::all().any(|c| letters(c.info()).rows.iter().any(|r| r[0] == letter));
+        for (letter, _) in SYMBOLS {
+            let used = Candidate::all().any(|c| symbols(c.info()).rows.iter().any(|r| r[0] == letter));
             assert!(used, "{letter} stands in no equation");
         }
     }
@@ -137,13 +137,13 @@ mod tests {
     #[test]
     fn every_letter_of_every_equation_is_explained_a_parameter_or_defined_by_the_equation_itself() {
         for info in Candidate::all().map(|c| c.info()) {
-            let table = letters(info);
+            let table = symbols(info);
             let (_, law) = info.equation.split_once('=').unwrap();
             let all = names(law);
             for p in info.parameters {
                 // `LP_τ` has the parameter τ.
                 let index = format!("_{}", p.letter);
-                let there = stands(p.letter, &all) || all.iter().any(|n| n.ends_with(&index));
+                let there = occurs(p.letter, &all) || all.iter().any(|n| n.ends_with(&index));
                 assert!(there, "{}: {} is not in the equation", info.name, p.letter);
             }
             for name in &all {
@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn the_force_on_the_right_is_told_from_that_on_the_left() {
-        let rows = |name| letters(Candidate::from_name(name).unwrap().info()).rows;
+        let rows = |name| symbols(Candidate::from_name(name).unwrap().info()).rows;
         assert_eq!(rows("force-offset").len(), 1);
         assert_eq!(rows("force-gain")[1][0], "F on the right");
         assert!(rows("coulomb-friction").iter().any(|r| r[0] == "s"));
@@ -170,7 +170,7 @@ mod tests {
     #[test]
     fn a_letter_that_is_a_parameter_is_left_to_it() {
         let told =
-            |name| letters(Candidate::from_name(name).unwrap().info()).rows.iter().any(|r| r[0] == "m");
+            |name| symbols(Candidate::from_name(name).unwrap().info()).rows.iter().any(|r| r[0] == "m");
         assert!(told("breakaway-friction") && !told("gravity"));
     }
 }

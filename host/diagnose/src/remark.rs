@@ -1,0 +1,188 @@
+//! What a diagnosis notes about the recordings, as values. The sentences are written by the report.
+
+use crate::reserve::Reserve;
+
+/// Why a campaign cannot be judged at all.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Unjudgeable {
+    /// Too few rows remain after screening.
+    FewRows {
+        /// Usable rows.
+        usable: usize,
+        /// The fewest that are judged.
+        least: usize,
+    },
+    /// Too few half-strokes for a test by whole blocks.
+    FewStrokes {
+        /// Half-strokes found.
+        found: usize,
+        /// The fewest that are judged.
+        least: usize,
+    },
+    /// The gauge pressure never rises to where a muscle pulls.
+    NoPressure {
+        /// The highest pressure, Pa.
+        highest: f64,
+    },
+    /// The force is constant or never a pull.
+    NoForce,
+    /// The model misses the force by more than the force itself.
+    WrongModel {
+        /// Root mean square error of the model, N.
+        misfit: f64,
+        /// Root mean square of the measured force, N.
+        measured: f64,
+    },
+}
+
+/// How friction acts while the length is held.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RestFriction {
+    /// The hysteresis gap closes with this time constant, s.
+    Fades(f64),
+    /// Friction follows a wandering pressure.
+    Follows {
+        /// Change of pressure that static friction carries, Pa.
+        carries: f64,
+        /// Further change over which friction reaches the other branch, Pa.
+        over: f64,
+    },
+}
+
+/// Why an effect was not kept after it had been selected.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Refusal {
+    /// It does not improve rows that the fit had not seen.
+    NotConfirmed {
+        /// Error without it, N.
+        without: f64,
+        /// Error with it, N.
+        with: f64,
+    },
+    /// It acts in the first strokes of recordings only, where the state of this memory effect is not known.
+    UnknownMemory(String),
+    /// So many others explain the same share that none is named.
+    Rivals {
+        /// Share of the misfit that each explains.
+        share: f64,
+        /// Their names.
+        others: Vec<String>,
+    },
+    /// A slowly wandering reading would explain it as well.
+    SlowDrift,
+    /// The joint refit keeps little of its gain.
+    LostInRefit,
+}
+
+/// One remark on what can and cannot be concluded.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Remark {
+    /// Beside a memory of the muscle, the static model between mountings leaves this error, N rms, without a name.
+    StaticMisfit(f64),
+    /// Nothing can be judged.
+    NotJudged(Unjudgeable),
+    /// The length was held throughout.
+    HeldLength,
+    /// All rows are at one pressure.
+    OnePressure,
+    /// No temperature column.
+    NoTemperature,
+    /// The muscle moves one way only.
+    OneDirection,
+    /// No vented rows.
+    NoVentedRows,
+    /// This share of the rows is slack and excluded.
+    Slack(f64),
+    /// Friction while the length is held.
+    FrictionAtRest(RestFriction),
+    /// Readings at the end of the force sensor's range, excluded.
+    SensorEnd {
+        /// Rows.
+        rows: usize,
+        /// The reading, N.
+        force: f64,
+    },
+    /// What screening of the recordings reported, in the data library's words.
+    Screening(String),
+    /// Isolated force readings, excluded.
+    Spikes {
+        /// Rows excluded.
+        excluded: usize,
+        /// Rows in all.
+        total: usize,
+    },
+    /// `k_F(P)` of the fitted tables follows `constant + slope/P`.
+    InverseFriction {
+        /// The constant.
+        constant: f64,
+        /// The slope, Pa.
+        slope: f64,
+    },
+    /// `E_1(P)` of the fitted tables is a straight line; its relative change over the range, with sign.
+    StraightElasticity(f64),
+    /// Noise had to be estimated without repeats.
+    NoRepeats,
+    /// The tables differ between pressures more than one bladder does.
+    Concealed {
+        /// What they take up, N rms.
+        rms: f64,
+        /// The same as a share of the blocked force.
+        share: f64,
+        /// Effects that would leave such a difference.
+        candidates: Vec<String>,
+    },
+    /// Strokes under the same conditions differ more than instruments scatter.
+    NotRepeatable(Scatter),
+    /// A gain or offset outside the known range, as a wrong muscle description imitates it.
+    CheckDescription(String),
+    /// An effect that was selected and not kept.
+    Refused {
+        /// Its name.
+        effect: String,
+        /// Why.
+        why: Refusal,
+    },
+    /// What a check of the bench measured.
+    Measured {
+        /// Which check.
+        check: String,
+        /// The value with its interval.
+        value: String,
+    },
+    /// The next experiment could not be worked out.
+    NoAdvice(String),
+    /// The table was written without the effects, or with them on the user's word.
+    Table {
+        /// The file.
+        file: String,
+        /// What happened.
+        reserve: Reserve,
+    },
+}
+
+/// How strokes under the same conditions differ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scatter {
+    /// Standard deviation, N.
+    pub sigma: f64,
+    /// The same as a share of the blocked force.
+    pub share: f64,
+    /// Correlation time, s.
+    pub memory: f64,
+}
+
+impl Remark {
+    /// Whether it says that an effect could not be told from others or was not kept.
+    #[must_use]
+    pub fn refuses(&self, name: &str) -> bool {
+        match self {
+            Self::Refused { effect, why: Refusal::Rivals { others, .. } } => {
+                effect == name || others.iter().any(|o| o == name)
+            }
+            Self::Refused { effect, why: Refusal::UnknownMemory(memory) } => effect == name || memory == name,
+            Self::Refused { effect, .. } | Self::CheckDescription(effect) => effect == name,
+            Self::Concealed { candidates, .. } => candidates.iter().any(|c| c == name),
+            _ => false,
+        }
+    }
+}

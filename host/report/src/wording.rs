@@ -1,0 +1,38 @@
+//! The sentences of a diagnosis: one file per kind. The diagnosis itself holds values only.
+
+mod experiment;
+mod outcome;
+mod region;
+mod remark;
+mod summary;
+mod value;
+mod why;
+mod why_not;
+
+pub use experiment::{measure, proposal};
+pub use outcome::{pattern, split, verdict};
+pub use region::region;
+pub use remark::{remark, reserve};
+pub use summary::summary;
+pub use value::with_interval;
+pub use why::why;
+pub use why_not::why_not;
+
+/// Half of a 95 % confidence interval in standard deviations.
+pub const HALF_95: f64 = 1.96;
+
+/// `a`, `a and b`, `a, b and c`.
+pub(crate) fn list(names: &[String]) -> String {
+    match names.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+        Some((last, _)) => last.clone(),
+        None => String::new(),
+    }
+}
+
+/// With a capital and a full stop.
+pub(crate) fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let capital = letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect());
+    if capital.ends_with(['.', '!', '?']) || capital.is_empty() { capital } else { capital + "." }
+}

@@ -1,0 +1,63 @@
+//! The judgement, what remains, and how rows were held out.
+
+use pam_diagnose::verdict::{Diagnosis, Pattern, Split, Verdict};
+
+use super::{list, region, remark};
+
+/// The judgement in one sentence.
+#[must_use]
+pub fn verdict(d: &Diagnosis) -> String {
+    let names: Vec<String> = d.missing.iter().map(|m| format!("`{}`", m.effect)).collect();
+    match d.verdict() {
+        Verdict::Consistent if !d.judged() => {
+            "These recordings do not allow a judgement of the model.".to_owned()
+        }
+        Verdict::Consistent => {
+            "Model and recordings agree: no error stands above the noise and the model's stated inexactness.".to_owned()
+        }
+        Verdict::Explained if d.missing.iter().any(|m| !m.supported) => {
+            "With the effects that were given, no error stands above the noise. The recordings do not support all of them.".to_owned()
+        }
+        Verdict::Explained => format!("The model lacks {}. This explains the excess error.", list(&names)),
+        Verdict::PartlyExplained => {
+            format!("The model lacks {}. This explains a part of the excess error.", list(&names))
+        }
+        Verdict::Unexplained => {
+            "The model lacks something, but no effect of the library explains it well enough to be named.".to_owned()
+        }
+    }
+}
+
+/// The pattern of what no named effect explains; `none` where there is none.
+#[must_use]
+pub fn pattern(pattern: &Pattern) -> String {
+    match pattern {
+        Pattern::None => "none".to_owned(),
+        Pattern::Periodic(hertz) => format!("periodic in time, {hertz:.2} Hz"),
+        Pattern::Region(r) => region(r),
+        Pattern::NotRepeatable(scatter) => remark::scatter(scatter),
+    }
+}
+
+/// How rows were held out.
+#[must_use]
+pub fn split(split: Split) -> String {
+    let text = match split {
+        Split::Runs(runs) => {
+            return format!(
+                "each of {runs} runs predicted from the other runs of this muscle, on settled points"
+            );
+        }
+        Split::NothingFitted => "none: nothing was fitted",
+        Split::NothingLeftOut => {
+            "none: no part of the recordings could be left out, so these are errors on the fitted rows"
+        }
+        Split::Pressures => "each pressure predicted from the others",
+        Split::Cycles => "every fourth cycle predicted from the others, in turn",
+        Split::Recordings => "each recording predicted from the others",
+        Split::TenthRecordings => "every tenth recording predicted from the others, in turn",
+        Split::Quarters => "each quarter of the time predicted from the rest",
+        Split::StrokeParts => "every fourth part of the stroke predicted from the others, in turn",
+    };
+    text.to_owned()
+}

@@ -1,0 +1,171 @@
+//! Remarks on what can and cannot be concluded.
+
+use pam_data::counted::counted;
+use pam_diagnose::remark::{Refusal, Remark, RestFriction, Scatter, Unjudgeable};
+use pam_diagnose::reserve::Reserve;
+
+/// A remark as text without its full stop.
+#[must_use]
+pub fn remark(remark: &Remark) -> String {
+    match remark {
+        Remark::NotJudged(reason) => format!("not judged: {}", unjudgeable(reason)),
+        Remark::StaticMisfit(rms) => format!(
+            "the static model leaves {rms:.2} N rms between mountings, which has no name: geometry, end effects and mounted lengths (±1 mm \
+             by tape measure) are not identifiable from one muscle"
+        ),
+        Remark::HeldLength => {
+            "the length was held throughout: speed, viscous friction, inertia and first strokes are not identifiable".to_owned()
+        }
+        Remark::OnePressure => {
+            "one pressure only: effects that depend on pressure are not identifiable".to_owned()
+        }
+        Remark::NoTemperature => "no temperature column: warming is seen only as a slow change".to_owned(),
+        Remark::OneDirection => "the muscle moves in one direction only: friction is not identifiable".to_owned(),
+        Remark::NoVentedRows => {
+            "no vented rows: an offset of the load cell is not identifiable".to_owned()
+        }
+        Remark::Slack(share) => format!("{:.0} % of the rows excluded: muscle slack", 100.0 * share),
+        Remark::FrictionAtRest(law) => friction_at_rest(*law),
+        Remark::SensorEnd { rows, force } => format!(
+            "{} of exactly {force:.2} N excluded: end of the force sensor's range",
+            counted(*rows, "reading")
+        ),
+        Remark::Screening(text) => text.clone(),
+        Remark::NoAdvice(error) => format!("no next experiment proposed: {error}"),
+        Remark::Spikes { excluded, total } => {
+            format!("{excluded} of {total} force readings excluded: isolated outliers")
+        }
+        Remark::InverseFriction { constant, slope } => format!(
+            "k_F(P) follows {constant:.3} + {:.1} kPa/P, as friction does that is not proportional to force (dry, seal, or viscous at \
+             one speed)",
+            slope * 1e-3
+        ),
+        Remark::StraightElasticity(change) => format!(
+            "E_1 {} linearly with pressure, by {:.0} % over the range. One bladder should not do this; possible causes: ends that are \
+             not cylindrical, a stretching braid, a gain error, or a slow change in the order of the tests",
+            if *change > 0.0 { "rises" } else { "falls" },
+            100.0 * change.abs()
+        ),
+        Remark::NoRepeats => {
+            "no stroke is repeated under the same conditions: the noise is estimated from the residual of the most flexible model".to_owned()
+        }
+        Remark::Concealed { rms, share, candidates } => concealed(*rms, *share, candidates),
+        Remark::NotRepeatable(s) => format!(
+            "{}. This is more than sensor noise, and no effect of the library explains it. Check the air supply, the stroke sensor and \
+             all fixings, then repeat two strokes under the same conditions",
+            scatter(s)
+        ),
+        Remark::CheckDescription(effect) => format!(
+            "{effect} is larger than any published value. Check the muscle's description (diameter, braid angle, rest length, wall) and \
+             the units first: an error there has the same effect"
+        ),
+        Remark::Refused { effect, why } => refused(effect, why),
+        Remark::Measured { check, value } => format!("measured with {check}: {value}"),
+        Remark::Table { file, reserve: r } => format!("{file}: {}", reserve(r)),
+    }
+}
+
+fn unjudgeable(reason: &Unjudgeable) -> String {
+    match reason {
+        Unjudgeable::FewRows { usable, least } => {
+            let usable =
+                if *usable == 0 { "no row is".to_owned() } else { format!("only {usable} rows are") };
+            format!("{usable} usable (direction known, muscle not slack); {least} are needed")
+        }
+        Unjudgeable::FewStrokes { found, least } => format!(
+            "only {}; {least} are needed to tell an effect from chance",
+            counted(*found, "half-stroke")
+        ),
+        Unjudgeable::NoPressure { highest } => format!(
+            "the pressure never rises above {:.1} kPa, where no muscle pulls. Check the gauge and its unit",
+            highest * 1e-3
+        ),
+        Unjudgeable::NoForce => "the force is constant or the muscle never pulls".to_owned(),
+        Unjudgeable::WrongModel { misfit, measured } => format!(
+            "the model's error ({misfit:.3} N rms) is larger than the measured force ({measured:.3} N rms). Check the muscle's \
+             description and the units"
+        ),
+    }
+}
+
+fn friction_at_rest(law: RestFriction) -> String {
+    match law {
+        RestFriction::Fades(time) => format!(
+            "while the length is held the hysteresis gap closes within about {time:.1} s (pressure ripple releases friction). The model \
+             keeps it open, so rows at rest are compared with a friction that decays"
+        ),
+        RestFriction::Follows { carries, over } => format!(
+            "while the length is held friction follows the wandering pressure (changes beyond ± {:.1} kPa, over about {:.1} kPa). The \
+             model keeps it constant, so rows at rest are compared with a friction that follows",
+            carries * 1e-3,
+            over * 1e-3
+        ),
+    }
+}
+
+fn concealed(rms: f64, share: f64, candidates: &[String]) -> String {
+    let which = if candidates.is_empty() {
+        "No effect of the library leaves such a difference".to_owned()
+    } else {
+        format!(
+            "Each of these effects leaves such a difference: {}; none is distinct enough to be named",
+            candidates.join(", ")
+        )
+    };
+    format!(
+        "one bladder does not fit all pressures: the tables take up {rms:.2} N rms ({:.2} % of blocked force) that changes with \
+         pressure. {which}. The table is accurate at tested pressures, less so between and beyond them",
+        100.0 * share
+    )
+}
+
+/// How strokes under the same conditions differ.
+pub(super) fn scatter(s: &Scatter) -> String {
+    format!(
+        "not repeatable: under the same conditions the force differs by {:.2} N ({:.1} % of blocked force) for about {:.1} s at a time",
+        s.sigma,
+        100.0 * s.share,
+        s.memory
+    )
+}
+
+fn refused(effect: &str, why: &Refusal) -> String {
+    match why {
+        Refusal::NotConfirmed { without, with } => format!(
+            "{effect} not named: it fits these recordings but does not improve held-out rows ({without:.3} N without it, {with:.3} N \
+             with it)"
+        ),
+        Refusal::UnknownMemory(memory) => format!(
+            "{effect} not named: it would act in the first strokes of recordings only, where the state of {memory} is unknown"
+        ),
+        Refusal::Rivals { share, others } => format!(
+            "{effect} not named: it would explain {:.0} % of the excess error, but these explain it nearly as well: {}",
+            100.0 * share,
+            others.join(", ")
+        ),
+        Refusal::SlowDrift => format!(
+            "{effect} not named: it would explain much of the excess error, but so would a slowly drifting sensor"
+        ),
+        Refusal::LostInRefit => format!(
+            "{effect} not named: it would explain much of the excess error, but little remains of it in the joint fit"
+        ),
+    }
+}
+
+/// What happened to the effects when the table was refitted.
+#[must_use]
+pub fn reserve(r: &Reserve) -> String {
+    let left_out = r.left_out.map_or(String::new(), |(plain, with)| {
+        format!("; a pressure left out of the fit: {with:.2} % of blocked force against {plain:.2} %")
+    });
+    format!(
+        "the effects do not improve the table's prediction of these recordings ({:.3} N with them, {:.3} N without{left_out}). {}",
+        r.with,
+        r.without,
+        if r.kept {
+            "They were written all the same, because they were given"
+        } else {
+            "The table was written without them"
+        }
+    )
+}

@@ -1,0 +1,163 @@
+//! The answer for a person at a terminal who has never heard of the effect.
+
+use std::fmt::Write;
+
+use pam_diagnose::experiment::what_would_show;
+use pam_diagnose::verdict::{Diagnosis, Missing, Pattern, Verdict};
+
+use super::{measure, pattern, proposal, region, remark, sentence, split, why, with_interval};
+use crate::effect_page::place;
+
+/// The diagnosis as text for a terminal.
+#[must_use]
+pub fn summary(d: &Diagnosis) -> String {
+    let mut s = String::new();
+    head(&mut s, d);
+    if !d.r#where.is_empty() {
+        let _ = writeln!(s, "\nWhere the model is wrong");
+        for r in d.r#where.iter().take(4) {
+            let _ = writeln!(s, "  {} (p = {:.3})", region(r), r.p);
+        }
+    }
+    for m in &d.missing {
+        effect(&mut s, m);
+    }
+    let h = &d.held_out;
+    if !d.missing.is_empty() {
+        let _ = writeln!(
+            s,
+            "\nError on held-out rows ({}), rms\n  {:.3} N without the effects, {:.3} N with them; noise {:.3} N\n  including the rows \
+             about each reversal: {:.3} N without, {:.3} N with",
+            split(h.split),
+            h.rms_before_N,
+            h.rms_after_N,
+            h.noise_N,
+            h.with_turns_before_N,
+            h.with_turns_after_N
+        );
+    }
+    if d.verdict() != Verdict::Consistent {
+        let pattern = match &d.unexplained.pattern {
+            Pattern::None => "no pattern".to_owned(),
+            other => pattern(other),
+        };
+        let _ =
+            writeln!(s, "\nUnexplained: {:.0} % of the excess error; {pattern}", 100.0 * d.unexplained.share);
+    }
+    if let Some(n) = &d.next_experiment {
+        let _ = writeln!(
+            s,
+            "\nNext experiment: {} (expected difference {:.2} N)",
+            proposal(&n.proposal),
+            n.expected_difference_N
+        );
+    }
+    if d.noise_N > 0.0 {
+        could_be_hidden(&mut s, d);
+    }
+    if !d.remarks.is_empty() {
+        let _ = writeln!(s, "\nRemarks");
+        for r in &d.remarks {
+            let _ = writeln!(s, "  {}", sentence(&remark(r)));
+        }
+    }
+    s
+}
+
+fn head(s: &mut String, d: &Diagnosis) {
+    let judged = d.judged();
+    let _ = if judged {
+        writeln!(s, "{}: {} rows, blocked force {:.1} N", d.muscle, d.samples, d.blocked_force_N)
+    } else {
+        writeln!(s, "{}: {} rows", d.muscle, d.samples)
+    };
+    let _ = writeln!(
+        s,
+        "\n{}",
+        match d.verdict() {
+            Verdict::Consistent if !judged =>
+                "NOT JUDGED: these recordings do not allow a judgement of the model; see the remarks.",
+            Verdict::Consistent =>
+                "CONSISTENT: no error stands above the noise and the model's stated inexactness.",
+            Verdict::Explained if d.missing.iter().any(|m| !m.supported) =>
+                "AS GIVEN: with the effects that were given, no error stands above the noise. The recordings do not support all of them.",
+            Verdict::Explained => "EXPLAINED: the effects below explain the model's excess error.",
+            Verdict::PartlyExplained =>
+                "PARTLY EXPLAINED: the effects below explain a part of the model's excess error.",
+            Verdict::Unexplained =>
+                "UNEXPLAINED: the model has an excess error that no effect of the library explains well enough to be named.",
+        }
+    );
+    if judged {
+        let _ = writeln!(
+            s,
+            "\n  error of the plain model {:.3} N rms ({:.2} % of blocked force)\n  noise                    {:.3} N rms (excess \
+             error: the squared error above it)",
+            d.misfit_rms_N,
+            100.0 * d.misfit_rms_N / d.blocked_force_N.max(1e-12),
+            d.noise_N
+        );
+    }
+}
+
+fn effect(s: &mut String, m: &Missing) {
+    let name = if m.given {
+        format!("Given: {}", m.effect)
+    } else {
+        format!("Missing: {} (probability {:.0} %)", m.effect, 100.0 * m.probability)
+    };
+    let _ = writeln!(s, "\n{name}, acts on {}", place(m.place));
+    let _ = writeln!(s, "  {}", m.summary);
+    let _ = writeln!(s, "  evidence: {}; largest force {:.2} N", why(&m.why), m.peak_N);
+    // Of alternative laws those that were not chosen are zero.
+    for p in m.parameters.iter().filter(|p| p.value != 0.0) {
+        let odd = if p.outside_known_range { "   outside the published range" } else { "" };
+        let _ = writeln!(s, "  {} = {}{odd}", p.name, with_interval(p.value, p.std, &p.unit));
+    }
+    if !m.confusable_with.is_empty() {
+        let _ =
+            writeln!(s, "  these recordings do not distinguish it from: {}", m.confusable_with.join(", "));
+    }
+    if m.correction {
+        let _ = writeln!(
+            s,
+            "  an error of the bench, not of the muscle: it corrects the data and is not sent to the controller"
+        );
+    }
+}
+
+/// What may be there unseen, by what would show it; and what checks of the bench have excluded.
+fn could_be_hidden(s: &mut String, d: &Diagnosis) {
+    let mut by_measure: Vec<(&str, Vec<String>)> = Vec::new();
+    for c in &d.considered {
+        let unseen = c.hidden_up_to_N.is_none_or(|h| h > 0.02 * d.blocked_force_N);
+        if !unseen || c.checked {
+            continue;
+        }
+        let size = match c.hidden_up_to_N {
+            Some(h) => format!("{} up to {h:.1} N", c.effect),
+            None => format!("{} of any size", c.effect),
+        };
+        let measure = measure(what_would_show(&c.effect));
+        match by_measure.iter_mut().find(|m| m.0 == measure) {
+            Some(known) => known.1.push(size),
+            None => by_measure.push((measure, vec![size])),
+        }
+    }
+    if !by_measure.is_empty() {
+        let _ = writeln!(s, "\nEffects that these recordings could hide, and how to find out");
+    }
+    for (measure, effects) in by_measure {
+        let _ = writeln!(s, "  {}: {measure}", effects.join(", "));
+    }
+    let checked = d.considered.iter().filter(|c| c.checked);
+    let cleared: Vec<String> = checked
+        .map(|c| match c.hidden_up_to_N {
+            Some(h) => format!("{} (at most {h:.2} N)", c.effect),
+            None => c.effect.clone(),
+        })
+        .collect();
+    if !cleared.is_empty() {
+        let _ = writeln!(s, "\nExcluded by checks of the bench: {}", cleared.join(", "));
+    }
+}
