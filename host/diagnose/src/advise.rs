@@ -1,10 +1,17 @@
 //! The cheapest next recording that would tell confusable effects apart, and the matrix of what a planned protocol can tell.
 
-use model_core::effects::{Context, MEMORY};
+use model_core::effects::{BenchCheck, Context, Experiment, Imitates, MEMORY};
 use model_core::muscle::Muscle;
 use rayon::prelude::*;
 
 use super::baselines::cosine;
+use super::criteria::baseline::TABLE_ORDER;
+use super::criteria::candidates::INVISIBLE;
+use super::criteria::planning::{
+    EXPECTED_NOISE, INDISTINGUISHABLE, MENU_PRESSURES, PLAN_POWERS, PROTOCOL_ROWS, RIVAL_GRID,
+    RIVAL_GRID_SEVERAL, SLOW_STROKE, WORTHWHILE_DIFFERENCE,
+};
+use super::criteria::rows::VENTED_SHARE;
 use super::linear::{Basis, add_scaled, energy};
 use super::planned::{Place, Protocol, Step, free_stroke, moments, play};
 use super::verdict::{Diagnosis, NextExperiment};
@@ -36,8 +43,8 @@ fn settable(value: f64) -> f64 {
 
 /// Recordings that tell effects apart, cheapest first, for a muscle and its pressures (Pa).
 fn menu(muscle: &Muscle<f64>, low: f64, high: f64) -> Vec<Item> {
-    let levels = [0.35 * high + 0.65 * low, 0.9 * high + 0.1 * low].map(|p| settable(p * 1e-3));
-    let slow = settable((free_stroke(muscle, high) * 1e3 / 27.0).max(1e-3));
+    let levels = MENU_PRESSURES.map(|part| settable((part * high + (1.0 - part) * low) * 1e-3));
+    let slow = settable((free_stroke(muscle, high) * 1e3 / SLOW_STROKE).max(1e-3));
     let set = |p: f64| Step::Pressure { to_kpa: p, rate_kpa_s: Some(50.0), settle_s: 2.0 };
     let loops = |part: f64, speed: f64, count: u32| Step::Cycles {
         to: Place { free: Some(part), ..Place::default() },
@@ -126,9 +133,9 @@ fn menu(muscle: &Muscle<f64>, low: f64, high: f64) -> Vec<Item> {
 fn tables(contexts: &[Context<f64>]) -> Basis {
     let top = contexts.iter().map(|c| c.pressure).fold(1.0, f64::max);
     let mut columns: Vec<Vec<f64>> = Vec::new();
-    for degree in 0..3 {
+    for degree in 0..PLAN_POWERS {
         let over = |c: &Context<f64>| (c.pressure / top).powi(degree);
-        for order in 1..=4 {
+        for order in 1..=TABLE_ORDER as i32 {
             columns.push(
                 contexts
                     .iter()
@@ -145,7 +152,7 @@ fn tables(contexts: &[Context<f64>]) -> Basis {
     columns.push(contexts.iter().map(|c| c.area).collect());
     for column in &mut columns {
         for (v, c) in column.iter_mut().zip(contexts) {
-            if c.pressure < 0.02 * top {
+            if c.pressure < VENTED_SHARE * top {
                 *v = 0.0;
             }
         }
@@ -170,66 +177,61 @@ fn trace(law: Candidate, shape: &[f64], amplitudes: &[f64], contexts: &[Context<
 
 /// Blocks of the menu that need the bench, not the muscle: they split what no motion can.
 fn bench_block(names: &[String]) -> Option<&'static str> {
-    let has = |n: &str| names.iter().any(|x| x == n);
-    if has("rig-compliance") || has("backlash") {
-        Some(
-            "put a rigid bar in the muscle's place and load it once: it shows what the frame and its joints give",
-        )
-    } else if has("force-gain") || has("cross-talk") || has("misalignment") {
-        Some("hang dead weights on the load cell, with and without pressure in the line")
-    } else if has("gauge-gain") || has("leak") {
-        Some("compare the gauge with a reference at three pressures, and close the valve for a minute")
-    } else if has("displacement-offset") || has("permanent-set") || has("end-slip") {
-        Some("measure the vented length with a calliper before and after")
-    } else if has("gravity") || has("force-offset") {
-        Some("weigh the muscle, and record the vented load cell before and after")
-    } else if has("tip-effect") || has("braid-elasticity") {
-        Some("photograph the ends and measure the diameter at three pressures")
-    } else {
-        None
-    }
+    let check = |name: &String| Candidate::from_name(name).and_then(|law| law.traits().check);
+    names.iter().filter_map(check).min().map(|check| match check {
+        BenchCheck::RigidBar => {
+            "put a rigid bar in the muscle's place and load it once: it shows what the frame and its joints give"
+        }
+        BenchCheck::DeadWeights => {
+            "hang dead weights on the load cell, with and without pressure in the line"
+        }
+        BenchCheck::ReferenceGauge => {
+            "compare the gauge with a reference at three pressures, and close the valve for a minute"
+        }
+        BenchCheck::VentedLength => "measure the vented length with a calliper before and after",
+        BenchCheck::Weighing => "weigh the muscle, and record the vented load cell before and after",
+        BenchCheck::EndsAndDiameter => "photograph the ends and measure the diameter at three pressures",
+    })
 }
 
 /// What to do so that an effect would show which recordings like these conceal.
 pub(crate) fn what_would_show(effect: &str) -> &'static str {
-    match effect {
-        "force-offset" | "force-drift" => "record the vented load cell before, between and after",
-        "gravity" => "weigh the muscle and its fittings, or turn the bench by a right angle",
-        "gauge-offset" | "gauge-gain" | "leak" => {
-            "compare the gauge with a reference, vented and at three pressures"
-        }
-        "force-gain" | "cross-talk" | "misalignment" => {
+    experiment(Candidate::from_name(effect).map_or(Experiment::Varied, |law| law.traits().shown_by))
+}
+
+/// An experiment in words.
+pub(crate) fn experiment(experiment: Experiment) -> &'static str {
+    match experiment {
+        Experiment::VentedReadings => "record the vented load cell before, between and after",
+        Experiment::Weighing => "weigh the muscle and its fittings, or turn the bench by a right angle",
+        Experiment::ReferenceGauge => "compare the gauge with a reference, vented and at three pressures",
+        Experiment::DeadWeights => {
             "hang dead weights on the load cell, with and without pressure in the line"
         }
-        "rig-compliance" | "backlash" => "put a rigid bar in the muscle's place and load it once",
-        "displacement-offset" | "permanent-set" | "end-slip" => {
-            "measure the vented length with a calliper before and after"
-        }
-        "tip-effect" | "braid-elasticity" => {
+        Experiment::RigidBar => "put a rigid bar in the muscle's place and load it once",
+        Experiment::VentedLength => "measure the vented length with a calliper before and after",
+        Experiment::EndsAndDiameter => {
             "photograph the ends and measure the diameter at three pressures, or test two lengths of the same stock"
         }
-        "contact-loss" | "pressure-sensor-lag" => {
-            "record slow ramps of pressure from zero at three held lengths"
-        }
-        "breakaway-friction" => "record rests of 1, 10 and 100 s at one place, sampled at 100 Hz or faster",
-        "presliding-hysteresis" | "minor-loop-memory" => "record nested small loops at two speeds",
-        "viscous-damping" | "rate-power" | "stribeck-friction" | "sensor-delay" | "pressure-lag"
-        | "inertia" => "record loops at four speeds over two decades",
-        "coulomb-friction" | "pressure-friction" | "seal-friction" => {
+        Experiment::PressureRamps => "record slow ramps of pressure from zero at three held lengths",
+        Experiment::Rests => "record rests of 1, 10 and 100 s at one place, sampled at 100 Hz or faster",
+        Experiment::NestedLoops => "record nested small loops at two speeds",
+        Experiment::Speeds => "record loops at four speeds over two decades",
+        Experiment::PressuresAndRamps => {
             "record loops at four pressures and slow ramps of pressure at held lengths"
         }
-        "friction-asymmetry" => {
+        Experiment::RestsFromBothSides => {
             "rest at one place reached from both sides: the gap closes to the true middle"
         }
-        "stress-relaxation" | "log-creep" => {
-            "hold the length for 100 s at two pressures, reached from both sides"
-        }
-        "mullins-softening" => "record a new specimen's first strokes, and the same again after a day",
-        "cyclic-softening" | "thermal-softening" => {
+        Experiment::LongHolds => "hold the length for 100 s at two pressures, reached from both sides",
+        Experiment::FirstStrokes => "record a new specimen's first strokes, and the same again after a day",
+        Experiment::RepeatsAfterRest => {
             "repeat the first loops at the end, and again after half an hour of vented rest"
         }
-        "strand-jamming" => "go to the very end of the free stroke",
-        _ => "record at several speeds, with rests, and the first pressure once more at the end",
+        Experiment::EndOfStroke => "go to the very end of the free stroke",
+        Experiment::Varied => {
+            "record at several speeds, with rests, and the first pressure once more at the end"
+        }
     }
 }
 
@@ -263,7 +265,9 @@ pub fn next_experiment(
             for rival in &rivals {
                 let span = pam_fit::bench::Span::of(&contexts)?;
                 let mut best = f64::INFINITY;
-                for shape in rival.grid(if rival.shapes().len() < 2 { 5 } else { 3 }, &span) {
+                for shape in
+                    rival.grid(if rival.shapes().len() < 2 { RIVAL_GRID } else { RIVAL_GRID_SEVERAL }, &span)
+                {
                     let mut with = basis.clone();
                     for c in rival.columns(&contexts, &shape, &mut [0.0; MEMORY]) {
                         if c.iter().all(|v| v.is_finite()) {
@@ -284,7 +288,7 @@ pub fn next_experiment(
     let mut separates = vec![first.effect.clone()];
     separates.extend(first.confusable_with.iter().cloned());
     Ok(best.map(|(_, difference, protocol, words)| {
-        let floor = 0.3 * diagnosis.noise_N.max(1e-3 * diagnosis.blocked_force_N);
+        let floor = WORTHWHILE_DIFFERENCE * diagnosis.noise_N.max(EXPECTED_NOISE * diagnosis.blocked_force_N);
         let words = match bench_block(&separates) {
             Some(block) if difference < floor => format!("no motion tells these apart; {block}"),
             Some(block) => format!("{words}; besides, {block}"),
@@ -312,12 +316,13 @@ pub struct Isolability {
 pub fn isolability(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Vec<Isolability>> {
     let campaign = play(protocol, muscle)?;
     let contexts = moments(muscle, &campaign);
-    let stride = contexts.len().div_ceil(12_000).max(1);
+    let stride = contexts.len().div_ceil(PROTOCOL_ROWS).max(1);
     let keep: Vec<usize> = (0..contexts.len()).step_by(stride).collect();
     let thin: Vec<Context<f64>> = keep.iter().map(|i| contexts[*i]).collect();
     let basis = tables(&thin);
     let span = pam_fit::bench::Span::of(&contexts);
-    let laws: Vec<Candidate> = Candidate::all().filter(|l| l.name() != "higher-order-elasticity").collect();
+    let laws: Vec<Candidate> =
+        Candidate::all().filter(|l| l.traits().imitates != Some(Imitates::ElasticOrders)).collect();
     let traces: Vec<(f64, Vec<f64>)> = laws
         .par_iter()
         .map(|law| {
@@ -343,9 +348,9 @@ pub fn isolability(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Vec<Isol
         .enumerate()
         .map(|(i, law)| {
             let mut not_told_from: Vec<(String, f64)> = (0..laws.len())
-                .filter(|j| *j != i && traces[i].0 > 1e-5 && traces[*j].0 > 1e-5)
+                .filter(|j| *j != i && traces[i].0 > INVISIBLE && traces[*j].0 > INVISIBLE)
                 .map(|j| (laws[j].name().to_owned(), cosine(&traces[i].1, &traces[j].1).abs()))
-                .filter(|(_, c)| *c > 0.9)
+                .filter(|(_, c)| *c > INDISTINGUISHABLE)
                 .collect();
             not_told_from.sort_by(|a, b| b.1.total_cmp(&a.1));
             Isolability { effect: law.name().to_owned(), visible: traces[i].0, not_told_from }

@@ -1,10 +1,17 @@
 //! From a campaign to the answer.
 
 use model_core::braid::{Braid, Geometry};
+use model_core::effects::Imitates;
 
 use super::baselines::{self, Kind};
 use super::candidates::library;
 use super::confirm::confirmed;
+use super::criteria::baseline::TABLE_ORDER;
+use super::criteria::judgement::{
+    EXPLAINED, LACK_OF_FIT, LACK_OF_FIT_NOISE, LINE_ALPHA, LINE_SHARE, LINE_UNEXPLAINED, PARTLY_EXPLAINED,
+    TRACE_POINTS,
+};
+use super::criteria::rows::{SLACK_MENTIONED, SLACK_ROUNDS};
 use super::frequency;
 use super::given;
 use super::judgeable::{blocked_force, cannot_be_judged, no_judgement, what_can_be_judged};
@@ -34,6 +41,19 @@ pub struct Options {
     pub given: Vec<Law>,
     /// Who watches how far it has come; nobody by default.
     pub progress: SharedProgress,
+    /// Effects beyond the catalogue, whose equations a test brings.
+    #[cfg(test)]
+    pub(crate) added: Vec<super::candidates::Law>,
+}
+
+impl Options {
+    /// Laws beyond the catalogue.
+    pub(super) fn added(&self) -> Vec<super::candidates::Law> {
+        #[cfg(test)]
+        return self.added.clone();
+        #[cfg(not(test))]
+        Vec::new()
+    }
 }
 
 /// An answer, and the baseline that it was given with.
@@ -41,10 +61,6 @@ pub(super) struct Asked {
     pub diagnosis: Diagnosis,
     pub kind: Kind,
 }
-
-/// Lack of fit that the model admits beside the pure error of repeats, rms as a share of the blocked force: friction by its sign
-/// alone where contacts give a little before they slide, and what a bladder of four orders leaves.
-const INEXACTNESS: f64 = 1.5e-3;
 
 /// Finds out what the model leaves out of a campaign of recordings.
 ///
@@ -75,12 +91,12 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
     }
     let step = rows::typical_step(&rows);
     let mut slack = 0;
-    for _ in 0..2 {
+    for _ in 0..SLACK_ROUNDS {
         // Twice: the first fit still saw the slack rows.
         let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
         slack += baselines::mask_slack(&mut rows, &fitted);
     }
-    if slack * 100 > rows.len() {
+    if slack * SLACK_MENTIONED > rows.len() {
         remarks.push(format!(
             "in {:.0} % of the rows the muscle hangs slack; they say nothing about its force and were left out",
             100.0 * slack as f64 / rows.len() as f64
@@ -93,7 +109,7 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
         remarks.push(law.words());
     }
     // The model as it was: four orders, tables free over pressure.
-    let production = baselines::fit(&rows, Kind::Flexible(4), &[]);
+    let production = baselines::fit(&rows, Kind::Flexible(TABLE_ORDER), &[]);
     let misfit = production.rms(&rows);
     let measured = baselines::measured_rms(&rows);
     if !(misfit < measured) {
@@ -104,9 +120,10 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
         return unjudged(no_judgement(&rows, options, remarks, reason, blocked));
     }
     remarks.extend(tables_as_evidence(&production, &rows));
-    let library: Vec<_> = library(&rows).into_iter().filter(|c| !known.settles(c, &options.given)).collect();
+    let library: Vec<_> =
+        library(&rows, &options.added()).into_iter().filter(|c| !known.settles(c, &options.given)).collect();
     let asked: Vec<usize> =
-        options.given.iter().filter_map(|law| library.iter().position(|c| c.law == *law)).collect();
+        options.given.iter().filter_map(|law| library.iter().position(|c| c.is(*law))).collect();
     let (found, held) = if options.given.is_empty() {
         confirmed(&mut rows, &library, blocked, step)
     } else {
@@ -130,13 +147,13 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
     };
     let weight = energy(&rows.root_weight).max(1e-12);
     let left = (energy(&found.full.residual) / weight - sigma * sigma).max(0.0).sqrt();
-    let own = (INEXACTNESS * blocked).max(0.6 * sigma);
+    let own = (LACK_OF_FIT * blocked).max(LACK_OF_FIT_NOISE * sigma);
     let beat = frequency::line(&rows, &found.full.residual, &block_ranges(&rows), step, 9)
-        .filter(|l| l.p <= 0.02 && l.share >= 0.15);
+        .filter(|l| l.p <= LINE_ALPHA && l.share >= LINE_SHARE);
     // What free tables take up where one bladder should serve all pressures.
     let taken_up = energy(&found.bare.core) - energy(&found.bare.residual);
     let concealed = (taken_up / weight).max(0.0).sqrt();
-    if missing.is_empty() && concealed > INEXACTNESS * blocked {
+    if missing.is_empty() && concealed > LACK_OF_FIT * blocked {
         remarks.push(in_the_tables(&found, &library, concealed, blocked));
     }
     let restless = missing.is_empty() && found.noise.has_a_reason(step, blocked);
@@ -149,11 +166,11 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
     }
     let verdict = if missing.is_empty() {
         // What beats in time is no noise, however well repeats seem to explain it; nor is what is larger than any instrument's.
-        let steady = beat.is_none_or(|l| l.share < 0.3) && !restless;
+        let steady = beat.is_none_or(|l| l.share < LINE_UNEXPLAINED) && !restless;
         if left <= own && steady { Verdict::Consistent } else { Verdict::Unexplained }
-    } else if explained >= 0.8 || left <= own {
+    } else if explained >= EXPLAINED || left <= own {
         Verdict::Explained
-    } else if explained >= 0.25 {
+    } else if explained >= PARTLY_EXPLAINED {
         Verdict::PartlyExplained
     } else {
         Verdict::Unexplained
@@ -210,18 +227,16 @@ fn ask(campaign: &Campaign, braid: &Braid<f64>, options: &Options, known: &Known
         remarks,
         profiles,
         trace: trace(&rows, &found),
+        history: None,
     };
     Ok(Asked { diagnosis, kind: found.full.kind })
 }
 
-/// Gains and offsets that a wrong description of the muscle imitates.
-const LIKE_A_DESCRIPTION: [&str; 5] =
-    ["force-gain", "gauge-gain", "displacement-offset", "braid-elasticity", "tip-effect"];
-
 /// What to look at before a fault of that size is believed.
 fn beyond_instruments(m: &Missing) -> Option<String> {
     let beyond = m.parameters.iter().any(|p| p.outside_known_range && p.value != 0.0);
-    (beyond && LIKE_A_DESCRIPTION.contains(&m.effect.as_str())).then(|| {
+    let imitates = Law::from_name(&m.effect).and_then(|law| law.traits().imitates);
+    (beyond && imitates == Some(Imitates::Description)).then(|| {
         format!(
             "{} of this size is more than anybody has met: look first at the muscle's description (diameter, braid angle, rest length, \
              wall) and at the units; a wrong one looks like this",
@@ -233,7 +248,8 @@ fn beyond_instruments(m: &Missing) -> Option<String> {
 /// Of the rows that are judged: elsewhere no residual is a misfit, and what an effect adds there is no one's claim.
 fn trace(rows: &Rows, found: &Found) -> Trace {
     let judged: Vec<usize> = (0..rows.len()).filter(|i| rows.root_weight[*i] > 0.0).collect();
-    let pick: Vec<usize> = judged.iter().copied().step_by(judged.len().div_ceil(1_500).max(1)).collect();
+    let pick: Vec<usize> =
+        judged.iter().copied().step_by(judged.len().div_ceil(TRACE_POINTS).max(1)).collect();
     Trace {
         time: pick.iter().map(|i| rows.contexts[*i].time).collect(),
         before: pick.iter().map(|i| found.bare.residual[*i]).collect(),

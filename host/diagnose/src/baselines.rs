@@ -13,6 +13,8 @@ mod reach;
 
 use self::plan::{Part, Plan};
 pub(crate) use self::reach::{Give, Reach, cosine, keeps, projected};
+use super::criteria::baseline::{DISTINCT_DIRECTION, FRICTION_LIMITS, LINEARISATIONS};
+use super::criteria::rows::{NO_LOAD, SLACK_MODEL};
 use super::linear::{Basis, energy, weighted};
 use super::rows::{ORDERS, Rows};
 
@@ -84,9 +86,6 @@ pub(crate) fn measured_rms(rows: &Rows) -> f64 {
     (sum / energy(&rows.root_weight).max(1e-12)).sqrt()
 }
 
-/// A soft direction must stand out from the others by this share of itself.
-const DISTINCT: f64 = 1e-3;
-
 /// Fits a baseline together with given effect columns (N per unit amplitude, unweighted).
 pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
     let n = rows.len();
@@ -98,7 +97,7 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
     let mut quasi: Vec<f64> =
         rows.contexts.iter().map(|c| if begun { c.quasi } else { c.pressure * c.area }).collect();
     let mut out: Option<Baseline> = None;
-    for _ in 0..if begun { 3 } else { 4 } {
+    for _ in 0..if begun { LINEARISATIONS.1 } else { LINEARISATIONS.0 } {
         let factor: Vec<f64> =
             (0..n).map(|i| live[i] * (1.0 - friction[i] * rows.contexts[i].direction)).collect();
         let column = |part: &Part| -> Vec<f64> {
@@ -125,7 +124,7 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
         }
         let hard = joint.clone();
         for part in &plan.soft {
-            joint.push_beyond(column(part), DISTINCT);
+            joint.push_beyond(column(part), DISTINCT_DIRECTION);
         }
         let soft = joint.columns(hard.rank(), n);
         let of_friction: Vec<bool> = joint.kept()[hard.rank()..]
@@ -268,7 +267,7 @@ fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
         v.gaylord[i] += context.pressure * shape.area;
         v.stiffness[i] += context.pressure * shape.area_slope;
         v.quasi[i] = v.gaylord[i] + elastic[i];
-        v.friction[i] = v.friction[i].clamp(-0.4, 0.8);
+        v.friction[i] = v.friction[i].clamp(FRICTION_LIMITS.0, FRICTION_LIMITS.1);
         let late = settling * rows.sign[i] * rows.settling[i];
         let direction = context.direction + departure[i];
         v.force[i] = live[i] * v.quasi[i] * (1.0 - v.friction[i] * direction - late);
@@ -282,7 +281,7 @@ pub(crate) fn mask_slack(rows: &mut Rows, fitted: &Baseline) -> usize {
     let strongest = rows.force.iter().copied().fold(0.0, f64::max);
     let mut masked = 0;
     for i in 0..rows.len() {
-        let slack = fitted.quasi[i] < 0.015 * strongest && rows.force[i] < 0.02 * strongest;
+        let slack = fitted.quasi[i] < SLACK_MODEL * strongest && rows.force[i] < NO_LOAD * strongest;
         if slack && !rows.vented[i] && rows.root_weight[i] > 0.0 {
             rows.root_weight[i] = 0.0;
             masked += 1;

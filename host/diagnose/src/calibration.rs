@@ -8,14 +8,10 @@
 //! logit p = A + B logit(belief) + C logit(explained)
 //! ```
 
-/// `A`, `B`, `C`: belief as it is. Of 756 names of four opened sets it was off by 0.047 (calibration error), and by 0.029 with constants
-/// learned on other trials; their log score was 0.333 instead of 0.337, too little to bend belief for.
-const CALIBRATION: [f64; 3] = [0.0, 1.0, 0.0];
-/// Belief and share are kept this far from certainty.
-const EDGE: f64 = 0.01;
+use super::criteria::uncertainty::{CALIBRATION, CERTAINTY};
 
 fn logit(x: f64) -> f64 {
-    let x = x.clamp(EDGE, 1.0 - EDGE);
+    let x = x.clamp(CERTAINTY, 1.0 - CERTAINTY);
     (x / (1.0 - x)).ln()
 }
 

@@ -1,19 +1,60 @@
 //! The library of effects as columns: each candidate evaluated over the rows, per amplitude, on a grid of its shapes.
 
-use model_core::effects::{Info, Link, MEMORY, Parameter, Role};
+use model_core::effects::{Axis, Context, Imitates, Info, Link, MEMORY, Parameter, Role, Traits, Vented};
 
+use super::criteria::candidates::{
+    CHANGE_POINTS, LAW_ERROR, LOGARITHMIC_RANGE, LOW_END, RANGE_OVERSHOOT, SHAPE_GRID,
+};
 use super::linear::Sign;
-use super::moment;
 use super::rows::Rows;
 use super::trial::Trial;
-use pam_fit::bench::{Candidate as Law, Span};
+use pam_fit::bench::{self, Span, read_when_vented};
 
-/// Moments at which something may have happened that are looked at first.
-const MOMENTS: usize = 40;
-/// A shape in this first part of its range stands at the low end.
-const LOW_END: f64 = 1e-3;
-/// How inexact a law is, as a share of its trace: first order in sensitivities, shapes from another muscle.
-const LAW_ERROR: f64 = 0.03;
+/// The equations of a candidate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Law {
+    /// Of the catalogue.
+    Catalogue(bench::Candidate),
+    /// Of an effect that a test adds.
+    #[cfg(test)]
+    Added(crate::tests::added::AddedName),
+}
+
+impl Law {
+    fn info(self) -> &'static Info {
+        match self {
+            Self::Catalogue(law) => law.info(),
+            #[cfg(test)]
+            Self::Added(law) => law.info(),
+        }
+    }
+
+    fn traits(self) -> &'static Traits {
+        match self {
+            Self::Catalogue(law) => law.traits(),
+            #[cfg(test)]
+            Self::Added(law) => law.traits(),
+        }
+    }
+
+    fn is_bench(self) -> bool {
+        matches!(self, Self::Catalogue(law) if law.is_bench())
+    }
+
+    fn columns(self, contexts: &[Context<f64>], shapes: &[f64], memory: &mut [f64; MEMORY]) -> Vec<Vec<f64>> {
+        match self {
+            Self::Catalogue(law) => law.columns(contexts, shapes, memory),
+            #[cfg(test)]
+            Self::Added(law) => {
+                let equations = (
+                    |p: &[f64], c: &Context<f64>, m: &mut [f64; MEMORY]| law.step(p, c, m),
+                    |p: &[f64], c: &Context<f64>, m: &[f64; MEMORY]| law.force(p, c, m),
+                );
+                bench::columns_of(law.info(), equations, contexts, shapes, memory)
+            }
+        }
+    }
+}
 
 /// One member of the library.
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +63,8 @@ pub(crate) struct Candidate {
     pub law: Law,
     /// What it is.
     pub info: &'static Info,
+    /// What is to be known of it beside its equations.
+    pub traits: &'static Traits,
     /// What the recordings can show of shapes on their own axes.
     span: Span,
 }
@@ -30,6 +73,11 @@ impl Candidate {
     /// Its name in the catalogue.
     pub(crate) fn name(&self) -> &'static str {
         self.info.name
+    }
+
+    /// Whether it is this effect of the catalogue.
+    pub(crate) fn is(&self, effect: bench::Candidate) -> bool {
+        self.law == Law::Catalogue(effect)
     }
 
     /// Whether it belongs to the bench and corrects the data.
@@ -65,7 +113,7 @@ impl Candidate {
 
     /// Whether a vented muscle shows it by itself: a weight, or an offset.
     pub(crate) fn shown_vented(&self, rows: &Rows) -> bool {
-        matches!(self.name(), "force-offset" | "gravity") && rows.vented.contains(&true)
+        self.traits.vented == Vented::Constant && rows.vented.contains(&true)
     }
 
     /// How inexact its law is, as a share of its trace. A weight or an offset is what it is where a vented muscle shows it; elsewhere it
@@ -78,15 +126,15 @@ impl Candidate {
     pub(crate) fn grid(&self) -> Vec<Vec<f64>> {
         let shapes: Vec<Parameter> = self.shapes().collect();
         let points = match shapes.len() {
-            0 | 1 => 9,
-            2 => 5,
-            3 => 4,
-            _ => 3,
+            0 | 1 => SHAPE_GRID[0],
+            2 => SHAPE_GRID[1],
+            3 => SHAPE_GRID[2],
+            _ => SHAPE_GRID[3],
         };
         let mut grid = vec![Vec::new()];
         for p in shapes {
             // A moment cannot be found by walking from a far one: the trace changes where it lies, not how large it is.
-            let points = if p.name == moment::MOMENT { MOMENTS } else { points };
+            let points = if p.axis == Axis::Time { CHANGE_POINTS } else { points };
             let axis: Vec<f64> = (0..points).map(|i| place(&p, (i as f64 + 0.5) / points as f64)).collect();
             grid = grid
                 .into_iter()
@@ -108,7 +156,7 @@ impl Candidate {
         for (i, p) in self.shapes().enumerate() {
             for sign in [-1.0, 1.0] {
                 let u = unplace(&p, center[i]) + sign * step;
-                if (-0.02..=1.02).contains(&u) {
+                if (-RANGE_OVERSHOOT..=1.0 + RANGE_OVERSHOOT).contains(&u) {
                     let mut moved = center.to_vec();
                     moved[i] = place(&p, u.clamp(0.0, 1.0));
                     near.push(moved);
@@ -120,17 +168,7 @@ impl Candidate {
 
     /// Whether numbers that were fitted freely can belong to one and the same thing.
     pub(super) fn holds_together(&self, amplitudes: &[f64], shapes: &[f64]) -> bool {
-        match (self.name(), amplitudes, shapes) {
-            // An offset e of the ends costs a = (e/L0)²/2 of the pull and rubs with b = μ e/L0: no guide is as smooth as μ = 0.1.
-            ("misalignment", [loss, rub], _) => *rub >= 0.1 * (2.0 * loss.max(0.0)).sqrt(),
-            // The frame that gives under load is the frame that gives at the turns.
-            ("rig-compliance", [give], [at_turns]) => *give <= 2.5 * at_turns,
-            // No joint is looser than free.
-            ("backlash", [free], _) => *free <= 1.3,
-            // No filter passes more than it is given.
-            ("sensor-delay", [_, filtered, delayed], _) => filtered.max(*delayed) <= 1.3,
-            _ => true,
-        }
+        (self.traits.consistent)(amplitudes, shapes)
     }
 
     /// Whether a trial stays within what is known of the effect: no shape at the low end of its range, where a law becomes a simpler one (a
@@ -147,7 +185,7 @@ impl Candidate {
         let mut memory = [0.0; MEMORY];
         let mut columns = self.law.columns(&rows.contexts, shapes, &mut memory);
         for (amplitude, column) in columns.iter_mut().enumerate() {
-            let vented_too = self.law.acts_on_a_slack_muscle(amplitude);
+            let vented_too = read_when_vented(self.traits, amplitude);
             for (value, vented) in column.iter_mut().zip(&rows.vented) {
                 if (*vented && !vented_too) || !value.is_finite() {
                     *value = 0.0;
@@ -160,7 +198,7 @@ impl Candidate {
 
 /// The value at a share of a parameter's range; by its logarithm where it spans decades.
 fn place(p: &Parameter, u: f64) -> f64 {
-    if p.low > 0.0 && p.high > 4.0 * p.low {
+    if p.low > 0.0 && p.high > LOGARITHMIC_RANGE * p.low {
         (p.low.ln() + u * (p.high / p.low).ln()).exp()
     } else {
         p.low + u * (p.high - p.low)
@@ -168,7 +206,7 @@ fn place(p: &Parameter, u: f64) -> f64 {
 }
 
 fn unplace(p: &Parameter, value: f64) -> f64 {
-    if p.low > 0.0 && p.high > 4.0 * p.low {
+    if p.low > 0.0 && p.high > LOGARITHMIC_RANGE * p.low {
         (value / p.low).ln() / (p.high / p.low).ln()
     } else {
         (value - p.low) / (p.high - p.low).max(1e-300)
@@ -177,15 +215,19 @@ fn unplace(p: &Parameter, value: f64) -> f64 {
 
 /// All effects that are looked at, in the order of the library. What cannot be told from a part of the base model in any
 /// recording stays out: the gauge's offset is the deadband, and a higher elastic order is offered by the baselines.
-pub(crate) fn library(rows: &Rows) -> Vec<Candidate> {
+///
+/// `added` are laws beyond the catalogue.
+pub(crate) fn library(rows: &Rows, added: &[Law]) -> Vec<Candidate> {
     let span = Span::of(&rows.contexts).unwrap_or(Span {
         time: (0.0, 1.0),
         contraction: (0.0, 1.0),
         stroke: (0.0, 1.0),
     });
-    Law::all()
-        .filter(|law| !matches!(law.name(), "gauge-offset" | "higher-order-elasticity"))
-        .map(|law| Candidate { law, info: law.info(), span })
+    let catalogue = bench::Candidate::all().map(Law::Catalogue);
+    catalogue
+        .chain(added.iter().copied())
+        .map(|law| Candidate { law, info: law.info(), traits: law.traits(), span })
+        .filter(|c| !matches!(c.traits.imitates, Some(Imitates::Deadband | Imitates::ElasticOrders)))
         .collect()
 }
 

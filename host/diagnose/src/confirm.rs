@@ -1,15 +1,13 @@
 //! What the search finds has to hold on rows that it has not seen.
 
 use super::candidates::Candidate;
-use super::held_out::{HELPS, Unseen};
+use super::criteria::selection::MOST_REFUSED;
+use super::criteria::uncertainty::HELD_OUT_LEAVES;
+use super::held_out::Unseen;
 use super::rows::Rows;
 use super::search::search;
 use super::select::Found;
 use super::verdict::HeldOut;
-
-/// So many first names may fail on unseen rows before none is named: where several laws fit the rows at hand alike, the one that
-/// fits them best need not be the one that holds on others.
-const MOST_REFUSED: usize = 3;
 
 /// What the search finds and unseen rows confirm, with the error on these rows.
 pub(super) fn confirmed(rows: &mut Rows, library: &[Candidate], blocked: f64, step: f64) -> (Found, HeldOut) {
@@ -42,7 +40,7 @@ fn keep_what_helps(found: &mut Found, rows: &mut Rows, library: &[Candidate]) ->
         let Some(fewer) = found.traces.len().checked_sub(1) else { return with };
         let before = if fewer == 0 { with.rms_before_N } else { unseen.error(&found.traces[..fewer]) };
         // An effect that takes a third of what is above the noise lowers the whole by more than this.
-        if with.rms_after_N < HELPS * before {
+        if with.rms_after_N < HELD_OUT_LEAVES * before {
             return with;
         }
         let name = found.taken.last().map_or("", |t| library[t.trial.candidate].name());

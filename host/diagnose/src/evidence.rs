@@ -12,14 +12,8 @@
 //! The integral is the usual one of mixed models (D. A. Harville, J. American Statistical Association 72 (1977) 320–338).
 
 use super::baselines::{Give, keeps};
+use super::criteria::baseline::{ELASTIC_GIVES, EXPECTED_GIVE, FRICTION_GIVES};
 use super::linear::{Sign, amplitudes, solve_symmetric};
-
-/// Sizes of a bladder's difference between pressures that are tried, rms as a share of the blocked force.
-const ELASTIC: [f64; 6] = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2];
-/// The same of friction's.
-const FRICTION: [f64; 4] = [1e-4, 5e-4, 2.5e-3, 1e-2];
-/// What they are expected to be, before anything is seen; to within a factor of e.
-const EXPECTED: (f64, f64) = (7e-4, 3e-4);
 
 /// What evidence is weighed with.
 #[derive(Clone, Copy, Debug)]
@@ -83,10 +77,10 @@ pub(crate) fn weigh(
     signs: &[Sign],
     most: u32,
 ) -> Weighed {
-    let gives = ELASTIC.iter().flat_map(|e| FRICTION.iter().map(move |f| (*e, *f)));
+    let gives = ELASTIC_GIVES.iter().flat_map(|e| FRICTION_GIVES.iter().map(move |f| (*e, *f)));
     let mut best: Option<Weighed> = None;
     for (elastic, friction) in gives {
-        let prior = (elastic / EXPECTED.0).ln().powi(2) + (friction / EXPECTED.1).ln().powi(2);
+        let prior = (elastic / EXPECTED_GIVE.0).ln().powi(2) + (friction / EXPECTED_GIVE.1).ln().powi(2);
         let mut w = Weighed {
             deviance: f64::INFINITY,
             give: Give { elastic: elastic * scale.blocked, friction: friction * scale.blocked, row: 0.0 },

@@ -6,16 +6,11 @@
 
 use rayon::prelude::*;
 
+use super::criteria::location::{
+    LINE_NEIGHBOURS, LINE_PERIODS, LINE_SHUFFLES, LINE_WIDTH, LONGEST_STRETCH, SHORTEST_STRETCH, STRETCHES,
+};
 use super::linear::{Random, median};
 use super::rows::Rows;
-
-/// Shuffles behind the p-value.
-const SHUFFLES: usize = 99;
-/// Longest stretch, rows.
-const LONGEST: usize = 1024;
-/// Neighbours on each side that a line is compared with, and those next to it that belong to it.
-const NEIGHBOURS: usize = 10;
-const OWN: usize = 2;
 
 /// A line in the spectrum of the misfit.
 #[derive(Clone, Copy, Debug)]
@@ -90,12 +85,13 @@ fn strongest(power: &[f64], lowest: usize) -> Option<(usize, f64, f64)> {
     if !(total > 0.0) {
         return None;
     }
-    (lowest.max(OWN + 1)..power.len().saturating_sub(OWN + 2))
+    (lowest.max(LINE_WIDTH + 1)..power.len().saturating_sub(LINE_WIDTH + 2))
         .map(|k| {
-            let (from, to) = (k.saturating_sub(NEIGHBOURS), (k + NEIGHBOURS + 1).min(power.len()));
-            let mut others: Vec<f64> = (from..to).filter(|j| j.abs_diff(k) > OWN).map(|j| power[j]).collect();
+            let (from, to) = (k.saturating_sub(LINE_NEIGHBOURS), (k + LINE_NEIGHBOURS + 1).min(power.len()));
+            let mut others: Vec<f64> =
+                (from..to).filter(|j| j.abs_diff(k) > LINE_WIDTH).map(|j| power[j]).collect();
             let floor = median(&mut others).max(1e-300);
-            let own: f64 = (k - OWN..=k + OWN).map(|j| (power[j] - floor).max(0.0)).sum();
+            let own: f64 = (k - LINE_WIDTH..=k + LINE_WIDTH).map(|j| (power[j] - floor).max(0.0)).sum();
             (k, power[k] / floor, own / total)
         })
         .max_by(|a, b| a.1.total_cmp(&b.1))
@@ -110,15 +106,15 @@ pub(crate) fn line(
     step: f64,
     seed: u64,
 ) -> Option<Line> {
-    let length = (residual.len() / 8).max(1).next_power_of_two().min(LONGEST);
-    if length < 64 || !(step > 0.0) || rows.isometric {
+    let length = (residual.len() / STRETCHES).max(1).next_power_of_two().min(LONGEST_STRETCH);
+    if length < SHORTEST_STRETCH || !(step > 0.0) || rows.isometric {
         return None;
     }
     let mut spans: Vec<f64> = blocks.iter().map(|(a, b)| (b - a) as f64).collect();
-    let lowest = (4.0 * length as f64 / median(&mut spans).max(1.0)).ceil() as usize;
+    let lowest = (LINE_PERIODS * length as f64 / median(&mut spans).max(1.0)).ceil() as usize;
     let seen = power(residual, length);
     let (at, height, share) = strongest(&seen, lowest)?;
-    let beyond: usize = (0..SHUFFLES)
+    let beyond: usize = (0..LINE_SHUFFLES)
         .into_par_iter()
         .map(|s| {
             let mut random = Random(seed.wrapping_mul(1000).wrapping_add(s as u64));
@@ -138,9 +134,9 @@ pub(crate) fn line(
     let resolution = 1.0 / (length as f64 * step);
     Some(Line {
         hertz: (at + 1) as f64 * resolution,
-        half: OWN as f64 * resolution,
+        half: LINE_WIDTH as f64 * resolution,
         share,
-        p: (beyond as f64 + 1.0) / (SHUFFLES as f64 + 1.0),
+        p: (beyond as f64 + 1.0) / (LINE_SHUFFLES as f64 + 1.0),
     })
 }
 

@@ -1,17 +1,21 @@
 //! Effects that the user knows to be there: fitted with the base by the same steps as names that are found, whatever the evidence; and
 //! what the recordings themselves say of them.
 
+use model_core::effects::Imitates;
 use rayon::prelude::*;
 
 use super::baselines::{self, Kind};
 use super::candidates::Candidate;
+use super::criteria::candidates::LEAST_SIGMA;
+use super::criteria::selection::{FAMILY_ALPHA, LEAST_EXCESS, LEAST_SCORE, LEAST_SCORE_ALONE, MAX_NAMED};
+use super::criteria::uncertainty::HELD_OUT_LEAVES;
 use super::evidence::Scale;
 use super::ground::Ground;
-use super::held_out::{HELPS, Unseen};
+use super::held_out::Unseen;
 use super::linear::energy;
 use super::rows::Rows;
-use super::search::{MAX_NAMED, search};
-use super::select::{self, Found, Taken, look, refit, rivals};
+use super::search::search;
+use super::select::{Found, Taken, look, refit, rivals};
 use super::trial::Trial;
 use super::verdict::{HeldOut, Missing};
 use pam_data::error::{DataCode, Error, Result};
@@ -27,22 +31,24 @@ pub(super) fn check(given: &[Law]) -> Result<()> {
         );
     }
     for (i, law) in given.iter().enumerate() {
-        match law.name() {
-            "gauge-offset" => {
+        match law.traits().imitates {
+            Some(Imitates::Deadband) => {
                 return refused(
-                    "`gauge-offset` cannot be given: it is the deadband, which is fitted in any case".into(),
+                    format!(
+                        "`{}` cannot be given: it is the deadband, which is fitted in any case",
+                        law.name()
+                    ),
                     "leave it out",
                 );
             }
-            "higher-order-elasticity" => {
+            Some(Imitates::ElasticOrders) => {
                 return refused(
-                    "`higher-order-elasticity` cannot be given: it is offered before any effect is weighed"
-                        .into(),
+                    format!("`{}` cannot be given: it is offered before any effect is weighed", law.name()),
                     "leave it out, or fit with `host fit --order`",
                 );
             }
-            name if given[..i].contains(law) => {
-                return refused(format!("`{name}` is given twice"), "give each effect once");
+            _ if given[..i].contains(law) => {
+                return refused(format!("`{}` is given twice", law.name()), "give each effect once");
             }
             _ => {}
         }
@@ -65,7 +71,7 @@ pub(super) fn fitted(
     let scale = Scale {
         weight,
         independent: found.noise.independent.max(rows.blocks as f64),
-        sigma: found.noise.sigma.max(1e-6 * blocked),
+        sigma: found.noise.sigma.max(LEAST_SIGMA * blocked),
         blocked,
     };
     let noise_energy = scale.sigma * scale.sigma * weight;
@@ -87,7 +93,7 @@ pub(super) fn fitted(
         let mut rivals = rivals(&trial, &best, library, rows, &ground, &metric.span);
         rivals.retain(|r| !given.contains(&r.0));
         if chosen.is_empty() {
-            found.above = (trial.before - noise_energy).max(0.02 * trial.before).max(1e-12);
+            found.above = (trial.before - noise_energy).max(LEAST_EXCESS * trial.before).max(1e-12);
         }
         let share = trial.gain / found.above;
         chosen.push(trial.clone());
@@ -135,12 +141,11 @@ pub(super) fn judge(missing: &mut [Missing], found: &Found, rows: &Rows, held: &
     for (i, (m, taken)) in missing.iter_mut().zip(&found.taken).enumerate() {
         let trial = &taken.trial;
         let sized = trial.amplitudes.iter().any(|a| *a != 0.0);
-        let likely = trial.score
-            >= if taken.p <= select::FAMILY_ALPHA { select::LEAST_SCORE } else { select::LEAST_ALONE };
+        let likely = trial.score >= if taken.p <= FAMILY_ALPHA { LEAST_SCORE } else { LEAST_SCORE_ALONE };
         let mut others = found.traces.clone();
         others.remove(i);
         let without = if others.is_empty() { held.rms_before_N } else { unseen_rows.error(&others) };
-        let helps = held.rms_after_N < HELPS * without;
+        let helps = held.rms_after_N < HELD_OUT_LEAVES * without;
         let unseen = format!("unseen rows go from {without:.3} to {:.3} N with it", held.rms_after_N);
         m.given = true;
         m.probability = 1.0;

@@ -5,17 +5,14 @@ use rayon::prelude::*;
 
 use super::baselines::{Baseline, Give, keeps};
 use super::candidates::Candidate;
+use super::criteria::candidates::{
+    AMPLITUDE_BEYOND, INVISIBLE, MOST_AMPLITUDES, REFINEMENT_GAIN, REFINEMENT_HALVINGS, REFINEMENT_STEP,
+    REFINEMENT_STEPS, SYSTEMATIC_ROWS,
+};
 use super::evidence::{Products, Scale, Target, Weighed, weigh, weigh_at};
 use super::linear::{add_scaled, dot, energy, weighted};
 use super::rows::Rows;
 use super::trial::Trial;
-
-/// An amplitude may exceed its known range by this factor.
-const BEYOND: f64 = 10.0;
-/// An error of a law repeats itself: it counts as no more independent rows than this.
-const SYSTEMATIC_ROWS: f64 = 100.0;
-/// The least share of a column's energy outside the baseline for it to be judged at all.
-const INVISIBLE: f64 = 1e-5;
 
 /// A baseline against which candidates are weighed.
 pub(crate) struct Ground<'a> {
@@ -153,11 +150,11 @@ impl<'a> Ground<'a> {
             return trial;
         }
         let signs = candidate.signs();
-        let most = if candidate.info.alternatives { 1 } else { 6 };
+        let most = if candidate.info.alternatives { 1 } else { MOST_AMPLITUDES };
         let w = weigh(&self.scale, &self.target, &products, &signs, most);
         // Ten times beyond what anybody has seen is another thing under this name.
         let known = candidate.info.parameters.iter();
-        let within = |(p, a): (&Parameter, &f64)| a.abs() <= BEYOND * p.low.abs().max(p.high.abs());
+        let within = |(p, a): (&Parameter, &f64)| a.abs() <= AMPLITUDE_BEYOND * p.low.abs().max(p.high.abs());
         let plausible =
             known.zip(&w.amplitudes).all(within) && candidate.holds_together(&w.amplitudes, shapes);
         if plausible && w.gain > 0.0 {
@@ -242,7 +239,7 @@ impl<'a> Ground<'a> {
     ) -> (f64, f64) {
         let candidate = &library[trial.candidate];
         let (_, products, _) = self.products(candidate, &trial.shapes, rows);
-        let most = if candidate.info.alternatives { 1 } else { 6 };
+        let most = if candidate.info.alternatives { 1 } else { MOST_AMPLITUDES };
         let w = weigh_at(&self.scale, &self.target, &products, &candidate.signs(), most, give);
         ((w.before - w.gain).max(0.0), w.before)
     }
@@ -293,9 +290,9 @@ impl<'a> Ground<'a> {
     pub(crate) fn refine(&self, start: &Trial, library: &[Candidate], rows: &Rows) -> Trial {
         let candidate = &library[start.candidate];
         let mut best = start.clone();
-        let mut step = (0.5 / candidate.grid().len() as f64).max(0.05);
-        for _ in 0..if best.shapes.is_empty() { 0 } else { 5 } {
-            for _ in 0..2 {
+        let mut step = (0.5 / candidate.grid().len() as f64).max(REFINEMENT_STEP);
+        for _ in 0..if best.shapes.is_empty() { 0 } else { REFINEMENT_HALVINGS } {
+            for _ in 0..REFINEMENT_STEPS {
                 let better = candidate
                     .neighbours(&best.shapes, step)
                     .par_iter()
@@ -304,7 +301,7 @@ impl<'a> Ground<'a> {
                     .into_iter()
                     .max_by(|a, b| a.score.total_cmp(&b.score));
                 match better {
-                    Some(b) if b.score > best.score + 1e-3 => best = b,
+                    Some(b) if b.score > best.score + REFINEMENT_GAIN => best = b,
                     _ => break,
                 }
             }

@@ -6,18 +6,15 @@ use std::ops::RangeInclusive;
 use rayon::prelude::*;
 
 use super::baselines::{self, Kind};
+use super::criteria::baseline::TABLE_ORDER;
+use super::criteria::rows::NO_LOAD;
+use super::criteria::uncertainty::{
+    FEWEST_LEVELS_HELD_OUT, FEWEST_RECORDINGS, FEWEST_STROKES_HELD_OUT, FOLDS, HELD_OUT_ROWS, ONE_BLADDER,
+    RECORDING_FOLDS, SEEN_ONCE, STROKE_PARTS,
+};
 use super::linear::energy;
 use super::rows::Rows;
 use super::verdict::HeldOut;
-
-/// Unseen rows must be predicted better by this factor for an effect to have helped.
-pub(super) const HELPS: f64 = 0.96;
-/// Rows at most: held-out error needs no more.
-const ROWS: usize = 6_000;
-
-/// Where the bladder differs between pressures by more than this share of the largest force, rms, no pressure is predicted from the
-/// others.
-const ONE_BLADDER: f64 = 5e-3;
 
 fn strongest(rows: &Rows) -> f64 {
     rows.force.iter().copied().fold(0.0, f64::max)
@@ -40,7 +37,7 @@ fn split(words: &'static str, rows: &Rows, key: &dyn Fn(usize) -> u32) -> Split 
 }
 
 fn stride(rows: &Rows) -> usize {
-    rows.len().div_ceil(ROWS).max(1)
+    rows.len().div_ceil(HELD_OUT_ROWS).max(1)
 }
 
 /// Every n-th row, with columns over them.
@@ -87,7 +84,7 @@ fn claimed(rows: &Rows) -> Vec<bool> {
         .map(|i| {
             let pressure = rows.contexts[i].pressure;
             rows.root_weight[i] > 0.0
-                || (rows.force[i] > 0.02 * strongest && low <= pressure && pressure <= high)
+                || (rows.force[i] > NO_LOAD * strongest && low <= pressure && pressure <= high)
         })
         .collect()
 }
@@ -143,11 +140,6 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split, tares: 
     })
 }
 
-/// A trace of which one group holds more than this share cannot be learnt from the others.
-const SEEN_ONCE: f64 = 0.8;
-/// Parts of the whole stroke, which are then left out by fours.
-const PARTS: f64 = 24.0;
-
 /// Whether what the base leaves of an effect's trace sits in one group.
 fn seen_once(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Split) -> bool {
     let base = baselines::fit(rows, kind, &[]);
@@ -167,21 +159,23 @@ fn strictest(rows: &Rows, kind: Kind) -> Split {
     let pressure = |i: usize| if rows.vented[i] { rows.levels.len() as u32 + tare(i) } else { rows.level[i] };
     let by_pressure = split("each pressure predicted from the others", rows, &pressure);
     let by_stroke =
-        split("every fourth cycle predicted from the others, in turn", rows, &|i| rows.block[i] / 2 % 4);
+        split("every fourth cycle predicted from the others, in turn", rows, &|i| rows.block[i] / 2 % FOLDS);
     let by_recording = split("each recording predicted from the others", rows, &|i| rows.recording[i]);
-    let by_run =
-        split("every tenth recording predicted from the others, in turn", rows, &|i| rows.recording[i] % 10);
-    let quarter = rows.blocks.div_ceil(4).max(1) as u32;
+    let by_run = split("every tenth recording predicted from the others, in turn", rows, &|i| {
+        rows.recording[i] % RECORDING_FOLDS
+    });
+    let quarter = rows.blocks.div_ceil(FOLDS as usize).max(1) as u32;
     let by_time =
         split("each quarter of the time predicted from the rest", rows, &|i| rows.block[i] / quarter);
     // A pressure left out needs a baseline that reaches over pressures.
-    if rows.isometric && rows.names.len() >= 4 {
+    if rows.isometric && rows.names.len() >= FEWEST_RECORDINGS {
         by_run
     } else if kind.reaches_over_pressures()
-        && by_pressure.groups.iter().filter(|g| (**g as usize) < rows.levels.len()).count() >= 3
+        && by_pressure.groups.iter().filter(|g| (**g as usize) < rows.levels.len()).count()
+            >= FEWEST_LEVELS_HELD_OUT
     {
         by_pressure
-    } else if rows.blocks >= 16 {
+    } else if rows.blocks >= FEWEST_STROKES_HELD_OUT {
         by_stroke
     } else if (2..=10).contains(&by_recording.groups.len()) && rows.levels.len() < 2 {
         by_recording
@@ -206,8 +200,8 @@ impl Unseen {
         // Directions with a prior are made for the pressures they were fitted to; a pressure left out asks for one bladder, where
         // there is one.
         let kind = match kind {
-            Kind::Flexible(m) => Kind::Flexible(m.min(4)),
-            Kind::Soft(give) if give.elastic > ONE_BLADDER * strongest(rows) => Kind::Flexible(4),
+            Kind::Flexible(m) => Kind::Flexible(m.min(TABLE_ORDER)),
+            Kind::Soft(give) if give.elastic > ONE_BLADDER * strongest(rows) => Kind::Flexible(TABLE_ORDER),
             Kind::Soft(_) | Kind::Stiff => Kind::Stiff,
         };
         let (thin, traces) = thin(rows, traces);
@@ -217,8 +211,8 @@ impl Unseen {
         if !thin.isometric && split.groups.len() > 1 && seen_once(&thin, kind, &traces, &split) {
             // What a virgin muscle's first stroke alone shows no other stroke can foretell.
             let strokes = strokes(&thin);
-            let part = (strokes.end() - strokes.start()) / PARTS;
-            let of = |i: usize| ((thin.contexts[i].stroke - strokes.start()) / part).max(0.0) as u32 % 4;
+            let part = (strokes.end() - strokes.start()) / STROKE_PARTS;
+            let of = |i: usize| ((thin.contexts[i].stroke - strokes.start()) / part).max(0.0) as u32 % FOLDS;
             split =
                 self::split("every fourth part of the stroke predicted from the others, in turn", &thin, &of);
         }

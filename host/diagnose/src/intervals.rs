@@ -14,6 +14,8 @@ use rayon::prelude::*;
 
 use super::baselines;
 use super::candidates::Candidate;
+use super::criteria::rows::MOST_LEVELS;
+use super::criteria::uncertainty::{FEWEST_GROUPS, FOLDS, IDENTIFIABLE, LAW_DEVIATION, TANGENT_STEP};
 use super::held_out::thin;
 use super::linear::{Basis, dot, energy, solve_symmetric};
 use super::moment;
@@ -46,7 +48,7 @@ fn tangents(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<Tangent> {
             |shapes: &[f64]| trial::trace(&Trial { shapes: shapes.to_vec(), ..trial.clone() }, library, rows);
         let moment = moment::place(candidate, trial);
         for (j, s) in trial.shapes.iter().enumerate().filter(|(j, _)| moment != Some(*j)) {
-            let h = 0.02 * s.abs().max(1e-9);
+            let h = TANGENT_STEP * s.abs().max(1e-9);
             let (mut up, mut down) = (trial.shapes.clone(), trial.shapes.clone());
             up[j] += h;
             down[j] -= h;
@@ -76,7 +78,7 @@ pub(crate) fn deviations(found: &Found, library: &[Candidate], rows: &Rows) -> V
         let Some(strokes) = by_strokes[i] else { continue };
         let trial = &found.taken[t.effect].trial;
         let value = trial.amplitudes.iter().chain(&trial.shapes).nth(t.parameter).copied().unwrap_or(0.0);
-        let variance = strokes.max(by_groups[i]) + (LAW * value).powi(2);
+        let variance = strokes.max(by_groups[i]) + (LAW_DEVIATION * value).powi(2);
         if variance.is_finite() {
             result[t.effect][t.parameter] = Some(variance.sqrt());
         }
@@ -91,13 +93,6 @@ pub(crate) fn deviations(found: &Found, library: &[Candidate], rows: &Rows) -> V
     result
 }
 
-/// How far a parameter is off by its law's own inexactness, as a share of it.
-const LAW: f64 = 0.07;
-
-/// A number whose change moves the force no further than this share of itself beyond what the base and the others before it could do is
-/// not told by the recordings; the others are then told for the value that it has.
-const TOLD: f64 = 1e-3;
-
 /// Variances by the scatter of whole half-strokes: amplitudes exactly, shapes by their linearised traces.
 fn by_strokes(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<Option<f64>> {
     // The bare baseline's span, not the full one's, which holds the amplitudes themselves.
@@ -106,7 +101,7 @@ fn by_strokes(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<Option<f6
     let z: Vec<Vec<f64>> = baselines::projected(&columns, &rows.root_weight, &base.span);
     let n = z.len();
     let mut apart = Basis::default();
-    let told: Vec<bool> = z.iter().map(|z| apart.push_beyond(z.clone(), TOLD)).collect();
+    let told: Vec<bool> = z.iter().map(|z| apart.push_beyond(z.clone(), IDENTIFIABLE)).collect();
     let gram: Vec<Vec<f64>> = z.iter().map(|a| z.iter().map(|b| dot(a, b)).collect()).collect();
     let kept: Vec<usize> = (0..n).filter(|i| told[*i]).collect();
     (0..n)
@@ -129,9 +124,6 @@ fn by_strokes(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<Option<f6
         .collect()
 }
 
-/// With more groups than this none is left out by itself: others tell.
-const MOST_GROUPS: usize = 12;
-
 /// Variances with a pressure, a recording or a quarter of the time left out: the largest of the three jackknives.
 fn by_groups(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<f64> {
     let mut columns: Vec<Vec<f64>> = tangents.iter().map(|t| t.column.clone()).collect();
@@ -142,7 +134,7 @@ fn by_groups(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<f64> {
         thin.force.iter_mut().zip(&trace).for_each(|(f, t)| *f -= t);
     }
     let moved = |rows: &Rows| baselines::fit(rows, found.full.kind, &columns).amplitudes;
-    let quarter = thin.blocks.div_ceil(4).max(1) as u32;
+    let quarter = thin.blocks.div_ceil(FOLDS as usize).max(1) as u32;
     let quarters: Vec<u32> = thin.block.iter().map(|b| b / quarter).collect();
     let mut largest = vec![0.0_f64; tangents.len()];
     for grouping in [&thin.level, &thin.recording, &quarters] {
@@ -158,7 +150,7 @@ fn jackknife(rows: &Rows, group: &[u32], estimate: &(dyn Fn(&Rows) -> Vec<f64> +
     let mut groups: Vec<u32> = seen.map(|(g, _)| *g).collect();
     groups.sort_unstable();
     groups.dedup();
-    if !(3..=MOST_GROUPS).contains(&groups.len()) {
+    if !(FEWEST_GROUPS..=MOST_LEVELS).contains(&groups.len()) {
         return Vec::new();
     }
     let without: Vec<Vec<f64>> = groups

@@ -2,24 +2,19 @@
 
 use super::answer::Options;
 use super::candidates::library;
+use super::criteria::judgement::{
+    CONSTANT_FORCE, DEAD_GAUGE, FEWEST_BLOCKS, FEWEST_ROWS, FORCE_SCALE, ONE_WAY_ROWS,
+};
 use super::rows::Rows;
 use super::verdict::{Considered, Diagnosis, HeldOut, Trace, Unexplained, Verdict};
 use pam_data::counted::counted;
-
-/// Fewest rows and half-strokes from which anything is judged.
-const FEWEST_ROWS: usize = 60;
-
-const FEWEST_BLOCKS: usize = 6;
-
-/// A gauge that never reads more than this, Pa, is dead or was never connected: vented, a muscle does not pull.
-const VENTED: f64 = 1e3;
 
 /// The scale of forces: what the highest pressure would give at rest length, or the largest force seen.
 pub(super) fn blocked_force(rows: &Rows) -> f64 {
     let strongest = rows.force.iter().copied().fold(0.0, f64::max);
     let by_pressure = rows.contexts.iter().map(|c| c.pressure * c.area).fold(0.0, f64::max);
     // An outlier must not set the scale.
-    if by_pressure > 0.0 { strongest.min(1.3 * by_pressure) } else { strongest }
+    if by_pressure > 0.0 { strongest.min(FORCE_SCALE * by_pressure) } else { strongest }
 }
 
 pub(super) fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<String> {
@@ -39,7 +34,7 @@ pub(super) fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<String> {
     }
     let judged = || rows.root_weight.iter().zip(&rows.contexts).filter(|(w, _)| **w > 0.0);
     let highest = judged().map(|(_, c)| c.pressure).fold(f64::NEG_INFINITY, f64::max);
-    if highest <= VENTED {
+    if highest <= DEAD_GAUGE {
         return Some(format!(
             "the pressure never rises above {:.1} kPa, where no muscle pulls: look at the gauge and at the unit",
             highest * 1e-3
@@ -51,7 +46,7 @@ pub(super) fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<String> {
         .zip(&rows.root_weight)
         .filter(|(_, w)| **w > 0.0)
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (f, _)| (l.min(*f), h.max(*f)));
-    if !(hi - lo > 1e-6 * blocked.abs().max(1e-9)) || !(blocked > 0.0) {
+    if !(hi - lo > CONSTANT_FORCE * blocked.abs().max(1e-9)) || !(blocked > 0.0) {
         return Some("the force is constant or never pulls: there is nothing to explain".to_owned());
     }
     None
@@ -74,7 +69,7 @@ pub(super) fn what_can_be_judged(rows: &Rows) -> Vec<String> {
     }
     let moving = rows.sign.iter().filter(|s| **s > 0.0).count();
     let back = rows.sign.iter().filter(|s| **s < 0.0).count();
-    if moving + back > 0 && moving.min(back) * 50 < rows.len() {
+    if moving + back > 0 && moving.min(back) * ONE_WAY_ROWS < rows.len() {
         remarks.push("the muscle moves one way only: friction cannot be judged".to_owned());
     }
     if !rows.vented.iter().any(|v| *v) {
@@ -94,7 +89,7 @@ pub(super) fn no_judgement(
     blocked: f64,
 ) -> Diagnosis {
     remarks.insert(0, format!("nothing can be judged: {reason}"));
-    let considered = library(rows)
+    let considered = library(rows, &options.added())
         .iter()
         .map(|c| Considered {
             effect: c.name().into(),
@@ -132,5 +127,6 @@ pub(super) fn no_judgement(
         remarks,
         profiles: Vec::new(),
         trace: Trace { time: Vec::new(), before: Vec::new(), after: Vec::new(), effects: Vec::new() },
+        history: None,
     }
 }

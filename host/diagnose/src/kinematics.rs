@@ -15,6 +15,7 @@ use self::holds::{Holds, holds};
 use self::onset::{Leg, Motion, Onset, onset};
 pub(crate) use self::series::white_noise;
 use self::series::{extremes, slopes};
+use super::criteria::motion::RAMP_NOISE;
 use super::linear::median;
 
 /// What was found of one recording, row by row, SI units.
@@ -102,7 +103,7 @@ pub(crate) fn kinematics(recorded: Recorded<'_>, rested: f64, thresholds: Thresh
     for row in 0..n {
         course.go(row, &mut k);
     }
-    ramps::mark_ramps_from_their_start(&mut k, pressure, 4.0 * white_noise(pressure), half + 2);
+    ramps::mark_ramps_from_their_start(&mut k, pressure, RAMP_NOISE * white_noise(pressure), half + 2);
     k.pressure_rate = slopes(time, pressure, half, |_| (0, n));
     ramps::mark_steady_ramps(&mut k, time, pressure, thresholds.pressure);
     let turned = |o: &&Onset| o.row > 0 && k.turns[o.row] != k.turns[o.row - 1];

@@ -8,6 +8,8 @@ use model_core::effects::MEMORY;
 use super::answer::Asked;
 use super::baselines::{self, Baseline, Kind};
 use super::candidates::{Candidate, place_in_words};
+use super::criteria::baseline::TABLE_ORDER;
+use super::criteria::judgement::{CHECK_DEVIATIONS, CHECK_RESOLUTION, CHECKED_PROBABILITY, MATERIAL_FAULT};
 use super::held_out::Unseen;
 use super::locate::locate;
 use super::rows::{self, Rows};
@@ -16,12 +18,6 @@ use pam_data::error::Result;
 use pam_data::recording::Campaign;
 use pam_fit::bench::{BenchName, Candidate as Law};
 use pam_fit::checks::{self, Checks, Measured};
-
-/// A fault that a check shows is named from this peak on, as a share of the blocked force: below, it is within what data sheets of good
-/// instruments allow.
-const MATERIAL: f64 = 2.5e-3;
-/// How sure a name is that an instrument showed against something known.
-const CHECKED: f64 = 0.99;
 
 /// A fault that was checked, and how large it is in these recordings.
 struct Judged {
@@ -60,14 +56,14 @@ impl Known {
                 .parameters
                 .iter()
                 .zip(&measured.deviations)
-                .map(|(v, std)| v + std.unwrap_or(0.0) * 2.0_f64.copysign(*v))
+                .map(|(v, std)| v + std.unwrap_or(0.0) * CHECK_DEVIATIONS.copysign(*v))
                 .collect();
             let judged = Judged {
                 measured: measured.clone(),
                 peak: peak(&measured.parameters),
                 at_most: peak(&further),
             };
-            if !(judged.measured.is_sure() && judged.peak >= MATERIAL * blocked) {
+            if !(judged.measured.is_sure() && judged.peak >= MATERIAL_FAULT * blocked) {
                 known.absent.push(judged);
             } else if judged.measured.fault != BenchName::Backlash {
                 // No reading can be freed of a play: the recordings have to say.
@@ -93,8 +89,8 @@ impl Known {
     ///
     /// What the user gives as known is fitted even where a check found nothing of it that matters.
     pub(super) fn settles(&self, candidate: &Candidate, given: &[Law]) -> bool {
-        let is = |j: &Judged| Law::Bench(j.measured.fault) == candidate.law;
-        self.named.iter().any(is) || (!given.contains(&candidate.law) && self.absent.iter().any(is))
+        let is = |j: &Judged| candidate.is(Law::Bench(j.measured.fault));
+        self.named.iter().any(is) || (!given.iter().any(|g| candidate.is(*g)) && self.absent.iter().any(is))
     }
 
     /// Enters what is known into the answer that was given without it.
@@ -132,7 +128,8 @@ impl Known {
         let (freed_rows, after) = as_read(freed, braid)?;
         let (was, is) = (before.per_row(&rows), after.per_row(&freed_rows));
         let noise = diagnosis.noise_N.powi(2);
-        let share = ((was - is) / (was - noise).max(1e-3 * was).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        let share =
+            ((was - is) / (was - noise).max(CHECK_RESOLUTION * was).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
         for m in &mut diagnosis.missing {
             m.share_explained *= 1.0 - share;
         }
@@ -154,7 +151,7 @@ impl Known {
             runners_up: Vec::new(),
         };
         diagnosis.path.splice(0..0, self.named.iter().map(step));
-        diagnosis.misfit_rms_N = baselines::fit(&rows, Kind::Flexible(4), &[]).rms(&rows);
+        diagnosis.misfit_rms_N = baselines::fit(&rows, Kind::Flexible(TABLE_ORDER), &[]).rms(&rows);
         let unseen = Unseen::new(&rows, kind, &[]).held_out(&[], diagnosis.noise_N);
         // What is named may have asked for another split; its errors are not to be compared with this one's.
         if unseen.split == diagnosis.held_out.split {
@@ -209,8 +206,8 @@ fn missing(judged: &Judged, share: f64) -> Missing {
         .collect();
     Missing {
         effect: info.name.into(),
-        probability: CHECKED,
-        belief: CHECKED,
+        probability: CHECKED_PROBABILITY,
+        belief: CHECKED_PROBABILITY,
         share_explained: share,
         parameters,
         confusable_with: Vec::new(),

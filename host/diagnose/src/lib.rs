@@ -14,6 +14,7 @@
 //! | `evidence` | how strongly the recordings speak for an effect |
 //! | `candidates` | the library of effects as columns |
 //! | `select` | which effects, and when to abstain |
+//! | [`history`] | what the muscle remembers over a campaign of isometric staircases, before the search |
 //! | `given` | effects that the user knows to be there |
 //! | `named`, `calibration` | names with their parameters and probabilities; what could be hidden |
 //! | `intervals` | how sure the parameters are |
@@ -31,11 +32,13 @@ mod baselines;
 mod calibration;
 mod candidates;
 mod confirm;
+pub mod criteria;
 mod evidence;
 mod frequency;
 mod given;
 mod ground;
 mod held_out;
+pub mod history;
 mod intervals;
 mod judgeable;
 mod kinematics;

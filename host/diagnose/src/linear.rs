@@ -3,6 +3,8 @@
 //! Columns are long (one entry per row of a recording) and few. Everything is computed column by column in a fixed
 //! order, so a result does not depend on how many threads share the columns among them.
 
+use super::criteria::baseline::DEPENDENT_COLUMN;
+use super::criteria::candidates::MOST_AMPLITUDES;
 /// Sum of products.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Four partial sums: the compiler vectorises, and the order of summation stays fixed.
@@ -28,9 +30,6 @@ pub(crate) fn add_scaled(to: &mut [f64], factor: f64, from: &[f64]) {
         *t += factor * f;
     }
 }
-
-/// A column less than this share of itself outside the basis (in norm) counts as lying in it.
-const DEPENDENT: f64 = 1e-7;
 
 /// A unit vector that is zero outside a stretch of rows.
 #[derive(Clone, Debug)]
@@ -88,7 +87,7 @@ impl Basis {
 
     /// Adds a column that is already weighted; `false` when it lies in the basis and is left out.
     pub(crate) fn push(&mut self, column: Vec<f64>) -> bool {
-        self.push_beyond(column, DEPENDENT)
+        self.push_beyond(column, DEPENDENT_COLUMN)
     }
 
     /// The same for a column that has to stand out by more than a share of itself.
@@ -194,7 +193,7 @@ pub(crate) enum Sign {
 pub(crate) fn amplitudes(gram: &[Vec<f64>], moment: &[f64], signs: &[Sign], most: u32) -> (Vec<f64>, f64) {
     let n = moment.len();
     let mut best = (vec![0.0; n], 0.0);
-    for subset in (1_u32..(1 << n.min(6))).filter(|s| s.count_ones() <= most) {
+    for subset in (1_u32..(1 << n.min(MOST_AMPLITUDES as usize))).filter(|s| s.count_ones() <= most) {
         let chosen: Vec<usize> = (0..n).filter(|i| subset & (1 << i) != 0).collect();
         let Some(solution) = solve_symmetric(gram, moment, &chosen) else { continue };
         let allowed = chosen.iter().zip(&solution).all(|(i, a)| match signs[*i] {

@@ -1,13 +1,14 @@
 //! Where the misfit sits: its energy above the noise along every coordinate, with a p-value from shuffled blocks.
 
+use super::criteria::location::{
+    BINS, DISCRETE_BINS, MOST_REGIONS, REGION_ALPHA, REGION_ROWS, REGION_SHUFFLES, REGION_SMOOTHING,
+    REGION_VARIANCE, SMOOTHED_NOISE, SMOOTHED_NOISE_MOST,
+};
+use super::criteria::planning::NEW_CONTRACTION;
+use super::criteria::rows::MOST_LEVELS;
 use super::linear::{Random, energy};
 use super::rows::Rows;
 use super::verdict::{Profile, Region};
-
-/// Bins along a coordinate.
-const BINS: usize = 12;
-/// Shuffles behind a p-value.
-const SHUFFLES: usize = 199;
 
 struct Coordinate {
     name: &'static str,
@@ -29,7 +30,7 @@ fn coordinates(rows: &Rows) -> Vec<Coordinate> {
         of("recording", "", true, &|i| f64::from(rows.recording[i]) + 1.0),
         of("time", "s", false, &|i| c[i].time),
         of("cycle", "", true, &|i| f64::from(rows.cycle[i])),
-        of("pressure", "Pa", rows.levels.len() > 1 && rows.levels.len() <= 12, &|i| {
+        of("pressure", "Pa", rows.levels.len() > 1 && rows.levels.len() <= MOST_LEVELS, &|i| {
             rows.levels[rows.level[i] as usize]
         }),
         of("contraction", "", false, &|i| c[i].contraction),
@@ -62,7 +63,7 @@ fn edges(values: &[f64], weight: &[f64], discrete: bool) -> Vec<f64> {
     let mut edges = vec![live[0]];
     if discrete {
         live.dedup_by(|a, b| (*a - *b).abs() < 1e-9 * span);
-        if live.len() <= 4 * BINS {
+        if live.len() <= DISCRETE_BINS * BINS {
             for w in live.windows(2) {
                 edges.push(0.5 * (w[0] + w[1]));
             }
@@ -97,9 +98,9 @@ fn best_run(energy_in: &[f64], rows_in: &[f64]) -> (usize, usize, f64) {
         for b in a..energy_in.len() {
             e += energy_in[b] / total;
             r += rows_in[b] / count;
-            if r > 0.0 && r < 0.85 {
+            if r > 0.0 && r < REGION_ROWS {
                 // The floor keeps a handful of rows from looking like a place.
-                let excess = (e - r) / (r * (1.0 - r)).max(0.02).sqrt();
+                let excess = (e - r) / (r * (1.0 - r)).max(REGION_VARIANCE).sqrt();
                 if excess > best.2 {
                     best = (a, b + 1, excess);
                 }
@@ -144,10 +145,11 @@ pub(crate) fn locate(
     sigma: f64,
     seed: u64,
 ) -> (Vec<Region>, Vec<Profile>) {
-    let smooth = smoothed(rows, before, 2);
+    let smooth = smoothed(rows, before, REGION_SMOOTHING);
     let local: Vec<f64> = smooth.iter().map(|s| s * s).collect();
     // Noise that the smoothing leaves; independent rows would leave a fifth.
-    let floor = (0.3 * sigma * sigma).min(0.5 * local.iter().sum::<f64>() / rows.effective().max(1) as f64);
+    let floor = (SMOOTHED_NOISE * sigma * sigma)
+        .min(SMOOTHED_NOISE_MOST * local.iter().sum::<f64>() / rows.effective().max(1) as f64);
     let mut regions = Vec::new();
     let mut profiles = Vec::new();
     let blocks = block_ranges(rows);
@@ -192,7 +194,7 @@ pub(crate) fn locate(
         let mut random = Random(seed);
         let mut as_good = 0;
         let mut shuffled = vec![0.0; rows.len()];
-        for _ in 0..SHUFFLES {
+        for _ in 0..REGION_SHUFFLES {
             let mut order: Vec<usize> = (0..blocks.len()).collect();
             for i in (1..order.len()).rev() {
                 order.swap(i, random.below(i + 1));
@@ -231,15 +233,15 @@ pub(crate) fn locate(
             to,
             share,
             rows: part,
-            p: (f64::from(as_good) + 1.0) / (SHUFFLES as f64 + 1.0),
+            p: (f64::from(as_good) + 1.0) / (REGION_SHUFFLES as f64 + 1.0),
             unit: c.unit.into(),
             words: words(c.name, from, to, share, part),
         });
     }
-    let strength = |r: &Region| (r.share - r.rows) / (r.rows * (1.0 - r.rows)).max(0.02).sqrt();
+    let strength = |r: &Region| (r.share - r.rows) / (r.rows * (1.0 - r.rows)).max(REGION_VARIANCE).sqrt();
     regions.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
-    regions.retain(|r| r.p <= 0.05);
-    regions.truncate(6);
+    regions.retain(|r| r.p <= REGION_ALPHA);
+    regions.truncate(MOST_REGIONS);
     (regions, profiles)
 }
 
@@ -303,7 +305,7 @@ fn words(name: &str, from: f64, to: f64, share: f64, part: f64) -> String {
         "pressure-rate" => format!("where the pressure changes by {}", range(1e-3, " kPa/s", 2)),
         "since-reversal" => format!("{} after a turn", range(1.0, " s", 2)),
         "hold-time" => format!("after a rest of {}", range(1.0, " s", 1)),
-        "largest-contraction-so-far" if to >= -1e-4 => {
+        "largest-contraction-so-far" if to >= -NEW_CONTRACTION => {
             "where the muscle is as short as never before".to_owned()
         }
         "largest-contraction-so-far" => {

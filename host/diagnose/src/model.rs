@@ -3,6 +3,8 @@
 use model_core::effects::{FittedEffect, MEMORY};
 use model_core::muscle::Muscle;
 
+use super::criteria::judgement::{CHECKED_COST, PREDICTIVE_COST, REFIT_ROUNDS};
+use super::history;
 use super::planned::moments;
 use super::verdict::{Diagnosis, Verdict};
 use pam_data::error::Result;
@@ -30,15 +32,6 @@ pub struct Refitted {
     /// What is to be known of the effects in the table: that they were left out of it, or kept on the user's word alone.
     pub reserve: Option<String>,
 }
-
-/// Rounds of fitting the table to the force without the effects.
-const ROUNDS: usize = 3;
-/// A measured fault of the bench that tables had swallowed may cost them this factor on the same recordings.
-const SWALLOWED: f64 = 1.1;
-
-/// Tables that share out between pressures what an effect explains follow the very recordings they were made from as closely as the
-/// effect does, or a little closer: where a pressure left out is predicted no worse, the effect may cost this factor.
-const FOLLOWED: f64 = 1.1;
 
 /// Fits the table anew beside the named effects. They are kept only where the recordings are then predicted better, or about as well
 /// and a pressure left out of the fit no worse: a table must not get worse by a diagnosis. What the user gave is kept in any case.
@@ -68,7 +61,7 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
     let mut left_out = None;
     let mut with = TableFile { table: plain.table.clone(), about: about(&plain, corrections.clone()) };
     with.table.effects = effects.iter().cloned().collect();
-    for _ in 0..ROUNDS {
+    for _ in 0..REFIT_ROUNDS {
         let mut without = with.clone();
         without.table.effects.clear();
         without.about.corrections.clear();
@@ -92,8 +85,9 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
     // What a check has measured is there, even where tables would swallow it.
     let measured = diagnosis.missing.iter().all(|m| m.checked);
     let foretells = left_out.is_some_and(|(plain, with)| with <= plain);
-    let better =
-        after < before || measured && after <= SWALLOWED * before || foretells && after <= FOLLOWED * before;
+    let better = after < before
+        || measured && after <= CHECKED_COST * before
+        || foretells && after <= PREDICTIVE_COST * before;
     let possible = with.table.check().is_ok();
     let no_better = |verdict: &str| {
         let unseen = left_out.map(|(plain, with)| {
@@ -140,6 +134,8 @@ fn parts(diagnosis: &Diagnosis) -> (Vec<FittedEffect>, Vec<Correction>) {
     for m in &diagnosis.missing {
         let values: Vec<f64> = m.parameters.iter().map(|p| p.value).collect();
         match Candidate::from_name(&m.effect) {
+            // The memory found by the history layer has another law than the catalogue's effect of that name.
+            Some(Candidate::Muscle(_)) if history::is_from_history(m) => {}
             Some(Candidate::Muscle(effect)) => {
                 effects.push(FittedEffect::new(effect, &values));
             }

@@ -7,24 +7,18 @@
 
 use super::baselines;
 use super::candidates::Candidate;
+use model_core::effects::Axis;
+
+use super::criteria::uncertainty::{CHANGE_POINT_RATIO, CHANGE_POINT_SCAN, NORMAL_95};
 use super::linear::{add_scaled, dot, energy};
 use super::rows::Rows;
 use super::select::{Found, Taken};
 use super::trial::{self, Trial};
 
-/// The name of a shape that is a moment.
-pub(crate) const MOMENT: &str = "slip_time";
-/// Once in twenty the likelihood ratio of the true moment falls by more.
-const ONCE_IN_TWENTY: f64 = 7.35;
-/// Moments, spread over the campaign, that are tried for a second top of the likelihood.
-const LOOKS: usize = 250;
-/// An interval of 95 % is so many standard deviations to either side.
-const DEVIATIONS: f64 = 1.96;
-
 /// Where in an effect's shapes its moment stands, if it has one.
 pub(crate) fn place(candidate: &Candidate, trial: &Trial) -> Option<usize> {
-    let name = |shape: usize| candidate.info.parameters.get(trial.amplitudes.len() + shape).map(|p| p.name);
-    (0..trial.shapes.len()).find(|s| name(*s) == Some(MOMENT))
+    let axis = |shape: usize| candidate.info.parameters.get(trial.amplitudes.len() + shape).map(|p| p.axis);
+    (0..trial.shapes.len()).find(|s| axis(*s) == Some(Axis::Time))
 }
 
 /// Where in the campaign a moment lies.
@@ -75,15 +69,15 @@ pub(crate) fn deviation(
     let here = times.partition_point(|t| *t < moment).clamp(1, gaps);
     let least = left(moment);
     let row = least / found.noise.independent.max(1.0);
-    let possible = |gap: usize| left(0.5 * (times[gap - 1] + times[gap])) - least < ONCE_IN_TWENTY * row;
+    let possible = |gap: usize| left(0.5 * (times[gap - 1] + times[gap])) - least < CHANGE_POINT_RATIO * row;
     // Where the likelihood has several tops, what lies beyond a dip is possible too: all of the campaign is looked over first.
     let elsewhere: Vec<usize> =
-        (1..=gaps).step_by(gaps.div_ceil(LOOKS)).filter(|gap| possible(*gap)).collect();
+        (1..=gaps).step_by(gaps.div_ceil(CHANGE_POINT_SCAN)).filter(|gap| possible(*gap)).collect();
     let [first, last] = [elsewhere.first(), elsewhere.last()].map(|gap| gap.map_or(here, |gap| *gap));
     let (first, last) = (first.min(here), last.max(here));
     let earliest = times[first - 1 - farthest(first - 1, |back| possible(first - back))];
     let latest = times[last + farthest(gaps - last, |on| possible(last + on))];
-    let deviation = (latest - moment).max(moment - earliest).max(0.0) / DEVIATIONS;
+    let deviation = (latest - moment).max(moment - earliest).max(0.0) / NORMAL_95;
     deviation.is_finite().then_some(deviation)
 }
 

@@ -1,19 +1,19 @@
 //! The names: what was taken and how sure that is; what was looked at and why it was not taken.
 
-use super::advise::what_would_show;
+use super::advise::experiment;
 use super::calibration;
 use super::candidates::{Candidate, place_in_words};
+use super::criteria::judgement::{ABSURD_SIZE, DETECTION, DETECTION_ROWS, RELEVANT_SIZE};
+use super::criteria::selection::{
+    CONCEALED, FAMILY_ALPHA, LEAST_SCORE, LEAST_SHARE, MOST_REPORTED, REPORTED_RIVAL, SELECTION_FLOOR,
+    STATIC_PEAK,
+};
 use super::intervals::deviations;
 use super::linear::energy;
 use super::moment;
 use super::rows::Rows;
-use super::select::{self, Found};
+use super::select::Found;
 use super::verdict::{Considered, Missing, ParameterValue};
-
-/// A rival of at least this weight against the winner is said to be possible beside it. Of 34 names of a development set all sets so made
-/// hold the truth, with 2.2 members on average; from a weight of 0.1 on, or of whatever weight where traces are parallel, 3.3. Of 62 larger
-/// effects of the last sealed set 59 sets held it, with 1.6 members (`docs/src/proof.md`).
-const AMONG: f64 = 0.15;
 
 /// The effects that were taken, with parameters and intervals, what they cannot be told from, and how probable they are.
 pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<Missing> {
@@ -47,12 +47,12 @@ pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<
             let confusable: Vec<String> = t
                 .rivals
                 .iter()
-                .filter(|r| r.1 > AMONG)
-                .take(8)
+                .filter(|r| r.1 > REPORTED_RIVAL)
+                .take(MOST_REPORTED)
                 .map(|r| library[r.0].name().to_owned())
                 .collect();
             let share = (explained * t.share / total).clamp(0.0, 1.0);
-            let chance = if t.p <= select::FAMILY_ALPHA {
+            let chance = if t.p <= FAMILY_ALPHA {
                 format!(
                     "by chance over all {} effects and their shapes this would happen with p = {:.4}",
                     library.len(),
@@ -95,9 +95,6 @@ pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<
         .collect()
 }
 
-/// A trace as large as this share of the blocked force would not go unnoticed by whoever knows the muscle's size.
-const ABSURD: f64 = 0.5;
-
 /// The effects that were looked at and not named: what they would take, how large they could be unseen, and what would show them.
 pub(crate) fn considered(
     found: &Found,
@@ -119,32 +116,34 @@ pub(crate) fn considered(
             // The trace that noise could hide, given how much of it the base leaves; and below the size from which an effect that
             // tables imitate is named at all it could be there anyway.
             let hidden = (t.size > 0.0 && t.peak > 0.0).then(|| {
-                let detectable =
-                    3.5 * sigma / (found.noise.independent.max(4.0)).sqrt() / t.visible.max(1e-12).sqrt();
+                let detectable = DETECTION * sigma
+                    / (found.noise.independent.max(DETECTION_ROWS)).sqrt()
+                    / t.visible.max(1e-12).sqrt();
                 // What moves the force by less than the model's own inexactness is not named either.
-                let nameable = select::OWN_INEXACTNESS * blocked / t.visible.max(1e-12).sqrt();
+                let nameable = SELECTION_FLOOR * blocked / t.visible.max(1e-12).sqrt();
                 let by_noise = detectable.max(nameable) * t.peak / t.size;
-                let least =
-                    if t.beyond_tables < select::CONCEALED { select::STATIC_PEAK * blocked } else { 0.0 };
+                let least = if t.beyond_tables < CONCEALED { STATIC_PEAK * blocked } else { 0.0 };
                 by_noise.max(least)
             });
-            let hidden = hidden.filter(|h| h.is_finite() && *h < ABSURD * blocked);
+            let hidden = hidden.filter(|h| h.is_finite() && *h < ABSURD_SIZE * blocked);
             let size = match hidden {
                 Some(h) => format!("up to {h:.2} N"),
                 None => "at any size".to_owned(),
             };
-            let could_be =
-                format!("it could be hidden in these recordings {size}; to know, {}", what_would_show(name));
-            let unseen = hidden.is_none_or(|h| h > 0.01 * blocked);
+            let could_be = format!(
+                "it could be hidden in these recordings {size}; to know, {}",
+                experiment(library[t.candidate].traits.shown_by)
+            );
+            let unseen = hidden.is_none_or(|h| h > RELEVANT_SIZE * blocked);
             let why_not = if confusable.iter().any(|c| c.as_str() == name) {
                 "cannot be told from what is named".to_owned()
             } else if t.size <= 0.0 {
                 format!("these recordings do not excite it: {could_be}")
-            } else if unseen && t.score < select::LEAST_SCORE {
+            } else if unseen && t.score < LEAST_SCORE {
                 could_be
-            } else if *p > select::FAMILY_ALPHA && t.score < select::LEAST_SCORE {
+            } else if *p > FAMILY_ALPHA && t.score < LEAST_SCORE {
                 format!("no more than chance gives over all effects looked at (p = {p:.2}); {could_be}")
-            } else if missing.is_empty() && gain >= select::FIRST_OF_ALL {
+            } else if missing.is_empty() && gain >= LEAST_SHARE {
                 let refused = if found.remarks.iter().any(|r| r.contains(name)) {
                     "was not confirmed (see the remarks)"
                 } else {

@@ -3,11 +3,12 @@
 
 use std::collections::BTreeMap;
 
+use super::criteria::noise::{
+    CORRELATION_END, FEWEST_REPEATS, INSTRUMENT_MEMORY, INSTRUMENT_NOISE, LAG_GROWTH, LATER_REPEATS,
+    LONGEST_LAG, REPEAT_BINS, REPEAT_OUTLIERS, REPEAT_PRESSURE_BINS, REPEAT_SPEED_BINS, SAME_LENGTH,
+};
 use super::linear::{Random, energy, median, quantile};
 use super::rows::Rows;
-
-/// Contractions that differ by less are one held length.
-const SAME_LENGTH: f64 = 1e-3;
 
 /// The noise of the rows.
 #[derive(Clone, Copy, Debug)]
@@ -22,16 +23,11 @@ pub(crate) struct Noise {
     pub independent: f64,
 }
 
-/// Load cells and gauges scatter by less than this share of the blocked force.
-const OF_INSTRUMENTS: f64 = 5e-3;
-/// What an instrument scatters by itself is over within so many readings.
-const FEW_READINGS: f64 = 3.0;
-
 impl Noise {
     /// Whether it is more, and lasts longer, than instruments scatter: then strokes under the same conditions differ for a reason.
     /// `step` is the time between rows, s, `blocked` the blocked force, N.
     pub(crate) fn has_a_reason(&self, step: f64, blocked: f64) -> bool {
-        self.sigma > OF_INSTRUMENTS * blocked && self.memory > FEW_READINGS * step
+        self.sigma > INSTRUMENT_NOISE * blocked && self.memory > INSTRUMENT_MEMORY * step
     }
 
     /// How strokes under the same conditions differ, in words.
@@ -89,7 +85,7 @@ fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
             (l.min(c.contraction), h.max(c.contraction))
         });
     let top = rows.contexts.iter().map(|c| c.pressure).fold(1.0, f64::max);
-    let width = ((range.1 - range.0) / 25.0).max(1e-6);
+    let width = ((range.1 - range.0) / REPEAT_BINS).max(1e-6);
     let runs = runs(rows);
     let mut cells: BTreeMap<(u32, i8, i32, i32, u32), Cell> = BTreeMap::new();
     for i in 0..rows.len() {
@@ -98,9 +94,9 @@ fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
             // Repeats at another speed are no repeats.
             // (At held length the place on the staircase takes the speed's part, and the run the cycle's.)
             let speed = if rows.isometric {
-                (c.pressure / top * 40.0).round() as i32
+                (c.pressure / top * REPEAT_PRESSURE_BINS).round() as i32
             } else {
-                (c.speed.abs().ln() * 1.5).round() as i32
+                (c.speed.abs().ln() * REPEAT_SPEED_BINS).round() as i32
             };
             let bin = (c.contraction / width).round() as i32;
             let turn = if rows.isometric { runs[i] } else { rows.cycle[i] };
@@ -126,11 +122,12 @@ fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
     }
     // The first cycle may differ for a reason; where there are three, it stays out.
     let later: Vec<f64> = between.iter().filter(|(_, cycle)| *cycle > 1).map(|(d, _)| *d).collect();
-    let mut used = if later.len() >= 30 { later } else { between.iter().map(|(d, _)| *d).collect() };
-    if used.len() < 20 {
+    let mut used =
+        if later.len() >= LATER_REPEATS { later } else { between.iter().map(|(d, _)| *d).collect() };
+    if used.len() < FEWEST_REPEATS {
         return None;
     }
-    let cut = quantile(&mut used, 0.95);
+    let cut = quantile(&mut used, REPEAT_OUTLIERS);
     let kept: Vec<f64> = used.into_iter().filter(|d| *d <= cut).collect();
     let slow = kept.iter().sum::<f64>() / kept.len() as f64;
     let fast = if within.is_empty() { 0.0 } else { median(&mut within) };
@@ -147,7 +144,7 @@ pub(crate) fn correlation_time(rows: &Rows, residual: &[f64], step: f64) -> f64 
     let mut sum = 0.5;
     let mut lag = 1_usize;
     let mut last = 0_usize;
-    while lag < n / 3 {
+    while lag < n / LONGEST_LAG {
         let (mut product, mut count) = (0.0, 0.0);
         for i in lag..n {
             if rows.recording[i] == rows.recording[i - lag]
@@ -159,12 +156,12 @@ pub(crate) fn correlation_time(rows: &Rows, residual: &[f64], step: f64) -> f64 
             }
         }
         let r = if count > 0.0 { product / count / variance } else { 0.0 };
-        if r < 0.05 {
+        if r < CORRELATION_END {
             break;
         }
         sum += r * (lag - last) as f64;
         last = lag;
-        lag = (lag as f64 * 1.4).ceil() as usize;
+        lag = (lag as f64 * LAG_GROWTH).ceil() as usize;
     }
     2.0 * sum * step
 }

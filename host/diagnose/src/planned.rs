@@ -10,14 +10,12 @@ use model_core::muscle::Muscle;
 use model_core::units::{Length, Pressure};
 pub use pam_protocol::{Place, Protocol, Step};
 
+use super::criteria::planning::{FREE_STROKE, PROTOCOL_SAMPLES};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::file_kind::FileKind;
 use pam_data::recording::segment::Motion;
 use pam_data::recording::{Campaign, Follower, Recording};
 use pam_data::toml_words::toml_error;
-
-/// More samples than this are no protocol but a mistake.
-const MOST: usize = 400_000;
 
 /// Reads a protocol file.
 ///
@@ -109,7 +107,7 @@ impl Player<'_> {
     fn tick(&mut self) -> Result<(), &'static str> {
         self.time += self.dt;
         self.samples += 1;
-        if self.samples > MOST {
+        if self.samples > PROTOCOL_SAMPLES {
             return Err("the protocol is too long");
         }
         if let Some(r) = &mut self.open {
@@ -151,7 +149,7 @@ impl Player<'_> {
         }
         let from = self.stroke;
         let steps = ((to - from).abs() / (speed * self.dt)).ceil().max(1.0) as usize;
-        for i in 1..=steps.min(MOST) {
+        for i in 1..=steps.min(PROTOCOL_SAMPLES) {
             self.stroke = from + (to - from) * i as f64 / steps as f64;
             self.tick()?;
         }
@@ -172,7 +170,7 @@ impl Player<'_> {
                 let (from, to) = (self.pressure, to_kpa * 1e3);
                 let rate = rate_kpa_s.unwrap_or(1e3).max(1e-3) * 1e3;
                 let steps = ((to - from).abs() / (rate * self.dt)).ceil().max(1.0) as usize;
-                for i in 1..=steps.min(MOST) {
+                for i in 1..=steps.min(PROTOCOL_SAMPLES) {
                     self.pressure = from + (to - from) * i as f64 / steps as f64;
                     self.tick()?;
                 }
@@ -193,7 +191,7 @@ impl Player<'_> {
             Step::Rest { seconds } => self.time += seconds,
             Step::Sine { amplitude_mm, frequency_hz, seconds } => {
                 let from = self.stroke;
-                for i in 0..((seconds / self.dt).max(0.0) as usize).min(MOST) {
+                for i in 0..((seconds / self.dt).max(0.0) as usize).min(PROTOCOL_SAMPLES) {
                     let phase = std::f64::consts::TAU * frequency_hz * i as f64 * self.dt;
                     self.stroke = from + amplitude_mm * 1e-3 * phase.sin();
                     self.tick()?;
@@ -210,7 +208,8 @@ pub fn free_stroke(muscle: &Muscle<f64>, pressure: f64) -> f64 {
     let braid = muscle.braid();
     let force =
         |x: f64| muscle.force(Pressure::from_pascals(pressure), Length::from_metres(x), 0.0).newtons();
-    let (mut low, mut high) = (0.0, braid.neutral_contraction().clamp(0.01, 0.6) * braid.rest_length());
+    let (mut low, mut high) =
+        (0.0, braid.neutral_contraction().clamp(FREE_STROKE.0, FREE_STROKE.1) * braid.rest_length());
     // The first place where it stops pulling, also where the polynomial comes back beyond.
     let steps = 60;
     for i in 1..=steps {

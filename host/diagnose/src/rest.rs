@@ -9,30 +9,15 @@
 use rayon::prelude::*;
 
 use super::baselines::{self, Baseline, Kind};
+use super::criteria::baseline::TABLE_ORDER;
+use super::criteria::rest_friction::{
+    CARRIED_PRESSURES, FEWEST_MOVING_ROWS, FOLLOWING_PRESSURES, HOLD_ROWS, MOST_RESTS, NEARBY_FACTORS,
+    NO_LAW_RATIO, PRESSURE_SMOOTHING, REST_JUMP, REST_LAW_LEAVES, RESTING_AFTER, RESTING_ROWS,
+    SETTLING_TIMES,
+};
 use super::rows::Rows;
 
 mod steps;
-
-/// Settling times that are tried, s.
-const SETTLING: [f64; 8] = [0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 30.0, 100.0];
-/// Changes of pressure that static friction carries, half-widths that are tried first, Pa.
-const CARRIED: [f64; 8] = [0.0, 500.0, 1.0e3, 1.5e3, 2.0e3, 2.6e3, 4.0e3, 7.0e3];
-/// Changes of pressure over which friction follows, Pa.
-const FOLLOWS: [f64; 7] = [100.0, 300.0, 1.0e3, 3.0e3, 1.0e4, 3.0e4, 1.0e5];
-/// Rows each way over which the pressure's noise is smoothed.
-const SMOOTHING: [usize; 3] = [0, 1, 3];
-/// Factors by which the best law is varied, coarse and fine.
-const NEARBY: [[f64; 4]; 2] = [[0.7, 0.87, 1.15, 1.4], [0.9, 0.95, 1.05, 1.1]];
-/// Rows at rest that leave so many times what the moving ones leave, and follow no law, are fitted rest by rest.
-const NO_LAW: f64 = 4.0;
-/// A change of the friction's direction that ends one rest and begins another.
-const LETS_GO: f64 = 0.1;
-/// At most so many rests beyond one for each hold.
-const MOST_RESTS: u32 = 100;
-/// From fewer moving rows nobody knows what friction and bladder are; however long the muscle rested beside.
-const FEWEST_MOVING: usize = 400;
-/// Another law than the model's must leave less than this share of what the rows at rest leave.
-const CLEARLY: f64 = 0.7;
 
 /// What friction does at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,7 +64,7 @@ fn holds(rows: &Rows) -> Vec<(usize, usize)> {
         while to < n && held(to) == held(from) && rows.recording[to] == rows.recording[from] {
             to += 1;
         }
-        if held(from) && to - from > 4 {
+        if held(from) && to - from > HOLD_ROWS {
             found.push((from, to));
         }
         from = to;
@@ -168,8 +153,9 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
     rows.settling = vec![0.0; rows.len()];
     rows.unsettled = vec![0.0; rows.len()];
     rows.rest = vec![0; rows.len()];
-    let resting = rows.still.iter().zip(&rows.root_weight).filter(|(s, w)| **s > 1.0 && **w > 0.0).count();
-    if !rows.isometric && resting * 50 < rows.effective() {
+    let resting =
+        rows.still.iter().zip(&rows.root_weight).filter(|(s, w)| **s > RESTING_AFTER && **w > 0.0).count();
+    if !rows.isometric && resting * RESTING_ROWS < rows.effective() {
         return None;
     }
     let holds = holds(rows);
@@ -182,12 +168,12 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
         for (from, to) in &holds {
             moving.root_weight[*from..*to].fill(0.0);
         }
-        if moving.effective() < FEWEST_MOVING {
+        if moving.effective() < FEWEST_MOVING_ROWS {
             return None;
         }
     }
-    let fitted = baselines::fit(&moving, Kind::Flexible(4), &[]);
-    let pressures: Vec<Vec<f64>> = SMOOTHING.iter().map(|h| smoothed(rows, *h)).collect();
+    let fitted = baselines::fit(&moving, Kind::Flexible(TABLE_ORDER), &[]);
+    let pressures: Vec<Vec<f64>> = PRESSURE_SMOOTHING.iter().map(|h| smoothed(rows, *h)).collect();
     let stays: Vec<Vec<f64>> =
         holds.iter().map(|(a, b)| rows.contexts[*a..*b].iter().map(|c| c.direction).collect()).collect();
     let held = left(rows, &fitted, &holds, &stays);
@@ -199,14 +185,15 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
         laws.into_iter().zip(tried).min_by(|a, b| a.1.total_cmp(&b.1))
     };
     let follows = |smoothing: usize| {
-        CARRIED.iter().flat_map(move |h| {
-            FOLLOWS.iter().map(move |b| AtRest::Follows { carries: *h, over: *b, smoothing })
+        CARRIED_PRESSURES.iter().flat_map(move |h| {
+            FOLLOWING_PRESSURES.iter().map(move |b| AtRest::Follows { carries: *h, over: *b, smoothing })
         })
     };
     // Of a muscle that was held throughout the direction comes from the pressure: there it is followed or not.
-    let first = SETTLING.iter().filter(|_| !rows.isometric).map(|t| AtRest::Fades(*t));
-    let (mut best, mut energy) = best_of(first.chain((0..SMOOTHING.len()).flat_map(follows)).collect())?;
-    for factors in NEARBY {
+    let first = SETTLING_TIMES.iter().filter(|_| !rows.isometric).map(|t| AtRest::Fades(*t));
+    let (mut best, mut energy) =
+        best_of(first.chain((0..PRESSURE_SMOOTHING.len()).flat_map(follows)).collect())?;
+    for factors in NEARBY_FACTORS {
         let near = match best {
             AtRest::Fades(time) => factors.iter().map(|f| AtRest::Fades(time * f)).collect(),
             AtRest::Follows { carries, over, smoothing } => factors
@@ -225,13 +212,13 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
             (best, energy) = (b, e);
         }
     }
-    let law = (energy < CLEARLY * held).then_some(best);
+    let law = (energy < REST_LAW_LEAVES * held).then_some(best);
     let chosen = law.map_or(stays, |law| directions(rows, &holds, &pressures, law));
     if !rows.isometric {
         let moved = fitted.per_row(&moving);
         let doubted = match law {
             Some(law) => matches!(law, AtRest::Follows { .. }),
-            None => held > NO_LAW * moved * weight_at(rows, &holds),
+            None => held > NO_LAW_RATIO * moved * weight_at(rows, &holds),
         };
         let steps = steps::of(rows, &fitted, &holds, &chosen);
         number_rests(rows, &holds, &chosen, &steps, doubted);
@@ -270,10 +257,10 @@ fn number_rests(
     steps: &[Vec<bool>],
     doubted: bool,
 ) {
-    let most = MOST_RESTS as usize + holds.len();
+    let most = MOST_RESTS + holds.len();
     let stepped = steps.iter().flatten().filter(|step| **step).count();
     let lets_go = stepped + if doubted { holds.len() } else { 0 } <= most;
-    let mut jump = LETS_GO;
+    let mut jump = REST_JUMP;
     // A direction lies within ±1: no change of it is a jump at last.
     loop {
         let mut number = 0;

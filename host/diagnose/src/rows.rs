@@ -13,6 +13,11 @@ use model_core::effects::Context;
 pub(crate) use self::blocks::typical_step;
 use self::gather::Gathering;
 pub(crate) use self::sleeve::{ORDERS, Shape, YEOH};
+use super::criteria::motion::{
+    HOLD_DRIFT, MOTION_NOISE, MOTION_PRESSURE_FLOOR, MOTION_PRESSURE_SHARE, MOTION_STROKE_FLOOR,
+    MOTION_STROKE_SHARE, RANGE_TRIM,
+};
+use super::criteria::rows::SPIKES_MENTIONED;
 use super::kinematics::{Thresholds, white_noise};
 use super::linear::quantile;
 use pam_data::counted::counted;
@@ -20,9 +25,6 @@ use pam_data::error::Result;
 use pam_data::progress::SharedProgress;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::{Campaign, Recording};
-
-/// Rows aimed at: enough for every reversal, few enough for seconds.
-pub(crate) const TARGET_ROWS: usize = 24_000;
 
 /// All recordings of a campaign as one sequence of rows.
 #[derive(Clone, Debug, Default)]
@@ -128,7 +130,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
         gathering.add(recording, &screened.read(index), campaign.pause_before(index))?;
     }
     let (readable, spiked) = gathering.end();
-    if spiked * 200 > total {
+    if spiked * SPIKES_MENTIONED > total {
         rows.remarks.push(format!(
             "{spiked} of {total} force readings stand out alone and were left out as outliers"
         ));
@@ -144,7 +146,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
 /// The range of a column over all recordings, without its few farthest values.
 fn range(campaign: &Campaign, column: impl Fn(&Recording) -> &Vec<f64>) -> (f64, f64) {
     let mut all: Vec<f64> = campaign.recordings.iter().flat_map(|r| column(r).iter().copied()).collect();
-    (quantile(&mut all, 0.002), quantile(&mut all, 0.998))
+    (quantile(&mut all, RANGE_TRIM), quantile(&mut all, 1.0 - RANGE_TRIM))
 }
 
 /// What counts as a motion: well above the noise, and a noticeable part of the range.
@@ -153,12 +155,12 @@ fn thresholds(campaign: &Campaign, braid: &Braid<f64>, pressures: (f64, f64)) ->
     let noise =
         |column: &dyn Fn(&Recording) -> f64| campaign.recordings.iter().map(column).fold(0.0, f64::max);
     Thresholds {
-        stroke: (8.0 * noise(&|r| white_noise(&r.stroke)))
-            .max(0.004 * (strokes.1 - strokes.0))
-            .max(1e-3 * braid.rest_length() * 0.05),
-        pressure: (8.0 * noise(&|r| white_noise(&r.pressure)))
-            .max(0.02 * (pressures.1 - pressures.0))
-            .max(2e3),
+        stroke: (MOTION_NOISE * noise(&|r| white_noise(&r.stroke)))
+            .max(MOTION_STROKE_SHARE * (strokes.1 - strokes.0))
+            .max(MOTION_STROKE_FLOOR * braid.rest_length()),
+        pressure: (MOTION_NOISE * noise(&|r| white_noise(&r.pressure)))
+            .max(MOTION_PRESSURE_SHARE * (pressures.1 - pressures.0))
+            .max(MOTION_PRESSURE_FLOOR),
     }
 }
 
@@ -167,6 +169,6 @@ fn held(campaign: &Campaign, least_motion: f64) -> bool {
     campaign.recordings.iter().all(|r| {
         let (low, high) =
             r.stroke.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(*s), h.max(*s)));
-        !(high - low > 3.0 * least_motion)
+        !(high - low > HOLD_DRIFT * least_motion)
     })
 }

@@ -6,39 +6,20 @@ use model_core::effects::{Link, Start};
 
 use super::baselines::{self, Baseline, Give, Kind};
 use super::candidates::Candidate;
+use super::criteria::baseline::{FIRST_GIVE, TABLE_ORDER};
+use super::criteria::candidates::LEAST_SIGMA;
+use super::criteria::selection::{
+    ALIKE, ALONE_FLOOR, CONFUSABLE, EXCHANGE_LEAVES, FAMILY_ALPHA, FEWEST_INDEPENDENT, FIRST_STROKES,
+    FURTHER_SHARE, KEPT_GAIN, LEAST_EXCESS, LEAST_SCORE, LEAST_SCORE_ALONE, LEAST_SHARE, MAX_NAMED,
+    MOST_BARRED, MOST_RIVALS, NARROW_FLOOR, NARROW_PEAK, NARROW_SCORE, SELECTION_FLOOR, SHADOW,
+};
 use super::evidence::Scale;
 use super::ground::Ground;
 use super::linear::energy;
 use super::noise::{self, Noise};
-use super::rows::Rows;
-use super::select::{
-    CONFUSABLE, FAMILY_ALPHA, FIRST_OF_ALL, Found, LEAST_ALONE, LEAST_SCORE, OWN_INEXACTNESS, Taken,
-    best_of_each, look, refit, rivals, worth_naming,
-};
+use super::rows::{ORDERS, Rows};
+use super::select::{Found, Taken, best_of_each, look, refit, rivals, worth_naming};
 use super::trial::Trial;
-
-/// At most so many effects are named.
-pub(crate) const MAX_NAMED: usize = 3;
-/// A further effect must take this share of all misfit above noise …
-const FURTHER_OF_ALL: f64 = 0.1;
-/// … and this share of what its predecessors left.
-const FURTHER_OF_REST: f64 = 0.4;
-/// A name of less than this part of what something else would score is the shadow of that.
-const SHADOW: f64 = 2.0;
-/// Laws that are little more than a slow course of time, which a reading that wanders imitates best.
-const SLOW: [&str; 4] = ["force-drift", "thermal-softening", "cyclic-softening", "permanent-set"];
-/// However long the noise's memory is, half-strokes over several pressures and two directions say more than one number.
-const FEWEST_INDEPENDENT: f64 = 8.0;
-/// So many candidates may fail when everything is fitted together before the search ends.
-const MOST_BARRED: usize = 4;
-/// What takes more than this share of its evidence from the first strokes of recordings lives there.
-const FIRST_STROKES: f64 = 0.7;
-/// A rival of this weight explains what the winner explains.
-const ALIKE: f64 = 0.5;
-/// With more rivals than this a name says nothing.
-const MOST_RIVALS: usize = 10;
-/// A trace as high as this share of the blocked force counts although few rows have it.
-const NARROW_PEAK: f64 = 0.01;
 
 /// Searches for what is missing. Candidates in `refused` are looked at and may be rivals, but are not taken.
 pub(crate) fn search(
@@ -90,18 +71,18 @@ impl<'a> Search<'a> {
         step: f64,
         refused: &[usize],
     ) -> Self {
-        let order = if rows.isometric { 4 } else { 6 };
+        let order = if rows.isometric { TABLE_ORDER } else { ORDERS };
         let flexible = baselines::fit(rows, Kind::Flexible(order), &[]);
         let weight = energy(&rows.root_weight).max(1e-12);
         let noise = noise::estimate(rows, &flexible.residual, step);
         let scale = Scale {
             weight,
             independent: noise.independent.max(rows.blocks as f64),
-            sigma: noise.sigma.max(1e-6 * blocked),
+            sigma: noise.sigma.max(LEAST_SIGMA * blocked),
             blocked,
         };
         let row = scale.sigma * (weight / scale.independent).sqrt();
-        let first = Give { elastic: 1e-3 * blocked, friction: 5e-4 * blocked, row };
+        let first = Give { elastic: FIRST_GIVE.0 * blocked, friction: FIRST_GIVE.1 * blocked, row };
         let begun = baselines::fit(rows, Kind::Soft(first), &[]);
         baselines::into_contexts(rows, &begun);
         let kind = Kind::Soft(Ground::new(&begun, scale).give);
@@ -130,7 +111,7 @@ impl<'a> Search<'a> {
     }
 
     fn above_noise(&self, energy: f64) -> f64 {
-        (energy - self.noise.sigma.powi(2) * self.scale.weight).max(0.02 * energy).max(1e-12)
+        (energy - self.noise.sigma.powi(2) * self.scale.weight).max(LEAST_EXCESS * energy).max(1e-12)
     }
 
     /// Looks for one more effect: whether another look may be worth it.
@@ -192,7 +173,7 @@ impl<'a> Search<'a> {
         let (at, winner) = open.max_by(|a, b| a.1.score.total_cmp(&b.1.score))?;
         // Where something that tables imitate explains far more, naming the next best would be naming a shadow of it.
         let best_of_all = best.iter().map(|t| t.score).fold(0.0, f64::max);
-        let shadow = best_of_all > (winner.score + LEAST_ALONE).max(SHADOW * winner.score);
+        let shadow = best_of_all > (winner.score + LEAST_SCORE_ALONE).max(SHADOW * winner.score);
         (!self.chosen.is_empty() || !shadow).then_some(at)
     }
 
@@ -237,25 +218,26 @@ impl<'a> Search<'a> {
         // happen by chance once in 64. There the likelihood counts, whose independent rows are those that the residual's own
         // correlation leaves.
         let by_blocks = p <= FAMILY_ALPHA;
-        let significant = winner.score >= if by_blocks { LEAST_SCORE } else { LEAST_ALONE };
+        let significant = winner.score >= if by_blocks { LEAST_SCORE } else { LEAST_SCORE_ALONE };
         let of_rest = self.of_rest(winner);
         let worth = if self.chosen.is_empty() {
-            of_rest >= FIRST_OF_ALL
+            of_rest >= LEAST_SHARE
         } else {
-            winner.gain / self.above >= FURTHER_OF_ALL && of_rest >= FURTHER_OF_REST
+            winner.gain / self.above >= FURTHER_SHARE && of_rest >= LEAST_SHARE
         };
         // A wall at the end of the stroke is high and narrow.
-        let narrow = winner.peak >= NARROW_PEAK * self.blocked && winner.score >= 2.0 * LEAST_ALONE;
+        let narrow =
+            winner.peak >= NARROW_PEAK * self.blocked && winner.score >= NARROW_SCORE * LEAST_SCORE_ALONE;
         // A few readings that come a sample late at a turn make a likelihood of any size, and move little.
         let relief = if by_blocks { winner.relief } else { 0.0 };
         let moved = (winner.gain.max(relief) / self.scale.weight).sqrt();
         let shown = self.library[winner.candidate].shown_vented(self.rows);
         let least = match (by_blocks || shown, narrow) {
-            (true, true) => 0.4,
+            (true, true) => NARROW_FLOOR,
             (true, false) => 1.0,
-            (false, _) => 2.0,
+            (false, _) => ALONE_FLOOR,
         };
-        significant && worth && moved >= least * OWN_INEXACTNESS * self.blocked
+        significant && worth && moved >= least * SELECTION_FLOOR * self.blocked
     }
 
     /// Fits everything together with it, and keeps it if it then still does what it promised; else it is barred.
@@ -266,13 +248,14 @@ impl<'a> Search<'a> {
         self.chosen.push(winner.clone());
         let (with, traces) = refit(self.rows, beside, &mut self.chosen, self.library);
         // One step of a linear problem promised this; the whole refit has to keep a good part of it.
-        let kept = energy(&with.residual) <= winner.before - 0.6 * winner.gain;
+        let kept = energy(&with.residual) <= winner.before - KEPT_GAIN * winner.gain;
         // What the effect leaves tells anew how many rows are independent: a wandering zero that flexible tables had followed from
         // pressure to pressure shows itself only now.
         let left = noise::estimate(self.rows, &with.residual, self.step);
         let independent = left.independent.max(FEWEST_INDEPENDENT);
         let score = winner.score * (independent / self.scale.independent).min(1.0);
-        let least = if SLOW.contains(&name) { LEAST_ALONE } else { LEAST_SCORE };
+        let slow = self.library[winner.candidate].traits.slow;
+        let least = if slow { LEAST_SCORE_ALONE } else { LEAST_SCORE };
         if !kept || score < least {
             self.chosen.pop();
             self.rows.contexts = seen;
@@ -317,10 +300,11 @@ impl<'a> Search<'a> {
                 let (mine, _) =
                     ground.left_under(&self.chosen[position], self.library, self.rows, refined.give);
                 // It must leave clearly less than the present one does.
-                if refined.score > own + LEAST_SCORE && refined.before - refined.gain < 0.8 * mine {
+                if refined.score > own + LEAST_SCORE && refined.before - refined.gain < EXCHANGE_LEAVES * mine
+                {
                     let taken = &mut self.taken[position];
                     taken.rivals.retain(|r| r.0 != refined.candidate);
-                    taken.rivals.insert(0, (present, 0.1, 0.0));
+                    taken.rivals.insert(0, (present, CONFUSABLE, 0.0));
                     taken.trial = refined.clone();
                     self.chosen[position] = refined;
                 }

@@ -4,44 +4,16 @@ use rayon::prelude::*;
 
 use super::baselines::{self, Baseline, Give, Kind, cosine};
 use super::candidates::Candidate;
+use super::criteria::selection::{
+    CONCEALED, LARGEST_PEAK, LEAST_SHARE, NEGLIGIBLE_RIVAL, PARALLEL, REFINED, RIVAL_COST, RIVAL_FLOOR,
+    RIVAL_SHARPNESS, SELECTION_FLOOR, SIGN_FLIPS, STATIC_MOVED, STATIC_PEAK, TWIN_OF_TABLES, WORSE,
+};
 use super::evidence::Scale;
 use super::ground::Ground;
 use super::linear::{Sign, add_scaled, energy};
 use super::noise::{Noise, family_p};
 use super::rows::Rows;
 use super::trial::{self, Trial};
-
-/// The family-wise error that a name may have.
-pub(crate) const FAMILY_ALPHA: f64 = 0.01;
-/// Misfit below this share of the blocked force is the model's own: `M = 4` leaves 0.03 to 0.06 % on a hyperelastic wall, and
-/// friction by its sign alone about as much again where contacts give a little before they slide.
-pub(crate) const OWN_INEXACTNESS: f64 = 4e-4;
-/// A static effect is named from this peak on, as a share of the blocked force: below, an error of a tenth of a degree in the braid
-/// angle makes the same surface.
-pub(crate) const STATIC_PEAK: f64 = 0.015;
-/// Below this share of its energy outside the flexible tables an effect counts as concealed by them.
-pub(crate) const CONCEALED: f64 = 0.04;
-/// Below this share tables that differ from pressure to pressure are the very same surface: no recording can tell a bladder that stiffens with
-/// pressure from it.
-const TWIN_OF_TABLES: f64 = 2e-4;
-/// And it must move the fit by this much, rms as a share of the blocked force.
-const STATIC_MOVED: f64 = 1e-3;
-/// A trace that must be larger than this share of the blocked force to explain a small misfit is no explanation where the tables would
-/// have to cancel nearly all of it.
-const LARGEST_PEAK: f64 = 0.25;
-/// The first must take this share of the misfit above noise.
-pub(crate) const FIRST_OF_ALL: f64 = 0.4;
-/// How much the deviance must fall for an effect, beyond what its free numbers cost.
-pub(crate) const LEAST_SCORE: f64 = 12.0;
-/// The same where no test by whole blocks can support it: chance in four hundred looks gives 2 ln 400 = 12 at most once in e, and
-/// each 2 ln 10 = 4.6 more once in ten times as many.
-pub(crate) const LEAST_ALONE: f64 = 25.0;
-/// Throws of the coin behind a family-wise p.
-const THROWS: usize = 1999;
-/// A slope that leaves more than this times what the one before left is the worse.
-const WORSE: f64 = 1.25;
-/// How many candidates are refined in their shapes at every step.
-const REFINED: usize = 12;
 
 /// An effect taken, with its standing among its rivals at that step.
 #[derive(Clone, Debug)]
@@ -113,7 +85,7 @@ fn p_values(best: &[Trial], all: &[Trial]) -> Vec<f64> {
     for t in all {
         views.extend(t.singles.iter().map(Vec::as_slice));
     }
-    let mut p = family_p(&views, THROWS, 11);
+    let mut p = family_p(&views, SIGN_FLIPS, 11);
     p.truncate(best.len());
     p
 }
@@ -231,19 +203,8 @@ fn seen_past_tables(trial: &Trial, library: &[Candidate], rows: &Rows, ground: &
     let (left, before) = ground.left_under(trial, library, rows, Give::free(blocked));
     let above = before - sigma * sigma * weight;
     let taken = before - left;
-    taken >= FIRST_OF_ALL * above && taken >= weight * (OWN_INEXACTNESS * blocked).powi(2)
+    taken >= LEAST_SHARE * above && taken >= weight * (SELECTION_FLOOR * blocked).powi(2)
 }
-
-/// A rival of at least this weight against the winner is confusable with it.
-pub(crate) const CONFUSABLE: f64 = 0.1;
-/// A rival whose trace is as parallel as this to the winner's, once the base is refitted, is confusable whatever its weight.
-const PARALLEL: f64 = 0.95;
-/// How inexact a right law is, as a share of the misfit that it explains …
-const INEXACT: f64 = 0.05;
-/// … and how fast belief falls with the logarithm of what a law leaves beyond that.
-const SHARPNESS: f64 = 7.0;
-/// What each further free number costs in the logarithm of belief.
-const PER_NUMBER: f64 = 0.3;
 
 /// The weight of each rival against the winner, from what each leaves of the misfit above noise where the bladder differs between
 /// pressures as much as it does beside the winner.
@@ -261,19 +222,20 @@ pub(crate) fn rivals(
     let noise_energy = scale.sigma * scale.sigma * scale.weight;
     let excess = |e: f64| (e - noise_energy).max(0.0);
     let (own_left, before) = ground.left_under(winner, library, rows, winner.give);
-    let floor = INEXACT * excess(before) + noise_energy * (2.0 / scale.independent.max(2.0)).sqrt();
+    let floor = RIVAL_FLOOR * excess(before) + noise_energy * (2.0 / scale.independent.max(2.0)).sqrt();
     let mut rivals: Vec<(usize, f64, f64)> = best
         .par_iter()
         .filter(|t| t.candidate != winner.candidate && t.gain > 0.0)
         .map(|t| {
             let (left, _) = ground.left_under(t, library, rows, winner.give);
             let worse = ((excess(left) + floor) / (excess(own_left) + floor)).ln();
-            let weight = (-SHARPNESS * worse - PER_NUMBER * (numbers(t) - numbers(winner))).min(0.0).exp();
+            let weight =
+                (-RIVAL_SHARPNESS * worse - RIVAL_COST * (numbers(t) - numbers(winner))).min(0.0).exp();
             let c = cosine(&mine, &trial::projected_trace(t, library, rows, span));
             (t.candidate, weight, c)
         })
         .collect();
     rivals.sort_by(|a, b| b.1.total_cmp(&a.1));
-    rivals.retain(|r| r.1 > 0.01 || r.2.abs() > PARALLEL);
+    rivals.retain(|r| r.1 > NEGLIGIBLE_RIVAL || r.2.abs() > PARALLEL);
     rivals
 }

@@ -2,15 +2,20 @@
 
 use super::baselines::Baseline;
 use super::candidates::Candidate;
+use super::criteria::judgement::{
+    FEWEST_LEVELS_READ, INVERSE_ADVANTAGE, INVERSE_PART, INVERSE_SHARE, MOST_LISTED, STRAIGHT_CHANGE,
+    STRAIGHT_SHARE,
+};
+use super::criteria::selection::LEAST_SCORE;
 use super::rows::Rows;
-use super::select::{Found, LEAST_SCORE};
+use super::select::Found;
 use super::trial::Trial;
 
 /// What to say where the tables differ between pressures more than a bladder does, and nothing can be named for it.
 pub(super) fn in_the_tables(found: &Found, library: &[Candidate], concealed: f64, blocked: f64) -> String {
     let mut able: Vec<&Trial> = found.first_look.iter().filter(|t| t.score >= LEAST_SCORE).collect();
     able.sort_by(|a, b| b.score.total_cmp(&a.score));
-    let names: Vec<&str> = able.iter().take(6).map(|t| library[t.candidate].name()).collect();
+    let names: Vec<&str> = able.iter().take(MOST_LISTED).map(|t| library[t.candidate].name()).collect();
     let which = if names.is_empty() {
         "no effect of the library makes such a surface".to_owned()
     } else {
@@ -30,7 +35,7 @@ pub(super) fn in_the_tables(found: &Found, library: &[Candidate], concealed: f64
 pub(super) fn tables_as_evidence(production: &Baseline, rows: &Rows) -> Vec<String> {
     let mut remarks = Vec::new();
     let levels = &rows.levels;
-    if !rows.steady || levels.len() < 4 {
+    if !rows.steady || levels.len() < FEWEST_LEVELS_READ {
         return remarks;
     }
     let fit_to = |values: &[f64], of: &dyn Fn(f64) -> f64| -> Option<(f64, f64, f64)> {
@@ -47,7 +52,11 @@ pub(super) fn tables_as_evidence(production: &Baseline, rows: &Rows) -> Vec<Stri
         (fit_to(k_f, &|p| 1.0 / p), fit_to(k_f, &|p| p))
     {
         let lowest = b / levels[0];
-        if by_inverse > 0.97 && by_inverse > straight + 0.02 && b > 0.0 && lowest > 0.5 * a.abs() {
+        if by_inverse > INVERSE_SHARE
+            && by_inverse > straight + INVERSE_ADVANTAGE
+            && b > 0.0
+            && lowest > INVERSE_PART * a.abs()
+        {
             remarks.push(format!(
                 "k_F(P) follows {a:.3} + {:.1} kPa/P: what a friction that does not scale with the force (dry, seal, viscous at one \
                  speed) leaves in the tables",
@@ -59,7 +68,7 @@ pub(super) fn tables_as_evidence(production: &Baseline, rows: &Rows) -> Vec<Stri
         && let Some((a, b, share)) = fit_to(e_1, &|p| p)
     {
         let change = b * (levels[levels.len() - 1] - levels[0]);
-        if share > 0.9 && change.abs() > 0.3 * a.abs() {
+        if share > STRAIGHT_SHARE && change.abs() > STRAIGHT_CHANGE * a.abs() {
             remarks.push(format!(
                 "E_1 {} in a straight line with pressure, by {:.0} % over the range: one bladder should not; ends that are not \
                  cylinders, a braid that stretches, a gain or a slow change in the order of testing leave this",

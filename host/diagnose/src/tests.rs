@@ -2,6 +2,8 @@
 //!
 //! The force comes from a table muscle, friction and faults from plain formulas below, not from the library of effects.
 
+pub(crate) mod added;
+
 use model_core::braid::Geometry;
 use model_core::muscle::Muscle;
 use model_core::table::{self, MuscleTable};

@@ -244,6 +244,9 @@ pub struct Diagnosis {
     pub profiles: Vec<Profile>,
     /// For pictures.
     pub trace: Trace,
+    /// What the muscle remembers over a campaign of isometric staircases; absent of other campaigns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub history: Option<super::history::History>,
 }
 
 impl Diagnosis {

@@ -88,7 +88,7 @@ impl Arguments {
         let progress = SharedProgress::new(Arc::new(ProgressLine::new(&watched, "diagnosing")));
         let checks = Checks::read(&self.check)?;
         let options = Options { muscle: muscle.name.clone(), checks, given, progress };
-        let mut answer = pam_diagnose::diagnose(&campaign, &geometry, &options)?;
+        let mut answer = pam_diagnose::history::diagnose(&campaign, &geometry, &options)?;
         let diagnosed = start.elapsed();
         if let Some(table) = &table {
             let predicted = predict(table, &campaign)?;

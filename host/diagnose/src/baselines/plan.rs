@@ -3,6 +3,7 @@
 use model_core::spline;
 
 use super::Kind;
+use crate::criteria::baseline::{FRICTION_POWERS, FRICTION_RANGE, TABLE_ORDER};
 use crate::rows::{ORDERS, Rows, YEOH};
 
 /// The cardinal functions of the natural spline on the levels, at pressure `p` (held at the ends).
@@ -109,8 +110,14 @@ impl Plan {
         } else {
             let (lo, hi) =
                 (rows.levels.first().copied().unwrap_or(0.0), rows.levels.last().copied().unwrap_or(1.0));
-            let u = |p: f64| if hi > lo { (2.0 * (p - lo) / (hi - lo) - 1.0).clamp(-1.2, 1.2) } else { 0.0 };
-            for degree in 0..rows.levels.len().clamp(1, 3) {
+            let u = |p: f64| {
+                if hi > lo {
+                    (2.0 * (p - lo) / (hi - lo) - 1.0).clamp(-FRICTION_RANGE, FRICTION_RANGE)
+                } else {
+                    0.0
+                }
+            };
+            for degree in 0..rows.levels.len().clamp(1, FRICTION_POWERS) {
                 functions.push(rows.contexts.iter().map(|c| u(c.pressure).powi(degree as i32)).collect());
             }
             hard.extend((0..ORDERS).map(|k| Part::Elastic(k, 0)));
@@ -118,7 +125,7 @@ impl Plan {
             hard.extend((0..functions.len()).map(Part::Friction));
             if matches!(kind, Kind::Soft(_)) && rows.levels.len() > 1 {
                 let over = cardinals(&mut functions);
-                soft = tables(4, over);
+                soft = tables(TABLE_ORDER, over);
             }
         }
         // At a few held lengths a tenth of a degree in the braid's angle, or a millimetre in the mounting, cannot be told from a

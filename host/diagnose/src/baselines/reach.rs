@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::criteria::baseline::{FREE_GIVE, FREE_ROW};
 use crate::linear::{Basis, add_scaled, dot, energy, weighted};
 
 /// How much one bladder may differ between pressures, and how unsure a row is: what a soft baseline takes for granted.
@@ -18,7 +19,7 @@ pub(crate) struct Give {
 impl Give {
     /// Tables that are free at every pressure.
     pub(crate) fn free(blocked: f64) -> Self {
-        Self { elastic: 1e3 * blocked, friction: 1e3 * blocked, row: 1e-3 * blocked }
+        Self { elastic: FREE_GIVE * blocked, friction: FREE_GIVE * blocked, row: FREE_ROW * blocked }
     }
 }
 

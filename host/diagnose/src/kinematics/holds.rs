@@ -2,6 +2,10 @@
 
 use super::onset::Onset;
 use super::series::slopes;
+use crate::criteria::motion::{
+    DWELL_RATIO, HOLD_DRIFT, PACE_PARTS, PACE_ROWS, REST_SPEED, REST_SPEED_MOST, REST_SPEED_NOISE,
+    SLOPE_HALF_ROWS, SLOPE_ROWS, SPEED_PRECISION,
+};
 use crate::linear::median;
 
 /// Where a recording rests, and what was made on the way to it.
@@ -13,13 +17,6 @@ pub(super) struct Holds {
     /// Slopes over so many rows, across turns and holds, m/s.
     pub raw_speed: Vec<f64>,
 }
-
-/// Parts of a half-stroke between which its pace is compared, at most …
-const PARTS: usize = 10;
-/// … of at least so many rows each, on average.
-const ROWS_PER_PART: usize = 3;
-/// A part that takes so many times what the middle one takes has a hold in it. The ends of a sine take three times as long.
-const DWELL: f64 = 10.0;
 
 /// A motion's typical speed, m/s: that of the half-stroke in the middle by way gone, holds on its way left out. A frame that gives while the
 /// force changes makes many half-strokes, none of which goes far.
@@ -44,7 +41,7 @@ fn typical_speed(time: &[f64], stroke: &[f64], starts: &[Onset]) -> f64 {
 fn pace(time: &[f64], stroke: &[f64]) -> (f64, f64) {
     let last = time.len() - 1;
     let way = stroke[last] - stroke[0];
-    let parts = (time.len() / ROWS_PER_PART).clamp(1, PARTS);
+    let parts = (time.len() / PACE_ROWS).clamp(1, PACE_PARTS);
     let reached = |part: usize| {
         let level = way.abs() * part as f64 / parts as f64;
         let passed = |x: &f64| (x - stroke[0]) * way.signum() >= level;
@@ -54,7 +51,7 @@ fn pace(time: &[f64], stroke: &[f64]) -> (f64, f64) {
     let taken: Vec<f64> = at.windows(2).map(|w| w[1] - w[0]).collect();
     let middle = median(&mut taken.clone());
     let moving: f64 =
-        taken.iter().map(|t| if *t > DWELL * middle && middle > 0.0 { middle } else { *t }).sum();
+        taken.iter().map(|t| if *t > DWELL_RATIO * middle && middle > 0.0 { middle } else { *t }).sum();
     (way.abs() / moving, way.abs())
 }
 
@@ -71,15 +68,16 @@ pub(super) fn holds(
     let n = time.len();
     let typical = typical_speed(time, stroke, starts);
     let wanted = if typical > 0.0 && noise > 0.0 {
-        (12.0 * (noise / (0.03 * typical * dt)).powi(2)).cbrt()
+        (12.0 * (noise / (SPEED_PRECISION * typical * dt)).powi(2)).cbrt()
     } else {
-        5.0
+        SLOPE_ROWS
     };
-    let half = ((wanted / 2.0).ceil() as usize).clamp(2, 60).min((n / 4).max(1));
+    let half =
+        ((wanted / 2.0).ceil() as usize).clamp(SLOPE_HALF_ROWS.0, SLOPE_HALF_ROWS.1).min((n / 4).max(1));
     let raw_speed = slopes(time, stroke, half, |_| (0, n));
     let slope_noise = noise * 12.0_f64.sqrt() / (dt * (2.0 * half as f64 + 1.0).powf(1.5));
-    let rest = (0.05 * typical).max(5.0 * slope_noise).max(1e-9);
-    let rest = if typical > 0.0 { rest.min(0.3 * typical) } else { rest };
+    let rest = (REST_SPEED * typical).max(REST_SPEED_NOISE * slope_noise).max(1e-9);
+    let rest = if typical > 0.0 { rest.min(REST_SPEED_MOST * typical) } else { rest };
     let quiet: Vec<bool> = raw_speed.iter().map(|v| v.abs() < rest).collect();
     let mut held = vec![starts.is_empty(); n];
     let mut i = 0;
@@ -100,5 +98,5 @@ fn stays(stroke: &[f64], threshold: f64) -> bool {
         stroke.iter().copied().fold(f64::INFINITY, f64::min),
         stroke.iter().copied().fold(f64::NEG_INFINITY, f64::max),
     ];
-    high - low <= 3.0 * threshold && (stroke[stroke.len() - 1] - stroke[0]).abs() <= threshold
+    high - low <= HOLD_DRIFT * threshold && (stroke[stroke.len() - 1] - stroke[0]).abs() <= threshold
 }

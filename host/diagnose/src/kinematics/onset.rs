@@ -4,6 +4,10 @@
 //! the line's meeting with the extreme is the beginning. Where a sine turns, or a drive takes time to reach its speed, the path leaves the extreme as
 //! a parabola, and the straight line would put the beginning a third of the way too late: friction would act the wrong way until then.
 
+use crate::criteria::motion::{
+    ONSET_CLEAR, ONSET_DOUBT_NOISE, ONSET_DOUBT_ROWS, ONSET_DOUBT_SAMPLING, ONSET_SLOPE_FROM,
+};
+
 /// A stroke on its way from a turn: from row `extreme` to before row `end`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leg {
@@ -34,25 +38,21 @@ pub(super) struct Onset {
     pub doubt: f64,
 }
 
-/// Readings farther than this from the extreme, in deviations of their noise, belong to the motion.
-const CLEAR: f64 = 3.0;
-/// The doubt of a straight beginning is so many rows at most.
-const MOST_ROWS: f64 = 5.0;
-
 /// When a stroke began, from the rows until it passed the threshold.
 pub(super) fn onset(time: &[f64], stroke: &[f64], leg: Leg, motion: Motion) -> Onset {
     let Leg { extreme, end, direction } = leg;
     let Motion { dt, noise, threshold } = motion;
     let gone = |j: usize| (stroke[j] - stroke[extreme]) * direction;
     let passed = (extreme..end).find(|j| gone(*j) > threshold).unwrap_or(end - 1);
-    let third = (extreme..passed).rev().find(|j| gone(*j) <= threshold / 3.0).unwrap_or(extreme);
+    let third = (extreme..passed).rev().find(|j| gone(*j) <= threshold / ONSET_SLOPE_FROM).unwrap_or(extreme);
     let rate = (gone(passed) - gone(third)) / (time[passed] - time[third]).max(1e-12);
     let straight = if rate > 0.0 { time[passed] - gone(passed) / rate } else { time[extreme] };
     let mut began = straight;
-    let mut doubt = if rate > 0.0 { (2.0 * noise / rate).min(MOST_ROWS * dt) } else { 0.0 };
+    let mut doubt =
+        if rate > 0.0 { (ONSET_DOUBT_NOISE * noise / rate).min(ONSET_DOUBT_ROWS * dt) } else { 0.0 };
     // The last row at rest, as far as its noise lets one see: the farthest of m readings stands √(2 ln m) deviations off their level.
     let farthest = (2.0 * ((passed - extreme).max(1) as f64).ln()).sqrt();
-    let clear = CLEAR.max(1.0 + farthest) * noise;
+    let clear = ONSET_CLEAR.max(1.0 + farthest) * noise;
     let at_rest = (extreme..passed).rev().find(|j| gone(*j) <= clear).unwrap_or(extreme);
     if rate > 0.0 && time[at_rest] + dt < straight && gone(third) > 0.0 {
         let (near, far) = (gone(third).sqrt(), gone(passed).sqrt());
@@ -62,7 +62,7 @@ pub(super) fn onset(time: &[f64], stroke: &[f64], leg: Leg, motion: Motion) -> O
     }
     let began = began.clamp(time[extreme], time[passed]);
     let row = (extreme..=passed).find(|j| time[*j] >= began).unwrap_or(passed);
-    Onset { row, direction, doubt: 1.6 * dt + doubt }
+    Onset { row, direction, doubt: ONSET_DOUBT_SAMPLING * dt + doubt }
 }
 
 /// Strokes that go on after a hold the way they went before it. The pressure may have turned the friction meanwhile.

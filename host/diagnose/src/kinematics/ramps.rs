@@ -1,6 +1,7 @@
 //! Ramps of pressure at held length: where they begin, and from where they are judged.
 
 use super::Kinematics;
+use crate::criteria::motion::{RAMP_SETTLES, RAMP_STEADY};
 use crate::linear::median;
 
 /// A ramp begins before it has passed the threshold by which it is found: back to where the pressure left what it had been about the
@@ -28,9 +29,6 @@ pub(super) fn mark_ramps_from_their_start(k: &mut Kinematics, pressure: &[f64], 
     }
 }
 
-/// A ramp is judged from so long after its turn, s: what a regulator does in a step is another matter.
-const RAMP_SETTLES: f64 = 3.0;
-
 /// Marks the rows of slow ramps, from `turning` Pa after a turn on, as long as the pressure goes on the same way.
 pub(super) fn mark_steady_ramps(k: &mut Kinematics, time: &[f64], pressure: &[f64], turning: f64) {
     let mut turn = 0;
@@ -39,7 +37,7 @@ pub(super) fn mark_steady_ramps(k: &mut Kinematics, time: &[f64], pressure: &[f6
             turn = row;
         }
         let (passed, gone) = (time[row] - time[turn], (pressure[row] - pressure[turn]) * k.direction[row]);
-        let goes_on = k.pressure_rate[row] * k.direction[row] > 0.3 * gone / passed.max(1e-9);
+        let goes_on = k.pressure_rate[row] * k.direction[row] > RAMP_STEADY * gone / passed.max(1e-9);
         k.on_ramp[row] = k.ramped[row] && k.held[row] && passed > RAMP_SETTLES && gone > turning && goes_on;
     }
 }

@@ -1,5 +1,6 @@
 //! Noise, extremes and slopes of a series of readings.
 
+use crate::criteria::motion::{NOISE_SAMPLES, QUANTISATION, QUANTISED_REPEATS};
 use crate::linear::median;
 
 /// Standard deviation of white noise on a smooth series, from its second differences; a quantised series has at least a
@@ -8,7 +9,7 @@ pub(crate) fn white_noise(series: &[f64]) -> f64 {
     if series.len() < 3 {
         return 0.0;
     }
-    let stride = (series.len() / 20_000).max(1);
+    let stride = (series.len() / NOISE_SAMPLES).max(1);
     let mut second: Vec<f64> =
         series.windows(3).step_by(stride).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
     let by_curvature = median(&mut second) / (0.6745 * 6.0_f64.sqrt());
@@ -19,7 +20,11 @@ pub(crate) fn white_noise(series: &[f64]) -> f64 {
         .filter(|d| *d > 0.0)
         .fold(f64::INFINITY, f64::min);
     let still = series.windows(2).step_by(stride).filter(|w| w[0] == w[1]).count() * stride;
-    if still * 5 > series.len() && step.is_finite() { by_curvature.max(step / 3.0) } else { by_curvature }
+    if still * QUANTISED_REPEATS > series.len() && step.is_finite() {
+        by_curvature.max(step / QUANTISATION)
+    } else {
+        by_curvature
+    }
 }
 
 /// Indices of the alternating extremes of a series that lie more than `threshold` apart, and the direction after each.

@@ -2,25 +2,13 @@
 
 use super::left_of;
 use crate::baselines::Baseline;
+use crate::criteria::rest_friction::{
+    STEP_BEFORE, STEP_BESIDE, STEP_NOISE, STEP_OF_GAP, STEP_ROWS, STEP_SHARPNESS, STEP_TIME,
+};
 use crate::kinematics::white_noise;
 use crate::linear::median;
 use crate::rows::Rows;
 
-/// A step of the force at rest that is so many times the readings' own noise there ends one as well …
-const STEP: f64 = 6.0;
-/// … where it is a good part of the gap between the branches …
-const PART_OF_GAP: f64 = 0.2;
-/// … and this part of it happens within a time that is short beside those over which the force before and after is taken: what relaxes
-/// or drifts goes on.
-const SHARP: f64 = 0.7;
-/// Rows each way within which a step happens: at once, or in a burst of small slips …
-const WITHIN: [usize; 4] = [1, 2, 4, 8];
-/// … that lasts no longer than this, s.
-const BURST: f64 = 1.5;
-/// Rows each way over which the force before and after a step is taken, at least; twice as many as it happens within.
-const BESIDE: usize = 5;
-/// Soon after a hold's beginning at least so many before it.
-const FEWEST_BEFORE: usize = 2;
 /// Where the force steps while the length is held, hold by hold: static friction let go there, shaken by more than the pressure's
 /// samples show.
 pub(super) fn of(
@@ -34,13 +22,14 @@ pub(super) fn of(
         let noise = white_noise(&left);
         let least = |i: usize| {
             let gap = 2.0 * (fitted.quasi[from + i] * fitted.friction[from + i]).abs();
-            (STEP * noise).max(PART_OF_GAP * gap)
+            (STEP_NOISE * noise).max(STEP_OF_GAP * gap)
         };
         let time = |i: usize| rows.contexts[from + i].time;
         let mut steps = vec![false; left.len()];
         let mut near = vec![false; left.len()];
-        for within in WITHIN {
-            let short = |i: &usize| time(i + within) - time(i - within) <= BURST || within == WITHIN[0];
+        for within in STEP_ROWS {
+            let short =
+                |i: &usize| time(i + within) - time(i - within) <= STEP_TIME || within == STEP_ROWS[0];
             let mut sharp: Vec<(usize, f64)> =
                 sharp_steps(&left, within, &least).filter(|(i, _)| short(i)).collect();
             sharp.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -48,7 +37,7 @@ pub(super) fn of(
                 if near[i] {
                     continue;
                 }
-                let reach = within + BESIDE;
+                let reach = within + STEP_BESIDE;
                 near[i.saturating_sub(reach)..(i + reach + 1).min(left.len())].fill(true);
                 // What lies within a burst is a rest of its own.
                 steps[i + 1 - within] = true;
@@ -67,15 +56,15 @@ fn sharp_steps(
     within: usize,
     least: &impl Fn(usize) -> f64,
 ) -> impl Iterator<Item = (usize, f64)> {
-    let beside = BESIDE.max(2 * within);
+    let beside = STEP_BESIDE.max(2 * within);
     // At once is at once soon after a hold's beginning, too; a burst needs a time before it.
-    let begin = if within == WITHIN[0] { FEWEST_BEFORE } else { within + beside };
+    let begin = if within == STEP_ROWS[0] { STEP_BEFORE } else { within + beside };
     (begin..left.len().saturating_sub(within + beside - 1)).filter_map(move |i| {
         let middle = |part: &[f64]| median(&mut part.to_vec());
         let before = &left[(i + 1 - within).saturating_sub(beside)..=i - within];
         let step = middle(&left[i + within..i + within + beside]) - middle(before);
         let gone = (left[i + within] - left[i - within]) * step.signum();
-        (step.abs() > least(i) && gone >= SHARP * step.abs()).then_some((i, gone))
+        (step.abs() > least(i) && gone >= STEP_SHARPNESS * step.abs()).then_some((i, gone))
     })
 }
 
@@ -86,7 +75,7 @@ mod tests {
     /// The widths within which some step of at least a newton is sharp.
     fn widths(left: &[f64]) -> Vec<usize> {
         let sharp = |within: &usize| sharp_steps(left, *within, &|_| 1.0).next().is_some();
-        super::WITHIN.iter().copied().filter(sharp).collect()
+        super::STEP_ROWS.iter().copied().filter(sharp).collect()
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Half-strokes and cycles: the pieces of a recording that are tested and left out whole.
 
 use super::Rows;
+use crate::criteria::rows::{LONGEST_BLOCK, SHORTEST_BLOCK, TYPICAL_BLOCK};
 use crate::linear::{median, quantile};
 
 /// Half-strokes become blocks; those that are very short join the one before, those very long are cut, so that blocks
@@ -16,8 +17,8 @@ pub(super) fn merge(rows: &mut Rows) {
         }
     }
     let mut sorted: Vec<f64> = spans.iter().copied().filter(|s| *s > 0.0).collect();
-    let typical = quantile(&mut sorted, 0.7).max(1e-9);
-    let (shortest, longest) = (0.35 * typical, 3.0 * typical);
+    let typical = quantile(&mut sorted, TYPICAL_BLOCK).max(1e-9);
+    let (shortest, longest) = (SHORTEST_BLOCK * typical, LONGEST_BLOCK * typical);
     let mut number = 0_u32;
     let mut start = 0;
     let mut fresh = vec![0_u32; n];

@@ -4,7 +4,9 @@ use model_core::braid::Braid;
 use model_core::effects::Context;
 use model_core::units::Length;
 
-use super::{Rows, TARGET_ROWS, readings, sleeve};
+use super::{Rows, readings, sleeve};
+use crate::criteria::baseline::TABLE_ORDER;
+use crate::criteria::rows::TARGET_ROWS;
 use crate::kinematics::{Kinematics, Recorded, Thresholds, kinematics};
 use pam_data::error::Result;
 use pam_data::recording::{Recording, UNKNOWN_PAUSE};
@@ -224,7 +226,7 @@ impl<'a> Gathering<'a> {
             length: posture.length,
             fibre_length: braid.fibre_length(),
             turns: braid.turns(),
-            order: 4.0,
+            order: TABLE_ORDER as f64,
             ..Context::default()
         });
         rows.shapes.push(sleeve::shape(braid, mean.stroke));

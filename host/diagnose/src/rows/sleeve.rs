@@ -3,11 +3,7 @@
 use model_core::braid::Braid;
 use model_core::units::Length;
 
-/// The highest elastic order that is ever offered.
-pub(crate) const ORDERS: usize = 6;
-
-/// Columns of a hyperelastic (Yeoh) wall.
-pub(crate) const YEOH: usize = 3;
+pub(crate) use crate::criteria::baseline::{ORDERS, YEOH};
 
 /// What a force of the model is made of at a row's length, and how it changes with the stroke.
 #[derive(Clone, Copy, Debug, Default)]

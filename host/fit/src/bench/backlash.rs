@@ -9,7 +9,9 @@
 //! loose the muscle rests, and its friction keeps the direction `s_y` of its own last motion; once it is drawn along again, that turns
 //! over a travel of `η b`, as the joint does not bear all at once and the braid gives a little before it slides.
 
-use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start, decay};
+use model_core::effects::{
+    BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, decay,
+};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -33,6 +35,9 @@ impl Effect for Backlash {
         summary: "A loose joint lets the sensor move before the muscle does, after every turn.",
         source: "play operator; sensitivity of the base model",
     };
+
+    const TRAITS: Traits =
+        Traits::shown_by(Experiment::RigidBar).check(BenchCheck::RigidBar).consistent(no_looser_than_free);
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [play(x) − x, last stroke, seen, direction of the muscle behind the play, last direction]
@@ -60,4 +65,9 @@ impl Effect for Backlash {
         let late = if known { context.direction - memory[3] } else { T::ZERO };
         parameters[0] * (context.slope() * memory[0] + context.friction * context.quasi * late)
     }
+}
+
+/// No joint is looser than free: `κ` is 1 at most, and 1.3 with its error.
+fn no_looser_than_free(amplitudes: &[f64], _shapes: &[f64]) -> bool {
+    !matches!(amplitudes, [free] if !(*free <= 1.3))
 }

@@ -1,6 +1,6 @@
 //! One kind of value for every effect that a diagnosis may weigh, of the muscle or of the bench.
 
-use model_core::effects::{Context, EffectName, Info, MEMORY, Memory, Parameter, Role};
+use model_core::effects::{Axis, Context, EffectName, Info, MEMORY, Memory, Parameter, Role, Traits, Vented};
 use serde::{Deserialize, Serialize};
 
 use super::BenchName;
@@ -57,16 +57,55 @@ impl Span {
     /// The range of a shape parameter: the plausible one, within what the recordings can show of it.
     #[must_use]
     pub fn range(&self, shape: &Parameter) -> (f64, f64) {
-        match shape.name {
-            "slip_time" => self.time,
-            "jamming_contraction" => (self.contraction.0.max(0.0), self.contraction.1),
-            "widest_play" => {
+        match shape.axis {
+            Axis::Time => self.time,
+            Axis::Contraction => (self.contraction.0.max(0.0), self.contraction.1),
+            Axis::Travel => {
                 let least = NARROWEST_PLAY * (self.stroke.1 - self.stroke.0);
                 (shape.low.max(least), shape.high.max(2.0 * least))
             }
-            _ => (shape.low, shape.high),
+            Axis::Own => (shape.low, shape.high),
         }
     }
+}
+
+/// Whether the force of an amplitude is read while the muscle is vented and slack.
+#[must_use]
+pub fn read_when_vented(traits: &Traits, amplitude: usize) -> bool {
+    match traits.vented {
+        Vented::Everything | Vented::Constant => true,
+        Vented::FirstLaw => amplitude == 0,
+        Vented::Nothing => false,
+    }
+}
+
+/// [`Candidate::columns`] of any equations, given by their steps in time and their force.
+pub fn columns_of<'a>(
+    info: &Info,
+    (step, force): (
+        impl Fn(&[f64], &Context<f64>, &mut Memory<f64>),
+        impl Fn(&[f64], &Context<f64>, &Memory<f64>) -> f64,
+    ),
+    contexts: impl IntoIterator<Item = &'a Context<f64>>,
+    shape: &[f64],
+    memory: &mut Memory<f64>,
+) -> Vec<Vec<f64>> {
+    let amplitudes = info.amplitudes();
+    let mut parameters = vec![0.0; info.parameters.len()];
+    for (to, from) in parameters[amplitudes..].iter_mut().zip(shape) {
+        *to = *from;
+    }
+    let contexts = contexts.into_iter();
+    let mut columns = vec![Vec::with_capacity(contexts.size_hint().0); amplitudes];
+    for context in contexts {
+        step(&parameters, context, memory);
+        for (i, column) in columns.iter_mut().enumerate() {
+            parameters[i] = 1.0;
+            column.push(force(&parameters, context, memory));
+            parameters[i] = 0.0;
+        }
+    }
+    columns
 }
 
 impl Candidate {
@@ -91,6 +130,15 @@ impl Candidate {
         }
     }
 
+    /// What a diagnosis has to know of it.
+    #[must_use]
+    pub const fn traits(self) -> &'static Traits {
+        match self {
+            Self::Muscle(e) => e.traits(),
+            Self::Bench(e) => e.traits(),
+        }
+    }
+
     /// Its name in the catalogue.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -107,11 +155,7 @@ impl Candidate {
     /// what it held; strands that no pressure holds together do not rub.
     #[must_use]
     pub fn acts_on_a_slack_muscle(self, amplitude: usize) -> bool {
-        match self.name() {
-            "force-offset" | "force-drift" | "cross-talk" | "gravity" | "seal-friction" => true,
-            "coulomb-friction" => amplitude == 0,
-            _ => false,
-        }
+        read_when_vented(self.traits(), amplitude)
     }
 
     /// Lets time pass in its memory.
@@ -156,22 +200,13 @@ impl Candidate {
         shape: &[f64],
         memory: &mut Memory<f64>,
     ) -> Vec<Vec<f64>> {
-        let amplitudes = self.info().amplitudes();
-        let mut parameters = vec![0.0; self.info().parameters.len()];
-        for (to, from) in parameters[amplitudes..].iter_mut().zip(shape) {
-            *to = *from;
-        }
-        let contexts = contexts.into_iter();
-        let mut columns = vec![Vec::with_capacity(contexts.size_hint().0); amplitudes];
-        for context in contexts {
-            self.step(&parameters, context, memory);
-            for (i, column) in columns.iter_mut().enumerate() {
-                parameters[i] = 1.0;
-                column.push(self.force(&parameters, context, memory));
-                parameters[i] = 0.0;
-            }
-        }
-        columns
+        let step = |parameters: &[f64], context: &Context<f64>, memory: &mut Memory<f64>| {
+            self.step(parameters, context, memory);
+        };
+        let force = |parameters: &[f64], context: &Context<f64>, memory: &Memory<f64>| {
+            self.force(parameters, context, memory)
+        };
+        columns_of(self.info(), (step, force), contexts, shape, memory)
     }
 
     /// The traces that an unknown beginning leaves, one column for each slot of [`Info::fading`]: what the force would be

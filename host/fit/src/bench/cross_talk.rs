@@ -2,7 +2,9 @@
 //!
 //! `c`, m²: thrust on an end cap, a hose that straightens. Pressurise with the muscle disconnected, or blocked at both ends.
 
-use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use model_core::effects::{
+    BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, Vented,
+};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -22,6 +24,9 @@ impl Effect for CrossTalk {
         summary: "Pressure in hose or fittings pushes on the load cell by itself.",
         source: "end-cap thrust; 0.1 to 5 N per 100 kPa",
     };
+
+    const TRAITS: Traits =
+        Traits::shown_by(Experiment::DeadWeights).check(BenchCheck::DeadWeights).vented(Vented::Everything);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         parameters[0] * context.pressure

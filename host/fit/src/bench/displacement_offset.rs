@@ -2,7 +2,9 @@
 //!
 //! `δ`, m, is how much more the muscle is contracted than the stroke says. First order. Measure the vented length with a caliper.
 
-use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use model_core::effects::{
+    BenchCheck, Context, Effect, Experiment, Imitates, Info, Link, Memory, Parameter, Start, Traits,
+};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -22,6 +24,10 @@ impl Effect for DisplacementOffset {
         summary: "The zero of the stroke sensor is not the rest length of the muscle.",
         source: "sensitivity of the base model; 0.1 to 1 mm are usual",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::VentedLength)
+        .check(BenchCheck::VentedLength)
+        .imitates(Imitates::Description);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         parameters[0] * context.slope()

@@ -7,7 +7,9 @@
 //! N/K, the zero's dependence on temperature, `θ` counted from the first reading (zero where none is measured). Laws to choose
 //! from. Tare at the beginning, between levels and at the end.
 
-use model_core::effects::{Context, Effect, Fading, Info, Link, Memory, Parameter, Start, decay};
+use model_core::effects::{
+    Context, Effect, Experiment, Fading, Info, Link, Memory, Parameter, Start, Traits, Vented, decay,
+};
 use model_core::scalar::Scalar;
 
 type Cell = Fading<1, 1>;
@@ -37,6 +39,8 @@ impl Effect for ForceDrift {
         summary: "The zero of the load cell wanders in the course of the recording.",
         source: "creep of 0.02 to 0.05 % of full scale in 20 to 30 minutes: manufacturers of load cells (VPG technical note VPGT-02)",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::VentedReadings).vented(Vented::Everything).slow();
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         Cell::step(memory, context.dt, &[parameters[4]], &[context.force()]);

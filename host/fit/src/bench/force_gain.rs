@@ -2,7 +2,9 @@
 //!
 //! `γ` (dimensionless), `γ_2`, 1/N; `F`, N, the base model's force. Hang known weights.
 
-use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use model_core::effects::{
+    BenchCheck, Context, Effect, Experiment, Imitates, Info, Link, Memory, Parameter, Start, Traits,
+};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -25,6 +27,10 @@ impl Effect for ForceGain {
         summary: "The scale of the load cell is off by some per cent.",
         source: "non-linearity of 0.02 to 0.1 % of full scale: manufacturers of load cells; wrong calibration 1 to 3 %",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::DeadWeights)
+        .check(BenchCheck::DeadWeights)
+        .imitates(Imitates::Description);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let pull = context.force();

@@ -2,7 +2,9 @@
 //!
 //! Ten seconds of a vented, slack muscle at either end of a recording settle it; without them free tables swallow it.
 
-use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use model_core::effects::{
+    BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, Vented,
+};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -22,6 +24,9 @@ impl Effect for ForceOffset {
         summary: "The load cell reads something when nothing pulls.",
         source: "zero balance of ±1 to 5 % of rated output before taring: manufacturers of load cells",
     };
+
+    const TRAITS: Traits =
+        Traits::shown_by(Experiment::VentedReadings).check(BenchCheck::Weighing).vented(Vented::Constant);
 
     fn force<T: Scalar>(parameters: &[T], _context: &Context<T>, _memory: &Memory<T>) -> T {
         parameters[0]

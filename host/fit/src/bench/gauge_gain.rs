@@ -3,7 +3,9 @@
 //! `γ` (dimensionless) is the part by which it reads too low, `γ_2`, 1/Pa, a curvature. Of the same shape as a wrong force gain and a
 //! direction-dependent friction within a few per cent: compare with a reference gauge at three pressures.
 
-use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use model_core::effects::{
+    BenchCheck, Context, Effect, Experiment, Imitates, Info, Link, Memory, Parameter, Start, Traits,
+};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -26,6 +28,10 @@ impl Effect for GaugeGain {
         summary: "The scale of the pressure gauge is off by some per cent.",
         source: "usual gauge accuracy, 0.1 to 1 %; sensitivity of the base model",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::ReferenceGauge)
+        .check(BenchCheck::ReferenceGauge)
+        .imitates(Imitates::Description);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         context.pull_per_pressure() * context.pressure * (parameters[0] + parameters[1] * context.pressure)

@@ -3,7 +3,9 @@
 //! `g = ∂F_G/∂P`, m². Identical to a shift of the deadband `P0`, at every pressure and stroke: never named alone, reported as "`P0` includes the
 //! gauge's zero". Read the gauge with the muscle vented.
 
-use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use model_core::effects::{
+    Context, Effect, Experiment, Imitates, Info, Link, Memory, Parameter, Start, Traits,
+};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -23,6 +25,8 @@ impl Effect for GaugeOffset {
         summary: "The pressure gauge does not read zero when the muscle is vented.",
         source: "usual gauge accuracy, 0.1 to 0.5 % of full scale; sensitivity of the base model",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::ReferenceGauge).imitates(Imitates::Deadband);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         parameters[0] * context.pull_per_pressure()

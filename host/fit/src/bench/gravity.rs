@@ -3,7 +3,9 @@
 //! `m`, kg, is a dead weight that the load cell's zero did not take in; `ρ`, kg/m, a weight that comes to bear as the muscle shortens (a hose
 //! or chain lifted). The constant is a force offset under another name: weigh it, or turn the bench by 90°.
 
-use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use model_core::effects::{
+    BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, Vented,
+};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -26,6 +28,9 @@ impl Effect for Gravity {
         summary: "Part of the muscle force carries the weight of muscle and fittings.",
         source: "Newton; 0.5 to 5 N for a hanging muscle",
     };
+
+    const TRAITS: Traits =
+        Traits::shown_by(Experiment::Weighing).check(BenchCheck::Weighing).vented(Vented::Constant);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let g = T::from_f64(9.806_65);

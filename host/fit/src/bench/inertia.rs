@@ -2,7 +2,7 @@
 //!
 //! `m`, kg: moving head, fittings and half the muscle. Seen at turns and in fast runs only: 20 mN for 1 kg at 20 mm/s².
 
-use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use model_core::effects::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -22,6 +22,8 @@ impl Effect for Inertia {
         summary: "Moving masses between muscle and load cell take force when they speed up.",
         source: "Newton; moving heads of 0.1 to 2 kg",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         -parameters[0] * context.acceleration

@@ -4,7 +4,9 @@
 //! guide, `b = μ e/L0` (taken at the rest length), against the direction `s` in which the stroke last went. `F`, N, is the base model's force. One degree costs 0.015 % of gain but puts 1.7 % of
 //! the force on the guide.
 
-use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start, stroke_direction};
+use model_core::effects::{
+    BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, stroke_direction,
+};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -28,6 +30,9 @@ impl Effect for Misalignment {
         source: "statics of an inclined pull",
     };
 
+    const TRAITS: Traits =
+        Traits::shown_by(Experiment::DeadWeights).check(BenchCheck::DeadWeights).consistent(guide_rubs);
+
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: the direction of the stroke
         stroke_direction(context, memory, 0);
@@ -38,4 +43,9 @@ impl Effect for Misalignment {
         let pull = context.force();
         -(parameters[0] * longer * longer * pull) - parameters[1] * memory[0] * pull.abs()
     }
+}
+
+/// An offset `e` of the ends costs `a = (e/L0)²/2` of the pull and rubs with `b = μ e/L0`: no guide is as smooth as `μ = 0.1`.
+fn guide_rubs(amplitudes: &[f64], _shapes: &[f64]) -> bool {
+    !matches!(amplitudes, [loss, rub] if !(*rub >= 0.1 * (2.0 * loss.max(0.0)).sqrt()))
 }

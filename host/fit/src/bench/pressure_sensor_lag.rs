@@ -4,7 +4,7 @@
 //! `τ`, s. First order: for ramps slower than the sensor. Invisible while the pressure is constant. The muscle's own lag behind the
 //! regulator (`pressure-lag`) has the opposite sign.
 
-use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use model_core::effects::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -24,6 +24,8 @@ impl Effect for PressureSensorLag {
         summary: "The pressure sensor responds late.",
         source: "first-order sensor; time constants of 1 to 50 ms are usual",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::PressureRamps);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         parameters[0] * context.pull_per_pressure() * context.pressure_rate

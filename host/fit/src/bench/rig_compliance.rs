@@ -9,7 +9,9 @@
 //! nothing else gives. A stretching braid looks the same in free tables but for the turns: measure with a rigid bar in the muscle's
 //! place.
 
-use model_core::effects::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use model_core::effects::{
+    BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits,
+};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -32,6 +34,9 @@ impl Effect for RigCompliance {
         summary: "The test frame bends, so the muscle is a little shorter than the stroke sensor says.",
         source: "first-order sensitivity of the base model; frames of 0.5 to 50 N/µm",
     };
+
+    const TRAITS: Traits =
+        Traits::shown_by(Experiment::RigidBar).check(BenchCheck::RigidBar).consistent(gives_alike);
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [z, last stroke, seen]
@@ -62,4 +67,9 @@ impl Effect for RigCompliance {
 /// `c`, guarded against a table's zero.
 fn give<T: Scalar>(parameters: &[T]) -> T {
     parameters[1].max(T::from_f32(1.0e-10))
+}
+
+/// The frame that gives under load is the frame that gives at the turns; half-strokes that overlap leave a factor of 2.5 between them.
+fn gives_alike(amplitudes: &[f64], shapes: &[f64]) -> bool {
+    !matches!((amplitudes, shapes), ([under_load], [at_turns]) if !(*under_load <= 2.5 * at_turns))
 }

@@ -8,7 +8,9 @@
 //! converter's filter: four equal filters in a row, which bring a jump late and not at once. `F`, N, is the base model's force. Laws to
 //! choose from.
 
-use model_core::effects::{Context, Effect, Fading, Info, Link, Memory, Parameter, Start};
+use model_core::effects::{
+    Context, Effect, Experiment, Fading, Info, Link, Memory, Parameter, Start, Traits,
+};
 use model_core::scalar::Scalar;
 
 type Filter = Fading<1, 1>;
@@ -46,6 +48,8 @@ impl Effect for SensorDelay {
         summary: "The force channel is late against the other channels.",
         source: "first-order filter or skew; 1 to 100 ms are usual",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds).consistent(passes_no_more);
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         let time = parameters[3];
@@ -126,6 +130,11 @@ fn catch_up<T: Scalar>(memory: &mut Memory<T>, time: T, dt: T, force: T) {
             input = (before, *output);
         }
     }
+}
+
+/// No filter passes more than it is given: its parts are 1 at most, and 1.3 with their error.
+fn passes_no_more(amplitudes: &[f64], _shapes: &[f64]) -> bool {
+    !matches!(amplitudes, [_, filtered, delayed] if !(filtered.max(*delayed) <= 1.3))
 }
 
 #[cfg(test)]
