@@ -10,7 +10,6 @@
 
 mod bench;
 mod flash;
-mod register;
 mod semihosting;
 mod time;
 mod uart;

@@ -76,3 +76,14 @@ fn each_image_lies_where_its_boards_map_says() {
     check(&emulated, include_str!("../../../memory.x"));
     check(&nucleo, include_str!("../../../firmware/memory/nucleo-f446re.x"));
 }
+
+/// The table that the tests of the Nucleo's image send. `TABLE=overwrite` writes it anew.
+#[test]
+fn the_tests_of_the_nucleo_send_the_example_table() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../nucleo/example-table.bin");
+    let image = emulator_tests::image_of(&model_core::table::example());
+    if std::env::var_os("TABLE").is_some_and(|value| value == "overwrite") {
+        std::fs::write(&path, &image).expect("a file");
+    }
+    assert_eq!(std::fs::read(&path).expect("the table's file"), image);
+}
