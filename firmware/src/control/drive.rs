@@ -7,7 +7,7 @@ use model_core::scalar::Scalar;
 use super::Controller;
 use crate::board::Command;
 use crate::modes;
-use crate::pair::{Posed, Pull};
+use crate::pair::{self, Posed, Pull};
 use crate::regulator::Wish;
 use crate::tick::TICK_S;
 use crate::watch::Finding;
@@ -51,7 +51,10 @@ impl Controller {
             let actuator = &mut sides[side.index()];
             let (wish, reached) = wishes[side.index()];
             if !used {
-                actuator.vent(&settings.regulator);
+                // Its regulator's model is kept up for the watch on what stays in it, where there is a second muscle at all.
+                if pair::SUPPORTED {
+                    actuator.vent(&settings.regulator);
+                }
                 continue;
             }
             if !wish.pressure_pa.is_finite() {

@@ -95,8 +95,7 @@ pub fn clocks(crystal: bool) -> Config {
     };
     config.pll_src = source;
     // 2 MHz · 180 / 2.
-    config.pll =
-        Some(Pll { prediv, mul: PllMul::MUL180, divp: Some(PllPDiv::DIV2), divq: None, divr: None });
+    config.pll = Some(Pll { prediv, mul: PllMul::MUL180, divp: Some(PllPDiv::DIV2), divq: None, divr: None });
     config.sys = Sysclk::PLL1_P;
     config.ahb_pre = AHBPrescaler::DIV1;
     config.apb1_pre = APBPrescaler::DIV4;

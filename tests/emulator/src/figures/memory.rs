@@ -23,9 +23,9 @@ use crate::tracking::{self, Stretch, Wanted};
 use crate::{fitting, pair, roll_back, upload};
 
 /// The most flash that an image without logs may take, bytes.
-pub const FLASH: u32 = 64 * 1024;
+pub const FLASH: u32 = 160 * 1024;
 /// The most memory, static and stack together, bytes.
-pub const RAM: u32 = 16 * 1024;
+pub const RAM: u32 = 48 * 1024;
 
 /// What a board's image takes of the chip, bytes.
 #[derive(Clone, Debug, PartialEq)]
