@@ -290,3 +290,6 @@ fn persistent_memories(model: &Model) -> usize {
     let any = model.chain.memories().any(|(effect, _)| effect.is_persistent());
     if any { model.chain.memories().count() } else { 0 }
 }
+
+#[cfg(test)]
+mod tests;

@@ -363,4 +363,4 @@ fn fits(image: &[u8], described: &Described) -> bool {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

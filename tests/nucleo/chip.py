@@ -59,8 +59,8 @@ class Chip:
         # What stays through a restart.
         self.now, self.instructions = 0.0, 0
         self.crystal_dead, self.erase_s = False, 1.0
-        self.restarts, self.erased, self.moments = [], [], {}
-        self.outputs, self.counts, self._hook = [], None, None
+        self.restarts, self.erased = [], []
+        self.outputs = []
         self.reset_flags = 1 << 27 | 1 << 26
         self._begin()
 

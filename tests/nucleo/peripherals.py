@@ -53,8 +53,10 @@ class Rcc(Registers):
         if offset == 0x74 and value >> 24 & 1:
             self.chip.reset_flags = 0
             value &= ~(1 << 24)
-        if offset == 0x00 and value >> 16 & 1 and "crystal" not in self.chip.moments:
-            self.chip.moments["crystal"] = self.chip.now
+        if offset == 0x00:
+            old = self.get(0x00)
+            bypass_moves = (old ^ value) >> 18 & 1
+            assert not (bypass_moves and (old | value) >> 16 & 1), "HSEBYP is only written while HSEON is off"
         self.words[offset] = value
 
     def hclk(self):

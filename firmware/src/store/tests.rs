@@ -12,18 +12,20 @@ const WORD: usize = 4;
 
 /// Flash in memory that counts its words and erases, and loses power after some of them.
 #[derive(Clone, Debug)]
-struct MockFlash {
+pub(crate) struct MockFlash {
     bytes: Vec<u8, { PAGE * PAGES }>,
     /// Words that may still be written (an erase of a page counts as one).
     left: usize,
     done: usize,
     off: bool,
+    /// Writes that still work, where the flash wears out and is read all the same.
+    lasts: usize,
     /// What a cut leaves of the word or page it hits: 0 nothing happened, 1 half, 2 all of it.
     tear: usize,
 }
 
 #[derive(Debug)]
-struct PowerCut;
+pub(crate) struct PowerCut;
 
 impl NorFlashError for PowerCut {
     fn kind(&self) -> NorFlashErrorKind {
@@ -32,10 +34,16 @@ impl NorFlashError for PowerCut {
 }
 
 impl MockFlash {
-    fn erased() -> Self {
+    pub(crate) fn erased() -> Self {
         let mut bytes = Vec::new();
         bytes.resize(PAGE * PAGES, 0xFF).expect("its own size");
-        Self { bytes, left: usize::MAX, done: 0, off: false, tear: 0 }
+        Self { bytes, left: usize::MAX, done: 0, off: false, lasts: usize::MAX, tear: 0 }
+    }
+
+    /// The same worn out: so many more writes work, and everything is read.
+    pub(crate) fn failing_after(mut self, writes: usize) -> Self {
+        self.lasts = writes;
+        self
     }
 
     /// Counts one operation; false when the power goes with it.
@@ -49,7 +57,7 @@ impl MockFlash {
         true
     }
 
-    fn powered(mut self, left: usize, tear: usize) -> Self {
+    pub(crate) fn powered(mut self, left: usize, tear: usize) -> Self {
         (self.left, self.off, self.done, self.tear) = (left, false, 0, tear);
         self
     }
@@ -100,6 +108,10 @@ impl NorFlash for MockFlash {
     async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), PowerCut> {
         let offset = offset as usize;
         assert!(offset.is_multiple_of(WORD) && bytes.len().is_multiple_of(WORD), "a write is of whole words");
+        if self.lasts == 0 {
+            return Err(PowerCut);
+        }
+        self.lasts = self.lasts.saturating_sub(1);
         for (n, word) in bytes.chunks(WORD).enumerate() {
             if self.off {
                 return Err(PowerCut);

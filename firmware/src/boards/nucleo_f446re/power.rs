@@ -73,13 +73,16 @@ pub fn clock_had_failed() -> bool {
 
 /// Starts the crystal, the 8 MHz that the debug probe gives; whether it runs.
 pub fn start_crystal() -> bool {
-    RCC_CR.set(HSE_ON | HSE_BYPASSED);
+    // The bypass can only be chosen while the oscillator is off.
+    RCC_CR.set(HSE_BYPASSED);
+    RCC_CR.set(HSE_ON);
     for _ in 0..LOOKS {
         if RCC_CR.read() & HSE_READY != 0 {
             return true;
         }
     }
-    RCC_CR.write(RCC_CR.read() & !(HSE_ON | HSE_BYPASSED));
+    RCC_CR.write(RCC_CR.read() & !HSE_ON);
+    RCC_CR.write(RCC_CR.read() & !HSE_BYPASSED);
     false
 }
 
