@@ -75,8 +75,7 @@ fn deadband_in_use(shared: &Shared) -> Option<f32> {
 fn nothing_is_written_while_a_fault_holds_a_command() {
     let shared = Shared::new(Settings::default());
     let mut server = started(MockFlash::erased(), &shared);
-    let mut settings = Settings::default();
-    settings.hold_on = 1 << Fault::SetPointSilence.code();
+    let mut settings = Settings { hold_on: 1 << Fault::SetPointSilence.code(), ..Settings::default() };
     settings.watch.silence_ticks = 500;
     let set = |server: &mut Server<MockFlash>, settings: &Settings| {
         Session { server, shared: &shared }.set_settings(settings, &mut Settings::default())
