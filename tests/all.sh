@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
-# Every test: both firmware images, all crates with their documentation, the firmware in QEMU, the Nucleo's image on a model of its chip,
-# the page in a browser.
+# Every test: both firmware images, all crates with their documentation, the firmware in QEMU, the page in a browser.
 #
 #     bash tests/all.sh            # everything
 #     bash tests/all.sh --lint     # and clippy, and documentation without a warning
@@ -49,10 +48,8 @@ fi
 if command -v python3 >/dev/null; then
     echo "== Python =="
     bash host/python/tests/run.sh || failed=$?
-    echo "== the Nucleo's image, executed =="
-    bash tests/nucleo/run.sh || failed=$?
 else
-    echo "tests/all.sh: neither the Python bindings nor the Nucleo's image are tested: there is no python3"
+    echo "tests/all.sh: the Python bindings are not tested: there is no python3"
 fi
 
 if [ "$lint" = yes ]; then
