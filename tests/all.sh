@@ -1,74 +1,151 @@
 #!/usr/bin/env bash
-# Every test: both firmware images, all crates with their documentation, the firmware in QEMU, the page in a browser.
+# Runs the tests, in one of three tiers:
 #
-#     bash tests/all.sh            # everything
-#     bash tests/all.sh --lint     # and clippy, and documentation without a warning
+#     bash tests/all.sh --quick    # format, language, unit tests of the libraries: up to 3 minutes on 2 cores after the first build
+#     bash tests/all.sh            # the whole suite: up to 25 minutes
+#     bash tests/all.sh --long     # the whole suite, the long tests, and the coverage
 #
-# Missing tools for the firmware are installed (firmware/build --install). Tests on real recordings run where these are
-# beside the project (../shared/data), the test of the page where Chromium is; both say so when they are skipped.
+#     --lint                       # with any tier: Clippy, documentation, licences of the dependencies
+#
+# The README lists the contents of each tier. Tests on real recordings run if the recordings are next to the project
+# (../shared/data). A missing tool skips its test with a message; with CI=true it is installed if possible, and is a failure otherwise.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
+tier=whole
 lint=no
 for argument in "$@"; do
     case $argument in
+        --quick) tier=quick ;;
+        --long) tier=long ;;
         --lint) lint=yes ;;
-        *) echo "tests/all.sh: '$argument' is no option; there is --lint" >&2; exit 2 ;;
+        *) echo "tests/all.sh: unknown option '$argument'; options: --quick, --long, --lint" >&2; exit 2 ;;
     esac
 done
 
-command -v cargo >/dev/null || { echo "tests/all.sh: no Rust compiler; install one from https://rustup.rs" >&2; exit 1; }
-[ -d ../shared/data ] || echo "tests/all.sh: tests on real recordings are skipped: ../shared/data is not there"
-browser=no
-if command -v chromedriver >/dev/null && command -v python3 >/dev/null; then browser=yes; fi
-[ $browser = yes ] || echo "tests/all.sh: the test of the page is skipped: there is no chromedriver, or no python3"
+say() { echo "tests/all.sh: $*"; }
+has() { command -v "$1" >/dev/null 2>&1; }
 
-# Property tests draw the same cases in every run, so that a red run can be repeated; another number tries others.
+failed=0
+report=()
+# A step that fails does not stop the others.
+step() {
+    local name=$1 start=$SECONDS outcome=passed
+    shift
+    echo "== $name =="
+    "$@" || { failed=1; outcome=FAILED; }
+    report+=("$(printf '%-28s %-7s %5d s' "$name" "$outcome" $((SECONDS - start)))")
+}
+
+# Whether a tool is there; in continuous integration the distribution's packages are installed first. Its absence is a failure there.
+require() {
+    local what=$1 tool=$2
+    shift 2
+    has "$tool" && return 0
+    if [ "${CI:-}" = true ] && has apt-get; then
+        local root=()
+        [ "$(id -u)" = 0 ] || root=(sudo)
+        "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get update -qq >&2 || true
+        "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >&2 || true
+        has "$tool" && return 0
+    fi
+    if [ "${CI:-}" = true ]; then
+        say "FAILED: $what: $tool is missing and could not be installed (packages: $*)" >&2
+        failed=1
+    else
+        say "skipped: $what: $tool is missing (packages: $*)"
+    fi
+    return 1
+}
+
+has cargo || { echo "tests/all.sh: no Rust compiler; install one from https://rustup.rs" >&2; exit 1; }
+target=${CARGO_TARGET_DIR:-target}
+# Property tests draw the same cases in every run, so that a failure can be repeated; another number draws other cases.
 export PROPTEST_RNG_SEED="${PROPTEST_RNG_SEED:-1}"
 
-began=$SECONDS
-echo "== firmware images =="
-firmware/build --install mps2-an386
-firmware/build nucleo-f446re
+browser() {
+    cargo build --quiet --locked --package host && python3 tests/studio.py "$target/debug/host"
+}
 
-if command -v rustfmt >/dev/null && cargo fmt --version >/dev/null 2>&1; then
-    echo "== format =="
-    cargo fmt --all --check
+language() {
+    local status=0
+    bash tests/prose/run.sh || status=$?
+    # 3: the linter could not be installed, for example without a network.
+    if [ $status = 3 ] && [ "${CI:-}" != true ]; then
+        say "skipped: language of the pages: the linter could not be installed"
+        return 0
+    fi
+    return $status
+}
+
+board_documentation() {
+    # The files of the boards compile for their target only. The distribution's compiler, which builds the images on machines
+    # without rustup, is not used for documentation.
+    local triple=thumbv7em-none-eabihf board
+    if [ ! -d "$(rustc --print sysroot)/lib/rustlib/$triple/lib" ]; then
+        say "skipped: documentation of the boards: rustup target add $triple"
+        return 0
+    fi
+    for board in mps2-an386 nucleo-f446re; do
+        RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --locked --package firmware --target $triple --no-default-features \
+            --features $board --target-dir "$target/firmware/doc" || return 1
+    done
+}
+
+if cargo fmt --version >/dev/null 2>&1; then
+    step "format" cargo fmt --all --check
+fi
+if require "language of the pages" npm nodejs npm; then
+    step "language of the pages" language
+fi
+if require "picture of the crates" python3 python3; then
+    step "picture of the crates" python3 tests/crates.py --check
 fi
 
-echo "== tests =="
-failed=0
-cargo test --workspace --locked --no-fail-fast || failed=$?
-
-if [ "$browser" = yes ]; then
-    echo "== the page in a browser =="
-    { cargo build --quiet --locked --package host && python3 tests/studio.py target/debug/host; } || failed=$?
-fi
-
-if command -v python3 >/dev/null; then
-    echo "== Python =="
-    bash host/python/tests/run.sh || failed=$?
+if [ $tier = quick ]; then
+    step "unit tests" cargo test --workspace --locked --no-fail-fast --lib
 else
-    echo "tests/all.sh: the Python bindings are not tested: there is no python3"
+    [ -d ../shared/data ] || say "skipped: tests on real recordings: ../shared/data does not exist"
+    step "firmware image, emulated" firmware/build --install mps2-an386
+    step "firmware image, Nucleo" firmware/build nucleo-f446re
+    step "tests" cargo test --workspace --locked --no-fail-fast
+    if require "live view in a browser" python3 python3 && require "live view in a browser" chromedriver chromium chromium-driver; then
+        step "live view in a browser" browser
+    fi
+    if require "Python bindings" python3 python3 python3-venv; then
+        step "Python bindings" bash host/python/tests/run.sh
+    fi
+    if require "image of the Nucleo, executed" python3 python3 python3-venv; then
+        step "image of the Nucleo, executed" bash tests/nucleo/run.sh
+    fi
 fi
-
-if [ "$lint" = yes ]; then
-    echo "== lints =="
-    cargo clippy --workspace --all-targets --locked -- -D warnings || failed=$?
-    RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked || failed=$?
-    # The boards' own files are only there for their target; the distribution's compiler, which builds the images elsewhere, is not asked.
-    target=thumbv7em-none-eabihf
-    if [ -d "$(rustc --print sysroot)/lib/rustlib/$target/lib" ]; then
-        for board in mps2-an386 nucleo-f446re; do
-            RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --locked --package firmware --target $target --no-default-features \
-                --features $board --target-dir target/firmware/doc || failed=$?
-        done
+if [ $tier = long ]; then
+    step "long tests" env PAM_LONG=1 cargo test --workspace --release --locked --no-fail-fast \
+        --test kills --test closed_loop --test commands
+    if has cargo-llvm-cov; then
+        step "coverage" bash tests/coverage.sh
+    else
+        say "skipped: coverage: cargo install --locked cargo-llvm-cov"
     fi
 fi
 
-if [ "$failed" = 0 ]; then
-    echo "tests/all.sh: everything passed in $((SECONDS - began)) s"
-else
-    echo "tests/all.sh: FAILED, see above ($((SECONDS - began)) s)" >&2
+if [ $lint = yes ]; then
+    step "Clippy" cargo clippy --workspace --all-targets --locked -- -D warnings
+    step "documentation" env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
+    step "documentation of the boards" board_documentation
+    if has cargo-deny; then
+        # Advisories change from day to day and need a network: .github/workflows/ci.yml checks them.
+        step "licences of dependencies" cargo deny --locked check bans licenses sources
+    else
+        say "skipped: licences of dependencies: cargo install --locked cargo-deny"
+    fi
 fi
-exit "$failed"
+
+echo "== summary =="
+printf '%s\n' "${report[@]}"
+if [ $failed = 0 ]; then
+    say "all tests of the $tier tier passed in $SECONDS s"
+else
+    say "FAILED, see above ($SECONDS s)" >&2
+fi
+exit $failed

@@ -1,4 +1,4 @@
-"""`host studio` and a real headless Chromium on it, through WebDriver; nothing of Python beyond its own library."""
+"""Controls `host studio` in headless Chromium through WebDriver, with the standard library of Python only."""
 
 import base64
 import contextlib
@@ -12,12 +12,12 @@ import time
 import urllib.request
 
 
-# How long to wait for what must happen, s: what has not by then never will, however busy the machine is.
+# Timeout for an expected event, s; long enough for a busy machine.
 HOPELESS = 180
 
 
 def ended(program):
-    """Asked to end, it ends the emulator too, if it has one."""
+    """Ends the program with a signal, so that it also ends its emulator."""
     program.send_signal(signal.SIGINT)
     try:
         program.wait(10)
@@ -26,10 +26,10 @@ def ended(program):
 
 
 class Program(subprocess.Popen):
-    """A program that says where it is in its first line, after some word."""
+    """A program that prints its address in its first line, after a given word."""
 
     def __init__(self, *command):
-        # Errors and notes go to a file, which never fills as a pipe that nobody reads would.
+        # Errors and notes go to a file; an unread pipe would fill up and block.
         self.notes = tempfile.TemporaryFile("w+")
         super().__init__(command, stdout=subprocess.PIPE, stderr=self.notes, text=True)
 
@@ -59,14 +59,14 @@ def studio(program, on=None, muscle="mini"):
                 which = ["--port", running[-1].address()]
             running.append(Program(program, "studio", *which, "-o", folder))
             url = running[-1].address("open ")
-            # It takes a port that is free, and says which; then it serves.
+            # It selects a free port and prints it, then serves.
             said = (re.search(r"successfully on port (\d+)", line) for line in running[0].stdout)
             port = next((found[1] for found in said if found), None)
             if not port:
                 raise SystemExit("chromedriver does not say its port")
             yield url, f"http://127.0.0.1:{port}", running[-1]
         finally:
-            # A driver that ends leaves its browsers behind.
+            # A driver that ends does not end its browsers.
             for page in list(Browser.open):
                 with contextlib.suppress(OSError):
                     page.close()
@@ -101,7 +101,7 @@ class Browser:
         self.js(f"document.getElementById('{name}').click()")
 
     def click_until(self, name, condition):
-        """Asks again as long as it is refused, for what is allowed only a while after its cause."""
+        """Repeats a request while it is refused, for requests that are allowed only some time after their cause."""
         end = time.time() + HOPELESS
         while not self.js(f"return !!({condition})"):
             assert time.time() < end, f"never came by {name}: {condition}; the page says: {self.text('message')}"
@@ -142,7 +142,7 @@ class Browser:
         self.cdp("Emulation.setEmulatedMedia", features=[])
 
     def picture(self, path, until):
-        """The page from its head to the end of an element, light, 1300 pixels wide: a picture for the book."""
+        """A picture for the book: the page from the top to the end of an element, light theme, 1300 pixels wide."""
         self.cdp("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "light"}])
         self.cdp("Emulation.setDeviceMetricsOverride", width=1300, height=900, deviceScaleFactor=1, mobile=False)
         time.sleep(1)
@@ -169,7 +169,7 @@ class Browser:
         self.js(f"let s = document.getElementById('mishap'); s.value = '{code}'; s.dispatchEvent(new Event('change'))")
 
     def table_on_device(self):
-        """From nothing to a controller that has a table: the example's recordings, fitted and sent."""
+        """Loads the example's recordings, fits them, and sends the table to the controller."""
         self.click("example")
         self.until("document.querySelectorAll('#list li').length == 6")
         self.click("fit")

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The page of `host studio` in a real headless Chromium, against the firmware in QEMU (or as a library, where QEMU is not).
+"""Tests the page of `host studio` in headless Chromium, with the firmware in QEMU (or as a library, if there is no QEMU).
 
     python3 tests/studio.py [PROGRAM] [FOLDER FOR SCREENSHOTS]
 
@@ -34,7 +34,7 @@ def passed(what):
     print(f"test studio::{what} ... ok", flush=True)
 
 
-# Ten minutes at 1 kHz, as the stream brings them: batches of 33 samples, each parsed, kept and from time to time drawn.
+# Ten minutes at 1 kHz, as the stream delivers them: batches of 33 samples, each parsed and stored, and drawn at intervals.
 LONG = """
     const from = ring.last("t") + 1, batches = 18000, times = [], plain = [];
     // What a picture is measured by: ten times as many strokes as its curves have columns of pixels, and nothing else.
@@ -74,13 +74,13 @@ LONG = """
 
 
 def ten_minutes(page):
-    # The first time what is made once is made; the second time nothing may stay.
+    # The first pass allocates what is allocated once; the second one must not retain anything.
     page.js(LONG)
     found = page.js(LONG)
     assert found["grown"] < 1e6, f"ten minutes of samples leave {found['grown']} bytes behind"
     assert found["kept"] <= 40000, found
-    # Other programs on a busy machine lengthen most pictures; the quickest tenth shows what a picture costs, and what ten
-    # times its strokes do.
+    # Other programs on a busy machine delay most pictures; the fastest tenth shows the cost of a picture, and of one with ten times
+    # the strokes.
     ratio = found["picture"] / found["strokes"]
     assert ratio < 3, f"a picture of 30 s takes {found['picture']} ms, {ratio:.1f} times as long as ten times its strokes"
     passed(f"ten_minutes_of_samples_leave_nothing_behind ({found['grown'] / 1e3:.0f} kB, {found['picture']:.1f} ms a picture, {ratio:.2f} of ten times its strokes)")
@@ -88,11 +88,11 @@ def ten_minutes(page):
 
 def reads_where_one_points(page):
     value = "document.querySelector('[data-of=F]').textContent"
-    # On a slow machine the samples may not yet reach back to the picture's middle.
+    # On a slow machine, the samples may not yet extend to the middle of the picture.
     page.until("ring.last('t') - ring.get('t', 0) > Number(document.getElementById('window').value)", 240)
     page.click("hold")
     page.over("#p-force")
-    # The middle of the picture, by its geometry; the value there, by looking at every sample.
+    # The middle of the picture from its geometry; the value there from a search of all samples.
     found = page.js("""const c = document.getElementById("p-force"), inner = c.clientWidth - LEFT - RIGHT, s = scopes[0];
       const time = s.from + (c.clientWidth / 2 - LEFT) / inner * (s.to - s.from), pixel = (s.to - s.from) / inner;
       const near = [...Array(shown.length).keys()].filter((i) => Math.abs(shown.get("t", i) - time) <= pixel).map((i) => "measured " + shown.get("F", i).toFixed(1));
@@ -103,7 +103,7 @@ def reads_where_one_points(page):
     assert said in found["near"] and said in found["text"], (said, found)
     time.sleep(0.6)
     assert page.js("return " + value) == said, "a held picture's value changes"
-    # It follows the system's colours all the same.
+    # It still follows the colours of the system.
     picture = "document.getElementById('p-force').toDataURL()"
     light = page.js("return " + picture)
     page.cdp("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
@@ -119,7 +119,7 @@ def reads_where_one_points(page):
     page.until(f"parseFloat(document.getElementById('cursor-time').textContent.slice(3)) < {found['told']} - {found['pixel']}")
     page.js("document.activeElement.blur()")
     assert page.text("cursor-time") == "", page.text("cursor-time")
-    # Where nothing is drawn, before the first sample and after the last, nothing is read.
+    # No value is shown where no curve is drawn: before the first sample and after the last.
     blank = page.js("""shown.length = 100;
       const told = [0.1, 1].map((to) => { point(to); return document.querySelector("[data-of=F]").textContent; });
       scopes[0].to += 5; point(1); told.push(document.querySelector("[data-of=F]").textContent); point(null); return told""")
@@ -131,7 +131,7 @@ def reads_where_one_points(page):
 
 
 def glimpse(url):
-    """The controller's state, by looking for a moment without a page."""
+    """The state of the controller, queried without a page."""
     base, token = url.split("/?token=")
     request = urllib.request.Request(base + "/api/stream", headers={"x-studio-token": token})
     with urllib.request.urlopen(request, timeout=HOPELESS) as stream:
@@ -169,7 +169,7 @@ def story(url, driver):
     page.click("follow")
     page.state("running")
     page.until("state.recording > 1000")
-    # The newest values stand behind the curves' names, and what is asked at the quantity that is asked for.
+    # The newest values follow the names of the curves, and the setpoint is shown at the controlled quantity.
     page.until("/^measured [0-9.]+$/.test(document.querySelector('[data-of=F]').textContent)")
     asked = page.js("return keys.filter((k) => k.of === 'a' && !k.place.hidden).map((k) => k.mode)")
     assert asked == ["force"], asked
@@ -185,14 +185,14 @@ def story(url, driver):
     page.mishap(1)
     page.until("!document.getElementById('fault').hidden")
     assert "load cell" in page.text("fault-text") and "What to do" in page.text("fault-text"), page.text("fault-text")
-    # The broken cell reads 100 kN: told, marked, and kept out of the axis.
+    # The broken load cell reads 100 kN: reported, marked, and excluded from the axis.
     page.until("!document.getElementById('out-force').hidden")
     assert "100000 N" in page.text("out-force"), page.text("out-force")
     most = page.js("let s = scopes[0].stretches, most = 0; s.each((slot) => { most = Math.max(most, s.curves.F.most[slot]); }); return most")
     assert 0 < most < 500, f"the axis of force goes to {most} N"
     page.shot(SHOTS, "fault")
     page.mishap(0)
-    # Refused until the cell has been read again.
+    # Refused until the load cell has been sampled again.
     page.click_until("clear", "document.getElementById('state').textContent === 'disarmed'")
     page.until("document.getElementById('out-force').hidden")
     passed("tells_a_fault_in_words_and_clears_it")
@@ -222,14 +222,14 @@ def story(url, driver):
     page.state("disarmed")
     passed("vents_by_one_key_wherever_the_cursor_is")
     bad = [entry["message"] for entry in page.ask("POST", page.path + "/se/log", {"type": "browser"}) if entry["level"] == "SEVERE"]
-    # A refused order is the page's business; the browser notes it all the same.
+    # The page handles a refused request; the browser logs it nevertheless.
     assert not [b for b in bad if "400" not in b], bad
     page.click("arm")
     page.state("armed")
     page.click("follow")
     page.state("running")
     page.close()
-    # Nobody looks for longer than the studio lets a muscle work unwatched; a glimpse begins that anew.
+    # The page is hidden for longer than the studio allows a muscle to run unattended; each view of the page restarts that time.
     end = time.time() + HOPELESS
     while glimpse(url) != "disarmed":
         assert time.time() < end, "the controller works on unwatched"

@@ -1,6 +1,6 @@
-"""Fit, predict and diagnose pneumatic artificial muscles.
+"""Fit, predict, and diagnose pneumatic artificial muscles.
 
-Arrays are SI throughout: s, Pa (gauge), m, N, K. Whatever is wrong raises PamError.
+All arrays are in SI units: s, Pa (gauge), m, N, K. All errors are of the type PamError.
 """
 
 import os
@@ -16,9 +16,9 @@ _Array = NDArray[np.float64]
 __version__: str
 
 class PamError(ValueError):
-    """What is wrong: the text names cause, place and remedy, the attributes give them one by one."""
+    """An error. The text states cause, place, and remedy; the attributes contain the parts."""
     code: str
-    """The stable name of the failure, such as "recording::time-order"."""
+    """The stable error code, such as "recording::time-order"."""
     cause: str
     file: str | None
     line: int | None
@@ -27,7 +27,7 @@ class PamError(ValueError):
 
 @final
 class Muscle:
-    """A muscle as its maker or a calliper describes it."""
+    """The geometry and limits of a muscle."""
     def __new__(
         cls,
         name: str,
@@ -52,7 +52,7 @@ class Muscle:
 
 @final
 class Recording:
-    """One recording, columns in SI units. Time must rise; all columns are equally long."""
+    """One recording, columns in SI units. Time must increase, and all columns must have the same length."""
     def __new__(
         cls,
         name: str,
@@ -72,48 +72,48 @@ class Recording:
         """Gauge pressure, Pa."""
     @property
     def stroke(self) -> _Array:
-        """Contraction stroke, m: positive as the muscle shortens."""
+        """Contraction stroke, m; positive when the muscle shortens."""
     @property
     def force(self) -> _Array | None:
-        """N, where it was measured."""
+        """N, if it was measured."""
     @property
     def temperature(self) -> _Array | None:
-        """K, where it was measured."""
+        """K, if it was measured."""
     def __len__(self) -> int: ...
 
 @final
 class Campaign:
-    """Recordings of one muscle in chronological order: the muscle remembers what earlier ones did to it."""
+    """Recordings of one muscle in chronological order; earlier recordings affect the model of later ones."""
     def __new__(cls, recordings: Sequence[Recording]) -> Campaign: ...
     @property
     def recordings(self) -> list[Recording]: ...
     @property
     def warnings(self) -> list[str]:
-        """What was noticed while reading."""
+        """Warnings of the reader."""
     def __len__(self) -> int: ...
     def __getitem__(self, index: int) -> Recording: ...
     def __iter__(self) -> Iterator[Recording]: ...
 
 @final
 class Prediction:
-    """What a table says of one recording."""
+    """The prediction of one recording."""
     @property
     def force(self) -> _Array:
         """N."""
     @property
     def band(self) -> _Array | None:
-        """Half the width of the 95 % interval of the table's own force, N; None where the table holds no uncertainty."""
+        """Half the width of the 95 % confidence band of the force, N; None if the table contains no uncertainty."""
     @property
     def rms(self) -> float | None:
         """Root mean square of measured minus predicted force, N; None without a force column."""
     @property
     def inside(self) -> float | None:
-        """The share of readings within the 95 % interval of single readings, 0 to 1."""
+        """The share of readings within the 95 % prediction interval, 0 to 1."""
     def __len__(self) -> int: ...
 
 @final
 class Table:
-    """What goes to the controller, and what predicts."""
+    """A fitted model, as it is sent to a controller."""
     @staticmethod
     def read(path: _Path) -> Table:
         """Reads a .pam file."""
@@ -132,29 +132,28 @@ class Table:
     def friction(self) -> _Array:
         """k_F at the nodes."""
     def force(self, pressure: ArrayLike, stroke: ArrayLike, direction: ArrayLike | None = None) -> Any:
-        """Force (N) of the base model; direction is 1 shortening, -1 lengthening, 0 (or None) the mid-line. Arrays as numpy
-        broadcasts them; numbers give a number. Raises PamError for a length that the braid cannot have; warns where the table was
-        not fitted."""
+        """Force (N) of the base model. The direction is 1 for shortening, -1 for lengthening, and 0 or None for the mid-line. Arrays
+        are broadcast; numbers give a number. Raises PamError for an impossible length, and warns outside the fitted range."""
     def force_band(self, pressure: ArrayLike, stroke: ArrayLike, direction: ArrayLike | None = None) -> Any:
-        """Half the width of that force's 95 % interval, N; None where the table holds no uncertainty."""
+        """Half the width of the 95 % confidence band of that force, N; None if the table contains no uncertainty."""
     def predict(self, campaign: Campaign) -> list[_Array]:
-        """The force that the load cell would read, N: one array a recording, effects and their memory included."""
+        """The predicted reading of the load cell, N: one array per recording, with effects and their memory."""
     def predict_with_bands(self, campaign: Campaign) -> list[Prediction]:
-        """The same with how sure it is and how well it fits, as `host predict` tells it."""
+        """The same with confidence bands and errors, as in `host predict`."""
 
 @final
 class Fit:
     """A finished fit."""
     @property
     def summary(self) -> dict[str, Any]:
-        """The figures of the fit, as in the JSON of `host fit` (schema pam-fit/1)."""
+        """The results of the fit, as in the JSON of `host fit` (schema pam-fit/1)."""
     @property
     def table(self) -> Table: ...
     def report(self, path: _Path) -> None:
         """Writes the report, one HTML file."""
 
 def read(paths: _Path | Sequence[_Path], muscle: Muscle | None = None, import_description: _Path | None = None) -> Campaign:
-    """Reads a file, or several in chronological order; import_description is the TOML file for foreign formats."""
+    """Reads a file, or several in chronological order; import_description is a TOML file that describes another format."""
 
 def fit(
     campaign: Campaign,
@@ -169,4 +168,4 @@ def fit(
     """Fits a muscle's table to recordings."""
 
 def diagnose(campaign: Campaign, muscle: Muscle, report: _Path | None = None) -> dict[str, Any]:
-    """Finds out what the model leaves out: the JSON of `host diagnose` (schema pam-diagnose/1); report names an HTML file to write."""
+    """Reports the effects that the model lacks, as the JSON of `host diagnose` (schema pam-diagnose/1); report is an HTML file to write."""

@@ -8,8 +8,8 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::commands;
 use crate::console::{Colour, Console};
-use crate::error::Result;
 use crate::settings::{all_settings, apply};
+use pam_data::error::Result;
 
 /// Recordings of pneumatic artificial muscles to tables, tables to controllers.
 #[derive(Debug, Parser)]

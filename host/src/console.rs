@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::io::{IsTerminal, Write};
 
-use crate::error::Error;
+use pam_data::error::Error;
 
 /// When messages are coloured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

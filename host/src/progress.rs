@@ -5,6 +5,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use pam_data::progress::Progress;
+
 use crate::console::Console;
 
 /// Time between two pictures of the line.
@@ -28,14 +30,14 @@ struct Stage {
 /// The line of one piece of work. Steps may be counted from several threads; the line goes when this is dropped.
 ///
 /// ```
-/// use host::progress::Progress;
-/// let progress = Progress::silent();
+/// use pam_data::progress::Progress;
+/// let progress = ProgressLine::silent();
 /// progress.total(200);
 /// (0..200).for_each(|_| progress.step());
 /// assert_eq!(progress.done(), 200);
 /// ```
 #[derive(Debug)]
-pub struct Progress {
+pub struct ProgressLine {
     stage: Mutex<Stage>,
     live: bool,
     begun: Instant,
@@ -45,7 +47,7 @@ pub struct Progress {
     drawn: AtomicU64,
 }
 
-impl Progress {
+impl ProgressLine {
     /// A line that begins with `what` is done, on a terminal and without `--quiet` only.
     #[must_use]
     pub fn new(console: &Console, what: impl Into<String>) -> Self {
@@ -68,43 +70,6 @@ impl Progress {
             total: AtomicU64::new(0),
             drawn: AtomicU64::new(0),
         }
-    }
-
-    /// States how many steps there are altogether; may be said again when more is known. 0: not known.
-    pub fn total(&self, steps: u64) {
-        self.total.store(steps, Ordering::Relaxed);
-    }
-
-    /// Begins another part of the work, of so many steps: they and the remaining time are counted anew. For work whose later
-    /// parts depend on what the earlier find.
-    pub fn stage(&self, what: impl Into<String>, steps: u64) {
-        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) =
-            Stage { what: what.into(), begun: Instant::now() };
-        self.done.store(0, Ordering::Relaxed);
-        self.total.store(steps, Ordering::Relaxed);
-        // A part that cannot be counted must at least be named, however soon it comes after the last picture.
-        self.drawn.fetch_min(
-            self.drawn.load(Ordering::Relaxed).saturating_sub(REDRAW.as_millis() as u64),
-            Ordering::Relaxed,
-        );
-        self.draw(0);
-    }
-
-    /// One step is done.
-    pub fn step(&self) {
-        self.add(1);
-    }
-
-    /// Several steps are done.
-    pub fn add(&self, steps: u64) {
-        let before = self.done.fetch_add(steps, Ordering::Relaxed);
-        self.draw(before.saturating_add(steps));
-    }
-
-    /// So many steps are done by now.
-    pub fn set(&self, done: u64) {
-        self.done.store(done, Ordering::Relaxed);
-        self.draw(done);
     }
 
     fn draw(&self, done: u64) {
@@ -134,13 +99,42 @@ impl Progress {
     }
 }
 
-impl Default for Progress {
+impl Progress for ProgressLine {
+    fn total(&self, steps: u64) {
+        self.total.store(steps, Ordering::Relaxed);
+    }
+
+    fn stage(&self, name: &str, steps: u64) {
+        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) =
+            Stage { what: name.to_owned(), begun: Instant::now() };
+        self.done.store(0, Ordering::Relaxed);
+        self.total.store(steps, Ordering::Relaxed);
+        // A part that cannot be counted must at least be named, however soon it comes after the last picture.
+        self.drawn.fetch_min(
+            self.drawn.load(Ordering::Relaxed).saturating_sub(REDRAW.as_millis() as u64),
+            Ordering::Relaxed,
+        );
+        self.draw(0);
+    }
+
+    fn add(&self, steps: u64) {
+        let before = self.done.fetch_add(steps, Ordering::Relaxed);
+        self.draw(before.saturating_add(steps));
+    }
+
+    fn set(&self, done: u64) {
+        self.done.store(done, Ordering::Relaxed);
+        self.draw(done);
+    }
+}
+
+impl Default for ProgressLine {
     fn default() -> Self {
         Self::silent()
     }
 }
 
-impl Drop for Progress {
+impl Drop for ProgressLine {
     fn drop(&mut self) {
         if self.drawn.load(Ordering::Relaxed) > 0 {
             let _ = std::io::stderr().lock().write_all(b"\r\x1b[K");
@@ -213,7 +207,7 @@ mod tests {
 
     #[test]
     fn a_new_stage_counts_anew() {
-        let progress = Progress::silent();
+        let progress = ProgressLine::silent();
         progress.stage("first", 3);
         progress.add(3);
         progress.stage("second", 5);
@@ -224,7 +218,7 @@ mod tests {
 
     #[test]
     fn steps_are_counted_from_several_threads() {
-        let progress = Progress::silent();
+        let progress = ProgressLine::silent();
         std::thread::scope(|scope| {
             for _ in 0..4 {
                 scope.spawn(|| (0..1000).for_each(|_| progress.step()));

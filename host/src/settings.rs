@@ -19,8 +19,9 @@ use std::path::{Path, PathBuf};
 use clap::{Arg, ArgAction, Command};
 use toml::de::{DeTable, DeValue};
 
-use crate::error::{Code, Error, Result, nearest};
-use crate::toml_words::toml_error;
+use crate::error::HostCode;
+use pam_data::error::{Error, Result, nearest};
+use pam_data::toml_words::toml_error;
 
 /// The name of the file.
 pub const NAME: &str = "pam.toml";
@@ -77,7 +78,7 @@ fn probe(arg: &Arg, value: &str) -> std::result::Result<(), String> {
 /// Files that count here, the one that yields first.
 ///
 /// # Errors
-/// [`Code::FileUnreadable`] when `PAM_SETTINGS` names a file that is not there.
+/// [`DataCode::FileUnreadable`] when `PAM_SETTINGS` names a file that is not there.
 pub fn files() -> Result<Vec<PathBuf>> {
     if let Some(named) = std::env::var_os("PAM_SETTINGS") {
         if named.is_empty() {
@@ -103,12 +104,12 @@ pub fn files() -> Result<Vec<PathBuf>> {
 /// Reads the settings of a file for a command line.
 ///
 /// # Errors
-/// [`Code::FileUnreadable`]; [`Code::SettingsInvalid`] with the line for text that is no TOML, an option that no command has, a
+/// [`DataCode::FileUnreadable`]; [`HostCode::SettingsInvalid`] with the line for text that is no TOML, an option that no command has, a
 /// value that it cannot take.
 pub fn read(file: &Path, command: &Command) -> Result<Vec<Setting>> {
     let text = std::fs::read_to_string(file).map_err(|e| Error::unreadable(file, &e))?;
     let parsed = DeTable::parse(&text).map_err(|e| {
-        toml_error(Code::SettingsInvalid, &text, &e)
+        toml_error(HostCode::SettingsInvalid, &text, &e)
             .file(file)
             .help("`host settings --example` prints a file to begin with")
     })?;
@@ -129,7 +130,7 @@ impl Reading<'_> {
     }
 
     fn wrong(&self, at: usize, key: &str, cause: impl Into<String>) -> Error {
-        Error::new(Code::SettingsInvalid, cause).file(self.file).line(self.line(at)).column(key)
+        Error::new(HostCode::SettingsInvalid, cause).file(self.file).line(self.line(at)).column(key)
     }
 
     /// `path` names the commands from the program down to `command`.
@@ -400,7 +401,7 @@ mod tests {
             let error = of(text).unwrap_err();
             assert_eq!(
                 (error.code(), error.place().line),
-                (Code::SettingsInvalid, Some(line)),
+                (HostCode::SettingsInvalid.into(), Some(line)),
                 "{text}: {error}"
             );
             assert!(error.advice().unwrap_or_default().contains(said), "{text}: {:?}", error.advice());

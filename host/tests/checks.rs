@@ -4,11 +4,11 @@ mod bench_campaign;
 
 use std::path::PathBuf;
 
-use host::bench::BenchName;
-use host::checks::Checks;
-use host::diagnose::{Diagnosis, Options, diagnose};
-use host::muscle_description::MuscleDescription;
-use host::recording::Campaign;
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::Campaign;
+use pam_diagnose::{Diagnosis, Options, diagnose};
+use pam_fit::bench::BenchName;
+use pam_fit::checks::Checks;
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::checks::all;
 use virtual_bench::muscle::Muscle;

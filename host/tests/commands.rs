@@ -97,7 +97,7 @@ fn every_json_names_its_schema() {
     let rows: String = (0..12).map(|i| format!("{i},300,{0},{1}\n", 0.1 * f64::from(i), 50 - i)).collect();
     write("a.csv", &format!("time_s,pressure_kPa,displacement_mm,force_N\n{rows}"));
     let table =
-        host::table_file::TableFile { table: model_core::table::example(), about: Default::default() };
+        pam_fit::table_file::TableFile { table: model_core::table::example(), about: Default::default() };
     table.write(folder.path().join("t.pam")).unwrap();
     for (call, schema) in [
         ("effects --json", "pam-effects/1"),

@@ -7,11 +7,11 @@ use std::process::{Command, Output};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use host::device::recorder::side_file;
-use host::emulated::{Emulated, Kind, Mishap, Stand};
-use host::recording::Reader;
-use host::table_file::{About, TableFile};
 use model_core::units::Pressure;
+use pam_data::recording::Reader;
+use pam_device::emulated::{Emulated, Kind, Mishap, Stand};
+use pam_device::recorder::side_file;
+use pam_fit::table_file::{About, TableFile};
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::plant::Motion;
 use virtual_bench::presets;

@@ -7,14 +7,14 @@ mod bench_campaign;
 
 use std::collections::BTreeMap;
 
-use host::bench::{Candidate, Span};
-use host::fit;
-use host::muscle_description::MuscleDescription;
-use host::recording::segment::Motion;
-use host::recording::{Campaign, Follower, Recording};
 use model_core::effects::{Context, MEMORY};
 use model_core::muscle::Muscle as Model;
 use model_core::units::{Length, Pressure};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::segment::Motion;
+use pam_data::recording::{Campaign, Follower, Recording};
+use pam_fit::bench::{Candidate, Span};
+use pam_fit::fit;
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::Muscle;

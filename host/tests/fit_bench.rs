@@ -1,8 +1,8 @@
 //! The fit on muscles of other physics than its own: the virtual bench's, which store energy in a hyperelastic tube.
 
-use host::band::ForceBand;
-use host::fit::other_length::unseen_length;
-use host::fit::{Options, fit, result::Fit};
+use pam_evaluate::other_length::unseen_length;
+use pam_fit::band::ForceBand;
+use pam_fit::fit::{Options, fit, result::Fit};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::Muscle;
 use virtual_bench::presets;
@@ -104,8 +104,8 @@ fn without_blocked_force_the_interval_of_the_deadband_holds_the_truth() {
 fn joined(fitted: &Fit, pressure: f64, stroke: f64) -> f64 {
     let m4 = fitted.models.iter().find(|m| m.name == "m4").expect("a model");
     let levels = &fitted.prepared.pressures.levels;
-    let phi = host::fit::basis::PressureBasis::new(levels).at(pressure);
-    let columns = host::fit::basis::columns(&fitted.prepared.braid, stroke);
+    let phi = pam_fit::fit::basis::PressureBasis::new(levels).at(pressure);
+    let columns = pam_fit::fit::basis::columns(&fitted.prepared.braid, stroke);
     let mut force = (pressure - fitted.prepared.deadband()) * columns.area;
     for (name, group, value) in &m4.constants {
         let Some(g) = group else { continue };
@@ -160,8 +160,8 @@ fn stated_intervals_cover() {
     let options = Options { order: 2, ..Options::default() };
     let truth = fit(&base, &muscle, &options).expect("a fit");
     // The truth is the model itself on the recording's motion; what is left after a turn is the model's too.
-    let table = host::fit::hold_out::as_file(&truth);
-    let clean = host::predict::predict(&table, &base).expect("a prediction");
+    let table = pam_evaluate::hold_out::as_file(&truth);
+    let clean = pam_fit::predict::predict(&table, &base).expect("a prediction");
     let (mut inside, mut all) = (0, 0);
     let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
     let mut uniform = || {
@@ -187,7 +187,7 @@ fn stated_intervals_cover() {
             // The force at half the free stroke stands for the curve: single E_k trade with each other.
             let x = 0.5 * t.free_contraction.expect("a free contraction") * muscle.rest_length();
             let p = fitted.prepared.pressures.levels[i];
-            let mut with_band = host::fit::hold_out::as_file(&fitted);
+            let mut with_band = pam_evaluate::hold_out::as_file(&fitted);
             with_band.about.uncertainty = Some(fitted.stored_uncertainty());
             let band = ForceBand::of(&with_band).expect("a band").std(p, x, 0.0);
             for (off, std) in [

@@ -5,9 +5,9 @@
 use std::fmt::Write;
 use std::fs;
 
-use host::fit::{Options, fit, result::Fit};
-use host::muscle_description::MuscleDescription;
-use host::recording::{Campaign, Import, Reader, Recording};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::{Campaign, Import, Reader, Recording};
+use pam_fit::fit::{Options, fit, result::Fit};
 use proptest::prelude::*;
 use virtual_bench::presets;
 
@@ -227,8 +227,8 @@ proptest! {
             Ok(fitted) => {
                 prop_assert!(fitted.table.check().is_ok());
                 prop_assert!(fitted.summary.rms_N.is_finite() && fitted.summary.mean_error_pct.is_finite());
-                let bytes = host::fit::hold_out::as_file(&fitted).to_bytes().expect("a file");
-                prop_assert!(host::table_file::TableFile::from_bytes(&bytes).is_ok());
+                let bytes = pam_evaluate::hold_out::as_file(&fitted).to_bytes().expect("a file");
+                prop_assert!(pam_fit::table_file::TableFile::from_bytes(&bytes).is_ok());
             }
             Err(e) => prop_assert!(e.advised() && !e.cause().is_empty(), "{e}"),
         }

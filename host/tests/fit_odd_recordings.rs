@@ -6,12 +6,12 @@
 
 use std::f64::consts::PI;
 
-use host::diagnose::{self, diagnose};
-use host::fit::{Options, fit, result::Fit};
-use host::muscle_description::MuscleDescription;
-use host::predict::{predict, to_csv};
-use host::recording::{Campaign, Reader, Recording};
-use host::table_file::{About, TableFile};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::{Campaign, Reader, Recording};
+use pam_diagnose::diagnose;
+use pam_fit::fit::{Options, fit, result::Fit};
+use pam_fit::predict::{predict, to_csv};
+use pam_fit::table_file::{About, TableFile};
 
 const REST: f64 = 39.16e-3;
 const DEADBAND: f64 = 76.5e3;
@@ -208,7 +208,7 @@ fn a_gauge_that_falls_out_does_no_harm() {
     assert_eq!(remark(&foretold.warnings).as_ref(), Some(&said));
 
     let answer =
-        |campaign| diagnose(campaign, &description().geometry(), &diagnose::Options::default()).unwrap();
+        |campaign| diagnose(campaign, &description().geometry(), &pam_diagnose::Options::default()).unwrap();
     let (with, without) = (answer(&spoiled), answer(&clean));
     assert_eq!((with.verdict, with.missing.len()), (without.verdict, without.missing.len()));
     assert!((with.misfit_rms_N / without.misfit_rms_N - 1.0).abs() < 0.05, "{} N", with.misfit_rms_N);
@@ -236,7 +236,7 @@ fn a_recording_in_another_unit_does_no_harm() {
     assert!((foretold.rms.unwrap() / rms - 1.0).abs() < 0.1, "{:?} N beside {rms} N", foretold.rms);
     assert_eq!(remark(&foretold.warnings).as_ref(), Some(&said));
 
-    let answer = diagnose(&campaign, &description().geometry(), &diagnose::Options::default()).unwrap();
+    let answer = diagnose(&campaign, &description().geometry(), &pam_diagnose::Options::default()).unwrap();
     assert_eq!((answer.missing.len(), remark(&answer.remarks)), (0, Some(said)));
 }
 

@@ -5,14 +5,14 @@
 
 use std::path::{Path, PathBuf};
 
-use host::fit::nodes::pressures;
-use host::fit::other_length::unseen_length;
-use host::fit::points::points;
-use host::fit::{Options, fit};
-use host::muscle_description::MuscleDescription;
-use host::recording::dropouts::Screened;
-use host::recording::segment::Motion;
-use host::recording::{Campaign, Clock, Import, Reader};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::dropouts::Screened;
+use pam_data::recording::segment::Motion;
+use pam_data::recording::{Campaign, Clock, Import, Reader};
+use pam_evaluate::other_length::unseen_length;
+use pam_fit::fit::nodes::pressures;
+use pam_fit::fit::points::points;
+use pam_fit::fit::{Options, fit};
 
 fn project() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()

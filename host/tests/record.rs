@@ -3,7 +3,7 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)] // what fails here fails the test
 
-#[path = "common/line.rs"]
+#[path = "../device/tests/common/line.rs"]
 mod line;
 
 use std::net::{Shutdown, TcpStream};
@@ -11,10 +11,10 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use host::device::Address;
-use host::device::recorder::side_file;
-use host::emulated::{Emulated, Kind, Stand};
-use host::recording::{Reader, Recording};
+use pam_data::recording::{Reader, Recording};
+use pam_device::Address;
+use pam_device::emulated::{Emulated, Kind, Stand};
+use pam_device::recorder::side_file;
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::plant::Motion;
 use virtual_bench::presets;

@@ -42,7 +42,8 @@
 //! assert!(more > 1.0e3 && more < 30.0e3, "{more} Pa");
 //! ```
 //!
-//! Adding an effect: write its file, and add it to the list below.
+//! Adding an effect: write its file, and add it to the list below. The file holds the equations, what they mean ([`Info`]) and what a
+//! diagnosis has to know ([`Traits`]).
 
 use crate::fields::{Fields, Walk, fields};
 use crate::scalar::Scalar;
@@ -52,6 +53,7 @@ mod chain;
 mod context;
 mod fading;
 mod list;
+mod traits;
 mod travel;
 mod work;
 
@@ -83,6 +85,7 @@ mod viscous_damping;
 pub use chain::Chain;
 pub use context::Context;
 pub use fading::{Fading, decay};
+pub use traits::{BenchCheck, Experiment, Imitates, Traits, Vented};
 pub use travel::{BraidTravel, stroke_direction};
 
 crate::effect_list! {
@@ -168,6 +171,19 @@ pub enum Role {
     Shape,
 }
 
+/// The axis of the recordings on which a shape parameter lives, so that they limit its range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// None: its range is its own.
+    Own,
+    /// The campaign's time: it is a change point.
+    Time,
+    /// The contractions that were reached.
+    Contraction,
+    /// The length of the travel.
+    Travel,
+}
+
 /// One parameter of an effect, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
@@ -183,6 +199,8 @@ pub struct Parameter {
     pub high: f64,
     /// What it does to the force.
     pub role: Role,
+    /// The axis of the recordings that it lives on.
+    pub axis: Axis,
 }
 
 impl Parameter {
@@ -194,7 +212,7 @@ impl Parameter {
         low: f64,
         high: f64,
     ) -> Self {
-        Self { letter, name, unit, low, high, role: Role::Amplitude }
+        Self { letter, name, unit, low, high, role: Role::Amplitude, axis: Axis::Own }
     }
     /// A parameter that shapes the force.
     pub const fn shape(
@@ -204,7 +222,12 @@ impl Parameter {
         low: f64,
         high: f64,
     ) -> Self {
-        Self { letter, name, unit, low, high, role: Role::Shape }
+        Self { letter, name, unit, low, high, role: Role::Shape, axis: Axis::Own }
+    }
+    /// The same on an axis of the recordings.
+    #[must_use]
+    pub const fn along(self, axis: Axis) -> Self {
+        Self { axis, ..self }
     }
 }
 
@@ -275,6 +298,8 @@ pub type Memory<T> = [T; MEMORY];
 pub trait Effect {
     /// What it is.
     const INFO: Info;
+    /// What a diagnosis has to know of it.
+    const TRAITS: Traits;
     /// Lets time pass: `memory` goes from the last moment to this one.
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         let _ = (parameters, context, memory);

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How long a diagnosis against the whole library takes: writes diagnose.md next to it.
+"""Measures the time of a diagnosis with all candidates, and writes diagnose.md.
 
     python3 tests/benchmarks/diagnose.py [ROWS]       a million unless told otherwise
 
@@ -19,12 +19,12 @@ environment.enter()
 
 from measure import COSTS, Bound, finish, run  # noqa: E402
 
-# Rows of the campaign per sample a second.
+# Rows of the campaign per hertz of sampling rate.
 ROWS_PER_HERTZ = 1582.3
 
 
 def made(bench: Path, folder: Path, rows: int) -> tuple[list[Path], int, float]:
-    """A campaign of about so many rows: its files, its rows and its size in MB."""
+    """A campaign of about this many rows: its files, its rows, and its size in MB."""
     hertz = f"{rows / ROWS_PER_HERTZ:.2f}"
     asked = ["record", "--muscle", "contractile", "--protocol", "D", "--cell-gain", "0.03", "--sample-hz", hertz]
     subprocess.run([bench, *asked, "-o", folder], check=True, capture_output=True)

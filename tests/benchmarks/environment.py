@@ -1,4 +1,4 @@
-"""The peers' own Python: made once under target/, entered by every benchmark."""
+"""The Python environment of the compared programs: created once under target/ and used by every benchmark."""
 
 import os
 import subprocess
@@ -12,7 +12,7 @@ PLACE = ROOT / "target" / "benchmarks-python"
 
 
 def enter() -> None:
-    """Starts the script again in an environment that has what requirements.txt names, made at the first call."""
+    """Restarts the script in an environment with the packages of requirements.txt, created in the first call."""
     python = PLACE / "bin" / "python"
     if Path(sys.prefix) == PLACE:
         return
@@ -26,6 +26,6 @@ def enter() -> None:
 
 
 def built(*arguments: str) -> Path:
-    """Builds a release program of `host` and gives the folder it is in."""
+    """Builds `host` in release mode and returns its folder."""
     subprocess.run(["cargo", "build", "--release", "--quiet", "--package", "host", *arguments], cwd=ROOT, check=True)
     return ROOT / "target" / "release"

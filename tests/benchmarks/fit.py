@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How fast the fit is, beside the programs that do parts of it: writes fit.md next to it.
+"""Compares the speed of the fit with programs that do parts of it, and writes fit.md.
 
     python3 tests/benchmarks/fit.py [ROWS]        10 million unless told otherwise
 
@@ -44,7 +44,7 @@ def points(path: Path):
 
 
 def objective(p, x, f, w):
-    """Eq. 23 of one pressure as a function of the E_k in MPa. Columns are computed once: the peers' best case."""
+    """Eq. 23 of one pressure as a function of the E_k in MPa. Columns are computed once, which is the best case for the compared programs."""
     g, c = muscle.parts(x)
     c, rest = 1e6 * c * w[:, None], (f - (p - muscle.P0) * g) * w
     return lambda e: np.sum((c @ e - rest) ** 2)
@@ -65,13 +65,13 @@ def solved(data):
 
 
 def excess(data, moduli) -> float:
-    """By how much the objective exceeds the least one, in shares of it; the worst pressure."""
+    """Relative excess of the objective over the smallest one, at the worst pressure."""
     least = solved(data)
     return max(objective(*of)(e) / objective(*of)(b) - 1 for of, e, b in zip(data, moduli, least))
 
 
 def best(call, count):
-    """The least processor time of some calls: on a machine that others use, the wall time of a long call is theirs too."""
+    """The smallest processor time of some calls: on a shared machine, the wall time of a long call includes other programs."""
     least, out = np.inf, None
     for _ in range(count):
         start = time.process_time()

@@ -9,15 +9,15 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 
-# A reader in a process of its own says what the reading alone took: starting Python and importing is not held against it.
+# A reader in a separate process reports the time of reading alone, without the start of Python and imports.
 PEER = """import {0} as m, sys, time
 wall, processor = time.perf_counter(), time.process_time()
 m.read_csv(sys.argv[1])
 print(time.perf_counter() - wall, time.process_time() - processor)
 """
 
-# Linux counts what a process held before it became another program as that program's memory, so that a small program started by
-# a large one seems as large. This one is small; it starts the program to be measured, and tells what that took.
+# Linux counts the memory of a process before `exec` as that of the new program, so that a small program started by a large one appears
+# as large. This launcher is small; it starts the measured program and reports its usage.
 LAUNCHER = """import os, sys, time
 start = time.perf_counter()
 child = os.posix_spawnp(sys.argv[1], sys.argv[1:], os.environ)
@@ -36,14 +36,14 @@ class Cost:
     """Largest, MB."""
 
     def least(self, other: "Cost") -> "Cost":
-        """Whatever else the machine does only adds."""
+        """The smallest value, because other programs can only add to it."""
         return Cost(
             min(self.wall, other.wall), min(self.processor, other.processor), min(self.memory, other.memory)
         )
 
 
 def run(command: list[str], says_seconds: bool = False) -> Cost:
-    """One run, in a process of its own. Where the program prints wall and processor seconds of its own work, they count."""
+    """One run, in a separate process. If the program prints wall and processor seconds of its own work, these are used."""
     launcher = [sys.executable, "-I", "-S", "-c", LAUNCHER, *map(str, command)]
     done = subprocess.run(launcher, capture_output=True, text=True)
     if done.returncode != 0:
@@ -56,7 +56,7 @@ def run(command: list[str], says_seconds: bool = False) -> Cost:
 
 
 def rounds(programs: dict[str, tuple[list[str], bool]], count: int) -> dict[str, Cost]:
-    """The programs in turn, `count` times, so that a busy minute of the machine meets all of them; the least of each."""
+    """Runs the programs in turn, `count` times, so that a busy period of the machine affects all of them; returns the smallest of each."""
     best: dict[str, Cost] = {}
     for _ in range(count):
         for name, (command, says_seconds) in programs.items():
@@ -87,7 +87,7 @@ def machine(packages: tuple[str, ...]) -> str:
                 break
     except OSError:
         pass
-    # Whoever else works on the machine shows in wall times first.
+    # Other programs on the machine affect wall times first.
     load = f"load {os.getloadavg()[0]:.1f}"
     versions = "".join(f", {p} {version(p)}" for p in packages)
     return f"{os.cpu_count()} cores, {model}, {load}; Python {platform.python_version()}{versions}."
@@ -114,7 +114,7 @@ COSTS = ["| rows | file | program | wall | processor | memory |", "| ---: | ---:
 
 
 def table(programs, most: int, costs: dict[int, dict[str, Cost]]):
-    """Programs on recordings of a hundredth, a tenth and all of `most` rows: a line of the page for each, and its cost in `costs`.
+    """Runs programs on recordings of 1 %, 10 %, and 100 % of `most` rows: a line of the page for each, and its cost in `costs`.
 
     `programs` makes them for a file."""
     yield from COSTS
@@ -130,7 +130,7 @@ def table(programs, most: int, costs: dict[int, dict[str, Cost]]):
 
 
 def linear(costs: dict[int, dict[str, Cost]], name: str) -> list[Bound]:
-    """Time and memory grow no faster than the rows do."""
+    """Time and memory grow no faster than the number of rows."""
     most = max(costs)
     full, tenth = costs[most][name], costs[most // 10][name]
     return [
@@ -143,7 +143,7 @@ PEERS = ("numpy", "scipy", "polars", "pandas")
 
 
 def finish(script: str, title: str, lines: list[str], bounds: list[Bound], packages: tuple[str, ...] = PEERS) -> None:
-    """Writes the page beside the script, with the versions of the packages that took part, and ends with 1 where a bound is missed."""
+    """Writes the page next to the script, with the versions of the packages, and exits with 1 if a bound is missed."""
     script = Path(script).name
     page = [f"# {title}", "", *lines, "", "## Bounds", "", "| | bound | measured | met |", "| --- | --- | ---: | --- |"]
     page += [*map(str, bounds), "", f"{machine(packages)} Written by tests/benchmarks/{script}."]

@@ -1,4 +1,4 @@
-"""The thesis's miniature muscle as numpy has it, and recordings of it.
+"""The thesis's miniature muscle in NumPy, and recordings of it.
 
     python3 muscle.py PATH ROWS     writes one CSV of triangular loops at six pressures, with friction and noise
 """
@@ -43,7 +43,7 @@ def quasi(p, x):
 
 
 def stroke(p):
-    """How far the muscle is let contract at a pressure, m."""
+    """Largest stroke at a pressure, m."""
     return TOP * (p - P0) / (LEVELS[-1] - P0)
 
 

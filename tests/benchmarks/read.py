@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How fast recordings are read, beside polars and pandas on the same file: writes read.md next to it.
+"""Compares the speed of reading a recording with polars and pandas on the same file, and writes read.md.
 
     python3 tests/benchmarks/read.py [ROWS]       10 million unless told otherwise
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""The live page of `host studio` for an hour at 1 kHz, in a real headless Chromium on an emulated controller.
+"""Runs the live page of `host studio` for an hour at 1 kHz, in headless Chromium with an emulated controller.
 
-    python3 tests/benchmarks/studio.py                     # an hour; writes studio.md beside this script
-    python3 tests/benchmarks/studio.py --minutes 2         # a look; writes nothing
-    python3 tests/benchmarks/studio.py --on native         # the firmware as a library, where QEMU is too slow for 1 kHz on this machine
-    python3 tests/benchmarks/studio.py --shots FOLDER      # the page photographed at the end, light and dark, wide and phone
-    python3 tests/benchmarks/studio.py --program FILE      # another `host` than the release build
+    python3 tests/benchmarks/studio.py                     # an hour; writes studio.md next to this script
+    python3 tests/benchmarks/studio.py --minutes 2         # a short run; writes nothing
+    python3 tests/benchmarks/studio.py --on native         # the firmware as a library, if QEMU is too slow for 1 kHz on this machine
+    python3 tests/benchmarks/studio.py --shots FOLDER      # screenshots of the page at the end, light and dark, wide and phone
+    python3 tests/benchmarks/studio.py --program FILE      # a `host` other than the release build
 
 A sine of force runs for the whole time; four live pictures are drawn, force against stroke among them. Every ten seconds: how far
 apart the pictures were and what drawing took, how far the page is behind the controller, samples received and missing, the
@@ -29,8 +29,8 @@ from environment import built
 
 INTERVAL = 10.0
 
-# Notes what the page's own code does: nothing of it is replaced, each call is only timed. Samples are counted by their own times, so
-# that one that the page never saw is seen to be missing whoever lost it.
+# Records what the code of the page does: nothing is replaced, each call is only timed. Samples are counted by their own times, so that a
+# sample lost anywhere on its way is detected.
 WATCH = """
     window.seen = null;
     window.anew = () => { seen = {gaps: [], draws: [], late: [], long: [], samples: 0, missing: 0}; };
@@ -57,7 +57,7 @@ WATCH = """
     new PerformanceObserver((list) => { for (const e of list.getEntries()) seen.long.push(e.duration); }).observe({entryTypes: ["longtask"]});
 """
 
-# What was noted since the last time.
+# The records since the last query.
 REPORT = """
     const s = seen; anew();
     const sorted = (a) => a.sort((x, y) => x - y), at = (a, q) => a.length ? a[Math.min(a.length - 1, Math.floor(q * a.length))] : 0;
@@ -74,7 +74,7 @@ def program_memory(pid):
 
 
 def watch(page, pid, minutes):
-    """A row for every ten seconds."""
+    """One row per ten seconds."""
     page.js(WATCH)
     page.js("anew()")
     rows, began, last = [], time.time(), time.time()
@@ -96,7 +96,7 @@ def watch(page, pid, minutes):
 
 
 def page_of(rows):
-    """The page's lines: one for each tenth of the time."""
+    """The lines of the page: one for each tenth of the time."""
     yield "| until | pictures a second | apart: median, 99 %, most | drawing: median, 99 % | samples a second | missing | page | program | load |"
     yield "| ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
     # The lateness of the first interval is the clock's zero: the controller's clock and the page's begin at different times.
@@ -118,7 +118,7 @@ def bounds_of(rows):
     seconds = sum(r["seconds"] for r in rows)
     third = max(1, len(rows) // 3)
     grown = lambda key, of: of(r[key] for r in rows[-third:]) - of(r[key] for r in rows[:third])
-    # The clocks' difference is unknown; what the page is behind is counted from its least.
+    # The offset between the clocks is unknown; the delay of the page is counted from its minimum.
     drift = statistics.median(r["late50"] for r in rows[-third:]) - statistics.median(r["late50"] for r in rows[:third])
     return [
         measure.Bound("samples missing or lost", sum(r["missing"] for r in rows) + rows[-1]["lost"], 0),

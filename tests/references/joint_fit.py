@@ -1,4 +1,4 @@
-"""P0, E_k and k_F of all pressures at once, by SciPy: the reference for host/tests/fit_references.rs.
+"""P0, E_k, and k_F of all pressures together, with SciPy: the reference for host/tests/fit_references.rs.
 
     python3 tests/references/joint_fit.py       writes joint_fit_points.csv and joint_fit.csv next to it
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Reference numbers for the fit, by numpy and SciPy: the thesis's M = 4 at each pressure by itself.
+"""Reference numbers for the fit, with NumPy and SciPy: the thesis's M = 4 at each pressure separately.
 
 Writes `separate_fits_points.csv` (mid-line points of a muscle whose wall is a hyperelastic tube, differentiated numerically)
 and `separate_fits.csv` (E_1..E_4 in MPa by numpy.linalg.lstsq on scaled columns, and the largest residual in N).

@@ -5,18 +5,19 @@
 use std::ffi::CString;
 use std::path::PathBuf;
 
-use host::band::{ForceBand, HALF_95};
-use host::counted::counted;
-use host::diagnose as diagnosis;
-use host::error::{Code, Error};
-use host::fit::Options;
-use host::fit::result::Fit as HostFit;
-use host::muscle_description::{Kind, MuscleDescription};
-use host::possible::{self, Contractions};
-use host::predict::{Predicted, beyond, predict as host_predict, predict_with_bands};
-use host::recording::{Campaign as HostCampaign, Import, Reader, Recording as HostRecording};
-use host::report::{Page, diagnose_page, fit_page};
-use host::table_file::{self, About, TableFile};
+use pam_fit::band::{ForceBand, HALF_95};
+use pam_data::date;
+use pam_data::counted::counted;
+use pam_diagnose as diagnosis;
+use pam_data::error::{DataCode, Error};
+use pam_fit::fit::Options;
+use pam_fit::fit::result::Fit as HostFit;
+use pam_data::muscle_description::{Kind, MuscleDescription};
+use pam_data::possible::{self, Contractions};
+use pam_fit::predict::{Predicted, beyond, predict as host_predict, predict_with_bands};
+use pam_data::recording::{Campaign as HostCampaign, Import, Reader, Recording as HostRecording};
+use pam_report::{Page, diagnose_page, fit_page};
+use pam_fit::table_file::{self, About, TableFile};
 use model_core::muscle::Muscle as Model;
 use model_core::units::{Length, Pressure};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
@@ -51,7 +52,7 @@ fn raised(error: Error) -> PyErr {
 }
 
 fn wrong(text: impl Into<String>) -> PyErr {
-    raised(Error::new(Code::CallInvalid, text).help("help() of the function shows what it takes"))
+    raised(Error::new(DataCode::CallInvalid, text).help("help() of the function shows what it takes"))
 }
 
 /// Anything that numpy takes for a column of numbers.
@@ -60,7 +61,7 @@ fn column(name: &str, values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let shape: Vec<usize> = array.getattr("shape")?.extract()?;
     if shape.len() != 1 {
         return Err(raised(
-            Error::new(Code::CallInvalid, format!("`{name}` has {} dimensions", shape.len()))
+            Error::new(DataCode::CallInvalid, format!("`{name}` has {} dimensions", shape.len()))
                 .help("give a one-dimensional array, one number a row"),
         ));
     }
@@ -75,12 +76,12 @@ fn numbers<'py>(name: &str, values: &Bound<'py, PyAny>) -> PyResult<Bound<'py, P
     // numpy would drop the imaginary parts with no more than a warning.
     if numpy.call_method1("iscomplexobj", (values,))?.is_truthy()? {
         return Err(raised(
-            Error::new(Code::CallInvalid, format!("`{name}` holds complex numbers")).help("give its real part"),
+            Error::new(DataCode::CallInvalid, format!("`{name}` holds complex numbers")).help("give its real part"),
         ));
     }
     numpy.call_method1("asarray", (values, "float64")).map_err(|e| {
         raised(
-            Error::new(Code::CallInvalid, format!("`{name}` is no array of numbers: {}", e.value(py))).help(
+            Error::new(DataCode::CallInvalid, format!("`{name}` is no array of numbers: {}", e.value(py))).help(
                 "give a numpy array, a list or a column of a data frame; missing values are not filled in",
             ),
         )
@@ -311,7 +312,7 @@ fn read(
 }
 
 fn write_report(page: &Page, path: &PathBuf) -> PyResult<()> {
-    host::output::write_whole(path, page.html().as_bytes()).map_err(raised)
+    pam_data::output::write_whole(path, page.html().as_bytes()).map_err(raised)
 }
 
 /// What a table says of one recording.
@@ -487,7 +488,7 @@ fn over<'py>(
     };
     let same = numpy.call_method1("broadcast_arrays", (pressure, stroke, direction)).map_err(|e| {
         raised(
-            Error::new(Code::CallInvalid, format!("the arrays do not fit each other: {}", e.value(py)))
+            Error::new(DataCode::CallInvalid, format!("the arrays do not fit each other: {}", e.value(py)))
                 .help("pressure, stroke and direction are numbers or arrays of one shape"),
         )
     })?;
@@ -532,7 +533,7 @@ impl Fit {
     fn table(&self) -> Table {
         let about = About {
             muscle: self.fit.summary.muscle.clone(),
-            date: table_file::now_utc(),
+            date: date::now_utc(),
             tool: format!("pamtools {}", env!("CARGO_PKG_VERSION")),
             fit: self.fit.summary.quality(),
             uncertainty: Some(self.fit.stored_uncertainty()),
@@ -586,7 +587,7 @@ fn fit(
         ..Options::default()
     };
     let (campaign, muscle) = (campaign.0.clone(), muscle.0.clone());
-    let fit = py.detach(|| host::fit::fit(&campaign, &muscle, &options)).map_err(raised)?;
+    let fit = py.detach(|| pam_fit::fit::fit(&campaign, &muscle, &options)).map_err(raised)?;
     Ok(Fit { fit, campaign, options })
 }
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs the bindings from this checkout into an environment of its own by pip, as a user would, and runs their notebook on
-# recordings of the virtual bench. Without optimisation across crates, so that it takes its share of the suite's time only.
+# Installs the bindings from this checkout into a temporary environment with pip, as a user does, and runs their notebook on
+# recordings of the virtual bench. The build has no optimisation across crates, which keeps it short.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 root=$(cd "$here/../../.." && pwd)
@@ -11,12 +11,12 @@ fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 python3 -m venv "$work/env"
-# Build back-end and numpy come from the package index.
+# The build back-end and NumPy are from the package index.
 if ! "$work/env/bin/pip" --quiet download --no-deps --dest "$work/wheels" numpy; then
-    echo "host/python/tests/run.sh: skipped: no package index can be reached" >&2
+    echo "host/python/tests/run.sh: skipped: the package index is not available" >&2
     exit 0
 fi
-# The same folder as everything else is built in: crates that are built already serve again.
+# The build folder of the workspace, so that crates that are built already are reused.
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$root/target}
 "$work/env/bin/pip" install --quiet --find-links "$work/wheels" --config-settings=build-args='--profile dev' "$root/host/python"
 cargo run --quiet --locked --manifest-path "$root/Cargo.toml" -p virtual-bench -- record --muscle mini --protocol thesis -o "$work/bench"

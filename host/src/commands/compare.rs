@@ -6,14 +6,16 @@ use std::sync::Arc;
 use clap::Args;
 
 use super::reports::Reports;
-use crate::compare::compare;
 use crate::console::Console;
-use crate::error::{Code, Error, Result};
-use crate::muscle_description::MuscleDescription;
-use crate::output::{printed, to_standard_output};
-use crate::progress::Progress;
-use crate::recording::{Import, Reader};
-use crate::report::compare_page;
+use pam_data::compare::compare;
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::output::{printed, to_standard_output};
+use pam_data::progress::Progress;
+
+use crate::progress::ProgressLine;
+use pam_data::recording::{Import, Reader};
+use pam_report::compare_page;
 
 /// Arguments of `host compare`.
 #[derive(Debug, Args)]
@@ -50,19 +52,19 @@ impl Arguments {
         let taken = to_standard_output(&[("--json", printed(self.json)), ("--report", self.reports.file())])?;
         // Whoever asks for JSON is a program.
         let watched = if self.json { Console::silent() } else { console.clone() };
-        let progress = Arc::new(Progress::new(&watched, "reading"));
+        let progress = Arc::new(ProgressLine::new(&watched, "reading"));
         let sizes = [&self.a, &self.b].into_iter().filter_map(|f| std::fs::metadata(f).ok());
         progress.total(sizes.map(|m| m.len()).sum());
         let muscle = self.muscle.as_ref().map(MuscleDescription::read).transpose()?;
         let import = self.import.as_ref().map(Import::read).transpose()?;
         let one = |path: &PathBuf| {
             let mut reader = muscle.as_ref().map_or_else(Reader::new, Reader::of).import(import.as_ref());
-            reader.progress = Some(Arc::clone(&progress));
+            reader.progress = Some(progress.clone());
             let mut all = reader.file(path)?;
             if all.len() == 1 {
                 Ok(all.remove(0))
             } else {
-                Err(Error::new(Code::RecordingTooShort, "the file holds more than one recording")
+                Err(Error::new(DataCode::RecordingTooShort, "the file holds more than one recording")
                     .file(path)
                     .help(
                         "an import description with a group splits it; compare files of one recording each",

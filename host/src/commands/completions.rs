@@ -4,8 +4,8 @@ use clap::Args;
 use clap_complete::Shell;
 
 use crate::console::Console;
-use crate::error::Result;
-use crate::output::write_whole;
+use pam_data::error::Result;
+use pam_data::output::write_whole;
 
 /// Arguments of `host completions`.
 #[derive(Debug, Args)]

@@ -14,18 +14,21 @@ use crate::console::Console;
 use crate::demo::campaign::{Made, record};
 use crate::demo::page::{Story, page, rms};
 use crate::demo::tracking::{Law, Task, Track, choose, track};
-use crate::device::recorder::{Recorder, about_losses, about_start};
-use crate::device::{Client, regulator, tables};
-use crate::emulated::{Emulated, Kind, Stand};
-use crate::error::{Code, Error, Result};
-use crate::fit::result::Fit;
-use crate::fit::{Options, fit};
-use crate::muscle_description::MuscleDescription;
-use crate::output::write_whole;
-use crate::predict::predict;
-use crate::progress::Progress;
-use crate::recording::{Campaign, Reader};
-use crate::table_file::{self, About, TableFile};
+use pam_data::date;
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::output::write_whole;
+use pam_data::progress::Progress;
+use pam_device::emulated::{Emulated, Kind, Stand};
+use pam_device::recorder::{Recorder, about_losses, about_start};
+use pam_device::{Client, regulator, tables};
+use pam_fit::fit::result::Fit;
+use pam_fit::fit::{Options, fit};
+use pam_fit::predict::predict;
+
+use crate::progress::ProgressLine;
+use pam_data::recording::{Campaign, Reader};
+use pam_fit::table_file::{self, About, TableFile};
 
 /// Device seconds in a second: nobody should wait for what a real controller would take.
 const SPEED: u32 = 4;
@@ -153,7 +156,7 @@ impl Arguments {
         client.call_once::<SetSettings>(&settings)?;
         let mut buffer = [0; image::MAX_LEN];
         let image = image::write(&table.table, &mut buffer)
-            .map_err(|e| Error::new(Code::TableInvalid, e.to_string()))?;
+            .map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
         let kept = tables::write(&mut client, Side::Agonist, image, |_| ())?;
         let (major, minor, patch) = client.hello().release;
         let device =
@@ -186,7 +189,7 @@ impl Arguments {
         let gain = made.blocked_force / span.max(1.0);
         let mut tracks = Vec::new();
         let mut recordings = Vec::new();
-        let progress = Progress::new(console, "tracking");
+        let progress = ProgressLine::new(console, "tracking");
         progress.total(1000 * (Law::ALL.len() * Task::ALL.len()) as u64);
         for law in Law::ALL {
             choose(&mut client, law, gain)?;
@@ -257,7 +260,7 @@ fn fit_campaign(made: &Made, folder: &Path) -> Result<(MuscleDescription, Campai
     let hashes = made.recordings.iter().map(table_file::sha256).collect::<Result<Vec<_>>>()?;
     let about = About {
         muscle: muscle.name.clone(),
-        date: table_file::now_utc(),
+        date: date::now_utc(),
         tool: format!("host {} demo", env!("CARGO_PKG_VERSION")),
         sources: table_file::sources(&campaign, &made.recordings, hashes),
         fit: fitted.summary.quality(),
@@ -290,7 +293,10 @@ fn read_back(told: &Told, table: &TableFile, muscle: &MuscleDescription) -> Resu
         }
     }
     if rows == 0 {
-        return Err(Error::new(Code::RecordingTooShort, "no telemetry lies inside the table's tested range"));
+        return Err(Error::new(
+            DataCode::RecordingTooShort,
+            "no telemetry lies inside the table's tested range",
+        ));
     }
     Ok(((squares / f64::from(rows)).sqrt(), rows as usize))
 }

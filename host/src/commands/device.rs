@@ -15,7 +15,7 @@ use serde_json::json;
 
 use super::port::{Muscle, PortOption};
 use crate::console::Console;
-use crate::error::Result;
+use pam_data::error::Result;
 
 pub(crate) use settings::changed;
 

@@ -10,17 +10,20 @@ use model_core::muscle::Muscle;
 use super::effects;
 use super::recordings::Recordings;
 use super::reports::Reports;
-use crate::checks::Checks;
 use crate::console::Console;
-use crate::diagnose::{self, Options, advise, model, summary::summary};
-use crate::error::Result;
-use crate::muscle_description::MuscleDescription;
-use crate::output::{to_standard_output, write_whole};
-use crate::predict::predict;
-use crate::progress::Progress;
-use crate::recording::Reader;
-use crate::report::diagnose_page;
-use crate::table_file::{self, TableFile};
+use pam_data::date;
+use pam_data::error::Result;
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::output::{to_standard_output, write_whole};
+use pam_data::progress::SharedProgress;
+use pam_diagnose::{Options, advise, model, summary::summary};
+use pam_fit::checks::Checks;
+use pam_fit::predict::predict;
+
+use crate::progress::ProgressLine;
+use pam_data::recording::Reader;
+use pam_fit::table_file::{self, TableFile};
+use pam_report::diagnose_page;
 
 /// Arguments of `host diagnose`.
 #[derive(Debug, Args)]
@@ -82,10 +85,10 @@ impl Arguments {
         }
         let table = self.table.as_ref().map(TableFile::read).transpose()?;
         let geometry = muscle.geometry();
-        let progress = Arc::new(Progress::new(&watched, "diagnosing"));
+        let progress = SharedProgress::new(Arc::new(ProgressLine::new(&watched, "diagnosing")));
         let checks = Checks::read(&self.check)?;
         let options = Options { muscle: muscle.name.clone(), checks, given, progress };
-        let mut answer = diagnose::diagnose(&campaign, &geometry, &options)?;
+        let mut answer = pam_diagnose::history::diagnose(&campaign, &geometry, &options)?;
         let diagnosed = start.elapsed();
         if let Some(table) = &table {
             let predicted = predict(table, &campaign)?;
@@ -129,9 +132,9 @@ impl Arguments {
     fn with_model(
         &self,
         console: &Console,
-        campaign: &crate::recording::Campaign,
+        campaign: &pam_data::recording::Campaign,
         mut refitted: model::Refitted,
-        answer: &mut diagnose::Diagnosis,
+        answer: &mut pam_diagnose::Diagnosis,
     ) -> Result<()> {
         let tested = refitted.file.table.tested;
         let (low, high) = (tested.pressure_low.pascals(), tested.pressure_high.pascals());
@@ -148,7 +151,7 @@ impl Arguments {
         }
         let files = &self.recordings.files;
         let hashes = files.iter().map(table_file::sha256).collect::<Result<Vec<_>>>()?;
-        refitted.file.about.date = table_file::now_utc();
+        refitted.file.about.date = date::now_utc();
         refitted.file.about.sources = table_file::sources(campaign, files, hashes);
         refitted.file.write(path)?;
         if let Some(reserve) = refitted.reserve {

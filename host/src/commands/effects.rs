@@ -6,12 +6,12 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use crate::bench::Candidate;
 use crate::console::Console;
-use crate::error::{Code, Error, Result, nearest};
-use crate::output::{printed, to_standard_output, write_whole};
-use crate::report::letters::letters;
-use crate::report::{effect_page, rich};
+use pam_data::error::{DataCode, Error, Result, nearest};
+use pam_data::output::{printed, to_standard_output, write_whole};
+use pam_fit::bench::Candidate;
+use pam_report::letters::letters;
+use pam_report::{effect_page, rich};
 
 /// Arguments of `host effects`.
 #[derive(Debug, Args)]
@@ -74,8 +74,8 @@ impl Arguments {
     }
 }
 
-fn catalogue() -> Result<Vec<(crate::report::effect_trace::Trace, crate::report::Figure)>> {
-    effect_page::catalogue().map_err(|e| Error::new(Code::TableInvalid, e.to_string()))
+fn catalogue() -> Result<Vec<(pam_report::effect_trace::Trace, pam_report::Figure)>> {
+    effect_page::catalogue().map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))
 }
 
 /// The effect of this name.
@@ -89,7 +89,7 @@ pub(super) fn named(name: &str) -> Result<Candidate> {
 fn unknown(name: &str) -> Error {
     let near = nearest(name, Candidate::all().map(Candidate::name));
     let help = near.map_or(String::new(), |n| format!("did you mean `{n}`? "));
-    Error::new(Code::CallInvalid, "there is no such effect")
+    Error::new(DataCode::CallInvalid, "there is no such effect")
         .value(name)
         .help(format!("{help}`host effects` lists all"))
 }

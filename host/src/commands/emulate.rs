@@ -9,8 +9,8 @@ use serde_json::json;
 use super::run::{interrupts, positive};
 use crate::console::Console;
 use crate::demo::campaign::muscle;
-use crate::emulated::{Emulated, Kind, Stand};
-use crate::error::Result;
+use pam_data::error::Result;
+use pam_device::emulated::{Emulated, Kind, Stand};
 
 /// Arguments of `host emulate`.
 #[derive(Debug, Args)]

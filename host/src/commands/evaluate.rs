@@ -7,16 +7,18 @@ use serde_json::{Value, json};
 
 use super::recordings::Recordings;
 use crate::console::Console;
-use crate::error::{Code, Error, Result};
-use crate::fit::Options;
-use crate::fit::hold_out::{HeldOut, Score, Split, Spot, hold_out};
-use crate::fit::other_length::{Carried, unseen_length};
-use crate::fit::published::Published;
-use crate::fit::result::Fit;
-use crate::muscle_description::MuscleDescription;
-use crate::output::write_whole;
-use crate::progress::Progress;
-use crate::recording::{Campaign, Reader};
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::output::write_whole;
+use pam_data::progress::Progress;
+use pam_evaluate::hold_out::{HeldOut, Score, Split, Spot, hold_out};
+use pam_evaluate::other_length::{Carried, unseen_length};
+use pam_evaluate::published::Published;
+use pam_fit::fit::Options;
+use pam_fit::fit::result::Fit;
+
+use crate::progress::ProgressLine;
+use pam_data::recording::{Campaign, Reader};
 
 /// Arguments of `host evaluate`.
 #[derive(Debug, Args)]
@@ -85,7 +87,7 @@ impl Arguments {
         };
         let watched = if self.json.is_some() { Console::silent() } else { console.clone() };
         let splits = if self.leave_out == LeaveOut::Both { 2 } else { 1 };
-        let progress = Progress::new(&watched, "leaving out");
+        let progress = ProgressLine::new(&watched, "leaving out");
         progress.total(splits * self.muscle.len() as u64);
         let mut cases = Vec::new();
         let mut failure: Option<Error> = None;
@@ -124,7 +126,7 @@ impl Arguments {
         if let Some(path) = &self.json {
             let all: Vec<Value> = cases.iter().zip(&lengths).map(|(c, l)| to_json(c, l.as_ref())).collect();
             let text = serde_json::to_string_pretty(&json!({ "schema": "pam-evaluate/1", "muscles": all }))
-                .map_err(|e| Error::new(Code::FileUnwritable, e.to_string()))?;
+                .map_err(|e| Error::new(DataCode::FileUnwritable, e.to_string()))?;
             write_whole(path, format!("{text}\n").as_bytes())?;
             if path.as_os_str() == "-" {
                 return Ok(());

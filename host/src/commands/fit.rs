@@ -8,15 +8,17 @@ use clap::Args;
 use super::recordings::Recordings;
 use super::reports::Reports;
 use crate::console::Console;
-use crate::counted::counted;
-use crate::error::{Code, Error, Result};
-use crate::fit::{self, Options};
-use crate::muscle_description::MuscleDescription;
-use crate::output::{to_standard_output, write_whole};
-use crate::progress::Progress;
-use crate::recording::Reader;
-use crate::report::fit_page;
-use crate::table_file::{self, TableFile};
+use pam_data::counted::counted;
+use pam_data::date;
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::output::{to_standard_output, write_whole};
+use pam_fit::fit::{self, Options};
+
+use crate::progress::ProgressLine;
+use pam_data::recording::Reader;
+use pam_fit::table_file::{self, TableFile};
+use pam_report::fit_page;
 
 /// Arguments of `host fit`.
 #[derive(Debug, Args)]
@@ -69,7 +71,7 @@ impl Arguments {
         if let Some(weight) = self.smoothing
             && !(weight.is_finite() && weight >= 0.0)
         {
-            return Err(Error::new(Code::CallInvalid, "a smoothing weight must be a number from 0 up")
+            return Err(Error::new(DataCode::CallInvalid, "a smoothing weight must be a number from 0 up")
                 .value(weight.to_string())
                 .help("1e-3 bends freely, 10 is nearly straight; leave the option out to have it chosen"));
         }
@@ -98,16 +100,17 @@ impl Arguments {
         let files = self.recordings.files.clone();
         let (fitted, hashes) = std::thread::scope(|scope| {
             let hashes = scope.spawn(|| files.iter().map(table_file::sha256).collect::<Result<Vec<_>>>());
-            let progress = Progress::new(&watched, "fitting");
+            let progress = ProgressLine::new(&watched, "fitting");
             let fitted = fit::watched(&campaign, &muscle, &options, &progress);
             (fitted, hashes.join())
         });
         let fitted = fitted?;
-        let hashes = hashes.map_err(|_| Error::new(Code::FileUnreadable, "a file could not be hashed"))??;
+        let hashes =
+            hashes.map_err(|_| Error::new(DataCode::FileUnreadable, "a file could not be hashed"))??;
         console.detail(format!("fitted in {:.3} s", started.elapsed().as_secs_f64()));
         let about = table_file::About {
             muscle: muscle.name.clone(),
-            date: table_file::now_utc(),
+            date: date::now_utc(),
             tool: format!("host {}", env!("CARGO_PKG_VERSION")),
             sources: table_file::sources(&campaign, &files, hashes),
             fit: fitted.summary.quality(),
@@ -117,7 +120,7 @@ impl Arguments {
         };
         let table = TableFile { table: fitted.table.clone(), about };
         let json = serde_json::to_string_pretty(&fitted.summary)
-            .map_err(|e| Error::new(Code::FileUnwritable, e.to_string()))?;
+            .map_err(|e| Error::new(DataCode::FileUnwritable, e.to_string()))?;
         if let Some(path) = &self.output {
             table.write(path)?;
         }

@@ -11,11 +11,15 @@ use serde_json::{Value, json};
 
 use super::port::{Muscle, PortOption};
 use crate::console::Console;
-use crate::device::{Client, difference, recorder, tables};
-use crate::error::{Code, Error, Result};
-use crate::output::{printed, to_standard_output, write_whole};
-use crate::progress::Progress;
-use crate::table_file::{About, TableFile, now_utc};
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::output::{printed, to_standard_output, write_whole};
+use pam_data::progress::Progress;
+use pam_device::error::DeviceCode;
+use pam_device::{Client, difference, recorder, tables};
+
+use crate::progress::ProgressLine;
+use pam_data::date::now_utc;
+use pam_fit::table_file::{About, TableFile};
 
 /// Arguments of `host flash`.
 #[derive(Debug, Args)]
@@ -62,7 +66,7 @@ impl Arguments {
         match (&self.firmware, &self.chip, &self.table) {
             (Some(firmware), Some(chip), _) => program(firmware, chip, console),
             (_, _, Some(table)) => self.send(table, console),
-            _ => Err(Error::new(Code::CallInvalid, "neither a table nor a firmware is given")),
+            _ => Err(Error::new(DataCode::CallInvalid, "neither a table nor a firmware is given")),
         }
     }
 
@@ -71,7 +75,7 @@ impl Arguments {
         let file = TableFile::read(path)?;
         let mut buffer = [0; image::MAX_LEN];
         let image = image::write(&file.table, &mut buffer)
-            .map_err(|e| Error::new(Code::TableInvalid, e.to_string()).file(path))?;
+            .map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()).file(path))?;
         if !file.about.corrections.is_empty() {
             console.note("the table's corrections of the bench stay here; the controller is sent the muscle's part only");
         }
@@ -91,7 +95,7 @@ impl Arguments {
             if let Some(before) = &before {
                 done["backup"] = self.keep(path, before, &client, console)?;
             }
-            let progress = Progress::new(console, "flash");
+            let progress = ProgressLine::new(console, "flash");
             progress.total(image.len() as u64);
             let kept = tables::write(&mut client, side, image, |sent| progress.set(sent as u64))?;
             drop(progress);
@@ -185,7 +189,7 @@ impl Arguments {
                     let crc = info.tables[side.index()].map(|t| t.crc);
                     if crc != Some(check::of_image(image)) {
                         return Err(Error::new(
-                            Code::DeviceVerify,
+                            DeviceCode::DeviceVerify,
                             "after its restart the device has another table",
                         )
                         .help("send it again; if it comes back, the device's memory is failing"));
@@ -197,7 +201,7 @@ impl Arguments {
                 Err(e) => last = Some(e),
             }
         }
-        Err(last.unwrap_or_else(|| Error::new(Code::DeviceSilent, "the device did not restart")))
+        Err(last.unwrap_or_else(|| Error::new(DeviceCode::DeviceSilent, "the device did not restart")))
     }
 }
 
@@ -207,12 +211,12 @@ fn program(firmware: &Path, _chip: &str, _console: &Console) -> Result<()> {
         Error::unreadable(firmware, &e)
             .help("`firmware/build BOARD` makes the image, in target/firmware of the checkout")
     })?;
-    Err(Error::new(Code::CallInvalid, "this program was built without debug probes").help(
+    Err(Error::new(DataCode::CallInvalid, "this program was built without debug probes").help(
         "build it with them: cargo build --release --package host --features probe; it takes a minute longer",
     ))
 }
 
 #[cfg(feature = "probe")]
 fn program(firmware: &Path, chip: &str, console: &Console) -> Result<()> {
-    crate::device::probe::program(firmware, chip, console)
+    pam_device::probe::program(firmware, chip, console)
 }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::console::Console;
-use crate::error::{Error, Result};
-use crate::output::write_whole;
+use pam_data::error::{Error, Result};
+use pam_data::output::write_whole;
 
 /// Arguments of `host man`.
 #[derive(Debug, Args)]

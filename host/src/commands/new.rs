@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::console::Console;
-use crate::error::{Code, Error, Result};
-use crate::muscle_description::MuscleDescription;
-use crate::output::write_whole;
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::output::write_whole;
 
 /// Arguments of `host new`.
 #[derive(Debug, Args)]
@@ -55,10 +55,10 @@ impl Arguments {
     /// Asks, checks each answer as it comes, writes.
     ///
     /// # Errors
-    /// [`Code::CallInvalid`] when the file is there already or the answers end early, [`Code::FileUnwritable`].
+    /// [`DataCode::CallInvalid`] when the file is there already or the answers end early, [`DataCode::FileUnwritable`].
     pub fn run(self, console: &Console) -> Result<()> {
         if !self.replace && self.output.as_os_str() != "-" && self.output.exists() {
-            return Err(Error::new(Code::CallInvalid, "the file is there already")
+            return Err(Error::new(DataCode::CallInvalid, "the file is there already")
                 .file(&self.output)
                 .help("name another one with -o, or replace it with --replace"));
         }
@@ -67,7 +67,7 @@ impl Arguments {
         if let Some(folder) = folder
             && !folder.is_dir()
         {
-            return Err(Error::new(Code::FileUnwritable, "the folder is not there")
+            return Err(Error::new(DataCode::FileUnwritable, "the folder is not there")
                 .file(folder)
                 .help("make it first"));
         }
@@ -109,7 +109,7 @@ fn ask(input: &mut impl BufRead, prompt: impl Fn(&str), complain: impl Fn(&str))
             let mut line = String::new();
             let count = input.read_line(&mut line).map_err(|e| Error::unreadable("standard input", &e))?;
             if count == 0 && default.is_none() {
-                return Err(Error::new(Code::CallInvalid, format!("the answers end before `{key}`"))
+                return Err(Error::new(DataCode::CallInvalid, format!("the answers end before `{key}`"))
                     .help("answer one question a line; `host new --help` shows an example"));
             }
             let given = match (line.trim(), default) {

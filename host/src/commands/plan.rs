@@ -6,11 +6,11 @@ use clap::Args;
 use model_core::muscle::Muscle;
 
 use crate::console::Console;
-use crate::diagnose::advise::isolability;
-use crate::diagnose::planned;
-use crate::error::{Code, Error, Result};
-use crate::output::write_whole;
-use crate::table_file::TableFile;
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::output::write_whole;
+use pam_diagnose::advise::isolability;
+use pam_diagnose::planned;
+use pam_fit::table_file::TableFile;
 
 /// Arguments of `host plan`.
 #[derive(Debug, Args)]
@@ -35,14 +35,14 @@ impl Arguments {
     /// Files that cannot be read, or a protocol that cannot be carried out.
     pub fn run(self, console: &Console) -> Result<()> {
         let file = TableFile::read(&self.table)?;
-        let muscle =
-            Muscle::<f64>::build(&file.table).map_err(|e| Error::new(Code::TableInvalid, e.to_string()))?;
+        let muscle = Muscle::<f64>::build(&file.table)
+            .map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
         let protocol = planned::read(&self.protocol)?;
         let rows = isolability(&protocol, &muscle).map_err(|e| e.file(&self.protocol))?;
         if let Some(path) = &self.json {
             let json =
                 serde_json::to_string_pretty(&serde_json::json!({ "schema": "pam-plan/1", "effects": rows }))
-                    .map_err(|e| Error::new(Code::FileUnwritable, e.to_string()))?;
+                    .map_err(|e| Error::new(DataCode::FileUnwritable, e.to_string()))?;
             write_whole(path, (json + "\n").as_bytes())?;
         }
         if self.json.as_deref() != Some(std::path::Path::new("-")) {

@@ -7,8 +7,8 @@ use model_core::link::hello::Board;
 use model_core::link::messages::Side;
 
 use crate::console::Console;
-use crate::device::{Address, Client, Patience, Port, plugged_in};
-use crate::error::{Code, Error, Result};
+use pam_data::error::{DataCode, Error, Result};
+use pam_device::{Address, Client, Patience, Port, plugged_in};
 
 /// Which device.
 #[derive(Debug, Clone, Args)]
@@ -22,7 +22,7 @@ impl PortOption {
     /// The address: what was given, or the only controller that is plugged in.
     ///
     /// # Errors
-    /// [`Code::CallInvalid`] when nothing was given and there is none, or more than one controller.
+    /// [`DataCode::CallInvalid`] when nothing was given and there is none, or more than one controller.
     pub fn address(&self) -> Result<Address> {
         if let Some(port) = &self.port {
             return port.parse();
@@ -52,7 +52,7 @@ impl PortOption {
 fn chosen(plugged_in: &[String], is_controller: impl Fn(&str) -> bool) -> Result<&str> {
     if plugged_in.is_empty() {
         return Err(Error::new(
-            Code::CallInvalid,
+            DataCode::CallInvalid,
             "no port is given, and no USB serial device is plugged in",
         )
         .help("name it: --port /dev/ttyACM0, or --port tcp:HOST:PORT for an emulated one"));
@@ -63,7 +63,7 @@ fn chosen(plugged_in: &[String], is_controller: impl Fn(&str) -> bool) -> Result
     let controllers: Vec<&str> =
         plugged_in.iter().map(String::as_str).filter(|name| is_controller(name)).collect();
     let several = |count: usize, what: &str, names: String| {
-        Error::new(Code::CallInvalid, format!("no port is given, and there are {count} {what}"))
+        Error::new(DataCode::CallInvalid, format!("no port is given, and there are {count} {what}"))
             .help(format!("name one: --port {names}"))
     };
     match controllers[..] {

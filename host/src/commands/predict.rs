@@ -7,12 +7,12 @@ use serde_json::json;
 
 use super::recordings::Recordings;
 use crate::console::Console;
-use crate::counted::counted;
-use crate::error::{Code, Error, Result};
-use crate::output::{to_standard_output, write_whole};
-use crate::predict::{predict_with_bands, to_csv};
-use crate::recording::Reader;
-use crate::table_file::TableFile;
+use pam_data::counted::counted;
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::output::{to_standard_output, write_whole};
+use pam_data::recording::Reader;
+use pam_fit::predict::{predict_with_bands, to_csv};
+use pam_fit::table_file::TableFile;
 
 /// Arguments of `host predict`.
 #[derive(Debug, Args)]
@@ -48,7 +48,7 @@ impl Arguments {
             && self.recordings.files.iter().any(|f| same_file(f, path))
         {
             return Err(Error::new(
-                Code::CallInvalid,
+                DataCode::CallInvalid,
                 "the output would take the place of a recording that is read",
             )
             .file(path)
@@ -88,7 +88,7 @@ impl Arguments {
             let json =
                 json!({ "schema": "pam-predict/1", "rms_N": prediction.rms, "recordings": recordings });
             let text = serde_json::to_string_pretty(&json)
-                .map_err(|e| Error::new(Code::FileUnwritable, e.to_string()))?;
+                .map_err(|e| Error::new(DataCode::FileUnwritable, e.to_string()))?;
             write_whole(path, format!("{text}\n").as_bytes())?;
         }
         for (recording, p) in campaign.recordings.iter().zip(&prediction.recordings) {

@@ -12,12 +12,15 @@ use serde_json::json;
 use super::port::PortOption;
 use super::run::{begin, end, interrupts, not_there, positive};
 use crate::console::Console;
-use crate::counted::counted;
-use crate::device::recorder::{Recorder, about_losses, about_start, rescue};
-use crate::device::{Client, Topic, words};
-use crate::error::{Code, Error, Result};
-use crate::progress::Progress;
-use crate::table_file::now_utc;
+use pam_data::counted::counted;
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::progress::Progress;
+use pam_device::error::DeviceCode;
+use pam_device::recorder::{Recorder, about_losses, about_start, rescue};
+use pam_device::{Client, Topic, words};
+
+use crate::progress::ProgressLine;
+use pam_data::date::now_utc;
 
 /// Arguments of `host record`.
 #[derive(Debug, Args)]
@@ -81,11 +84,11 @@ impl Arguments {
         let mut about = about_start("pam-record/1", &mut client)?;
         about["samples_per_s"] = json!(ticks / f64::from(every_ticks));
         let Some(mut recorder) = begin(&output, &about, console)? else {
-            return Err(Error::new(Code::CallInvalid, "a recording needs a file"));
+            return Err(Error::new(DataCode::CallInvalid, "a recording needs a file"));
         };
         let names = output.iter().map(|f| f.display().to_string()).collect::<Vec<_>>().join(" and ");
         console.note(format!("recording to {names}; Ctrl-C ends it"));
-        let progress = Progress::new(console, "record");
+        let progress = ProgressLine::new(console, "record");
         progress.total(self.seconds.map_or(0, |s| (s * 1e3) as u64));
         let watched = watch(&mut client, every_ticks, self.seconds, &mut recorder, &progress, || {
             interrupted.load(Ordering::Relaxed)
@@ -135,7 +138,7 @@ fn watch(
     every_ticks: u16,
     seconds: Option<f64>,
     recorder: &mut Recorder,
-    progress: &Progress,
+    progress: &ProgressLine,
     stop: impl Fn() -> bool,
 ) -> Result<Ending> {
     client
@@ -150,8 +153,11 @@ fn watch(
             Some(Topic::Telemetry(sample)) => {
                 heard = Instant::now();
                 if sample.time_us < last {
-                    return Err(Error::new(Code::DeviceSilent, "the device restarted while it was recorded")
-                        .help("`host device faults` says whether a fault did it; look at its supply"));
+                    return Err(Error::new(
+                        DeviceCode::DeviceSilent,
+                        "the device restarted while it was recorded",
+                    )
+                    .help("`host device faults` says whether a fault did it; look at its supply"));
                 }
                 last = sample.time_us;
                 let elapsed = last - *first.get_or_insert(last);
@@ -166,7 +172,7 @@ fn watch(
             None if heard.elapsed() > SILENCE => {
                 let status = client.call::<GetStatus>(&())?;
                 return Err(Error::new(
-                    Code::DeviceSilent,
+                    DeviceCode::DeviceSilent,
                     format!("the device answers, but sends no telemetry; it is {}", words::state(status.state)),
                 )
                 .help("it may have restarted: `host device info` shows for how long it runs, and whether ticks are counted"));

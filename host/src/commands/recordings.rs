@@ -6,9 +6,11 @@ use std::sync::Arc;
 use clap::Args;
 
 use crate::console::Console;
-use crate::error::{Code, Error, Result};
-use crate::progress::Progress;
-use crate::recording::{Campaign, Import, Reader};
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::progress::Progress;
+
+use crate::progress::ProgressLine;
+use pam_data::recording::{Campaign, Import, Reader};
 
 /// Recordings on the command line.
 #[derive(Debug, Clone, Args)]
@@ -34,7 +36,7 @@ impl Recordings {
         let mut reader = reader.import(import.as_ref());
         for filter in &self.filters {
             let (column, value) = filter.split_once('=').ok_or_else(|| {
-                Error::new(Code::CallInvalid, "a filter without `=`")
+                Error::new(DataCode::CallInvalid, "a filter without `=`")
                     .value(filter)
                     .help("write --where column=value, such as --where run=8")
             })?;
@@ -49,7 +51,7 @@ impl Recordings {
     /// As [`Recordings::read`].
     pub fn read_watched(&self, mut reader: Reader<'_>, console: &Console) -> Result<Campaign> {
         let sizes = self.files.iter().filter_map(|f| std::fs::metadata(f).ok());
-        let progress = Arc::new(Progress::new(console, "reading"));
+        let progress = Arc::new(ProgressLine::new(console, "reading"));
         progress.total(sizes.map(|m| m.len()).sum());
         reader.progress = Some(progress);
         self.read(reader)

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::console::Console;
-use crate::counted::counted;
-use crate::error::Result;
-use crate::output::write_whole;
-use crate::report::Page;
+use pam_data::counted::counted;
+use pam_data::error::Result;
+use pam_data::output::write_whole;
+use pam_report::Page;
 
 /// What to write of a report.
 #[derive(Debug, Clone, Default, Args)]

@@ -11,14 +11,17 @@ use serde_json::{Value, json};
 
 use super::port::PortOption;
 use crate::console::Console;
-use crate::counted::counted;
-use crate::device::course::{Course, Quantity};
-use crate::device::reach::Reached;
-use crate::device::recorder::{Recorder, about_losses, about_start};
-use crate::device::run::{Ending, Plan, run, vent};
-use crate::device::{Client, words};
-use crate::error::{Code, Error, Result};
-use crate::progress::Progress;
+use pam_data::counted::counted;
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::progress::Progress;
+use pam_device::course::{Course, Quantity};
+use pam_device::error::DeviceCode;
+use pam_device::reach::Reached;
+use pam_device::recorder::{Recorder, about_losses, about_start};
+use pam_device::run::{Ending, Plan, run, vent};
+use pam_device::{Client, words};
+
+use crate::progress::ProgressLine;
 
 /// Arguments of `host run`.
 #[derive(Debug, Args)]
@@ -94,7 +97,7 @@ impl Asked {
             (_, Some(_), ..) => Quantity::Pressure,
             (_, _, Some(_), _) => Quantity::Stroke,
             (.., Some(stiffness_nm_per_rad)) => Quantity::Angle { stiffness_nm_per_rad },
-            _ => return Err(Error::new(Code::CallInvalid, "nothing is asked for")),
+            _ => return Err(Error::new(DataCode::CallInvalid, "nothing is asked for")),
         };
         let text = self.text().unwrap_or_default();
         Ok((quantity, Course::parse(text, quantity)?))
@@ -120,7 +123,7 @@ impl Arguments {
         let (quantity, course) = self.quantity.parse(self.stiffness)?;
         positive([("--seconds", self.seconds), ("--rate", self.rate)])?;
         if self.stiffness.is_some_and(|s| !(s >= 0.0 && s.is_finite())) {
-            return Err(Error::new(Code::CallInvalid, "--stiffness must be zero or more"));
+            return Err(Error::new(DataCode::CallInvalid, "--stiffness must be zero or more"));
         }
         not_there(&self.output, self.replace)?;
         let interrupted = interrupts()?;
@@ -139,7 +142,7 @@ impl Arguments {
         let plan = Plan { quantity, course, seconds: self.seconds, every_ticks };
         let mut errors = Errors::new(client.call::<GetSettings>(&())?.joint);
         let saturated_before = client.call::<GetStatus>(&())?.saturated_ticks;
-        let progress = Progress::new(console, "run");
+        let progress = ProgressLine::new(console, "run");
         progress.total(self.seconds.map_or(0, |s| (s * 1e3) as u64));
         let mut reached = if quantity == Quantity::Pressure { None } else { Reached::of(&mut client)? };
         let mut start = None;
@@ -297,7 +300,7 @@ fn choose_feed_forward(client: &mut Client, source: Source) -> Result<()> {
     };
     let kept = client.call_once::<SetSettings>(&settings)?;
     if kept != settings {
-        return Err(Error::new(Code::DeviceVerify, "the device keeps other settings than it was sent")
+        return Err(Error::new(DeviceCode::DeviceVerify, "the device keeps other settings than it was sent")
             .help("see `host device settings`"));
     }
     Ok(())
@@ -309,7 +312,7 @@ pub(super) fn positive<const N: usize>(options: [(&str, Option<f64>); N]) -> Res
         if let Some(value) = value
             && !(value > 0.0 && value.is_finite())
         {
-            return Err(Error::new(Code::CallInvalid, format!("{option} must be above zero"))
+            return Err(Error::new(DataCode::CallInvalid, format!("{option} must be above zero"))
                 .value(value.to_string())
                 .help("leave the option out to go on at the controller's own rate until Ctrl-C"));
         }
@@ -321,7 +324,7 @@ pub(super) fn positive<const N: usize>(options: [(&str, Option<f64>); N]) -> Res
 pub(super) fn not_there(files: &[PathBuf], replace: bool) -> Result<()> {
     // A device such as /dev/null takes any number of recordings.
     match files.iter().find(|f| f.is_file()) {
-        Some(there) if !replace => Err(Error::new(Code::CallInvalid, "the recording is there already")
+        Some(there) if !replace => Err(Error::new(DataCode::CallInvalid, "the recording is there already")
             .file(there)
             .help("name another one with -o, or replace it with --replace")),
         _ => Ok(()),
@@ -353,7 +356,7 @@ pub(super) fn interrupts() -> Result<Arc<AtomicBool>> {
     let flag = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&flag);
     ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))
-        .map_err(|e| Error::new(Code::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
+        .map_err(|e| Error::new(DataCode::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
     Ok(flag)
 }
 

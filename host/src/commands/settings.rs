@@ -4,8 +4,8 @@ use clap::Args;
 use serde_json::json;
 
 use crate::console::Console;
-use crate::error::Result;
 use crate::settings::{NAME, all_settings, files};
+use pam_data::error::Result;
 
 /// Arguments of `host settings`.
 #[derive(Debug, Args)]

@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex};
 use clap::Args;
 
 use crate::console::Console;
-use crate::error::{Code, Error, Result};
 use crate::studio::keeper::Order;
 use crate::studio::server::serve;
+use pam_data::error::{DataCode, Error, Result};
 
 /// Arguments of `host studio`.
 #[derive(Debug, Args)]
@@ -51,7 +51,7 @@ impl Arguments {
                 let _ = send.send(());
             }
         })
-        .map_err(|e| Error::new(Code::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
+        .map_err(|e| Error::new(DataCode::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
         let ready = |address: &str| {
             if self.json {
                 console.result(serde_json::json!({ "schema": "pam-studio/1", "address": address }));

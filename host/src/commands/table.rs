@@ -2,16 +2,40 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 use model_core::muscle::Muscle;
 use serde_json::{Value, json};
 
 use crate::console::Console;
-use crate::counted::counted;
-use crate::error::Result;
-use crate::output::{json_of, printed, to_standard_output, write_whole};
-use crate::table_export::{self, Format};
-use crate::table_file::TableFile;
+use pam_data::counted::counted;
+use pam_data::error::Result;
+use pam_data::output::{json_of, printed, to_standard_output, write_whole};
+use pam_fit::table_export::{self, Format};
+use pam_fit::table_file::TableFile;
+
+/// The forms of an exported table, as the command line names them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum FormatName {
+    /// As `host table show --json` prints it.
+    Json,
+    /// One line per pressure node.
+    Csv,
+    /// Constants for firmware in C or C++.
+    C,
+    /// MATLAB level 5 (`load` reads it, also Octave and SciPy).
+    Matlab,
+}
+
+impl From<FormatName> for Format {
+    fn from(name: FormatName) -> Self {
+        match name {
+            FormatName::Json => Self::Json,
+            FormatName::Csv => Self::Csv,
+            FormatName::C => Self::C,
+            FormatName::Matlab => Self::Matlab,
+        }
+    }
+}
 
 /// Arguments of `host table`.
 #[derive(Debug, Args)]
@@ -50,7 +74,7 @@ struct Export {
     output: PathBuf,
     /// The form; by default what the output's name ends in.
     #[arg(long, value_enum)]
-    format: Option<Format>,
+    format: Option<FormatName>,
     /// Print JSON on what was written.
     #[arg(long)]
     json: bool,
@@ -96,7 +120,7 @@ impl Arguments {
                     .map_err(|e| e.help("`--format json -o -` gives the table as JSON"))?;
                 let table = TableFile::read(&export.table)?;
                 let format = match export.format {
-                    Some(format) => format,
+                    Some(format) => format.into(),
                     None => Format::of(&export.output)?,
                 };
                 let bytes = match format {

@@ -8,8 +8,8 @@ use virtual_bench::muscle::{Muscle, MuscleSpec};
 use virtual_bench::presets;
 use virtual_bench::recording::Columns;
 
-use crate::error::{Code, Error, Result};
-use crate::output::write_whole;
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::output::write_whole;
 
 /// What the bench recorded.
 #[derive(Debug, Clone)]
@@ -31,7 +31,7 @@ pub struct Made {
 /// Records a muscle and writes its files into a folder.
 ///
 /// # Errors
-/// [`Code::CallInvalid`] for a muscle that the bench does not know, [`Code::FileUnwritable`].
+/// [`DataCode::CallInvalid`] for a muscle that the bench does not know, [`DataCode::FileUnwritable`].
 pub fn record(name: &str, seed: u64, folder: &Path) -> Result<Made> {
     let spec = muscle(name)?;
     let bench = BenchSpec::laboratory(spec.clone(), seed);
@@ -43,7 +43,7 @@ pub fn record(name: &str, seed: u64, folder: &Path) -> Result<Made> {
     };
     let protocol = campaigns::thesis(&built, &levels);
     let files = Bench::new(&bench).run(&protocol).map_err(|e| {
-        Error::new(Code::CallInvalid, format!("the bench cannot carry out its protocol: {e}"))
+        Error::new(DataCode::CallInvalid, format!("the bench cannot carry out its protocol: {e}"))
     })?;
     std::fs::create_dir_all(folder).map_err(|e| Error::unwritable(folder, &e))?;
     let description = folder.join("muscle.toml");
@@ -70,10 +70,10 @@ pub fn record(name: &str, seed: u64, folder: &Path) -> Result<Made> {
 /// A muscle of the bench by its name.
 ///
 /// # Errors
-/// [`Code::CallInvalid`] naming those that there are.
+/// [`DataCode::CallInvalid`] naming those that there are.
 pub fn muscle(name: &str) -> Result<MuscleSpec> {
     presets::by_name(name).ok_or_else(|| {
-        Error::new(Code::CallInvalid, "the bench has no such muscle")
+        Error::new(DataCode::CallInvalid, "the bench has no such muscle")
             .value(name)
             .help("take mini, contractile, push or random:SEED")
     })

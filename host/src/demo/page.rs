@@ -4,10 +4,10 @@ use model_core::muscle::Muscle;
 use model_core::units::{Length, Pressure};
 
 use super::tracking::{SETTLE, Task, Track};
-use crate::error::{Code, Error, Result};
-use crate::fit::result::Fit;
-use crate::recording::Campaign;
-use crate::report::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, fixed};
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::recording::Campaign;
+use pam_fit::fit::result::Fit;
+use pam_report::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, fixed};
 
 /// What the page tells.
 #[derive(Debug)]
@@ -35,7 +35,7 @@ pub struct Story<'a> {
 /// Builds the page.
 ///
 /// # Errors
-/// [`Code::TableInvalid`] where the fitted table cannot be evaluated.
+/// [`DataCode::TableInvalid`] where the fitted table cannot be evaluated.
 pub fn page(story: &Story<'_>) -> Result<Page> {
     let summary = &story.fit.summary;
     let percent = |newtons: f64| 100.0 * newtons / story.blocked_force;
@@ -188,7 +188,7 @@ fn error_figure(tracks: &[Track], blocked: f64) -> Figure {
 /// Measured loops as points, the fitted force on the way out and back as lines.
 fn load_lines(campaign: &Campaign, fit: &Fit) -> Result<Figure> {
     let muscle =
-        Muscle::<f64>::build(&fit.table).map_err(|e| Error::new(Code::TableInvalid, e.to_string()))?;
+        Muscle::<f64>::build(&fit.table).map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
     let l0 = f64::from(fit.table.geometry.rest_length.metres());
     let mut panel = Panel::new(Axis::new("contraction ΔL/L_{0}", "%"), Axis::new("force F", "N"));
     let count = campaign.recordings.len();

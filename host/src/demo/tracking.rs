@@ -4,10 +4,11 @@ use model_core::link::endpoints::{GetSettings, SetSettings};
 use model_core::link::messages::{Reference, Telemetry};
 use model_core::link::settings::{FeedForward, ForceLoop, Settings};
 
-use crate::device::Client;
-use crate::device::course::{Course, Quantity};
-use crate::device::run::{Ending, Plan, run};
-use crate::error::{Code, Error, Result};
+use pam_data::error::{Error, Result};
+use pam_device::Client;
+use pam_device::course::{Course, Quantity};
+use pam_device::error::DeviceCode;
+use pam_device::run::{Ending, Plan, run};
 
 /// Where a controller's pressure comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -127,11 +128,11 @@ pub struct Track {
 /// Chooses a law on a device and has it confirmed.
 ///
 /// # Errors
-/// Refusals, silence, or [`Code::DeviceVerify`].
+/// Refusals, silence, or [`DeviceCode::DeviceVerify`].
 pub fn choose(client: &mut Client, law: Law, gain: f64) -> Result<()> {
     let wanted = law.settings(client.call::<GetSettings>(&())?, gain);
     if client.call_once::<SetSettings>(&wanted)? != wanted {
-        return Err(Error::new(Code::DeviceVerify, "the device keeps other settings than it was sent"));
+        return Err(Error::new(DeviceCode::DeviceVerify, "the device keeps other settings than it was sent"));
     }
     Ok(())
 }
@@ -139,7 +140,7 @@ pub fn choose(client: &mut Client, law: Law, gain: f64) -> Result<()> {
 /// Lets a device follow a task and judges it.
 ///
 /// # Errors
-/// As [`run`]; [`Code::DeviceSilent`] when too little came back.
+/// As [`run`]; [`DeviceCode::DeviceSilent`] when too little came back.
 pub fn track(
     client: &mut Client,
     law: Law,
@@ -169,7 +170,7 @@ pub fn track(
         .filter_map(|s| Some(f64::from(s.sides.first()?.force_n) - f64::from(s.asked)))
         .collect();
     if errors.len() < 100 {
-        return Err(Error::new(Code::DeviceSilent, format!("only {} samples came back", errors.len())));
+        return Err(Error::new(DeviceCode::DeviceSilent, format!("only {} samples came back", errors.len())));
     }
     let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
     let largest = errors.iter().fold(0.0_f64, |a, e| a.max(e.abs()));

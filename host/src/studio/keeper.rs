@@ -18,14 +18,15 @@ use serde_json::{Value, json};
 use tokio::sync::{broadcast, oneshot};
 
 use crate::demo::campaign::muscle;
-use crate::device::course::{Course, Quantity};
-use crate::device::recorder::{Recorder, about_losses, about_start, serial};
-use crate::device::run::{Plan, Steps, arm, vent};
-use crate::device::{Client, Topic, difference, tables, words};
-use crate::emulated::{Emulated, Kind, Stand};
-use crate::error::{Code, Error, Result};
-use crate::output::json_of;
-use crate::table_file::TableFile;
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::output::json_of;
+use pam_device::course::{Course, Quantity};
+use pam_device::emulated::{Emulated, Kind, Stand};
+use pam_device::error::DeviceCode;
+use pam_device::recorder::{Recorder, about_losses, about_start, serial};
+use pam_device::run::{Plan, Steps, arm, vent};
+use pam_device::{Client, Topic, difference, tables, words};
+use pam_fit::table_file::TableFile;
 
 use super::told::{batch, credible, tell};
 
@@ -144,7 +145,7 @@ fn report(connected: Option<&mut Connected>, say: &broadcast::Sender<String>) {
 }
 
 fn none() -> Error {
-    Error::new(Code::CallInvalid, "no controller is connected")
+    Error::new(DataCode::CallInvalid, "no controller is connected")
         .help("connect to a port, or start an emulated one")
 }
 
@@ -303,9 +304,8 @@ impl Connected {
             Order::Follow(quantity, text) => {
                 let course = Course::parse(&text, quantity)?;
                 if self.status.state == State::Disarmed {
-                    return Err(
-                        Error::new(Code::DeviceRefused, "the controller is disarmed").help("arm it first")
-                    );
+                    return Err(Error::new(DeviceCode::DeviceRefused, "the controller is disarmed")
+                        .help("arm it first"));
                 }
                 if self.status.state == State::Running && self.status.mode != quantity.mode() {
                     self.client.call::<Stop>(&())?;
@@ -331,7 +331,7 @@ impl Connected {
             Order::Mishap(code) => match &self.emulated {
                 Some((_, mishap)) => mishap.store(code, Ordering::Relaxed),
                 None => {
-                    return Err(Error::new(Code::CallInvalid, "mishaps are for emulated benches"));
+                    return Err(Error::new(DataCode::CallInvalid, "mishaps are for emulated benches"));
                 }
             },
             Order::Difference(path) => return self.difference(&path),
@@ -359,7 +359,7 @@ impl Connected {
             let read = self.client.call::<GetSettings>(&())?;
             if kept != settings || read != settings {
                 return Err(Error::new(
-                    Code::DeviceVerify,
+                    DeviceCode::DeviceVerify,
                     "the device keeps other settings than it was sent",
                 ));
             }
@@ -372,7 +372,7 @@ impl Connected {
         let new = TableFile::read(path)?;
         let before = tables::read(&mut self.client, Side::Agonist)?;
         let Some(before) = before else { return Ok(json!({ "text": "the device has no table yet" })) };
-        let old = image::read(&before).map_err(|e| Error::new(Code::TableInvalid, e.to_string()))?;
+        let old = image::read(&before).map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
         Ok(json!({ "text": difference::between(&old, &new.table).to_text() }))
     }
 
@@ -380,11 +380,11 @@ impl Connected {
         let file = TableFile::read(path)?;
         let mut buffer = [0; image::MAX_LEN];
         let image = image::write(&file.table, &mut buffer)
-            .map_err(|e| Error::new(Code::TableInvalid, e.to_string()).file(path))?;
+            .map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()).file(path))?;
         if let Some(before) = tables::read(&mut self.client, Side::Agonist)?
             && before != image
         {
-            crate::output::write_whole(
+            pam_data::output::write_whole(
                 &path.with_extension(format!("{:08x}.image", check::of_image(&before))),
                 &before,
             )?;

@@ -25,9 +25,10 @@ use tokio_stream::wrappers::BroadcastStream;
 
 use super::keeper::{Asked, Order, keep};
 use super::workshop::Workshop;
-use crate::device::available;
-use crate::device::course::Quantity;
-use crate::error::{Code, Error, Result};
+use pam_data::error::{DataCode, Error, Result};
+use pam_device::available;
+use pam_device::course::Quantity;
+use pam_device::error::DeviceCode;
 
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("studio.css");
@@ -51,7 +52,7 @@ struct Shared {
 /// Serves until `stop` completes; `ready` is told the address with the token. At the end the controller is vented.
 ///
 /// # Errors
-/// [`Code::DevicePort`] when the port cannot be listened on, [`Code::FileUnwritable`] for the folder.
+/// [`DeviceCode::DevicePort`] when the port cannot be listened on, [`DataCode::FileUnwritable`] for the folder.
 pub fn serve(
     port: u16,
     folder: PathBuf,
@@ -59,7 +60,8 @@ pub fn serve(
     ready: impl FnOnce(&str),
     stop: impl Future<Output = ()> + Send + 'static,
 ) -> Result<()> {
-    let broken = |e: std::io::Error| Error::new(Code::DevicePort, format!("the page cannot be served: {e}"));
+    let broken =
+        |e: std::io::Error| Error::new(DeviceCode::DevicePort, format!("the page cannot be served: {e}"));
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(broken)?;
     let workshop = Workshop::new(folder)?;
     let (orders, taken) = channel();
@@ -96,7 +98,7 @@ pub fn serve(
     drop(orders);
     keeper
         .join()
-        .map_err(|_| Error::new(Code::DeviceSilent, "the thread of the controller ended in a fault"))?;
+        .map_err(|_| Error::new(DeviceCode::DeviceSilent, "the thread of the controller ended in a fault"))?;
     outcome
 }
 
@@ -264,7 +266,7 @@ enum Posted {
 impl Shared {
     async fn order(&self, order: Order) -> Result<Value> {
         let gone = || {
-            Error::new(Code::DeviceSilent, "the thread of the controller has ended")
+            Error::new(DeviceCode::DeviceSilent, "the thread of the controller has ended")
                 .help("start `host studio` again")
         };
         let (answer, answered) = oneshot::channel();
@@ -281,7 +283,8 @@ impl Shared {
         let done = tokio::task::spawn_blocking(move || {
             work(&mut workshop.lock().unwrap_or_else(PoisonError::into_inner))
         });
-        done.await.map_err(|e| Error::new(Code::CallInvalid, format!("the work ended in a fault: {e}")))?
+        done.await
+            .map_err(|e| Error::new(DataCode::CallInvalid, format!("the work ended in a fault: {e}")))?
     }
 
     async fn post(&self, posted: Posted) -> Result<Value> {
@@ -299,14 +302,14 @@ impl Shared {
                     "stroke" => Quantity::Stroke,
                     _ => {
                         return Err(Error::new(
-                            Code::CallInvalid,
+                            DataCode::CallInvalid,
                             "a course is of force, pressure or stroke",
                         ));
                     }
                 };
                 // A page may not read files of this machine by naming them as a course.
                 if course.trim_start().starts_with('@') {
-                    return Err(Error::new(Code::CallInvalid, "the page takes no course from a file")
+                    return Err(Error::new(DataCode::CallInvalid, "the page takes no course from a file")
                         .help("use host run"));
                 }
                 self.order(Order::Follow(quantity, course)).await
@@ -353,7 +356,7 @@ async fn order(State(shared): State<Shared>, body: Bytes) -> Response {
     match serde_json::from_slice::<Posted>(&body) {
         Ok(posted) => answered(shared.post(posted).await),
         Err(e) => {
-            failed(&Error::new(Code::CallInvalid, format!("the page asked for something unknown: {e}")))
+            failed(&Error::new(DataCode::CallInvalid, format!("the page asked for something unknown: {e}")))
         }
     }
 }

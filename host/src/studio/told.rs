@@ -5,8 +5,8 @@ use model_core::link::settings::Settings;
 use serde_json::{Value, json};
 use tokio::sync::broadcast;
 
-use crate::device::words;
-use crate::error::Error;
+use pam_data::error::Error;
+use pam_device::words;
 
 /// Something went wrong.
 pub(super) fn tell(say: &broadcast::Sender<String>, level: &str, error: &Error) {

@@ -7,16 +7,16 @@ use model_core::muscle::Muscle;
 use model_core::units::{Length, Pressure};
 use serde_json::{Value, json};
 
-use crate::compare::compare;
 use crate::demo::campaign::record;
-use crate::diagnose;
-use crate::error::{Code, Error, Result};
-use crate::fit::{Options, fit};
-use crate::muscle_description::MuscleDescription;
-use crate::output::write_whole;
-use crate::recording::{Campaign, Reader, Recording};
-use crate::report::{diagnose_page, fit_page};
-use crate::table_file::{self, About, TableFile};
+use pam_data::compare::compare;
+use pam_data::date;
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::output::write_whole;
+use pam_data::recording::{Campaign, Reader, Recording};
+use pam_fit::fit::{Options, fit};
+use pam_fit::table_file::{self, About, TableFile};
+use pam_report::{diagnose_page, fit_page};
 
 /// Points of a curve that are sent to the page.
 const POINTS: usize = 1_500;
@@ -34,7 +34,7 @@ impl Workshop {
     /// An empty one in a folder, which is made where it is missing.
     ///
     /// # Errors
-    /// [`Code::FileUnwritable`].
+    /// [`DataCode::FileUnwritable`].
     pub fn new(folder: PathBuf) -> Result<Self> {
         std::fs::create_dir_all(&folder).map_err(|e| Error::unwritable(&folder, &e))?;
         Ok(Self { folder, recordings: Vec::new(), table: None, reports: BTreeMap::new() })
@@ -43,10 +43,10 @@ impl Workshop {
     /// The fitted table, if there is one.
     ///
     /// # Errors
-    /// [`Code::CallInvalid`] when nothing was fitted yet.
+    /// [`DataCode::CallInvalid`] when nothing was fitted yet.
     pub fn table(&self) -> Result<PathBuf> {
         self.table.clone().ok_or_else(|| {
-            Error::new(Code::CallInvalid, "there is no table yet").help("fit recordings first")
+            Error::new(DataCode::CallInvalid, "there is no table yet").help("fit recordings first")
         })
     }
 
@@ -120,10 +120,10 @@ impl Workshop {
         let (_, path) = self
             .recordings
             .get(number)
-            .ok_or_else(|| Error::new(Code::CallInvalid, "there is no such recording"))?;
+            .ok_or_else(|| Error::new(DataCode::CallInvalid, "there is no such recording"))?;
         let mut all = Reader::new().file(path)?;
         if all.is_empty() {
-            return Err(Error::new(Code::RecordingEmpty, "the recording is empty").file(path));
+            return Err(Error::new(DataCode::RecordingEmpty, "the recording is empty").file(path));
         }
         Ok(all.remove(0))
     }
@@ -176,7 +176,7 @@ impl Workshop {
         let hashes = files.iter().map(table_file::sha256).collect::<Result<Vec<_>>>()?;
         let about = About {
             muscle: muscle.name.clone(),
-            date: table_file::now_utc(),
+            date: date::now_utc(),
             tool: format!("host {} studio", env!("CARGO_PKG_VERSION")),
             sources: table_file::sources(&campaign, &files, hashes),
             fit: fitted.summary.quality(),
@@ -197,17 +197,17 @@ impl Workshop {
     /// What the model leaves out of all recordings.
     ///
     /// # Errors
-    /// As [`diagnose::diagnose`].
+    /// As [`pam_diagnose::diagnose`].
     pub fn diagnose(&mut self, muscle: &str) -> Result<Value> {
         let (muscle, campaign) = self.read(muscle)?;
         let geometry = muscle.geometry();
-        let answer = diagnose::diagnose(
+        let answer = pam_diagnose::diagnose(
             &campaign,
             &geometry,
-            &diagnose::Options { muscle: muscle.name.clone(), ..Default::default() },
+            &pam_diagnose::Options { muscle: muscle.name.clone(), ..Default::default() },
         )?;
         self.reports.insert("diagnosis", diagnose_page::page(&answer, &geometry, &campaign).html());
-        Ok(json!({ "text": diagnose::summary::summary(&answer) }))
+        Ok(json!({ "text": pam_diagnose::summary::summary(&answer) }))
     }
 
     /// The folder.
@@ -219,7 +219,8 @@ impl Workshop {
 
 /// Measured and fitted load lines: contraction in percent, force in N.
 fn lines(campaign: &Campaign, table: &model_core::table::MuscleTable) -> Result<Vec<Value>> {
-    let muscle = Muscle::<f64>::build(table).map_err(|e| Error::new(Code::TableInvalid, e.to_string()))?;
+    let muscle =
+        Muscle::<f64>::build(table).map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
     let l0 = f64::from(table.geometry.rest_length.metres());
     let mut out = Vec::new();
     for recording in &campaign.recordings {

@@ -5,8 +5,8 @@
     reason = "helpers of several tests: a failure here is a failure of the test"
 )]
 
-use host::muscle_description::MuscleDescription;
-use host::recording::{Campaign, Recording};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::{Campaign, Recording};
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::{Muscle, MuscleSpec};

@@ -11,7 +11,9 @@
 //! that pulls less. To first order in `c` this is the derivative of the energy `−T² B c/2` that the fibres give way by; soft braids with
 //! tens of per cent of loss are beyond it.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use super::{
+    BenchCheck, Context, Effect, Experiment, Imitates, Info, Link, Memory, Parameter, Start, Traits,
+};
 use crate::scalar::Scalar;
 
 /// The way over which the modulus is taken from the slope of the elastic force, as a part of the rest length.
@@ -34,6 +36,10 @@ impl Effect for BraidElasticity {
         summary: "The fibres of the braid stretch under load, so the muscle swells more and pulls less at high pressure.",
         source: "J. Chambers and N. Wereley, Actuators 11(8) (2022) 219, doi 10.3390/act11080219; the hoop balance is that of M. Gaylord, US patent 2,844,126",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::EndsAndDiameter)
+        .check(BenchCheck::EndsAndDiameter)
+        .imitates(Imitates::Description);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let b = context.fibre_length;

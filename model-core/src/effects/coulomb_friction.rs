@@ -8,7 +8,9 @@
 //! Holds while the muscle slides; within the first tenths of a millimetre after a turn see `presliding-hysteresis`. Until the
 //! muscle first moves `s` is unknown and nothing is added.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start, stroke_direction};
+use super::{
+    Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, Vented, stroke_direction,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -31,6 +33,8 @@ impl Effect for CoulombFriction {
         summary: "A friction force of constant size opposes every motion, whatever the muscle pulls.",
         source: "C.-P. Chou and B. Hannaford, IEEE Trans. Robotics and Automation 12 (1996) 90–102, doi 10.1109/70.481753",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::PressuresAndRamps).vented(Vented::FirstLaw);
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: the direction of the stroke

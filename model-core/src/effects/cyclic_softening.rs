@@ -8,7 +8,7 @@
 //! path has grown by a thousandth.
 
 use super::{
-    Context, Effect, Info, Link, Memory, Parameter, Start, decay,
+    Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, decay,
     work::{PATH, WORK_SLOTS, work},
 };
 use crate::scalar::Scalar;
@@ -38,6 +38,8 @@ impl Effect for CyclicSoftening {
         summary: "Every cycle wears the bladder a little, so it resists less and less.",
         source: "B. Woods, M. Gentry, C. Kothera, N. Wereley, J. Intelligent Material Systems and Structures 23 (2012) 327–343: fatigue of swaged muscles",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::RepeatsAfterRest).slow();
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         work(context, memory);

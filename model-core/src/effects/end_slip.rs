@@ -6,7 +6,7 @@
 //! `x` is the contraction stroke, `δ`, m, positive when slipping gave length; `t_s`, s, on the clock of the campaign. A slip at or before
 //! time zero is there from the first reading; once seen it stays (the memory is kept over a power cycle). First order in `δ`.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use super::{Axis, BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -18,7 +18,7 @@ impl Effect for EndSlip {
         link: Link::Braid,
         parameters: &[
             Parameter::amplitude("δ", "slip", "m", -5.0e-3, 5.0e-3),
-            Parameter::shape("t_s", "slip_time", "s", 0.0, 1.0e5),
+            Parameter::shape("t_s", "slip_time", "s", 0.0, 1.0e5).along(Axis::Time),
         ],
         depends_on_pressure: true,
         persistent: true,
@@ -29,6 +29,8 @@ impl Effect for EndSlip {
         summary: "At one moment an end slipped in its fitting, and every reading after it belongs to another length.",
         source: "a step of the rest length at a change point; sensitivity of the base model",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::VentedLength).check(BenchCheck::VentedLength);
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         if context.time >= parameters[1] {

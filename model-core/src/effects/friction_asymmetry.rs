@@ -4,7 +4,7 @@
 //! direction is known. In a recording of full loops it cannot be told from a gain of the load cell or the gauge; a dwell
 //! approached from both sides can tell.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -24,6 +24,8 @@ impl Effect for FrictionAsymmetry {
         summary: "The muscle rubs more one way than the other.",
         source: "M. Capace et al., Actuators 8(2) (2019) 49, doi 10.3390/act8020049; D. B. Reynolds et al. 2003, doi 10.1114/1.1554921",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::RestsFromBothSides);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let known = context.direction * context.direction;

@@ -8,7 +8,7 @@
 //! This is the base model's own inexactness, not physics that was left out: it is offered before any effect is. High powers
 //! are for the recorded range only.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use super::{Context, Effect, Experiment, Imitates, Info, Link, Memory, Parameter, Start, Traits};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -32,6 +32,8 @@ impl Effect for HigherOrderElasticity {
         summary: "The rubber wall follows a more curved law than the table has terms for.",
         source: "E. G. Hocking, thesis, University of Maryland (2012), chapter 3; neo-Hookean law: L. R. G. Treloar, The Physics of Rubber Elasticity, 1975",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::Varied).imitates(Imitates::ElasticOrders);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let (z, x) = (context.axial_strain, context.radial_strain);

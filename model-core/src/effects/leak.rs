@@ -4,7 +4,7 @@
 //! laminar line at a regulated pressure; a closed muscle that leaks shows it in the measured pressure itself, and nothing is
 //! missing. From force alone it cannot be told from a wrong gain of the gauge: close the valve for a minute and watch.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use super::{BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -24,6 +24,8 @@ impl Effect for Leak {
         summary: "The muscle leaks, so a part of the pressure is lost on the way to it.",
         source: "continuity of laminar flow through line and leak in series; leak-down recordings of Festo muscles lose 5 to 480 kPa in two minutes",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::ReferenceGauge).check(BenchCheck::ReferenceGauge);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         -context.pull_per_pressure() * parameters[0] * context.pressure

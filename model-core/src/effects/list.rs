@@ -20,6 +20,13 @@ macro_rules! effect_list {
                 }
             }
 
+            /// What a diagnosis has to know of it.
+            pub const fn traits(self) -> &'static $crate::effects::Traits {
+                match self {
+                    $(Self::$variant => &<$module::$variant as $crate::effects::Effect>::TRAITS,)+
+                }
+            }
+
             // What a controller asks of an effect, apart from its description: a program that asks for no more carries none of
             // the texts.
 

@@ -20,7 +20,7 @@
 //! known at once. So the pull is counted from the fresh load, and the muscle hung unloaded before the first moment; of the bladder the
 //! memory begins settled, and over-stresses left from before fade on their own.
 
-use super::{Context, Effect, Fading, Info, Link, Memory, Parameter, Start};
+use super::{Context, Effect, Experiment, Fading, Info, Link, Memory, Parameter, Start, Traits};
 use crate::scalar::Scalar;
 
 /// Branches, one per decade.
@@ -65,6 +65,8 @@ impl Effect for LogCreep {
         summary: "At constant length and pressure the force creeps, as much in each tenfold of time, and remembers earlier runs.",
         source: "S. M. Clarke, F. Elias, E. M. Terentjev, European Physical Journal E 2 (2000) 335–341, doi 10.1007/s101890050015; W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::LongHolds);
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         let times = times(parameters[3]);

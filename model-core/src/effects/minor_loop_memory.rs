@@ -11,7 +11,7 @@
 //! extremum is wiped out once the muscle goes beyond it. On loops wider than `2r` it is a dry friction. Before the first full travel
 //! the state is unknown; it begins in the middle.
 
-use super::{BraidTravel, Context, Effect, Info, Link, Memory, Parameter, Start};
+use super::{Axis, BraidTravel, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -24,7 +24,7 @@ impl Effect for MinorLoopMemory {
         parameters: &[
             Parameter::amplitude("A", "loop_force", "N", 0.1, 30.0),
             Parameter::amplitude("A_P", "loop_force_per_pressure", "N/Pa", 1.0e-7, 5.0e-5),
-            Parameter::shape("r", "widest_play", "m", 5.0e-5, 3.0e-2),
+            Parameter::shape("r", "widest_play", "m", 5.0e-5, 3.0e-2).along(Axis::Travel),
         ],
         depends_on_pressure: true,
         persistent: false,
@@ -35,6 +35,8 @@ impl Effect for MinorLoopMemory {
         summary: "Inside a large loop the force depends on where the muscle turned before, whatever the speed.",
         source: "Y. Liu et al., Strojniški vestnik 63 (2017) 56–64, doi 10.5545/sv-jme.2016.4027 (Prandtl–Ishlinskii operators for a pneumatic muscle); P. Krejčí and K. Kuhnen, IEE Proc. Control Theory and Applications 148 (2001) 185–192",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::NestedLoops);
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [(ξ − y_i)/r, i = 1…6; last stroke, last pressure, seen]

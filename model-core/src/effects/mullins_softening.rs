@@ -10,7 +10,7 @@
 //! this law nothing.
 //! The error function is Abramowitz and Stegun's 7.1.27, within 5·10⁻⁴.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -34,6 +34,8 @@ impl Effect for MullinsSoftening {
         summary: "The first stroke into new strain breaks bonds in the rubber; every later stroke meets less resistance.",
         source: "R. W. Ogden and D. G. Roxburgh, Proc. R. Soc. A 455 (1999) 2861–2877, doi 10.1098/rspa.1999.0431",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::FirstStrokes);
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [W_m]

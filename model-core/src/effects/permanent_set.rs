@@ -8,7 +8,7 @@
 //! muscle with a longer rest length is contracted further and pulls less. First order in `δ`.
 
 use super::{
-    Context, Effect, Info, Link, Memory, Parameter, Start, decay,
+    BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, decay,
     work::{IMPULSE, PATH, work},
 };
 use crate::scalar::Scalar;
@@ -36,6 +36,8 @@ impl Effect for PermanentSet {
         summary: "Working stretches the muscle for good by a fraction of a per cent, mostly in its early life.",
         source: "change of rest length in early life, 0.1 to 1 %; E. G. Hocking, thesis, University of Maryland (2012): run-in over the first tests",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::VentedLength).check(BenchCheck::VentedLength).slow();
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         work(context, memory);

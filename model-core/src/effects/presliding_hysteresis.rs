@@ -10,7 +10,7 @@
 //! it has the loops' own memory: return to a turning point closes its loop.
 //! Before the first full travel the elements' state is unknown; they begin in the middle.
 
-use super::{BraidTravel, Context, Effect, Info, Link, Memory, Parameter, Start};
+use super::{BraidTravel, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -34,6 +34,8 @@ impl Effect for PreslidingHysteresis {
         summary: "Just after a turn the strands stretch before they slide, so friction builds up over a distance instead of jumping.",
         source: "F. Al-Bender, V. Lampaert, J. Swevers, Chaos 14 (2004) 446–460, doi 10.1063/1.1741752 (generalized Maxwell slip); T. Vo-Minh et al., Mechatronics 20 (2010) 402–414 (for a pneumatic muscle)",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::NestedLoops);
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [z_1…z_4, last stroke, last pressure, seen]

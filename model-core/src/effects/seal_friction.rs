@@ -7,7 +7,10 @@
 //! `P_a = 101.3 kPa`; `k` the ratio of breakaway to running friction and `v_s`, m/s, the speed over which it falls off. Below 1 to
 //! 5 mm/s real seals stick and slip, which a mean force describes only on average.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start, decay, stroke_direction};
+use super::{
+    Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, Vented, decay,
+    stroke_direction,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -32,6 +35,8 @@ impl Effect for SealFriction {
         summary: "The seal around a push-rod rubs, the more the higher the pressure, and most when slow.",
         source: "B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083–1138, doi 10.1016/0005-1098(94)90209-7",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::PressuresAndRamps).vented(Vented::Everything);
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: the direction of the stroke

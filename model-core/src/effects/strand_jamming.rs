@@ -3,7 +3,7 @@
 //! `ε = ΔL/L0`; `ε_j` where the strands begin to touch; `k_j`, N, how hard the wall is. One-sided. The true wall is steeper the further one
 //! goes; beyond a few per cent past `ε_j` the square is too soft.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use super::{Axis, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -15,7 +15,7 @@ impl Effect for StrandJamming {
         link: Link::Braid,
         parameters: &[
             Parameter::amplitude("k_j", "wall_stiffness", "N", 3.0e2, 1.0e7),
-            Parameter::shape("ε_j", "jamming_contraction", "", 0.02, 0.35),
+            Parameter::shape("ε_j", "jamming_contraction", "", 0.02, 0.35).along(Axis::Contraction),
         ],
         depends_on_pressure: true,
         persistent: false,
@@ -26,6 +26,8 @@ impl Effect for StrandJamming {
         summary: "Near full contraction the strands of the braid touch and lock, which stops the muscle.",
         source: "S. Davis and D. Caldwell, Int. J. Robotics Research 25 (2006) 359–369, doi 10.1177/0278364906063227",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::EndOfStroke);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let over = (context.contraction - parameters[1]).max(T::ZERO);

@@ -14,7 +14,7 @@
 //! `q` is the over-stress of a drive. For a spectrum over decades see `log-creep`. The memory begins settled: at rest for long in the
 //! state of the first reading; an over-stress left from before fades as `e^(−t/τ)`.
 
-use super::{Context, Effect, Fading, Info, Link, Memory, Parameter, Start};
+use super::{Context, Effect, Experiment, Fading, Info, Link, Memory, Parameter, Start, Traits};
 use crate::scalar::Scalar;
 
 type Solid = Fading<1, 3>;
@@ -42,6 +42,8 @@ impl Effect for StressRelaxation {
         summary: "After each change of length or pressure the force fades towards its final value, as rubber does.",
         source: "W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::LongHolds);
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         let (elastic, gaylord) = context.loads();

@@ -4,7 +4,7 @@
 //! speed, `v_s`, m/s, the speed of the fall. Tondu and Lopez give the braid's friction this form. At one speed it cannot be told
 //! from dry friction; four speeds over two decades are needed, the slowest below 0.3 mm/s.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start, decay};
+use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, decay};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -28,6 +28,8 @@ impl Effect for StribeckFriction {
         summary: "Slow motion rubs more than fast motion.",
         source: "B. Tondu and P. Lopez, IEEE Control Systems Magazine 20(2) (2000) 15–38, doi 10.1109/37.833638; Armstrong-Hélouvry et al. 1994, doi 10.1016/0005-1098(94)90209-7",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let slow = decay(context.speed / parameters[2].max(T::from_f32(1.0e-6)));

@@ -9,7 +9,7 @@
 //! minutes). `a` softens the bladder's part of the pull, `F_b` ([`Context::bladder`]), and `b` the friction, per watt or per kelvin. Entropic rubber stiffens by 0.34 %/K
 //! (`a_T = −0.0034`); filled rubber near its transition softens. Recovers at rest with the same `τ`, unlike wear.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -35,6 +35,8 @@ impl Effect for ThermalSoftening {
         summary: "Work warms the muscle, which changes the stiffness of its rubber; rest cools it again.",
         source: "M. Doumit and S. Pardoel, Mechanical Systems and Signal Processing 91 (2017) 93–110; L. R. G. Treloar, The Physics of Rubber Elasticity, 1975",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::RepeatsAfterRest).slow();
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [w, pending time, pending work, last stroke, seen, first temperature, step that the share holds for, share]

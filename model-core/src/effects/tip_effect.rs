@@ -10,7 +10,9 @@
 //! `R/L`: for muscles shorter than about five diameters both are a trend only. Tables that are free at each pressure swallow them
 //! whole; they show as `E_k` that rise in proportion to pressure.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use super::{
+    BenchCheck, Context, Effect, Experiment, Imitates, Info, Link, Memory, Parameter, Start, Traits,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -33,6 +35,10 @@ impl Effect for TipEffect {
         summary: "The muscle narrows towards its ends, which do not pull like a cylinder.",
         source: "J. Chambers and N. Wereley, Actuators 10(4) (2021) 72, doi 10.3390/act10040072; E. G. Hocking, thesis, University of Maryland (2012), appendix on tip correction",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::EndsAndDiameter)
+        .check(BenchCheck::EndsAndDiameter)
+        .imitates(Imitates::Description);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let cross_section = T::from_f64(core::f64::consts::PI) * context.radius * context.radius;

@@ -5,7 +5,7 @@
 //! Holds at the speeds of one decade or two; rubber's own damping rises more slowly than speed (see `rate-power`). At rest it
 //! vanishes at once, unlike a lag of pressure.
 
-use super::{Context, Effect, Info, Link, Memory, Parameter, Start};
+use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -28,6 +28,8 @@ impl Effect for ViscousDamping {
         summary: "The faster the muscle moves, the more it resists: a force proportional to speed.",
         source: "D. B. Reynolds et al., Annals of Biomedical Engineering 31 (2003) 310–317, doi 10.1114/1.1554921",
     };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds);
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         -(parameters[0] + parameters[1] * context.pressure) * context.speed

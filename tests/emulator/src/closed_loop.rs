@@ -6,11 +6,11 @@ use firmware::control::Controller;
 use firmware::regulator::SMOOTHING;
 use firmware::spoken::Sample;
 use firmware::tick::TICK_S;
-use host::device::regulator::{self, Found};
 use model_core::link::messages::{Mode, Reference, SetPoint, Side, State};
 use model_core::link::settings::{FeedForward, Settings};
 use model_core::table::MuscleTable;
 use model_core::units::Length;
+use pam_device::regulator::{self, Found};
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::plant::{Motion, Plant};
 

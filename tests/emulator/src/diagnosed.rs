@@ -1,13 +1,13 @@
 //! Does a diagnosis matter to the controller? A muscle with physics that the model leaves out is recorded on the bench, fitted
 //! plainly and diagnosed; the controller then follows a force on that muscle with either table.
 
-use host::diagnose::{self, model};
-use host::fit::{self, Options};
-use host::muscle_description::MuscleDescription;
-use host::recording::{Campaign, Reader};
 use model_core::link::messages::{Mode, Reference, SetPoint, Side};
 use model_core::link::settings::{FeedForward, Settings};
 use model_core::table::MuscleTable;
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::{Campaign, Reader};
+use pam_diagnose::model;
+use pam_fit::fit::{self, Options};
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::{Muscle, MuscleSpec};
@@ -165,8 +165,8 @@ pub fn tables(case: &Case) -> Tables {
     let (muscle, campaign) = record(&case.spec);
     let plain = fit::fit(&campaign, &muscle, &Options::default()).expect("a fit").table;
     let geometry = muscle.geometry();
-    let options = diagnose::Options { muscle: muscle.name.clone(), ..Default::default() };
-    let answer = diagnose::diagnose(&campaign, &geometry, &options).expect("a diagnosis");
+    let options = pam_diagnose::Options { muscle: muscle.name.clone(), ..Default::default() };
+    let answer = pam_diagnose::diagnose(&campaign, &geometry, &options).expect("a diagnosis");
     let refitted = model::refit(&campaign, &muscle, &answer).expect("a table");
     Tables {
         plain,

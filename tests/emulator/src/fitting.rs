@@ -2,10 +2,10 @@
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-use host::fit::{self, Options};
-use host::muscle_description::MuscleDescription;
-use host::recording::Reader;
 use model_core::table::MuscleTable;
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::Reader;
+use pam_fit::fit::{self, Options};
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::MuscleSpec;

@@ -22,11 +22,11 @@ pub mod tracking;
 pub use machine::{Machine, Options, Skipped};
 pub use stations::Watched;
 
-use host::device::Client;
 use model_core::image;
 use model_core::link::endpoints::{GetInfo, RollBackTable};
 use model_core::link::messages::{RollBack, Side};
 use model_core::table::MuscleTable;
+use pam_device::Client;
 
 /// The bytes of a table.
 ///
@@ -42,7 +42,7 @@ pub fn image_of(table: &MuscleTable) -> Vec<u8> {
 /// # Panics
 /// When the device refuses it.
 pub fn upload(client: &mut Client, side: Side, table: &MuscleTable) {
-    host::device::tables::write(client, side, &image_of(table), |_| ()).expect("the table is taken");
+    pam_device::tables::write(client, side, &image_of(table), |_| ()).expect("the table is taken");
 }
 
 /// Goes back to the table before, as `host device rollback` does.

@@ -9,11 +9,11 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use host::device::{Client, Patience, Port};
-use host::emulated::qemu::{Line, Paced, board, end};
-use host::emulated::relay::Relay;
-use host::emulated::wire::{Wire, listener};
 use object::{Object, ObjectSymbol};
+use pam_device::emulated::qemu::{Line, Paced, board, end};
+use pam_device::emulated::relay::Relay;
+use pam_device::emulated::wire::{Wire, listener};
+use pam_device::{Client, Patience, Port};
 use virtual_bench::lockstep::{self, Station};
 
 use crate::debugger::Debugger;

@@ -5,12 +5,12 @@
 //! [`in_qemu`] runs a case through the real image and the real link, to show that it makes no difference.
 
 use firmware::tick::TICK_S;
-use host::device::regulator::Found;
 use model_core::link::messages::{Mode, Reference, SetPoint, Side};
 use model_core::link::settings::{FeedForward, Settings};
 use model_core::muscle::Muscle;
 use model_core::table::MuscleTable;
 use model_core::units::Length;
+use pam_device::regulator::Found;
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::muscle::MuscleSpec;
 use virtual_bench::plant::{Motion, PlantStation};

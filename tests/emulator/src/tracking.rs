@@ -2,7 +2,6 @@
 
 use std::time::{Duration, Instant};
 
-use host::device::{Client, Topic};
 use model_core::link::endpoints::{
     ClearFault, Disarm, GetSettings, GetStatus, SetReference, SetSettings, SetTelemetry, SetTo, StartMode,
     Stop,
@@ -11,6 +10,7 @@ use model_core::link::messages::{
     Event, FaultReport, Mode, Reference, SetPoint, Start, State, Telemetry, TelemetryRate,
 };
 use model_core::link::settings::{FeedForward, Settings};
+use pam_device::{Client, Topic};
 
 use crate::machine::HOPELESS;
 

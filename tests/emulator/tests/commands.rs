@@ -9,14 +9,14 @@ use emulator_tests::joint;
 use emulator_tests::line::{self, Line};
 use emulator_tests::machine::{self, Folder, PATIENCE};
 use emulator_tests::{Machine, Options, Watched, fitting, pair, program, tracking, upload};
-use host::device::{Client, Port};
-use host::table_file::{About, TableFile};
 use model_core::effects::{EffectName, FittedEffect};
 use model_core::link::endpoints::{Disarm, SetTelemetry, SetTo, Stop};
 use model_core::link::messages::{Fault, Mode, SetPoint, Side, TelemetryRate};
 use model_core::muscle::Muscle;
 use model_core::table::{self, MuscleTable};
 use model_core::units::{Length, Pressure};
+use pam_device::{Client, Port};
+use pam_fit::table_file::{About, TableFile};
 use serde_json::Value;
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::lockstep::{Answer, Station as _};
@@ -284,7 +284,7 @@ fn the_log_of_the_image_is_decoded_beside_events() {
     let Ok(elf) = machine::log_image() else { return };
     let elf = elf.to_string_lossy().into_owned();
     let mut client =
-        host::device::Client::open(&stand.line.address().parse().expect("an address")).expect("hello");
+        pam_device::Client::open(&stand.line.address().parse().expect("an address")).expect("hello");
     tracking::start(&mut client, Mode::Pressure);
     client.call::<Stop>(&()).expect("it stops, and stays armed");
     client.call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 }).expect("quiet");
@@ -331,7 +331,7 @@ fn held_and_stretched() -> Vec<Motion> {
 }
 
 /// How much stronger the device thinks the muscle than its table without memory, N, in the last of so many samples.
-fn softening(client: &mut host::device::Client, muscle: &Muscle<f32>, samples: usize) -> f32 {
+fn softening(client: &mut pam_device::Client, muscle: &Muscle<f32>, samples: usize) -> f32 {
     let (mut sum, mut count) = (0.0, 0);
     for n in 0..samples {
         let sample = tracking::sample(client).expect("no fault");

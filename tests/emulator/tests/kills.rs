@@ -5,13 +5,13 @@ use std::time::Duration;
 
 use emulator_tests::machine::Folder;
 use emulator_tests::{Machine, Options, image_of, upload};
-use host::device::tables;
 use model_core::check;
 use model_core::link::endpoints::{BeginTable, CommitTable, Endpoint, SendTablePiece};
 use model_core::link::frame::{Header, Kind, MAX_WIRE, encode};
 use model_core::link::messages::{PIECE, Side, TableBegin, TablePiece};
 use model_core::table::{self, MuscleTable};
 use model_core::units::Pressure;
+use pam_device::tables;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 

@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use emulator_tests::machine::{Folder, PATIENCE};
 use emulator_tests::{Machine, Options, image_of, upload};
-use host::device::{Client, Port, tables};
 use model_core::check;
 use model_core::link::endpoints::BeginTable;
 use model_core::link::endpoints::{
@@ -18,6 +17,7 @@ use model_core::link::messages::{
 use model_core::muscle::Muscle;
 use model_core::table::{self, MuscleTable};
 use model_core::units::{Length, Pressure};
+use pam_device::{Client, Port, tables};
 
 fn board(folder: &Folder) -> Option<Machine> {
     Machine::start(folder.path(), Options::default()).ok()

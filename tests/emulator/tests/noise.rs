@@ -9,12 +9,12 @@ use emulator_tests::joint::{self, Joint};
 use emulator_tests::line::{self, Line};
 use emulator_tests::machine::{Folder, HOPELESS, PATIENCE};
 use emulator_tests::{Machine, Options, Watched, image_of, tracking, upload};
-use host::device::{Client, Patience, Port, Topic, tables};
 use model_core::link::endpoints::{Endpoint, GetStatus, SetTelemetry, SetTo};
 use model_core::link::frame::{Header, Kind, MAX_WIRE, encode};
 use model_core::link::messages::{Mode, SetPoint, Side, State, TelemetryRate};
 use model_core::table::{self, MuscleTable};
 use model_core::units::Pressure;
+use pam_device::{Client, Patience, Port, Topic, tables};
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::plant::{Motion, PlantStation};
 use virtual_bench::presets;
@@ -104,7 +104,7 @@ fn flipped_bits_cost_repeats_and_nothing_else() {
             assert!(losses.bad_frames > 0 && frames_bad > 0, "the line was noisy at {rate}");
         }
         patient(&mut client, &|client| {
-            host::device::run::vent(client).is_ok_and(|status| status.state == State::Disarmed)
+            pam_device::run::vent(client).is_ok_and(|status| status.state == State::Disarmed)
         });
         drop(client);
         drop(line);
@@ -245,5 +245,5 @@ fn telemetry_of_two_muscles_at_1_khz_and_commands_beside_it_fit_a_line_of_1_mbau
     let status = client.call::<GetStatus>(&()).expect("a status");
     assert_eq!(status.telemetry_dropped, 0);
     client.call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 }).expect("quiet");
-    host::device::run::vent(&mut client).expect("it vents");
+    pam_device::run::vent(&mut client).expect("it vents");
 }

@@ -4,12 +4,12 @@ use std::time::{Duration, Instant};
 
 use emulator_tests::machine::{self, Folder};
 use emulator_tests::{Machine, Options, image_of, tracking, upload};
-use host::device::{Topic, tables};
 use model_core::link::endpoints::{EvaluateTable, GetInfo, GetSettings, GetStatus, SetReference};
 use model_core::link::messages::{Evaluate, Event, Mode, Point, Reference, Side, State};
 use model_core::muscle::Muscle;
 use model_core::table;
 use model_core::units::{Length, Pressure};
+use pam_device::{Topic, tables};
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::plant::{Motion, PlantStation};
 use virtual_bench::presets;

@@ -266,7 +266,7 @@ fn write_page(set: &Path, page: &Path) -> Result<(), Box<dyn Error>> {
          opened; the seed of the final set comes from the operating system. Half of the trials carry noise resampled from residuals of \
          real recordings, where these are. Protocol A is the classic one (ascending levels, one slow speed), D the enriched one \
          (shuffled levels, one of them twice, three speeds, dwells, nested loops, tares), C the complete one (more of each, tares \
-         between levels, half an hour of rest, checks of the bench); `tests/trials/README.md` and `tests/bench/src/campaigns.rs` say \
+         between levels, half an hour of rest, checks of the bench); `tests/trials/README.md` and `host/virtual-bench/src/campaigns.rs` say \
          it in full.\n\n\
          ```text\n\
          cargo run --release -p trials -- prove -o DIR\n\

@@ -1,5 +1,5 @@
 //! The sensors and the regulator of this board: a second UART to a virtual bench, one exchange a control tick, in
-//! lock-step. The bench's side and the meaning of each byte are described in `tests/bench/src/lockstep.rs`.
+//! lock-step. The bench's side and the meaning of each byte are described in `host/virtual-bench/src/lockstep.rs`.
 //!
 //! The bench keeps the time: a tick is one answer. Without an answer the request is repeated, which advances nothing; after
 //! [`PATIENCE`] the tick goes by without readings, so that the device stays alive on a bench that is gone.

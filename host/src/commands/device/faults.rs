@@ -6,8 +6,8 @@ use serde_json::json;
 
 use crate::commands::port::PortOption;
 use crate::console::Console;
-use crate::device::words;
-use crate::error::Result;
+use pam_data::error::Result;
+use pam_device::words;
 
 pub(super) fn run(port: &PortOption, clear: bool, json: bool, console: &Console) -> Result<()> {
     let mut client = port.connect(console)?;

@@ -8,8 +8,8 @@ use serde_json::json;
 use crate::commands::port::PortOption;
 use crate::commands::run::interrupts;
 use crate::console::Console;
-use crate::device::regulator;
-use crate::error::{Code, Error, Result};
+use pam_data::error::{DataCode, Error, Result};
+use pam_device::regulator;
 
 /// Arguments of `host device identify`.
 #[derive(Debug, Args)]
@@ -33,7 +33,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let (low, high) = (arguments.low, arguments.high);
     if !(low >= 20.0 && high - low >= 30.0 && high.is_finite()) {
-        return Err(Error::new(Code::CallInvalid, "these pressures show no regulator")
+        return Err(Error::new(DataCode::CallInvalid, "these pressures show no regulator")
             .value(format!("--low {low} --high {high}"))
             .help("the lower one must be 20 kPa at least, and the upper one 30 kPa above it"));
     }

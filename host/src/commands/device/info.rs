@@ -7,9 +7,9 @@ use serde_json::json;
 
 use crate::commands::port::PortOption;
 use crate::console::Console;
-use crate::counted::counted;
-use crate::device::{Client, Patience, Port, recorder, words};
-use crate::error::Result;
+use pam_data::counted::counted;
+use pam_data::error::Result;
+use pam_device::{Client, Patience, Port, recorder, words};
 
 pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()> {
     // The versions are told even when they do not fit, and then the refusal.

@@ -7,8 +7,8 @@ use model_core::link::hello::Board;
 use serde_json::json;
 
 use crate::console::Console;
-use crate::device::{Client, Patience, Port, available, recorder};
-use crate::error::Result;
+use pam_data::error::Result;
+use pam_device::{Client, Patience, Port, available, recorder};
 
 pub(super) fn run(json: bool, console: &Console) -> Result<()> {
     let patience = Patience { answer: Duration::from_millis(200), tries: 2, ..Patience::default() };

@@ -9,8 +9,9 @@ use serde_json::json;
 
 use crate::commands::port::PortOption;
 use crate::console::Console;
-use crate::error::{Code, Error, Result, nearest};
-use crate::output::json_of;
+use pam_data::error::{DataCode, Error, Result, nearest};
+use pam_data::output::json_of;
+use pam_device::error::DeviceCode;
 
 /// Arguments of `host device settings`.
 #[derive(Debug, Args)]
@@ -36,7 +37,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         Some(path) => {
             let text = std::fs::read_to_string(path).map_err(|e| Error::unreadable(path, &e))?;
             Some(toml::from_str::<Settings>(&text).map_err(|e| {
-                crate::toml_words::toml_error(Code::CallInvalid, &text, &e)
+                pam_data::toml_words::toml_error(DataCode::CallInvalid, &text, &e)
                     .file(path)
                     .help("the file must hold all settings, as `host device settings` prints them")
             })?)
@@ -54,8 +55,11 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         let answered = client.call_once::<SetSettings>(&wanted)?;
         now = client.call::<GetSettings>(&())?;
         if answered != wanted || now != wanted {
-            return Err(Error::new(Code::DeviceVerify, "the device keeps other settings than it was sent")
-                .help("look at them with `host device settings`"));
+            return Err(Error::new(
+                DeviceCode::DeviceVerify,
+                "the device keeps other settings than it was sent",
+            )
+            .help("look at them with `host device settings`"));
         }
         console.note("written and read back");
     }
@@ -64,8 +68,9 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         all["schema"] = json!("pam-device-settings/1");
         console.result(format!("{all:#}"));
     } else {
-        let text = toml::to_string(&now)
-            .map_err(|e| Error::new(Code::DeviceVerify, format!("the settings cannot be printed: {e}")))?;
+        let text = toml::to_string(&now).map_err(|e| {
+            Error::new(DeviceCode::DeviceVerify, format!("the settings cannot be printed: {e}"))
+        })?;
         console.result(text.trim_end());
     }
     Ok(())
@@ -74,7 +79,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
 /// The settings with one of them changed, by its dotted name.
 pub(crate) fn changed(settings: Settings, assignment: &str) -> Result<Settings> {
     let wrong = |cause: String| {
-        Error::new(Code::CallInvalid, cause)
+        Error::new(DataCode::CallInvalid, cause)
             .value(assignment)
             .help("write KEY=VALUE with a key as `host device settings` prints it, such as limits.pressure_pa=500e3")
     };

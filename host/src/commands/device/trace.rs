@@ -10,10 +10,11 @@ use serde_json::json;
 
 use crate::commands::port::PortOption;
 use crate::console::Console;
-use crate::counted::counted;
-use crate::device::Client;
-use crate::error::{Code, Error, Result, nearest};
-use crate::output::write_whole;
+use pam_data::counted::counted;
+use pam_data::error::{DataCode, Error, Result, nearest};
+use pam_data::output::write_whole;
+use pam_device::Client;
+use pam_device::error::DeviceCode;
 
 /// Arguments of `host device trace`.
 #[derive(Debug, Args)]
@@ -82,7 +83,7 @@ fn variable(name: &str) -> Result<Variable> {
         let names: Vec<&str> = VARIABLES.iter().map(|(n, _, _)| *n).collect();
         let near =
             nearest(name, names.iter().copied()).map(|n| format!("did you mean {n}? ")).unwrap_or_default();
-        Error::new(Code::CallInvalid, "no variable of the loop has this name")
+        Error::new(DataCode::CallInvalid, "no variable of the loop has this name")
             .value(name)
             .help(format!("{near}there are: {}", names.join(", ")))
     })
@@ -101,7 +102,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     for name in &arguments.variables {
         variables.push(variable(name)?).map_err(|_| {
             Error::new(
-                Code::CallInvalid,
+                DataCode::CallInvalid,
                 format!("a trace records at most {} variables", variables.capacity()),
             )
         })?;
@@ -123,7 +124,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         finished(&mut client, arguments.wait)?
     };
     if trace.records == 0 {
-        return Err(Error::new(Code::DeviceRefused, "the trace is empty")
+        return Err(Error::new(DeviceCode::DeviceRefused, "the trace is empty")
             .help("arm one first, without --read; a table that is put to use takes the trace's room"));
     }
     let ticks_per_s = client.call::<GetInfo>(&())?.ticks_per_s;
@@ -147,7 +148,7 @@ fn finished(client: &mut Client, wait: f64) -> Result<TraceInfo> {
         }
         if !(begin.elapsed().as_secs_f64() < wait) {
             return Err(Error::new(
-                Code::DeviceSilent,
+                DeviceCode::DeviceSilent,
                 format!("the trace has not ended within {wait} s; it has {} records", trace.records),
             )
             .help("wait longer with --wait, or read it later with --read"));
@@ -167,7 +168,7 @@ fn read_columns(client: &mut Client, trace: &TraceInfo, ticks_per_s: u32) -> Res
     while record < trace.records {
         let piece = client.call::<ReadTrace>(&TraceRead { record })?;
         if piece.values.len() < width {
-            return Err(Error::new(Code::DeviceVerify, "the trace ends before its announced end")
+            return Err(Error::new(DeviceCode::DeviceVerify, "the trace ends before its announced end")
                 .help("it was armed again while it was read; try again"));
         }
         for values in piece.values.chunks_exact(width).take((trace.records - record) as usize) {

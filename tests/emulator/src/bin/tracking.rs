@@ -6,8 +6,8 @@ use std::path::Path;
 
 use emulator_tests::bandwidth::Bandwidth;
 use emulator_tests::sweep::{COURSES, Course, LAWS, Law, Load, Still, Subject, in_qemu};
-use host::report::{Axis, Colour, Figure, Panel};
 use model_core::link::messages::Mode;
+use pam_report::{Axis, Colour, Figure, Panel};
 use virtual_bench::presets;
 
 const HEAD: &str = "| load | asked | table | table + trim | Gaylord | PI alone | regulator's limit | PI : table + trim |\n\

@@ -121,7 +121,7 @@ fn of_one_muscle() -> Result<u32, Skipped> {
     let sine = Reference::Sine { mean: 45.0, amplitude: 20.0, frequency_hz: 2.0 };
     let stretch = Stretch { wanted: Wanted::Wave(sine), ticks: 1000, unjudged: 0 };
     tracking::run(&mut client, Mode::Force, &[stretch]);
-    host::device::tables::read(&mut client, Side::Agonist).expect("it reads");
+    pam_device::tables::read(&mut client, Side::Agonist).expect("it reads");
     client.call::<GetPastFault>(&PastFault { back: 0 }).expect("a log");
     client.call::<Forget>(&ForgetMemory { side: Side::Agonist }).expect("it forgets");
     let starts = client.hello().starts;

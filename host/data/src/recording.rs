@@ -1,0 +1,42 @@
+//! Recordings: read once into SI columns, then passed down.
+//!
+//! A file becomes one [`Recording`], or several when an import description splits it; the recordings of one call become a
+//! [`Campaign`] in chronological order. Nothing behind this door parses text or knows a unit other than SI.
+
+mod assemble;
+mod blocks;
+mod campaign;
+mod cells;
+mod check;
+mod columns;
+mod container;
+mod decimal;
+pub mod dropouts;
+mod follow;
+#[cfg(feature = "hdf5")]
+mod hdf5;
+mod head;
+pub mod import;
+mod line;
+mod matlab;
+mod mcap;
+mod noise;
+pub mod other_unit;
+#[cfg(feature = "parquet")]
+mod parquet;
+mod plan;
+mod quantity;
+mod read;
+pub mod segment;
+mod sheet;
+mod source;
+mod zero;
+
+pub use campaign::{Campaign, Clock};
+pub use columns::Recording;
+pub use follow::{Follower, UNKNOWN_PAUSE};
+pub use head::has_decimal_commas;
+pub use import::Import;
+pub use noise::white_noise;
+pub use quantity::{Named, Quantity, Unit, named};
+pub use read::Reader;

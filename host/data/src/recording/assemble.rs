@@ -1,0 +1,395 @@
+//! From the columns of a file to recordings: filters, groups, stroke, and the checks that need whole columns.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use super::blocks::Rows;
+use super::cells::{Want, Words};
+use super::check::check;
+use super::columns::Recording;
+use super::decimal;
+use super::import::{FoundZero, Import, Value, Zero};
+use super::plan::{Plan, Role};
+use super::quantity::Quantity;
+use super::zero::{at_largest, first_level, smallest};
+use crate::counted::counted;
+use crate::error::{DataCode, Error, Result};
+
+/// A lookup table as text.
+#[derive(Debug, Default)]
+pub(super) struct LookupTable {
+    pub header: Vec<String>,
+    pub rows: Vec<Vec<String>>,
+}
+
+/// Columns of a whole file, by what they are for.
+struct Table {
+    quantities: HashMap<Quantity, Vec<f64>>,
+    splits: Vec<Words>,
+    filters: Vec<Words>,
+}
+
+pub(super) struct Job<'a> {
+    pub path: &'a Path,
+    /// Fewer rows are no recording.
+    pub min_rows: usize,
+    /// L0 of the muscle that made it, m, where it is known.
+    pub rest_length: Option<f64>,
+    pub muscle_name: Option<&'a str>,
+    pub import: &'a Import,
+    pub filters: &'a [(String, Value)],
+    pub plan: &'a Plan,
+    pub names: &'a [String],
+    pub lookup: Option<&'a LookupTable>,
+    /// Line of the file that holds line 0 of the rows, counted from 1.
+    pub first_line: u64,
+    pub labels: Vec<(String, String)>,
+}
+
+/// Makes recordings of the rows of a file.
+pub(super) fn assemble(job: &Job<'_>, mut rows: Rows) -> Result<Vec<Recording>> {
+    if rows.rows < job.min_rows {
+        let cause = match rows.rows {
+            0 => "there is no row below the header".to_owned(),
+            1 => "there is one row only".to_owned(),
+            n => format!("there are {n} rows only"),
+        };
+        return Err(Error::new(DataCode::RecordingTooShort, cause)
+            .help(format!("a recording has at least {}", counted(job.min_rows, "row"))));
+    }
+    let mut table = sort_columns(job, &mut rows)?;
+    let map = |row: usize| job.first_line + rows.map.line(row);
+    if let Some(interval) = job.import.sample_interval_s
+        && !table.quantities.contains_key(&Quantity::Time)
+    {
+        table.quantities.insert(Quantity::Time, (0..rows.rows).map(|i| i as f64 * interval).collect());
+    }
+    for (quantity, value) in &job.plan.constants {
+        table.quantities.insert(*quantity, vec![*value; rows.rows]);
+    }
+    set_zero(job, &mut table);
+    let keep = keep(job, &table, rows.rows)?;
+    let groups = groups(&table.splits, keep.as_deref(), rows.rows);
+    let mut recordings = Vec::with_capacity(groups.len());
+    for (labels, group) in groups {
+        let mut recording = take(job, &mut table, group, &labels)?;
+        recording.labels.extend(job.labels.iter().cloned());
+        check(&recording, &map)?;
+        recordings.push(recording);
+    }
+    Ok(recordings)
+}
+
+fn sort_columns(job: &Job<'_>, rows: &mut Rows) -> Result<Table> {
+    let plan = job.plan;
+    let mut table = Table {
+        quantities: HashMap::new(),
+        splits: vec![Words::default(); job.import.split_by.len()],
+        filters: vec![Words::default(); job.filters.len()],
+    };
+    let mut keys: HashMap<usize, Words> = HashMap::new();
+    for (i, role) in plan.roles.iter().enumerate() {
+        let words = std::mem::take(&mut rows.texts[i]);
+        match role {
+            Role::Quantity(q) => {
+                table.quantities.insert(*q, std::mem::take(&mut rows.numbers[i]));
+            }
+            Role::Coded(q, values) => {
+                let name = &job.names[plan.wanted[i].index];
+                let code = |row: usize| {
+                    let word = words.get(row).trim();
+                    values.get(word).copied().ok_or_else(|| {
+                        let known: Vec<_> = values.keys().map(|k| format!("`{k}`")).collect();
+                        Error::new(
+                            DataCode::RecordingNotANumber,
+                            format!("a word without a value for {}", q.name()),
+                        )
+                        .line(job.first_line + rows.map.line(row))
+                        .column(name)
+                        .value(word)
+                        .help(format!("the import description knows {}", known.join(", ")))
+                    })
+                };
+                table.quantities.insert(*q, (0..rows.rows).map(code).collect::<Result<_>>()?);
+            }
+            Role::Split(n) => table.splits[*n] = words,
+            Role::Filter(n) => table.filters[*n] = words,
+            Role::Key(n) => {
+                keys.insert(*n, words);
+            }
+        }
+    }
+    if !plan.looked_up.is_empty()
+        && let Some(lookup) = job.lookup
+    {
+        look_up(job, rows, &mut table, &keys, lookup)?;
+    }
+    Ok(table)
+}
+
+/// Whether two cells say the same: as numbers when both are, else as text.
+fn same(a: &str, b: &str) -> bool {
+    let (a, b) = (a.trim(), b.trim());
+    a == b
+        || matches!((number(a), number(b)), (Some(x), Some(y)) if (x - y).abs() <= 1e-9 * x.abs().max(y.abs()))
+}
+
+/// Whether a muscle's name is this word, or ends in it as a word: `festo10-29cm` is called `29cm`.
+fn is_called(name: &str, word: &str) -> bool {
+    let before = name.trim().strip_suffix(word);
+    !word.is_empty() && before.is_some_and(|b| b.chars().next_back().is_none_or(|c| !c.is_alphanumeric()))
+}
+
+fn number(text: &str) -> Option<f64> {
+    decimal::prefix(text.as_bytes()).and_then(|(v, used)| (used == text.len()).then_some(v))
+}
+
+fn look_up(
+    job: &Job<'_>,
+    rows: &Rows,
+    table: &mut Table,
+    keys: &HashMap<usize, Words>,
+    lookup: &LookupTable,
+) -> Result<()> {
+    let Some(described) = &job.import.lookup else { return Ok(()) };
+    let file = job.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut columns = Vec::new();
+    for (n, theirs) in described.keys.keys().enumerate() {
+        let index = lookup.header.iter().position(|h| h == theirs).ok_or_else(|| {
+            Error::new(DataCode::ImportInvalid, format!("the lookup table has no column `{theirs}`"))
+                .file(&described.file)
+                .help(format!("it has {}", lookup.header.join(", ")))
+        })?;
+        columns.push((index, keys.get(&n)));
+    }
+    let find = |row: usize| {
+        let wanted: Vec<&str> =
+            columns.iter().map(|(_, words)| words.map_or(file.as_str(), |w| w.get(row))).collect();
+        let fits = |line: &&Vec<String>| {
+            columns
+                .iter()
+                .zip(&wanted)
+                .all(|((i, _), want)| line.get(*i).is_some_and(|have| same(have, want)))
+        };
+        lookup.rows.iter().find(fits).ok_or_else(|| {
+            Error::new(
+                DataCode::ImportInvalid,
+                format!("{} has no line for {}", described.file, wanted.join(", ")),
+            )
+            .line(job.first_line + rows.map.line(row))
+            .help("complete the lookup table, or leave these rows out by [where]")
+        })
+    };
+    let mut last: Option<(Vec<u32>, &Vec<String>)> = None;
+    let mut lines = Vec::with_capacity(rows.rows);
+    for row in 0..rows.rows {
+        let code: Vec<u32> =
+            columns.iter().map(|(_, w)| w.and_then(|w| w.codes.get(row).copied()).unwrap_or(0)).collect();
+        let line = match &last {
+            Some((previous, line)) if *previous == code => *line,
+            _ => find(row)?,
+        };
+        last = Some((code, line));
+        lines.push(line);
+    }
+    for column in &job.plan.looked_up {
+        let name = &lookup.header[column.index];
+        let cell = |line: &Vec<String>| line.get(column.index).cloned().unwrap_or_default();
+        let convert = |line: &&Vec<String>| match (column.want, &column.role) {
+            (Want::Number { scale, offset }, _) => {
+                number(&cell(line)).filter(|v| v.is_finite()).map(|v| v * scale + offset).ok_or_else(|| {
+                    Error::new(DataCode::RecordingNotANumber, "not a number in the lookup table")
+                        .file(&described.file)
+                        .column(name)
+                        .value(cell(line))
+                })
+            }
+            (Want::Text, Role::Coded(_, values)) => values.get(cell(line).trim()).copied().ok_or_else(|| {
+                Error::new(DataCode::RecordingNotANumber, "a word without a value")
+                    .file(&described.file)
+                    .value(cell(line))
+            }),
+            (Want::Text, _) => Ok(0.0),
+        };
+        match &column.role {
+            Role::Quantity(q) | Role::Coded(q, _) => {
+                table.quantities.insert(*q, lines.iter().map(convert).collect::<Result<_>>()?);
+            }
+            Role::Split(n) => lines.iter().for_each(|l| table.splits[*n].push(&cell(l))),
+            Role::Filter(n) => lines.iter().for_each(|l| table.filters[*n].push(&cell(l))),
+            Role::Key(_) => {}
+        }
+    }
+    Ok(())
+}
+
+/// Moves the zero of a displacement to where the muscle has its rest length.
+fn set_zero(job: &Job<'_>, table: &mut Table) {
+    let Some(zero) = job.import.described(Quantity::Displacement).and_then(|c| c.zero) else { return };
+    let force = table.quantities.get(&Quantity::Force);
+    let Some(stroke) = table.quantities.get(&Quantity::Displacement) else { return };
+    let at = match zero {
+        Zero::At(reading) => {
+            // The reading is in the column's unit, before the sign; both are in the plan's scale.
+            let scale = job.plan.roles.iter().zip(&job.plan.wanted).find_map(|(role, wanted)| {
+                match (role, wanted.want) {
+                    (Role::Quantity(Quantity::Displacement), Want::Number { scale, .. }) => Some(scale),
+                    _ => None,
+                }
+            });
+            let own = job.import.described(Quantity::Displacement).map_or(1.0, |c| c.scale);
+            scale.map_or(0.0, |s| reading * s / own)
+        }
+        Zero::Found(FoundZero::First) => first_level(stroke),
+        Zero::Found(FoundZero::Longest) => smallest(stroke),
+        Zero::Found(FoundZero::LargestForce) => {
+            force.map_or_else(|| first_level(stroke), |f| at_largest(stroke, f))
+        }
+    };
+    if at.is_finite()
+        && let Some(stroke) = table.quantities.get_mut(&Quantity::Displacement)
+    {
+        stroke.iter_mut().for_each(|s| *s -= at);
+    }
+}
+
+/// Which rows the filters leave; `None` when all.
+fn keep(job: &Job<'_>, table: &Table, rows: usize) -> Result<Option<Vec<bool>>> {
+    if job.filters.is_empty() {
+        return Ok(None);
+    }
+    let mut keep = vec![true; rows];
+    let mut rest_length = false;
+    for ((name, value), words) in job.filters.iter().zip(&table.filters) {
+        let muscle_length = matches!(value, Value::Text(t) if t == "{rest_length_mm}");
+        rest_length |= muscle_length;
+        let fits = |word: &String| -> Result<bool> {
+            Ok(match value {
+                Value::Number(n) => {
+                    number(word.trim()).is_some_and(|w| (w - n).abs() <= 1e-9 * n.abs().max(1e-3))
+                }
+                Value::Text(t) if t == "{rest_length_mm}" => {
+                    let rest = job.rest_length.ok_or_else(|| needs_rest_length(name))? * 1e3;
+                    // A tape measure is good to half a per cent at best; muscles of one shelf differ by more.
+                    number(word.trim()).is_some_and(|w| (w - rest).abs() <= 5e-3 * rest)
+                }
+                Value::Text(t) if t == "{name}" => job.muscle_name.is_some_and(|n| is_called(n, word.trim())),
+                Value::Text(t) => same(t, word),
+            })
+        };
+        let verdicts: Vec<bool> = words.words.iter().map(fits).collect::<Result<_>>()?;
+        for (kept, code) in keep.iter_mut().zip(&words.codes) {
+            *kept &= verdicts[*code as usize];
+        }
+    }
+    if keep.iter().any(|k| *k) {
+        return Ok(Some(keep));
+    }
+    let list = |(words, (name, _)): (&Words, &(String, Value))| {
+        let some: Vec<_> = words.words.iter().take(8).map(String::as_str).collect();
+        format!("{name} is one of {}", some.join(", "))
+    };
+    let has: Vec<String> = table.filters.iter().zip(job.filters).map(list).collect();
+    let muscle = match (rest_length, job.rest_length) {
+        (true, Some(rest)) => format!(" for a muscle of {} mm", (rest * 1e6).round() / 1e3),
+        _ => String::new(),
+    };
+    Err(Error::new(DataCode::RecordingTooShort, format!("no row passes the filters{muscle}"))
+        .help(format!("in the file, {}", has.join("; "))))
+}
+
+fn needs_rest_length(what: &str) -> Error {
+    Error::new(DataCode::RecordingRestLength, format!("`{what}` needs the muscle's rest length"))
+        .help("give the muscle's description (--muscle) or its table (--table)")
+}
+
+type Group = (Vec<String>, Option<Vec<u32>>);
+
+/// The rows of each recording, in the order of first appearance; `None` when a recording is the whole file.
+fn groups(splits: &[Words], keep: Option<&[bool]>, rows: usize) -> Vec<Group> {
+    if splits.is_empty() {
+        let all = keep.map(|k| (0..rows as u32).filter(|r| k[*r as usize]).collect());
+        return vec![(Vec::new(), all)];
+    }
+    let mut index: HashMap<Vec<u32>, usize> = HashMap::new();
+    let mut groups: Vec<(Vec<String>, Vec<u32>)> = Vec::new();
+    let mut last: Option<(Vec<u32>, usize)> = None;
+    for row in (0..rows).filter(|r| keep.is_none_or(|k| k[*r])) {
+        let code: Vec<u32> = splits.iter().map(|w| w.codes.get(row).copied().unwrap_or(0)).collect();
+        let at = match &last {
+            Some((previous, at)) if *previous == code => *at,
+            _ => *index.entry(code.clone()).or_insert_with(|| {
+                groups.push((splits.iter().map(|w| w.get(row).trim().to_owned()).collect(), Vec::new()));
+                groups.len() - 1
+            }),
+        };
+        groups[at].1.push(row as u32);
+        last = Some((code, at));
+    }
+    groups.into_iter().map(|(labels, rows)| (labels, Some(rows))).collect()
+}
+
+fn take(job: &Job<'_>, table: &mut Table, rows: Option<Vec<u32>>, labels: &[String]) -> Result<Recording> {
+    let mut column = |quantity: Quantity| match &rows {
+        // The whole file: its columns move over without a copy.
+        None => table.quantities.remove(&quantity),
+        Some(rows) => table
+            .quantities
+            .get(&quantity)
+            .map(|c| rows.iter().filter_map(|r| c.get(*r as usize).copied()).collect()),
+    };
+    let stroke_source = job.plan.stroke.unwrap_or(Quantity::Displacement);
+    let mut stroke: Vec<f64> = column(stroke_source).unwrap_or_default();
+    let own_rest: Option<Vec<f64>> = column(Quantity::RestLength);
+    let own_rest = own_rest.as_ref().and_then(|c| c.first().copied());
+    if let (Some(own), Some(muscle)) = (own_rest, job.rest_length)
+        && (own - muscle).abs() > 0.02 * muscle
+    {
+        let cause = format!(
+            "the rest length is {} mm in the file and {} mm for the muscle",
+            (own * 1e6).round() / 1e3,
+            (muscle * 1e6).round() / 1e3
+        );
+        return Err(Error::new(DataCode::RecordingOutOfRange, cause)
+            .help("keep the rows of this muscle by [where] in the import description"));
+    }
+    let rest_length = job.rest_length.or(own_rest);
+    let needed = || rest_length.ok_or_else(|| needs_rest_length(stroke_source.name()));
+    match stroke_source {
+        Quantity::Length => {
+            let rest = needed()?;
+            stroke.iter_mut().for_each(|l| *l = rest - *l);
+        }
+        Quantity::Contraction => {
+            let rest = needed()?;
+            stroke.iter_mut().for_each(|c| *c *= rest);
+        }
+        _ => {}
+    }
+    let stem = job.path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let labels: Vec<_> = job.import.split_by.iter().cloned().zip(labels.iter().cloned()).collect();
+    let name = if labels.is_empty() {
+        stem
+    } else {
+        let list: Vec<_> = labels.iter().map(|(k, v)| format!("{k}={v}")).collect();
+        format!("{stem} [{}]", list.join(", "))
+    };
+    let cycle = column(Quantity::Cycle).map(|c| c.iter().map(|v| v.round().clamp(0.0, 4e9) as u32).collect());
+    let direction = column(Quantity::Direction)
+        .map(|d: Vec<f64>| d.iter().map(|v| if *v > 0.0 { 1 } else { -i8::from(*v < 0.0) }).collect());
+    Ok(Recording {
+        name,
+        source: job.path.to_path_buf(),
+        labels,
+        rest_length,
+        time: column(Quantity::Time).unwrap_or_default(),
+        pressure: column(Quantity::Pressure).unwrap_or_default(),
+        stroke,
+        force: column(Quantity::Force),
+        temperature: column(Quantity::Temperature),
+        pressure_command: column(Quantity::PressureCommand),
+        cycle,
+        direction,
+        rows,
+    })
+}

@@ -1,0 +1,61 @@
+//! What is wrong with a recording that no single cell shows.
+
+use super::columns::Recording;
+use crate::error::{DataCode, Error, Result};
+use crate::possible;
+
+/// Metres as millimetres to the micrometre: what arithmetic leaves beyond that nobody measured.
+fn millimetres(metres: f64) -> f64 {
+    let micrometres = (metres * 1e6).round();
+    if micrometres.is_finite() { micrometres / 1e3 } else { metres * 1e3 }
+}
+
+/// Where more than one row in so many repeats the time of the one before, it is the clock's way.
+const COARSE: usize = 20;
+
+/// The checks that a single cell does not show.
+pub(super) fn check(recording: &Recording, line_of_row: &dyn Fn(usize) -> u64) -> Result<()> {
+    let line = |i: usize| line_of_row(recording.rows.as_ref().map_or(i, |r| r[i] as usize));
+    if let Some(i) = recording.time.windows(2).position(|w| w[1] <= w[0]) {
+        let (before, after) = (recording.time[i], recording.time[i + 1]);
+        let cause = if after == before { "time stands still" } else { "time goes backwards" };
+        let repeated = recording.time.windows(2).filter(|w| w[1] == w[0]).count();
+        let twice = after == before
+            && recording.pressure[i] == recording.pressure[i + 1]
+            && recording.stroke[i] == recording.stroke[i + 1]
+            && recording.force.as_ref().is_none_or(|f| f[i] == f[i + 1]);
+        let help = if repeated * COARSE > recording.len() {
+            "the clock is coarser than the rows are apart: log more digits, or give sample_interval_s in an import description"
+        } else if twice {
+            "the row is there twice: leave one of them out"
+        } else {
+            "time must strictly increase within a file; if several runs are in one file, split it (split_by)"
+        };
+        return Err(Error::new(DataCode::RecordingTimeOrder, cause)
+            .line(line(i + 1))
+            .column("time")
+            .value(format!("{after} s after {before} s"))
+            .help(help));
+    }
+    for (i, p) in recording.pressure.iter().enumerate() {
+        possible::pressure(*p).map_err(|e| e.line(line(i)))?;
+    }
+    for (i, f) in recording.force.iter().flatten().enumerate() {
+        possible::force(*f).map_err(|e| e.line(line(i)))?;
+    }
+    if let Some(rest) = recording.rest_length
+        && let Some(i) = recording.stroke.iter().position(|s| *s >= rest || *s <= -rest)
+    {
+        return Err(Error::new(DataCode::RecordingOutOfRange, "the muscle cannot have this length")
+            .line(line(i))
+            .value(format!("{} mm", millimetres(rest - recording.stroke[i])))
+            .help(format!("its rest length is {} mm; check the unit and the zero", millimetres(rest))));
+    }
+    if let Some(i) = recording.temperature.as_ref().and_then(|t| t.iter().position(|k| *k <= 0.0)) {
+        return Err(Error::new(DataCode::RecordingOutOfRange, "a temperature below absolute zero")
+            .line(line(i))
+            .column("temperature")
+            .help("check the unit in the column's name: C or K"));
+    }
+    Ok(())
+}

@@ -1,0 +1,225 @@
+//! The beginning of a text file: what separates its cells, what its columns are called, where its rows begin.
+
+use super::cells::Dialect;
+use super::import::{Decimal, Import};
+use super::line::Cells;
+use super::quantity::{Named, named};
+use crate::counted::counted;
+use crate::error::{DataCode, Error, Result};
+
+/// The beginning of a text file: how it is cut, and what its columns are called.
+pub(super) struct Head {
+    pub dialect: Dialect,
+    pub names: Vec<String>,
+    /// Bytes above the header or the first row.
+    pub preamble: usize,
+    /// Bytes and lines that the head takes.
+    pub bytes: usize,
+    pub lines: u64,
+}
+
+impl Head {
+    pub fn read(text: &[u8], import: &Import) -> Result<Self> {
+        let comment = import.comment.and_then(|c| u8::try_from(c).ok());
+        let mut bytes = 0;
+        let mut lines = 0;
+        let mut skipped = 0;
+        let mut told = None;
+        let mut remark: &[u8] = &[];
+        loop {
+            let rest = &text[bytes..];
+            if rest.is_empty() {
+                let cause = format!("the file ends within its first {}", counted(lines, "line"));
+                return Err(Error::new(DataCode::RecordingTooShort, cause)
+                    .help("see skip_lines in the import description"));
+            }
+            let end = line_end(rest);
+            let line = rest[..end].trim_ascii_end();
+            let remarked = line.first().is_some_and(|b| Some(*b) == comment);
+            // Spreadsheets tell each other the delimiter in a first line of its own.
+            let telling = line.strip_prefix(b"sep=").filter(|d| d.len() == 1 && lines == 0);
+            if let Some([delimiter]) = telling {
+                told = Some(*delimiter);
+            }
+            if remarked {
+                remark = &line[1..];
+            }
+            if skipped < import.skip_lines || line.is_empty() || remarked || telling.is_some() {
+                skipped += 1;
+                bytes += end;
+                lines += 1;
+                continue;
+            }
+            let line = if line.contains(&b'\r') { Err(mac_lines()) } else { Ok(line) }?;
+            let delimiter = import.delimiter()?.or(told).unwrap_or_else(|| guess_delimiter(line, import));
+            let with_row = |rows: &[u8]| {
+                let row = rows.split(|b| *b == b'\n').find(|l| !l.trim_ascii().is_empty());
+                let commas = delimiter != b',' && has_decimal_commas(row.unwrap_or_default(), delimiter);
+                Dialect { delimiter, comment, decimal_comma: import.decimal == Decimal::Comma || commas }
+            };
+            let dialect = with_row(&rest[end..]);
+            let split = |line: &[u8]| {
+                Cells::split(line, dialect).map_err(|()| {
+                    Error::new(DataCode::RecordingWrongWidth, "a quotation mark is not closed")
+                        .line(lines + 1)
+                })
+            };
+            let cells = split(line)?;
+            if import.header == Some(false) {
+                let names = (1..=cells.len()).map(|n| n.to_string()).collect();
+                return Ok(Self { dialect, names, preamble: bytes, bytes, lines });
+            }
+            let numbers = cells.iter().filter(|c| c.parse::<f64>().is_ok()).count();
+            if numbers > 0 && numbers == cells.len() {
+                // Some programs write the names as a remark.
+                let names = split(remark.trim_ascii())?;
+                if names.len() == cells.len() && names.iter().any(|n| named(n) != Named::Other) {
+                    return Ok(Self { dialect, names, preamble: bytes, bytes, lines });
+                }
+                return Err(Error::new(DataCode::RecordingMissingColumn, "the file has no header line")
+                    .line(lines + 1)
+                    .value(String::from_utf8_lossy(&line[..line.len().min(100)]))
+                    .help(
+                        "put names with units above the numbers, such as `time_s,pressure_kPa,displacement_mm,force_N`, \
+                         or describe the columns by number in an import description (--import)",
+                    ));
+            }
+            let (bytes_here, below) = (bytes + end, &text[bytes + end..]);
+            let units = &below[..line_end(below)];
+            if let Some(names) = with_units(&cells, &split(units.trim_ascii_end())?) {
+                let (bytes, lines) = (bytes_here + units.len(), lines + 2);
+                let dialect = with_row(&below[units.len()..]);
+                return Ok(Self { dialect, names, preamble: bytes_here - end, bytes, lines });
+            }
+            return Ok(Self { dialect, names: cells, preamble: bytes, bytes: bytes_here, lines: lines + 1 });
+        }
+    }
+
+    /// For streams of unknown size: none; the estimate is only for reserving memory.
+    pub fn average_line(&self, rest: &[u8]) -> Option<u64> {
+        (rest.len() < 65_536).then_some(rest.len() as u64)
+    }
+}
+
+/// Bytes of the first line with its end.
+fn line_end(text: &[u8]) -> usize {
+    memchr::memchr(b'\n', text).map_or(text.len(), |e| e + 1)
+}
+
+/// The names with the units that test machines write into a row of their own below the header, in brackets or without; `None` where
+/// the row below is none of units.
+fn with_units(names: &[String], below: &[String]) -> Option<Vec<String>> {
+    let bare = |unit: &str| unit.trim_matches(['(', ')', '[', ']', ' ']).to_owned();
+    let joined: Vec<String> = names
+        .iter()
+        .zip(below)
+        .map(|(name, unit)| {
+            let with = format!("{name} [{}]", bare(unit));
+            let gained = !matches!(named(name), Named::Known(..)) && matches!(named(&with), Named::Known(..));
+            if gained { with } else { name.clone() }
+        })
+        .collect();
+    let gained = joined.iter().zip(names).filter(|(j, n)| j != n).count();
+    let numbers = below.iter().any(|cell| cell.parse::<f64>().is_ok());
+    (names.len() == below.len() && gained >= 2 && !numbers).then_some(joined)
+}
+
+fn mac_lines() -> Error {
+    Error::new(DataCode::RecordingNotText, "lines end in carriage returns only")
+        .help("save the file with usual line ends")
+}
+
+/// A tab in the header decides, then a comma, a semicolon, a blank; with decimal commas, the semicolon that goes with them.
+fn guess_delimiter(line: &[u8], import: &Import) -> u8 {
+    if line.contains(&b'\t') {
+        b'\t'
+    } else if import.decimal == Decimal::Comma {
+        b';'
+    } else {
+        b",; ".iter().copied().find(|d| line.contains(d)).unwrap_or(b',')
+    }
+}
+
+/// Whether a row's cells are numbers with decimal commas. `207,000` may be either; `0,207`, `1207,5` and `20,7` may not.
+pub fn has_decimal_commas(row: &[u8], delimiter: u8) -> bool {
+    let decimal = |cell: &[u8]| {
+        let cell: Vec<u8> = cell.iter().copied().filter(|b| !b" \"+-".contains(b)).collect();
+        let mut parts = cell.split(|b| *b == b',');
+        let (Some(whole), Some(rest), None) = (parts.next(), parts.next(), parts.next()) else {
+            return false;
+        };
+        let thousands = rest.len() == 3 && whole.len() <= 3 && whole != b"0";
+        !rest.is_empty() && !thousands && whole.iter().chain(rest).all(u8::is_ascii_digit)
+    };
+    !row.contains(&b'.') && row.trim_ascii_end().split(|b| *b == delimiter).any(decimal)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write;
+
+    use crate::recording::Reader;
+
+    /// The same readings as other programs write them: what is certain needs no import description.
+    #[test]
+    fn what_spreadsheets_and_laboratory_programs_write_is_read() {
+        let rows = |delimiter: &str, comma: bool, end: &str| {
+            (0..20).fold(String::new(), |mut text, i| {
+                let cells = [0.01 * f64::from(i), 300.125, 0.5 + 0.125 * f64::from(i), 40.5].map(|v| {
+                    let cell = format!("{v:.3}");
+                    if comma { cell.replace('.', ",") } else { cell }
+                });
+                write!(text, "{}{end}", cells.join(delimiter)).expect("text grows");
+                text
+            })
+        };
+        let names =
+            |delimiter: &str| ["time_s", "pressure_kPa", "displacement_mm", "force_N"].join(delimiter);
+        let forms = [
+            format!("{}\n{}", names(","), rows(",", false, "\n")),
+            format!("\u{feff}{}\r\n{}", names(","), rows(",", false, "\r\n")),
+            format!("{}\r\n{}", names(";"), rows(";", true, "\r\n")),
+            format!("{}\n{}", names(";"), rows(";", false, "\n")),
+            format!("sep=;\r\n{}\r\n{}", names(";"), rows(";", true, "\r\n")),
+            format!("{}\n{}", names("\t"), rows("\t", true, "\n")),
+            format!("# bench 2\n{}\n{}", names(","), rows(",", false, "\n")),
+            format!("# {}\n{}", names(" "), rows(" ", false, "\n")),
+            format!("Time [s],Pressure (kPa),Displacement [mm], Force_N\n{}", rows(",", false, "\n")),
+            format!(
+                "Time\tPressure\tDisplacement\tForce\r\n(s)\t(kPa)\t(mm)\t(N)\r\n{}",
+                rows("\t", false, "\r\n")
+            ),
+            format!("time;pressure;displacement;force\ns;kPa;mm;N\n{}", rows(";", true, "\n")),
+            format!("{}\n{},,,\n , ,,\n", names(","), rows(",", false, "\n")),
+            format!("{},Temperature [\u{b0}C]\n{}", names(","), rows(",", false, ",21.5\n")),
+        ];
+        let folder = tempfile::tempdir().expect("a folder");
+        let read = |n: usize, text: &str| {
+            let path = folder.path().join(format!("{n}.csv"));
+            std::fs::write(&path, text).expect("a file");
+            Reader::new().file(&path).unwrap_or_else(|e| panic!("{text}: {e}")).remove(0)
+        };
+        let spreadsheet = format!("\u{feff}{}\r\n{}", names("\t"), rows("\t", true, "\r\n"));
+        let utf16 =
+            |bytes: fn(u16) -> [u8; 2]| spreadsheet.encode_utf16().flat_map(bytes).collect::<Vec<u8>>();
+        for (n, bytes) in [utf16(u16::to_le_bytes), utf16(u16::to_be_bytes)].iter().enumerate() {
+            let path = folder.path().join(format!("unicode{n}.txt"));
+            std::fs::write(&path, bytes).expect("a file");
+            let recording = Reader::new().file(&path).unwrap_or_else(|e| panic!("{e}")).remove(0);
+            assert!((recording.stroke[19] - 2.875e-3).abs() < 1e-12 && recording.len() == 20);
+        }
+        for (n, form) in forms.iter().enumerate() {
+            let recording = read(n, form);
+            assert_eq!(recording.len(), 20, "{form}");
+            assert!((recording.pressure[7] - 300_125.0).abs() < 1e-6, "{form}");
+            assert!((recording.stroke[19] - 2.875e-3).abs() < 1e-12, "{form}");
+        }
+    }
+
+    #[test]
+    fn a_comma_between_thousands_is_no_decimal_comma() {
+        assert!(!super::has_decimal_commas(b"1;207,000;3;40", b';'));
+        assert!(super::has_decimal_commas(b"0,010;207,000;3;40", b';'));
+        assert!(!super::has_decimal_commas(b"0.5;a,b;3", b';'));
+    }
+}

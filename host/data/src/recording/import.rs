@@ -1,0 +1,332 @@
+//! Foreign files by description: a small TOML file, written once per bench.
+//!
+//! ```toml
+//! skip_lines = 5                    # lines before the header, or before the first row
+//! header = false                    # then columns are named by their number, from 1
+//! delimiter = "tab"                 # "comma", "tab", "semicolon", "space" (runs of blanks) or one character
+//! comment = "#"                     # lines that begin so are skipped
+//! decimal = "comma"                 # how decimals are written; "point" unless said otherwise
+//! sample_interval_s = 0.01          # when there is no column of time
+//! file_name = '(?<pressure_kPa>[0-9.]+)kPa'   # regular expression; what its named groups catch is constant per file
+//! preamble = 'pressure: (?<pressure_psi>[0-9.]+)' # the same for the skipped lines
+//! split_by = ["run"]                # one recording per value
+//!
+//! [columns.displacement]            # time, pressure, displacement, length, contraction, force, temperature,
+//! column = 2                        # pressure_command, cycle, direction, rest_length
+//! unit = "in"
+//! scale = 1.0                       # value in `unit` = cell · scale + offset
+//! offset = 0.0
+//! positive = "extension"            # or "contraction"
+//! zero = "longest"                  # stroke 0 is at the greatest length; or "first", "largest-force", or a number
+//!
+//! [columns.direction]
+//! column = "phase"
+//! values = { up = 1, down = -1 }    # text to number, for any quantity
+//!
+//! [constants]
+//! pressure_kPa = 207
+//!
+//! [where]
+//! rest_length_mm = "{rest_length_mm}"   # the muscle's own; also "{name}"; or plain text or a number
+//!
+//! [lookup]                          # a table beside the file; its columns can be used like the file's own
+//! file = "runs.csv"
+//! match = { file = "{file}", run = "run" }   # column of the table = column of the file
+//! ```
+//!
+//! A quantity that is not described is looked for in the header under its usual name.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::quantity::{Quantity, Unit};
+use crate::error::{DataCode, Error, Result, nearest};
+use crate::file_kind::FileKind;
+use crate::toml_words::toml_error;
+
+/// A column by name or by number, counted from 1.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(untagged)]
+pub enum ColumnRef {
+    /// Counted from 1.
+    Number(usize),
+    /// As the header has it.
+    Name(String),
+}
+
+impl fmt::Display for ColumnRef {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Name(name) => write!(f, "{name}"),
+        }
+    }
+}
+
+/// Which way a displacement counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Positive {
+    /// Readings grow as the muscle gets longer.
+    Extension,
+    /// Readings grow as the muscle shortens.
+    Contraction,
+}
+
+/// Where a displacement of arbitrary zero has stroke 0, that is, where the muscle has its rest length.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(untagged)]
+pub enum Zero {
+    /// At a reading, in the column's unit after scale and offset, before the sign.
+    At(f64),
+    /// At a place that the data show.
+    Found(FoundZero),
+}
+
+/// A zero that the data show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FoundZero {
+    /// Where the file begins.
+    First,
+    /// Where the muscle is longest, as on a machine that never stretches it beyond rest.
+    Longest,
+    /// Where the force is largest: the blocked force, at rest length.
+    LargestForce,
+}
+
+/// What one quantity is made from.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Column {
+    /// The column of the file or of the lookup table.
+    pub column: ColumnRef,
+    /// The unit after scale and offset; by default what the column's name says, or SI.
+    pub unit: Option<String>,
+    /// Value in `unit` = cell · scale + offset.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// See `scale`.
+    #[serde(default)]
+    pub offset: f64,
+    /// For displacements: which way is positive; contraction by default.
+    pub positive: Option<Positive>,
+    /// For displacements: where stroke 0 is; where the reading is 0 by default.
+    pub zero: Option<Zero>,
+    /// Text to number, for columns of words.
+    pub values: Option<BTreeMap<String, f64>>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// A table beside the recording, such as a list of runs with their geometry.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lookup {
+    /// Path relative to the recording's folder.
+    pub file: String,
+    /// Column of the table = column of the recording, or `{file}` for the recording's file name.
+    #[serde(rename = "match")]
+    pub keys: BTreeMap<String, String>,
+}
+
+/// How decimals are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Decimal {
+    /// 12.5
+    #[default]
+    Point,
+    /// 12,5
+    Comma,
+}
+
+/// A text or a number to compare cells with.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(untagged)]
+pub enum Value {
+    /// A number; cells are compared as numbers.
+    Number(f64),
+    /// A text, or `{rest_length_mm}` or `{name}` of the muscle.
+    Text(String),
+}
+
+/// An import description.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Import {
+    /// What this describes, for the reader of the file.
+    pub description: Option<String>,
+    /// Lines to skip before the header, or before the first row when there is none.
+    #[serde(default)]
+    pub skip_lines: usize,
+    /// Whether a header names the columns; yes unless said otherwise.
+    pub header: Option<bool>,
+    /// `comma`, `tab`, `semicolon`, `space` or one character; found out by default.
+    pub delimiter: Option<String>,
+    /// Lines that begin so are skipped.
+    pub comment: Option<char>,
+    /// How decimals are written.
+    #[serde(default)]
+    pub decimal: Decimal,
+    /// Seconds between rows, when no column gives the time.
+    pub sample_interval_s: Option<f64>,
+    /// A regular expression for the file's name.
+    pub file_name: Option<String>,
+    /// A regular expression for the skipped lines.
+    pub preamble: Option<String>,
+    /// Columns whose values set recordings apart.
+    #[serde(default)]
+    pub split_by: Vec<String>,
+    /// By quantity.
+    #[serde(default)]
+    pub columns: BTreeMap<String, Column>,
+    /// By header name with unit.
+    #[serde(default)]
+    pub constants: BTreeMap<String, f64>,
+    /// Rows to keep: all of these must hold.
+    #[serde(default, rename = "where")]
+    pub filters: BTreeMap<String, Value>,
+    /// A table beside the file.
+    pub lookup: Option<Lookup>,
+}
+
+impl Import {
+    /// Reads and checks a description.
+    ///
+    /// # Errors
+    /// [`DataCode::FileUnreadable`] or [`DataCode::ImportInvalid`] with the line.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let text = FileKind::Import.read_text(path)?;
+        Self::parse(&text).map_err(|e| FileKind::Import.wanted(path, e))
+    }
+
+    /// Parses and checks the text of a description.
+    ///
+    /// # Errors
+    /// [`DataCode::ImportInvalid`] with the line.
+    pub fn parse(text: &str) -> Result<Self> {
+        let import: Self = toml::from_str(text).map_err(|e| toml_error(DataCode::ImportInvalid, text, &e))?;
+        import.check()?;
+        Ok(import)
+    }
+
+    fn check(&self) -> Result<()> {
+        let invalid = |cause: String| Error::new(DataCode::ImportInvalid, cause);
+        for (name, column) in &self.columns {
+            let quantity = self::quantity(name)?;
+            if column.column == ColumnRef::Number(0) {
+                return Err(invalid("columns are counted from 1".into()).column(name));
+            }
+            if !(column.scale.is_finite() && column.scale != 0.0 && column.offset.is_finite()) {
+                return Err(
+                    invalid("scale must be a number other than 0, and offset a number".into()).column(name)
+                );
+            }
+            if let Some(unit) = &column.unit
+                && quantity.unit(unit).is_none()
+            {
+                return Err(invalid(format!("{name} has no unit `{unit}`"))
+                    .column(name)
+                    .help(format!("use {}, with scale and offset for anything else", quantity.unit_list())));
+            }
+            let arbitrary = column.positive.is_some() || column.zero.is_some();
+            if arbitrary && quantity != Quantity::Displacement {
+                return Err(invalid("`positive` and `zero` are for displacements".into()).column(name));
+            }
+            if matches!(column.zero, Some(Zero::At(at)) if !at.is_finite()) {
+                return Err(invalid("zero must be a number".into()).column(name));
+            }
+        }
+        for (name, value) in &self.constants {
+            constant(name)?;
+            if !value.is_finite() {
+                return Err(invalid("a constant must be a number".into()).column(name));
+            }
+        }
+        if let Some(interval) = self.sample_interval_s
+            && !(interval > 0.0 && interval.is_finite())
+        {
+            return Err(invalid("sample_interval_s must be a positive number".into()));
+        }
+        if self.comment.is_some_and(|c| !c.is_ascii()) {
+            return Err(invalid("comment must be one plain character".into()));
+        }
+        pattern("file_name", self.file_name.as_deref())?;
+        pattern("preamble", self.preamble.as_deref())?;
+        self.delimiter()?;
+        Ok(())
+    }
+
+    pub(super) fn delimiter(&self) -> Result<Option<u8>> {
+        Ok(match self.delimiter.as_deref() {
+            None => None,
+            Some("comma") => Some(b','),
+            Some("tab") => Some(b'\t'),
+            Some("semicolon") => Some(b';'),
+            Some("space") => Some(b' '),
+            Some(text) => match text.as_bytes() {
+                [byte]
+                    if byte.is_ascii_punctuation() && !b"\"+-.".contains(byte)
+                        || *byte == b'\t'
+                        || *byte == b' ' =>
+                {
+                    Some(*byte)
+                }
+                _ => {
+                    return Err(Error::new(DataCode::ImportInvalid, "this cannot be a delimiter")
+                        .column("delimiter")
+                        .value(text)
+                        .help("use \"comma\", \"tab\", \"semicolon\", \"space\" or one character"));
+                }
+            },
+        })
+    }
+
+    pub(super) fn described(&self, quantity: Quantity) -> Option<&Column> {
+        self.columns.get(quantity.name())
+    }
+}
+
+/// Compiles a regular expression of a description.
+pub(super) fn pattern(key: &str, pattern: Option<&str>) -> Result<Option<regex_lite::Regex>> {
+    let compile = |p: &str| {
+        regex_lite::Regex::new(p).map_err(|e| {
+            Error::new(DataCode::ImportInvalid, format!("{key} is not a regular expression: {e}"))
+                .value(p)
+                .help("for example '(?<pressure_kPa>[0-9.]+)kPa'")
+        })
+    };
+    pattern.map(compile).transpose()
+}
+
+/// The quantity of that name in an import description.
+fn quantity(name: &str) -> Result<Quantity> {
+    let all = || Quantity::IN_HEADERS.into_iter().chain([Quantity::Direction, Quantity::RestLength]);
+    all().find(|q| q.name() == name).ok_or_else(|| {
+        let names: Vec<_> = all().map(Quantity::name).collect();
+        let help = match nearest(name, names.iter().copied()) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("the quantities are {}", names.join(", ")),
+        };
+        Error::new(DataCode::ImportInvalid, format!("there is no quantity `{name}`")).help(help)
+    })
+}
+
+/// What a constant's name means, such as `pressure_kPa`.
+pub(super) fn constant(name: &str) -> Result<(Quantity, Unit)> {
+    let known = Quantity::IN_HEADERS.into_iter().chain([Quantity::RestLength]);
+    known
+        .flat_map(|q| q.headers().zip(q.units()).map(move |(header, unit)| (header, q, *unit)))
+        .find_map(|(header, quantity, unit)| (header == name).then_some((quantity, unit)))
+        .ok_or_else(|| {
+            Error::new(DataCode::ImportInvalid, format!("`{name}` is no quantity with a unit"))
+                .help("write it as in a header, for example pressure_kPa or rest_length_mm")
+        })
+}

@@ -1,0 +1,386 @@
+//! Files to recordings.
+
+use std::borrow::Cow;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::assemble::{Job, LookupTable, assemble};
+use super::blocks::{BlockError, Blocks, Rows, RowsError, read_rows};
+use super::campaign::Campaign;
+use super::cells::{Dialect, Fault, LineError};
+use super::columns::Recording;
+use super::container::{self, Container};
+use super::head::Head;
+use super::import::{Decimal, Import, Value, pattern as pattern_of};
+use super::line::Cells;
+use super::plan::{Context, Plan, plan};
+use super::quantity::{Named, named};
+use super::sheet::select;
+use super::source;
+use crate::counted::counted;
+use crate::error::{DataCode, Error, Result};
+use crate::file_kind::FileKind;
+use crate::muscle_description::MuscleDescription;
+use crate::progress::Progress;
+
+/// How to read recordings, and what is known of the muscle that made them.
+#[derive(Debug, Clone, Default)]
+pub struct Reader<'a> {
+    /// L0 in metres; needed when files give lengths or contractions instead of a stroke.
+    pub rest_length: Option<f64>,
+    /// The muscle's name, which an import description can select rows by.
+    pub muscle_name: Option<&'a str>,
+    /// For files that are not in our own form.
+    pub import: Option<&'a Import>,
+    /// Further row filters: column and the text or number that it must have.
+    pub filters: Vec<(String, String)>,
+    /// Files with fewer rows are refused.
+    pub min_rows: usize,
+    /// Told of every byte that is read.
+    pub progress: Option<Arc<dyn Progress>>,
+}
+
+/// Lines below what was taken for the header among which the header itself is looked for.
+const LOOKED_BELOW: usize = 100;
+/// Fewer rows than this are no recording of a muscle, but a mistake.
+const MIN_ROWS: usize = 10;
+
+impl<'a> Reader<'a> {
+    /// For recordings of a muscle that is not known.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { min_rows: MIN_ROWS, ..Self::default() }
+    }
+
+    /// For recordings of the muscle that is described.
+    #[must_use]
+    pub fn of(muscle: &'a MuscleDescription) -> Self {
+        Self { rest_length: Some(muscle.rest_length()), muscle_name: Some(&muscle.name), ..Self::new() }
+    }
+
+    /// For recordings of a muscle of this rest length (m), as a table knows it.
+    #[must_use]
+    pub fn with_rest_length(rest_length: f64) -> Self {
+        Self { rest_length: Some(rest_length), ..Self::new() }
+    }
+
+    /// By an import description.
+    #[must_use]
+    pub fn import(mut self, import: Option<&'a Import>) -> Self {
+        self.import = import;
+        self
+    }
+
+    /// Reads files in chronological order.
+    ///
+    /// # Errors
+    /// As [`Reader::file`], for the first file that is not right.
+    pub fn campaign<P: AsRef<Path>>(&self, paths: impl IntoIterator<Item = P>) -> Result<Campaign> {
+        let mut recordings = Vec::new();
+        for path in paths {
+            recordings.extend(self.file(path.as_ref())?);
+        }
+        if recordings.is_empty() {
+            return Err(Error::new(DataCode::CallInvalid, "no recording was given"));
+        }
+        Ok(Campaign::new(recordings))
+    }
+
+    /// Reads one file: one recording, or several when the import description splits it.
+    ///
+    /// Text (CSV, tab-separated, or as described), also compressed by gzip or zstd; MATLAB files of version 5 to 7.3, HDF5 and
+    /// Parquet, whose columns have the names that a text file's header would have.
+    ///
+    /// ```
+    /// use pam_data::recording::Reader;
+    ///
+    /// let file = tempfile::NamedTempFile::new()?;
+    /// let rows: String = (0..10).map(|i| format!("{i},45,{},2\n", 0.1 * f64::from(i))).collect();
+    /// std::fs::write(&file, format!("time_s,pressure_psi,displacement_in,force_lbf\n{rows}"))?;
+    /// let recording = &Reader::new().file(file.path())?[0];
+    /// // One pound-force per square inch is 6894.757 Pa, an inch 25.4 mm, one pound-force 4.448222 N.
+    /// assert!((recording.pressure[0] - 45.0 * 6894.757).abs() < 0.1);
+    /// assert!((recording.stroke[9] - 0.9 * 25.4e-3).abs() < 1e-9);
+    /// assert!((recording.require_force()?[0] - 2.0 * 4.448222).abs() < 1e-5);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Any `file::`, `recording::` or `import::` code, with file, line, column and value as far as they apply.
+    pub fn file(&self, path: &Path) -> Result<Vec<Recording>> {
+        self.open(path).map_err(|e| FileKind::Recording.wanted(path, e))
+    }
+
+    fn open(&self, path: &Path) -> Result<Vec<Recording>> {
+        let source = source::open(path, self.progress.as_ref())?;
+        if source.magic.is_empty() {
+            return Err(Error::new(DataCode::RecordingEmpty, "the file is empty"));
+        }
+        match Container::of(&source.magic) {
+            Some(container) => self.container(path, container),
+            None => self.text(path, source),
+        }
+    }
+
+    fn text(&self, path: &Path, source: source::Source) -> Result<Vec<Recording>> {
+        let description = self.description();
+        let mut blocks = Blocks::new(source.reader);
+        let mut first = Vec::new();
+        let start = match blocks.next(&mut first) {
+            Ok(_) => source::check_text(&first)?,
+            Err(BlockError::LongLine) => {
+                source::check_text(&first)?;
+                return Err(block_error(BlockError::LongLine));
+            }
+            Err(e) => return Err(block_error(e)),
+        };
+        let text = &first[start..];
+        if text.iter().all(u8::is_ascii_whitespace) {
+            return Err(Error::new(DataCode::RecordingEmpty, "the file holds nothing but blanks"));
+        }
+        let head = Head::read(text, &description)?;
+        let rest = &text[head.bytes..];
+        let average = head.average_line(rest);
+        blocks.put_back(rest);
+        let preamble = String::from_utf8_lossy(&text[..head.preamble]);
+        let layout = self.layout(path, &head.names, &description, &preamble).map_err(|e| {
+            let below = if self.import.is_none() { header_below(text, &head) } else { None };
+            match below {
+                Some(line) if e.code() == DataCode::RecordingMissingColumn => e.help(format!(
+                    "line {line} looks like the header: give skip_lines = {} in an import description (--import)",
+                    line - 1
+                )),
+                _ => e,
+            }
+        })?;
+        let rows =
+            read_rows(blocks, head.dialect, &layout.plan.wanted, head.names.len(), source.size.or(average))
+                .map_err(|e| rows_error(e, &head, &description))?;
+        self.finish(path, &description, &head.names, &layout, head.lines + 1, rows)
+    }
+
+    /// A container gives recordings by the same rules as text.
+    fn container(&self, path: &Path, container: Container) -> Result<Vec<Recording>> {
+        let description = self.description();
+        let sheet = container::columns(path, container)?;
+        let names: Vec<String> = sheet.iter().map(|(n, _)| n.clone()).collect();
+        let layout = self.layout(path, &names, &description, "")?;
+        let rows = select(&sheet, &layout.plan.wanted)?;
+        drop(sheet);
+        self.finish(path, &description, &names, &layout, 1, rows)
+    }
+
+    fn description(&self) -> Cow<'a, Import> {
+        // What a file of no description has for sure: a line that begins with a number sign is a remark.
+        let own = || Cow::Owned(Import { comment: Some('#'), ..Import::default() });
+        self.import.map_or_else(own, Cow::Borrowed)
+    }
+
+    /// Decides what to read of columns with these names.
+    fn layout(&self, path: &Path, names: &[String], import: &Import, preamble: &str) -> Result<Layout> {
+        let mut constants = Constants::default();
+        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        constants.catch("the file's name is", "file_name", import.file_name.as_deref(), &name)?;
+        constants.catch("the skipped lines are", "preamble", import.preamble.as_deref(), preamble)?;
+        let lookup = import.lookup.as_ref().map(|l| read_lookup(path, &l.file)).transpose()?;
+        let mut filters: Vec<(String, Value)> =
+            import.filters.iter().map(|(k, v)| (k.clone(), v.clone())).collect();
+        for (name, text) in &self.filters {
+            // A filter of the call replaces that of the description.
+            filters.retain(|(n, _)| n != name);
+            filters.push((name.clone(), Value::Text(text.clone())));
+        }
+        let context = Context {
+            import,
+            foreign: self.import.is_some(),
+            constants: constants.quantities,
+            filters: filters.iter().map(|(n, _)| n.clone()).collect(),
+            lookup: lookup.as_ref().map(|l| l.header.as_slice()),
+        };
+        Ok(Layout { plan: plan(names, &context)?, filters, lookup, labels: constants.labels })
+    }
+
+    fn finish(
+        &self,
+        path: &Path,
+        import: &Import,
+        names: &[String],
+        layout: &Layout,
+        first_line: u64,
+        rows: Rows,
+    ) -> Result<Vec<Recording>> {
+        let job = Job {
+            path,
+            min_rows: self.min_rows,
+            rest_length: self.rest_length,
+            muscle_name: self.muscle_name,
+            import,
+            filters: &layout.filters,
+            plan: &layout.plan,
+            names,
+            lookup: layout.lookup.as_ref(),
+            first_line,
+            labels: layout.labels.clone(),
+        };
+        assemble(&job, rows)
+    }
+}
+
+/// The first of the next lines, counted from 1, that names columns as a header does: above it a program may have told other things.
+fn header_below(text: &[u8], head: &Head) -> Option<u64> {
+    let names = |line: &[u8]| {
+        let line = String::from_utf8_lossy(line);
+        let known = |n: &str| matches!(named(n.trim().trim_matches('"')), Named::Known(..));
+        line.split([',', ';', '\t']).filter(|n| known(n)).count()
+    };
+    let below = text[head.bytes..].split(|b| *b == b'\n').take(LOOKED_BELOW);
+    below.zip(head.lines + 1..).find_map(|(line, number)| (names(line) >= 2).then_some(number))
+}
+
+/// What is read of one file.
+struct Layout {
+    plan: Plan,
+    filters: Vec<(String, Value)>,
+    lookup: Option<LookupTable>,
+    labels: Vec<(String, String)>,
+}
+
+fn block_error(error: BlockError) -> Error {
+    match error {
+        BlockError::LongLine => {
+            Error::new(DataCode::RecordingNotText, "the file has a line of more than 4 MiB")
+                .help("this is no table of text; give a CSV or tab-separated file with one header line")
+        }
+        BlockError::Io(e) if e.kind() == std::io::ErrorKind::NotFound => Error::unreadable("", &e),
+        BlockError::Io(e) if matches!(e.kind(), std::io::ErrorKind::PermissionDenied) => {
+            Error::new(DataCode::FileUnreadable, format!("cannot be read: {e}"))
+        }
+        BlockError::Io(e) => {
+            // What follows a colon is the unpacker's own, written for its authors.
+            let reason = e.to_string();
+            let reason = reason.split(':').next().unwrap_or_default();
+            Error::new(DataCode::RecordingContainer, format!("cannot be read to its end: {reason}"))
+                .help("the file may be damaged or cut short; get it again from where it was recorded")
+        }
+    }
+}
+
+fn rows_error(error: RowsError, head: &Head, import: &Import) -> Error {
+    let LineError { line, cell, value, fault } = match error {
+        RowsError::Block(e) => return block_error(e),
+        RowsError::Line(e) => *e,
+    };
+    let separator = match head.dialect.delimiter {
+        b'\t' => "tabs",
+        b';' => "semicolons",
+        b' ' => "blanks",
+        _ => "commas",
+    };
+    let error = match &fault {
+        Fault::Empty => Error::new(DataCode::RecordingNotANumber, "an empty cell")
+            .help("every row needs a number in every column that is used; leave incomplete rows out"),
+        Fault::NotFinite => Error::new(DataCode::RecordingNotFinite, "not a finite number")
+            .help("leave such rows out, or repair the sensor's channel; nothing is filled in silently"),
+        Fault::NotANumber => {
+            let comma =
+                value.contains(',') && value.chars().all(|c| c.is_ascii_digit() || ",.-+ ".contains(c));
+            let of_a_clock = value.contains(':') || value.matches(['-', '/']).count() == 2;
+            let help = if of_a_clock && value.starts_with(|c: char| c.is_ascii_digit()) {
+                "dates and times of day are not read: write seconds or milliseconds from some beginning (in a spreadsheet \
+                 =(A2-A$2)*86400), or give sample_interval_s in an import description"
+            } else if value.contains(',') && value.contains('.') {
+                "write numbers without signs between thousands"
+            } else if comma && !head.dialect.decimal_comma {
+                "decimals are written with a point; for decimal commas use an import description with decimal = \"comma\""
+            } else if head.dialect.decimal_comma && value.contains('.') && import.decimal == Decimal::Comma {
+                "the import description says that decimals are written with a comma"
+            } else if head.dialect.decimal_comma && value.contains('.') {
+                "decimals are written with a comma in this file's first row; write numbers without points between thousands"
+            } else {
+                "every cell of a column that is used must be a number"
+            };
+            Error::new(DataCode::RecordingNotANumber, "not a number").help(help)
+        }
+        Fault::Width { found, expected } => {
+            let cells = counted(found, "cell");
+            let help = if *found == 2 * expected && separator == "commas" {
+                "this looks like decimal commas; write decimals with a point, or use an import description"
+                    .to_owned()
+            } else {
+                format!("cells are separated by {separator}; the line may be cut short or damaged")
+            };
+            Error::new(DataCode::RecordingWrongWidth, format!("{cells} where {expected} are expected"))
+                .help(help)
+        }
+        Fault::OpenQuote => {
+            Error::new(DataCode::RecordingWrongWidth, "a quotation mark is not closed on its line")
+                .help("cells that hold line breaks are not supported")
+        }
+    };
+    let error = error.line(head.lines + line + 1).value(value);
+    match cell.and_then(|c| head.names.get(c)) {
+        Some(name) => error.column(name.clone()),
+        None => error,
+    }
+}
+
+/// What is constant over a file and stands in its name or above its table.
+#[derive(Default)]
+struct Constants {
+    quantities: Vec<(String, f64)>,
+    labels: Vec<(String, String)>,
+}
+
+impl Constants {
+    /// Takes what the named groups of `pattern` catch in `text`.
+    fn catch(&mut self, what: &str, key: &str, pattern: Option<&str>, text: &str) -> Result<()> {
+        let Some(pattern) = pattern_of(key, pattern)? else { return Ok(()) };
+        let Some(captures) = pattern.captures(text) else {
+            return Err(Error::new(
+                DataCode::ImportInvalid,
+                format!("{what} not as the import description says"),
+            )
+            .value(text)
+            .help(format!("{key} must match {}", pattern.as_str())));
+        };
+        for group in pattern.capture_names().flatten() {
+            let Some(caught) = captures.name(group).map(|m| m.as_str()) else { continue };
+            if super::import::constant(group).is_err() {
+                self.labels.push((group.to_owned(), caught.to_owned()));
+                continue;
+            }
+            let value = caught.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
+                Error::new(DataCode::ImportInvalid, format!("{key} catches no number for {group}"))
+                    .value(caught)
+            })?;
+            self.quantities.push((group.to_owned(), value));
+        }
+        Ok(())
+    }
+}
+
+fn read_lookup(recording: &Path, file: &str) -> Result<LookupTable> {
+    let path = recording.parent().unwrap_or(Path::new("")).join(file);
+    let text = std::fs::read(&path).map_err(|e| {
+        Error::unreadable(&path, &e)
+            .help("the import description's lookup table stands in the recording's folder")
+    })?;
+    let text = &text[source::check_text(&text).map_err(|e| e.file(&path))?..];
+    let mut lines = text.split(|b| *b == b'\n').enumerate().filter(|(_, l)| !l.trim_ascii().is_empty());
+    let mut table = LookupTable::default();
+    let Some((_, header)) = lines.next() else {
+        return Err(Error::new(DataCode::RecordingEmpty, "the lookup table is empty").file(&path));
+    };
+    let delimiter = if header.contains(&b'\t') { b'\t' } else { b',' };
+    let dialect = Dialect { delimiter, comment: None, decimal_comma: false };
+    let open = |line: usize| {
+        Error::new(DataCode::RecordingWrongWidth, "a quotation mark is not closed")
+            .file(&path)
+            .line(line as u64 + 1)
+    };
+    table.header = Cells::split(header, dialect).map_err(|()| open(0))?;
+    for (n, line) in lines {
+        table.rows.push(Cells::split(line, dialect).map_err(|()| open(n))?);
+    }
+    Ok(table)
+}

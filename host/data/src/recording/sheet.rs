@@ -1,0 +1,120 @@
+//! Named columns as they stand in a container: not yet chosen, not yet in SI.
+
+use super::blocks::Rows;
+use super::cells::{Want, Wanted, Words};
+use crate::counted::counted;
+use crate::error::{DataCode, Error, Result};
+
+/// The columns of one file, in its order.
+pub(super) type Sheet = Vec<(String, Column)>;
+
+/// One column of a container.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Column {
+    /// Missing values are NaN.
+    Numbers(Vec<f64>),
+    /// Only Parquet columns hold text.
+    #[cfg_attr(not(feature = "parquet"), allow(dead_code))]
+    Texts(Vec<String>),
+    /// What a recording has no use for, by what it is: told only where such a column is asked for.
+    #[cfg_attr(not(any(feature = "parquet", feature = "hdf5")), allow(dead_code))]
+    Other(String),
+}
+
+/// A failure inside a container, in the words of whoever read it.
+pub(super) fn damaged(what: impl std::fmt::Display) -> Error {
+    Error::new(DataCode::RecordingContainer, what.to_string())
+}
+
+/// The columns of a matrix that is stored column after column, called `name(:,k)` as MATLAB does; a vector is one column.
+pub(super) fn matrix(name: &str, rows: usize, wide: usize, values: Vec<f64>, sheet: &mut Sheet) {
+    /// A wider matrix is a picture or a table of coefficients, no recording.
+    const WIDEST: usize = 1000;
+    if values.is_empty() || rows.checked_mul(wide) != Some(values.len()) {
+        return;
+    }
+    if rows == 1 || wide == 1 {
+        sheet.push((name.to_owned(), Column::Numbers(values)));
+    } else if wide <= WIDEST {
+        let named = |(k, c): (usize, &[f64])| (format!("{name}(:,{})", k + 1), Column::Numbers(c.to_vec()));
+        sheet.extend(values.chunks_exact(rows).enumerate().map(named));
+    }
+}
+
+/// The same columns by the rest of their names, where all names share what stands before a point: the fields of the one struct,
+/// group or table that a file holds.
+pub(super) fn without_common_prefix(mut sheet: Sheet) -> Sheet {
+    loop {
+        let Some(prefix) =
+            sheet.first().and_then(|(name, _)| name.split_once('.')).map(|(p, _)| format!("{p}."))
+        else {
+            return sheet;
+        };
+        if !sheet.iter().all(|(name, _)| name.len() > prefix.len() && name.starts_with(&prefix)) {
+            return sheet;
+        }
+        for (name, _) in &mut sheet {
+            name.drain(..prefix.len());
+        }
+    }
+}
+
+/// Takes the wanted columns, as numbers in SI or as words. Where text errors name a line, these name the row, counted from 1.
+pub(super) fn select(sheet: &Sheet, wanted: &[Wanted]) -> Result<Rows> {
+    let mut rows = Rows::default();
+    let mut length: Option<(usize, &str)> = None;
+    for wanted in wanted {
+        let Some((name, column)) = sheet.get(wanted.index) else { continue };
+        let count = match column {
+            Column::Numbers(n) => n.len(),
+            Column::Texts(t) => t.len(),
+            Column::Other(what) => {
+                return Err(Error::new(
+                    DataCode::RecordingNotANumber,
+                    format!("a column of {what} where numbers are needed"),
+                )
+                .column(name)
+                .help("save the column as numbers, in the unit that its name says"));
+            }
+        };
+        match length {
+            Some((n, first)) if n != count => {
+                return Err(Error::new(
+                    DataCode::RecordingWrongWidth,
+                    format!("`{name}` has {} and `{first}` has {n}", counted(count, "row")),
+                )
+                .help("all columns of a recording are equally long"));
+            }
+            _ => length = Some((count, name)),
+        }
+        let (mut numbers, mut words) = (Vec::new(), Words::default());
+        match (wanted.want, column) {
+            (Want::Number { scale, offset }, Column::Numbers(values)) => {
+                if let Some(row) = values.iter().position(|v| !v.is_finite()) {
+                    return Err(Error::new(DataCode::RecordingNotFinite, "not a finite number")
+                        .line(row as u64 + 1)
+                        .column(name)
+                        .value(values[row].to_string())
+                        .help("leave such rows out; missing values are not filled in silently"));
+                }
+                numbers = values.iter().map(|v| v * scale + offset).collect();
+            }
+            (Want::Number { .. }, Column::Texts(texts)) => {
+                return Err(Error::new(
+                    DataCode::RecordingNotANumber,
+                    "a column of text where numbers are needed",
+                )
+                .column(name)
+                .value(texts.first().map_or("", String::as_str))
+                .help("save the column as numbers"));
+            }
+            (Want::Text, Column::Numbers(values)) => values.iter().for_each(|v| words.push(&v.to_string())),
+            (Want::Text, Column::Texts(texts)) => texts.iter().for_each(|t| words.push(t)),
+            (_, Column::Other(_)) => {}
+        }
+        rows.numbers.push(numbers);
+        rows.texts.push(words);
+    }
+    rows.rows = length.map_or(0, |(n, _)| n);
+    Ok(rows)
+}

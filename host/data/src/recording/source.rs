@@ -1,0 +1,198 @@
+//! Bytes of a file, decompressed on the way when it is compressed.
+
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::error::{DataCode, Error, Result};
+use crate::progress::Progress;
+
+/// Compression is recognised by the first bytes, not by the name: files get renamed.
+const GZIP: [u8; 2] = [0x1f, 0x8b];
+const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+/// Byte-order marks of UTF-16, in which spreadsheets save "Unicode text".
+const UTF_16_LITTLE: [u8; 2] = [0xff, 0xfe];
+const UTF_16_BIG: [u8; 2] = [0xfe, 0xff];
+
+/// An open file, read from its beginning.
+pub(super) struct Source {
+    pub reader: Box<dyn Read + Send>,
+    /// Size of the text if it is known beforehand, bytes.
+    pub size: Option<u64>,
+    /// The first bytes of the file itself, before any decompression.
+    pub magic: Vec<u8>,
+}
+
+pub(super) fn open(path: &Path, progress: Option<&Arc<dyn Progress>>) -> Result<Source> {
+    let unreadable = |e: io::Error| Error::unreadable(path, &e);
+    let mut file = File::open(path).map_err(unreadable)?;
+    let meta = file.metadata().map_err(unreadable)?;
+    if meta.is_dir() {
+        return Err(Error::new(DataCode::FileUnreadable, "is a folder")
+            .file(path)
+            .help("name the files in it"));
+    }
+    let counted = |file: File| Counted { file, progress: progress.cloned() };
+    let mut magic = Vec::new();
+    (&mut file).take(512).read_to_end(&mut magic).map_err(unreadable)?;
+    if magic.starts_with(&GZIP) || magic.starts_with(&ZSTD) {
+        // A pipe cannot be rewound, so the bytes already read go in front again.
+        let whole = io::Cursor::new(magic.clone()).chain(counted(file));
+        let reader: Box<dyn Read + Send> = if magic.starts_with(&GZIP) {
+            Box::new(flate2::read::MultiGzDecoder::new(whole))
+        } else {
+            let decoder = ruzstd::decoding::StreamingDecoder::new(whole).map_err(|e| {
+                Error::new(DataCode::RecordingContainer, format!("damaged zstd file: {e}")).file(path)
+            })?;
+            Box::new(decoder)
+        };
+        return Ok(Source { reader, size: None, magic });
+    }
+    let big_endian = magic.starts_with(&UTF_16_BIG);
+    if big_endian || magic.starts_with(&UTF_16_LITTLE) {
+        let whole = Box::new(io::Cursor::new(magic[2..].to_vec()).chain(counted(file)));
+        let reader = Box::new(Utf16::new(whole, big_endian));
+        return Ok(Source { reader, size: None, magic });
+    }
+    if meta.is_file() {
+        file.seek(SeekFrom::Start(0)).map_err(unreadable)?;
+        return Ok(Source { reader: Box::new(counted(file)), size: Some(meta.len()), magic });
+    }
+    Ok(Source { reader: Box::new(io::Cursor::new(magic.clone()).chain(counted(file))), size: None, magic })
+}
+
+/// A file that tells how far it is read.
+struct Counted {
+    file: File,
+    progress: Option<Arc<dyn Progress>>,
+}
+
+impl Read for Counted {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.file.read(buffer)?;
+        if let Some(progress) = &self.progress {
+            progress.add(count as u64);
+        }
+        Ok(count)
+    }
+}
+
+/// UTF-16 as UTF-8, as it is read. What is no character becomes the sign for that.
+struct Utf16 {
+    units: Box<dyn Read + Send>,
+    big_endian: bool,
+    /// The first byte of a unit whose second is still to come.
+    half: Option<u8>,
+    /// The first unit of a pair.
+    high: Option<u16>,
+    /// What is decoded and was not asked for yet.
+    ready: io::Cursor<Vec<u8>>,
+}
+
+impl Utf16 {
+    /// Behind the byte-order mark.
+    fn new(units: Box<dyn Read + Send>, big_endian: bool) -> Self {
+        Self { units, big_endian, half: None, high: None, ready: io::Cursor::default() }
+    }
+
+    /// The next characters; none at the end.
+    fn decode(&mut self) -> io::Result<String> {
+        let mut raw = [0; 1 << 13];
+        let mut text = String::new();
+        while text.is_empty() {
+            let count = self.units.read(&mut raw)?;
+            if count == 0 {
+                text.extend(self.high.take().map(|_| char::REPLACEMENT_CHARACTER));
+                break;
+            }
+            let bytes: Vec<u8> = self.half.take().into_iter().chain(raw[..count].iter().copied()).collect();
+            let (pairs, rest) = bytes.as_chunks::<2>();
+            self.half = rest.first().copied();
+            let unit =
+                |b: &[u8; 2]| if self.big_endian { u16::from_be_bytes(*b) } else { u16::from_le_bytes(*b) };
+            let mut units: Vec<u16> = self.high.take().into_iter().chain(pairs.iter().map(unit)).collect();
+            if units.last().is_some_and(|u| (0xd800..0xdc00).contains(u)) {
+                self.high = units.pop();
+            }
+            text.extend(char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)));
+        }
+        Ok(text)
+    }
+}
+
+impl Read for Utf16 {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.ready.position() == self.ready.get_ref().len() as u64 {
+            self.ready = io::Cursor::new(self.decode()?.into_bytes());
+        }
+        self.ready.read(buffer)
+    }
+}
+
+/// Refuses what is not text in UTF-8 or UTF-16, from the first block of it, and gives the length of a byte order mark to be skipped.
+pub(super) fn check_text(first: &[u8]) -> Result<usize> {
+    let not_text = |cause: &str, help: &str| Err(Error::new(DataCode::RecordingNotText, cause).help(help));
+    if first.starts_with(&UTF_16_LITTLE) || first.starts_with(&UTF_16_BIG) {
+        return not_text("the file is UTF-16 text", "save it as UTF-8, or as plain text");
+    }
+    if first.starts_with(b"\x89HDF") || first.starts_with(b"PAR1") || first.starts_with(b"PK\x03\x04") {
+        return not_text(
+            "the file is a container, not text",
+            "see the manual for the formats that are read directly",
+        );
+    }
+    let head = &first[..first.len().min(1 << 16)];
+    let zeros = memchr::memchr_iter(0, head).count();
+    if zeros > 0 && zeros * 3 > head.len() && zeros * 3 < head.len() * 2 {
+        return not_text(
+            "the file looks like UTF-16 text without a mark",
+            "save it as UTF-8, or as plain text",
+        );
+    }
+    if zeros > 0 {
+        return not_text(
+            "the file is binary, not text",
+            "give a CSV or tab-separated file with one header line",
+        );
+    }
+    Ok(if first.starts_with(&[0xef, 0xbb, 0xbf]) { 3 } else { 0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Gives so many bytes at a time.
+    struct Slowly(Vec<u8>, usize);
+
+    impl Read for Slowly {
+        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+            let count = self.1.min(buffer.len()).min(self.0.len());
+            buffer[..count].copy_from_slice(&self.0[..count]);
+            self.0.drain(..count);
+            Ok(count)
+        }
+    }
+
+    #[test]
+    fn utf_16_is_read_whole_however_it_comes_and_is_asked_for() {
+        let text = "time_s\t°C\t\u{1d53d}\u{20ac}\n".repeat(40);
+        for big_endian in [false, true] {
+            let bytes = |u: u16| if big_endian { u.to_be_bytes() } else { u.to_le_bytes() };
+            let raw: Vec<u8> = text.encode_utf16().flat_map(bytes).collect();
+            for (given, asked) in [(1, 1), (3, 2), (5, 7), (1 << 20, 1), (1 << 20, 1 << 20)] {
+                let mut reader = Utf16::new(Box::new(Slowly(raw.clone(), given)), big_endian);
+                let (mut all, mut some) = (Vec::new(), vec![0; asked]);
+                loop {
+                    let count = reader.read(&mut some).expect("bytes");
+                    if count == 0 {
+                        break;
+                    }
+                    all.extend_from_slice(&some[..count]);
+                }
+                assert_eq!(String::from_utf8(all).as_deref(), Ok(text.as_str()), "{given} {asked}");
+            }
+        }
+    }
+}

@@ -1,0 +1,402 @@
+//! A conversation with a controller: hello, typed calls, topics, and what was lost on the way.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use model_core::link::endpoints::{EVENT, Endpoint, GetStatus, LOG, TELEMETRY};
+use model_core::link::frame::{Accumulator, Header, Kind, MAX_BODY, MAX_WIRE, encode, encode_bytes};
+use model_core::link::hello::{self, Hello};
+use model_core::link::messages::{Event, Refusal, Telemetry};
+use model_core::link::{LINK_VERSION, SCHEMA_HASH};
+
+use super::heard::{Heard, lost, version_error};
+use super::{Address, Port, words};
+use crate::error::DeviceCode;
+use pam_data::error::{DataCode, Error, Result};
+
+/// Telemetry that nobody fetches is kept up to this many samples: a minute at 1 kHz.
+const BACKLOG: usize = 60_000;
+
+/// A running controller hears from its host at least this often; it stops by itself after `watch.host_silence_ticks`, a
+/// second unless set otherwise.
+const HEARTBEAT: Duration = Duration::from_millis(100);
+
+/// How long to wait for answers.
+#[derive(Debug, Clone, Copy)]
+pub struct Patience {
+    /// Time for one answer.
+    pub answer: Duration,
+    /// Time for an answer that waits for flash memory to be erased.
+    pub slow_answer: Duration,
+    /// Times that a question is asked, when asking twice does no harm and the line is silent.
+    pub tries: u32,
+    /// The same on a line that is not silent but noisy: frames arrive and fail their check.
+    pub noisy_tries: u32,
+}
+
+impl Default for Patience {
+    fn default() -> Self {
+        Self {
+            answer: Duration::from_millis(600),
+            slow_answer: Duration::from_secs(6),
+            tries: 3,
+            noisy_tries: 60,
+        }
+    }
+}
+
+/// What a device says by itself.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Topic {
+    /// A sample.
+    Telemetry(Telemetry),
+    /// Something that happened.
+    Event(Event),
+    /// A log line, for [`LogTable`](super::log_table::LogTable).
+    Log(Vec<u8>),
+}
+
+/// What did not arrive.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Losses {
+    /// Samples of telemetry that the sequence numbers miss.
+    pub samples: u64,
+    /// Gaps in which they were lost.
+    pub gaps: u64,
+    /// Frames whose check failed, and bytes between frames that were none.
+    pub bad_frames: u64,
+    /// Questions that had to be asked again.
+    pub repeats: u64,
+    /// Samples that arrived and were never fetched.
+    pub unread: u64,
+}
+
+struct Answer {
+    header: Header,
+    body: Vec<u8>,
+}
+
+/// A controller that has said hello and speaks our schema.
+pub struct Client {
+    port: Port,
+    accumulator: Accumulator,
+    sequence: u16,
+    hello: Hello,
+    topics: VecDeque<Topic>,
+    expected: Option<u16>,
+    losses: Losses,
+    patience: Patience,
+    spoke: Instant,
+}
+
+impl std::fmt::Debug for Client {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Client").field("port", &self.port).field("hello", &self.hello).finish_non_exhaustive()
+    }
+}
+
+impl Client {
+    /// Opens a port and says hello.
+    ///
+    /// # Errors
+    /// [`DeviceCode::DevicePort`], [`DeviceCode::DeviceSilent`] when nothing answers, [`DeviceCode::DeviceForeign`] when what answers is not
+    /// a controller of ours, [`DeviceCode::DeviceVersion`] when it speaks another schema.
+    pub fn open(address: &Address) -> Result<Self> {
+        Self::connect(Port::open(address)?, Patience::default())
+    }
+
+    /// Says hello over an open port.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn connect(port: Port, patience: Patience) -> Result<Self> {
+        let client = Self::greet(port, patience)?;
+        let hello = client.hello;
+        if hello.link_version != LINK_VERSION || hello.schema_hash != SCHEMA_HASH {
+            return Err(version_error(&client.port, &hello));
+        }
+        Ok(client)
+    }
+
+    /// Says hello and leaves the comparison of versions to the caller: for asking a device what it is.
+    ///
+    /// # Errors
+    /// As [`Self::open`], without [`DeviceCode::DeviceVersion`].
+    pub fn greet(port: Port, patience: Patience) -> Result<Self> {
+        let unknown = Hello {
+            release: (0, 0, 0),
+            link_version: 0,
+            table_format: 0,
+            store_format: 0,
+            schema_hash: 0,
+            board: 0,
+            muscles: 0,
+            serial: [0; 12],
+            starts: 0,
+        };
+        let mut client = Self {
+            port,
+            accumulator: Accumulator::new(),
+            sequence: 0,
+            hello: unknown,
+            topics: VecDeque::new(),
+            expected: None,
+            losses: Losses::default(),
+            patience,
+            spoke: Instant::now(),
+        };
+        let mut heard = Heard::default();
+        let mut attempt = 0;
+        while attempt < patience.tries.max(1) || (heard.frames > 0 && attempt < patience.noisy_tries) {
+            attempt += 1;
+            // A zero ends whatever half frame an earlier program left on the line.
+            client.send(&[0])?;
+            let sequence = client.next_sequence();
+            let header = Header { kind: Kind::Request, id: hello::ID, sequence };
+            let answer = client
+                .transmit(header, &[])
+                .and_then(|()| client.await_answer(hello::ID, sequence, patience.answer, &mut heard))?;
+            let Some(answer) = answer else { continue };
+            match Hello::from_bytes(&answer.body) {
+                Ok(hello) if answer.header.kind == Kind::Response => {
+                    client.hello = hello;
+                    client.topics.clear();
+                    client.losses = Losses::default();
+                    return Ok(client);
+                }
+                _ => {
+                    return Err(Error::new(
+                        DeviceCode::DeviceForeign,
+                        "it speaks in frames like ours, but its hello is not a controller's",
+                    )
+                    .value(client.port.name())
+                    .help("is this the controller's own port?"));
+                }
+            }
+        }
+        Err(heard.error(&client.port))
+    }
+
+    /// Every version of the device, and which device it is.
+    #[must_use]
+    pub fn hello(&self) -> &Hello {
+        &self.hello
+    }
+
+    /// The port's address.
+    #[must_use]
+    pub fn port(&self) -> &str {
+        self.port.name()
+    }
+
+    /// What did not arrive so far.
+    #[must_use]
+    pub fn losses(&self) -> Losses {
+        Losses { bad_frames: u64::from(self.accumulator.counts().bad), ..self.losses }
+    }
+
+    /// Asks once more when no answer comes: for questions that may be asked twice.
+    ///
+    /// # Errors
+    /// [`DeviceCode::DeviceSilent`], or [`DeviceCode::DeviceRefused`] with the device's reason in words.
+    pub fn call<E: Endpoint>(&mut self, request: &E::Request) -> Result<E::Response> {
+        match self.ask::<E>(request, self.patience.answer, self.patience.tries)? {
+            Ok(response) => Ok(response),
+            Err(refusal) => Err(words::refused(E::NAME, refusal)),
+        }
+    }
+
+    /// Asks once and waits long: for what must not happen twice, or waits for flash memory.
+    ///
+    /// # Errors
+    /// As [`Self::call`].
+    pub fn call_once<E: Endpoint>(&mut self, request: &E::Request) -> Result<E::Response> {
+        match self.ask::<E>(request, self.patience.slow_answer, 1)? {
+            Ok(response) => Ok(response),
+            Err(refusal) => Err(words::refused(E::NAME, refusal)),
+        }
+    }
+
+    /// As [`Self::call`], with the refusal as a value, for callers that know what to do about it.
+    ///
+    /// # Errors
+    /// [`DeviceCode::DeviceSilent`] when no answer comes, [`DeviceCode::DeviceForeign`] when it cannot be read.
+    pub fn try_call<E: Endpoint>(&mut self, request: &E::Request) -> Result<Result<E::Response, Refusal>> {
+        self.ask::<E>(request, self.patience.answer, self.patience.tries)
+    }
+
+    /// Lets the device know that its host is alive, if nothing was sent for a while (a tenth of a second). Nothing is waited for:
+    /// the answer is passed over when it comes.
+    ///
+    /// # Errors
+    /// [`DeviceCode::DeviceSilent`] when the line is gone.
+    pub fn keep_alive(&mut self) -> Result<()> {
+        if self.spoke.elapsed() < HEARTBEAT {
+            return Ok(());
+        }
+        let header = Header { kind: Kind::Request, id: GetStatus::ID, sequence: self.next_sequence() };
+        self.transmit(header, &[])
+    }
+
+    /// As [`Self::try_call`], asked once: for what is repeated only after looking what became of it.
+    ///
+    /// # Errors
+    /// As [`Self::try_call`].
+    pub fn try_once<E: Endpoint>(&mut self, request: &E::Request) -> Result<Result<E::Response, Refusal>> {
+        self.ask::<E>(request, self.patience.answer, 1)
+    }
+
+    /// The next thing the device said by itself, waiting at most `patience` for one.
+    ///
+    /// # Errors
+    /// [`DeviceCode::DeviceSilent`] when the line is gone.
+    pub fn topic(&mut self, patience: Duration) -> Result<Option<Topic>> {
+        let deadline = Instant::now() + patience;
+        loop {
+            if let Some(topic) = self.topics.pop_front() {
+                return Ok(Some(topic));
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(None);
+            }
+            self.pump(left, &mut Heard::default())?;
+        }
+    }
+
+    fn ask<E: Endpoint>(
+        &mut self,
+        request: &E::Request,
+        patience: Duration,
+        tries: u32,
+    ) -> Result<Result<E::Response, Refusal>> {
+        let unreadable = || {
+            Error::new(DeviceCode::DeviceForeign, format!("the answer to `{}` cannot be read", E::NAME))
+                .help("the device said the same schema as this program, so this is a fault in one of them: please report it")
+        };
+        let mut wire = [0; MAX_WIRE];
+        let bad = self.accumulator.counts().bad;
+        let mut attempt = 0;
+        while attempt < self.allowed(tries, bad) {
+            self.losses.repeats += u64::from(attempt > 0);
+            let sequence = self.next_sequence();
+            let header = Header { kind: Kind::Request, id: E::ID, sequence };
+            let length = encode(header, request, &mut wire).map_err(|e| {
+                Error::new(DataCode::CallInvalid, format!("the request `{}` cannot be sent: {e}", E::NAME))
+            })?;
+            self.send(&wire[..length])?;
+            attempt += 1;
+            let Some(answer) = self.await_answer(E::ID, sequence, patience, &mut Heard::default())? else {
+                continue;
+            };
+            return match answer.header.kind {
+                Kind::Refusal => postcard::from_bytes(&answer.body).map(Err).map_err(|_| unreadable()),
+                _ => postcard::from_bytes(&answer.body).map(Ok).map_err(|_| unreadable()),
+            };
+        }
+        Err(Error::new(
+            DeviceCode::DeviceSilent,
+            format!("the device does not answer `{}` any more", E::NAME),
+        )
+        .value(self.port.name())
+        .help("look at cable and supply; when it answers again it is disarmed, or vented by its own watch"))
+    }
+
+    /// How often a question may be asked, when so many frames were bad before it was asked first.
+    fn allowed(&self, tries: u32, bad_before: u32) -> u32 {
+        if tries > 1 && self.accumulator.counts().bad != bad_before {
+            self.patience.noisy_tries
+        } else {
+            tries.max(1)
+        }
+    }
+
+    fn next_sequence(&mut self) -> u16 {
+        self.sequence = self.sequence.wrapping_add(1);
+        self.sequence
+    }
+
+    fn transmit(&mut self, header: Header, body: &[u8]) -> Result<()> {
+        let mut wire = [0; MAX_WIRE];
+        debug_assert!(body.len() <= MAX_BODY);
+        let length = encode_bytes(header, body, &mut wire)
+            .map_err(|e| Error::new(DataCode::CallInvalid, format!("the request cannot be sent: {e}")))?;
+        self.send(&wire[..length])
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<()> {
+        self.spoke = Instant::now();
+        self.port.write_all(bytes).map_err(|e| lost(&self.port, &e))
+    }
+
+    /// Waits for the answer with this endpoint and number; late answers to earlier questions are passed over.
+    fn await_answer(
+        &mut self,
+        id: u8,
+        sequence: u16,
+        patience: Duration,
+        heard: &mut Heard,
+    ) -> Result<Option<Answer>> {
+        let deadline = Instant::now() + patience;
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(None);
+            }
+            let answers = self.pump(left, heard)?;
+            let ours = |a: &Answer| a.header.id == id && a.header.sequence == sequence;
+            if let Some(answer) = answers.into_iter().find(ours) {
+                return Ok(Some(answer));
+            }
+        }
+    }
+
+    /// Reads once, sorts what came: topics into their queue, answers to the caller.
+    fn pump(&mut self, patience: Duration, heard: &mut Heard) -> Result<Vec<Answer>> {
+        let mut buffer = [0; 2048];
+        let count = match self.port.read(&mut buffer, patience) {
+            Ok(count) => count,
+            Err(e) => {
+                // A foreign peer often hangs up on bytes it does not understand; what it said until then is the better news.
+                return Err(if heard.bytes > 0 { heard.error(&self.port) } else { lost(&self.port, &e) });
+            }
+        };
+        heard.take(&buffer[..count]);
+        let mut answers = Vec::new();
+        for &byte in &buffer[..count] {
+            let Some(Ok(frame)) = self.accumulator.push(byte) else { continue };
+            heard.frames += 1;
+            match frame.header.kind {
+                Kind::Response | Kind::Refusal => {
+                    answers.push(Answer { header: frame.header, body: frame.body.to_vec() });
+                }
+                Kind::Topic if frame.header.id == TELEMETRY => {
+                    if let Ok(sample) = postcard::from_bytes::<Telemetry>(frame.body) {
+                        let missing =
+                            self.expected.map_or(0, |expected| frame.header.sequence.wrapping_sub(expected));
+                        self.losses.samples += u64::from(missing);
+                        self.losses.gaps += u64::from(missing > 0);
+                        self.expected = Some(frame.header.sequence.wrapping_add(1));
+                        self.topics.push_back(Topic::Telemetry(sample));
+                    }
+                }
+                Kind::Topic if frame.header.id == EVENT => {
+                    if let Ok(event) = postcard::from_bytes::<Event>(frame.body) {
+                        self.topics.push_back(Topic::Event(event));
+                    }
+                }
+                Kind::Topic if frame.header.id == LOG => {
+                    self.topics.push_back(Topic::Log(frame.body.to_vec()));
+                }
+                // A controller never asks: what arrives as a request is our own, sent back.
+                Kind::Request => heard.echoes += 1,
+                Kind::Topic => {}
+            }
+        }
+        while self.topics.len() > BACKLOG {
+            self.topics.pop_front();
+            self.losses.unread += 1;
+        }
+        Ok(answers)
+    }
+}

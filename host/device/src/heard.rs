@@ -1,0 +1,101 @@
+//! What a line lets one hear when there is no controller at its end, or another one than expected: errors in words.
+
+use model_core::link::hello::{Board, Hello};
+use model_core::link::{LINK_VERSION, SCHEMA_HASH};
+
+use super::Port;
+use crate::error::DeviceCode;
+use pam_data::counted::counted;
+use pam_data::error::Error;
+
+/// What came before any hello, to tell a silent line from a foreign peer.
+#[derive(Default)]
+pub(super) struct Heard {
+    /// Everything that arrived.
+    pub bytes: usize,
+    /// Whole frames.
+    pub frames: usize,
+    /// Questions of our own, sent back.
+    pub echoes: usize,
+    first: Vec<u8>,
+}
+
+impl Heard {
+    /// Takes note of what arrived.
+    pub fn take(&mut self, bytes: &[u8]) {
+        self.bytes += bytes.len();
+        let room = 32usize.saturating_sub(self.first.len());
+        self.first.extend_from_slice(&bytes[..bytes.len().min(room)]);
+    }
+
+    /// Why there is no controller at this port, as far as one can hear.
+    pub fn error(&self, port: &Port) -> Error {
+        if self.bytes == 0 {
+            return Error::new(DeviceCode::DeviceSilent, "nothing answers on this port")
+                .value(port.name())
+                .help("is the controller powered, flashed, and is this its port? `host device list` shows the ports here");
+        }
+        if self.echoes > 0 {
+            return Error::new(DeviceCode::DeviceForeign, "the line only sends back what it is sent")
+                .value(port.name())
+                .help("are transmit and receive joined, or is a terminal program on the other end?");
+        }
+        if self.frames > 0 {
+            return Error::new(
+                DeviceCode::DeviceSilent,
+                "a controller is there, but it does not answer hello",
+            )
+            .value(port.name())
+            .help("is another program talking to it? close it, or restart the controller");
+        }
+        let shown = String::from_utf8_lossy(&self.first);
+        let printable = shown.chars().filter(|c| c.is_ascii_graphic() || c.is_ascii_whitespace()).count();
+        let begins = if printable * 2 > shown.chars().count() {
+            format!("`{}`", shown.trim().chars().flat_map(char::escape_debug).collect::<String>())
+        } else {
+            self.first.iter().take(12).map(|b| format!("{b:02x}")).collect::<Vec<_>>().join(" ")
+        };
+        Error::new(
+            DeviceCode::DeviceForeign,
+            format!(
+                "something answers here, but it is not a controller of this project: it sent {}, beginning {begins}",
+                counted(self.bytes, "byte")
+            ),
+        )
+        .value(port.name())
+        .help("is it the right port? if it is the right board, flash it first: host flash --firmware ELF --chip CHIP")
+    }
+}
+
+/// The line is gone in the middle of a conversation.
+pub(super) fn lost(port: &Port, reason: &std::io::Error) -> Error {
+    Error::new(DeviceCode::DeviceSilent, format!("the connection to the device is gone: {reason}"))
+        .value(port.name())
+        .help("look at cable and supply, then try again; a running controller without its host stops itself within a second, unless it was set otherwise")
+}
+
+/// It is a controller, of another schema.
+pub(super) fn version_error(port: &Port, hello: &Hello) -> Error {
+    let (major, minor, patch) = hello.release;
+    let ours = env!("CARGO_PKG_VERSION");
+    let older = match hello.link_version.cmp(&LINK_VERSION) {
+        std::cmp::Ordering::Less => "the device is older: flash the firmware of this release onto it",
+        std::cmp::Ordering::Greater => "the device is newer: update this program",
+        std::cmp::Ordering::Equal => {
+            "they were built from different sources: build and flash both from the same release"
+        }
+    };
+    Error::new(
+        DeviceCode::DeviceVersion,
+        format!(
+            "the device ({}, release {major}.{minor}.{patch}) speaks link version {} with schema {:016x}; this program ({ours}) \
+             speaks version {LINK_VERSION} with schema {:016x}",
+            Board::from_code(hello.board).map_or("unknown board", Board::name),
+            hello.link_version,
+            hello.schema_hash,
+            SCHEMA_HASH
+        ),
+    )
+    .value(port.name())
+    .help(older)
+}

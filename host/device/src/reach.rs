@@ -1,0 +1,121 @@
+//! Why what was asked of a muscle could not be had, and for how long its table went on beyond what it was tested at.
+
+use model_core::inverse::Reach;
+use model_core::link::messages::{Side, State, Telemetry};
+use model_core::muscle::Muscle;
+use model_core::table::MuscleTable;
+use model_core::units::{Force, Length, Pressure};
+use serde_json::{Value, json};
+
+use super::course::Quantity;
+use super::{Client, tables};
+use pam_data::error::Result;
+
+/// Samples of a run by what the first muscle's table has to say to them, friction and effects left out.
+#[derive(Debug)]
+pub struct Reached {
+    table: MuscleTable,
+    muscle: Muscle<f32>,
+    guess: Pressure<f32>,
+    samples: u64,
+    beyond_blocked_force: u64,
+    below_deadband: u64,
+    not_rising: u64,
+    outside_tested: u64,
+}
+
+impl Reached {
+    /// For the table that a device has; none without one that this version can read.
+    ///
+    /// # Errors
+    /// As [`tables::read`].
+    pub fn of(client: &mut Client) -> Result<Option<Self>> {
+        let image = tables::read(client, Side::Agonist)?;
+        let table = image.and_then(|image| model_core::image::read(&image).ok());
+        Ok(table.and_then(|table| {
+            let muscle = Muscle::build(&table).ok()?;
+            Some(Self {
+                table,
+                muscle,
+                guess: Pressure::ZERO,
+                samples: 0,
+                beyond_blocked_force: 0,
+                below_deadband: 0,
+                not_rising: 0,
+                outside_tested: 0,
+            })
+        }))
+    }
+
+    /// Takes a sample of a run.
+    pub fn add(&mut self, quantity: Quantity, sample: &Telemetry) {
+        let Some(side) = sample.sides.first() else { return };
+        if sample.state != State::Running || !side.stroke_m.is_finite() || !side.pressure_pa.is_finite() {
+            return;
+        }
+        self.samples += 1;
+        let tested = &self.table.tested;
+        let contraction = side.stroke_m / self.table.geometry.rest_length.si();
+        // Friction and a sensor's noise go a little beyond the ends.
+        let slack = 0.02 * tested.contraction_high;
+        let inside = side.pressure_pa <= 1.02 * tested.pressure_high.pascals()
+            && (tested.contraction_low - slack..=tested.contraction_high + slack).contains(&contraction);
+        self.outside_tested += u64::from(!inside);
+        if quantity == Quantity::Force && sample.asked.is_finite() {
+            let held = self.muscle.held(Length::from_metres(side.stroke_m));
+            let force = Force::from_newtons(sample.asked);
+            let found = self.muscle.pressure_for(force, &held, 0.0, self.guess, &self.muscle.search());
+            self.guess = found.pressure;
+            match found.reach {
+                Reach::Reached => {}
+                Reach::BeyondBlockedForce => self.beyond_blocked_force += 1,
+                Reach::BelowDeadband => self.below_deadband += 1,
+                Reach::NotRising => self.not_rising += 1,
+            }
+        }
+    }
+
+    /// The seconds of each, for so many samples in a second.
+    #[must_use]
+    pub fn to_json(&self, per_s: f64) -> Value {
+        let seconds = |samples: u64| samples as f64 / per_s;
+        json!({
+            "beyond_blocked_force_s": seconds(self.beyond_blocked_force),
+            "below_deadband_s": seconds(self.below_deadband),
+            "not_rising_s": seconds(self.not_rising),
+            "outside_tested_s": seconds(self.outside_tested),
+        })
+    }
+
+    /// Why a force was out of reach, in words: the reason that held longest.
+    #[must_use]
+    pub fn why(&self) -> Option<&'static str> {
+        let reasons = [
+            (
+                self.beyond_blocked_force,
+                "more than the muscle can pull at that stroke and the highest pressure allowed",
+            ),
+            (self.below_deadband, "less than it pulls there without pressure"),
+            (self.not_rising, "at a stroke where more pressure pulls no harder"),
+        ];
+        let (samples, words) = reasons.into_iter().max_by_key(|reason| reason.0)?;
+        (samples > 0).then_some(words)
+    }
+
+    /// What to tell of a run that was for more than a tenth of its time outside what the table was tested at.
+    #[must_use]
+    pub fn extrapolated(&self, per_s: f64) -> Option<String> {
+        let tested = &self.table.tested;
+        (self.outside_tested * 10 > self.samples).then(|| {
+            format!(
+                "for {:.2} of {:.2} s the muscle was beyond what its table was tested at (up to {:.0} kPa, contraction {:.3} to {:.3}): \
+                 the table goes on there as it ends, and its error is not known",
+                self.outside_tested as f64 / per_s,
+                self.samples as f64 / per_s,
+                tested.pressure_high.kilopascals(),
+                tested.contraction_low,
+                tested.contraction_high
+            )
+        })
+    }
+}

@@ -1,0 +1,285 @@
+//! A run: start, follow a course, hand on every sample, and leave the muscle vented whatever happens.
+
+use std::time::{Duration, Instant};
+
+use model_core::link::Endpoint;
+use model_core::link::endpoints::{
+    Arm, Disarm, GetFaults, GetStatus, SetReference, SetReferencePoints, SetTelemetry, SetTo, StartMode, Stop,
+};
+use model_core::link::messages::{
+    Event, Fault, REFERENCE_PIECE, Reference, ReferencePoints, Refusal, Start, State, Status, Telemetry,
+    TelemetryRate,
+};
+
+use super::course::{Course, Quantity};
+use super::{Client, Topic, words};
+use crate::error::DeviceCode;
+use pam_data::error::{DataCode, Error, Result};
+
+/// What a run is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// What is controlled.
+    pub quantity: Quantity,
+    /// What is asked.
+    pub course: Course,
+    /// Device time from the start until the end, s; `None` until `stop` says so.
+    pub seconds: Option<f64>,
+    /// One sample every so many ticks.
+    pub every_ticks: u16,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// The time was over.
+    Done,
+    /// `stop` said so.
+    Stopped,
+}
+
+/// Silence of the telemetry after which the device counts as gone.
+const SILENCE: Duration = Duration::from_secs(5);
+
+/// How long arming may take: the air of the run before leaves in two seconds, the test of the dump valve takes as long at most.
+const ARMING: Duration = Duration::from_secs(8);
+
+/// Vents and disarms: allowed in every state, repeated until it is confirmed.
+///
+/// # Errors
+/// When the device does not answer; then it must be vented by hand.
+pub fn vent(client: &mut Client) -> Result<Status> {
+    let stopped = client.try_call::<Stop>(&());
+    let disarmed = client.try_call::<Disarm>(&());
+    match disarmed.and(stopped) {
+        Ok(_) => client.call::<GetStatus>(&()),
+        Err(e) => Err(Error::new(e.code(), format!("the device may not have vented: {}", e.cause()))
+            .help("take the supply air away from the muscle by hand")),
+    }
+}
+
+/// Carries out a plan. `sample` is handed every sample from the start on; `stop` is asked between samples.
+///
+/// Whatever the outcome, the device is vented and disarmed at the end, and its telemetry stopped.
+///
+/// # Errors
+/// Refusals, silence, the fault that stopped the device in words, or what `sample` returns.
+pub fn run(
+    client: &mut Client,
+    plan: &Plan,
+    sample: impl FnMut(&Telemetry) -> Result<()>,
+    stop: impl Fn() -> bool,
+) -> Result<Ending> {
+    run_asking(client, plan, sample, stop, |_| None)
+}
+
+/// The same; besides, `next` is asked after each sample, with the time since the start in s, whether another value is wanted from
+/// now on.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_asking(
+    client: &mut Client,
+    plan: &Plan,
+    sample: impl FnMut(&Telemetry) -> Result<()>,
+    stop: impl Fn() -> bool,
+    next: impl FnMut(f64) -> Option<f32>,
+) -> Result<Ending> {
+    let outcome = follow(client, plan, sample, stop, next);
+    let quiet = client.try_call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 });
+    let vented = vent(client);
+    let ending = outcome?;
+    vented?;
+    quiet?.map_err(|refusal| words::refused("telemetry", refusal))?;
+    Ok(ending)
+}
+
+/// Arms, once the last run's air has left the muscle, and waits for the device's own test of its dump valve.
+///
+/// # Errors
+/// As the device refuses, or the fault that the test ended in.
+pub fn arm(client: &mut Client) -> Result<()> {
+    let deadline = Instant::now() + ARMING;
+    let empty = Refusal::StillFaulty(Fault::NotVented);
+    loop {
+        let now = match client.try_call::<Arm>(&())? {
+            Ok(status) => status.state,
+            Err(refusal) if refusal == empty && Instant::now() < deadline => State::Disarmed,
+            Err(refusal) => return Err(words::refused(Arm::NAME, refusal)),
+        };
+        match now {
+            State::Armed | State::Running => return Ok(()),
+            State::Fault => return Err(fault(client)?),
+            State::Disarmed if Instant::now() < deadline => std::thread::sleep(Duration::from_millis(20)),
+            State::Disarmed => {
+                return Err(Error::new(Code::DeviceSilent, "the test of the dump valve does not end")
+                    .help("look at `host device info`"));
+            }
+        }
+    }
+}
+
+fn follow(
+    client: &mut Client,
+    plan: &Plan,
+    mut sample: impl FnMut(&Telemetry) -> Result<()>,
+    stop: impl Fn() -> bool,
+    mut next: impl FnMut(f64) -> Option<f32>,
+) -> Result<Ending> {
+    let mut status = client.call::<GetStatus>(&())?;
+    if status.state == State::Fault {
+        return Err(fault(client)?);
+    }
+    if status.state == State::Running {
+        client.call::<Stop>(&())?;
+        status = client.call::<GetStatus>(&())?;
+    }
+    if status.state == State::Disarmed {
+        arm(client)?;
+    }
+    if let Course::Points { values, .. } = &plan.course {
+        send_points(client, values)?;
+    }
+    client.call::<SetTelemetry>(&TelemetryRate { every_ticks: plan.every_ticks })?;
+    client.call::<StartMode>(&Start { mode: plan.quantity.mode() })?;
+    let mut steps = Steps::begin(client, plan)?;
+    let mut begun = None;
+    let mut heard = Instant::now();
+    loop {
+        if stop() {
+            return Ok(Ending::Stopped);
+        }
+        client.keep_alive()?;
+        match client.topic(Duration::from_millis(50))? {
+            Some(Topic::Telemetry(s)) => {
+                heard = Instant::now();
+                // Samples from before the start may still be on the line, those of an earlier run too.
+                let early = s.state != State::Running || s.time_us <= status.time_us;
+                if early && begun.is_none() {
+                    continue;
+                }
+                let start = *begun.get_or_insert(s.time_us);
+                let elapsed = s.time_us.saturating_sub(start) as f64 * 1e-6;
+                if plan.seconds.is_some_and(|end| elapsed >= end) {
+                    return Ok(Ending::Done);
+                }
+                sample(&s)?;
+                if s.state == State::Fault {
+                    return Err(fault(client)?);
+                }
+                steps.advance(client, plan.quantity, elapsed)?;
+                if let Some(value) = next(elapsed) {
+                    client.call::<SetTo>(&plan.quantity.set_point(value))?;
+                }
+            }
+            Some(Topic::Event(Event::Fault(report))) => return Err(words::stopped(&report)),
+            Some(Topic::Event(_) | Topic::Log(_)) => {}
+            None if heard.elapsed() > SILENCE => {
+                let status = client.call::<GetStatus>(&())?;
+                if status.state == State::Fault {
+                    return Err(fault(client)?);
+                }
+                return Err(Error::new(
+                    DeviceCode::DeviceSilent,
+                    format!("the device answers, but sends no telemetry; it is {}", words::state(status.state)),
+                )
+                .help("its control loop may be waiting for its sensors: `host device info` shows whether ticks are counted"));
+            }
+            None => {}
+        }
+    }
+}
+
+/// The fault that holds a device, as an error.
+fn fault(client: &mut Client) -> Result<Error> {
+    let faults = client.call::<GetFaults>(&())?;
+    Ok(match faults.latched {
+        Some(report) => words::stopped(&report),
+        None => {
+            Error::new(DeviceCode::DeviceFault, "the device is stopped by a fault that it no longer names")
+                .help("clear it with `host device faults --clear`")
+        }
+    })
+}
+
+fn send_points(client: &mut Client, values: &[f32]) -> Result<()> {
+    for (piece, points) in values.chunks(REFERENCE_PIECE).enumerate() {
+        let offset = u16::try_from(piece * REFERENCE_PIECE).map_err(|_| too_long())?;
+        let points = heapless::Vec::from_slice(points).map_err(|_| too_long())?;
+        client.call::<SetReferencePoints>(&ReferencePoints { offset, points })?;
+    }
+    Ok(())
+}
+
+fn too_long() -> Error {
+    Error::new(DataCode::CallInvalid, "the course has more points than a device holds")
+        .help("use fewer points")
+}
+
+/// The first value of a course that the device makes.
+fn begins_at(course: &Course) -> f32 {
+    match course {
+        Course::Constant(value) => *value,
+        Course::Steps { values, .. } | Course::Points { values, .. } => {
+            values.first().copied().unwrap_or(0.0)
+        }
+        Course::Wave(wave) => match *wave {
+            Reference::Sine { mean, .. } | Reference::Chirp { mean, .. } => mean,
+            Reference::Trapezoid { low, .. } => low,
+            Reference::SetPoint | Reference::Table { .. } => 0.0,
+        },
+    }
+}
+
+/// Steps that the host sends at their times.
+#[derive(Debug)]
+pub struct Steps {
+    values: Vec<f32>,
+    hold_s: f64,
+    sent: usize,
+}
+
+impl Steps {
+    /// Sends what the course needs at its beginning.
+    ///
+    /// # Errors
+    /// What the device refuses, or silence.
+    pub fn begin(client: &mut Client, plan: &Plan) -> Result<Self> {
+        if let (Quantity::Angle { .. }, Course::Wave(_) | Course::Points { .. }) =
+            (plan.quantity, &plan.course)
+        {
+            // A wave has one value; the stiffness is the last set-point's.
+            let angle = begins_at(&plan.course);
+            client.call::<SetTo>(&plan.quantity.set_point(angle))?;
+        }
+        let (values, hold_s) = match &plan.course {
+            Course::Constant(value) => (vec![*value], f64::INFINITY),
+            Course::Steps { values, hold_s } => (values.clone(), *hold_s),
+            Course::Wave(reference) => {
+                client.call::<SetReference>(reference)?;
+                (Vec::new(), f64::INFINITY)
+            }
+            Course::Points { step_s, .. } => {
+                client.call::<SetReference>(&Reference::Table { step_s: *step_s, repeat: true })?;
+                (Vec::new(), f64::INFINITY)
+            }
+        };
+        if let Some(first) = values.first() {
+            client.call::<SetTo>(&plan.quantity.set_point(*first))?;
+        }
+        Ok(Self { values, hold_s, sent: 0 })
+    }
+
+    /// Sends the step that is due after `elapsed` seconds.
+    ///
+    /// # Errors
+    /// What the device refuses, or silence.
+    pub fn advance(&mut self, client: &mut Client, quantity: Quantity, elapsed: f64) -> Result<()> {
+        let due = (elapsed / self.hold_s) as usize;
+        if due > self.sent && !self.values.is_empty() {
+            self.sent = due;
+            client.call::<SetTo>(&quantity.set_point(self.values[due % self.values.len()]))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,305 @@
+//! What the model can say without any further effect: the production baseline, whose tables are free over pressure, and
+//! the stiff one, which knows a single bladder.
+//!
+//! ```text
+//! F = ( (P − P0) g + Σ_k E_k(P) c_k ) (1 − k_F(P) s) + effects
+//! ```
+//! The flexible tables swallow physics (static effects lose more than 97 % of their trace in them); the stiff baseline keeps
+//! it, but is itself wrong where a real bladder is. Both are linear once `k_F` is linearised about the last iterate, so a fit
+//! is three or four orthogonal least-squares solutions.
+
+mod plan;
+mod reach;
+
+use self::plan::{Part, Plan};
+pub(crate) use self::reach::{Give, Reach, cosine, keeps, projected};
+use super::criteria::baseline::{DISTINCT_DIRECTION, FRICTION_LIMITS, LINEARISATIONS};
+use super::criteria::rows::{NO_LOAD, SLACK_MODEL};
+use super::linear::{Basis, energy, weighted};
+use super::rows::{ORDERS, Rows};
+
+/// Which baseline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Kind {
+    /// `E_1…E_M` and `k_F` free at each pressure level.
+    Flexible(usize),
+    /// One bladder for all pressures: `E_1…E_6` and a Yeoh wall without pressure in them, `k_F` quadratic in pressure.
+    Stiff,
+    /// One bladder that may differ a little between pressures: the stiff baseline, and beyond it the flexible one's columns with
+    /// a prior of zero mean on each.
+    Soft(Give),
+}
+
+impl Kind {
+    /// Whether pressures are tied together.
+    pub(crate) fn reaches_over_pressures(self) -> bool {
+        !matches!(self, Self::Flexible(_))
+    }
+}
+
+/// A fitted baseline, with effects that were fitted beside it.
+#[derive(Clone, Debug)]
+pub(crate) struct Baseline {
+    /// Which.
+    pub kind: Kind,
+    /// What the baseline and the effects beside it express.
+    pub span: Reach,
+    /// What is to be explained, weighted and freed of the hard columns only.
+    pub core: Vec<f64>,
+    /// Measured less fitted, times the square root of the weight, whitened, N.
+    pub residual: Vec<f64>,
+    /// Measured less fitted on every row, N, whatever its weight.
+    pub raw_residual: Vec<f64>,
+    /// Amplitudes of the effects fitted beside it.
+    pub amplitudes: Vec<f64>,
+    /// `P0`, Pa.
+    pub deadband: f64,
+    /// Friction-free force of the model, N.
+    pub quasi: Vec<f64>,
+    /// `F_G(P′, L)`, N.
+    pub gaylord: Vec<f64>,
+    /// `k_F` at each row.
+    pub friction: Vec<f64>,
+    /// `∂F_quasi/∂(ΔL)`, N/m.
+    pub stiffness: Vec<f64>,
+    /// `E_k` per node (outer: k) of a flexible baseline, Pa.
+    pub elastic_nodes: Vec<Vec<f64>>,
+    /// `k_F` per node of a flexible baseline.
+    pub friction_nodes: Vec<f64>,
+}
+
+impl Baseline {
+    /// Weighted root mean square of the residual, N.
+    pub(crate) fn rms(&self, rows: &Rows) -> f64 {
+        self.per_row(rows).sqrt()
+    }
+
+    /// Weighted mean square of the residual, N².
+    pub(crate) fn per_row(&self, rows: &Rows) -> f64 {
+        energy(&self.residual) / energy(&rows.root_weight).max(1e-12)
+    }
+}
+
+/// Weighted root mean square of the measured force itself, N: the error of a model that knows nothing.
+pub(crate) fn measured_rms(rows: &Rows) -> f64 {
+    let sum: f64 = rows.force.iter().zip(&rows.root_weight).map(|(f, w)| (f * w).powi(2)).sum();
+    (sum / energy(&rows.root_weight).max(1e-12)).sqrt()
+}
+
+/// Fits a baseline together with given effect columns (N per unit amplitude, unweighted).
+pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
+    let n = rows.len();
+    let plan = Plan::new(rows, kind);
+    let live: Vec<f64> = rows.vented.iter().map(|v| if *v { 0.0 } else { 1.0 }).collect();
+    // From what was fitted before, where there is anything.
+    let begun = rows.contexts.iter().any(|c| c.quasi != 0.0);
+    let mut friction: Vec<f64> = rows.contexts.iter().map(|c| c.friction).collect();
+    let mut quasi: Vec<f64> =
+        rows.contexts.iter().map(|c| if begun { c.quasi } else { c.pressure * c.area }).collect();
+    let mut out: Option<Baseline> = None;
+    for _ in 0..if begun { LINEARISATIONS.1 } else { LINEARISATIONS.0 } {
+        let factor: Vec<f64> =
+            (0..n).map(|i| live[i] * (1.0 - friction[i] * rows.contexts[i].direction)).collect();
+        let column = |part: &Part| -> Vec<f64> {
+            let (shapes, contexts, w) = (&rows.shapes, &rows.contexts, &rows.root_weight);
+            let of = |value: &dyn Fn(usize) -> f64| (0..n).map(|i| value(i) * w[i]).collect::<Vec<f64>>();
+            match *part {
+                Part::Deadband => of(&|i| -factor[i] * shapes[i].area),
+                Part::Elastic(k, f) => of(&|i| factor[i] * shapes[i].elastic[k] * plan.functions[f][i]),
+                Part::Yeoh(k) => of(&|i| factor[i] * shapes[i].yeoh[k]),
+                Part::Friction(f) => {
+                    of(&|i| -live[i] * contexts[i].direction * quasi[i] * plan.functions[f][i])
+                }
+                Part::Area => of(&|i| factor[i] * shapes[i].area * contexts[i].pressure),
+                Part::AreaSlope => of(&|i| factor[i] * shapes[i].area_slope * contexts[i].pressure),
+                Part::Settling => of(&|i| -live[i] * rows.sign[i] * quasi[i] * rows.settling[i]),
+                Part::Unsettled | Part::Rest(..) | Part::Ramping => {
+                    of(&|i| -live[i] * friction[i] * quasi[i] * part.departure(rows, i))
+                }
+            }
+        };
+        let mut joint = Basis::default();
+        for part in &plan.hard {
+            joint.push(column(part));
+        }
+        let hard = joint.clone();
+        for part in &plan.soft {
+            joint.push_beyond(column(part), DISTINCT_DIRECTION);
+        }
+        let soft = joint.columns(hard.rank(), n);
+        let of_friction: Vec<bool> = joint.kept()[hard.rank()..]
+            .iter()
+            .map(|j| matches!(plan.soft[j - plan.hard.len()], Part::Friction(_)))
+            .collect();
+        let keep = match kind {
+            Kind::Soft(give) => keeps(give, &of_friction, energy(&rows.root_weight)),
+            _ => Vec::new(),
+        };
+        // With friction's coefficients counted from zero, not from the last round, so that a prior holds for the whole.
+        let y: Vec<f64> = (0..n)
+            .map(|i| {
+                let pressed = factor[i] * rows.shapes[i].area * rows.contexts[i].pressure;
+                let rubbed = live[i] * rows.contexts[i].direction * quasi[i] * friction[i];
+                (rows.force[i] - pressed - rubbed) * rows.root_weight[i]
+            })
+            .collect();
+        let mut span = Reach { hard, soft, of_friction, keep, ..Reach::default() };
+        let mut white = y.clone();
+        span.whiten(&mut white);
+        for effect in effects {
+            let mut core = weighted(effect, &rows.root_weight);
+            span.hard.project_out(&mut core);
+            let mut z = core.clone();
+            span.whiten(&mut z);
+            span.chosen.push(z);
+            span.chosen_core.push(core);
+        }
+        let amplitudes = span.chosen.solve(&white);
+        let mut freed = y.clone();
+        for (effect, a) in effects.iter().zip(&amplitudes) {
+            for i in 0..n {
+                freed[i] -= a * effect[i] * rows.root_weight[i];
+            }
+        }
+        let mut core = y;
+        span.hard.project_out(&mut core);
+        let mut coefficients = joint.along(&freed);
+        for (c, keep) in coefficients[span.hard.rank()..].iter_mut().zip(&span.keep) {
+            *c *= 1.0 - keep * keep;
+        }
+        let solution = joint.unravel(&coefficients);
+        let fitted = values(rows, &plan, &solution, &live);
+        quasi.clone_from(&fitted.quasi);
+        friction.clone_from(&fitted.friction);
+        let raw_residual: Vec<f64> = (0..n)
+            .map(|i| {
+                let added: f64 = effects.iter().zip(&amplitudes).map(|(e, a)| a * e[i]).sum();
+                rows.force[i] - fitted.force[i] - added
+            })
+            .collect();
+        let nodes = |order: usize| -> Vec<f64> {
+            let parts = plan.hard.iter().zip(&solution);
+            parts.filter(|(p, _)| matches!(p, Part::Elastic(k, _) if *k == order)).map(|(_, v)| *v).collect()
+        };
+        out = Some(Baseline {
+            kind,
+            residual: white,
+            core,
+            raw_residual,
+            amplitudes,
+            deadband: fitted.deadband,
+            quasi: fitted.quasi,
+            gaylord: fitted.gaylord,
+            friction: fitted.friction,
+            stiffness: fitted.stiffness,
+            elastic_nodes: (0..ORDERS).map(nodes).collect(),
+            friction_nodes: plan
+                .hard
+                .iter()
+                .zip(&solution)
+                .filter(|(p, _)| matches!(p, Part::Friction(_)))
+                .map(|(_, v)| *v)
+                .collect(),
+            span,
+        });
+    }
+    let mut fitted = out.unwrap_or_else(|| unreachable!("the loop above runs"));
+    fitted.span.chosen.project_out(&mut fitted.residual);
+    fitted
+}
+
+/// A baseline's forces at every row.
+struct Values {
+    force: Vec<f64>,
+    quasi: Vec<f64>,
+    gaylord: Vec<f64>,
+    friction: Vec<f64>,
+    stiffness: Vec<f64>,
+    deadband: f64,
+}
+
+fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
+    let n = rows.len();
+    let mut v = Values {
+        force: vec![0.0; n],
+        quasi: vec![0.0; n],
+        gaylord: vec![0.0; n],
+        friction: vec![0.0; n],
+        stiffness: vec![0.0; n],
+        deadband: 0.0,
+    };
+    let mut settling = 0.0;
+    let (mut elastic, mut departure) = (vec![0.0; n], vec![0.0; n]);
+    for (part, c) in plan.hard.iter().chain(&plan.soft).zip(solution).filter(|(_, c)| **c != 0.0) {
+        if let Part::Deadband = part {
+            v.deadband = *c;
+        }
+        for i in 0..n {
+            let (shape, context) = (&rows.shapes[i], &rows.contexts[i]);
+            match *part {
+                Part::Deadband => {
+                    v.gaylord[i] -= c * shape.area;
+                    v.stiffness[i] -= c * shape.area_slope;
+                }
+                Part::Elastic(k, f) => {
+                    elastic[i] += c * plan.functions[f][i] * shape.elastic[k];
+                    v.stiffness[i] += c * plan.functions[f][i] * shape.elastic_slope[k];
+                }
+                Part::Yeoh(k) => {
+                    elastic[i] += c * shape.yeoh[k];
+                    v.stiffness[i] += c * shape.yeoh_slope[k];
+                }
+                Part::Friction(f) => v.friction[i] += c * plan.functions[f][i],
+                Part::Area => {
+                    v.gaylord[i] += c * context.pressure * shape.area;
+                    v.stiffness[i] += c * context.pressure * shape.area_slope;
+                }
+                Part::AreaSlope => v.gaylord[i] += c * context.pressure * shape.area_slope,
+                Part::Settling => settling = *c,
+                Part::Unsettled | Part::Rest(..) | Part::Ramping => {
+                    departure[i] += c * part.departure(rows, i)
+                }
+            }
+        }
+    }
+    for i in 0..n {
+        let (shape, context) = (&rows.shapes[i], &rows.contexts[i]);
+        v.gaylord[i] += context.pressure * shape.area;
+        v.stiffness[i] += context.pressure * shape.area_slope;
+        v.quasi[i] = v.gaylord[i] + elastic[i];
+        v.friction[i] = v.friction[i].clamp(FRICTION_LIMITS.0, FRICTION_LIMITS.1);
+        let late = settling * rows.sign[i] * rows.settling[i];
+        let direction = context.direction + departure[i];
+        v.force[i] = live[i] * v.quasi[i] * (1.0 - v.friction[i] * direction - late);
+    }
+    v
+}
+
+/// Rows at which the muscle hangs slack (no force although the pressure would give some) lose their weight; returns how
+/// many. A slack muscle's force is its floor, not the model's.
+pub(crate) fn mask_slack(rows: &mut Rows, fitted: &Baseline) -> usize {
+    let strongest = rows.force.iter().copied().fold(0.0, f64::max);
+    let mut masked = 0;
+    for i in 0..rows.len() {
+        let slack = fitted.quasi[i] < SLACK_MODEL * strongest && rows.force[i] < NO_LOAD * strongest;
+        if slack && !rows.vented[i] && rows.root_weight[i] > 0.0 {
+            rows.root_weight[i] = 0.0;
+            masked += 1;
+        }
+    }
+    masked
+}
+
+/// Writes the baseline's forces and slopes into the rows' contexts, where effects look for them.
+pub(crate) fn into_contexts(rows: &mut Rows, fitted: &Baseline) {
+    for (i, c) in rows.contexts.iter_mut().enumerate() {
+        let live = if rows.vented[i] { 0.0 } else { 1.0 };
+        c.corrected_pressure = c.pressure - fitted.deadband;
+        c.friction = fitted.friction[i];
+        c.gaylord = live * fitted.gaylord[i];
+        c.quasi = live * fitted.quasi[i];
+        c.elastic = c.quasi - c.gaylord;
+        c.stiffness = live * fitted.stiffness[i];
+        c.pressure_slope = c.area;
+    }
+}

@@ -1,0 +1,99 @@
+//! What a baseline can express, and what remains of a column once it has been fitted.
+
+use rayon::prelude::*;
+
+use crate::criteria::baseline::{FREE_GIVE, FREE_ROW};
+use crate::linear::{Basis, add_scaled, dot, energy, weighted};
+
+/// How much one bladder may differ between pressures, and how unsure a row is: what a soft baseline takes for granted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Give {
+    /// Rms that the elastic surface may differ by from one pressure to the next, N.
+    pub elastic: f64,
+    /// The same of the friction, N.
+    pub friction: f64,
+    /// Standard deviation of a row by which a sum over rows is judged, N: noise times the root of how many rows are worth one.
+    pub row: f64,
+}
+
+impl Give {
+    /// Tables that are free at every pressure.
+    pub(crate) fn free(blocked: f64) -> Self {
+        Self { elastic: FREE_GIVE * blocked, friction: FREE_GIVE * blocked, row: FREE_ROW * blocked }
+    }
+}
+
+/// What a baseline can express: fully (hard), within a prior (soft), and by effects fitted beside it.
+///
+/// In the soft directions a misfit is partly the bladder's own: the whitened space shrinks them by `keep`, so that inner products
+/// there are those of generalised least squares with the prior integrated out.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Reach {
+    /// Columns with free coefficients, weighted.
+    pub hard: Basis,
+    /// Unit directions of the flexible tables beyond, orthogonal to the hard ones.
+    pub soft: Vec<Vec<f64>>,
+    /// Whether a soft direction is friction's.
+    pub of_friction: Vec<bool>,
+    /// What remains of each soft direction.
+    pub keep: Vec<f64>,
+    /// The effects beside it, whitened.
+    pub chosen: Basis,
+    /// The effects beside it, freed of the hard columns only.
+    pub chosen_core: Vec<Vec<f64>>,
+}
+
+impl Reach {
+    /// Takes out of a weighted column what the baseline can express.
+    pub(crate) fn project_out(&self, v: &mut [f64]) {
+        self.whiten(v);
+        self.chosen.project_out(v);
+    }
+
+    /// The same without the effects.
+    pub(super) fn whiten(&self, v: &mut [f64]) {
+        self.hard.project_out(v);
+        for (q, keep) in self.soft.iter().zip(&self.keep) {
+            let c = dot(q, v);
+            add_scaled(v, -(1.0 - keep) * c, q);
+        }
+    }
+
+    /// A column's components along the soft directions.
+    pub(crate) fn components(&self, v: &[f64]) -> Vec<f64> {
+        self.soft.iter().map(|q| dot(q, v)).collect()
+    }
+}
+
+/// Every column weighted and freed of what a baseline expresses.
+pub(crate) fn projected(columns: &[Vec<f64>], root_weight: &[f64], span: &Reach) -> Vec<Vec<f64>> {
+    columns
+        .par_iter()
+        .map(|c| {
+            let mut v = weighted(c, root_weight);
+            span.project_out(&mut v);
+            v
+        })
+        .collect()
+}
+
+/// What remains of each soft direction, when the bladder may differ as much as `give` says.
+pub(crate) fn keeps(give: Give, of_friction: &[bool], weight: f64) -> Vec<f64> {
+    let friction = of_friction.iter().filter(|f| **f).count().max(1) as f64;
+    let elastic = of_friction.iter().filter(|f| !**f).count().max(1) as f64;
+    let noise = give.row * give.row;
+    of_friction
+        .iter()
+        .map(|f| {
+            let own =
+                weight * if *f { give.friction.powi(2) / friction } else { give.elastic.powi(2) / elastic };
+            (noise / (noise + own).max(1e-300)).sqrt()
+        })
+        .collect()
+}
+
+/// Cosine of two columns after weighting and projection.
+pub(crate) fn cosine(a: &[f64], b: &[f64]) -> f64 {
+    let size = (energy(a) * energy(b)).sqrt();
+    if size > 0.0 { dot(a, b) / size } else { 0.0 }
+}

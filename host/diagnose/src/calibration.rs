@@ -1,0 +1,22 @@
+//! From belief to probability: how often names of the same standing were right on the development set.
+//!
+//! The search believes in a name as much as its rivals allow (`select`). How often such a name is right is a matter of experience,
+//! and is learned where truths are known, by a command that prints these constants:
+//!
+//! ```text
+//! cargo run --release -p pam-diagnose --example calibrate_diagnosis -- SET…
+//! logit p = A + B logit(belief) + C logit(explained)
+//! ```
+
+use super::criteria::uncertainty::{CALIBRATION, CERTAINTY};
+
+fn logit(x: f64) -> f64 {
+    let x = x.clamp(CERTAINTY, 1.0 - CERTAINTY);
+    (x / (1.0 - x)).ln()
+}
+
+/// The probability of a name with this belief among its rivals, where all names together explain this share of the misfit above noise.
+pub(crate) fn probability(belief: f64, explained: f64) -> f64 {
+    let [a, b, c] = CALIBRATION;
+    1.0 / (1.0 + (-(a + b * logit(belief) + c * logit(explained))).exp())
+}

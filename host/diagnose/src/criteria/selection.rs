@@ -1,0 +1,79 @@
+//! Forward selection: when an effect is taken, what it must explain, what it cannot be distinguished from.
+
+criteria! {
+    "Forward selection":
+    /// Family-wise error probability that a selected effect may have, by whole blocks.
+    FAMILY_ALPHA: f64 = 0.01, "alpha", "1", Convention("one false selection in a hundred campaigns without a missing effect");
+    /// Random signs of the blocks behind a family-wise p.
+    SIGN_FLIPS: usize = 1999, "n_flip", "1", Derived("p = 0.01 is then known to 0.002");
+    /// How much the deviance must fall, beyond what the free numbers cost.
+    LEAST_SCORE: f64 = 12.0, "D_min", "1", Derived("chance in 400 candidate fits gives 2 ln 400 = 12 once in e");
+    /// The same where no test by whole blocks supports it.
+    LEAST_SCORE_ALONE: f64 = 25.0, "D_alone", "1", Derived("2 ln 400 and nearly three times 2 ln 10 = 4.6: once in about seven hundred");
+    /// Error below this share of the blocked force is the base model's own, and nothing is selected for it.
+    SELECTION_FLOOR: f64 = 4e-4, "e_sel/F_b", "1", Trials("four elastic orders leave 0.03 to 0.06 %, friction by its sign alone about as much");
+    /// The same where a test by blocks, or a vented muscle, supports a high and narrow trace.
+    NARROW_FLOOR: f64 = 0.4, "e_narrow/e_sel", "1", Judgement;
+    /// The same where neither supports it.
+    ALONE_FLOOR: f64 = 2.0, "e_alone/e_sel", "1", Judgement;
+    /// A trace as high as this share of the blocked force counts although few rows have it.
+    NARROW_PEAK: f64 = 0.01, "F_narrow/F_b", "1", Judgement;
+    /// ... where its score exceeds that of an effect without support by this factor.
+    NARROW_SCORE: f64 = 2.0, "D_narrow/D_alone", "1", Judgement;
+    /// A static effect is selected from this peak on, in blocked forces.
+    STATIC_PEAK: f64 = 0.015, "F_static/F_b", "1", Derived("an error of a tenth of a degree of the braid angle makes the same surface");
+    /// ... and where it moves the fit by this, root mean square in blocked forces.
+    STATIC_MOVED: f64 = 1e-3, "e_static/F_b", "1", Judgement;
+    /// Below this share of its energy outside the flexible tables an effect is concealed by them.
+    CONCEALED: f64 = 0.04, "q_conceal", "1", Derived("a root mean square of a fifth");
+    /// Below this share the tables are the very same surface.
+    TWIN_OF_TABLES: f64 = 2e-4, "q_twin", "1", Judgement;
+    /// A trace larger than this share of the blocked force, nearly all of it cancelled by the tables, explains nothing.
+    LARGEST_PEAK: f64 = 0.25, "F_cancel/F_b", "1", Judgement;
+    /// An effect must explain this share of the excess error that it finds.
+    LEAST_SHARE: f64 = 0.4, "q_first", "1", Judgement;
+    /// A further effect must also explain this share of all excess error.
+    FURTHER_SHARE: f64 = 0.1, "q_further", "1", Judgement;
+    /// Effects that are selected at most.
+    MAX_NAMED: usize = 3, "n_max", "1", Judgement;
+    /// An effect is not selected where one that is concealed scores this many times as much.
+    SHADOW: f64 = 2.0, "D_hidden/D", "1", Judgement;
+    /// Independent rows of any campaign, at least.
+    FEWEST_INDEPENDENT: f64 = 8.0, "n_min", "1", Judgement;
+    /// Candidates that may fail in the joint fit before the selection ends.
+    MOST_BARRED: usize = 4, "n_barred", "1", Cost;
+    /// Selections that may fail on held-out rows before none is made.
+    MOST_REFUSED: usize = 3, "n_refused", "1", Cost;
+    /// Evidence comes from the first strokes where they hold more than this share of it.
+    FIRST_STROKES: f64 = 0.7, "q_strokes", "1", Judgement;
+    /// Candidates whose shapes are refined at every step.
+    REFINED: usize = 12, "n_refine", "1", Cost;
+    /// A linearisation that leaves more than this times the error of the one before is rejected.
+    WORSE: f64 = 1.25, "S_new/S_old", "1", Judgement;
+    /// The joint fit must keep this share of the gain that the single fit promised.
+    KEPT_GAIN: f64 = 0.6, "q_kept", "1", Judgement;
+    /// An exchanged effect must leave less than this share of what the present one leaves.
+    EXCHANGE_LEAVES: f64 = 0.8, "q_exchange", "1", Judgement;
+    /// Excess error is at least this share of the error, so that shares of it stay finite.
+    LEAST_EXCESS: f64 = 0.02, "q_excess", "1", Judgement;
+    /// A rival of this weight keeps the effect from being selected itself; an exchanged effect counts with it.
+    CONFUSABLE: f64 = 0.1, "w_conf", "1", Trials("sets of names made with it held the truth, with 3.3 members on average");
+    /// A rival of this weight is reported beside the selected effect.
+    REPORTED_RIVAL: f64 = 0.15, "w_rep", "1", Trials("of 62 larger effects of a sealed set 59 sets held the truth, with 1.6 members (docs/src/proof.md)");
+    /// Rivals reported at most.
+    MOST_REPORTED: usize = 8, "n_rep", "1", Cost;
+    /// A rival of this weight explains what the selected effect explains.
+    ALIKE: f64 = 0.5, "w_alike", "1", Judgement;
+    /// Rivals of less weight than this are dropped unless their traces are parallel.
+    NEGLIGIBLE_RIVAL: f64 = 0.01, "w_min", "1", Judgement;
+    /// With more rivals than this no effect is selected.
+    MOST_RIVALS: usize = 10, "n_rival", "1", Judgement;
+    /// A trace with this cosine to the selected one, once the base is refitted, is kept as a rival whatever its weight.
+    PARALLEL: f64 = 0.95, "cos", "1", Convention("18 degrees");
+    /// How inexact a right law is, as a share of the excess error it explains, when rivals are compared.
+    RIVAL_FLOOR: f64 = 0.05, "e_rival", "1", Judgement;
+    /// How fast the weight of a rival falls with the logarithm of what it leaves beyond that.
+    RIVAL_SHARPNESS: f64 = 7.0, "kappa", "1", Judgement;
+    /// What each further free number costs in the logarithm of the weight.
+    RIVAL_COST: f64 = 0.3, "c_number", "1", Judgement;
+}

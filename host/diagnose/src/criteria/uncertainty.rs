@@ -1,0 +1,43 @@
+//! Held-out rows, intervals of parameters, change points, calibration of probabilities.
+
+criteria! {
+    "Held-out rows, intervals, probabilities":
+    /// Held-out error with an effect must be less than this share of the error without it.
+    HELD_OUT_LEAVES: f64 = 0.96, "e_with/e_without", "1", Derived("an effect that takes a third of the excess lowers the whole by more");
+    /// Rows at most from which the held-out error is taken.
+    HELD_OUT_ROWS: usize = 6_000, "N_held", "1", Cost;
+    /// No pressure is predicted from the others where the bladder differs between them by more than this share of the largest force.
+    ONE_BLADDER: f64 = 5e-3, "V_one/F_max", "1", Judgement;
+    /// A trace of which one group holds more than this share cannot be learnt from the others.
+    SEEN_ONCE: f64 = 0.8, "q_once", "1", Judgement;
+    /// Parts of the stroke that are left out by fours.
+    STROKE_PARTS: f64 = 24.0, "n_part", "1", Judgement;
+    /// Groups that are left out in turn.
+    FOLDS: u32 = 4, "n_fold", "1", Convention("four-fold cross-validation");
+    /// Recordings of a held length are left out by this many.
+    RECORDING_FOLDS: u32 = 10, "n_rec", "1", Convention("ten-fold cross-validation");
+    /// Recordings of held length from which they are left out by recordings.
+    FEWEST_RECORDINGS: usize = 4, "n_rec,min", "1", Judgement;
+    /// Pressure levels from which a pressure can be left out.
+    FEWEST_LEVELS_HELD_OUT: usize = 3, "n_P,min", "1", Derived("two others span a range to interpolate in");
+    /// Half-strokes from which cycles are left out.
+    FEWEST_STROKES_HELD_OUT: usize = 16, "n_stroke,min", "1", Derived("four cycles, left out in turn");
+    /// How far a parameter is off by its law's inexactness, as a share of it.
+    LAW_DEVIATION: f64 = 0.07, "e_par", "1", Trials("of 57 given effects 53 intervals of 95 % held the truth with it");
+    /// A parameter whose change moves the force by less than this share beyond the others is not identifiable.
+    IDENTIFIABLE: f64 = 1e-3, "q_id", "1", Judgement;
+    /// Relative change of a shape by which its tangent is taken.
+    TANGENT_STEP: f64 = 0.02, "h", "1", Judgement;
+    /// Groups of a jackknife, least.
+    FEWEST_GROUPS: usize = 3, "n_jack,min", "1", Judgement;
+    /// Twice the log-likelihood ratio that the true change point exceeds once in twenty.
+    CHANGE_POINT_RATIO: f64 = 7.35, "LR", "1", Published("-2 ln(1 - sqrt 0.95): B. E. Hansen, Econometrica 68 (2000) 575-603, doi 10.1111/1468-0262.00124");
+    /// Change points over the campaign that are tried for a second maximum of the likelihood.
+    CHANGE_POINT_SCAN: usize = 250, "n_scan", "1", Cost;
+    /// Standard deviations of an interval of 95 %.
+    NORMAL_95: f64 = 1.96, "z", "1", Convention("normal quantile");
+    /// Calibration of a belief: logit p = A + B logit(belief) + C logit(explained).
+    CALIBRATION: ([f64; 3]) = [0.0, 1.0, 0.0], "A, B, C", "1", Trials("756 names of four opened sets: calibration error 0.047, 0.029 with learned constants; log score 0.337 against 0.333, too little to bend belief for. cargo run --release -p pam-diagnose --example calibrate_diagnosis -- SET...");
+    /// Beliefs and shares are kept this far from certainty.
+    CERTAINTY: f64 = 0.01, "p_edge", "1", Judgement;
+}

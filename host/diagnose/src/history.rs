@@ -1,0 +1,204 @@
+//! What a muscle remembers over a campaign of isometric staircases: found before any static model is asked.
+//!
+//! Visits of different runs to the same pressure, length and direction differ by history alone, so a free static curve for each mounting is all
+//! that is needed beside it.
+//!
+//! | file | what |
+//! | --- | --- |
+//! | `campaign` | mountings, runs and their clock |
+//! | `staircase` | pulses, settled points, direction |
+//! | `memory` | the relaxing states, stepped exactly |
+//! | `spline`, `shift_fit` | free curves on a shifted pressure |
+//! | `law` | threshold of each mounting, relaxed share, stress-free pressure, unrecorded times |
+//! | `unseen` | each run predicted from the others; jackknife over runs |
+//! | `run_offset` | slips and bad runs |
+//! | `findings` | documented contrasts with intervals over runs or mountings |
+//! | `places` | where the static error sits: run within mounting, time since mounting, mounting |
+//! | `judge` | rules of the verdict |
+//! | [`answer`] | the findings as values and JSON |
+//! | `enter` | the history beside what the static search says |
+//! | [`criteria`] | every constant |
+
+pub mod answer;
+pub mod criteria;
+
+mod campaign;
+mod enter;
+mod findings;
+mod judge;
+mod law;
+mod memory;
+mod places;
+mod run_offset;
+mod shift_fit;
+mod spline;
+mod staircase;
+#[cfg(test)]
+mod tests;
+mod unseen;
+
+pub use answer::History;
+pub use enter::diagnose;
+pub(crate) use enter::is_from_history;
+
+use model_core::braid::Geometry;
+use pam_data::recording::Campaign;
+
+use self::campaign::Points;
+use self::criteria::{KEPT_ERRORS, KEPT_GAIN, TIMES};
+use self::law::{Law, Layer};
+use self::run_offset::Event;
+use self::unseen::{Unseen, jackknife};
+use super::verdict::Region;
+
+/// Time constants of the laws with a single one that the spectrum is compared with, s.
+const SINGLE_TIMES: [f64; 2] = [30.0, 300.0];
+
+/// A history with what its use needs beside the answer.
+#[derive(Clone, Debug)]
+pub(super) struct Found {
+    pub answer: History,
+    /// Where the static error of unseen runs sits.
+    pub regions: Vec<Region>,
+    /// By recording: times, s, and shifts of pressure, Pa.
+    pub shifts: Vec<(Vec<f64>, Vec<f64>)>,
+    /// The largest force that the memory makes, N.
+    pub peak: f64,
+}
+
+/// All fits of a campaign.
+struct Fits<'a> {
+    layer: Layer<'a>,
+    /// The law alone, and its unseen runs.
+    law: Law,
+    memory: Unseen,
+    /// A curve for each mounting and direction; a curve for each mounting.
+    by_direction: Unseen,
+    plain: Unseen,
+    /// Offsets of runs, kPa.
+    offsets: Vec<f64>,
+    events: Vec<Event>,
+    /// The law beside slips, and its unseen runs; absent without a slip.
+    with_slips: Option<(Law, Unseen)>,
+    /// Unseen errors with the slips alone.
+    slips_alone: Option<Unseen>,
+    /// Friction beside the memory: whether it is kept, its coefficient and standard error.
+    friction: (bool, f64, f64),
+    /// Unseen error of the best law with one time constant over that of the spectrum, rms.
+    single: f64,
+}
+
+impl Fits<'_> {
+    /// The law that is reported: beside slips where there are any.
+    fn best(&self) -> (&Law, &Unseen) {
+        self.with_slips.as_ref().map_or((&self.law, &self.memory), |(l, u)| (l, u))
+    }
+}
+
+/// The history of a campaign; `None` where it is none of isometric staircases with repeated runs.
+#[must_use]
+pub fn history(campaign: &Campaign, geometry: &Geometry) -> Option<History> {
+    found(campaign, geometry.rest_length.metres()).map(|f| f.answer)
+}
+
+pub(super) fn found(campaign: &Campaign, rest_length: f64) -> Option<Found> {
+    let points = campaign::points(campaign, rest_length)?;
+    let fits = fits(&points);
+    let answer = judge::answer(&points, &fits, campaign, rest_length);
+    let (law, _) = fits.best();
+    let peak = (0..points.len())
+        .map(|i| (law.columns[0][i] * law.fit.theta[0] * fits.layer.slope(law, i)).abs())
+        .fold(0.0, f64::max);
+    let shifts = points
+        .runs
+        .iter()
+        .map(|run| {
+            let own = run.points.0..run.points.1;
+            let moved = |i: usize| -> f64 {
+                law.columns.iter().zip(&law.fit.theta).map(|(q, t)| 1e3 * q[i] * t).sum()
+            };
+            (own.clone().map(|i| points.time[i] + run.zero).collect(), own.map(moved).collect())
+        })
+        .collect();
+    let regions = places::regions(&points, &fits.by_direction, &fits.layer.clocks[law.choice.pause].1.since);
+    Some(Found { answer, regions, shifts, peak })
+}
+
+fn fits(points: &Points) -> Fits<'_> {
+    let layer = Layer::new(points, &TIMES);
+    let everything = vec![true; points.len()];
+    let law = layer.fit(&everything, None, &[], None);
+    let memory = unseen::with_memory(&layer, &law, &[], false);
+    let offsets = run_offset::offsets(&layer, &law);
+    let events = run_offset::events(&layer, &law, &memory, &offsets);
+    let steps: Vec<Vec<f64>> = events
+        .iter()
+        .filter(|e| e.lasts)
+        .map(|e| run_offset::step_column(points, e.mounting, e.run))
+        .collect();
+    let with_slips = (!steps.is_empty()).then(|| {
+        let mut start = law.clone();
+        steps.iter().for_each(|_| start.fit = run_offset::with_room(&start));
+        let law = layer.fit(&everything, None, &steps, Some(&start));
+        let unseen = unseen::with_memory(&layer, &law, &steps, false);
+        (law, unseen)
+    });
+    let slips_alone = (!steps.is_empty()).then(|| {
+        let predicted = unseen::shifted_curves(&layer, &steps, &vec![0.0; steps.len()]);
+        Unseen { predicted, folds: Vec::new() }
+    });
+    let (reported, seen) = with_slips.as_ref().map_or((&law, &memory), |(l, u)| (l, u));
+    let friction = friction(&layer, reported, seen, &steps);
+    let single = single_time(points, &law, &memory);
+    Fits {
+        by_direction: unseen::static_curves(points, true),
+        plain: unseen::static_curves(points, false),
+        layer,
+        law,
+        memory,
+        offsets,
+        events,
+        with_slips,
+        slips_alone,
+        friction,
+        single,
+    }
+}
+
+/// Whether friction, as a loss of pressure in proportion to the pull's onset, lowers the error that the memory leaves.
+fn friction(layer: &Layer<'_>, law: &Law, memory: &Unseen, steps: &[Vec<f64>]) -> (bool, f64, f64) {
+    let points = layer.points;
+    let rubs = |i: usize| {
+        let onset = layer.thresholds[points.mounting[i]].max(0.0);
+        -f64::from(points.direction[i]) * points.pressure[i].clamp(0.0, onset)
+    };
+    let mut columns = steps.to_vec();
+    columns.push((0..points.len()).map(rubs).collect());
+    let start = Law { fit: run_offset::with_room(law), ..law.clone() };
+    let with = layer.fit(&vec![true; points.len()], Some(law.choice), &columns, Some(&start));
+    let unseen = unseen::with_memory(layer, &with, &columns, true);
+    let last = |law: &Law| law.fit.theta.last().copied().unwrap_or(0.0);
+    let error = jackknife(&unseen.folds.iter().map(last).collect::<Vec<_>>());
+    let supported = points.supported();
+    let counts = |i: usize| supported[i];
+    let (before, after) = (memory.sizes(points, counts).rms, unseen.sizes(points, counts).rms);
+    let value = last(&with);
+    let kept = after.powi(2) <= (1.0 - KEPT_GAIN) * before.powi(2) && value > KEPT_ERRORS * error;
+    (kept, value, error)
+}
+
+/// See [`Fits::single`].
+fn single_time(points: &Points, law: &Law, memory: &Unseen) -> f64 {
+    let supported = points.supported();
+    let counts = |i: usize| supported[i];
+    let spectrum = memory.sizes(points, counts).rms;
+    let best = SINGLE_TIMES
+        .iter()
+        .map(|time| {
+            let layer = Layer::new(points, &[*time]);
+            let one = layer.fit(&vec![true; points.len()], Some(law.choice), &[], None);
+            unseen::with_memory(&layer, &one, &[], true).sizes(points, counts).rms
+        })
+        .fold(f64::INFINITY, f64::min);
+    if spectrum > 0.0 && best.is_finite() { best / spectrum } else { 1.0 }
+}

@@ -1,0 +1,237 @@
+//! The history of a campaign as plain values, and as the object `history` of the answer's JSON.
+
+// Field names carry their unit as the JSON does: N is not n.
+#![allow(non_snake_case)]
+
+use serde::Serialize;
+
+/// A number with its 95 % interval.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Its value.
+    pub value: f64,
+    /// Lower end; absent where it is not determined.
+    pub low: Option<f64>,
+    /// Upper end.
+    pub high: Option<f64>,
+    /// Its unit.
+    pub unit: String,
+    /// Of what the interval counts the independent units: runs, or mountings.
+    pub unit_of_uncertainty: String,
+}
+
+impl Estimate {
+    /// A value with the half-width of its interval.
+    pub(super) fn new(value: f64, half: Option<f64>, unit: &str, of: &str) -> Self {
+        let half = half.filter(|h| h.is_finite());
+        Self {
+            value,
+            low: half.map(|h| value - h),
+            high: half.map(|h| value + h),
+            unit: unit.to_owned(),
+            unit_of_uncertainty: of.to_owned(),
+        }
+    }
+
+    /// Half of the interval's width.
+    #[must_use]
+    pub fn half(&self) -> Option<f64> {
+        self.low.zip(self.high).map(|(low, high)| 0.5 * (high - low))
+    }
+}
+
+/// The muscle between two changes of its held length.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Mounting {
+    /// Its number, from 1, in the order of the recordings.
+    pub number: usize,
+    /// Active length, mm.
+    pub length_mm: f64,
+    /// `ΔL/L0`.
+    pub contraction: f64,
+    /// How many runs.
+    pub runs: usize,
+    /// Pressure at which the muscle begins to pull, kPa.
+    pub threshold_kPa: f64,
+    /// Part of the pressure that the bladder carries, kPa.
+    pub carried_kPa: f64,
+}
+
+/// The fitted law of the memory.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MemoryLaw {
+    /// Relaxed share of the carried pressure over the whole spectrum.
+    pub relaxed_share: Estimate,
+    /// Pressure at which the bladder carries no axial stress.
+    pub balance_pressure: Estimate,
+    /// Whether the recordings determine it; else it is a usual value.
+    pub balance_identifiable: bool,
+    /// Time constants, s.
+    pub time_constants_s: Vec<f64>,
+    /// Pause between runs, s: chosen on a grid; absent where the bench's clock tells the pauses.
+    pub pause_s: Option<f64>,
+    /// How long the muscle had been loaded before the first run of a mounting, s: chosen on a grid.
+    pub loaded_before_s: f64,
+    /// Unseen error of the best law with one time constant, as a ratio to this one (rms).
+    pub one_time_constant_ratio: f64,
+}
+
+/// Sizes of errors on points that the fit had not seen.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ErrorSize {
+    /// Root mean square, N.
+    pub rms_N: f64,
+    /// Root mean square, % of the largest force.
+    pub rms_pct: f64,
+    /// Mean absolute, % of the largest force.
+    pub mean_pct: f64,
+    /// How many points.
+    pub points: usize,
+}
+
+/// Each run predicted from the other runs of the muscle.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct UnseenRuns {
+    /// A static curve for each mounting and direction.
+    pub without_memory: ErrorSize,
+    /// A static curve for each mounting, and the memory.
+    pub with_memory: ErrorSize,
+    /// The same two over points whose pressure another run of the mounting reaches.
+    pub supported_without: ErrorSize,
+    /// With memory.
+    pub supported_with: ErrorSize,
+    /// With memory and the slips that were found; absent where none was.
+    pub with_slips: Option<ErrorSize>,
+    /// Share by which the memory lowers the squared error of supported points.
+    pub gain: f64,
+}
+
+/// One run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunError {
+    /// Its recording.
+    pub name: String,
+    /// Number of its mounting, from 1.
+    pub mounting: usize,
+    /// Its number within the mounting, from 1.
+    pub run: usize,
+    /// When it begins, s since the mounting.
+    pub since_mounting_s: f64,
+    /// Mean unseen error (measured less predicted) over filling, static, N.
+    pub mean_before_N: f64,
+    /// With memory.
+    pub mean_after_N: f64,
+    /// Root mean square, static, N.
+    pub rms_before_N: f64,
+    /// With memory.
+    pub rms_after_N: f64,
+    /// Shift of pressure that remains against the other runs of the mounting, kPa; absent where it cannot be told.
+    pub offset_kPa: Option<f64>,
+}
+
+/// What a finding is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FindingKind {
+    /// The first filling of a mounting pulls less than the second.
+    FirstRunDeficit,
+    /// Creep that outlives a recording.
+    Creep,
+    /// Emptying pulls more than filling, the more the shorter.
+    FillingEmptyingGap,
+    /// The held length changed during a mounting and stayed changed.
+    Slip,
+    /// One run differs from the others of its mounting.
+    BadRun,
+    /// The muscle had been loaded before the first run.
+    LoadedBefore,
+}
+
+/// Something documented of such muscles, as these recordings show it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// What it is about.
+    pub kind: FindingKind,
+    /// Whether its interval excludes zero, or its rule holds.
+    pub found: bool,
+    /// Its size.
+    pub size: Estimate,
+    /// How many independent units the interval counts.
+    pub units: usize,
+    /// Sum of squares between those units, for pooling over muscles of one protocol.
+    pub squares: f64,
+    /// The effect that explains it; absent where none does.
+    pub cause: Option<String>,
+    /// Number of the mounting, from 1, where it is about one.
+    pub mounting: Option<usize>,
+    /// Number of the run within the mounting, from 1, where it is about one.
+    pub run: Option<usize>,
+    /// In words.
+    pub words: String,
+}
+
+/// What one layer takes of the squared error of unseen runs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LayerShare {
+    /// Its name.
+    pub layer: String,
+    /// Share that it takes when the layers enter in this order.
+    pub in_order: f64,
+    /// Share of the error without this layer alone that it takes when it enters last.
+    pub last_in: f64,
+}
+
+/// Force over time since the mounting at one pressure, for a picture.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Course {
+    /// Number of the mounting, from 1.
+    pub mounting: usize,
+    /// Its length, mm.
+    pub length_mm: f64,
+    /// The pressure, kPa.
+    pub pressure_kPa: f64,
+    /// s since the mounting.
+    pub time_s: Vec<f64>,
+    /// Measured force, brought to this pressure by the curve's slope, N.
+    pub force_N: Vec<f64>,
+    /// Force by the law at this pressure, N.
+    pub law_N: Vec<f64>,
+}
+
+/// The history of a campaign of isometric staircases.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct History {
+    /// Whether the memory is named: its rules hold.
+    pub named: bool,
+    /// Which rules do not hold, in words; empty where it is named.
+    pub why_not: Vec<String>,
+    /// Settled points.
+    pub points: usize,
+    /// Whether rows were averaged into settled points after each pulse.
+    pub averaged: bool,
+    /// The largest force, N: the scale of errors in percent.
+    pub largest_force_N: f64,
+    /// Mountings.
+    pub mountings: Vec<Mounting>,
+    /// The law.
+    pub law: MemoryLaw,
+    /// Unseen runs.
+    pub unseen: UnseenRuns,
+    /// Run by run.
+    pub runs: Vec<RunError>,
+    /// Documented findings.
+    pub findings: Vec<Finding>,
+    /// Layers.
+    pub layers: Vec<LayerShare>,
+    /// For a picture.
+    pub courses: Vec<Course>,
+    /// Slope of the force over pressure at full length near the highest pressure, N/kPa: comes with the length to an end effect over a stock.
+    pub full_length_slope_N_per_kPa: Option<f64>,
+}
+
+impl History {
+    /// The findings of one kind.
+    pub fn of(&self, kind: FindingKind) -> impl Iterator<Item = &Finding> {
+        self.findings.iter().filter(move |f| f.kind == kind)
+    }
+}

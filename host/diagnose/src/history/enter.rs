@@ -1,0 +1,189 @@
+//! The history beside what the static search says: the search is asked about recordings from which the memory was taken out.
+
+use model_core::braid::{Braid, Geometry};
+
+use super::criteria::LEAST_GAIN;
+use super::{Found, History, found};
+use crate::answer::{Options, diagnose as statically};
+use crate::baselines::{self, Kind};
+use crate::candidates::place_in_words;
+use crate::rows;
+use crate::verdict::{Diagnosis, HeldOut, Missing, ParameterValue, Verdict};
+use model_core::effects::EffectName;
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::recording::Campaign;
+
+/// The memory's parameter in an answer; the catalogue's `log-creep` is driven by another load and has other parameters.
+const RELAXED_SHARE: &str = "relaxed_share";
+/// The same for `P_b`.
+const BALANCE_PRESSURE: &str = "balance_pressure";
+/// Names of the memory: one and the same to these recordings.
+const NAMES: [&str; 2] = ["log-creep", "stress-relaxation"];
+/// A single time constant is refuted when its unseen error (rms) is larger by this factor: a tenth of the squared error.
+const REFUTES: f64 = 1.054;
+/// How sure the name is then; and how sure where a single time constant does as well. Both are judgements, not calibrated on known truths.
+const SURE: f64 = 0.9;
+const UNSURE: f64 = 0.5;
+/// An unseen error below this share of the largest force is within what the sensors of such benches resolve (0.683 N of 450 N).
+const RESOLVED: f64 = 1.5e-3;
+/// The static search's own boundaries of a verdict.
+const EXPLAINED: f64 = 0.8;
+
+/// Whether an entry was found by the history layer: its parameters are not those of the catalogue's effect of that name.
+pub(crate) fn is_from_history(missing: &Missing) -> bool {
+    missing.parameters.iter().any(|p| p.name == RELAXED_SHARE)
+}
+
+/// Finds out what the model leaves out of a campaign: its history first, where it is one of isometric staircases, then the rest.
+///
+/// # Errors
+/// Recordings without force or without rows, or an impossible geometry.
+pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> Result<Diagnosis> {
+    options.progress.stage("what the muscle remembers", 0);
+    let Some(found) = found(campaign, geometry.rest_length.metres()) else {
+        return statically(campaign, geometry, options);
+    };
+    // What the user gives as known is fitted as it is, to the recordings as they are.
+    if !(found.answer.named && options.given.is_empty()) {
+        let mut diagnosis = statically(campaign, geometry, options)?;
+        diagnosis.history = Some(found.answer);
+        return Ok(diagnosis);
+    }
+    let braid = geometry.build().map_err(|e| Error::new(DataCode::MuscleInvalid, e.to_string()))?;
+    let mut diagnosis = statically(&without_memory(campaign, &found), geometry, options)?;
+    if let Some(misfit) = misfit(campaign, &braid)? {
+        diagnosis.misfit_rms_N = misfit;
+    }
+    enter(&mut diagnosis, found);
+    Ok(diagnosis)
+}
+
+/// The recordings with the pressure that the muscle would need without its memory and slips.
+fn without_memory(campaign: &Campaign, found: &Found) -> Campaign {
+    let mut freed = campaign.clone();
+    for (recording, (times, shifts)) in freed.recordings.iter_mut().zip(&found.shifts) {
+        let mut at = 0;
+        for (time, pressure) in recording.time.iter().zip(&mut recording.pressure) {
+            while at + 2 < times.len() && times[at + 1] < *time {
+                at += 1;
+            }
+            let (Some(t0), Some(s0)) = (times.get(at), shifts.get(at)) else { continue };
+            let next = times.get(at + 1).zip(shifts.get(at + 1));
+            *pressure += next.map_or(*s0, |(t1, s1)| {
+                s0 + (s1 - s0) * ((time - t0) / (t1 - t0).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
+            });
+        }
+    }
+    freed
+}
+
+/// Misfit of the model as it was on the recordings as they are, N.
+fn misfit(campaign: &Campaign, braid: &Braid<f64>) -> Result<Option<f64>> {
+    let mut rows = rows::prepare(campaign, braid)?;
+    let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
+    baselines::mask_slack(&mut rows, &fitted);
+    let misfit = baselines::fit(&rows, Kind::Flexible(4), &[]).rms(&rows);
+    Ok((misfit.is_finite() && misfit > 0.0).then_some(misfit))
+}
+
+fn enter(diagnosis: &mut Diagnosis, found: Found) {
+    let Found { answer, regions, peak, .. } = found;
+    let unseen = &answer.unseen;
+    let left = (1.0 - unseen.gain).clamp(0.0, 1.0);
+    let resolved = unseen.supported_with.rms_N <= RESOLVED * answer.largest_force_N;
+    // What the search calls a memory in recordings freed of it is the rest of the same.
+    diagnosis.missing.retain(|m| !NAMES.contains(&m.effect.as_str()));
+    diagnosis.missing.insert(0, memory(&answer, peak));
+    let rest_agrees = !diagnosis.judged || matches!(diagnosis.verdict, Verdict::Consistent | Verdict::Explained);
+    let well = unseen.gain >= EXPLAINED || resolved;
+    if !rest_agrees {
+        diagnosis.remarks.insert(
+            0,
+            format!(
+                "beside the memory the static model between mountings misses up to {:.2} N rms, and this part has no name: geometry, ends \
+                 and mounted lengths (by tape measure to 1 mm) are not told apart by one muscle",
+                diagnosis.misfit_rms_N
+            ),
+        );
+    }
+    diagnosis.verdict = if well && rest_agrees { Verdict::Explained } else { Verdict::PartlyExplained };
+    diagnosis.judged = true;
+    diagnosis.unexplained.share = left;
+    diagnosis.r#where.splice(0..0, regions);
+    diagnosis.held_out = HeldOut {
+        split: format!(
+            "each of {} runs predicted from the other runs of this muscle; settled points, static curves for each mounting and direction \
+             before, the memory after",
+            answer.runs.len()
+        ),
+        rms_before_N: unseen.without_memory.rms_N,
+        rms_after_N: unseen.with_memory.rms_N,
+        noise_N: diagnosis.noise_N,
+        with_turns_before_N: unseen.without_memory.rms_N,
+        with_turns_after_N: unseen.with_memory.rms_N,
+    };
+    diagnosis.history = Some(answer);
+}
+
+/// The memory as an entry of what is missing.
+fn memory(history: &History, peak: f64) -> Missing {
+    let spectrum = history.law.one_time_constant_ratio >= REFUTES;
+    let probability = if spectrum { SURE } else { UNSURE };
+    let half_to_std = |e: &super::answer::Estimate, scale: f64| e.half().map(|h| scale * h / 1.96);
+    let mut parameters = vec![
+        ParameterValue {
+            name: RELAXED_SHARE.into(),
+            value: history.law.relaxed_share.value,
+            std: half_to_std(&history.law.relaxed_share, 1.0),
+            unit: String::new(),
+            outside_known_range: false,
+        },
+        ParameterValue {
+            name: BALANCE_PRESSURE.into(),
+            value: 1e3 * history.law.balance_pressure.value,
+            std: half_to_std(&history.law.balance_pressure, 1e3),
+            unit: "Pa".into(),
+            outside_known_range: false,
+        },
+    ];
+    parameters.extend(history.law.time_constants_s.iter().enumerate().map(|(k, t)| ParameterValue {
+        name: format!("time_constant_{}", k + 1),
+        value: *t,
+        std: None,
+        unit: "s".into(),
+        outside_known_range: false,
+    }));
+    let found: Vec<&str> = history.findings.iter().filter(|f| f.found).map(|f| f.words.as_str()).collect();
+    Missing {
+        effect: NAMES[0].into(),
+        probability,
+        belief: probability,
+        share_explained: history.unseen.gain.clamp(0.0, 1.0),
+        parameters,
+        confusable_with: vec![NAMES[1].into()],
+        place: place_in_words(EffectName::LogCreep.info().link).into(),
+        correction: false,
+        checked: false,
+        given: false,
+        supported: true,
+        summary: "The bladder carries a part of the pressure. That part relaxes at constant length, as much in each tenfold of time, and \
+                  comes back as slowly when the muscle is vented: the next runs remember it."
+            .into(),
+        source: "P_eff = P + c·z̄, dz_k/dt = (u − z_k)/τ_k, u = p_el·clip((P − P_b)/max(|p_el|, 60 kPa), 0, 1), p_el = P_th(L) − P_b; \
+                 linear relaxation with a flat spectrum over decades: W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear \
+                 Viscoelastic Materials, 1976"
+            .into(),
+        peak_N: peak,
+        p: 0.05,
+        why: format!(
+            "unseen runs: {:.2} → {:.2} % of the largest force (rms), squared error less by {:.0} % ({:.0} % is the least); a single time \
+             constant leaves {:.2} times as much; {}",
+            history.unseen.without_memory.rms_pct,
+            history.unseen.with_memory.rms_pct,
+            100.0 * history.unseen.gain,
+            100.0 * LEAST_GAIN,
+            history.law.one_time_constant_ratio,
+            found.join("; ")
+        ),
+    }
+}

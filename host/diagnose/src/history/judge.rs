@@ -1,0 +1,384 @@
+//! From the fits to the answer: the rules of the verdict, and each finding in words.
+
+use super::answer::{
+    Course, ErrorSize, Estimate, Finding, FindingKind, History, LayerShare, MemoryLaw, Mounting, RunError, UnseenRuns,
+};
+use super::campaign::Points;
+use super::criteria::{LEAST_GAIN, LEAST_SHARE, TIMES, t_quantile};
+use super::findings::{self, Contrast, Visits};
+use super::law::Law;
+use super::shift_fit::knot_step;
+use super::unseen::{Sizes, Unseen};
+use super::Fits;
+use pam_data::recording::Campaign;
+
+/// A muscle that had been loaded this long before the first run was not rested, s.
+const LOADED_LONG: f64 = 1e3;
+/// The pressure of the picture of force over time, as a share of the highest.
+const PICTURED: f64 = 0.75;
+
+/// Share by which the squared error falls.
+fn gain(before: Sizes, after: Sizes) -> f64 {
+    if before.rms > 0.0 { 1.0 - (after.rms / before.rms).powi(2) } else { 0.0 }
+}
+
+/// The whole answer.
+pub(super) fn answer(points: &Points, fits: &Fits<'_>, campaign: &Campaign, rest_length: f64) -> History {
+    let (law, unseen) = fits.best();
+    let share = unseen.standard_error(|l| l.fit.theta[0]);
+    let quantile = t_quantile(points.runs.len() - 1);
+    let unseen_runs = unseen_runs(points, fits);
+    let why_not = why_not(points, fits, law, quantile * share);
+    let named = why_not.is_empty();
+    let visits = Visits::new(points);
+    History {
+        named,
+        why_not,
+        points: points.len(),
+        averaged: points.averaged,
+        largest_force_N: points.largest_force(),
+        mountings: mountings(points, fits, law, rest_length),
+        law: memory_law(points, fits, law, unseen, quantile),
+        unseen: unseen_runs,
+        runs: runs(points, fits, law, unseen, campaign),
+        findings: all_findings(points, fits, &visits, named, quantile * share),
+        layers: layers(points, fits),
+        courses: courses(points, fits, law, rest_length),
+        full_length_slope_N_per_kPa: findings::full_length_slope(points),
+    }
+}
+
+/// The rules of a named memory that do not hold.
+fn why_not(points: &Points, fits: &Fits<'_>, law: &Law, half: f64) -> Vec<String> {
+    let share = law.fit.theta[0];
+    let supported = points.supported();
+    let counts = |i: usize| supported[i] && fits.by_direction.predicted[i].is_finite();
+    let (_, unseen) = fits.best();
+    let after = unseen.sizes(points, counts);
+    let mut why = Vec::new();
+    if !(share >= LEAST_SHARE) {
+        why.push(format!("the relaxed share is {share:.3}; {LEAST_SHARE} is the least that is named"));
+    }
+    if !(share > half) {
+        why.push(format!("the relaxed share {share:.3} is within its 95 % interval of none (± {half:.3}, by runs)"));
+    }
+    let statics = [(&fits.by_direction, "a curve for each mounting and direction"), (&fits.plain, "a curve for each mounting")];
+    for (one, words) in statics {
+        let gained = gain(one.sizes(points, counts), after);
+        if !(gained >= LEAST_GAIN) {
+            why.push(format!(
+                "against {words} the squared error of unseen runs falls by {:.0} %; {:.0} % is the least",
+                100.0 * gained,
+                100.0 * LEAST_GAIN
+            ));
+        }
+    }
+    why
+}
+
+fn mountings(points: &Points, fits: &Fits<'_>, law: &Law, rest_length: f64) -> Vec<Mounting> {
+    points
+        .mountings
+        .iter()
+        .enumerate()
+        .map(|(m, own)| Mounting {
+            number: m + 1,
+            length_mm: 1e3 * (rest_length - own.stroke),
+            contraction: own.contraction,
+            runs: own.runs.len(),
+            threshold_kPa: fits.layer.thresholds[m],
+            carried_kPa: fits.layer.carried(m, law.balance),
+        })
+        .collect()
+}
+
+fn memory_law(points: &Points, fits: &Fits<'_>, law: &Law, unseen: &Unseen, quantile: f64) -> MemoryLaw {
+    let error = |quantity: &dyn Fn(&Law) -> f64| quantile * unseen.standard_error(quantity);
+    let free = fits.layer.balance_is_free;
+    MemoryLaw {
+        relaxed_share: Estimate::new(law.fit.theta[0], Some(error(&|l| l.fit.theta[0])), "", "run"),
+        balance_pressure: Estimate::new(law.balance, free.then(|| error(&|l| l.balance)), "kPa", "run"),
+        balance_identifiable: free,
+        time_constants_s: TIMES.to_vec(),
+        pause_s: (!points.pauses_known()).then(|| fits.layer.clocks[law.choice.pause].0),
+        loaded_before_s: law.choice.loaded,
+        one_time_constant_ratio: fits.single,
+    }
+}
+
+fn unseen_runs(points: &Points, fits: &Fits<'_>) -> UnseenRuns {
+    let largest = points.largest_force().max(f64::MIN_POSITIVE);
+    let size = |s: Sizes| ErrorSize {
+        rms_N: s.rms,
+        rms_pct: 100.0 * s.rms / largest,
+        mean_pct: 100.0 * s.mean / largest,
+        points: s.count,
+    };
+    let supported = points.supported();
+    // Both over the same points.
+    let all = |i: usize| fits.by_direction.predicted[i].is_finite() && fits.memory.predicted[i].is_finite();
+    let near = |i: usize| all(i) && supported[i];
+    let (before, after) = (fits.by_direction.sizes(points, near), fits.memory.sizes(points, near));
+    UnseenRuns {
+        without_memory: size(fits.by_direction.sizes(points, all)),
+        with_memory: size(fits.memory.sizes(points, all)),
+        supported_without: size(before),
+        supported_with: size(after),
+        with_slips: fits.with_slips.as_ref().map(|(_, u)| size(u.sizes(points, all))),
+        gain: gain(before, after),
+    }
+}
+
+fn runs(points: &Points, fits: &Fits<'_>, law: &Law, unseen: &Unseen, campaign: &Campaign) -> Vec<RunError> {
+    let since = &fits.layer.clocks[law.choice.pause].1.since;
+    let mean = |unseen: &Unseen, from: usize, to: usize| {
+        let own = (from..to).filter(|i| points.direction[*i] == 1).map(|i| unseen.error(points, i));
+        let finite: Vec<f64> = own.filter(|e| e.is_finite()).collect();
+        finite.iter().sum::<f64>() / finite.len().max(1) as f64
+    };
+    points
+        .runs
+        .iter()
+        .enumerate()
+        .map(|(r, run)| {
+            let (from, to) = run.points;
+            let own = |i: usize| (from..to).contains(&i);
+            RunError {
+                name: campaign.recordings[run.recording].name.clone(),
+                mounting: run.mounting + 1,
+                run: run.number,
+                since_mounting_s: since.get(from).copied().unwrap_or(0.0),
+                mean_before_N: mean(&fits.by_direction, from, to),
+                mean_after_N: mean(unseen, from, to),
+                rms_before_N: fits.by_direction.sizes(points, own).rms,
+                rms_after_N: unseen.sizes(points, own).rms,
+                offset_kPa: Some(fits.offsets[r]).filter(|o| o.is_finite()),
+            }
+        })
+        .collect()
+}
+
+fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, half: f64) -> Vec<Finding> {
+    let mut found = Vec::new();
+    found.extend(first_run(points, fits, visits, named));
+    found.push(creep(points, fits, named, half));
+    found.extend(gap(points, fits, visits, named));
+    found.extend(fits.events.iter().map(|e| {
+        let length = 1e3 * points.mountings[e.mounting].stroke;
+        let half = if e.lasts { t_quantile(points.runs.len() - 1) * e.error } else { 2.0 * e.error };
+        Finding {
+            kind: if e.lasts { FindingKind::Slip } else { FindingKind::BadRun },
+            found: true,
+            size: Estimate::new(e.shift, Some(half), "kPa", "run"),
+            units: points.mountings[e.mounting].runs.len(),
+            squares: 0.0,
+            cause: e.lasts.then(|| "end-slip".to_owned()),
+            mounting: Some(e.mounting + 1),
+            run: Some(e.run),
+            words: format!(
+                "mounting {} (shortened by {length:.1} mm), run {}: {} shift of {:+.1} ± {half:.1} kPa against the other runs; {}",
+                e.mounting + 1,
+                e.run,
+                if e.lasts { "from this run on a" } else { "a" },
+                e.shift,
+                if e.lasts { "the held length changed" } else { "look at this run before it is used" }
+            ),
+        }
+    }));
+    let loaded = fits.best().0.choice.loaded;
+    if named && loaded >= LOADED_LONG {
+        found.push(Finding {
+            kind: FindingKind::LoadedBefore,
+            found: true,
+            size: Estimate::new(loaded, None, "s", "run"),
+            units: 0,
+            squares: 0.0,
+            cause: None,
+            mounting: None,
+            run: None,
+            words: format!(
+                "the muscle had been loaded for about {loaded:.0} s before the first recorded run: a first-run deficit is not to be \
+                 expected (chosen on a grid, weakly known)"
+            ),
+        });
+    }
+    found
+}
+
+fn estimate(contrast: &Contrast, of: &str) -> Estimate {
+    Estimate::new(contrast.mean, contrast.half, "N", of)
+}
+
+fn plus_minus(contrast: &Contrast) -> String {
+    contrast.half.map_or_else(
+        || format!("{:.1} N (one unit: no interval)", contrast.mean),
+        |h| format!("{:.1} ± {h:.1} N", contrast.mean),
+    )
+}
+
+fn first_run(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool) -> Option<Finding> {
+    let deficit = findings::first_run_deficit(points, visits)?;
+    let later = findings::later_differences(points, visits);
+    let firsts = findings::first_differences(points, visits);
+    // Every first difference above every later one: by chance once in the number of ways to choose them.
+    let least = firsts.iter().copied().fold(f64::INFINITY, f64::min);
+    let above = later.iter().all(|l| *l < least) && findings::ways(firsts.len(), later.len()) >= 20.0;
+    let found = deficit.mean > 0.0 && (deficit.is_positive() || above);
+    let (_, unseen) = fits.best();
+    let left = findings::first_run_left(points, &unseen.predicted);
+    let words = format!(
+        "the first filling of a mounting pulls {} less than the second ({} shortened mountings){}",
+        plus_minus(&deficit),
+        deficit.units,
+        match (found, named, left) {
+            (true, true, Some(l)) => format!(
+                "; one memory of the bladder, which does not recover in the pauses; of the first filling it leaves {:.1} N",
+                -l
+            ),
+            (true, _, _) => String::new(),
+            (false, _, _) => "; its interval includes none".to_owned(),
+        }
+    );
+    Some(Finding {
+        kind: FindingKind::FirstRunDeficit,
+        found,
+        size: estimate(&deficit, "mounting"),
+        units: deficit.units,
+        squares: deficit.squares,
+        cause: (found && named).then(|| "log-creep".to_owned()),
+        mounting: None,
+        run: Some(1),
+        words,
+    })
+}
+
+fn creep(points: &Points, fits: &Fits<'_>, named: bool, half: f64) -> Finding {
+    let (law, _) = fits.best();
+    let share = law.fit.theta[0];
+    let plateau = findings::plateau_creep(points)
+        .filter(|p| p.units > 2)
+        .map(|p| format!("; at the top pressure the force of shortened mountings creeps by {} a decade", plus_minus(&p)));
+    Finding {
+        kind: FindingKind::Creep,
+        found: named,
+        size: Estimate::new(share, Some(half), "", "run"),
+        units: points.runs.len(),
+        squares: 0.0,
+        cause: named.then(|| "log-creep".to_owned()),
+        mounting: None,
+        run: None,
+        words: format!(
+            "the part of the pressure that the bladder carries relaxes by {:.1} ± {:.1} % a decade of time, over {} decades, and the next \
+             run remembers it{}",
+            100.0 * share / TIMES.len() as f64,
+            100.0 * half / TIMES.len() as f64,
+            TIMES.len(),
+            plateau.unwrap_or_default()
+        ),
+    }
+}
+
+fn gap(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool) -> Option<Finding> {
+    let (by_mounting, by_run) = findings::gap(points, visits);
+    let positive = |c: &Option<Contrast>| c.as_ref().is_some_and(Contrast::is_positive);
+    let (contrast, of) = match (by_mounting, by_run) {
+        (Some(m), _) if positive(&by_mounting) => (m, "mounting"),
+        (_, Some(r)) if positive(&by_run) => (r, "run"),
+        (Some(m), _) => (m, "mounting"),
+        (None, Some(r)) => (r, "run"),
+        (None, None) => return None,
+    };
+    let found = contrast.is_positive();
+    let (_, unseen) = fits.best();
+    let left = findings::gap_left(points, &unseen.predicted);
+    let (rubs, friction, error) = fits.friction;
+    let cause = match (found, rubs, named) {
+        (true, true, _) => Some("pressure-friction".to_owned()),
+        (true, false, true) => Some("log-creep".to_owned()),
+        _ => None,
+    };
+    let after = left.map(|l| format!("; the memory leaves {}", plus_minus(&l))).unwrap_or_default();
+    let words = format!(
+        "emptying pulls {} more than filling when shortened, compared with full length ({} {of}s){}",
+        plus_minus(&contrast),
+        contrast.units,
+        match (found, named) {
+            (false, _) => "; its interval includes none".to_owned(),
+            (true, false) => String::new(),
+            (true, true) if rubs =>
+                format!("{after}, and friction of {friction:.4} ± {error:.4} of the pressure is needed beside it"),
+            (true, true) => format!("{after}: the memory explains it, dry friction is not needed"),
+        }
+    );
+    Some(Finding {
+        kind: FindingKind::FillingEmptyingGap,
+        found,
+        size: estimate(&contrast, of),
+        units: contrast.units,
+        squares: contrast.squares,
+        cause,
+        mounting: None,
+        run: None,
+        words,
+    })
+}
+
+/// What each layer takes of the squared error of supported points of unseen runs.
+fn layers(points: &Points, fits: &Fits<'_>) -> Vec<LayerShare> {
+    let supported = points.supported();
+    let square = |unseen: &Unseen| {
+        let counts = |i: usize| supported[i] && fits.memory.predicted[i].is_finite();
+        unseen.sizes(points, counts).rms.powi(2)
+    };
+    let none = square(&fits.plain);
+    if !(none > 0.0) {
+        return Vec::new();
+    }
+    let share = |part: f64, of: f64| if of > 0.0 { part / of } else { 0.0 };
+    let memory = square(&fits.memory);
+    let mut layers = Vec::new();
+    let mut left = memory;
+    match (&fits.with_slips, &fits.slips_alone) {
+        (Some((_, both)), Some(slips)) => {
+            let (both, slips) = (square(both), square(slips));
+            layers.push(("memory", share(none - memory, none), share(slips - both, slips)));
+            layers.push(("slips", share(memory - both, none), share(memory - both, memory)));
+            left = both;
+        }
+        _ => layers.push(("memory", share(none - memory, none), share(none - memory, none))),
+    }
+    layers.push(("not explained", share(left, none), share(left, none)));
+    let entry = |(layer, in_order, last_in): (&str, f64, f64)| LayerShare { layer: layer.into(), in_order, last_in };
+    layers.into_iter().map(entry).collect()
+}
+
+/// Force over time at one pressure, of each mounting that pulls there.
+fn courses(points: &Points, fits: &Fits<'_>, law: &Law, rest_length: f64) -> Vec<Course> {
+    let step = knot_step(points.highest());
+    let pressure = (PICTURED * points.highest() / step).round() * step;
+    let since = &fits.layer.clocks[law.choice.pause].1.since;
+    let shift = |i: usize| -> f64 { law.columns.iter().zip(&law.fit.theta).map(|(q, t)| q[i] * t).sum() };
+    (0..points.mountings.len())
+        .map(|m| {
+            let near = (0..points.len())
+                .filter(|i| points.mounting[*i] == m && (points.pressure[*i] - pressure).abs() <= 0.5 * step);
+            let mut course = Course {
+                mounting: m + 1,
+                length_mm: 1e3 * (rest_length - points.mountings[m].stroke),
+                pressure_kPa: pressure,
+                time_s: Vec::new(),
+                force_N: Vec::new(),
+                law_N: Vec::new(),
+            };
+            for i in near {
+                let at_pressure = fits.layer.spline.at(pressure + shift(i)).value(&law.fit.curves[m]);
+                let moved = at_pressure - fits.layer.predict(law, i);
+                course.time_s.push(since[i]);
+                course.force_N.push(points.force[i] + moved);
+                course.law_N.push(at_pressure);
+            }
+            course
+        })
+        .filter(|c| c.time_s.len() > 3)
+        .collect()
+}

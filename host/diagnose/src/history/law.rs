@@ -1,0 +1,190 @@
+//! The law of the bladder's relaxing back pressure, fitted to the settled points of one muscle.
+//!
+//! ```text
+//! F = S_m(P + c z̄)      dz_k/dt = (u − z_k)/τ_k      u = p_el clip((P − P_b)/max(|p_el|, ΔP_r), 0, 1)      p_el = P_th,m − P_b
+//! ```
+//! | symbol | meaning | unit |
+//! | --- | --- | --- |
+//! | `c` | relaxed share of the back pressure over the whole spectrum, `c/5` a decade | – |
+//! | `P_b` | pressure at which the bladder carries no axial stress | kPa |
+//! | `P_th,m` | pressure at which the muscle begins to pull at the length of mounting `m` | kPa |
+//! | `p_el` | part of the pressure that the bladder carries; negative where it is stretched | kPa |
+//!
+//! The law was found on isometric recordings at four lengths; under motion it is a prediction.
+
+use rayon::prelude::*;
+
+use super::campaign::Points;
+use super::criteria::{
+    BALANCE_MOST, BALANCE_MOVES, BALANCE_START, LOADED, NEAR_BALANCE, PAUSES, RAMP, THRESHOLD_FROM, THRESHOLD_TO,
+};
+use super::memory::Clockwork;
+use super::shift_fit::{self, ShiftFit};
+use super::spline::Spline;
+
+/// Below this the carried part has no sign of its own, kPa.
+const NO_SIGN: f64 = 1.0;
+
+/// What is assumed of times that nobody recorded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Choice {
+    /// Which of the pauses.
+    pub pause: usize,
+    /// How long the muscle had been loaded before the first run, s.
+    pub loaded: f64,
+}
+
+/// A campaign with all that the fits share.
+#[derive(Debug)]
+pub(super) struct Layer<'a> {
+    pub points: &'a Points,
+    pub spline: Spline,
+    /// `P_th,m`, kPa.
+    pub thresholds: Vec<f64>,
+    /// Pauses between runs, s, with the steps of the states over each.
+    pub clocks: Vec<(f64, Clockwork)>,
+    /// Whether the recordings determine `P_b`.
+    pub balance_is_free: bool,
+}
+
+/// The fitted law.
+#[derive(Clone, Debug)]
+pub(super) struct Law {
+    /// `c`, then the coefficients of further columns.
+    pub fit: ShiftFit,
+    /// `P_b`, kPa.
+    pub balance: f64,
+    pub choice: Choice,
+    /// Shifts per unit of each coefficient, kPa, at every point (also those left out).
+    pub columns: Vec<Vec<f64>>,
+    /// Sum of squared residuals over the points in use, N².
+    pub squares: f64,
+}
+
+/// Pressures at which a muscle begins to pull, by the tangent to its static curve near the highest pressure.
+fn thresholds(points: &Points) -> Vec<f64> {
+    let highest = points.highest();
+    let spline = shift_fit::static_spline(highest);
+    (0..points.mountings.len())
+        .map(|m| {
+            let own = || (0..points.len()).filter(|i| points.mounting[*i] == m);
+            let top = own().map(|i| points.pressure[i]).fold(0.0, f64::max).min(highest);
+            let Some(curve) = shift_fit::static_curve(points, &spline, own()) else { return top };
+            let tangents = (0..7).map(|k| {
+                let p = top * (THRESHOLD_FROM + (THRESHOLD_TO - THRESHOLD_FROM) * f64::from(k) / 6.0);
+                let local = spline.at(p);
+                p - local.value(&curve) / local.slope(&curve)
+            });
+            let mean = tangents.sum::<f64>() / 7.0;
+            // A muscle that never pulls at this length begins above what was tried.
+            if mean.is_finite() { mean.clamp(-top, 1.2 * top) } else { top }
+        })
+        .collect()
+}
+
+impl<'a> Layer<'a> {
+    pub(super) fn new(points: &'a Points, times: &[f64]) -> Self {
+        let thresholds = thresholds(points);
+        let pauses = if points.pauses_known() { &PAUSES[..1] } else { &PAUSES[..] };
+        let clocks = pauses.iter().map(|p| (*p, Clockwork::new(points, *p, times))).collect();
+        let (low, high) =
+            thresholds.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(*t), h.max(*t)));
+        // One mounting tells c (P_th − P_b) only; two tell P_b where their carried parts differ.
+        let balance_is_free = low < NEAR_BALANCE * BALANCE_START && high - low > RAMP;
+        let spline = shift_fit::shifted_spline(points.highest());
+        Self { points, spline, thresholds, clocks, balance_is_free }
+    }
+
+    /// `z̄` per kPa of the carried part.
+    fn unit_state(&self, balance: f64, choice: Choice) -> Vec<f64> {
+        let p = self.points;
+        let drive: Vec<f64> = (0..p.len())
+            .map(|i| {
+                let carried = self.carried(p.mounting[i], balance).abs();
+                ((p.pressure[i] - balance) / carried.max(RAMP)).clamp(0.0, 1.0)
+            })
+            .collect();
+        self.clocks[choice.pause].1.mean_state(&drive, choice.loaded)
+    }
+
+    /// `p_el`, kPa.
+    pub(super) fn carried(&self, mounting: usize, balance: f64) -> f64 {
+        let carried = self.thresholds[mounting] - balance;
+        if carried.abs() < NO_SIGN { NO_SIGN } else { carried }
+    }
+
+    /// The law at one choice of unrecorded times.
+    fn fit_at(&self, use_point: &[bool], choice: Choice, further: &[Vec<f64>], start: Option<&Law>) -> Law {
+        let p = self.points;
+        let first = self.thresholds[p.longest()].clamp(0.5 * BALANCE_START, 1.3 * BALANCE_START);
+        let mut balance = match start {
+            Some(law) => law.balance,
+            None if self.balance_is_free => first,
+            None => BALANCE_START,
+        };
+        let rounds = if self.balance_is_free { 3 } else { 0 };
+        let mut theta: Option<Vec<f64>> = start.map(|law| {
+            let c = law.fit.theta[0];
+            let own = [c, c * law.balance / 100.0];
+            own.into_iter().chain(law.fit.theta[1..].iter().copied()).collect()
+        });
+        for _ in 0..rounds {
+            let z = self.unit_state(balance, choice);
+            let shifts = (0..p.len()).map(|i| z[i] * self.thresholds[p.mounting[i]]).collect();
+            let mut columns = vec![shifts, z.iter().map(|z| -100.0 * z).collect()];
+            columns.extend_from_slice(further);
+            let fit = shift_fit::fit(p, &self.spline, use_point, &columns, theta.as_deref(), 4);
+            let share = fit.theta[0];
+            let next = if share > 0.05 { (100.0 * fit.theta[1] / share).clamp(0.0, BALANCE_MOST) } else { 100.0 };
+            let moved = (next - balance).abs();
+            balance = next;
+            theta = Some(fit.theta);
+            if !(moved >= BALANCE_MOVES) {
+                break;
+            }
+        }
+        let z = self.unit_state(balance, choice);
+        let mut columns = vec![(0..p.len()).map(|i| z[i] * self.carried(p.mounting[i], balance)).collect()];
+        columns.extend_from_slice(further);
+        let from = start.map(|law| law.fit.theta.clone());
+        let steps = if from.is_some() { 3 } else { 5 };
+        let fit = shift_fit::fit(p, &self.spline, use_point, &columns, from.as_deref(), steps);
+        let squares = (0..p.len())
+            .filter(|i| use_point[*i])
+            .map(|i| (shift_fit::predict(p, &self.spline, &columns, &fit, i) - p.force[i]).powi(2))
+            .sum();
+        Law { fit, balance, choice, columns, squares }
+    }
+
+    /// The law at the best choice of unrecorded times, or at a given one.
+    pub(super) fn fit(
+        &self,
+        use_point: &[bool],
+        choice: Option<Choice>,
+        further: &[Vec<f64>],
+        start: Option<&Law>,
+    ) -> Law {
+        if let Some(choice) = choice {
+            return self.fit_at(use_point, choice, further, start);
+        }
+        let choices: Vec<Choice> = (0..self.clocks.len())
+            .flat_map(|pause| LOADED.iter().map(move |loaded| Choice { pause, loaded: *loaded }))
+            .collect();
+        let fits: Vec<Law> =
+            choices.par_iter().map(|c| self.fit_at(use_point, *c, further, start)).collect();
+        let first = Choice { pause: 0, loaded: 0.0 };
+        fits.into_iter()
+            .min_by(|a, b| a.squares.total_cmp(&b.squares))
+            .unwrap_or_else(|| self.fit_at(use_point, first, further, start))
+    }
+
+    /// What a law predicts at a point, N.
+    pub(super) fn predict(&self, law: &Law, i: usize) -> f64 {
+        shift_fit::predict(self.points, &self.spline, &law.columns, &law.fit, i)
+    }
+
+    /// `dS/dP` at a point, N/kPa.
+    pub(super) fn slope(&self, law: &Law, i: usize) -> f64 {
+        shift_fit::slope(self.points, &self.spline, &law.columns, &law.fit, i)
+    }
+}

@@ -1,0 +1,129 @@
+//! Where the error of static curves on unseen runs sits: run within mounting, time since mounting, mounting.
+//!
+//! How likely a concentration is by chance comes from shuffling whole runs: within each mounting for the order, over all for the mounting.
+
+use super::campaign::Points;
+use super::unseen::Unseen;
+use crate::linear::Random;
+use crate::verdict::Region;
+
+/// Shuffles; the least p is one over this.
+const SHUFFLES: usize = 499;
+/// A place is told when it holds at least this much more of the error than of the points.
+const CONCENTRATED: f64 = 1.5;
+/// And when chance gives as much no more often than this.
+const SURE: f64 = 0.05;
+
+/// The places, the most telling first.
+pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Region> {
+    let energy: Vec<f64> = points
+        .runs
+        .iter()
+        .map(|r| {
+            let own = (r.points.0..r.points.1).map(|i| unseen.error(points, i)).filter(|e| e.is_finite());
+            own.map(|e| e * e).sum()
+        })
+        .collect();
+    let all: f64 = energy.iter().sum();
+    if !(all > 0.0) {
+        return Vec::new();
+    }
+    let count = |runs: &[usize]| -> f64 {
+        runs.iter().map(|r| (points.runs[*r].points.1 - points.runs[*r].points.0) as f64).sum()
+    };
+    let share = |runs: &[usize]| runs.iter().map(|r| energy[*r]).sum::<f64>() / all;
+    let first: Vec<usize> = points
+        .mountings
+        .iter()
+        .filter(|m| m.runs.len() > 1)
+        .filter_map(|m| m.runs.first().copied())
+        .collect();
+    let p_first = chance(points, &energy, true, share(&first) * all, |e| {
+        first.iter().map(|r| e[*r]).sum()
+    });
+    let rows = |runs: &[usize]| count(runs) / points.len() as f64;
+    let told = |runs: &[usize], p: f64| share(runs) >= CONCENTRATED * rows(runs) && p <= SURE;
+    let mut found = Vec::new();
+    if told(&first, p_first) {
+        let (share, rows) = (share(&first), rows(&first));
+        let words = format!(
+            "{:.0} % of the static error of unseen runs lies in the first run of a mounting, in {:.0} % of the points",
+            100.0 * share,
+            100.0 * rows
+        );
+        let region = |coordinate: &str, from: f64, to: f64, unit: &str, words: String| Region {
+            coordinate: coordinate.into(),
+            from,
+            to,
+            share,
+            rows,
+            p: p_first,
+            unit: unit.into(),
+            words,
+        };
+        let ends = first.iter().map(|r| points.runs[*r].points.1.saturating_sub(1));
+        let end = ends.map(|i| since[i]).fold(0.0, f64::max);
+        found.push(region("run-in-mounting", 1.0, 1.0, "", words));
+        let words = format!("{:.0} % of it lies in the first {end:.0} s after a mounting", 100.0 * share);
+        found.push(region("time-since-mounting", 0.0, end, "s", words));
+    }
+    let own = |m: &usize| share(&points.mountings[*m].runs);
+    let worst = (0..points.mountings.len()).max_by(|a, b| own(a).total_cmp(&own(b)));
+    if let Some(m) = worst.filter(|_| points.mountings.len() > 1) {
+        let runs = &points.mountings[m].runs;
+        let largest = |e: &[f64]| {
+            let sums = points.mountings.iter().map(|m| m.runs.iter().map(|r| e[*r]).sum::<f64>());
+            sums.fold(0.0, f64::max)
+        };
+        let p = chance(points, &energy, false, share(runs) * all, largest);
+        if told(runs, p) {
+            let words = format!(
+                "{:.0} % of it lies in mounting {} (shortened by {:.1} mm)",
+                100.0 * share(runs),
+                m + 1,
+                1e3 * points.mountings[m].stroke
+            );
+            let number = (m + 1) as f64;
+            let (share, rows) = (share(runs), rows(runs));
+            found.push(Region {
+                coordinate: "mounting".into(),
+                from: number,
+                to: number,
+                share,
+                rows,
+                p,
+                unit: String::new(),
+                words,
+            });
+        }
+    }
+    found
+}
+
+/// How often shuffled runs give at least as much.
+fn chance(
+    points: &Points,
+    energy: &[f64],
+    within: bool,
+    measured: f64,
+    statistic: impl Fn(&[f64]) -> f64,
+) -> f64 {
+    let mut random = Random(0x5eed);
+    let mut as_much = 1;
+    let groups: Vec<Vec<usize>> = if within {
+        points.mountings.iter().map(|m| m.runs.clone()).collect()
+    } else {
+        vec![(0..points.runs.len()).collect()]
+    };
+    for _ in 0..SHUFFLES {
+        let mut shuffled = energy.to_vec();
+        for group in &groups {
+            for k in (1..group.len()).rev() {
+                shuffled.swap(group[k], group[random.below(k + 1)]);
+            }
+        }
+        // Sums of the same numbers in another order differ by rounding.
+        as_much += usize::from(statistic(&shuffled) >= measured * (1.0 - 1e-12));
+    }
+    as_much as f64 / (SHUFFLES + 1) as f64
+}

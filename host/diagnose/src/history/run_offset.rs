@@ -1,0 +1,176 @@
+//! A run that differs from what the memory explains: a slip that lasts, or a single bad run.
+//!
+//! The offset of a run is the shift of pressure that brings it onto the curve of the other runs of its mounting, with the memory held:
+//! `o = Σ S′(y − ŷ)/Σ S′²`, kPa. A change of length by slipping shows as such a shift. The first run of a mounting is never called bad: what
+//! the memory leaves of it is run-in.
+
+use super::campaign::Points;
+use super::criteria::{
+    BAD_RUN_ERRORS, BAD_RUN_LEAST, BAD_RUN_NEXT, BAD_RUN_RUNS, SLIP_ERRORS, SLIP_GAIN, SLIP_LEAST, SLIP_RUNS,
+    SLIP_SCATTER, SUPPORT,
+};
+use super::law::{Law, Layer};
+use super::shift_fit;
+use super::spline::{Banded, Spline};
+use super::unseen::{Unseen, jackknife, with_memory};
+use crate::linear::median;
+
+/// Slopes below this say nothing about a shift, as a share of the largest.
+const FLAT: f64 = 0.03;
+/// Fewest points from which an offset is taken.
+const LEAST: usize = 5;
+
+/// What happened to a run, or from a run on.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Event {
+    pub mounting: usize,
+    /// Number of the run within its mounting, from 1.
+    pub run: usize,
+    /// Whether it lasts until the end of the mounting.
+    pub lasts: bool,
+    /// Shift of pressure, kPa.
+    pub shift: f64,
+    /// Its standard error: by jackknife over runs, or the deviation of all runs.
+    pub error: f64,
+}
+
+/// Offset of each run from the others of its mounting, kPa; not a number where it cannot be told.
+pub(super) fn offsets(layer: &Layer<'_>, law: &Law) -> Vec<f64> {
+    let points = layer.points;
+    let shifted: Vec<f64> = (0..points.len())
+        .map(|i| {
+            let shifts = law.columns.iter().zip(&law.fit.theta).map(|(q, t)| q[i] * t);
+            points.pressure[i] + shifts.sum::<f64>()
+        })
+        .collect();
+    (0..points.runs.len()).map(|r| offset(points, &layer.spline, &shifted, r).unwrap_or(f64::NAN)).collect()
+}
+
+fn offset(points: &Points, spline: &Spline, shifted: &[f64], run: usize) -> Option<f64> {
+    let mounting = points.runs[run].mounting;
+    let mut band =
+        Banded::penalty(spline.len(), super::criteria::SMOOTHNESS, super::criteria::RIDGE);
+    let mut weights = vec![0.0; spline.len()];
+    let mut reached = f64::NEG_INFINITY;
+    for i in (0..points.len()).filter(|i| points.mounting[*i] == mounting && points.run[*i] != run) {
+        let local = spline.at(shifted[i]);
+        band.add(&local, 1.0);
+        (0..4).for_each(|k| weights[local.first + k] += local.value[k] * points.force[i]);
+        reached = reached.max(shifted[i]);
+    }
+    if !reached.is_finite() {
+        return None;
+    }
+    band.factor().solve(&mut weights);
+    let (from, to) = points.runs[run].points;
+    let own: Vec<(f64, f64)> = (from..to)
+        .filter(|i| shifted[*i] <= reached + SUPPORT)
+        .map(|i| {
+            let local = spline.at(shifted[i]);
+            (local.slope(&weights), points.force[i] - local.value(&weights))
+        })
+        .collect();
+    let steepest = own.iter().map(|o| o.0).fold(0.0, f64::max);
+    let counts = own.iter().filter(|o| o.0 > FLAT * steepest);
+    let (n, along, square) = counts.fold((0, 0.0, 0.0), |(n, a, q), (s, e)| (n + 1, a + s * e, q + s * s));
+    (n >= LEAST && square > 0.0).then(|| along / square)
+}
+
+/// Robust deviation of all offsets about the median of their mounting, kPa.
+pub(super) fn deviation(points: &Points, offsets: &[f64]) -> f64 {
+    let mut away = Vec::new();
+    for mounting in &points.mountings {
+        let own: Vec<f64> = mounting.runs.iter().map(|r| offsets[*r]).filter(|o| o.is_finite()).collect();
+        let middle = midpoint(&own);
+        away.extend(own.iter().map(|o| (o - middle).abs()));
+    }
+    1.4826 * median(&mut away)
+}
+
+/// The median; of an even number the mean of the middle two.
+fn midpoint(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let n = sorted.len();
+    if n == 0 { 0.0 } else { 0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]) }
+}
+
+/// The runs of a mounting whose offset is known, with it.
+fn known(points: &Points, mounting: usize, offsets: &[f64]) -> Vec<(usize, f64)> {
+    let runs = points.mountings[mounting].runs.iter();
+    runs.map(|r| (points.runs[*r].number, offsets[*r])).filter(|o| o.1.is_finite()).collect()
+}
+
+/// A single run that is off, and no other.
+fn bad_run(points: &Points, mounting: usize, offsets: &[f64], deviation: f64) -> Option<Event> {
+    let own = known(points, mounting, offsets);
+    if (own.len() as f64) < BAD_RUN_RUNS {
+        return None;
+    }
+    let middle = midpoint(&own.iter().map(|o| o.1).collect::<Vec<_>>());
+    let mut away: Vec<(usize, f64)> = own.iter().map(|(k, o)| (*k, o - middle)).collect();
+    away.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+    let ((run, shift), next) = (away[0], away[1].1.abs());
+    let large = shift.abs() > (BAD_RUN_ERRORS * deviation).max(BAD_RUN_LEAST);
+    let alone = shift.abs() > BAD_RUN_NEXT * next;
+    (run > 1 && large && alone).then_some(Event { mounting, run, lasts: false, shift, error: deviation })
+}
+
+/// The best place at which the offsets of a mounting could step, where they do so clearly.
+fn candidate(points: &Points, mounting: usize, offsets: &[f64]) -> Option<usize> {
+    let own = known(points, mounting, offsets);
+    if (own.len() as f64) < SLIP_RUNS {
+        return None;
+    }
+    let scatter = |part: &[(usize, f64)]| {
+        let mean = part.iter().map(|o| o.1).sum::<f64>() / part.len().max(1) as f64;
+        part.iter().map(|o| (o.1 - mean).powi(2)).sum::<f64>()
+    };
+    let splits = (2..own.len() - 1).map(|s| (s, scatter(&own[..s]) + scatter(&own[s..])));
+    let (split, within) = splits.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (within < SLIP_SCATTER * scatter(&own)).then(|| own[split].0)
+}
+
+/// The column of a step that lasts from a run of a mounting on.
+pub(super) fn step_column(points: &Points, mounting: usize, from_run: usize) -> Vec<f64> {
+    let after = |i: usize| points.mounting[i] == mounting && points.runs[points.run[i]].number >= from_run;
+    (0..points.len()).map(|i| f64::from(u8::from(after(i)))).collect()
+}
+
+/// A slip that unseen runs support, in one mounting.
+fn slip(layer: &Layer<'_>, law: &Law, memory: &Unseen, mounting: usize, offsets: &[f64]) -> Option<Event> {
+    let points = layer.points;
+    let run = candidate(points, mounting, offsets)?;
+    let column = vec![step_column(points, mounting, run)];
+    let everything = vec![true; points.len()];
+    let start = Law { fit: with_room(law), ..law.clone() };
+    let with = layer.fit(&everything, Some(law.choice), &column, Some(&start));
+    let shift = *with.fit.theta.last()?;
+    if !(shift.abs() >= SLIP_LEAST) {
+        return None;
+    }
+    let unseen = with_memory(layer, &with, &column, true);
+    let steps: Vec<f64> = unseen.folds.iter().filter_map(|f| f.fit.theta.last().copied()).collect();
+    let error = jackknife(&steps);
+    let here = |i: usize| points.mounting[i] == mounting;
+    let (before, after) = (memory.sizes(points, here).rms, unseen.sizes(points, here).rms);
+    let kept = shift.abs() > SLIP_ERRORS * error && after <= (1.0 - SLIP_GAIN) * before;
+    kept.then_some(Event { mounting, run, lasts: true, shift, error })
+}
+
+/// A fit with one more coefficient, zero.
+pub(super) fn with_room(law: &Law) -> shift_fit::ShiftFit {
+    let mut fit = law.fit.clone();
+    fit.theta.push(0.0);
+    fit
+}
+
+/// All slips and bad runs, mounting by mounting.
+pub(super) fn events(layer: &Layer<'_>, law: &Law, memory: &Unseen, offsets: &[f64]) -> Vec<Event> {
+    let deviation = deviation(layer.points, offsets);
+    (0..layer.points.mountings.len())
+        .filter_map(|m| {
+            bad_run(layer.points, m, offsets, deviation).or_else(|| slip(layer, law, memory, m, offsets))
+        })
+        .collect()
+}

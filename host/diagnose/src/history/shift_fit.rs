@@ -1,0 +1,190 @@
+//! A free static curve for each mounting on a pressure that is shifted: `F = S_m(P + Σ q_j θ_j)`.
+//!
+//! Gauss–Newton in which the splines stay linear: at `θ`, with `B` at the shifted pressures and `S′` the present slope,
+//! `min ‖y + S′·(qθ) − B w − S′ q θ_new‖²`. The splines are evaluated at the shifted pressure: made linear about no shift, the knee of the
+//! curve would be lost. Bands of four and a border of `J` columns: `O(rows (4 + J)²)`.
+
+use super::campaign::Points;
+use super::criteria::{DAMPING, RIDGE, SMOOTHNESS, SMOOTHNESS_STATIC};
+use super::spline::{Banded, Spline};
+
+/// Weak prior that keeps a coefficient finite which no row determines.
+const PRIOR: f64 = 1e-8;
+
+/// Coefficients of shifts, and of the curve of each mounting.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ShiftFit {
+    pub theta: Vec<f64>,
+    pub curves: Vec<Vec<f64>>,
+}
+
+/// The splines of a campaign: knots every 1, 2 or 5 × 10ⁿ kPa, about thirteen below the highest pressure.
+pub(super) fn knot_step(highest: f64) -> f64 {
+    let aimed = highest.max(1e-3) / 13.0;
+    let decade = 10.0_f64.powf(aimed.log10().floor());
+    let steps = [1.0, 2.0, 5.0, 10.0].map(|s| s * decade);
+    let nearer = |a: &f64, b: &f64| (a / aimed).ln().abs().total_cmp(&(b / aimed).ln().abs());
+    steps.into_iter().min_by(nearer).unwrap_or(aimed)
+}
+
+/// On shifted pressures: one knot below zero, four above the highest pressure.
+pub(super) fn shifted_spline(highest: f64) -> Spline {
+    let step = knot_step(highest);
+    Spline::new(-step, step, (highest / step).ceil() as usize + 5)
+}
+
+/// On measured pressures.
+pub(super) fn static_spline(highest: f64) -> Spline {
+    let step = knot_step(highest);
+    Spline::new(0.0, step, (highest / step).ceil() as usize + 1)
+}
+
+/// `Σ q_j θ_j` at a point.
+fn shift(columns: &[Vec<f64>], theta: &[f64], i: usize) -> f64 {
+    columns.iter().zip(theta).map(|(q, t)| q[i] * t).sum()
+}
+
+/// The normal equations of one mounting.
+struct Block {
+    band: Banded,
+    border: Vec<Vec<f64>>,
+    moment: Vec<f64>,
+}
+
+/// Solves once: the curves, and the coefficients where `free`.
+fn solve(
+    points: &Points,
+    spline: &Spline,
+    use_point: &[bool],
+    columns: &[Vec<f64>],
+    at: &[f64],
+    slopes: Option<&[Vec<f64>]>,
+) -> ShiftFit {
+    let (count, free) = (spline.len(), if slopes.is_some() { columns.len() } else { 0 });
+    let mut blocks: Vec<Block> = (0..points.mountings.len())
+        .map(|_| Block {
+            band: Banded::penalty(count, SMOOTHNESS, RIDGE),
+            border: vec![vec![0.0; count]; free],
+            moment: vec![0.0; count],
+        })
+        .collect();
+    let mut gram = vec![vec![0.0; free]; free];
+    let mut right = vec![0.0; free];
+    let mut own = vec![0.0; free];
+    for i in (0..points.len()).filter(|i| use_point[*i]) {
+        let moved = shift(columns, at, i);
+        let local = spline.at(points.pressure[i] + moved);
+        let slope = slopes.map_or(0.0, |curves| local.slope(&curves[points.mounting[i]]));
+        let target = points.force[i] + slope * moved;
+        let block = &mut blocks[points.mounting[i]];
+        block.band.add(&local, 1.0);
+        for k in 0..4 {
+            block.moment[local.first + k] += local.value[k] * target;
+        }
+        for (o, q) in own.iter_mut().zip(columns) {
+            *o = slope * q[i];
+        }
+        for j in 0..free {
+            for k in 0..4 {
+                block.border[j][local.first + k] += local.value[k] * own[j];
+            }
+            right[j] += own[j] * target;
+            for l in 0..free {
+                gram[j][l] += own[j] * own[l];
+            }
+        }
+    }
+    let mut solved = Vec::with_capacity(blocks.len());
+    for block in blocks {
+        let factor = block.band.factor();
+        let (mut alone, mut along) = (block.moment, block.border.clone());
+        factor.solve(&mut alone);
+        along.iter_mut().for_each(|c| factor.solve(c));
+        for j in 0..free {
+            right[j] -= dot(&block.border[j], &alone);
+            for l in 0..free {
+                gram[j][l] -= dot(&block.border[j], &along[l]);
+            }
+        }
+        solved.push((alone, along));
+    }
+    for (j, row) in gram.iter_mut().enumerate() {
+        row[j] += PRIOR;
+    }
+    let chosen: Vec<usize> = (0..free).collect();
+    let theta = match free {
+        0 => at.to_vec(),
+        _ => crate::linear::solve_symmetric(&gram, &right, &chosen).unwrap_or_else(|| at.to_vec()),
+    };
+    let curves = solved
+        .into_iter()
+        .map(|(mut alone, along)| {
+            for (column, t) in along.iter().zip(&theta) {
+                alone.iter_mut().zip(column).for_each(|(w, c)| *w -= t * c);
+            }
+            alone
+        })
+        .collect();
+    ShiftFit { theta, curves }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Fits the coefficients of the shifts and a curve for each mounting to the points in use.
+pub(super) fn fit(
+    points: &Points,
+    spline: &Spline,
+    use_point: &[bool],
+    columns: &[Vec<f64>],
+    start: Option<&[f64]>,
+    steps: usize,
+) -> ShiftFit {
+    let mut theta = start.map_or_else(|| vec![0.0; columns.len()], <[f64]>::to_vec);
+    if !columns.is_empty() {
+        let mut now = solve(points, spline, use_point, columns, &theta, None);
+        for step in 0..steps {
+            let next = solve(points, spline, use_point, columns, &theta, Some(&now.curves));
+            let share = if step + 1 < steps { DAMPING } else { 1.0 };
+            for (t, n) in theta.iter_mut().zip(&next.theta) {
+                *t += share * (n - *t);
+            }
+            now = next;
+        }
+    }
+    solve(points, spline, use_point, columns, &theta, None)
+}
+
+/// What a fit predicts at a point, N.
+pub(super) fn predict(points: &Points, spline: &Spline, columns: &[Vec<f64>], fit: &ShiftFit, i: usize) -> f64 {
+    let local = spline.at(points.pressure[i] + shift(columns, &fit.theta, i));
+    local.value(&fit.curves[points.mounting[i]])
+}
+
+/// `dS/dP` of a fit at a point, N/kPa.
+pub(super) fn slope(points: &Points, spline: &Spline, columns: &[Vec<f64>], fit: &ShiftFit, i: usize) -> f64 {
+    let local = spline.at(points.pressure[i] + shift(columns, &fit.theta, i));
+    local.slope(&fit.curves[points.mounting[i]])
+}
+
+/// A static curve through chosen points, on measured pressures; `None` of no point.
+pub(super) fn static_curve(
+    points: &Points,
+    spline: &Spline,
+    chosen: impl Iterator<Item = usize>,
+) -> Option<Vec<f64>> {
+    let mut band = Banded::penalty(spline.len(), SMOOTHNESS_STATIC, RIDGE);
+    let mut moment = vec![0.0; spline.len()];
+    let mut any = false;
+    for i in chosen {
+        any = true;
+        let local = spline.at(points.pressure[i]);
+        band.add(&local, 1.0);
+        for k in 0..4 {
+            moment[local.first + k] += local.value[k] * points.force[i];
+        }
+    }
+    band.factor().solve(&mut moment);
+    any.then_some(moment)
+}

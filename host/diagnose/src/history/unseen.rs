@@ -1,0 +1,132 @@
+//! Each run predicted from the other runs of the muscle: the static curves, and the law with memory.
+
+use rayon::prelude::*;
+
+use super::campaign::Points;
+use super::criteria::NESTED_RUNS;
+use super::law::{Law, Layer};
+use super::shift_fit;
+
+/// What each run's points are predicted to be from the other runs, N; not a number where no other run can say it.
+#[derive(Clone, Debug)]
+pub(super) struct Unseen {
+    pub predicted: Vec<f64>,
+    /// The fit without each run; empty for static curves.
+    pub folds: Vec<Law>,
+}
+
+/// Sizes of errors over the points that count.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Sizes {
+    /// Root mean square, N.
+    pub rms: f64,
+    /// Mean absolute, N.
+    pub mean: f64,
+    /// How many points.
+    pub count: usize,
+}
+
+impl Unseen {
+    /// The error at a point, N.
+    pub(super) fn error(&self, points: &Points, i: usize) -> f64 {
+        points.force[i] - self.predicted[i]
+    }
+
+    /// Sizes of the errors over chosen points; points without a prediction do not count.
+    pub(super) fn sizes(&self, points: &Points, chosen: impl Fn(usize) -> bool) -> Sizes {
+        let (mut squares, mut sum, mut count) = (0.0, 0.0, 0);
+        for i in (0..points.len()).filter(|i| chosen(*i)) {
+            let e = self.error(points, i);
+            if e.is_finite() {
+                squares += e * e;
+                sum += e.abs();
+                count += 1;
+            }
+        }
+        let n = count.max(1) as f64;
+        Sizes { rms: (squares / n).sqrt(), mean: sum / n, count }
+    }
+
+    /// Standard error of a quantity over delete-one-run folds (jackknife): `√((n−1)/n Σ(θ_j − θ̄)²)`.
+    pub(super) fn standard_error(&self, quantity: impl Fn(&Law) -> f64) -> f64 {
+        let values: Vec<f64> = self.folds.iter().map(quantity).collect();
+        jackknife(&values)
+    }
+}
+
+/// See [`Unseen::standard_error`].
+pub(super) fn jackknife(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n.max(1.0);
+    ((n - 1.0).max(0.0) / n.max(1.0) * values.iter().map(|v| (v - mean).powi(2)).sum::<f64>()).sqrt()
+}
+
+/// Whether a run has others of its mounting to be predicted from.
+fn has_others(points: &Points, run: usize) -> bool {
+    points.mountings[points.runs[run].mounting].runs.len() > 1
+}
+
+/// Static curves, one for each mounting, or for each mounting and direction.
+pub(super) fn static_curves(points: &Points, by_direction: bool) -> Unseen {
+    let spline = shift_fit::static_spline(points.highest());
+    let directions: &[Option<i8>] = if by_direction { &[Some(1), Some(-1)] } else { &[None] };
+    let mut predicted = vec![f64::NAN; points.len()];
+    for (r, run) in points.runs.iter().enumerate() {
+        for direction in directions {
+            let alike = |i: &usize| {
+                points.mounting[*i] == run.mounting && direction.is_none_or(|d| points.direction[*i] == d)
+            };
+            let others = (0..points.len()).filter(|i| points.run[*i] != r && alike(i));
+            let Some(curve) = shift_fit::static_curve(points, &spline, others) else { continue };
+            for i in (run.points.0..run.points.1).filter(alike) {
+                predicted[i] = spline.at(points.pressure[i]).value(&curve);
+            }
+        }
+    }
+    Unseen { predicted, folds: Vec::new() }
+}
+
+/// A curve for each mounting on pressures that are shifted by given columns alone (without memory).
+pub(super) fn shifted_curves(layer: &Layer<'_>, columns: &[Vec<f64>], start: &[f64]) -> Vec<f64> {
+    let points = layer.points;
+    let folds: Vec<(usize, Vec<f64>)> = (0..points.runs.len())
+        .into_par_iter()
+        .filter(|r| has_others(points, *r))
+        .map(|r| {
+            let others: Vec<bool> = points.run.iter().map(|k| *k != r).collect();
+            let fit = shift_fit::fit(points, &layer.spline, &others, columns, Some(start), 3);
+            let (from, to) = points.runs[r].points;
+            let predict = |i| shift_fit::predict(points, &layer.spline, columns, &fit, i);
+            (r, (from..to).map(predict).collect())
+        })
+        .collect();
+    let mut predicted = vec![f64::NAN; points.len()];
+    for (r, own) in folds {
+        predicted[points.runs[r].points.0..points.runs[r].points.1].copy_from_slice(&own);
+    }
+    predicted
+}
+
+/// The law with memory, everything chosen without the run that is predicted: `c`, `P_b` and, of few runs, pause and earlier load (which are
+/// `held` at those of the full fit where a variant is only compared).
+pub(super) fn with_memory(layer: &Layer<'_>, full: &Law, further: &[Vec<f64>], held: bool) -> Unseen {
+    let points = layer.points;
+    let nested = !held && (points.runs.len() as f64) < NESTED_RUNS;
+    let choice = (!nested).then_some(full.choice);
+    let folds: Vec<(Law, Vec<f64>)> = (0..points.runs.len())
+        .into_par_iter()
+        .map(|r| {
+            let others: Vec<bool> = points.run.iter().map(|k| *k != r).collect();
+            let mut law = layer.fit(&others, choice, further, Some(full));
+            let (from, to) = points.runs[r].points;
+            let own = (from..to).map(|i| if has_others(points, r) { layer.predict(&law, i) } else { f64::NAN });
+            let own = own.collect();
+            // The shifts of all points are not asked for again.
+            law.columns.clear();
+            (law, own)
+        })
+        .collect();
+    let (folds, own): (Vec<Law>, Vec<Vec<f64>>) = folds.into_iter().unzip();
+    // Points lie run after run.
+    Unseen { predicted: own.concat(), folds }
+}

@@ -1,0 +1,225 @@
+//! What checks of the bench measured: known before anything is asked of the recordings, and taken out of them first.
+
+use std::borrow::Cow;
+
+use model_core::braid::Braid;
+use model_core::effects::MEMORY;
+
+use super::answer::Asked;
+use super::baselines::{self, Baseline, Kind};
+use super::candidates::{Candidate, place_in_words};
+use super::criteria::baseline::TABLE_ORDER;
+use super::criteria::judgement::{CHECK_DEVIATIONS, CHECK_RESOLUTION, CHECKED_PROBABILITY, MATERIAL_FAULT};
+use super::held_out::Unseen;
+use super::locate::locate;
+use super::rows::{self, Rows};
+use super::verdict::{Considered, Missing, ParameterValue, PathStep, Verdict};
+use pam_data::error::Result;
+use pam_data::recording::Campaign;
+use pam_fit::bench::{BenchName, Candidate as Law};
+use pam_fit::checks::{self, Checks, Measured};
+
+/// A fault that was checked, and how large it is in these recordings.
+struct Judged {
+    measured: Measured,
+    /// The largest force that it makes at any row, N.
+    peak: f64,
+    /// The same two standard deviations further from none, N.
+    at_most: f64,
+}
+
+/// What is known from checks.
+pub(super) struct Known {
+    named: Vec<Judged>,
+    absent: Vec<Judged>,
+    /// The recordings as they were read, with one bladder for all pressures; only where something is named.
+    before: Option<(Rows, Baseline)>,
+}
+
+impl Known {
+    /// Weighs what checks measured against the recordings.
+    pub(super) fn of(checks: &Checks, campaign: &Campaign, braid: &Braid<f64>) -> Result<Self> {
+        let mut known = Self { named: Vec::new(), absent: Vec::new(), before: None };
+        if checks.is_empty() {
+            return Ok(known);
+        }
+        let (mut rows, fitted) = as_read(campaign, braid)?;
+        baselines::into_contexts(&mut rows, &fitted);
+        let blocked = rows.force.iter().copied().fold(0.0, f64::max);
+        for measured in checks.measured() {
+            let peak = |parameters: &[f64]| {
+                let trace = Law::Bench(measured.fault).trace(&rows.contexts, parameters, &mut [0.0; MEMORY]);
+                let counts = trace.iter().zip(&rows.root_weight).filter(|(_, w)| **w > 0.0);
+                counts.map(|(f, _)| f.abs()).fold(0.0, f64::max)
+            };
+            let further: Vec<f64> = measured
+                .parameters
+                .iter()
+                .zip(&measured.deviations)
+                .map(|(v, std)| v + std.unwrap_or(0.0) * CHECK_DEVIATIONS.copysign(*v))
+                .collect();
+            let judged = Judged {
+                measured: measured.clone(),
+                peak: peak(&measured.parameters),
+                at_most: peak(&further),
+            };
+            if !(judged.measured.is_sure() && judged.peak >= MATERIAL_FAULT * blocked) {
+                known.absent.push(judged);
+            } else if judged.measured.fault != BenchName::Backlash {
+                // No reading can be freed of a play: the recordings have to say.
+                known.named.push(judged);
+            }
+        }
+        if !known.named.is_empty() {
+            known.before = Some((rows, fitted));
+        }
+        Ok(known)
+    }
+
+    /// The recordings without the faults that were measured.
+    pub(super) fn free<'a>(&self, campaign: &'a Campaign) -> Cow<'a, Campaign> {
+        if self.named.is_empty() {
+            return Cow::Borrowed(campaign);
+        }
+        let faults: Vec<Measured> = self.named.iter().map(|j| j.measured.clone()).collect();
+        Cow::Owned(checks::freed(campaign, &faults))
+    }
+
+    /// Whether a check has said all there is to say about an effect.
+    ///
+    /// What the user gives as known is fitted even where a check found nothing of it that matters.
+    pub(super) fn settles(&self, candidate: &Candidate, given: &[Law]) -> bool {
+        let is = |j: &Judged| candidate.is(Law::Bench(j.measured.fault));
+        self.named.iter().any(is) || (!given.iter().any(|g| candidate.is(*g)) && self.absent.iter().any(is))
+    }
+
+    /// Enters what is known into the answer that was given without it.
+    pub(super) fn enter(
+        self,
+        asked: Asked,
+        given: &[Law],
+        freed: &Campaign,
+        braid: &Braid<f64>,
+    ) -> Result<super::Diagnosis> {
+        let Asked { mut diagnosis, kind } = asked;
+        for j in self.absent.iter().filter(|j| !given.contains(&Law::Bench(j.measured.fault))) {
+            diagnosis.considered.push(Considered {
+                effect: j.measured.fault.info().name.into(),
+                gain: 0.0,
+                why_not: format!(
+                    "measured with {}: {}; no more than {:.2} N here",
+                    j.measured.check, j.measured.words, j.at_most
+                ),
+                hidden_up_to_N: Some(j.at_most),
+                checked: true,
+                visible: 1.0,
+            });
+        }
+        if !diagnosis.judged {
+            // What the bench does is known all the same; what it does to these recordings is not.
+            let words = self
+                .named
+                .iter()
+                .map(|j| format!("measured with {}: {}", j.measured.check, j.measured.words));
+            diagnosis.remarks.extend(words);
+            return Ok(diagnosis);
+        }
+        let Some((rows, before)) = self.before else { return Ok(diagnosis) };
+        let (freed_rows, after) = as_read(freed, braid)?;
+        let (was, is) = (before.per_row(&rows), after.per_row(&freed_rows));
+        let noise = diagnosis.noise_N.powi(2);
+        let share =
+            ((was - is) / (was - noise).max(CHECK_RESOLUTION * was).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        for m in &mut diagnosis.missing {
+            m.share_explained *= 1.0 - share;
+        }
+        diagnosis.unexplained.share *= 1.0 - share;
+        let all: f64 = self.named.iter().map(|j| j.peak * j.peak).sum();
+        let entries = self.named.iter().map(|j| Missing {
+            given: given.contains(&Law::Bench(j.measured.fault)),
+            ..missing(j, share * j.peak * j.peak / all.max(1e-300))
+        });
+        for entry in entries {
+            // What moves the force most is said first, whoever found it.
+            let at = diagnosis.missing.iter().position(|m| m.peak_N < entry.peak_N);
+            diagnosis.missing.insert(at.unwrap_or(diagnosis.missing.len()), entry);
+        }
+        let step = |j: &Judged| PathStep {
+            effect: j.measured.fault.info().name.into(),
+            rms_N: is.sqrt(),
+            p: chance(&j.measured),
+            runners_up: Vec::new(),
+        };
+        diagnosis.path.splice(0..0, self.named.iter().map(step));
+        diagnosis.misfit_rms_N = baselines::fit(&rows, Kind::Flexible(TABLE_ORDER), &[]).rms(&rows);
+        let unseen = Unseen::new(&rows, kind, &[]).held_out(&[], diagnosis.noise_N);
+        // What is named may have asked for another split; its errors are not to be compared with this one's.
+        if unseen.split == diagnosis.held_out.split {
+            diagnosis.held_out.rms_before_N = unseen.rms_before_N;
+            diagnosis.held_out.with_turns_before_N = unseen.with_turns_before_N;
+        }
+        if diagnosis.verdict == Verdict::Consistent {
+            diagnosis.verdict = Verdict::Explained;
+            if rows.len() == freed_rows.len() {
+                (diagnosis.r#where, diagnosis.profiles) =
+                    locate(&rows, &before.residual, &after.residual, diagnosis.noise_N, 7);
+            }
+        }
+        Ok(diagnosis)
+    }
+}
+
+/// Recordings with one bladder for all pressures.
+fn as_read(campaign: &Campaign, braid: &Braid<f64>) -> Result<(Rows, Baseline)> {
+    let mut rows = rows::prepare(campaign, braid)?;
+    let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
+    baselines::mask_slack(&mut rows, &fitted);
+    let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
+    Ok((rows, fitted))
+}
+
+/// The probability that a value so many standard deviations from none is chance, by Chebyshev's inequality: no law of errors is assumed.
+fn chance(measured: &Measured) -> f64 {
+    let worst = measured
+        .parameters
+        .iter()
+        .zip(&measured.deviations)
+        .filter_map(|(v, std)| std.map(|s| (s / v.abs().max(1e-300)).powi(2)));
+    worst.fold(0.0, f64::max).min(1.0)
+}
+
+fn missing(judged: &Judged, share: f64) -> Missing {
+    let Judged { measured, peak, .. } = judged;
+    let info = measured.fault.info();
+    let values = measured.parameters.iter().zip(&measured.deviations);
+    let parameters = info
+        .parameters
+        .iter()
+        .zip(values)
+        .map(|(p, (value, std))| ParameterValue {
+            name: p.name.into(),
+            value: *value,
+            std: *std,
+            unit: p.unit.into(),
+            outside_known_range: ParameterValue::is_outside(*value, p),
+        })
+        .collect();
+    Missing {
+        effect: info.name.into(),
+        probability: CHECKED_PROBABILITY,
+        belief: CHECKED_PROBABILITY,
+        share_explained: share,
+        parameters,
+        confusable_with: Vec::new(),
+        place: place_in_words(info.link).into(),
+        correction: true,
+        checked: true,
+        given: false,
+        supported: true,
+        summary: info.summary.into(),
+        source: info.source.into(),
+        peak_N: *peak,
+        p: chance(measured),
+        why: format!("measured with {}: {}", measured.check, measured.words),
+    }
+}

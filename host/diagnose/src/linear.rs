@@ -1,0 +1,372 @@
+//! The linear algebra of the diagnosis: orthonormal bases of tall thin sets of columns, and amplitudes with signs.
+//!
+//! Columns are long (one entry per row of a recording) and few. Everything is computed column by column in a fixed
+//! order, so a result does not depend on how many threads share the columns among them.
+
+use super::criteria::baseline::DEPENDENT_COLUMN;
+use super::criteria::candidates::MOST_AMPLITUDES;
+/// Sum of products.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // Four partial sums: the compiler vectorises, and the order of summation stays fixed.
+    let mut sums = [0.0; 4];
+    let (ca, cb) = (a.chunks_exact(4), b.chunks_exact(4));
+    let tail: f64 = ca.remainder().iter().zip(cb.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in ca.zip(cb) {
+        for k in 0..4 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + tail
+}
+
+/// Sum of squares.
+pub(crate) fn energy(a: &[f64]) -> f64 {
+    dot(a, a)
+}
+
+/// `to += factor · from`.
+pub(crate) fn add_scaled(to: &mut [f64], factor: f64, from: &[f64]) {
+    for (t, f) in to.iter_mut().zip(from) {
+        *t += factor * f;
+    }
+}
+
+/// A unit vector that is zero outside a stretch of rows.
+#[derive(Clone, Debug)]
+struct Direction {
+    from: usize,
+    values: Vec<f64>,
+}
+
+impl Direction {
+    fn new(column: Vec<f64>) -> Self {
+        let from = column.iter().position(|v| *v != 0.0).unwrap_or(0);
+        let to = column.iter().rposition(|v| *v != 0.0).map_or(0, |i| i + 1);
+        let whole = 2 * (to - from) > column.len();
+        if whole {
+            Self { from: 0, values: column }
+        } else {
+            Self { from, values: column[from..to].to_vec() }
+        }
+    }
+
+    fn along(&self, v: &[f64]) -> f64 {
+        dot(&self.values, &v[self.from..self.from + self.values.len()])
+    }
+
+    /// Takes out of `v` what lies along it; gives how much that was.
+    fn out_of(&self, v: &mut [f64]) -> f64 {
+        let c = self.along(v);
+        add_scaled(&mut v[self.from..self.from + self.values.len()], -c, &self.values);
+        c
+    }
+}
+
+/// An orthonormal basis of weighted columns, with the triangle that leads back to their coefficients.
+///
+/// Columns that are zero on most rows cost no more than the rows they have, if they come before those that are not.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Basis {
+    q: Vec<Direction>,
+    /// For each kept column: its coefficients on the basis vectors up to its own.
+    r: Vec<Vec<f64>>,
+    /// Which of the columns offered were kept.
+    kept: Vec<usize>,
+    offered: usize,
+}
+
+impl Basis {
+    /// From columns, each multiplied by the square roots of the weights.
+    pub(crate) fn new(columns: &[Vec<f64>], root_weight: &[f64]) -> Self {
+        let mut basis = Self::default();
+        for column in columns {
+            basis.push(weighted(column, root_weight));
+        }
+        basis
+    }
+
+    /// Adds a column that is already weighted; `false` when it lies in the basis and is left out.
+    pub(crate) fn push(&mut self, column: Vec<f64>) -> bool {
+        self.push_beyond(column, DEPENDENT_COLUMN)
+    }
+
+    /// The same for a column that has to stand out by more than a share of itself.
+    pub(crate) fn push_beyond(&mut self, mut column: Vec<f64>, dependent: f64) -> bool {
+        let index = self.offered;
+        self.offered += 1;
+        let before = energy(&column).sqrt();
+        if !(before > 0.0 && before.is_finite()) {
+            return false;
+        }
+        let mut r = self.coefficients_out(&mut column);
+        // Once more: the first pass leaves what rounding left (Kahan: "twice is enough").
+        for (a, b) in r.iter_mut().zip(self.coefficients_out(&mut column)) {
+            *a += b;
+        }
+        let norm = energy(&column).sqrt();
+        if norm <= dependent * before {
+            return false;
+        }
+        column.iter_mut().for_each(|v| *v /= norm);
+        r.push(norm);
+        self.q.push(Direction::new(column));
+        self.r.push(r);
+        self.kept.push(index);
+        true
+    }
+
+    /// How many independent columns it has.
+    pub(crate) fn rank(&self) -> usize {
+        self.q.len()
+    }
+
+    fn coefficients_out(&self, v: &mut [f64]) -> Vec<f64> {
+        self.q.iter().map(|q| q.out_of(v)).collect()
+    }
+
+    /// The orthonormal columns from the `first` on.
+    pub(crate) fn columns(&self, first: usize, rows: usize) -> Vec<Vec<f64>> {
+        let spread = |q: &Direction| {
+            let mut column = vec![0.0; rows];
+            column[q.from..q.from + q.values.len()].copy_from_slice(&q.values);
+            column
+        };
+        self.q[first..].iter().map(spread).collect()
+    }
+
+    /// What a weighted column has along each of the orthonormal ones.
+    pub(crate) fn along(&self, v: &[f64]) -> Vec<f64> {
+        self.q.iter().map(|q| q.along(v)).collect()
+    }
+
+    /// Which of the columns offered were kept.
+    pub(crate) fn kept(&self) -> &[usize] {
+        &self.kept
+    }
+
+    /// Takes out of `v` (weighted) what the basis can express.
+    pub(crate) fn project_out(&self, v: &mut [f64]) {
+        self.coefficients_out(v);
+    }
+
+    /// Least-squares coefficients of `y` (weighted) on the columns offered; those left out get zero.
+    pub(crate) fn solve(&self, y: &[f64]) -> Vec<f64> {
+        let mut rest = y.to_vec();
+        self.unravel(&self.coefficients_out(&mut rest))
+    }
+
+    /// Coefficients on the columns offered, from those on the orthonormal ones.
+    pub(crate) fn unravel(&self, c: &[f64]) -> Vec<f64> {
+        let mut solution = vec![0.0; self.offered];
+        let mut x = vec![0.0; c.len()];
+        for i in (0..c.len()).rev() {
+            let mut v = c[i];
+            for j in i + 1..c.len() {
+                v -= self.r[j][i] * x[j];
+            }
+            x[i] = v / self.r[i][i];
+            solution[self.kept[i]] = x[i];
+        }
+        solution
+    }
+}
+
+/// A column times the square roots of the weights.
+pub(crate) fn weighted(column: &[f64], root_weight: &[f64]) -> Vec<f64> {
+    column.iter().zip(root_weight).map(|(c, w)| c * w).collect()
+}
+
+/// Which signs an amplitude may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Sign {
+    /// Either.
+    Free,
+    /// Zero or more.
+    Positive,
+    /// Zero or less.
+    Negative,
+}
+
+/// Amplitudes of few columns `z` against `r` by least squares under sign constraints, and the energy they remove.
+///
+/// All subsets of up to `most` columns are tried (there are few), so the constrained optimum is exact.
+pub(crate) fn amplitudes(gram: &[Vec<f64>], moment: &[f64], signs: &[Sign], most: u32) -> (Vec<f64>, f64) {
+    let n = moment.len();
+    let mut best = (vec![0.0; n], 0.0);
+    for subset in (1_u32..(1 << n.min(MOST_AMPLITUDES as usize))).filter(|s| s.count_ones() <= most) {
+        let chosen: Vec<usize> = (0..n).filter(|i| subset & (1 << i) != 0).collect();
+        let Some(solution) = solve_symmetric(gram, moment, &chosen) else { continue };
+        let allowed = chosen.iter().zip(&solution).all(|(i, a)| match signs[*i] {
+            Sign::Free => true,
+            Sign::Positive => *a >= 0.0,
+            Sign::Negative => *a <= 0.0,
+        });
+        let gain: f64 = chosen.iter().zip(&solution).map(|(i, a)| a * moment[*i]).sum();
+        if allowed && gain > best.1 {
+            let mut full = vec![0.0; n];
+            for (i, a) in chosen.iter().zip(solution) {
+                full[*i] = a;
+            }
+            best = (full, gain);
+        }
+    }
+    best
+}
+
+/// Solves the sub-system of `chosen` unknowns by Cholesky; `None` where it is singular.
+pub(crate) fn solve_symmetric(gram: &[Vec<f64>], moment: &[f64], chosen: &[usize]) -> Option<Vec<f64>> {
+    let n = chosen.len();
+    let scale: Vec<f64> = chosen.iter().map(|i| gram[*i][*i].sqrt()).collect();
+    if scale.iter().any(|s| !(*s > 0.0 && s.is_finite())) {
+        return None;
+    }
+    let mut l = vec![vec![0.0; n]; n];
+    for i in 0..n {
+        for j in 0..=i {
+            let mut v = gram[chosen[i]][chosen[j]] / (scale[i] * scale[j]);
+            for k in 0..j {
+                v -= l[i][k] * l[j][k];
+            }
+            if i == j {
+                if v <= 1e-10 {
+                    return None;
+                }
+                l[i][i] = v.sqrt();
+            } else {
+                l[i][j] = v / l[j][j];
+            }
+        }
+    }
+    let mut x: Vec<f64> = chosen.iter().zip(&scale).map(|(i, s)| moment[*i] / s).collect();
+    for i in 0..n {
+        for k in 0..i {
+            x[i] -= l[i][k] * x[k];
+        }
+        x[i] /= l[i][i];
+    }
+    for i in (0..n).rev() {
+        for k in i + 1..n {
+            x[i] -= l[k][i] * x[k];
+        }
+        x[i] /= l[i][i];
+    }
+    Some(x.iter().zip(&scale).map(|(v, s)| v / s).collect())
+}
+
+/// A small, fast generator of reproducible random numbers (SplitMix64; G. Steele et al., OOPSLA 2014), for permutations.
+#[derive(Clone, Debug)]
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+    /// Uniform in `0..n`.
+    pub(crate) fn below(&mut self, n: usize) -> usize {
+        (self.next() % n.max(1) as u64) as usize
+    }
+    /// Uniform in [0, 1).
+    #[cfg(test)]
+    pub(crate) fn uniform(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+    /// Standard normal (Box and Muller).
+    #[cfg(test)]
+    pub(crate) fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
+        radius * (std::f64::consts::TAU * self.uniform()).cos()
+    }
+}
+
+/// The middle of a set of numbers; zero of none.
+pub(crate) fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// The value below which a share of the numbers lies; zero of none.
+pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let at = ((values.len() - 1) as f64 * share).round() as usize;
+    *values.select_nth_unstable_by(at.min(values.len() - 1), f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_that_are_zero_on_most_rows_make_the_same_basis() {
+        let mut random = Random(3);
+        let stretch = |from: usize, to: usize| -> Vec<f64> {
+            (0..90).map(|i| if (from..to).contains(&i) { 1.0 + i as f64 } else { 0.0 }).collect()
+        };
+        let (first, second) = (stretch(10, 20), stretch(20, 35));
+        let whole: Vec<f64> = (0..90).map(|_| random.normal()).collect();
+        let y: Vec<f64> = (0..90).map(|i| 2.0 * first[i] - 3.0 * second[i] + 0.5 * whole[i]).collect();
+        let ones = vec![1.0; 90];
+        for columns in [[&first, &second, &whole], [&whole, &second, &first]] {
+            let basis = Basis::new(&columns.map(Vec::clone), &ones);
+            let found = basis.solve(&y);
+            let expected = columns.map(|c| {
+                if *c == first {
+                    2.0
+                } else if *c == second {
+                    -3.0
+                } else {
+                    0.5
+                }
+            });
+            for (a, b) in found.iter().zip(expected) {
+                assert!((a - b).abs() < 1e-9, "{found:?}");
+            }
+            let (mut rest, along) = (y.clone(), basis.along(&y));
+            basis.project_out(&mut rest);
+            assert!(energy(&rest) < 1e-16 * energy(&y));
+            assert!((energy(&along) - energy(&y)).abs() < 1e-9 * energy(&y));
+            for (q, c) in basis.columns(0, 90).iter().zip(along) {
+                assert!((energy(q) - 1.0).abs() < 1e-12 && (dot(q, &y) - c).abs() < 1e-9 * energy(&y).sqrt());
+            }
+        }
+    }
+
+    #[test]
+    fn coefficients_of_an_exact_combination_come_back_and_dependent_columns_are_left_out() {
+        let n = 200;
+        let t: Vec<f64> = (0..n).map(|i| i as f64 / n as f64).collect();
+        let columns = vec![
+            vec![1.0; n],
+            t.clone(),
+            t.iter().map(|v| 2.0 * v - 1.0).collect(),
+            t.iter().map(|v| v * v * v).collect(),
+        ];
+        let w: Vec<f64> = t.iter().map(|v| 0.5 + v).collect();
+        let basis = Basis::new(&columns, &w);
+        assert_eq!(basis.rank(), 3);
+        let y: Vec<f64> = t.iter().map(|v| 3.0 - 2.0 * v + 0.7 * v.powi(3)).collect();
+        let c = basis.solve(&weighted(&y, &w));
+        for (got, want) in c.iter().zip([3.0, -2.0, 0.0, 0.7]) {
+            assert!((got - want).abs() < 1e-9, "{c:?}");
+        }
+    }
+
+    #[test]
+    fn amplitudes_keep_their_signs() {
+        // r = 2 a − b with nearly parallel a and b: without b allowed below zero, a alone must serve.
+        let gram = vec![vec![1.0, 0.9], vec![0.9, 1.0]];
+        let moment = vec![2.0 - 0.9, 1.8 - 1.0];
+        let (free, gain_free) = amplitudes(&gram, &moment, &[Sign::Free, Sign::Free], 2);
+        assert!((free[0] - 2.0).abs() < 1e-9 && (free[1] + 1.0).abs() < 1e-9);
+        let (signed, gain) = amplitudes(&gram, &moment, &[Sign::Positive, Sign::Positive], 2);
+        assert!((signed[0] - 1.1).abs() < 1e-9 && signed[1] == 0.0 && gain < gain_free);
+    }
+}

@@ -1,0 +1,332 @@
+//! Where the misfit sits: its energy above the noise along every coordinate, with a p-value from shuffled blocks.
+
+use super::criteria::location::{
+    BINS, DISCRETE_BINS, MOST_REGIONS, REGION_ALPHA, REGION_ROWS, REGION_SHUFFLES, REGION_SMOOTHING,
+    REGION_VARIANCE, SMOOTHED_NOISE, SMOOTHED_NOISE_MOST,
+};
+use super::criteria::planning::NEW_CONTRACTION;
+use super::criteria::rows::MOST_LEVELS;
+use super::linear::{Random, energy};
+use super::rows::Rows;
+use super::verdict::{Profile, Region};
+
+struct Coordinate {
+    name: &'static str,
+    unit: &'static str,
+    values: Vec<f64>,
+    /// Only a few values, each a bin of its own.
+    discrete: bool,
+}
+
+fn coordinates(rows: &Rows) -> Vec<Coordinate> {
+    let c = &rows.contexts;
+    let of = |name, unit, discrete, f: &dyn Fn(usize) -> f64| Coordinate {
+        name,
+        unit,
+        values: (0..rows.len()).map(f).collect(),
+        discrete,
+    };
+    let mut all = vec![
+        of("recording", "", true, &|i| f64::from(rows.recording[i]) + 1.0),
+        of("time", "s", false, &|i| c[i].time),
+        of("cycle", "", true, &|i| f64::from(rows.cycle[i])),
+        of("pressure", "Pa", rows.levels.len() > 1 && rows.levels.len() <= MOST_LEVELS, &|i| {
+            rows.levels[rows.level[i] as usize]
+        }),
+        of("contraction", "", false, &|i| c[i].contraction),
+        of("direction", "", true, &|i| rows.sign[i]),
+        of("speed", "m/s", false, &|i| c[i].speed.abs()),
+        of("acceleration", "m/s²", false, &|i| c[i].acceleration),
+        of("force", "N", false, &|i| c[i].quasi),
+        of("pressure-rate", "Pa/s", false, &|i| c[i].pressure_rate),
+        of("since-reversal", "s", false, &|i| c[i].since_reversal),
+        of("hold-time", "s", false, &|i| if c[i].speed == 0.0 { c[i].hold_time } else { 0.0 }),
+        of("largest-contraction-so-far", "", false, &|i| c[i].contraction - rows.largest[i]),
+    ];
+    if rows.has_temperature {
+        all.push(of("temperature", "K", false, &|i| c[i].temperature));
+    }
+    all
+}
+
+/// Edges of bins with about as many rows in each; few values become a bin each.
+fn edges(values: &[f64], weight: &[f64], discrete: bool) -> Vec<f64> {
+    let mut live: Vec<f64> = values.iter().zip(weight).filter(|(_, w)| **w > 0.0).map(|(v, _)| *v).collect();
+    live.sort_by(f64::total_cmp);
+    if live.is_empty() {
+        return Vec::new();
+    }
+    let span = live[live.len() - 1] - live[0];
+    if !(span > 0.0) {
+        return Vec::new();
+    }
+    let mut edges = vec![live[0]];
+    if discrete {
+        live.dedup_by(|a, b| (*a - *b).abs() < 1e-9 * span);
+        if live.len() <= DISCRETE_BINS * BINS {
+            for w in live.windows(2) {
+                edges.push(0.5 * (w[0] + w[1]));
+            }
+            edges.push(live[live.len() - 1]);
+            return edges;
+        }
+    }
+    for k in 1..BINS {
+        let at = live[live.len() * k / BINS];
+        if at > edges[edges.len() - 1] + 1e-9 * span {
+            edges.push(at);
+        }
+    }
+    edges.push(live[live.len() - 1]);
+    edges
+}
+
+fn bin_of(edges: &[f64], value: f64) -> usize {
+    edges[1..edges.len() - 1].partition_point(|e| *e <= value)
+}
+
+/// The best contiguous run of bins: the one whose share of energy most exceeds its share of rows, in units of the
+/// spread that a share of rows has.
+fn best_run(energy_in: &[f64], rows_in: &[f64]) -> (usize, usize, f64) {
+    let (total, count): (f64, f64) = (energy_in.iter().sum(), rows_in.iter().sum());
+    let mut best = (0, energy_in.len(), 0.0);
+    if !(total > 0.0 && count > 0.0) {
+        return best;
+    }
+    for a in 0..energy_in.len() {
+        let (mut e, mut r) = (0.0, 0.0);
+        for b in a..energy_in.len() {
+            e += energy_in[b] / total;
+            r += rows_in[b] / count;
+            if r > 0.0 && r < REGION_ROWS {
+                // The floor keeps a handful of rows from looking like a place.
+                let excess = (e - r) / (r * (1.0 - r)).max(REGION_VARIANCE).sqrt();
+                if excess > best.2 {
+                    best = (a, b + 1, excess);
+                }
+            }
+        }
+    }
+    best
+}
+
+/// Smooths a residual within blocks so that white noise leaves its energy.
+fn smoothed(rows: &Rows, residual: &[f64], half: usize) -> Vec<f64> {
+    let n = rows.len();
+    let mut prefix = vec![(0.0, 0.0); n + 1];
+    for i in 0..n {
+        let w = rows.root_weight[i];
+        prefix[i + 1] = (prefix[i].0 + residual[i] * w, prefix[i].1 + w * w);
+    }
+    let mut out = vec![0.0; n];
+    let mut from = 0;
+    for i in 1..=n {
+        if i == n || rows.block[i] != rows.block[from] {
+            for (j, o) in out.iter_mut().enumerate().take(i).skip(from) {
+                let (a, b) = (j.saturating_sub(half).max(from), (j + half + 1).min(i));
+                let w = prefix[b].1 - prefix[a].1;
+                if w > 0.0 && rows.root_weight[j] > 0.0 {
+                    *o = (prefix[b].0 - prefix[a].0) / w;
+                }
+            }
+            from = i;
+        }
+    }
+    out
+}
+
+/// The misfit along every coordinate: regions that stand out, strongest first, and profiles for pictures.
+///
+/// `before` and `after` are weighted residuals without and with the named effects.
+pub(crate) fn locate(
+    rows: &Rows,
+    before: &[f64],
+    after: &[f64],
+    sigma: f64,
+    seed: u64,
+) -> (Vec<Region>, Vec<Profile>) {
+    let smooth = smoothed(rows, before, REGION_SMOOTHING);
+    let local: Vec<f64> = smooth.iter().map(|s| s * s).collect();
+    // Noise that the smoothing leaves; independent rows would leave a fifth.
+    let floor = (SMOOTHED_NOISE * sigma * sigma)
+        .min(SMOOTHED_NOISE_MOST * local.iter().sum::<f64>() / rows.effective().max(1) as f64);
+    let mut regions = Vec::new();
+    let mut profiles = Vec::new();
+    let blocks = block_ranges(rows);
+    let steady = (energy(before) / energy(&rows.root_weight).max(1e-12)).sqrt();
+    for c in coordinates(rows) {
+        let edges = edges(&c.values, &rows.root_weight, c.discrete);
+        if edges.len() < 3 {
+            continue;
+        }
+        let bins = edges.len() - 1;
+        let bin: Vec<usize> = c.values.iter().map(|v| bin_of(&edges, *v)).collect();
+        let mut in_energy = vec![0.0; bins];
+        let mut in_rows = vec![0.0; bins];
+        let mut sums = vec![[0.0; 4]; bins];
+        for i in 0..rows.len() {
+            let w = rows.root_weight[i];
+            if w > 0.0 {
+                in_energy[bin[i]] += local[i] - floor;
+                in_rows[bin[i]] += 1.0;
+                let s = &mut sums[bin[i]];
+                s[0] += before[i] * w;
+                s[1] += before[i] * before[i];
+                s[2] += after[i] * after[i];
+                s[3] += w * w;
+            }
+        }
+        in_energy.iter_mut().for_each(|e| *e = e.max(0.0));
+        profiles.push(Profile {
+            coordinate: c.name.into(),
+            unit: c.unit.into(),
+            at: edges.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect(),
+            mean_before: sums.iter().map(|s| s[0] / s[3].max(1e-12)).collect(),
+            rms_before: sums.iter().map(|s| (s[1] / s[3].max(1e-12)).sqrt()).collect(),
+            rms_after: sums.iter().map(|s| (s[2] / s[3].max(1e-12)).sqrt()).collect(),
+        });
+        let (a, b, excess) = best_run(&in_energy, &in_rows);
+        if excess <= 0.0 || steady < 1e-12 {
+            continue;
+        }
+        // Whole blocks change places and are turned round in themselves, so both what belongs to a block and what belongs
+        // to a place within it are torn from the coordinate, while the residual's own correlation stays.
+        let mut random = Random(seed);
+        let mut as_good = 0;
+        let mut shuffled = vec![0.0; rows.len()];
+        for _ in 0..REGION_SHUFFLES {
+            let mut order: Vec<usize> = (0..blocks.len()).collect();
+            for i in (1..order.len()).rev() {
+                order.swap(i, random.below(i + 1));
+            }
+            let mut to = 0;
+            for o in order {
+                let (from, until) = blocks[o];
+                let shift = random.below(until - from);
+                for k in 0..until - from {
+                    let i = from + (k + shift) % (until - from);
+                    shuffled[to] = if rows.root_weight[i] > 0.0 { local[i] - floor } else { 0.0 };
+                    to += 1;
+                }
+            }
+            let mut e = vec![0.0; bins];
+            for i in 0..rows.len() {
+                e[bin[i]] += shuffled[i];
+            }
+            e.iter_mut().for_each(|v| *v = v.max(0.0));
+            if best_run(&e, &in_rows).2 >= excess {
+                as_good += 1;
+            }
+        }
+        let total: f64 = in_energy.iter().sum();
+        let share = in_energy[a..b].iter().sum::<f64>() / total;
+        let part = in_rows[a..b].iter().sum::<f64>() / in_rows.iter().sum::<f64>();
+        let (from, to) = if c.discrete {
+            let at: Vec<f64> = distinct_between(&c.values, &rows.root_weight, edges[a], edges[b], b == bins);
+            (at.first().copied().unwrap_or(edges[a]), at.last().copied().unwrap_or(edges[b]))
+        } else {
+            (edges[a], edges[b])
+        };
+        regions.push(Region {
+            coordinate: c.name.into(),
+            from,
+            to,
+            share,
+            rows: part,
+            p: (f64::from(as_good) + 1.0) / (REGION_SHUFFLES as f64 + 1.0),
+            unit: c.unit.into(),
+            words: words(c.name, from, to, share, part),
+        });
+    }
+    let strength = |r: &Region| (r.share - r.rows) / (r.rows * (1.0 - r.rows)).max(REGION_VARIANCE).sqrt();
+    regions.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
+    regions.retain(|r| r.p <= REGION_ALPHA);
+    regions.truncate(MOST_REGIONS);
+    (regions, profiles)
+}
+
+fn distinct_between(values: &[f64], weight: &[f64], from: f64, to: f64, last: bool) -> Vec<f64> {
+    let mut inside: Vec<f64> = values
+        .iter()
+        .zip(weight)
+        .filter(|(v, w)| **w > 0.0 && **v >= from && (**v < to || last))
+        .map(|(v, _)| *v)
+        .collect();
+    inside.sort_by(f64::total_cmp);
+    inside.dedup();
+    inside
+}
+
+/// First row and the one behind the last of every block.
+pub(crate) fn block_ranges(rows: &Rows) -> Vec<(usize, usize)> {
+    let mut ranges = Vec::new();
+    let mut from = 0;
+    for i in 1..=rows.len() {
+        if i == rows.len() || rows.block[i] != rows.block[from] {
+            ranges.push((from, i));
+            from = i;
+        }
+    }
+    ranges
+}
+
+fn words(name: &str, from: f64, to: f64, share: f64, part: f64) -> String {
+    let range = |scale: f64, unit: &str, digits: usize| {
+        let number = |value: f64| {
+            let text = format!("{:.digits$}", value * scale);
+            // What is rounded to nothing has no sign.
+            let nothing = text.trim_start_matches(['-', '0', '.']).is_empty();
+            text.trim_start_matches(|c| c == '-' && nothing).to_owned()
+        };
+        if (from - to).abs() < 1e-12 {
+            format!("{}{unit}", number(from))
+        } else {
+            format!("{} to {}{unit}", number(from), number(to))
+        }
+    };
+    let place = match name {
+        "recording" => format!("in recording {}", range(1.0, "", 0)),
+        "time" => format!("from {} on the campaign's clock", range(1.0, " s", 0)),
+        "cycle" => format!("in cycle {} at a pressure", range(1.0, "", 0)),
+        "pressure" => format!("at {}", range(1e-3, " kPa", 0)),
+        "contraction" => format!("at contractions of {}", range(100.0, " %", 2)),
+        "direction" => {
+            if from > 0.0 {
+                "while shortening".to_owned()
+            } else if to < 0.0 {
+                "while lengthening".to_owned()
+            } else {
+                "in both directions".to_owned()
+            }
+        }
+        "speed" => format!("at speeds of {}", range(1e3, " mm/s", 2)),
+        "acceleration" => format!("at accelerations of {}", range(1e3, " mm/s²", 1)),
+        "force" => format!("where the muscle pulls {}", range(1.0, " N", 1)),
+        "pressure-rate" => format!("where the pressure changes by {}", range(1e-3, " kPa/s", 2)),
+        "since-reversal" => format!("{} after a turn", range(1.0, " s", 2)),
+        "hold-time" => format!("after a rest of {}", range(1.0, " s", 1)),
+        "largest-contraction-so-far" if to >= -NEW_CONTRACTION => {
+            "where the muscle is as short as never before".to_owned()
+        }
+        "largest-contraction-so-far" => {
+            format!("{} short of the largest contraction so far", range(-100.0, " %", 2))
+        }
+        "temperature" => format!("at {}", range(1.0, " K", 1)),
+        _ => range(1.0, "", 3),
+    };
+    format!("{:.0} % of the misfit sits {place}, in {:.0} % of the rows", share * 100.0, part * 100.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::words;
+
+    #[test]
+    fn a_region_that_begins_at_nothing_has_no_sign_there() {
+        assert_eq!(
+            words("force", -0.04, 13.1, 0.39, 0.17),
+            "39 % of the misfit sits where the muscle pulls 0.0 to 13.1 N, in 17 % of the rows"
+        );
+        assert!(words("force", -0.06, 13.1, 0.39, 0.17).contains("-0.1 to 13.1 N"));
+    }
+}

@@ -1,0 +1,112 @@
+//! How well a moment is known: when something slipped.
+//!
+//! A trace that begins at a moment does not change smoothly with it, so no tangent tells how sure it is. The misfit is profiled instead: the
+//! moment is moved reading by reading, the amplitude fitted anew, until the likelihood ratio of the true moment would be exceeded once in
+//! twenty. For a step in noise that is where twice the logarithm has fallen by `−2 ln(1 − √0.95)`
+//! (B. E. Hansen, Econometrica 68 (2000) 575–603).
+
+use super::baselines;
+use super::candidates::Candidate;
+use model_core::effects::Axis;
+
+use super::criteria::uncertainty::{CHANGE_POINT_RATIO, CHANGE_POINT_SCAN, NORMAL_95};
+use super::linear::{add_scaled, dot, energy};
+use super::rows::Rows;
+use super::select::{Found, Taken};
+use super::trial::{self, Trial};
+
+/// Where in an effect's shapes its moment stands, if it has one.
+pub(crate) fn place(candidate: &Candidate, trial: &Trial) -> Option<usize> {
+    let axis = |shape: usize| candidate.info.parameters.get(trial.amplitudes.len() + shape).map(|p| p.axis);
+    (0..trial.shapes.len()).find(|s| axis(*s) == Some(Axis::Time))
+}
+
+/// Where in the campaign a moment lies.
+pub(crate) fn in_words(moment: f64, rows: &Rows) -> String {
+    let name = |row: usize| &rows.names[rows.recording[row] as usize];
+    let after = rows.contexts.partition_point(|c| c.time < moment);
+    if after == 0 {
+        return format!("before {} began", name(0));
+    }
+    if after == rows.len() {
+        return format!("after the end of {}", name(after - 1));
+    }
+    if rows.recording[after] != rows.recording[after - 1] {
+        return format!("between {} and {}", name(after - 1), name(after));
+    }
+    let local = rows.local_time[after] - (rows.contexts[after].time - moment);
+    format!("in {}, {local:.1} s after its first reading", name(after))
+}
+
+/// The standard deviation that makes an interval of the moment's, s; none where the recordings do not determine it.
+pub(crate) fn deviation(
+    found: &Found,
+    taken: &Taken,
+    place: usize,
+    library: &[Candidate],
+    rows: &Rows,
+) -> Option<f64> {
+    let base = baselines::fit(rows, found.full.kind, &[]);
+    let at = |moment: f64| {
+        let mut trial = taken.trial.clone();
+        trial.shapes[place] = moment;
+        let trace = trial::trace(&trial, library, rows);
+        baselines::projected(&[trace], &rows.root_weight, &base.span).swap_remove(0)
+    };
+    let moment = taken.trial.shapes[place];
+    let mut unexplained = found.full.residual.clone();
+    add_scaled(&mut unexplained, 1.0, &at(moment));
+    let all = energy(&unexplained);
+    let left = |moment: f64| {
+        let trace = at(moment);
+        all - dot(&unexplained, &trace).powi(2) / energy(&trace).max(f64::MIN_POSITIVE)
+    };
+    // The moments that can be told apart lie between one reading that counts and the next.
+    let mut times: Vec<f64> =
+        rows.contexts.iter().zip(&rows.root_weight).filter(|(_, w)| **w > 0.0).map(|(c, _)| c.time).collect();
+    times.dedup();
+    let gaps = times.len().checked_sub(1).filter(|g| *g > 0)?;
+    let here = times.partition_point(|t| *t < moment).clamp(1, gaps);
+    let least = left(moment);
+    let row = least / found.noise.independent.max(1.0);
+    let possible = |gap: usize| left(0.5 * (times[gap - 1] + times[gap])) - least < CHANGE_POINT_RATIO * row;
+    // Where the likelihood has several tops, what lies beyond a dip is possible too: all of the campaign is looked over first.
+    let elsewhere: Vec<usize> =
+        (1..=gaps).step_by(gaps.div_ceil(CHANGE_POINT_SCAN)).filter(|gap| possible(*gap)).collect();
+    let [first, last] = [elsewhere.first(), elsewhere.last()].map(|gap| gap.map_or(here, |gap| *gap));
+    let (first, last) = (first.min(here), last.max(here));
+    let earliest = times[first - 1 - farthest(first - 1, |back| possible(first - back))];
+    let latest = times[last + farthest(gaps - last, |on| possible(last + on))];
+    let deviation = (latest - moment).max(moment - earliest).max(0.0) / NORMAL_95;
+    deviation.is_finite().then_some(deviation)
+}
+
+/// The farthest step from here, of so many, that is still possible; looked for in strides that double, then halve.
+fn farthest(steps: usize, possible: impl Fn(usize) -> bool) -> usize {
+    let (mut inside, mut stride) = (0, 1);
+    while inside + stride <= steps && possible(inside + stride) {
+        inside += stride;
+        stride *= 2;
+    }
+    while stride > 1 {
+        stride /= 2;
+        if inside + stride <= steps && possible(inside + stride) {
+            inside += stride;
+        }
+    }
+    inside
+}
+
+#[cfg(test)]
+mod tests {
+    use super::farthest;
+
+    #[test]
+    fn the_farthest_possible_step_is_found_wherever_it_is() {
+        for steps in 0..40 {
+            for last in 0..=steps {
+                assert_eq!(farthest(steps, |s| s <= last), last, "of {steps}");
+            }
+        }
+    }
+}

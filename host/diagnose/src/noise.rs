@@ -1,0 +1,241 @@
+//! What noise is, told by the recordings themselves: repeats give its size, their correlation in time gives how many
+//! rows are worth one; tests go by whole blocks.
+
+use std::collections::BTreeMap;
+
+use super::criteria::noise::{
+    CORRELATION_END, FEWEST_REPEATS, INSTRUMENT_MEMORY, INSTRUMENT_NOISE, LAG_GROWTH, LATER_REPEATS,
+    LONGEST_LAG, REPEAT_BINS, REPEAT_OUTLIERS, REPEAT_PRESSURE_BINS, REPEAT_SPEED_BINS, SAME_LENGTH,
+};
+use super::linear::{Random, energy, median, quantile};
+use super::rows::Rows;
+
+/// The noise of the rows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Noise {
+    /// Standard deviation of a row, N.
+    pub sigma: f64,
+    /// Whether repeats of cycles told it (else it is what no smooth function of the state can express).
+    pub from_repeats: bool,
+    /// Correlation time, s.
+    pub memory: f64,
+    /// How many independent rows the recordings are worth.
+    pub independent: f64,
+}
+
+impl Noise {
+    /// Whether it is more, and lasts longer, than instruments scatter: then strokes under the same conditions differ for a reason.
+    /// `step` is the time between rows, s, `blocked` the blocked force, N.
+    pub(crate) fn has_a_reason(&self, step: f64, blocked: f64) -> bool {
+        self.sigma > INSTRUMENT_NOISE * blocked && self.memory > INSTRUMENT_MEMORY * step
+    }
+
+    /// How strokes under the same conditions differ, in words.
+    pub(crate) fn words(&self, blocked: f64) -> String {
+        format!(
+            "what does not repeat: under the same conditions the force differs by {:.2} N ({:.1} % of blocked force), for about {:.1} s \
+             at a time",
+            self.sigma,
+            100.0 * self.sigma / blocked,
+            self.memory
+        )
+    }
+}
+
+/// The how manieth recording of its held length each row belongs to, from 1.
+fn runs(rows: &Rows) -> Vec<u32> {
+    let mut places: Vec<(f64, u32)> = Vec::new();
+    let (mut last, mut run) = (None, 0);
+    let mut of_row = Vec::with_capacity(rows.len());
+    for (recording, context) in rows.recording.iter().zip(&rows.contexts) {
+        if last != Some(*recording) {
+            last = Some(*recording);
+            let here = |p: &&mut (f64, u32)| (p.0 - context.contraction).abs() < SAME_LENGTH;
+            run = match places.iter_mut().find(here) {
+                Some(place) => {
+                    place.1 += 1;
+                    place.1
+                }
+                None => {
+                    places.push((context.contraction, 1));
+                    1
+                }
+            };
+        }
+        of_row.push(run);
+    }
+    of_row
+}
+
+/// Pure error from repeats: the same level, direction and contraction in successive cycles, or in successive recordings of one held
+/// length.
+fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
+    #[derive(Default, Clone, Copy)]
+    struct Cell {
+        sum: f64,
+        squares: f64,
+        count: f64,
+    }
+    let range = rows
+        .contexts
+        .iter()
+        .zip(&rows.root_weight)
+        .filter(|(_, w)| **w > 0.0)
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (c, _)| {
+            (l.min(c.contraction), h.max(c.contraction))
+        });
+    let top = rows.contexts.iter().map(|c| c.pressure).fold(1.0, f64::max);
+    let width = ((range.1 - range.0) / REPEAT_BINS).max(1e-6);
+    let runs = runs(rows);
+    let mut cells: BTreeMap<(u32, i8, i32, i32, u32), Cell> = BTreeMap::new();
+    for i in 0..rows.len() {
+        let c = &rows.contexts[i];
+        if rows.root_weight[i] > 0.0 && !rows.vented[i] && (c.speed != 0.0 || rows.isometric) {
+            // Repeats at another speed are no repeats.
+            // (At held length the place on the staircase takes the speed's part, and the run the cycle's.)
+            let speed = if rows.isometric {
+                (c.pressure / top * REPEAT_PRESSURE_BINS).round() as i32
+            } else {
+                (c.speed.abs().ln() * REPEAT_SPEED_BINS).round() as i32
+            };
+            let bin = (c.contraction / width).round() as i32;
+            let turn = if rows.isometric { runs[i] } else { rows.cycle[i] };
+            let cell = cells.entry((rows.level[i], rows.sign[i] as i8, bin, speed, turn)).or_default();
+            cell.sum += residual[i];
+            cell.squares += residual[i] * residual[i];
+            cell.count += 1.0;
+        }
+    }
+    let all: Vec<_> = cells.into_iter().collect();
+    let mut between = Vec::new();
+    let mut within = Vec::new();
+    for (a, b) in all.iter().zip(all.iter().skip(1)) {
+        let same = (a.0.0, a.0.1, a.0.2, a.0.3) == (b.0.0, b.0.1, b.0.2, b.0.3);
+        if same && b.0.4 == a.0.4 + 1 && a.1.count > 0.0 && b.1.count > 0.0 {
+            let d = a.1.sum / a.1.count - b.1.sum / b.1.count;
+            between.push((d * d / 2.0, a.0.4));
+            if b.1.count > 1.0 {
+                let mean = b.1.sum / b.1.count;
+                within.push((b.1.squares / b.1.count - mean * mean).max(0.0));
+            }
+        }
+    }
+    // The first cycle may differ for a reason; where there are three, it stays out.
+    let later: Vec<f64> = between.iter().filter(|(_, cycle)| *cycle > 1).map(|(d, _)| *d).collect();
+    let mut used =
+        if later.len() >= LATER_REPEATS { later } else { between.iter().map(|(d, _)| *d).collect() };
+    if used.len() < FEWEST_REPEATS {
+        return None;
+    }
+    let cut = quantile(&mut used, REPEAT_OUTLIERS);
+    let kept: Vec<f64> = used.into_iter().filter(|d| *d <= cut).collect();
+    let slow = kept.iter().sum::<f64>() / kept.len() as f64;
+    let fast = if within.is_empty() { 0.0 } else { median(&mut within) };
+    Some((slow + fast).sqrt())
+}
+
+/// The sum of the autocorrelation of a residual, in s, from lagged products within recordings.
+pub(crate) fn correlation_time(rows: &Rows, residual: &[f64], step: f64) -> f64 {
+    let n = rows.len();
+    let variance = energy(residual) / rows.effective().max(1) as f64;
+    if !(variance > 0.0) {
+        return step;
+    }
+    let mut sum = 0.5;
+    let mut lag = 1_usize;
+    let mut last = 0_usize;
+    while lag < n / LONGEST_LAG {
+        let (mut product, mut count) = (0.0, 0.0);
+        for i in lag..n {
+            if rows.recording[i] == rows.recording[i - lag]
+                && rows.root_weight[i] > 0.0
+                && rows.root_weight[i - lag] > 0.0
+            {
+                product += residual[i] * residual[i - lag];
+                count += 1.0;
+            }
+        }
+        let r = if count > 0.0 { product / count / variance } else { 0.0 };
+        if r < CORRELATION_END {
+            break;
+        }
+        sum += r * (lag - last) as f64;
+        last = lag;
+        lag = (lag as f64 * LAG_GROWTH).ceil() as usize;
+    }
+    2.0 * sum * step
+}
+
+/// Estimates the noise from a residual (of the most flexible thing there is, weighted).
+pub(crate) fn estimate(rows: &Rows, residual: &[f64], step: f64) -> Noise {
+    let effective = rows.effective().max(1) as f64;
+    let rms = (energy(residual) / energy(&rows.root_weight).max(1e-12)).sqrt();
+    let repeats = from_repeats(rows, residual);
+    let sigma = repeats.unwrap_or(rms).min(rms);
+    let memory = correlation_time(rows, residual, step);
+    let independent = (effective * step / memory).clamp(2.0, effective);
+    Noise { sigma, from_repeats: repeats.is_some(), memory, independent }
+}
+
+/// How often the largest of many statistics, each a sum over blocks divided by its own scatter, exceeds each observed one
+/// when the sign of every block is thrown by a coin: p-values that hold for the whole family.
+///
+/// `scores[j][b]` is statistic `j`'s share from block `b`. Blocks stay whole, so correlation within them does not matter.
+pub(crate) fn family_p(scores: &[&[f64]], throws: usize, seed: u64) -> Vec<f64> {
+    let blocks = scores.first().map_or(0, |s| s.len());
+    let inverse: Vec<f64> = scores
+        .iter()
+        .map(|s| {
+            let scatter = energy(s).sqrt();
+            if scatter > 0.0 { 1.0 / scatter } else { 0.0 }
+        })
+        .collect();
+    let observed: Vec<f64> =
+        scores.iter().zip(&inverse).map(|(s, i)| s.iter().sum::<f64>().abs() * i).collect();
+    let mut random = Random(seed);
+    let mut largest = Vec::with_capacity(throws);
+    let mut signs = vec![1.0; blocks];
+    for _ in 0..throws {
+        for s in &mut signs {
+            *s = if random.next() & 1 == 0 { 1.0 } else { -1.0 };
+        }
+        let top = scores
+            .iter()
+            .zip(&inverse)
+            .map(|(s, i)| super::linear::dot(s, &signs).abs() * i)
+            .fold(0.0, f64::max);
+        largest.push(top);
+    }
+    observed
+        .iter()
+        .map(|o| {
+            let beyond = largest.iter().filter(|l| **l >= *o - 1e-12).count();
+            (beyond as f64 + 1.0) / (throws as f64 + 1.0)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_family_is_controlled_and_a_real_one_is_found() {
+        let mut random = Random(3);
+        let mut alarms = 0;
+        for trial in 0..60 {
+            let scores: Vec<Vec<f64>> =
+                (0..100).map(|_| (0..36).map(|_| random.normal()).collect()).collect();
+            let views: Vec<&[f64]> = scores.iter().map(Vec::as_slice).collect();
+            let p = family_p(&views, 299, trial);
+            alarms += usize::from(p.iter().any(|p| *p <= 0.05));
+        }
+        assert!(alarms <= 9, "{alarms} of 60 at five percent");
+        let mut scores: Vec<Vec<f64>> =
+            (0..100).map(|_| (0..36).map(|_| random.normal()).collect()).collect();
+        scores[7].iter_mut().for_each(|s| *s += 2.0);
+        let views: Vec<&[f64]> = scores.iter().map(Vec::as_slice).collect();
+        let p = family_p(&views, 999, 5);
+        assert!(p[7] <= 0.002);
+    }
+}

@@ -1,0 +1,285 @@
+//! What friction does while the length is held: it stays, fades, or follows the wandering of the pressure.
+//!
+//! The model holds the sign of the last motion. On a real bench the air's ripple shakes the braid, so that friction ends near
+//! the middle of the gap between the branches, and a regulator that wanders by a few kilopascals turns it round: static friction
+//! carries small changes of pressure (a play of half-width `h`), what goes beyond lets the strands slip, and over a change `b`
+//! the friction follows to the other branch. That is no missing physics of the model in motion; but left out, every effect that
+//! lives in rests would be mistaken for it. Which of the three it is, and how fast, is what the rows at rest say.
+
+use rayon::prelude::*;
+
+use super::baselines::{self, Baseline, Kind};
+use super::criteria::baseline::TABLE_ORDER;
+use super::criteria::rest_friction::{
+    CARRIED_PRESSURES, FEWEST_MOVING_ROWS, FOLLOWING_PRESSURES, HOLD_ROWS, MOST_RESTS, NEARBY_FACTORS,
+    NO_LAW_RATIO, PRESSURE_SMOOTHING, REST_JUMP, REST_LAW_LEAVES, RESTING_AFTER, RESTING_ROWS,
+    SETTLING_TIMES,
+};
+use super::rows::Rows;
+
+mod steps;
+
+/// What friction does at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum AtRest {
+    /// It fades: `s → s e^(−t/τ)`, `t` since the braid last moved, s.
+    Fades(f64),
+    /// It follows the pressure.
+    Follows {
+        /// Half-width of the play that static friction carries, Pa.
+        carries: f64,
+        /// Change beyond it over which friction comes to the other branch, Pa.
+        over: f64,
+        /// Which smoothing of the pressure.
+        smoothing: usize,
+    },
+}
+
+impl AtRest {
+    /// In words.
+    pub(crate) fn words(self) -> String {
+        match self {
+            Self::Fades(time) => format!(
+                "while the length is held the gap between the branches closes within about {time:.1} s (the air's ripple shakes \
+                 friction out); the model holds it, so rows at rest are compared with a friction that settles"
+            ),
+            Self::Follows { carries, over, .. } => format!(
+                "while the length is held the pressure wanders and takes the friction with it (changes beyond ±{:.1} kPa, over about \
+                 {:.1} kPa); the model holds it, so rows at rest are compared with a friction that follows",
+                carries * 1e-3,
+                over * 1e-3
+            ),
+        }
+    }
+}
+
+/// Rows of each stay at one length.
+fn holds(rows: &Rows) -> Vec<(usize, usize)> {
+    let n = rows.len();
+    let held = |i: usize| rows.contexts[i].speed == 0.0 && !rows.vented[i];
+    let mut found = Vec::new();
+    let mut from = 0;
+    while from < n {
+        let mut to = from + 1;
+        while to < n && held(to) == held(from) && rows.recording[to] == rows.recording[from] {
+            to += 1;
+        }
+        if held(from) && to - from > HOLD_ROWS {
+            found.push((from, to));
+        }
+        from = to;
+    }
+    found
+}
+
+/// The pressure with its noise smoothed over `half` rows each way, within recordings.
+fn smoothed(rows: &Rows, half: usize) -> Vec<f64> {
+    let n = rows.len();
+    (0..n)
+        .map(|i| {
+            let (a, b) = (i.saturating_sub(half), (i + half + 1).min(n));
+            let same = (a..b).filter(|j| rows.recording[*j] == rows.recording[i]);
+            let (sum, count) = same.fold((0.0, 0.0), |(s, c), j| (s + rows.contexts[j].pressure, c + 1.0));
+            sum / count
+        })
+        .collect()
+}
+
+/// How far every change of pressure goes beyond what static friction carries: what a play of half-width `carries` lets through.
+/// The play has its memory: it follows the pressure through motion and over pauses too.
+fn let_through(pressure: &[f64], carries: f64) -> Vec<f64> {
+    let mut carried = 0.0;
+    let mut last = pressure.first().copied().unwrap_or(0.0);
+    pressure
+        .iter()
+        .map(|p| {
+            let reached: f64 = carried + p - last;
+            last = *p;
+            carried = reached.clamp(-carries, carries);
+            reached - carried
+        })
+        .collect()
+}
+
+/// The friction's direction in every hold under a law.
+fn directions(rows: &Rows, holds: &[(usize, usize)], pressures: &[Vec<f64>], law: AtRest) -> Vec<Vec<f64>> {
+    match law {
+        AtRest::Fades(time) => holds
+            .iter()
+            .map(|(from, to)| {
+                (*from..*to).map(|i| rows.sign[i] * (-rows.still[i].max(0.0) / time).exp()).collect()
+            })
+            .collect(),
+        AtRest::Follows { carries, over, smoothing } => {
+            let slips = let_through(&pressures[smoothing], carries);
+            holds
+                .iter()
+                .map(|(from, to)| {
+                    let mut z = rows.sign[*from];
+                    slips[*from..*to]
+                        .iter()
+                        .map(|slipped| {
+                            let way = if *slipped > 0.0 { 1.0 } else { -1.0 };
+                            z = way + (z - way) * (-slipped.abs() / over).exp();
+                            z
+                        })
+                        .collect()
+                })
+                .collect()
+        }
+    }
+}
+
+/// What is left of a row, N, where friction acts in a direction.
+fn left_of(rows: &Rows, fitted: &Baseline, i: usize, direction: f64) -> f64 {
+    fitted.raw_residual[i] + fitted.quasi[i] * fitted.friction[i] * (direction - rows.contexts[i].direction)
+}
+
+/// What a law leaves of the rows at rest: the friction is that of the moving rows, and the part of the force that stays the same
+/// through a hold is not held against it.
+fn left(rows: &Rows, fitted: &Baseline, holds: &[(usize, usize)], directions: &[Vec<f64>]) -> f64 {
+    let mut sum = 0.0;
+    for ((from, to), way) in holds.iter().zip(directions) {
+        for i in *from..*to {
+            let w = if rows.on_ramp[i] { 0.0 } else { rows.root_weight[i] };
+            sum += (w * left_of(rows, fitted, i, way[i - from])).powi(2);
+        }
+    }
+    sum
+}
+
+/// Finds out what friction does at rest and lets the rows' directions say so; `None` where it stays as the model holds it.
+pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
+    rows.settling = vec![0.0; rows.len()];
+    rows.unsettled = vec![0.0; rows.len()];
+    rows.rest = vec![0; rows.len()];
+    let resting =
+        rows.still.iter().zip(&rows.root_weight).filter(|(s, w)| **s > RESTING_AFTER && **w > 0.0).count();
+    if !rows.isometric && resting * RESTING_ROWS < rows.effective() {
+        return None;
+    }
+    let holds = holds(rows);
+    if holds.is_empty() {
+        return None;
+    }
+    // Friction and bladder as the moving rows have them; of a muscle that was held throughout, as all rows have them.
+    let mut moving = rows.clone();
+    if !rows.isometric {
+        for (from, to) in &holds {
+            moving.root_weight[*from..*to].fill(0.0);
+        }
+        if moving.effective() < FEWEST_MOVING_ROWS {
+            return None;
+        }
+    }
+    let fitted = baselines::fit(&moving, Kind::Flexible(TABLE_ORDER), &[]);
+    let pressures: Vec<Vec<f64>> = PRESSURE_SMOOTHING.iter().map(|h| smoothed(rows, *h)).collect();
+    let stays: Vec<Vec<f64>> =
+        holds.iter().map(|(a, b)| rows.contexts[*a..*b].iter().map(|c| c.direction).collect()).collect();
+    let held = left(rows, &fitted, &holds, &stays);
+    let best_of = |laws: Vec<AtRest>| {
+        let tried: Vec<f64> = laws
+            .par_iter()
+            .map(|l| left(rows, &fitted, &holds, &directions(rows, &holds, &pressures, *l)))
+            .collect();
+        laws.into_iter().zip(tried).min_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let follows = |smoothing: usize| {
+        CARRIED_PRESSURES.iter().flat_map(move |h| {
+            FOLLOWING_PRESSURES.iter().map(move |b| AtRest::Follows { carries: *h, over: *b, smoothing })
+        })
+    };
+    // Of a muscle that was held throughout the direction comes from the pressure: there it is followed or not.
+    let first = SETTLING_TIMES.iter().filter(|_| !rows.isometric).map(|t| AtRest::Fades(*t));
+    let (mut best, mut energy) =
+        best_of(first.chain((0..PRESSURE_SMOOTHING.len()).flat_map(follows)).collect())?;
+    for factors in NEARBY_FACTORS {
+        let near = match best {
+            AtRest::Fades(time) => factors.iter().map(|f| AtRest::Fades(time * f)).collect(),
+            AtRest::Follows { carries, over, smoothing } => factors
+                .iter()
+                .chain(&[1.0])
+                .flat_map(|f| {
+                    factors.iter().chain(&[1.0]).map(move |g| AtRest::Follows {
+                        carries: carries * f,
+                        over: over * g,
+                        smoothing,
+                    })
+                })
+                .collect(),
+        };
+        if let Some((b, e)) = best_of(near).filter(|(_, e)| *e < energy) {
+            (best, energy) = (b, e);
+        }
+    }
+    let law = (energy < REST_LAW_LEAVES * held).then_some(best);
+    let chosen = law.map_or(stays, |law| directions(rows, &holds, &pressures, law));
+    if !rows.isometric {
+        let moved = fitted.per_row(&moving);
+        let doubted = match law {
+            Some(law) => matches!(law, AtRest::Follows { .. }),
+            None => held > NO_LAW_RATIO * moved * weight_at(rows, &holds),
+        };
+        let steps = steps::of(rows, &fitted, &holds, &chosen);
+        number_rests(rows, &holds, &chosen, &steps, doubted);
+    }
+    let law = law?;
+    for ((from, to), way) in holds.iter().zip(&chosen) {
+        for i in (*from..*to).filter(|i| !rows.on_ramp[*i]) {
+            if !rows.isometric {
+                rows.unsettled[i] = rows.contexts[i].direction - way[i - from];
+            }
+            rows.contexts[i].direction = way[i - from];
+            if let AtRest::Fades(time) = law
+                && rows.still[i] > 0.0
+            {
+                // How a settling departs from an exponential is fitted beside it.
+                rows.settling[i] = (-3.0 * rows.still[i] / time).exp() - (-rows.still[i] / time).exp();
+            }
+        }
+    }
+    Some(law)
+}
+
+/// The weight of the rows at rest.
+fn weight_at(rows: &Rows, holds: &[(usize, usize)]) -> f64 {
+    let resting = holds.iter().flat_map(|(from, to)| *from..*to).filter(|i| !rows.on_ramp[*i]);
+    resting.map(|i| rows.root_weight[i].powi(2)).sum()
+}
+
+/// Static friction lets go by jumps too small and too quick for the pressure's samples to tell when: between those that a law sees or
+/// the force itself shows, where friction rests is fitted; where no law is doubted, only after such a step. A force that steps more often
+/// than that beats, and no friction lets go by it.
+fn number_rests(
+    rows: &mut Rows,
+    holds: &[(usize, usize)],
+    directions: &[Vec<f64>],
+    steps: &[Vec<bool>],
+    doubted: bool,
+) {
+    let most = MOST_RESTS + holds.len();
+    let stepped = steps.iter().flatten().filter(|step| **step).count();
+    let lets_go = stepped + if doubted { holds.len() } else { 0 } <= most;
+    let mut jump = REST_JUMP;
+    // A direction lies within ±1: no change of it is a jump at last.
+    loop {
+        let mut number = 0;
+        for (((from, to), way), steps) in holds.iter().zip(directions).zip(steps) {
+            let mut known = !doubted;
+            number += u32::from(doubted);
+            let mut since = way[0];
+            for i in *from..*to {
+                if (doubted && (way[i - from] - since).abs() > jump) || (lets_go && steps[i - from]) {
+                    since = way[i - from];
+                    number += 1;
+                    known = false;
+                }
+                rows.rest[i] = if known || rows.on_ramp[i] { 0 } else { number };
+            }
+        }
+        if number as usize <= most {
+            return;
+        }
+        jump *= 2.0;
+    }
+}

@@ -1,0 +1,43 @@
+//! Adding an effect takes its file and one line of a list: here both are outside the catalogue, and the diagnosis finds the effect,
+//! fits its shape and says what would show it, from nothing but that file.
+
+mod stroke_ripple;
+
+use super::*;
+use crate::candidates::Law;
+
+model_core::effect_list! {
+    /// Effects beyond the catalogue.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    AddedName:
+    /// The stroke changes the force periodically.
+    StrokeRipple = stroke_ripple;
+}
+
+fn diagnosed(campaign: &Campaign) -> Diagnosis {
+    let added = AddedName::ALL.iter().copied().map(Law::Added).collect();
+    let options = Options { muscle: "test".into(), added, ..Options::default() };
+    diagnose(campaign, &geometry(), &options).expect("an answer")
+}
+
+#[test]
+fn an_effect_of_one_file_and_one_line_is_considered_and_found() {
+    let plain = recorded(loops(&[0.2]), 5, coloured(0.1, 2.0), |_, _, _| 0.0);
+    let without = diagnosed(&plain);
+    assert_eq!(names(&without), [""; 0], "nothing is there");
+    let considered = without.considered.iter().find(|c| c.effect == "stroke-ripple").expect("considered");
+    assert!(considered.hidden_up_to_N.is_some_and(|h| h < 5.0), "{considered:?}");
+    // 3 N over a period of 4 mm, by a formula of its own.
+    let mut rippled = plain;
+    for r in &mut rippled.recordings {
+        let Recording { stroke, force: Some(force), .. } = r else { continue };
+        for (force, x) in force.iter_mut().zip(stroke.iter()) {
+            *force += 3.0 * (std::f64::consts::TAU * x / 4.0e-3).sin();
+        }
+    }
+    assert_eq!(names(&ask(&rippled)).contains(&"stroke-ripple"), false, "the catalogue does not have it");
+    let with = diagnosed(&rippled);
+    assert_eq!(names(&with).first(), Some(&"stroke-ripple"), "{}", summary(&with));
+    let [size, period] = [0, 1].map(|i| with.missing[0].parameters[i].value);
+    assert!((size - 3.0).abs() < 0.3 && (period - 4.0e-3).abs() < 1e-4, "{size} N over {period} m");
+}

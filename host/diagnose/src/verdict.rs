@@ -1,0 +1,260 @@
+//! The answer as plain values, and as JSON (`pam-diagnose/1`).
+
+// Field names carry their unit as the JSON does: N is not n.
+#![allow(non_snake_case)]
+
+use model_core::effects::Parameter;
+use serde::Serialize;
+
+/// The judgement in one word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Nothing stands above the noise and the model's own stated inexactness.
+    Consistent,
+    /// What stood above is explained by the effects named.
+    Explained,
+    /// A part of it is.
+    PartlyExplained,
+    /// Something is left out that no effect of the library describes, or that cannot be told apart.
+    Unexplained,
+}
+
+/// Where the misfit's energy above the noise sits along one coordinate.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Region {
+    /// Its name, one of those in the interface.
+    pub coordinate: String,
+    /// From this value, in `unit`.
+    pub from: f64,
+    /// To this value.
+    pub to: f64,
+    /// Share of the misfit's energy above noise that lies there.
+    pub share: f64,
+    /// Share of the rows that lie there.
+    pub rows: f64,
+    /// How often whole blocks, shuffled, concentrate as much.
+    pub p: f64,
+    /// Unit of `from` and `to`.
+    pub unit: String,
+    /// The region in words.
+    pub words: String,
+}
+
+/// One parameter of a named effect.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterValue {
+    /// Its name.
+    pub name: String,
+    /// Its value, SI.
+    pub value: f64,
+    /// Its standard deviation, by what groups of rows make of it and how inexact laws are; absent where the data do not determine it.
+    pub std: Option<f64>,
+    /// Its SI unit.
+    pub unit: String,
+    /// Whether the value lies outside the range known from the literature.
+    pub outside_known_range: bool,
+}
+
+impl ParameterValue {
+    /// Whether a value lies outside what the literature knows; one that is not used does not.
+    #[must_use]
+    pub fn is_outside(value: f64, parameter: &Parameter) -> bool {
+        let (low, high) = (parameter.low, parameter.high);
+        let too_small = value.abs() < low.abs().min(high.abs()) && low * high > 0.0;
+        value != 0.0 && (value.abs() > high.abs().max(low.abs()) || too_small)
+    }
+}
+
+/// An effect that is missing from the model.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Missing {
+    /// Its name in the catalogue.
+    pub effect: String,
+    /// How probable this very name is: its belief, calibrated where truths are known.
+    pub probability: f64,
+    /// Its belief among its rivals, before calibration.
+    pub belief: f64,
+    /// Share of the misfit's energy above noise that it explains.
+    pub share_explained: f64,
+    /// Its parameters.
+    pub parameters: Vec<ParameterValue>,
+    /// Effects that these data cannot tell from it.
+    pub confusable_with: Vec<String>,
+    /// Where it acts.
+    pub place: String,
+    /// Whether it is the bench's: it corrects the data and never goes to a controller.
+    pub correction: bool,
+    /// Whether a check of the bench measured it, apart from the recordings.
+    pub checked: bool,
+    /// Whether the user gave it as known: then it was fitted whatever the evidence, and its probability is one.
+    pub given: bool,
+    /// Whether the recordings support it, or a check of the bench; always so where it was not given.
+    pub supported: bool,
+    /// What it is, for someone who has never heard of it.
+    pub summary: String,
+    /// Its equation and where it comes from.
+    pub source: String,
+    /// The largest force that it makes in these recordings, N.
+    pub peak_N: f64,
+    /// Probability of having found as much by chance over all effects looked at, by whole blocks.
+    pub p: f64,
+    /// Why this one.
+    pub why: String,
+}
+
+/// What no named effect explains.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Unexplained {
+    /// Share of the misfit's energy above noise.
+    pub share: f64,
+    /// Its pattern in words.
+    pub pattern: String,
+}
+
+/// The improvement on rows that the fit had not seen.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HeldOut {
+    /// How rows were held out.
+    pub split: String,
+    /// Error of the model without the effects, N.
+    pub rms_before_N: f64,
+    /// Error with them, N.
+    pub rms_after_N: f64,
+    /// The noise, N.
+    pub noise_N: f64,
+    /// The same two with the samples about each turn left in.
+    pub with_turns_before_N: f64,
+    /// After.
+    pub with_turns_after_N: f64,
+}
+
+/// The recording that would tell.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NextExperiment {
+    /// What it separates.
+    pub separates: Vec<String>,
+    /// A protocol file that a bench can run.
+    pub protocol: String,
+    /// Largest expected difference between the candidates, N.
+    pub expected_difference_N: f64,
+    /// In words.
+    pub words: String,
+}
+
+/// An effect that was looked at.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Considered {
+    /// Its name.
+    pub effect: String,
+    /// Share of the misfit's energy above noise that it takes by itself.
+    pub gain: f64,
+    /// Why it is not named.
+    pub why_not: String,
+    /// The largest peak, N, at which it could be hidden in this recording; absent where the recording does not excite it.
+    pub hidden_up_to_N: Option<f64>,
+    /// Whether a check of the bench has said so, apart from the recordings.
+    pub checked: bool,
+    /// Share of its trace that the flexible tables cannot imitate.
+    pub visible: f64,
+}
+
+/// One step of the forward selection.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PathStep {
+    /// The effect taken.
+    pub effect: String,
+    /// Root mean square of the misfit after it, N.
+    pub rms_N: f64,
+    /// Family-wise p.
+    pub p: f64,
+    /// The next best at this step and their misfit, N.
+    pub runners_up: Vec<(String, f64)>,
+}
+
+/// The misfit along one coordinate, for a picture.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Profile {
+    /// The coordinate.
+    pub coordinate: String,
+    /// Its unit.
+    pub unit: String,
+    /// Middles of the bins.
+    pub at: Vec<f64>,
+    /// Mean residual before, N.
+    pub mean_before: Vec<f64>,
+    /// Root mean square residual before, N.
+    pub rms_before: Vec<f64>,
+    /// Root mean square residual after, N.
+    pub rms_after: Vec<f64>,
+}
+
+/// A residual over time, thinned for drawing.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Trace {
+    /// s.
+    pub time: Vec<f64>,
+    /// Before, N.
+    pub before: Vec<f64>,
+    /// After, N.
+    pub after: Vec<f64>,
+    /// What the named effects add, N.
+    pub effects: Vec<f64>,
+}
+
+/// The whole diagnosis.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// `pam-diagnose/1`.
+    pub schema: String,
+    /// The muscle's name.
+    pub muscle: String,
+    /// Rows in the recordings.
+    pub samples: usize,
+    /// Whether there was anything to judge. Where there was not (too few rows, a dead sensor) nothing was fitted, nothing stands
+    /// above anything, and the first of the remarks says why.
+    pub judged: bool,
+    /// The judgement.
+    pub verdict: Verdict,
+    /// Noise, N.
+    pub noise_N: f64,
+    /// Misfit of the model as it was, N.
+    pub misfit_rms_N: f64,
+    /// Where it sits.
+    pub r#where: Vec<Region>,
+    /// What is missing.
+    pub missing: Vec<Missing>,
+    /// What remains.
+    pub unexplained: Unexplained,
+    /// The improvement on unseen rows.
+    pub held_out: HeldOut,
+    /// What to record next.
+    pub next_experiment: Option<NextExperiment>,
+    /// All effects looked at.
+    pub considered: Vec<Considered>,
+    /// The forward selection, step by step.
+    pub path: Vec<PathStep>,
+    /// Force at rest length and the highest pressure: the scale of all this, N.
+    pub blocked_force_N: f64,
+    /// Correlation time of the noise, s.
+    pub noise_memory_s: f64,
+    /// What can and cannot be judged from these recordings, in sentences.
+    pub remarks: Vec<String>,
+    /// For pictures.
+    pub profiles: Vec<Profile>,
+    /// For pictures.
+    pub trace: Trace,
+    /// What the muscle remembers over a campaign of isometric staircases; absent of other campaigns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub history: Option<super::history::History>,
+}
+
+impl Diagnosis {
+    /// As JSON text.
+    ///
+    /// Every number is finite: what could not be computed is absent or zero before it comes here.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        serde_json::to_string_pretty(self).unwrap_or_else(|_| "{}".to_owned())
+    }
+}

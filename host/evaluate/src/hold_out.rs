@@ -1,0 +1,203 @@
+//! How good a table is on recordings that it has not seen.
+
+use std::collections::BTreeMap;
+
+use pam_data::error::{Error, Result};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::segment::Motion;
+use pam_data::recording::{Campaign, Recording};
+use pam_fit::error::FitCode;
+use pam_fit::predict::predict;
+use pam_fit::table_file::{About, TableFile};
+
+use pam_fit::fit::result::Fit;
+use pam_fit::fit::{Options, fit};
+
+use crate::published::Published;
+
+/// What is kept from the fit, in turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Split {
+    /// Every run: recordings that share their label `run`, or else each recording by itself.
+    Run,
+    /// Every contraction that recordings were held at.
+    Contraction,
+}
+
+/// Sums of errors over rows.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Score {
+    /// Rows.
+    pub rows: f64,
+    /// `Σ |F − F_model|`, N.
+    pub absolute: f64,
+    /// `Σ (F − F_model)²`, N².
+    pub square: f64,
+    /// `Σ (F − F_model)`, N.
+    pub signed: f64,
+}
+
+impl Score {
+    fn add(&mut self, residual: f64) {
+        self.rows += 1.0;
+        self.absolute += residual.abs();
+        self.square += residual * residual;
+        self.signed += residual;
+    }
+
+    /// Mean size of the error, N.
+    #[must_use]
+    pub fn mean(&self) -> f64 {
+        self.absolute / self.rows.max(1.0)
+    }
+
+    /// Root mean square of the error, N.
+    #[must_use]
+    pub fn rms(&self) -> f64 {
+        (self.square / self.rows.max(1.0)).sqrt()
+    }
+
+    /// Mean error with its sign, N.
+    #[must_use]
+    pub fn bias(&self) -> f64 {
+        self.signed / self.rows.max(1.0)
+    }
+}
+
+/// Where errors sit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spot {
+    /// What was left out: a run's or a contraction's value.
+    pub left_out: String,
+    /// Contraction, in thousandths.
+    pub contraction: i64,
+    /// +1 filling or shortening, −1 emptying or lengthening.
+    pub direction: i8,
+    /// The errors there.
+    pub score: Score,
+}
+
+/// Errors, together and by where they sit.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Tally {
+    /// Of all rows.
+    pub score: Score,
+    spots: BTreeMap<(String, i64, i8), Score>,
+}
+
+impl Tally {
+    pub(super) fn add(&mut self, left_out: &str, contraction: f64, direction: i8, residual: f64) {
+        self.score.add(residual);
+        let place = (left_out.to_owned(), (contraction * 1e3).round() as i64, direction);
+        self.spots.entry(place).or_default().add(residual);
+    }
+
+    pub(super) fn spots(self) -> Vec<Spot> {
+        let spot =
+            |((left_out, contraction, direction), score)| Spot { left_out, contraction, direction, score };
+        self.spots.into_iter().map(spot).collect()
+    }
+}
+
+/// Errors on what was left out.
+#[derive(Debug, Clone)]
+pub struct HeldOut {
+    /// The table's.
+    pub table: Score,
+    /// A published formula's on the same rows, where one was given.
+    pub published: Option<Score>,
+    /// Where the table's errors sit.
+    pub spots: Vec<Spot>,
+    /// Force at rest length and the highest tested pressure, by the fit to everything, N.
+    pub blocked: f64,
+    /// The fit to everything.
+    pub whole: Fit,
+}
+
+/// A table file of a fit, with no more history than prediction needs.
+#[must_use]
+pub fn as_file(fit: &Fit) -> TableFile {
+    let mountings = fit.prepared.mountings.iter().map(|m| (m.stroke, m.offset)).collect();
+    TableFile { table: fit.table.clone(), about: About { mountings, ..About::default() } }
+}
+
+fn key(recording: &Recording, index: usize, split: Split) -> String {
+    match split {
+        Split::Run => {
+            let label = recording.labels.iter().find(|(name, _)| name.starts_with("run"));
+            label.map_or_else(|| format!("{} ({index})", recording.name), |(_, v)| v.clone())
+        }
+        Split::Contraction => {
+            let middle = recording.stroke.iter().sum::<f64>() / recording.len().max(1) as f64;
+            format!("{:.1} mm", middle * 1e3)
+        }
+    }
+}
+
+/// Leaves each run or contraction out in turn, fits the rest, and scores what was left out.
+///
+/// # Errors
+/// [`FitCode::FitUnderdetermined`] where there is but one, or a fit that fails.
+pub fn hold_out(
+    campaign: &Campaign,
+    muscle: &MuscleDescription,
+    options: &Options,
+    split: Split,
+    published: Option<&Published>,
+) -> Result<HeldOut> {
+    let keys: Vec<String> = campaign.recordings.iter().enumerate().map(|(i, r)| key(r, i, split)).collect();
+    let mut values = keys.clone();
+    values.sort();
+    values.dedup();
+    if values.len() < 2 {
+        return Err(Error::new(
+            FitCode::FitUnderdetermined,
+            "there is nothing to leave out: all recordings are one",
+        )
+        .help("give several recordings, or an import description that splits the file by run"));
+    }
+    let whole = fit(campaign, muscle, options)?;
+    let clip = whole.prepared.clips.0.map(|c| c.force);
+    let blocked = f64::from(whole.table.blocked_force.newtons());
+    let mut out = HeldOut { table: Score::default(), published: None, spots: Vec::new(), blocked, whole };
+    let mut reference = Score::default();
+    let mut tally = Tally::default();
+    for value in &values {
+        let part = |inside: bool| Campaign {
+            recordings: campaign
+                .recordings
+                .iter()
+                .zip(&keys)
+                .filter(|(_, k)| (*k == value) == inside)
+                .map(|(r, _)| r.clone())
+                .collect(),
+            clock: campaign.clock,
+            warnings: Vec::new(),
+        };
+        let fitted = fit(&part(false), muscle, options)?;
+        let test = part(true);
+        let prediction = predict(&as_file(&fitted), &test)?;
+        let motions = Motion::of_campaign(&test);
+        for ((recording, predicted), motion) in
+            test.recordings.iter().zip(&prediction.recordings).zip(&motions)
+        {
+            let measured = recording.require_force()?;
+            for (i, force) in measured.iter().enumerate() {
+                // At the end of its range the sensor does not say what the force is.
+                if clip.is_some_and(|c| *force <= c) {
+                    continue;
+                }
+                let residual = force - predicted.force[i];
+                let contraction = recording.stroke[i] / muscle.rest_length();
+                tally.add(value, contraction, motion.direction[i], residual);
+                if let Some(p) = published {
+                    reference.add(force - p.force(muscle, recording.pressure[i], contraction));
+                }
+            }
+        }
+    }
+    out.published = published.map(|_| reference);
+    out.table = tally.score;
+    out.spots = tally.spots();
+    Ok(out)
+}

@@ -1,0 +1,34 @@
+//! The pressure acts on the load cell past the muscle: `F_add = c · P`.
+//!
+//! `c`, m²: thrust on an end cap, a hose that straightens. Pressurise with the muscle disconnected, or blocked at both ends.
+
+use model_core::effects::{
+    BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, Vented,
+};
+use model_core::scalar::Scalar;
+
+/// See the [module](self).
+pub(super) struct CrossTalk;
+
+impl Effect for CrossTalk {
+    const INFO: Info = Info {
+        name: "cross-talk",
+        link: Link::Reading,
+        parameters: &[Parameter::amplitude("c", "thrust_area", "m²", -5.0e-5, 5.0e-5)],
+        depends_on_pressure: true,
+        persistent: false,
+        alternatives: false,
+        start: Start::Known,
+        fading: &[],
+        equation: "F = c·P",
+        summary: "Pressure in hose or fittings pushes on the load cell by itself.",
+        source: "end-cap thrust; 0.1 to 5 N per 100 kPa",
+    };
+
+    const TRAITS: Traits =
+        Traits::shown_by(Experiment::DeadWeights).check(BenchCheck::DeadWeights).vented(Vented::Everything);
+
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
+        parameters[0] * context.pressure
+    }
+}

@@ -1,0 +1,33 @@
+//! The pressure sensor is late: the true pressure is ahead by `τ dP/dt`, so
+//! `F_add = g (1 − s k_F) · τ · dP/dt`.
+//!
+//! `τ`, s. First order: for ramps slower than the sensor. Invisible while the pressure is constant. The muscle's own lag behind the
+//! regulator (`pressure-lag`) has the opposite sign.
+
+use model_core::effects::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use model_core::scalar::Scalar;
+
+/// See the [module](self).
+pub(super) struct PressureSensorLag;
+
+impl Effect for PressureSensorLag {
+    const INFO: Info = Info {
+        name: "pressure-sensor-lag",
+        link: Link::Air,
+        parameters: &[Parameter::amplitude("τ", "delay", "s", 1.0e-3, 0.1)],
+        depends_on_pressure: true,
+        persistent: false,
+        alternatives: false,
+        start: Start::Known,
+        fading: &[],
+        equation: "F = g·(1 − s·k_F)·τ·dP/dt",
+        summary: "The pressure sensor responds late.",
+        source: "first-order sensor; time constants of 1 to 50 ms are usual",
+    };
+
+    const TRAITS: Traits = Traits::shown_by(Experiment::PressureRamps);
+
+    fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
+        parameters[0] * context.pull_per_pressure() * context.pressure_rate
+    }
+}

@@ -1,0 +1,134 @@
+//! Checks of the bench without its muscle: each instrument against something known.
+//!
+//! ```text
+//! dead weights      F_read = (1 + γ) (W + c P) + o        known weights W on the cell, line vented and under pressure P
+//! rigid bar         x_read = x_bar − δ − F/K − b/2·sign F a bar in the muscle's place, pulled and pushed
+//! reference gauge   P_read = (1 + ν) P + q                a better gauge beside the bench's own
+//! ```
+//! Loops of a muscle hardly tell a wrong scale of the cell from a wrong scale of the gauge, a frame that gives from a braid that
+//! stretches: more than nine tenths of such a trace lie in the tables. A minute with a weight tells. What a check measures is known
+//! before anything is fitted: readings are freed of it, and no other recording has to explain it.
+//!
+//! A check is a table like a recording, with the known quantity in a column whose name begins with `reference_`:
+//!
+//! | check | columns |
+//! | --- | --- |
+//! | dead weights | `time_`, `force_`, `reference_force_`; with `pressure_` the thrust of the line shows |
+//! | rigid bar | `time_`, `displacement_`, `force_`, `reference_displacement_` |
+//! | reference gauge | `time_`, `pressure_`, `reference_pressure_` |
+
+mod dead_weights;
+mod gauge;
+mod regression;
+mod rigid_bar;
+mod table;
+
+use std::path::Path;
+
+use crate::bench::BenchName;
+use pam_data::error::Result;
+use pam_data::recording::{Campaign, Quantity};
+
+use table::Table;
+
+/// A fault of the bench as a check measured it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// Which law of the bench.
+    pub fault: BenchName,
+    /// Its parameters in the law's order, SI.
+    pub parameters: Vec<f64>,
+    /// Their standard deviations, by whole stays or stretches; `None` for what the check does not vary.
+    pub deviations: Vec<Option<f64>>,
+    /// The first parameter with its interval, in words and handy units.
+    pub words: String,
+    /// Which check, in words.
+    pub check: &'static str,
+}
+
+impl Measured {
+    /// Whether the check shows the fault beyond its own uncertainty: the first number that it varied stands for all.
+    #[must_use]
+    pub fn is_sure(&self) -> bool {
+        let mut varied =
+            self.parameters.iter().zip(&self.deviations).filter_map(|(v, std)| Some((v, (*std)?)));
+        varied.next().is_some_and(|(value, std)| value.abs() > SURE * std)
+    }
+}
+
+/// A fault is taken for real from so many standard deviations on.
+const SURE: f64 = 4.0;
+
+/// Checks of one bench.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Checks {
+    measured: Vec<Measured>,
+}
+
+impl Checks {
+    /// Reads checks; of two of the same kind the later one counts.
+    ///
+    /// # Errors
+    /// Files that cannot be read, tables without a reference, or too short to tell anything.
+    pub fn read(files: &[impl AsRef<Path>]) -> Result<Self> {
+        let mut checks = Self::default();
+        for file in files {
+            let file = file.as_ref();
+            let table = Table::read(file)?;
+            let measured = if table.has_reference(Quantity::Force) {
+                dead_weights::measure(&table)?
+            } else if table.has_reference(Quantity::Displacement) {
+                rigid_bar::measure(&table)?
+            } else if table.has_reference(Quantity::Pressure) {
+                gauge::measure(&table)?
+            } else {
+                return Err(table.without_reference());
+            };
+            for m in measured {
+                checks.measured.retain(|old| old.fault != m.fault);
+                checks.measured.push(m);
+            }
+        }
+        Ok(checks)
+    }
+
+    /// Everything that was measured.
+    #[must_use]
+    pub fn measured(&self) -> &[Measured] {
+        &self.measured
+    }
+
+    /// Whether nothing was checked.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.measured.is_empty()
+    }
+}
+
+/// The recordings as a bench without these faults would have read them: the inverse of the readings above, exactly. A play is left
+/// in: how it shows in a loop depends on when the joint unloads.
+#[must_use]
+pub fn freed(campaign: &Campaign, faults: &[Measured]) -> Campaign {
+    let of = |name: BenchName, at: usize| -> f64 {
+        faults.iter().find(|m| m.fault == name).map_or(0.0, |m| m.parameters[at])
+    };
+    let (gain, thrust) = (of(BenchName::ForceGain, 0), of(BenchName::CrossTalk, 0));
+    let (scale, give) = (of(BenchName::GaugeGain, 0), of(BenchName::RigCompliance, 0));
+    let offset = of(BenchName::DisplacementOffset, 0);
+    let mut freed = campaign.clone();
+    for recording in &mut freed.recordings {
+        for p in &mut recording.pressure {
+            *p *= 1.0 + scale;
+        }
+        if let Some(force) = &mut recording.force {
+            for (f, p) in force.iter_mut().zip(&recording.pressure) {
+                *f = *f / (1.0 + gain) - thrust * p;
+            }
+            for (x, f) in recording.stroke.iter_mut().zip(force.iter()) {
+                // A pulling muscle draws the frame along.
+                *x += offset + give * f;
+            }
+        }
+    }
+    freed
+}

@@ -1,0 +1,66 @@
+//! Known weights on the load cell: its scale, and what the line's pressure adds to it.
+
+use super::Measured;
+use super::regression::{by_blocks, with_reference};
+use super::table::{Table, stays};
+use crate::bench::BenchName;
+use pam_data::error::Result;
+use pam_data::recording::Quantity;
+
+const CHECK: &str = "dead weights on the load cell";
+/// From this pressure on the line counts as under pressure, Pa.
+const PRESSED: f64 = 2e4;
+
+/// No weight is what is written on it: those of the workshop are wrong by up to this share (class M3 of OIML R 111).
+const WEIGHT_ERROR: f64 = 5e-4;
+
+/// Scale of the cell and thrust of the line.
+pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
+    let (read, weight) = (table.need(Quantity::Force)?, table.reference(Quantity::Force)?);
+    let pressure = table.find(Quantity::Pressure).filter(|p| {
+        let pressed = p.iter().filter(|p| **p > PRESSED).count();
+        pressed * 10 > p.len() && pressed * 10 < 9 * p.len()
+    });
+    let off: Vec<f64> = read.iter().zip(weight).map(|(r, w)| r - w).collect();
+    let mut columns = vec![weight.to_vec(), vec![1.0; read.len()]];
+    // The gauge's own noise must not make stays.
+    let line: Option<Vec<f64>> =
+        pressure.map(|p| p.iter().map(|p| if *p > PRESSED { 1.0 } else { 0.0 }).collect());
+    let block = line.as_ref().map_or_else(|| stays(&[weight]), |l| stays(&[weight, l]));
+    if let Some(p) = pressure {
+        columns.push(p.to_vec());
+    }
+    // A zero that wanders on meanwhile must not pass for what the line does.
+    if let Some(t) = table.find(Quantity::Time) {
+        let middle = 0.5 * (t.first().unwrap_or(&0.0) + t.last().unwrap_or(&0.0));
+        columns.push(t.iter().map(|t| t - middle).collect());
+    }
+    let Some(found) = by_blocks(&columns, &off, &block) else {
+        return Err(table.poor(
+            "the weights do not tell a scale from a zero, and how surely: hang at least three different ones, each for some seconds, all \
+             of them with the line under pressure too if the line was",
+        ));
+    };
+    let gain = found.values[0];
+    let gain_std = with_reference(found.deviations[0], WEIGHT_ERROR * (1.0 + gain));
+    let mut measured = vec![Measured {
+        fault: BenchName::ForceGain,
+        parameters: vec![gain, 0.0],
+        deviations: vec![Some(gain_std), None],
+        words: format!("the cell reads {:+.2} ± {:.2} % of the load", 100.0 * gain, 200.0 * gain_std),
+        check: CHECK,
+    }];
+    if pressure.is_some() {
+        // F = (1 + γ)(W + c P) + o
+        let thrust = found.values[2] / (1.0 + gain);
+        let std = found.deviations[2] / (1.0 + gain);
+        measured.push(Measured {
+            fault: BenchName::CrossTalk,
+            parameters: vec![thrust],
+            deviations: vec![Some(std)],
+            words: format!("the line pushes with {:+.3} ± {:.3} N per 100 kPa", 1e5 * thrust, 2e5 * std),
+            check: CHECK,
+        });
+    }
+    Ok(measured)
+}

@@ -1,0 +1,37 @@
+//! A reference gauge beside the bench's own: its scale. Its zero is a part of the dead band in every model, and stays there.
+
+use super::Measured;
+use super::regression::{by_blocks, with_reference};
+use super::table::{Table, stays};
+use crate::bench::BenchName;
+use pam_data::error::Result;
+use pam_data::recording::Quantity;
+
+/// The reference is wrong itself, by up to this share of its range (class 0.1 of EN 837-1).
+const REFERENCE_ERROR: f64 = 1e-3;
+
+/// Scale of the gauge.
+pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
+    let (read, known) = (table.need(Quantity::Pressure)?, table.reference(Quantity::Pressure)?);
+    let off: Vec<f64> = read.iter().zip(known).map(|(r, k)| r - k).collect();
+    let found = by_blocks(&[known.to_vec(), vec![1.0; read.len()]], &off, &stays(&[known]));
+    let Some(found) = found else {
+        return Err(table.poor(
+            "the pressures do not tell a scale from a zero: take at least three different ones, each for some seconds",
+        ));
+    };
+    // The law counts what is missing: the muscle has (1 + γ) of what is read.
+    let missing = 1.0 / (1.0 + found.values[0]) - 1.0;
+    let std = with_reference(found.deviations[0], REFERENCE_ERROR) / (1.0 + found.values[0]).powi(2);
+    Ok(vec![Measured {
+        fault: BenchName::GaugeGain,
+        parameters: vec![missing, 0.0],
+        deviations: vec![Some(std), None],
+        words: format!(
+            "the muscle has {:+.2} ± {:.2} % of what the gauge reads",
+            100.0 * missing,
+            200.0 * std
+        ),
+        check: "a reference gauge beside the bench's",
+    }])
+}

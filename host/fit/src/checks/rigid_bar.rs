@@ -1,0 +1,66 @@
+//! A bar that does not give, in the muscle's place: what is read as stroke is what frame and joints give.
+
+use super::Measured;
+use super::regression::by_blocks;
+use super::table::Table;
+use crate::bench::BenchName;
+use pam_data::error::Result;
+use pam_data::recording::Quantity;
+
+const CHECK: &str = "a rigid bar in the muscle's place";
+/// Below this share of the largest force the joint may hang within its play.
+const BEARS: f64 = 0.05;
+/// Stretches that count as one sample each.
+const STRETCHES: usize = 24;
+
+/// What the frame gives, the joint's play, and the stroke's zero.
+pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
+    let (read, known) = (table.need(Quantity::Displacement)?, table.reference(Quantity::Displacement)?);
+    let force = table.need(Quantity::Force)?;
+    let strongest = force.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
+    let bears: Vec<usize> = (0..read.len()).filter(|i| force[*i].abs() > BEARS * strongest).collect();
+    let pick = |of: &dyn Fn(usize) -> f64| bears.iter().map(|i| of(*i)).collect::<Vec<f64>>();
+    let off = pick(&|i| read[i] - known[i]);
+    // Rows left out between them would make unequal stretches of the rest: these go by the row's place in the whole.
+    let block: Vec<usize> = bears.iter().map(|i| i * STRETCHES / read.len()).collect();
+    let pulled = bears.iter().filter(|i| force[**i] > 0.0).count();
+    let both = pulled * 5 > bears.len() && pulled * 5 < 4 * bears.len();
+    let mut columns = vec![pick(&|i| -force[i]), vec![-1.0; bears.len()]];
+    if both {
+        columns.push(pick(&|i| -0.5 * force[i].signum()));
+    }
+    let Some(found) = by_blocks(&columns, &off, &block) else {
+        return Err(table.poor(
+            "the force on the bar hardly changes: pull and push at it, slowly, up to the muscle's force",
+        ));
+    };
+    let (give, give_std) = (found.values[0].max(0.0), found.deviations[0]);
+    let mut measured = vec![Measured {
+        fault: BenchName::RigCompliance,
+        // What gives under load gives at the turns as well.
+        parameters: vec![give, give],
+        deviations: vec![Some(give_std), None],
+        words: format!("the frame gives {:.2} ± {:.2} µm per newton", 1e6 * found.values[0], 2e6 * give_std),
+        check: CHECK,
+    }];
+    let (zero, zero_std) = (found.values[1], found.deviations[1]);
+    if both {
+        let (play, play_std) = (found.values[2].max(0.0), found.deviations[2]);
+        measured.push(Measured {
+            fault: BenchName::Backlash,
+            // How softly a braid is taken along behind the play a bar does not show.
+            parameters: vec![1.0, play, 0.1],
+            deviations: vec![None, Some(play_std), None],
+            words: format!("the joint has a play of {:.3} ± {:.3} mm", 1e3 * found.values[2], 2e3 * play_std),
+            check: CHECK,
+        });
+        measured.push(Measured {
+            fault: BenchName::DisplacementOffset,
+            parameters: vec![zero],
+            deviations: vec![Some(zero_std)],
+            words: format!("the stroke reads {:+.3} ± {:.3} mm too little", 1e3 * zero, 2e3 * zero_std),
+            check: CHECK,
+        });
+    }
+    Ok(measured)
+}

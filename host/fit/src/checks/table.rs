@@ -1,0 +1,141 @@
+//! The table of a check: columns by name, in SI units.
+
+use std::path::{Path, PathBuf};
+
+use pam_data::counted::counted;
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::file_kind::FileKind;
+use pam_data::recording::{Named, Quantity, named};
+
+/// What a column's name begins with when it holds what is known.
+const REFERENCE: &str = "reference_";
+/// Fewest rows from which anything is measured.
+const FEWEST: usize = 20;
+
+/// A check, read.
+pub(super) struct Table {
+    file: PathBuf,
+    /// Quantity, whether it is the reference, values in SI.
+    columns: Vec<(Quantity, bool, Vec<f64>)>,
+}
+
+impl Table {
+    /// Reads a comma- or tab-separated table with one header line.
+    pub(super) fn read(file: &Path) -> Result<Self> {
+        let text = FileKind::Check.read_text(file)?;
+        let tabs = text.lines().next().is_some_and(|header| header.contains('\t'));
+        let mut reader = csv::ReaderBuilder::new()
+            .delimiter(if tabs { b'\t' } else { b',' })
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
+        let damaged = |e: &csv::Error| {
+            let line = e.position().map_or(1, csv::Position::line);
+            Error::new(DataCode::CheckInvalid, format!("line {line}: {e}")).file(file)
+        };
+        let header = reader.headers().map_err(|e| damaged(&e))?.clone();
+        let mut columns = Vec::new();
+        let mut wanted = Vec::new();
+        for (at, name) in header.iter().enumerate() {
+            let (reference, name) = name.strip_prefix(REFERENCE).map_or((false, name), |n| (true, n));
+            match named(name) {
+                Named::Known(quantity, unit) => {
+                    wanted.push((at, unit));
+                    columns.push((quantity, reference, Vec::new()));
+                }
+                Named::UnknownUnit(quantity) => {
+                    return Err(Error::new(
+                        DataCode::CheckInvalid,
+                        format!("the column `{}` is in no unit that is known", &header[at]),
+                    )
+                    .file(file)
+                    .help(format!("{} is in {}", quantity.name(), quantity.unit_list())));
+                }
+                Named::Other => {}
+            }
+        }
+        for row in reader.records() {
+            let row = row.map_err(|e| damaged(&e))?;
+            let line = row.position().map_or(0, csv::Position::line);
+            for ((at, unit), column) in wanted.iter().zip(&mut columns) {
+                let value: Option<f64> = row[*at].parse().ok().filter(|v: &f64| v.is_finite());
+                let Some(value) = value else {
+                    return Err(Error::new(
+                        DataCode::CheckInvalid,
+                        format!("line {line}: `{}` is no number for `{}`", &row[*at], &header[*at]),
+                    )
+                    .file(file));
+                };
+                column.2.push(value * unit.scale + unit.offset);
+            }
+        }
+        let table = Self { file: file.to_owned(), columns };
+        let rows = table.columns.first().map_or(0, |c| c.2.len());
+        if rows < FEWEST {
+            return Err(table.poor(format!("{}, and at least {FEWEST} are needed", counted(rows, "row"))));
+        }
+        Ok(table)
+    }
+
+    /// A column, if there is one.
+    pub(super) fn find(&self, quantity: Quantity) -> Option<&[f64]> {
+        self.columns.iter().find(|c| c.0 == quantity && !c.1).map(|c| c.2.as_slice())
+    }
+
+    /// A column that the check cannot do without.
+    pub(super) fn need(&self, quantity: Quantity) -> Result<&[f64]> {
+        self.find(quantity).ok_or_else(|| self.missing("", quantity))
+    }
+
+    /// The known quantity.
+    pub(super) fn reference(&self, quantity: Quantity) -> Result<&[f64]> {
+        let found = self.columns.iter().find(|c| c.0 == quantity && c.1);
+        found.map(|c| c.2.as_slice()).ok_or_else(|| self.missing(REFERENCE, quantity))
+    }
+
+    /// Whether the known quantity is this one.
+    pub(super) fn has_reference(&self, quantity: Quantity) -> bool {
+        self.reference(quantity).is_ok()
+    }
+
+    fn missing(&self, prefix: &str, quantity: Quantity) -> Error {
+        let name = quantity.name();
+        Error::new(DataCode::RecordingMissingColumn, format!("this check has no column `{prefix}{name}_`"))
+            .file(&self.file)
+            .help(format!("name it with its unit: {}", quantity.unit_list()))
+    }
+
+    /// The file is no check.
+    pub(super) fn without_reference(&self) -> Error {
+        Error::new(DataCode::CheckInvalid, "there is no column of what is known")
+            .file(&self.file)
+            .help("a check has `reference_force_N`, `reference_displacement_mm` or `reference_pressure_kPa` beside the reading")
+    }
+
+    /// The check tells nothing.
+    pub(super) fn poor(&self, why: impl Into<String>) -> Error {
+        Error::new(DataCode::CheckInvalid, why.into()).file(&self.file)
+    }
+}
+
+/// Numbers the stretches of rows over which all of these quantities stay within a hundredth of their range.
+pub(super) fn stays(of: &[&[f64]]) -> Vec<usize> {
+    let n = of.first().map_or(0, |c| c.len());
+    let near: Vec<f64> = of
+        .iter()
+        .map(|c| {
+            let (low, high) =
+                c.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+            0.01 * (high - low)
+        })
+        .collect();
+    let mut stay = 0;
+    let mut first = 0;
+    (0..n)
+        .map(|i| {
+            if of.iter().zip(&near).any(|(c, near)| (c[i] - c[first]).abs() > *near) {
+                (stay, first) = (stay + 1, i);
+            }
+            stay
+        })
+        .collect()
+}

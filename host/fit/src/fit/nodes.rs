@@ -1,0 +1,204 @@
+//! Where the curves over pressure get their nodes: at the tested levels, or spread over a continuous range.
+
+use model_core::spline::MAX_NODES;
+
+use super::points::{Points, Range};
+
+/// The pressures of a campaign.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pressures {
+    /// The tested levels, or the middle of each interval of a continuous range, Pa, increasing.
+    pub levels: Vec<f64>,
+    /// Whether `levels` are pressures that were held; otherwise the pressure moved through the whole range.
+    pub held: bool,
+    /// The curves' nodes, Pa: the levels, and guards beyond them where the controller will need values.
+    pub nodes: Vec<f64>,
+}
+
+/// Intervals that a continuous range is cut into.
+const INTERVALS: usize = 8;
+const BINS: usize = 1024;
+
+/// Looks at how the rows are spread over pressure. `max_pressure` is the highest that a controller may command.
+#[must_use]
+pub fn pressures(points: &Points, max_pressure: f64) -> Pressures {
+    let range = points.pressure;
+    let levels = held_levels(points);
+    if let Some(levels) = levels {
+        let nodes = guarded(&levels, max_pressure);
+        return Pressures { levels, held: true, nodes };
+    }
+    let step = range.span() / INTERVALS as f64;
+    let levels = (0..INTERVALS).map(|i| range.low + (i as f64 + 0.5) * step).collect();
+    // One node more than intervals: the ends of the range are nodes.
+    let inner: Vec<f64> = (0..=INTERVALS).map(|i| range.low + i as f64 * step).collect();
+    Pressures { levels, held: false, nodes: guarded(&inner, max_pressure) }
+}
+
+/// Half-widths that a level may have, as shares of the range: the steps between few pressures may be small against the ripple
+/// of the regulator and the noise of the sensor, which are what makes a level wide.
+const HALF_WIDTHS: [f64; 4] = [0.0075, 0.015, 0.03, 0.06];
+
+/// The pressures that were held, if nearly all rows lie at a few of them.
+fn held_levels(points: &Points) -> Option<Vec<f64>> {
+    let range = points.pressure;
+    // A regulator's ripple is not a range of pressures.
+    if range.span() <= 0.02 * range.high.abs().max(range.low.abs()) {
+        let rows = points.rows.max(1) as f64;
+        return Some(vec![points.list.iter().map(|p| f64::from(p.rows) * p.pressure).sum::<f64>() / rows]);
+    }
+    let mut rows = vec![0.0; BINS];
+    for p in &points.list {
+        rows[bin(range, p.pressure)] += f64::from(p.rows);
+    }
+    HALF_WIDTHS.into_iter().find_map(|share| {
+        let half = (BINS as f64 * share) as usize;
+        let peaks = peaks(&rows, half)?;
+        let mut sums = vec![(0.0, 0.0); peaks.len()];
+        for p in &points.list {
+            let b = bin(range, p.pressure);
+            // Twice as far as a level is wide, so that its mean is not that of the densest part alone.
+            let nearest = (0..peaks.len()).min_by_key(|i| peaks[*i].abs_diff(b));
+            if let Some(i) = nearest.filter(|i| peaks[*i].abs_diff(b) <= 2 * half) {
+                let n = f64::from(p.rows);
+                sums[i] = (sums[i].0 + n * p.pressure, sums[i].1 + n);
+            }
+        }
+        let mut levels: Vec<f64> = sums.iter().map(|(sum, n)| sum / n).collect();
+        levels.sort_by(f64::total_cmp);
+        Some(levels)
+    })
+}
+
+fn bin(range: Range, pressure: f64) -> usize {
+    (((pressure - range.low) / range.span() * BINS as f64) as usize).min(BINS - 1)
+}
+
+/// Where rows crowd within `half` bins, if nearly all of them do: `rows` counts them by bin of pressure.
+fn peaks(rows: &[f64], half: usize) -> Option<Vec<usize>> {
+    let total: f64 = rows.iter().sum();
+    let within = |i: usize| rows[i.saturating_sub(half)..(i + half + 1).min(BINS)].iter().sum::<f64>();
+    let near: Vec<f64> = (0..BINS).map(within).collect();
+    let width = 2 * half + 1;
+    // A level stands out of its surroundings, however few of all rows it holds: short strokes at low pressure are a level too.
+    let stands_out = |i: usize| {
+        let around = [i.checked_sub(2 * width), i.checked_sub(width), Some(i + width), Some(i + 2 * width)];
+        let beside: f64 = around.into_iter().flatten().filter_map(|k| near.get(k)).sum::<f64>() / 4.0;
+        near[i] > 4.0 * beside && near[i] > (0.003 * total).max(8.0)
+    };
+    let mut order: Vec<usize> = (0..BINS).filter(|i| stands_out(*i)).collect();
+    order.sort_by(|a, b| near[*b].total_cmp(&near[*a]).then(a.cmp(b)));
+    let mut peaks: Vec<usize> = Vec::new();
+    for i in order {
+        if peaks.iter().all(|p| p.abs_diff(i) > width) {
+            peaks.push(i);
+        }
+    }
+    // Ramps between levels are welcome data, but do not make the levels disappear.
+    let held: f64 = peaks.iter().map(|i| near[*i]).sum();
+    (!peaks.is_empty() && peaks.len() <= MAX_NODES - 2 && held >= 0.8 * total).then_some(peaks)
+}
+
+/// Nodes beyond the tested pressures: down to where the muscle begins to pull, up to what may be commanded. The evaluator
+/// holds a curve's end value outside its nodes; with a guard the smoothness penalty continues the trend instead.
+fn guarded(tested: &[f64], max_pressure: f64) -> Vec<f64> {
+    let mut nodes = tested.to_vec();
+    let (Some(&low), Some(&high)) = (tested.first(), tested.last()) else { return nodes };
+    if tested.len() < 2 {
+        return nodes;
+    }
+    let step = (high - low) / (tested.len() - 1) as f64;
+    let guard = (low - 2.0 * step).max(0.3 * low);
+    if low > 0.1 * high && low - guard > 0.3 * step && nodes.len() < MAX_NODES {
+        nodes.insert(0, guard);
+    }
+    if max_pressure > high + 0.3 * step && nodes.len() < MAX_NODES {
+        nodes.push(max_pressure.min(high + 2.0 * step));
+    }
+    nodes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::points::points;
+    use pam_data::recording::dropouts::Screened;
+    use pam_data::recording::segment::Motion;
+    use pam_data::recording::{Campaign, Recording};
+
+    fn at(pressures: Vec<f64>) -> Points {
+        let n = pressures.len();
+        let recording = Recording {
+            time: (0..n).map(|i| i as f64).collect(),
+            stroke: (0..n).map(|i| 1e-3 * (i as f64 * 0.1).sin()).collect(),
+            force: Some(vec![1.0; n]),
+            pressure: pressures,
+            ..Recording::default()
+        };
+        points(
+            &Screened::of(&Campaign::new(vec![recording])),
+            &[Motion { direction: vec![1; n], ..Motion::default() }],
+        )
+    }
+
+    #[test]
+    fn levels_with_ripple_and_ramps_between_are_found() {
+        let levels = [207e3, 276e3, 345e3, 414e3, 483e3, 552e3];
+        let mut p = Vec::new();
+        for (k, level) in levels.iter().enumerate() {
+            p.extend((0..2000).map(|i| level + 800.0 * (f64::from(i) * 0.7).sin()));
+            if k + 1 < levels.len() {
+                p.extend((0..50).map(|i| level + 69e3 / 50.0 * f64::from(i)));
+            }
+        }
+        let found = pressures(&at(p), 600e3);
+        assert!(found.held);
+        assert_eq!(found.levels.len(), 6);
+        for (f, l) in found.levels.iter().zip(levels) {
+            assert!((f - l).abs() < 500.0, "{f} {l}");
+        }
+        assert_eq!(found.nodes.len(), 8, "one guard below, one above: {:?}", found.nodes);
+    }
+
+    #[test]
+    fn levels_close_to_one_another_are_found_beside_ripple_and_noise() {
+        // Two pressures 60 kPa apart under ±1.5 kPa of ripple; six under noise of 4 kPa, which is what a poor sensor reads.
+        let rippled = |level: f64| (0..3000).map(move |i| level + 1500.0 * (f64::from(i) * 0.044).sin());
+        let two = pressures(&at(rippled(300e3).chain(rippled(360e3)).collect()), 400e3);
+        assert!(two.held, "{two:?}");
+        assert_eq!(two.levels.len(), 2);
+        let noisy = |level: f64| {
+            // A sum of incommensurate waves is about normal.
+            (0..3000).map(move |i| {
+                let wave = |w: f64| (f64::from(i) * w + level).sin();
+                level + 4e3 * (wave(0.7) + wave(1.9) + wave(2.6) + wave(1.23)) / 2f64.sqrt()
+            })
+        };
+        let levels = [207e3, 276e3, 345e3, 414e3, 483e3, 552e3];
+        let six = pressures(&at(levels.into_iter().flat_map(noisy).collect()), 620e3);
+        assert!(six.held, "{six:?}");
+        assert_eq!(six.levels.len(), 6);
+        for (found, level) in six.levels.iter().zip(levels) {
+            assert!((found - level).abs() < 500.0, "{found} {level}");
+        }
+    }
+
+    #[test]
+    fn a_slow_wave_of_pressure_is_a_range() {
+        let wave = (0..5000).map(|i| 380e3 + 170e3 * (f64::from(i) * 0.01).sin());
+        assert!(!pressures(&at(wave.collect()), 620e3).held);
+    }
+
+    #[test]
+    fn a_staircase_without_held_levels_is_a_range() {
+        let found = pressures(&at((0..5000).map(|i| 8e3 + 120.0 * f64::from(i)).collect()), 620e3);
+        assert!(!found.held);
+        assert_eq!((found.levels.len(), found.nodes.len()), (INTERVALS, INTERVALS + 1));
+    }
+
+    #[test]
+    fn one_pressure_is_one_level() {
+        let found = pressures(&at((0..500).map(|i| 3e5 + 900.0 * f64::from(i).sin()).collect()), 4e5);
+        assert_eq!((found.levels.len(), found.nodes.len(), found.held), (1, 1, true));
+    }
+}

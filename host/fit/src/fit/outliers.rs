@@ -1,0 +1,106 @@
+//! Readings that do not belong to the rest: found, taken out, and listed.
+
+use pam_data::recording::Campaign;
+
+use super::points::{Points, median};
+use super::prepared::Prepared;
+use super::screen::{Outlier, Use};
+
+/// Finds single rows that jump out of their piece and takes them out of its mean.
+///
+/// Only pieces whose own spread is far above that of the others are looked at row by row. Strays beside a turn of the motion are
+/// rows of the other branch, whose turn the stroke's noise hides by a row or two: they leave the mean too, but are no odd readings.
+pub fn despike(campaign: &Campaign, points: &mut Points) -> Vec<Outlier> {
+    let mut spreads: Vec<f64> =
+        points.list.iter().filter(|p| p.rows >= 3).map(|p| p.force_range.1 - p.force_range.0).collect();
+    let typical = median(&mut spreads).max(4.0 * points.row_noise);
+    let mut found = Vec::new();
+    if typical <= 0.0 {
+        return found;
+    }
+    for index in 0..points.list.len() {
+        let turns = points.beside_turn(index);
+        let p = &mut points.list[index];
+        if p.dropout || p.rows < 3 || p.force_range.1 - p.force_range.0 < 6.0 * typical {
+            continue;
+        }
+        let Some(force) = campaign.recordings.get(p.recording as usize).and_then(|r| r.force.as_ref()) else {
+            continue;
+        };
+        let (first, last) = (p.first_row as usize, (p.first_row + p.rows) as usize);
+        let Some(rows) = force.get(first..last) else { continue };
+        let middle = median(&mut rows.to_vec());
+        let stray: Vec<usize> =
+            (0..rows.len()).filter(|i| (rows[*i] - middle).abs() > 4.0 * typical).collect();
+        // Many strays are a real jump, not spikes.
+        if stray.is_empty() || stray.len() * 5 > rows.len() {
+            continue;
+        }
+        let kept = rows.iter().enumerate().filter(|(i, _)| !stray.contains(i)).map(|(_, f)| *f);
+        p.force = kept.sum::<f64>() / (rows.len() - stray.len()) as f64;
+        let others_before =
+            if turns.0 { stray.iter().zip(0..).take_while(|(s, k)| **s == *k).count() } else { 0 };
+        let to_the_end = stray.iter().rev().zip((0..rows.len()).rev());
+        let others_after = if turns.1 { to_the_end.take_while(|(s, k)| **s == *k).count() } else { 0 };
+        for &i in &stray[others_before..stray.len() - others_after] {
+            found.push(Outlier {
+                recording: p.recording,
+                row: (first + i) as u32,
+                time: campaign.recordings[p.recording as usize].time[first + i],
+                force: rows[i],
+                off: rows[i] - middle,
+            });
+        }
+    }
+    found
+}
+
+impl Prepared {
+    /// Points far off the model for a moment only: spikes. A long stretch off the model is a misfit, and stays.
+    pub(super) fn find_outliers(&mut self) {
+        let residuals = self.design.residuals(&self.parameters);
+        // A point of few rows scatters as rows do, also where most points are means over many; of a million rows of normal noise none
+        // lies beyond eight standard deviations.
+        let within = self.points.scatter_within();
+        let scatter: Vec<f64> = self.scatter(&residuals).iter().map(|s| s.hypot(within)).collect();
+        let group = |i: usize| self.design.bins[self.design.rows[i].bin as usize].group as usize;
+        let force = self.points.force.span();
+        let far = |i: usize| {
+            residuals[i].abs() > (8.0 * scatter[group(i)]).max(0.01 * force) && self.used[i] == Use::Fitted
+        };
+        let n = self.used.len();
+        let mut i = 0;
+        let mut marked = Vec::new();
+        while i < n {
+            if !far(i) {
+                i += 1;
+                continue;
+            }
+            let start = i;
+            while i < n && far(i) {
+                i += 1;
+            }
+            // The neighbours on both sides must be well: then it is a spike of the reading.
+            let calm = |k: usize| residuals[k].abs() < 4.0 * scatter[group(k)];
+            if i - start <= 3 && start > 0 && i < n && calm(start - 1) && calm(i) {
+                // Beside a turn they are rows of the other branch, not odd readings.
+                let turn = self.points.beside_turn(start).0 || self.points.beside_turn(i - 1).1;
+                marked.extend((start..i).map(|k| (k, if turn { Use::NearTurn } else { Use::Outlier })));
+            }
+        }
+        for (i, what) in marked {
+            self.used[i] = what;
+            if what == Use::NearTurn {
+                continue;
+            }
+            let p = &self.points.list[i];
+            self.outliers.push(Outlier {
+                recording: p.recording,
+                row: p.first_row,
+                time: p.time,
+                force: p.force,
+                off: residuals[i],
+            });
+        }
+    }
+}

@@ -1,0 +1,276 @@
+//! Rows to points: means over short pieces of the motion, in time order.
+//!
+//! Ten million rows hold no more about a quasi-static force than some ten thousand means over pieces so short that
+//! pressure and stroke hardly change within. A piece ends where the direction turns, where stroke or pressure has moved on
+//! by a small share of their ranges, or where it holds enough rows. One pass, linear in rows; memory is that of the points.
+
+use pam_data::recording::dropouts::Screened;
+use pam_data::recording::segment::Motion;
+use pam_data::recording::{Campaign, Recording, white_noise};
+
+/// A mean over consecutive rows of one recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// The recording it comes from, counted as in the campaign.
+    pub recording: u32,
+    /// Its first row in that recording.
+    pub first_row: u32,
+    /// How many rows it holds.
+    pub rows: u32,
+    /// The half-stroke it belongs to, counted through the campaign: rows between two turns.
+    pub block: u32,
+    /// +1 shortening or filling, −1 lengthening or emptying, 0 unknown.
+    pub direction: f64,
+    /// s.
+    pub time: f64,
+    /// Pa.
+    pub pressure: f64,
+    /// m.
+    pub stroke: f64,
+    /// N.
+    pub force: f64,
+    /// The lowest and the highest force among its rows, N: spikes show here.
+    pub force_range: (f64, f64),
+    /// Distance from the last turn, or from the recording's beginning, in shares of the ranges of stroke and pressure.
+    pub since_turn: f64,
+    /// Whether the gauge fell out there: the pressure is bridged.
+    pub dropout: bool,
+}
+
+/// The smallest and the largest value of a column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// Smallest.
+    pub low: f64,
+    /// Largest.
+    pub high: f64,
+}
+
+impl Range {
+    /// Of numbers; `0..0` of none.
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
+        let mut range = Self { low: f64::INFINITY, high: f64::NEG_INFINITY };
+        for v in values {
+            range.low = range.low.min(v);
+            range.high = range.high.max(v);
+        }
+        if range.low <= range.high { range } else { Self { low: 0.0, high: 0.0 } }
+    }
+
+    /// `high − low`.
+    #[must_use]
+    pub fn span(&self) -> f64 {
+        self.high - self.low
+    }
+}
+
+/// All points of a campaign.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Points {
+    /// In time order.
+    pub list: Vec<Point>,
+    /// Rows behind them.
+    pub rows: usize,
+    /// Half-strokes.
+    pub blocks: u32,
+    /// Of pressure, Pa.
+    pub pressure: Range,
+    /// Of stroke, m.
+    pub stroke: Range,
+    /// Of force, N.
+    pub force: Range,
+    /// Standard deviation of the force from row to row beside its trend, N.
+    pub row_noise: f64,
+    /// Standard deviation of a single reading of the stroke, m.
+    pub stroke_noise: f64,
+}
+
+impl Points {
+    /// How far single rows scatter about their point's mean, N, by the median: noise that is correlated over some rows shows here
+    /// and not in `row_noise`. 0 where points hold too few rows to tell.
+    #[must_use]
+    pub fn scatter_within(&self) -> f64 {
+        // The range of n normal values is about 2 √(2 ln n) standard deviations.
+        let deviation =
+            |p: &Point| (p.force_range.1 - p.force_range.0) / (2.0 * (2.0 * f64::from(p.rows).ln()).sqrt());
+        median(&mut self.list.iter().filter(|p| p.rows >= 4).map(deviation).collect::<Vec<_>>())
+    }
+
+    /// Whether a turn of the motion lies just before and just after a point.
+    #[must_use]
+    pub fn beside_turn(&self, i: usize) -> (bool, bool) {
+        let here = &self.list[i];
+        let turns = |there: Option<&Point>| there.is_some_and(|p| p.block != here.block);
+        (turns(i.checked_sub(1).and_then(|k| self.list.get(k))), turns(self.list.get(i + 1)))
+    }
+}
+
+/// About how many points a campaign becomes when its motion is slow against its sampling.
+const AIM: usize = 16_000;
+/// A piece ends after this share of the range of stroke.
+const STROKE_STEP: f64 = 1.0 / 500.0;
+/// A piece ends after this share of the range of pressure.
+const PRESSURE_STEP: f64 = 1.0 / 100.0;
+/// Or after so many standard deviations of a single reading, where these are more: noise must not cut pieces short, or there would be
+/// as many points as rows.
+const NOISE_STEP: f64 = 6.0;
+
+/// Cuts a campaign into points; a dropout of the gauge shares none with what is beside it. `motions` are those of its recordings;
+/// recordings without a force, and those in another unit than the rest, are passed over.
+#[must_use]
+pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
+    let campaign = screened.campaign.as_ref();
+    let taken = |index: usize| campaign.recordings[index].force.is_some() && !screened.stands_apart(index);
+    let with_force = || (0..campaign.recordings.len()).filter(|i| taken(*i)).map(|i| &campaign.recordings[i]);
+    let rows: usize = with_force().map(Recording::len).sum();
+    let pressure = Range::of(with_force().flat_map(|r| r.pressure.iter().copied()));
+    let stroke = Range::of(with_force().flat_map(|r| r.stroke.iter().copied()));
+    let force = Range::of(with_force().flat_map(|r| r.force.iter().flatten().copied()));
+    let most_rows = (rows / AIM).max(1) as u32;
+    let noise = |of: fn(&Recording) -> &[f64]| with_force().map(|r| white_noise(of(r))).fold(0.0, f64::max);
+    let stroke_noise = noise(|r| &r.stroke);
+    let stroke_step = (stroke.span() * STROKE_STEP).max(NOISE_STEP * stroke_noise);
+    let pressure_step = (pressure.span() * PRESSURE_STEP).max(NOISE_STEP * noise(|r| &r.pressure));
+    let per_stroke = if stroke.span() > 0.0 { 1.0 / stroke.span() } else { 0.0 };
+    let per_pressure = if pressure.span() > 0.0 { 1.0 / pressure.span() } else { 0.0 };
+    let mut list: Vec<Point> = Vec::with_capacity(rows.min(2 * AIM));
+    let mut block = 0_u32;
+    for (index, recording) in campaign.recordings.iter().enumerate() {
+        let force = recording.force.as_ref().filter(|_| taken(index));
+        let (Some(f), Some(motion)) = (force, motions.get(index)) else { continue };
+        let directions = &motion.direction;
+        let (p, x, t) = (&recording.pressure, &recording.stroke, &recording.time);
+        let n = recording.len().min(directions.len());
+        // What the muscle did before is not recorded: a beginning is as good as a turn, and may be one.
+        let mut turn = 0;
+        let mut start = 0;
+        let mut dropouts = screened.of_recording(index).peekable();
+        while start < n {
+            while dropouts.next_if(|d| d.end <= start).is_some() {}
+            let dropout = dropouts.peek().is_some_and(|d| d.start <= start);
+            let limit = dropouts.peek().map_or(n, |d| if dropout { d.end } else { d.start }).min(n);
+            let direction = directions[start];
+            let mut sums = [0.0; 4];
+            let mut range = (f64::INFINITY, f64::NEG_INFINITY);
+            let mut end = start;
+            while end < limit
+                && directions[end] == direction
+                && ((end - start) as u32) < most_rows
+                && (x[end] - x[start]).abs() <= stroke_step
+                && (p[end] - p[start]).abs() <= pressure_step
+            {
+                for (sum, v) in sums.iter_mut().zip([t[end], p[end], x[end], f[end]]) {
+                    *sum += v;
+                }
+                range = (range.0.min(f[end]), range.1.max(f[end]));
+                end += 1;
+            }
+            let count = (end - start) as f64;
+            let [time, pressure, stroke, force] = sums.map(|s| s / count);
+            let since_turn =
+                (stroke - x[turn]).abs() * per_stroke + (pressure - p[turn]).abs() * per_pressure;
+            list.push(Point {
+                recording: index as u32,
+                first_row: start as u32,
+                rows: (end - start) as u32,
+                block,
+                direction: f64::from(direction),
+                time,
+                pressure,
+                stroke,
+                force,
+                force_range: range,
+                since_turn,
+                dropout,
+            });
+            if end < n && directions[end] != direction {
+                block += 1;
+                turn = end.saturating_sub(1);
+            }
+            start = end;
+        }
+        block += 1;
+    }
+    let row_noise = row_noise(campaign, rows);
+    Points { list, rows, blocks: block, pressure, stroke, force, row_noise, stroke_noise }
+}
+
+/// From the median size of second differences of the force, of at most some 40,000 rows spread evenly: trends drop out, and
+/// a few spikes or turns do not matter. For white noise the second difference has variance 6 σ².
+fn row_noise(campaign: &Campaign, rows: usize) -> f64 {
+    let stride = (rows / 40_000).max(1);
+    let mut seconds: Vec<f64> = campaign
+        .recordings
+        .iter()
+        .filter_map(|r| r.force.as_deref())
+        .flat_map(|f| f.windows(3).step_by(stride).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()))
+        .collect();
+    median(&mut seconds) / (0.6745 * 6.0_f64.sqrt())
+}
+
+/// The median, by partial sorting; 0 of none.
+pub fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn loops(rows: usize) -> (Campaign, Vec<Motion>) {
+        let phase = |i: usize| (i as f64 / rows as f64 * 6.0).fract();
+        let stroke: Vec<f64> = (0..rows).map(|i| 3e-3 * (1.0 - (1.0 - 2.0 * phase(i)).abs())).collect();
+        let direction = (0..rows).map(|i| if phase(i) < 0.5 { 1 } else { -1 }).collect();
+        let recording = Recording {
+            time: (0..rows).map(|i| i as f64 * 1e-3).collect(),
+            pressure: vec![3e5; rows],
+            force: Some(stroke.iter().map(|x| 40.0 - 1e4 * x).collect()),
+            stroke,
+            ..Recording::default()
+        };
+        (Campaign::new(vec![recording]), vec![Motion { direction, ..Motion::default() }])
+    }
+
+    #[test]
+    fn many_rows_become_few_points_with_the_same_content() {
+        let (campaign, motions) = loops(400_000);
+        let points = points(&Screened::of(&campaign), &motions);
+        assert!(points.list.len() < 30_000, "{}", points.list.len());
+        assert_eq!(points.list.iter().map(|p| p.rows as usize).sum::<usize>(), 400_000);
+        assert_eq!(points.blocks, 12);
+        let mean = points.list.iter().map(|p| f64::from(p.rows) * p.force).sum::<f64>() / 4e5;
+        assert!((mean - 25.0).abs() < 1e-3, "{mean}");
+        for p in &points.list {
+            assert!((p.force - (40.0 - 1e4 * p.stroke)).abs() < 1e-9, "means of a line lie on it");
+        }
+        assert!(points.row_noise < 1e-6);
+    }
+
+    #[test]
+    fn noise_of_the_stroke_makes_no_more_points() {
+        let (mut campaign, motions) = loops(400_000);
+        let quiet = points(&Screened::of(&campaign), &motions).list.len();
+        let mut state = 1_u32;
+        for x in &mut campaign.recordings[0].stroke {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            // Uniform over a step of the stroke on either side.
+            *x += 6e-6 * (f64::from(state >> 8) / f64::from(1 << 23) - 1.0);
+        }
+        let noisy = points(&Screened::of(&campaign), &motions).list.len();
+        assert!(noisy < quiet + quiet / 10, "{noisy} points instead of {quiet}");
+    }
+
+    #[test]
+    fn distance_from_a_turn_starts_at_the_turn() {
+        let (campaign, motions) = loops(6000);
+        let points = points(&Screened::of(&campaign), &motions);
+        let first = points.list.iter().position(|p| p.direction < 0.0).expect("a way back");
+        assert!((points.list[first - 1].since_turn - 1.0).abs() < 0.01);
+        assert!(points.list[first].since_turn < 0.01);
+        assert!(points.list[first + 100].since_turn > 0.15);
+    }
+}

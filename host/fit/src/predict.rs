@@ -1,0 +1,332 @@
+//! A table's force on recordings: the base model, the effects it carries, and the corrections of the bench.
+//!
+//! Effects have a memory, which runs through the recordings in their order: earlier files are the muscle's history. Over a pause
+//! of known length the memories fade as they do in time; an unknown pause counts as a minute.
+
+use std::borrow::Cow;
+use std::fmt::Write;
+use std::fs;
+
+use model_core::effects::{Chain, Memory};
+use model_core::muscle::Muscle;
+use model_core::table::MuscleTable;
+use model_core::units::{Length, Pressure};
+use rayon::prelude::*;
+
+use crate::band::{ForceBand, HALF_95};
+use crate::bench::Candidate;
+use crate::table_file::TableFile;
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::possible::Contractions;
+use pam_data::recording::dropouts::Screened;
+use pam_data::recording::segment::Motion;
+use pam_data::recording::{Campaign, Follower, Recording, has_decimal_commas};
+
+/// What a table says of a campaign.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// Per recording, in the campaign's order.
+    pub recordings: Vec<Predicted>,
+    /// Root mean square of `F − F_model` over all rows that have a force, N; `None` where none has.
+    pub rms: Option<f64>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// What a table says of one recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Predicted {
+    /// The force that the load cell would read, N, per row.
+    pub force: Vec<f64>,
+    /// Root mean square of `F − F_model` where it was read rightly, N; `None` without a force column, and where the
+    /// whole recording is in another unit than the rest ([`pam_data::recording::other_unit`]).
+    pub rms: Option<f64>,
+    /// How uncertain it is, where that was asked for and the table knows.
+    pub bands: Option<Bands>,
+}
+
+/// The uncertainty of a predicted recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bands {
+    /// Half the width of the 95 % interval of the base model's force, N, per row: what the table's numbers leave open.
+    pub half: Vec<f64>,
+    /// Its mean, N.
+    pub mean: f64,
+    /// The share of measured forces within the 95 % interval of single readings, which adds what the table does not describe;
+    /// `None` without a force column.
+    pub inside: Option<f64>,
+}
+
+/// Runs a table over a campaign. What was read wrongly ([`pam_data::recording::dropouts`]) is bridged.
+///
+/// # Errors
+/// [`DataCode::TableInvalid`] where the table cannot be evaluated, or names a correction that this program does not know;
+/// [`DataCode::RecordingOutOfRange`] where a recording has a length that the table's braid cannot have.
+pub fn predict(file: &TableFile, campaign: &Campaign) -> Result<Prediction> {
+    run(file, campaign, None)
+}
+
+/// As [`predict`], with the bands of the forces.
+///
+/// # Errors
+/// As [`predict`].
+pub fn predict_with_bands(file: &TableFile, campaign: &Campaign) -> Result<Prediction> {
+    run(file, campaign, ForceBand::of(file).as_ref())
+}
+
+fn bands(band: &ForceBand, recording: &Recording, motion: &Motion, force: &[f64]) -> Bands {
+    let at = |i: usize| (recording.pressure[i], recording.stroke[i], f64::from(motion.direction[i]));
+    let stds = (0..recording.len()).into_par_iter().map(|i| {
+        let (pressure, stroke, direction) = at(i);
+        band.std(pressure, stroke, direction)
+    });
+    let stds: Vec<f64> = stds.collect();
+    let inside = recording.force.as_ref().map(|measured| {
+        let near = |i: &usize| (measured[*i] - force[*i]).abs() <= HALF_95 * band.with_scatter(stds[*i]);
+        (0..measured.len()).filter(near).count() as f64 / measured.len().max(1) as f64
+    });
+    let half: Vec<f64> = stds.iter().map(|s| HALF_95 * s).collect();
+    let mean = half.iter().sum::<f64>() / half.len().max(1) as f64;
+    Bands { half, mean, inside }
+}
+
+fn run(file: &TableFile, campaign: &Campaign, band: Option<&ForceBand>) -> Result<Prediction> {
+    let screened = Screened::of(campaign);
+    let campaign = screened.campaign.as_ref();
+    let muscle =
+        Muscle::<f64>::build(&file.table).map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
+    let mut chain = Chain::<f64>::new(&file.table.effects);
+    let mut corrections: Vec<(Candidate, &[f64], Memory<f64>)> = Vec::new();
+    for c in &file.about.corrections {
+        let candidate = Candidate::from_name(&c.effect)
+            .filter(|k| k.info().parameters.len() == c.parameters.len())
+            .ok_or_else(|| {
+                Error::new(DataCode::TableInvalid, format!("unknown correction `{}`", c.effect))
+                    .help("the table was written by a newer version of this program")
+            })?;
+        corrections.push((candidate, &c.parameters, Memory::<f64>::default()));
+    }
+    let mut follower = Follower::of(campaign);
+    let plain = chain.is_empty() && corrections.is_empty();
+    let mut recordings = Vec::with_capacity(campaign.recordings.len());
+    let (mut square, mut rows) = (0.0, 0.0);
+    let corrected: Vec<Cow<'_, Recording>> =
+        campaign.recordings.iter().map(|r| with_true_length(file, r)).collect();
+    let rest_length = muscle.braid().rest_length();
+    let contractions = Contractions::of(muscle.braid());
+    for recording in &corrected {
+        for (i, stroke) in recording.stroke.iter().enumerate() {
+            contractions
+                .check(stroke / rest_length)
+                .map_err(|e| e.file(&recording.source).value(format!("row {}", i + 1)))?;
+        }
+    }
+    for (index, (recording, motion)) in
+        corrected.iter().map(Cow::as_ref).zip(Motion::of_campaign(campaign)).enumerate()
+    {
+        let force: Vec<f64> = if plain {
+            (0..recording.len())
+                .map(|i| {
+                    let p = Pressure::from_pascals(recording.pressure[i]);
+                    let x = Length::from_metres(recording.stroke[i]);
+                    muscle.force(p, x, f64::from(motion.direction[i])).newtons()
+                })
+                .collect()
+        } else {
+            let motions = follower.follow(recording, &motion, campaign.pause_before(index));
+            let mut forces = Vec::with_capacity(recording.len());
+            for (i, motion) in motions.iter().enumerate() {
+                let context = muscle.context(motion, Pressure::from_pascals(recording.pressure[i]));
+                chain.step(&context);
+                // What the muscle itself makes ends at slackness; what the bench adds to the reading does not.
+                let (mut pull, mut read) = (context.force() + chain.force(&context), 0.0);
+                for (candidate, parameters, memory) in &mut corrections {
+                    candidate.step(parameters, &context, memory);
+                    let part = candidate.force(parameters, &context, memory);
+                    *if candidate.acts_on_a_slack_muscle(0) { &mut read } else { &mut pull } += part;
+                }
+                forces.push(muscle.pull(pull).newtons() + read);
+            }
+            forces
+        };
+        let read = screened.read(index);
+        let measured = recording.force.as_ref().filter(|_| read.contains(&true));
+        let rms = measured.map(|measured| {
+            let scored = measured.iter().zip(&force).zip(&read).filter(|(_, read)| **read);
+            let sum: f64 = scored.map(|((f, m), _)| (f - m).powi(2)).sum();
+            let count = read.iter().filter(|read| **read).count() as f64;
+            square += sum;
+            rows += count;
+            (sum / count.max(1.0)).sqrt()
+        });
+        let bands = band.map(|band| bands(band, recording, &motion, &force));
+        recordings.push(Predicted { force, rms, bands });
+    }
+    let rms = (rows > 0.0).then(|| (square / rows).sqrt());
+    let places: Vec<(f64, f64)> = campaign
+        .recordings
+        .iter()
+        .flat_map(|r| r.pressure.iter().copied().zip(r.stroke.iter().copied()))
+        .collect();
+    let warnings = screened.remark().into_iter().chain(beyond(&file.table, &places)).collect();
+    Ok(Prediction { recordings, rms, warnings })
+}
+
+/// The recording with the correction of its mounting, where the table knows the stroke that it was held at.
+fn with_true_length<'a>(file: &TableFile, recording: &'a Recording) -> Cow<'a, Recording> {
+    let known = |held: f64| file.about.mountings.iter().find(|(s, _)| (s - held).abs() <= 1e-4);
+    match recording.held_stroke().filter(|_| !file.about.mountings.is_empty()).and_then(known) {
+        None => Cow::Borrowed(recording),
+        Some((_, offset)) => {
+            let stroke = recording.stroke.iter().map(|x| x + offset).collect();
+            Cow::Owned(Recording { stroke, ..recording.clone() })
+        }
+    }
+}
+
+/// Says where pressures (Pa) and strokes (m), pair by pair, leave the range that a table was fitted to: there its force is an
+/// extrapolation. Up to a hundredth of them may, and a fiftieth of the range counts as within.
+#[must_use]
+pub fn beyond(table: &MuscleTable, places: &[(f64, f64)]) -> Vec<String> {
+    let t = &table.tested;
+    let l0 = f64::from(table.geometry.rest_length.metres());
+    let mut warnings = Vec::new();
+    let mut say = |what: &str, unit: f64, name: &str, range: (f32, f32), of: &dyn Fn(&(f64, f64)) -> f64| {
+        let (low, high) = (f64::from(range.0), f64::from(range.1));
+        let slack = 0.02 * (high - low).abs() + 1e-9;
+        let out = places.iter().map(of).filter(|v| *v < low - slack || *v > high + slack).count();
+        if out * 100 > places.len() {
+            warnings.push(format!(
+                "{} % of the rows lie outside the {what} that the table was fitted to ({:.4} to {:.4}{name}): an extrapolation there",
+                out * 100 / places.len(),
+                low / unit,
+                high / unit
+            ));
+        }
+    };
+    say("pressures", 1e3, " kPa", (t.pressure_low.pascals(), t.pressure_high.pascals()), &|(p, _)| *p);
+    say("contractions", 1.0, "", (t.contraction_low, t.contraction_high), &|(_, x)| x / l0);
+    warnings
+}
+
+/// The recordings with a column `force_model_N` added, as one CSV table; with several recordings the first column is
+/// `file`. Where the prediction has bands, a last column `force_model_band_N` is half the width of the force's 95 % interval.
+///
+/// Where all files are plain text with one header their cells are kept as they are, other columns included. Recordings
+/// that came in by an import description, with decimal commas, or from other containers, are written in the usual columns instead.
+#[must_use]
+pub fn to_csv(campaign: &Campaign, prediction: &Prediction, imported: bool) -> Vec<u8> {
+    let verbatim = if imported { None } else { verbatim(campaign, prediction) };
+    verbatim.unwrap_or_else(|| standard(campaign, prediction)).into_bytes()
+}
+
+fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
+    let several = campaign.recordings.len() > 1;
+    let banded = prediction.recordings.iter().all(|p| p.bands.is_some());
+    let mut out = String::new();
+    let mut header: Option<(String, char)> = None;
+    for (recording, predicted) in campaign.recordings.iter().zip(&prediction.recordings) {
+        if recording.rows.is_some() {
+            return None;
+        }
+        let text = fs::read(&recording.source).ok().and_then(|b| String::from_utf8(b).ok())?;
+        let mut lines = text.trim_start_matches('\u{feff}').lines().filter(|l| !l.trim().is_empty());
+        let first = lines.next()?;
+        let delimiter = ['\t', ';', ','].into_iter().find(|d| first.contains(*d))?;
+        match &header {
+            None => {
+                let file = if several { format!("file{delimiter}") } else { String::new() };
+                let band = if banded { format!("{delimiter}force_model_band_N") } else { String::new() };
+                let _ = writeln!(out, "{file}{first}{delimiter}force_model_N{band}");
+                header = Some((first.to_owned(), delimiter));
+            }
+            Some((known, _)) if known != first => return None,
+            Some(_) => {}
+        }
+        let rows: Vec<&str> = lines.collect();
+        // Points among decimal commas are no table.
+        let commas = rows
+            .first()
+            .is_some_and(|r| delimiter != ',' && has_decimal_commas(r.as_bytes(), delimiter as u8));
+        if commas || rows.len() != predicted.force.len() {
+            return None;
+        }
+        for (i, (row, force)) in rows.iter().zip(&predicted.force).enumerate() {
+            if several {
+                let _ = write!(out, "{}{delimiter}", cell(&recording.name, delimiter));
+            }
+            let _ = write!(out, "{row}{delimiter}{force:.6}");
+            end_line(&mut out, predicted, i, delimiter);
+        }
+    }
+    Some(out)
+}
+
+fn standard(campaign: &Campaign, prediction: &Prediction) -> String {
+    let several = campaign.recordings.len() > 1;
+    let all = |has: &dyn Fn(&Recording) -> bool| campaign.recordings.iter().all(has);
+    let force = all(&|r| r.force.is_some());
+    let temperature = all(&|r| r.temperature.is_some());
+    let command = all(&|r| r.pressure_command.is_some());
+    let cycle = all(&|r| r.cycle.is_some());
+    let mut out = String::new();
+    if several {
+        out += "file,";
+    }
+    out += "time_s,pressure_kPa,displacement_mm";
+    for (there, name) in [
+        (force, ",force_N"),
+        (temperature, ",temperature_K"),
+        (command, ",pressure_command_kPa"),
+        (cycle, ",cycle"),
+    ] {
+        if there {
+            out += name;
+        }
+    }
+    out += ",force_model_N";
+    if prediction.recordings.iter().all(|p| p.bands.is_some()) {
+        out += ",force_model_band_N";
+    }
+    out.push('\n');
+    for (r, predicted) in campaign.recordings.iter().zip(&prediction.recordings) {
+        let name = cell(&r.name, ',');
+        for i in 0..r.len() {
+            if several {
+                let _ = write!(out, "{name},");
+            }
+            let _ = write!(out, "{},{},{}", r.time[i], r.pressure[i] / 1e3, r.stroke[i] * 1e3);
+            for (there, column, scale) in [
+                (force, &r.force, 1.0),
+                (temperature, &r.temperature, 1.0),
+                (command, &r.pressure_command, 1e-3),
+            ] {
+                if let (true, Some(column)) = (there, column) {
+                    let _ = write!(out, ",{}", column[i] * scale);
+                }
+            }
+            if let (true, Some(cycles)) = (cycle, &r.cycle) {
+                let _ = write!(out, ",{}", cycles[i]);
+            }
+            let _ = write!(out, ",{:.6}", predicted.force[i]);
+            end_line(&mut out, predicted, i, ',');
+        }
+    }
+    out
+}
+
+fn end_line(out: &mut String, predicted: &Predicted, row: usize, delimiter: char) {
+    if let Some(bands) = &predicted.bands {
+        let _ = write!(out, "{delimiter}{:.6}", bands.half[row]);
+    }
+    out.push('\n');
+}
+
+/// A name as one cell: quoted where it holds the delimiter or a quote.
+fn cell(name: &str, delimiter: char) -> String {
+    if name.contains([delimiter, '"', '\n']) {
+        format!("\"{}\"", name.replace('"', "\"\""))
+    } else {
+        name.to_owned()
+    }
+}

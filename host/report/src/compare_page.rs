@@ -1,0 +1,232 @@
+//! The page of two recordings side by side: each quantity of both over time, its difference, and both as loops.
+
+use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
+use pam_data::compare::{Column, Comparison};
+use pam_data::counted::counted;
+use pam_data::recording::Recording;
+
+/// The page of a comparison of `b` with `a`.
+#[must_use]
+pub fn page(a: &Recording, b: &Recording, found: &Comparison) -> Page {
+    let names = [named("A", a, b), named("B", b, a)];
+    let mut page = Page::new("Two recordings compared", format!("{} and {}", names[0], names[1]));
+    page.verdict(Tone::Plain, verdict(a, b, found));
+    for c in &found.columns {
+        let label = format!("{}, B − A", title(c.name));
+        if c.largest == 0.0 {
+            page.fact(label, "the same", "at every row", Tone::Plain);
+            continue;
+        }
+        let note = format!("rms; {} on average, {} at most", signed(c.mean, c.rms), figures(c.largest, 3));
+        page.fact(label, format!("{} {}", figures(c.rms, 3), c.unit), note, Tone::Plain);
+    }
+    page.push(numbers(found));
+    let mut over_time = Section::new("Over time");
+    over_time.text(
+        "Both are counted from their own start, and B is read at A's times, joined by straight lines. A recording that began \
+         later in its motion than the other shows as a difference, too.",
+    );
+    for column in &found.columns {
+        over_time_of(&mut over_time, a, b, &names, column, found);
+    }
+    page.push(over_time);
+    page.push(loops(a, b, &names));
+    for (letter, r) in [("A", a), ("B", b)] {
+        page.origin(
+            format!("recording {letter}"),
+            format!("{}, {}, {} s", r.source.display(), counted(r.len(), "row"), fixed(r.duration(), 1)),
+        );
+    }
+    page.origin("made by", format!("host {}", env!("CARGO_PKG_VERSION")));
+    page
+}
+
+/// The letter of a recording with its name; where both have the same name, with its folder.
+fn named(letter: &str, one: &Recording, other: &Recording) -> String {
+    if one.name == other.name && !one.source.as_os_str().is_empty() {
+        format!("{letter}: {}", one.source.display())
+    } else {
+        format!("{letter}: {}", one.name)
+    }
+}
+
+/// A mean with its sign; nothing where it is none beside the root mean square.
+fn signed(value: f64, rms: f64) -> String {
+    if value.abs() < 1e-3 * rms {
+        return "0".to_owned();
+    }
+    let sign = if value > 0.0 { "+" } else { "" };
+    format!("{sign}{}", figures(value, 3))
+}
+
+fn verdict(a: &Recording, b: &Recording, found: &Comparison) -> String {
+    let seconds = fixed(found.overlap, 1);
+    let Some(force) = found.columns.iter().find(|c| c.name == "force") else {
+        return format!("Over the {seconds} s that both cover there is no force in both to compare.");
+    };
+    if force.largest == 0.0 {
+        return format!("Over the {seconds} s that both cover, B reads the same force as A.");
+    }
+    // Of both: A may be a tare, of whose noise anything is thousands of percent.
+    let largest =
+        [a, b].into_iter().flat_map(|r| r.force.iter().flatten()).fold(0.0f64, |m, f| m.max(f.abs()));
+    let share = if largest > 0.0 {
+        format!(", {} % of the largest force in either", figures(100.0 * force.mean.abs() / largest, 2))
+    } else {
+        String::new()
+    };
+    format!(
+        "Over the {seconds} s that both cover, B pulls {} N {} than A on average{share}.",
+        figures(force.mean.abs(), 3),
+        if force.mean < 0.0 { "less" } else { "more" }
+    )
+}
+
+fn numbers(found: &Comparison) -> Section {
+    let mut section = Section::new("In numbers").summarised();
+    let caption = format!(
+        "B − A over {} in {} s",
+        counted(fixed(found.rows as f64, 0), "row"),
+        fixed(found.overlap, 1)
+    );
+    let mut table = Table::new(caption, &["quantity", "rms", "mean", "largest", "at s"]);
+    for c in &found.columns {
+        table.row([
+            format!("{}, {}", title(c.name), c.unit),
+            figures(c.rms, 3),
+            signed(c.mean, c.rms),
+            figures(c.largest, 3),
+            fixed(c.largest_at, 2),
+        ]);
+    }
+    section.table(table);
+    section
+}
+
+fn over_time_of(
+    section: &mut Section,
+    a: &Recording,
+    b: &Recording,
+    names: &[String; 2],
+    column: &Column,
+    found: &Comparison,
+) {
+    let (Some((ta, ya)), Some((tb, yb))) = (series(a, column.name), series(b, column.name)) else { return };
+    let title = title(column.name);
+    let time = || Axis::new("time after the start", "s");
+    let axis = Axis::new(format!("{title} {}", symbol(column.name)).trim_end(), column.unit);
+    let both = Panel::new(time(), axis).line(&names[0], Colour::Series(0), &ta, &ya).line(
+        &names[1],
+        Colour::Series(1),
+        &tb,
+        &yb,
+    );
+    let same = column.largest == 0.0;
+    let reading = if same {
+        "Both are the same at every row."
+    } else {
+        "Where the curves part, the recordings differ."
+    };
+    section.figure(Figure::new(column.name, capital(title), reading, both));
+    if same {
+        return;
+    }
+    let difference = Panel::new(time(), Axis::new("B − A", column.unit)).line(
+        "B − A",
+        Colour::Series(2),
+        &found.time,
+        &column.difference,
+    );
+    let reading = format!(
+        "The same, subtracted. The largest difference, {} {}, is at {} s.",
+        figures(column.largest, 3),
+        column.unit,
+        fixed(column.largest_at, 2)
+    );
+    let name = format!("{}-difference", column.name);
+    section.figure(Figure::new(name, format!("{}, B − A", capital(title)), reading, difference));
+}
+
+fn loops(a: &Recording, b: &Recording, names: &[String; 2]) -> Section {
+    let mut section = Section::new("As loops");
+    if let (Some(fa), Some(fb)) = (&a.force, &b.force) {
+        let millimetres = |r: &Recording| r.stroke.iter().map(|x| x * 1e3).collect::<Vec<_>>();
+        let panel = Panel::new(Axis::new("contraction stroke", "mm"), Axis::new("force F", "N"))
+            .line(&names[0], Colour::Series(0), &millimetres(a), fa)
+            .line(&names[1], Colour::Series(1), &millimetres(b), fb);
+        section.figure(Figure::new(
+            "loops",
+            "Force against stroke",
+            "A loop's height is friction, its place is pressure and elasticity; a loop that moved as a whole had another \
+             pressure or another zero.",
+            panel,
+        ));
+    }
+    section
+}
+
+fn title(name: &str) -> &'static str {
+    match name {
+        "force" => "force",
+        "pressure" => "pressure",
+        _ => "contraction stroke",
+    }
+}
+
+fn symbol(name: &str) -> &'static str {
+    match name {
+        "force" => "F",
+        "pressure" => "P",
+        _ => "",
+    }
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// Time after the start, s, and a quantity in the unit that it is compared in.
+fn series(r: &Recording, name: &str) -> Option<(Vec<f64>, Vec<f64>)> {
+    let (values, scale) = match name {
+        "force" => (r.force.as_ref()?, 1.0),
+        "pressure" => (&r.pressure, 1e-3),
+        _ => (&r.stroke, 1e3),
+    };
+    let start = r.time.first()?;
+    Some((r.time.iter().map(|t| t - start).collect(), values.iter().map(|v| v * scale).collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pam_data::compare::compare;
+
+    fn recording(folder: &str, offset: f64) -> Recording {
+        let time: Vec<f64> = (0..50).map(|i| f64::from(i) * 0.1).collect();
+        Recording {
+            name: "run".into(),
+            source: format!("{folder}/run.csv").into(),
+            force: Some(time.iter().map(|t| 10.0 * t + offset).collect()),
+            pressure: vec![3e5; 50],
+            stroke: time.iter().map(|t| t * 1e-3).collect(),
+            time,
+            ..Recording::default()
+        }
+    }
+
+    #[test]
+    fn the_page_says_in_a_sentence_which_pulls_more_and_tells_equal_names_apart() {
+        let (a, b) = (recording("before", 0.0), recording("after", 4.9));
+        let page = page(&a, &b, &compare(&a, &b).expect("a comparison"));
+        let (_, verdict) = page.verdict.clone().expect("a verdict");
+        assert!(
+            verdict.contains("B pulls 4.90 N more than A on average, 9.1 % of the largest force in either"),
+            "{verdict}"
+        );
+        assert_eq!(page.subtitle, "A: before/run.csv and B: after/run.csv");
+        assert!(page.markdown().contains("| force, N | 4.90 | +4.90 |"), "{}", page.markdown());
+        // Force, its difference, and the loops; pressure and stroke are the same and have no difference to show.
+        assert_eq!(page.figures().count(), 5);
+    }
+}

@@ -1,0 +1,129 @@
+//! Where the misfit sits: along each coordinate, and over time.
+
+use crate::{Axis, Colour, Figure, Mark, Panel, Section, figures};
+use pam_diagnose::verdict::{Diagnosis, Profile};
+use pam_fit::fit::points::median;
+
+/// A coordinate's name and numbers as an engineer reads them.
+fn shown(profile: &Profile) -> (String, &'static str, f64, f64) {
+    let name = profile.coordinate.replace('-', " ");
+    match profile.coordinate.as_str() {
+        "pressure" => (name, "kPa", 1e-3, 0.0),
+        "pressure-rate" => (name, "kPa/s", 1e-3, 0.0),
+        "contraction" => (name, "%", 100.0, 0.0),
+        // Both are distances from it.
+        "largest-contraction-so-far" => ("contraction less the largest so far".into(), "%", 100.0, 0.0),
+        "speed" => (name, "mm/s", 1e3, 0.0),
+        "acceleration" => (name, "mm/s²", 1e3, 0.0),
+        "temperature" => (name, "°C", 1.0, -273.15),
+        "force" => (name, "N", 1.0, 0.0),
+        "time" | "since-reversal" | "hold-time" => (name, "s", 1.0, 0.0),
+        "frequency" => (name, "Hz", 1.0, 0.0),
+        _ => (name, "", 1.0, 0.0),
+    }
+}
+
+/// The ways of the muscle, in the order of their sign.
+const WAYS: [&str; 2] = ["lengthening", "shortening"];
+
+/// The misfit along one coordinate.
+fn along(d: &Diagnosis, p: &Profile) -> Panel {
+    let (name, unit, scale, offset) = shown(p);
+    let region = d.r#where.iter().find(|r| r.coordinate == p.coordinate);
+    let (axis, x, region): (Axis, Vec<f64>, _) = if p.coordinate == "direction" && p.at.len() == WAYS.len() {
+        // A sign is not a number to read off: two places with names.
+        let half = |sign: f64| if sign < 0.0 { 0.0 } else { 1.0 };
+        let places = (0..WAYS.len()).map(|i| i as f64).collect();
+        let region = region.map(|r| (half(r.from) - 0.5, half(r.to) + 0.5));
+        (Axis::names("", WAYS.map(String::from).to_vec()), places, region)
+    } else {
+        let region = region.map(|r| (scale * r.from + offset, scale * r.to + offset));
+        (Axis::new(name.clone(), unit), p.at.iter().map(|v| scale * v + offset).collect(), region)
+    };
+    let mut panel = Panel::new(axis, Axis::new("misfit", "N").from_zero())
+        .titled(name)
+        .line("root mean square", Colour::Series(1), &x, &p.rms_before)
+        .dashes("mean", Colour::Series(0), &x, &p.mean_before);
+    if !d.missing.is_empty() {
+        panel = panel.line("root mean square, explained", Colour::Series(2), &x, &p.rms_after);
+    }
+    if let Some((from, to)) = region {
+        panel = panel.region("here it sits", from, to);
+    }
+    panel.with("noise", Colour::Muted, Mark::Level(d.noise_N))
+}
+
+/// The chapter: in words, along each coordinate, over time.
+pub(super) fn section(d: &Diagnosis) -> Section {
+    let mut section = Section::new("Where").summarised();
+    if !d.judged {
+        return section;
+    }
+    if d.r#where.is_empty() {
+        section.text(
+            "The misfit sits nowhere in particular: no part of any coordinate holds more than its share.",
+        );
+    } else {
+        section.list(d.r#where.iter().take(5).map(|r| format!("{} (p = {})", r.words, figures(r.p, 2))));
+    }
+    // The coordinates where it sits come first, then those that also were looked at.
+    let rank =
+        |p: &Profile| d.r#where.iter().position(|r| r.coordinate == p.coordinate).unwrap_or(usize::MAX);
+    let mut profiles: Vec<&Profile> = d.profiles.iter().filter(|p| p.at.len() > 1).collect();
+    profiles.sort_by_key(|p| rank(p));
+    let panels: Vec<Panel> = profiles.into_iter().take(6).map(|p| along(d, p)).collect();
+    if !panels.is_empty() {
+        section.figure(Figure::multiples(
+            "where",
+            "Misfit along each coordinate",
+            "Where the orange line rises far above the noise the model is wrong; the shaded part is the region that holds more \
+             than its share.",
+            panels,
+        ));
+    }
+    let t = &d.trace;
+    if t.time.len() > 1 {
+        let [time, before, after, effects] = with_pauses(&t.time, [&t.time, &t.before, &t.after, &t.effects]);
+        let mut panel = Panel::new(Axis::new("time", "s"), Axis::new("residual", "N"));
+        let found = !d.missing.is_empty();
+        if found {
+            // Beneath, for it may be larger than what it explains.
+            panel = panel.hair("what the found effects add", Colour::Muted, &time, &effects);
+        }
+        panel = panel.hair("plain model", Colour::Series(1), &time, &before);
+        if found {
+            panel = panel.hair("with what was found", Colour::Series(2), &time, &after);
+        }
+        if let Some(r) = d.r#where.iter().find(|r| r.coordinate == "time") {
+            panel = panel.region("here it sits", r.from, r.to);
+        }
+        section.figure(Figure::new(
+            "misfit-time",
+            "Measured minus computed force over time",
+            if d.missing.is_empty() {
+                "The plain model's misfit: where it is a band of even width around zero, it is noise."
+            } else {
+                "The plain model's misfit, and what remains of it with what was found: that should be noise. The grey line is what the \
+                 found effects add to the force; where it is larger than the misfit, the tables had taken up the rest."
+            },
+            panel,
+        ));
+    }
+    section
+}
+
+/// Columns with an empty row in each pause, where nothing was recorded: a line would claim that something was.
+fn with_pauses<const N: usize>(time: &[f64], columns: [&[f64]; N]) -> [Vec<f64>; N] {
+    let steps: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).collect();
+    let usual = median(&mut steps.clone());
+    columns.map(|column| {
+        let mut broken = Vec::with_capacity(column.len());
+        for (i, value) in column.iter().enumerate() {
+            if i > 0 && !(steps[i - 1] < 20.0 * usual) {
+                broken.push(f64::NAN);
+            }
+            broken.push(*value);
+        }
+        broken
+    })
+}

@@ -1,0 +1,194 @@
+//! One effect explained: for the terminal, as a page, and as a chapter of the book.
+
+use std::fmt::Write as _;
+
+use model_core::effects::{Info, Link, Role, Start};
+use model_core::table::TableError;
+
+use super::effect_trace::{Demonstration, Trace, likeness};
+use super::letters::letters;
+use super::{Page, Section, Table, figures};
+use pam_fit::bench::Candidate;
+
+/// Where in the chain from the air to the reading an effect acts, in words.
+#[must_use]
+pub fn place(link: Link) -> &'static str {
+    match link {
+        Link::Air => "the air: the pressure at the muscle",
+        Link::Braid => "the braid and the muscle's shape",
+        Link::Bladder => "the bladder's elastic stress",
+        Link::Memory => "the bladder's memory of the past",
+        Link::Friction => "friction",
+        Link::LoadPath => "the load path between muscle and load cell",
+        Link::Reading => "the reading of the sensors",
+    }
+}
+
+/// Every effect with its trace, in the order of the chain.
+///
+/// # Errors
+/// None in practice: the example table is valid.
+pub fn catalogue() -> Result<Vec<(Trace, super::Figure)>, TableError> {
+    let demonstration = Demonstration::new()?;
+    let mut all: Vec<Candidate> = Candidate::all().collect();
+    all.sort_by_key(|c| (c.info().link, c.is_bench()));
+    Ok(all
+        .into_iter()
+        .map(|c| {
+            let trace = demonstration.run(c);
+            let figure = demonstration.figure(&trace);
+            (trace, figure)
+        })
+        .collect())
+}
+
+/// The three traces that look most like this one, with their likeness.
+#[must_use]
+pub fn lookalikes<'a>(trace: &Trace, all: &'a [(Trace, super::Figure)]) -> Vec<(&'a Trace, f64)> {
+    let mut others: Vec<(&Trace, f64)> = all
+        .iter()
+        .map(|(other, _)| other)
+        .filter(|other| other.candidate != trace.candidate)
+        .map(|other| (other, likeness(trace, other)))
+        .collect();
+    others.sort_by(|a, b| b.1.total_cmp(&a.1));
+    others.truncate(3);
+    others
+}
+
+fn whose(candidate: Candidate) -> &'static str {
+    if candidate.is_bench() {
+        "It is the bench's: it corrects the recording and is never sent to a controller."
+    } else {
+        "It is the muscle's: it goes into the table and to the controller."
+    }
+}
+
+fn memory(info: &Info) -> &'static str {
+    match info.start {
+        Start::Known => "Its state at the beginning of a recording is known.",
+        Start::Settled => {
+            "It remembers; a recording that begins soon after other work starts with a state nobody recorded, which \
+             fades by itself."
+        }
+        Start::Branch => "It remembers where it last turned; after one full stroke it has found itself.",
+        Start::Virgin => {
+            "It remembers for good: a muscle that was worked before the recording brings a past nobody recorded."
+        }
+    }
+}
+
+fn parameters(trace: &Trace) -> Table {
+    let mut table = Table::new(
+        "Parameters in SI units, their plausible range, and the value in the picture",
+        &["letter", "parameter", "unit", "from", "to", "drawn with", "what it does"],
+    );
+    for (p, value) in trace.candidate.info().parameters.iter().zip(&trace.parameters) {
+        let role = match p.role {
+            Role::Amplitude => "scales the force",
+            Role::Shape => "shapes it",
+        };
+        let unit = if p.unit.is_empty() { "–" } else { p.unit };
+        let numbers = [p.low, p.high, *value].map(|v| figures(v, 2));
+        table.row([p.letter, p.name, unit, &numbers[0], &numbers[1], &numbers[2], role]);
+    }
+    table
+}
+
+/// One effect as a page, from the [`catalogue`].
+#[must_use]
+pub fn page(trace: &Trace, figure: &super::Figure, all: &[(Trace, super::Figure)]) -> Page {
+    let info = trace.candidate.info();
+    let mut page = Page::new(info.name, info.summary);
+    let mut what = Section::new("What it is").summarised();
+    what.text(format!("It acts on {}. {}", place(info.link), whose(trace.candidate)));
+    what.listing(info.equation);
+    what.table(letters(info));
+    what.table(parameters(trace));
+    what.text(memory(info));
+    page.push(what);
+    let mut looks = Section::new("What it looks like").summarised();
+    if trace.force.iter().all(|f| *f == 0.0) {
+        looks.text("The demonstration does not excite it: it adds nothing here.");
+    } else {
+        looks.figure(figure.clone());
+        looks.text(alike(trace, all));
+    }
+    page.push(looks);
+    page.origin("source of the equation", info.source);
+    page
+}
+
+fn alike(trace: &Trace, all: &[(Trace, super::Figure)]) -> String {
+    let names: Vec<String> = lookalikes(trace, all)
+        .iter()
+        .map(|(other, likeness)| format!("`{}` ({likeness:.2})", other.candidate.name()))
+        .collect();
+    format!(
+        "After a fit of the base model has taken its part, it looks most like {} on this demonstration. 1 means that one is a \
+         multiple of the other, and that this recording could not tell them apart.",
+        names.join(", ")
+    )
+}
+
+/// One effect as a chapter of the book, beside its picture `NAME.svg`.
+#[must_use]
+pub fn chapter(trace: &Trace, figure: &super::Figure, all: &[(Trace, super::Figure)]) -> String {
+    let info = trace.candidate.info();
+    let mut text = format!(
+        "# {}\n\n{}\n\nIt acts on {}. {}\n\n```text,equation\n{}\n```\n\n",
+        info.name,
+        info.summary,
+        place(info.link),
+        whose(trace.candidate),
+        info.equation
+    );
+    for table in [letters(info), parameters(trace)] {
+        let _ = writeln!(text, "{}:\n", table.caption);
+        let _ = writeln!(text, "| {} |", table.head.join(" | "));
+        let _ = writeln!(text, "|{}", " --- |".repeat(table.head.len()));
+        for row in &table.rows {
+            let cells: Vec<String> = row.iter().map(|c| super::rich::markdown(c)).collect();
+            let _ = writeln!(text, "| {} |", cells.join(" | "));
+        }
+        text.push('\n');
+    }
+    let _ = write!(text, "{}\n\n", memory(info));
+    if trace.force.iter().all(|f| *f == 0.0) {
+        text.push_str("The demonstration does not excite it: it adds nothing there.\n");
+    } else {
+        let _ = write!(text, "![{}]({}.svg)\n\n", figure.title, info.name);
+        let _ = write!(text, "{}\n\n{}\n", figure.reading, alike(trace, all));
+    }
+    let _ = write!(text, "\nSource: {}\n", super::rich::markdown(info.source));
+    text
+}
+
+/// The book's table of all effects.
+#[must_use]
+pub fn contents(all: &[(Trace, super::Figure)]) -> String {
+    let mut text = String::from(
+        "# What the model leaves out\n\n\
+         Every effect that `host diagnose` knows, in the order of the chain from the air to the reading. Each has a page with its \
+         equation, its parameters and a picture of its trace. These pages are written by `host effects --book`.\n",
+    );
+    let mut link = None;
+    for (trace, _) in all {
+        let info = trace.candidate.info();
+        if link != Some(info.link) {
+            link = Some(info.link);
+            let mut title = place(info.link).to_owned();
+            title[..1].make_ascii_uppercase();
+            let _ =
+                write!(text, "\n## {title}\n\n| effect | whose | in one sentence |\n| --- | --- | --- |\n");
+        }
+        let whose = if trace.candidate.is_bench() { "bench" } else { "muscle" };
+        let _ = writeln!(
+            text,
+            "| [{0}]({0}.md) | {whose} | {1} |",
+            info.name,
+            super::rich::markdown(info.summary)
+        );
+    }
+    text
+}

@@ -1,0 +1,175 @@
+//! The report of a fit: every figure of the thesis for any muscle, and what one expects of a fit besides.
+
+mod controller;
+mod curves;
+mod loads;
+mod models;
+mod parameters;
+mod residuals;
+mod view;
+
+use super::{Page, Section, Tone, figures, fixed};
+use pam_data::counted::counted;
+use pam_data::recording::Campaign;
+use pam_fit::fit::Options;
+use pam_fit::fit::result::Fit;
+use view::View;
+
+/// Error below which a table is called good, percent of blocked force; the thesis reaches a fifth of it.
+const GOOD: f64 = 1.0;
+/// Error above which a table is called bad.
+const BAD: f64 = 5.0;
+
+/// The page of a fit. `campaign` gives the recordings' names; the fit holds everything else.
+#[must_use]
+pub fn page(fit: &Fit, campaign: &Campaign, options: &Options) -> Page {
+    let view = View::new(fit, campaign);
+    let s = &fit.summary;
+    let mut page = Page::new(
+        format!("Fit of {}", s.muscle),
+        format!(
+            "{} rows of {}, order M = {}{}",
+            fixed(s.samples as f64, 0),
+            counted(campaign.recordings.len(), "recording"),
+            options.order,
+            if options.tip_correction { ", tip correction" } else { "" }
+        ),
+    );
+    head(&mut page, &view);
+    page.push(remarks(&view));
+    page.push(loads::section(&view));
+    page.push(models::section(&view));
+    page.push(curves::section(&view));
+    page.push(controller::section(&view));
+    page.push(residuals::section(&view));
+    page.push(parameters::section(&view));
+    page.recordings(campaign);
+    page.origin("made by", format!("host {}", env!("CARGO_PKG_VERSION")));
+    page
+}
+
+fn tone(percent: f64, good: f64, bad: f64) -> Tone {
+    if percent <= good {
+        Tone::Good
+    } else if percent <= bad {
+        Tone::Caution
+    } else {
+        Tone::Bad
+    }
+}
+
+fn head(page: &mut Page, view: &View<'_>) {
+    let s = &view.fit.summary;
+    let unseen = s.left_out_pressure_mean_error_pct;
+    let mut verdict = format!(
+        "The table describes the load lines to {} % of the blocked force on average, {} % at most",
+        figures(s.mean_error_pct, 2),
+        figures(s.max_error_pct, 2)
+    );
+    let mut worst = tone(s.mean_error_pct, GOOD, BAD);
+    match unseen {
+        Some(unseen) => {
+            verdict += &format!("; a pressure that it has not seen it predicts to {} %.", figures(unseen, 2));
+            if tone(unseen, 2.0 * GOOD, BAD) == Tone::Bad || worst == Tone::Good && unseen > 2.0 * GOOD {
+                worst = tone(unseen, 2.0 * GOOD, BAD);
+            }
+        }
+        None => verdict += "; with one pressure nothing can be said about others.",
+    }
+    page.verdict(worst, verdict);
+    page.fact(
+        "mean error",
+        format!("{} %", figures(s.mean_error_pct, 2)),
+        "of blocked force, mid-lines",
+        tone(s.mean_error_pct, GOOD, BAD),
+    );
+    page.fact(
+        "largest error",
+        format!("{} %", figures(s.max_error_pct, 2)),
+        view.worst_place(),
+        tone(s.max_error_pct, 3.0 * GOOD, 3.0 * BAD),
+    );
+    if let Some(unseen) = unseen {
+        page.fact(
+            "pressures left out",
+            format!("{} %", figures(unseen, 2)),
+            "each predicted from the others",
+            tone(unseen, 2.0 * GOOD, BAD),
+        );
+    }
+    page.fact(
+        "deadband P_{0}",
+        format!("{} kPa", fixed(s.deadband_kPa, 1)),
+        format!("± {} kPa (95 %)", figures(1.96 * s.deadband_std_kPa, 2)),
+        Tone::Plain,
+    );
+    page.fact(
+        "blocked force",
+        format!("{} N", figures(s.blocked_force_N, 4)),
+        view.levels.last().map_or(String::new(), |p| format!("at {} kPa", fixed(p / 1e3, 0))),
+        Tone::Plain,
+    );
+    page.fact("residual", format!("{} N", figures(s.rms_N, 2)), "root mean square, all points", Tone::Plain);
+}
+
+fn remarks(view: &View<'_>) -> Section {
+    let s = &view.fit.summary;
+    let mut section = Section::new("To be known first").summarised();
+    for warning in &s.warnings {
+        section.notice(Tone::Caution, capital(warning));
+    }
+    if let Some(free) = &s.physical {
+        section.notice(
+            Tone::Plain,
+            format!(
+                "Stress was made to rise with strain. That costs error: {} % mean and {} % at most, against {} % and {} % without.",
+                figures(s.mean_error_pct, 2),
+                figures(s.max_error_pct, 2),
+                figures(free.free_mean_error_pct, 2),
+                figures(free.free_max_error_pct, 2)
+            ),
+        );
+    }
+    let rows = &s.rows;
+    let set_aside = [
+        (rows.near_turn, "just after a turn, where friction has not yet turned round"),
+        (rows.unknown_direction, "with a direction of motion that is not known"),
+        (rows.slack, "with the muscle slack"),
+        (rows.clipped, "with the force sensor at the end of its range"),
+        (rows.outliers, "that do not belong to the rest"),
+        (rows.dropouts, "in which the gauge alone fell out"),
+    ];
+    let told: Vec<String> = set_aside
+        .iter()
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, why)| format!("{} {why}", fixed(*n as f64, 0)))
+        .collect();
+    let all = s.samples.max(1) as f64;
+    let mut text = format!(
+        "{} of {} rows were fitted ({} %).",
+        fixed(rows.fitted as f64, 0),
+        fixed(all, 0),
+        fixed(100.0 * rows.fitted as f64 / all, 0)
+    );
+    if !told.is_empty() {
+        text += &format!(" Set aside: {}.", told.join("; "));
+    }
+    section.text(text);
+    section
+}
+
+/// A sentence begins with a capital, wherever its words come from; symbols such as `k_F` stay.
+fn capital(text: &str) -> String {
+    let mut chars = text.chars();
+    match (chars.next(), text.chars().nth(1)) {
+        (Some(first), Some(second)) if second.is_alphabetic() || second == ' ' => {
+            let mut out: String = first.to_uppercase().collect();
+            out.push_str(chars.as_str());
+            if !out.ends_with(['.', '!', '?']) {
+                out.push('.');
+            }
+            out
+        }
+        _ => text.to_owned(),
+    }
+}

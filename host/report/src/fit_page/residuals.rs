@@ -1,0 +1,207 @@
+//! What the table leaves: against every coordinate, over time, and its memory.
+
+use super::super::{Axis, Colour, Figure, Mark, Panel, Section, Table, fixed};
+use super::view::View;
+
+pub(super) fn section(view: &View<'_>) -> Section {
+    let mut section = Section::new("What the table leaves");
+    section.text(
+        "Residuals are measured minus computed force, with the friction of the direction in which the muscle moved. What is \
+         random about them is noise; what is not is physics that the model lacks, and `host diagnose` looks for its name.",
+    );
+    section.figure(coordinates(view));
+    section.figure(time(view));
+    section.figure(memory(view));
+    outliers(view, &mut section);
+    section
+}
+
+fn axis() -> Axis {
+    Axis::new("residual", "N")
+}
+
+/// Mean of the residual in bins along a coordinate, with at least a few points each.
+fn trend(x: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    if !(low < high) {
+        return (Vec::new(), Vec::new());
+    }
+    const BINS: usize = 40;
+    let mut sums = [(0.0, 0.0, 0.0); BINS];
+    for (a, b) in x.iter().zip(y) {
+        let bin = (((a - low) / (high - low) * BINS as f64) as usize).min(BINS - 1);
+        let sum = &mut sums[bin];
+        *sum = (sum.0 + a, sum.1 + b, sum.2 + 1.0);
+    }
+    // A handful of points at the edge of a level is no trend.
+    let least = (0.003 * x.len() as f64).max(5.0);
+    sums.iter().filter(|s| s.2 >= least).map(|s| (s.0 / s.2, s.1 / s.2)).unzip()
+}
+
+/// Mean of the residual at each tested pressure: bins of a range would cut levels in two.
+fn by_level(view: &View<'_>, rows: &[usize], residual: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let mut sums = vec![(0.0, 0.0); view.levels.len()];
+    for (i, r) in rows.iter().zip(residual) {
+        let sum = &mut sums[view.group(*i)];
+        *sum = (sum.0 + r, sum.1 + 1.0);
+    }
+    let known = sums.iter().zip(view.levels).filter(|(s, _)| s.1 > 0.0);
+    known.map(|((sum, count), p)| (p / 1e3, sum / count)).unzip()
+}
+
+fn coordinates(view: &View<'_>) -> Figure {
+    let rows: Vec<usize> = (0..view.points().len()).filter(|i| view.fitted(*i)).collect();
+    let points = view.points();
+    let residual: Vec<f64> = rows.iter().map(|i| view.residual[*i]).collect();
+    let speed = speeds(view);
+    let of = |take: &dyn Fn(usize) -> f64| -> Vec<f64> { rows.iter().map(|i| take(*i)).collect() };
+    let mut coordinates = vec![
+        ("contraction ΔL/L_{0}", "%", of(&|i| view.contraction(points[i].stroke))),
+        ("pressure P", "kPa", of(&|i| points[i].pressure / 1e3)),
+        ("force F", "N", of(&|i| points[i].force)),
+        ("speed of shortening", "mm/s", of(&|i| 1e3 * speed[i])),
+    ];
+    // A temperature of each point is that of its first row.
+    let warm = |i: usize| {
+        let p = &points[i];
+        let column = view.campaign.recordings.get(p.recording as usize)?.temperature.as_ref()?;
+        column.get(p.first_row as usize).map(|k| k - 273.15)
+    };
+    if rows.iter().all(|i| warm(*i).is_some()) && !rows.is_empty() {
+        coordinates.push(("temperature", "°C", of(&|i| warm(i).unwrap_or(f64::NAN))));
+    }
+    let held = view.fit.prepared.pressures.held;
+    let panels = coordinates.into_iter().map(|(label, unit, x)| {
+        let (at, mean) =
+            if held && unit == "kPa" { by_level(view, &rows, &residual) } else { trend(&x, &residual) };
+        Panel::new(Axis::new(label, unit), axis())
+            .titled(format!("against {}", label.split(' ').next().unwrap_or(label)))
+            .points("each point", Colour::Muted, &x, &residual)
+            .line("mean", Colour::Series(1), &at, &mean)
+    });
+    Figure::multiples(
+        "residuals",
+        "Residuals against each coordinate",
+        "The mean line should stay at zero. Where it does not, the force depends on that coordinate in a way that the model \
+         does not have.",
+        panels.collect(),
+    )
+    .shared(false, true)
+}
+
+/// Speed of each point, m/s, from its neighbours in the same recording.
+fn speeds(view: &View<'_>) -> Vec<f64> {
+    let points = view.points();
+    (0..points.len())
+        .map(|i| {
+            let near = |k: Option<usize>| {
+                k.and_then(|k| points.get(k)).filter(|p| p.block == points[i].block).unwrap_or(&points[i])
+            };
+            let (a, b) = (near(i.checked_sub(1)), near(Some(i + 1)));
+            let dt = b.time - a.time;
+            if dt > 0.0 { (b.stroke - a.stroke) / dt } else { 0.0 }
+        })
+        .collect()
+}
+
+fn time(view: &View<'_>) -> Figure {
+    // Recordings that all start at zero are set one after another.
+    let mut shift = vec![0.0; view.campaign.recordings.len()];
+    let separate = view.campaign.clock == pam_data::recording::Clock::Separate;
+    let mut starts = Vec::new();
+    let mut end = 0.0;
+    for (i, recording) in view.campaign.recordings.iter().enumerate() {
+        let first = recording.time.first().copied().unwrap_or(0.0);
+        if separate {
+            shift[i] = end - first;
+        }
+        starts.push(first + shift[i]);
+        end = recording.time.last().copied().unwrap_or(0.0) + shift[i];
+    }
+    let rows = || (0..view.points().len()).filter(|i| view.fitted(*i));
+    let x: Vec<f64> =
+        rows().map(|i| view.points()[i].time + shift[view.points()[i].recording as usize]).collect();
+    let y: Vec<f64> = rows().map(|i| view.residual[i]).collect();
+    let label = if separate { "time, recordings one after another" } else { "time" };
+    let mut panel = Panel::new(Axis::new(label, "s"), axis()).points("each point", Colour::Muted, &x, &y);
+    let (at, mean) = trend(&x, &y);
+    panel = panel.line("mean", Colour::Series(1), &at, &mean);
+    if starts.len() <= 30 {
+        for (i, start) in starts.iter().enumerate().skip(1) {
+            let name = if i == 1 { "a new recording" } else { "" };
+            panel = panel.with(name, Colour::Muted, Mark::Moment(*start));
+        }
+    }
+    Figure::new(
+        "residuals-time",
+        "Residuals over time",
+        "A slow slope is drift, warming or run-in; a step is something that slipped; a pattern that repeats with every stroke \
+         depends on the motion, not on time.",
+        panel,
+    )
+}
+
+/// Autocorrelation of the residuals of points that follow each other within a half-stroke.
+fn memory(view: &View<'_>) -> Figure {
+    const LAGS: usize = 60;
+    let points = view.points();
+    let used: Vec<usize> = (0..points.len()).filter(|i| view.fitted(*i)).collect();
+    let mean = used.iter().map(|i| view.residual[*i]).sum::<f64>() / used.len().max(1) as f64;
+    let product = |lag: usize| {
+        let (mut sum, mut count) = (0.0, 0.0_f64);
+        for i in 0..points.len().saturating_sub(lag) {
+            if points[i].block == points[i + lag].block && view.fitted(i) && view.fitted(i + lag) {
+                sum += (view.residual[i] - mean) * (view.residual[i + lag] - mean);
+                count += 1.0;
+            }
+        }
+        if count > 20.0 { sum / count } else { f64::NAN }
+    };
+    let variance = product(0);
+    let lags: Vec<f64> = (0..=LAGS).map(|l| l as f64).collect();
+    let values: Vec<f64> =
+        (0..=LAGS).map(|l| if variance > 0.0 { product(l) / variance } else { f64::NAN }).collect();
+    let bound = 1.96 / (used.len().max(1) as f64).sqrt();
+    let correlation = view.fit.uncertain.correlation;
+    let panel =
+        Panel::new(Axis::new("distance in points", ""), Axis::new("autocorrelation", "").range(-1.0, 1.05))
+            .bars("residuals", Colour::Series(0), &lags, &values)
+            .with("95 % of what independent residuals would show", Colour::Alarm, Mark::Level(bound))
+            .with("", Colour::Alarm, Mark::Level(-bound));
+    Figure::new(
+        "autocorrelation",
+        "Memory of the residuals",
+        format!(
+            "Bars that stay high mean that neighbours err together, so {} points are worth about {} independent ones. All \
+             intervals of this report allow for that.",
+            fixed(used.len() as f64, 0),
+            fixed(used.len() as f64 / correlation.max(1.0), 0)
+        ),
+        panel,
+    )
+}
+
+fn outliers(view: &View<'_>, section: &mut Section) {
+    let all = &view.fit.summary.outliers;
+    if all.is_empty() {
+        return;
+    }
+    let mut table = Table::new(
+        "Readings that do not belong to the rest; they were not fitted",
+        &["recording", "row", "time (s)", "force (N)", "off by (N)"],
+    );
+    const MOST: usize = 25;
+    for o in all.iter().take(MOST) {
+        table.row([
+            o.recording.clone(),
+            o.row.to_string(),
+            fixed(o.time_s, 3),
+            fixed(o.force_N, 2),
+            fixed(o.off_N, 2),
+        ]);
+    }
+    section.table(table);
+    if all.len() > MOST {
+        section.text(format!("{} more are listed in the JSON of the fit.", all.len() - MOST));
+    }
+}

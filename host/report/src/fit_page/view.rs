@@ -1,0 +1,158 @@
+//! What the figures of a fit share: points with their residuals, and how tested pressures are called and coloured.
+
+use model_core::units::{Length, Pressure};
+
+use super::super::{Colour, figures, fixed};
+use pam_data::recording::Campaign;
+use pam_fit::band::{ForceBand, HALF_95};
+use pam_fit::fit::points::Point;
+use pam_fit::fit::result::Fit;
+use pam_fit::fit::screen::Use;
+use pam_fit::table_file::{About, TableFile};
+
+/// A fit, ready to be drawn.
+pub(super) struct View<'a> {
+    pub fit: &'a Fit,
+    pub campaign: &'a Campaign,
+    /// Tested pressures, or middles of intervals, Pa.
+    pub levels: &'a [f64],
+    /// m.
+    pub l0: f64,
+    /// `F − F_model` of every point by the table itself, N.
+    pub residual: Vec<f64>,
+    muscle: Option<model_core::muscle::Muscle<f64>>,
+    band: Option<ForceBand>,
+}
+
+/// A curve with the edges of its interval.
+pub(super) struct Banded {
+    pub middle: Vec<f64>,
+    pub low: Vec<f64>,
+    pub high: Vec<f64>,
+}
+
+impl FromIterator<[f64; 3]> for Banded {
+    fn from_iter<I: IntoIterator<Item = [f64; 3]>>(values: I) -> Self {
+        let mut all = Self { middle: Vec::new(), low: Vec::new(), high: Vec::new() };
+        for [middle, low, high] in values {
+            all.middle.push(middle);
+            all.low.push(low);
+            all.high.push(high);
+        }
+        all
+    }
+}
+
+impl<'a> View<'a> {
+    pub fn new(fit: &'a Fit, campaign: &'a Campaign) -> Self {
+        let muscle = model_core::muscle::Muscle::<f64>::build(&fit.table).ok();
+        let l0 = fit.prepared.braid.rest_length();
+        let levels = fit.prepared.pressures.levels.as_slice();
+        let uncertainty = Some(fit.stored_uncertainty());
+        let about = About { uncertainty, ..About::default() };
+        let band = ForceBand::of(&TableFile { table: fit.table.clone(), about });
+        let mut view = Self { fit, campaign, levels, l0, residual: Vec::new(), muscle, band };
+        view.residual = view
+            .points()
+            .iter()
+            .map(|p| p.force - view.force(p.pressure, p.stroke, view.direction(p)))
+            .collect();
+        view
+    }
+
+    pub fn points(&self) -> &'a [Point] {
+        &self.fit.prepared.points.list
+    }
+
+    fn direction(&self, p: &Point) -> f64 {
+        if self.fit.prepared.design.friction { p.direction } else { 0.0 }
+    }
+
+    /// The table's force, N.
+    pub fn force(&self, pressure: f64, stroke: f64, direction: f64) -> f64 {
+        self.muscle.as_ref().map_or(f64::NAN, |m| {
+            m.force(Pressure::from_pascals(pressure), Length::from_metres(stroke), direction).newtons()
+        })
+    }
+
+    /// Slope of the friction-free force over contraction, N.
+    pub fn slope(&self, pressure: f64, contraction: f64) -> f64 {
+        let h = 1e-4;
+        let at = |c: f64| self.force(pressure, c * self.l0, 0.0);
+        (at(contraction + h) - at(contraction - h)) / (2.0 * h)
+    }
+
+    /// The tested pressure that a point belongs to.
+    pub fn group(&self, i: usize) -> usize {
+        let design = &self.fit.prepared.design;
+        design.bins[design.rows[i].bin as usize].group as usize
+    }
+
+    pub fn fitted(&self, i: usize) -> bool {
+        self.fit.prepared.used[i] == Use::Fitted
+    }
+
+    /// Contraction in percent.
+    pub fn contraction(&self, stroke: f64) -> f64 {
+        100.0 * stroke / self.l0
+    }
+
+    pub fn name(&self, group: usize) -> String {
+        let Some(p) = self.levels.get(group) else { return String::new() };
+        if self.fit.prepared.pressures.held {
+            format!("{} kPa", fixed(p / 1e3, 0))
+        } else {
+            format!("about {} kPa", fixed(p / 1e3, 0))
+        }
+    }
+
+    pub fn colour(&self, group: usize) -> Colour {
+        Colour::ordered(group, self.levels.len())
+    }
+
+    /// At most `most` tested pressures, the lowest and the highest among them.
+    pub fn some(&self, most: usize) -> Vec<usize> {
+        let n = self.levels.len();
+        if n <= most {
+            return (0..n).collect();
+        }
+        let last = (most - 1).max(1);
+        (0..most).map(|i| i * (n - 1) / last).collect()
+    }
+
+    /// Strokes over the range tested at one pressure, m.
+    pub fn strokes(&self, group: usize, count: usize) -> Vec<f64> {
+        let of =
+            (0..self.points().len()).filter(|i| self.group(*i) == group).map(|i| self.points()[i].stroke);
+        let (low, high) = of.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        if !(low < high) {
+            return if low.is_finite() { vec![low] } else { Vec::new() };
+        }
+        (0..count).map(|i| low + (high - low) * i as f64 / (count - 1).max(1) as f64).collect()
+    }
+
+    /// The table's force with the edges of its 95 % interval along some strokes at one pressure, N.
+    pub fn banded(&self, pressure: f64, strokes: &[f64], direction: f64) -> Banded {
+        strokes.iter().map(|x| self.banded_at(pressure, *x, direction)).collect()
+    }
+
+    /// The same at one pressure and one stroke: force, lower and upper edge.
+    pub fn banded_at(&self, pressure: f64, stroke: f64, direction: f64) -> [f64; 3] {
+        let force = self.force(pressure, stroke, direction);
+        let half = self.band.as_ref().map_or(f64::NAN, |b| HALF_95 * b.std(pressure, stroke, direction));
+        [force, force - half, force + half]
+    }
+
+    /// Half the width of the 95 % interval of single readings, N.
+    pub fn half_of_readings(&self, pressure: f64, stroke: f64, direction: f64) -> f64 {
+        self.band.as_ref().map_or(f64::NAN, |b| HALF_95 * b.reading_std(pressure, stroke, direction))
+    }
+
+    /// Where the largest error is, in words.
+    pub fn worst_place(&self) -> String {
+        let worst = self.fit.chunks.iter().max_by(|a, b| a.percent.abs().total_cmp(&b.percent.abs()));
+        worst.map_or(String::new(), |c| {
+            format!("at {}, contraction {} %", self.name(c.group as usize), figures(100.0 * c.contraction, 2))
+        })
+    }
+}

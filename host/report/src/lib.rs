@@ -1,0 +1,44 @@
+//! Reports: pictures, one HTML file each, a Markdown summary.
+//!
+//! This room only draws what others computed. A picture is a value ([`Figure`]: panels, axes, marks); a report is a value
+//! ([`Page`]: verdict, facts, sections). Both turn into text in one place, so that every report of this program looks
+//! alike, in light and dark, on a page, on a phone and in print.
+//!
+//! ```
+//! use pam_report::{Axis, Colour, Figure, Panel};
+//!
+//! let pressure = [200.0, 300.0, 400.0, 500.0];
+//! let panel = Panel::new(Axis::new("pressure P", "kPa"), Axis::new("friction factor k_{F}", "").from_zero())
+//!     .band("95 %", Colour::Series(0), &pressure, &[0.13, 0.10, 0.08, 0.05], &[0.15, 0.12, 0.10, 0.07])
+//!     .line("fit", Colour::Series(0), &pressure, &[0.14, 0.11, 0.09, 0.06])
+//!     .rings("nodes", Colour::Series(0), &pressure, &[0.14, 0.11, 0.09, 0.06]);
+//! let figure = Figure::new("friction", "Friction factor", "The band is narrow where the data determine it.", panel);
+//! assert!(figure.svg().contains("friction factor k"));
+//! ```
+
+pub mod compare_page;
+pub mod diagnose_page;
+pub mod effect_page;
+pub mod effect_trace;
+pub mod fit_page;
+pub mod rich;
+
+mod axis;
+mod colour;
+mod figure;
+mod html;
+mod legend;
+pub mod letters;
+mod markdown;
+mod marks;
+mod numbers;
+mod page;
+mod paper;
+mod parts;
+mod svg;
+mod thin;
+
+pub use axis::{Axis, Scale, figures, fixed};
+pub use colour::Colour;
+pub use figure::{Figure, Layer, Look, Mark, Panel};
+pub use page::{Block, Fact, Page, Section, Table, Tone};
