@@ -1,4 +1,7 @@
 //! Picks the memory map of the board that is built.
+//!
+//! The emulated board's map is the top level's `memory.x`, which cortex-m-rt's script finds because cargo links there. Any other
+//! board is linked by a script of its own: a second `memory.x` would never be looked at.
 
 use std::{env, error::Error, fs, path::PathBuf};
 
@@ -10,18 +13,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     let here = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?);
     let out = PathBuf::from(env::var("OUT_DIR")?);
     let chosen = |feature: &str| env::var_os(format!("CARGO_FEATURE_{feature}")).is_some();
-    let map = if chosen("NUCLEO_F446RE") {
-        here.join("memory/nucleo-f446re.x")
+    if chosen("NUCLEO_F446RE") {
+        let maps = here.join("memory");
+        println!("cargo:rerun-if-changed={}", maps.display());
+        println!("cargo:rustc-link-search={}", maps.display());
+        println!("cargo:rustc-link-arg-bins=-Tnucleo-f446re.x");
     } else {
+        let map = here.join("../memory.x");
+        println!("cargo:rerun-if-changed={}", map.display());
+        fs::copy(&map, out.join("memory.x"))?;
         // The interrupts of this board are in the program itself, so the linker needs no list of their names.
         fs::write(out.join("device.x"), "")?;
-        here.join("../memory.x")
-    };
-    println!("cargo:rerun-if-changed={}", map.display());
-    fs::copy(&map, out.join("memory.x"))?;
-    println!("cargo:rustc-link-search={}", out.display());
+        println!("cargo:rustc-link-search={}", out.display());
+        println!("cargo:rustc-link-arg-bins=-Tlink.x");
+    }
     println!("cargo:rustc-link-arg-bins=--nmagic");
-    println!("cargo:rustc-link-arg-bins=-Tlink.x");
     // Functions of the same instructions once.
     println!("cargo:rustc-link-arg-bins=--icf=all");
     if chosen("LOG") {

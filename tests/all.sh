@@ -115,6 +115,9 @@ else
     if require "Python bindings" python3 python3 python3-venv; then
         step "Python bindings" bash host/python/tests/run.sh
     fi
+    if require "image of the Nucleo, executed" python3 python3 python3-venv; then
+        step "image of the Nucleo, executed" bash tests/nucleo/run.sh
+    fi
 fi
 if [ $tier = long ]; then
     step "long tests" env PAM_LONG=1 cargo test --workspace --release --locked --no-fail-fast \

@@ -1,7 +1,8 @@
 //! What a board must give: readings, a regulator, a place to keep things, and its identity.
 
 use model_core::link::hello::Board;
-use model_core::link::messages::StartedBy;
+use model_core::link::messages::{Fault, StartedBy};
+use model_core::link::settings::Settings;
 
 /// What the sensors of one muscle say.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -14,10 +15,10 @@ pub struct Readings {
     pub force_n: f32,
 }
 
-/// What one regulator is told.
+/// What one regulator and its dump valve are told.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Command {
-    /// Gauge pressure, Pa.
+    /// Gauge pressure that the regulator is asked for, Pa; above zero beside an open dump valve in the test of that valve only.
     pub pressure_pa: f32,
     /// Open the dump valve, whatever the pressure says.
     pub vent: bool,
@@ -61,6 +62,42 @@ pub trait Plant {
     fn exchange(&mut self, outputs: &Outputs) -> impl core::future::Future<Output = Inputs>;
 }
 
+/// The ends of what a converter can deliver: a reading there is a broken wire or a short, not a measurement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span {
+    /// Value of the lowest code.
+    pub low: f32,
+    /// Value of the highest code.
+    pub high: f32,
+}
+
+/// What a board's converters and regulator can do, whatever the settings say. A watch or a limit outside a span could never trip,
+/// so settings are refused there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hardware {
+    /// Pressure sensor's converter, Pa.
+    pub pressure: Span,
+    /// Stroke sensor's converter, m.
+    pub stroke: Span,
+    /// Load cell's converter, N.
+    pub force: Span,
+    /// Highest command that is ever given to a regulator, Pa.
+    pub command_ceiling_pa: f32,
+    /// Settings of a new device.
+    pub settings: Settings,
+}
+
+impl Hardware {
+    /// Numbers of a simulated bench, which no converter limits: bounded by what any muscle could bear.
+    pub const SIMULATED: Self = Self {
+        pressure: Span { low: -1e6, high: 10e6 },
+        stroke: Span { low: -2.0, high: 2.0 },
+        force: Span { low: -100e3, high: 100e3 },
+        command_ceiling_pa: 2e6,
+        settings: Settings::DEFAULT,
+    };
+}
+
 /// Who a board is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Identity {
@@ -72,4 +109,6 @@ pub struct Identity {
     pub serial: [u8; 12],
     /// Why it started.
     pub started_by: StartedBy,
+    /// What the board itself found wrong while it started.
+    pub fault: Option<Fault>,
 }

@@ -7,6 +7,8 @@ mod nucleo_f446re;
 
 mod division;
 mod memory;
+#[allow(dead_code, reason = "without a board there are no registers")]
+mod register;
 
 /// A line of the log, where logs are built in.
 #[allow(unused_macros, reason = "not every board logs")]

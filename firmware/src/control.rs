@@ -13,7 +13,7 @@ use model_core::motion::{MotionSettings, MotionTracker};
 use model_core::single;
 use model_core::table::{MuscleTable, TableError};
 
-use crate::board::{Inputs, Outputs, Readings};
+use crate::board::{Hardware, Inputs, Outputs, Readings};
 use crate::modes::{Model, Seat};
 use crate::pair::PairState;
 use crate::reference::Generator;
@@ -21,18 +21,20 @@ use crate::regulator;
 use crate::safety::{self, Machine};
 use crate::tick::{TICK_S, TICK_US};
 use crate::trace::Trace;
-use crate::watch::{Finding, SideWatch};
+use crate::watch::Finding;
 
 mod actuator;
+mod arming;
 mod check;
 mod drive;
 mod look_out;
 mod record;
 mod requests;
 
-pub use check::check_settings;
+pub use check::{check_settings, mend_settings};
 
 use actuator::Actuator;
+use arming::Arming;
 
 fn motion_settings(settings: &Settings) -> MotionSettings<f32> {
     MotionSettings {
@@ -54,7 +56,11 @@ enum News {
 #[derive(Debug)]
 pub struct Controller {
     settings: Settings,
+    hardware: &'static Hardware,
     machine: Machine,
+    arming: Arming,
+    /// Whether somebody has to send settings before the device can be armed.
+    unconfirmed: bool,
     mode: Mode,
     generator: Generator,
     asked: f32,
@@ -65,6 +71,8 @@ pub struct Controller {
     asked_age: u32,
     /// Ticks since a host's last frame.
     host_age: u32,
+    /// Ticks for which a fault has held the last command.
+    held_ticks: u32,
     sides: [Actuator; 2],
     pair: PairState,
     tick: u64,
@@ -84,13 +92,17 @@ pub struct Controller {
 impl Controller {
     /// As after power-up: disarmed, vented, without tables; for two muscles.
     pub fn new(settings: &Settings) -> Self {
-        Self::seated(settings, Seat::pair())
+        Self::seated(settings, &Hardware::SIMULATED, Seat::pair())
     }
 
     /// The same with places for the tables of the muscles that a board drives.
     #[inline(always)]
-    pub fn seated(settings: &Settings, [first, second]: [Seat; 2]) -> Self {
+    pub fn seated(settings: &Settings, hardware: &'static Hardware, [first, second]: [Seat; 2]) -> Self {
         Self {
+            hardware,
+            arming: Arming::Idle,
+            unconfirmed: false,
+            held_ticks: 0,
             machine: Machine::default(),
             mode: Mode::Vent,
             generator: Generator::default(),
@@ -172,13 +184,37 @@ impl Controller {
         &self.settings
     }
 
+    /// What the board can do.
+    pub fn hardware(&self) -> &'static Hardware {
+        self.hardware
+    }
+
     /// Uses other settings, which must have passed [`check_settings`].
     pub fn use_settings(&mut self, settings: &Settings) {
         self.settings = *settings;
         for side in &mut self.sides {
             side.motion = MotionTracker::new(motion_settings(settings));
-            side.watch = SideWatch::default();
+            side.watch.restart();
         }
+    }
+
+    /// The kept settings could not be trusted: nothing can be armed until somebody has sent settings.
+    pub fn distrust_settings(&mut self) {
+        self.unconfirmed = true;
+        let finding = Finding { fault: Fault::SettingsInvalid, sensor: None, value: 0.0, limit: 0.0 };
+        self.raise(Side::Agonist, &finding);
+    }
+
+    /// Settings were sent by somebody who has seen them.
+    pub fn confirm_settings(&mut self) {
+        self.unconfirmed = false;
+    }
+
+    /// Whether every muscle is vented and stays so: the flash, which stops the processor, may be written.
+    pub fn is_vented(&self) -> bool {
+        self.machine.state() != State::Running
+            && self.arming == Arming::Idle
+            && self.sides.iter().all(|side| side.command.vent)
     }
 
     /// A muscle's table in use.
@@ -221,7 +257,39 @@ impl Controller {
 
     /// Latches a fault.
     pub fn raise(&mut self, side: Side, finding: &Finding) {
-        let report = FaultReport {
+        let report = self.report(side, finding);
+        if !self.machine.fault(&report) {
+            return;
+        }
+        self.news = Some(News::Fault);
+        self.trace.on_fault();
+        self.held_ticks = 0;
+        // A fault of a start that never ran leaves nothing pressurised.
+        let vents = safety::reaction(finding.fault, self.settings.hold_on) == Reaction::Vent;
+        if vents || report.from != State::Running || self.settings.watch.hold_ticks == 0 {
+            self.vent_now();
+        }
+    }
+
+    /// A fault while one is latched: counted when it comes up; one that vents ends a hold.
+    fn raise_again(&mut self, side: Side, finding: &Finding, ends_hold: bool) {
+        let holds = !self.is_vented();
+        if !(holds && ends_hold) {
+            if self.present != Some(finding.fault) {
+                let report = self.report(side, finding);
+                self.machine.fault(&report);
+            }
+            return;
+        }
+        let report = self.report(side, finding);
+        self.machine.ended_hold(&report);
+        self.vent_now();
+        // The link's task keeps the report, now that nothing is held.
+        self.news = Some(News::State(State::Fault));
+    }
+
+    fn report(&self, side: Side, finding: &Finding) -> FaultReport {
+        FaultReport {
             fault: finding.fault,
             side,
             sensor: finding.sensor,
@@ -231,18 +299,6 @@ impl Controller {
             value: finding.value,
             limit: finding.limit,
             last: self.sides[side.index()].sample,
-        };
-        if !self.machine.fault(&report) {
-            return;
-        }
-        self.news = Some(News::Fault);
-        self.trace.on_fault();
-        if safety::reaction(finding.fault, self.settings.hold_on) == Reaction::Vent {
-            self.vent_now();
-        }
-        // A fault of a start that never ran leaves nothing pressurised.
-        if report.from != State::Running {
-            self.vent_now();
         }
     }
 
@@ -254,24 +310,22 @@ impl Controller {
             let model_n = self.look(side, inputs);
             self.sides[side.index()].model_n = model_n;
         }
-        let finding = self.watch(inputs);
-        self.present = finding.map(|(_, finding)| finding.fault);
-        if let Some((side, finding)) = finding {
-            let state = self.machine.state();
-            let watched = match state {
-                State::Running => true,
-                State::Armed => safety::rule_of(finding.fault).while_armed,
-                State::Disarmed | State::Fault => false,
-            };
-            if watched {
+        let found = self.watch(inputs);
+        if let Some((side, finding)) = found.gravest() {
+            if self.machine.state() == State::Fault {
+                self.raise_again(side, &finding, found.venting().is_some());
+            } else {
                 self.raise(side, &finding);
             }
         }
-        if self.machine.state() == State::Running {
-            self.ask();
-            self.drive();
-        } else {
-            self.rest();
+        self.present = found.gravest().map(|(_, finding)| finding.fault);
+        match (self.machine.state(), self.arming) {
+            (State::Running, _) => {
+                self.ask();
+                self.drive();
+            }
+            (State::Disarmed, Arming::Filling(_) | Arming::Dumping(_)) => self.test_valves(inputs),
+            _ => self.rest(),
         }
         self.record()
     }
@@ -306,3 +360,6 @@ impl Controller {
         Some(model_n)
     }
 }
+
+#[cfg(test)]
+mod tests;

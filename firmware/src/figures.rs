@@ -189,7 +189,8 @@ fn whole_step(table: &MuscleTable) {
         sides: [Some(Readings { pressure_pa, stroke_m, force_n }), None],
         ..Inputs::default()
     };
-    controller.step(&inputs(100e3, 0.9e-3, 10.0));
+    // Empty, as it must be to be armed.
+    controller.step(&inputs(0.0, 0.9e-3, 0.0));
     let wave = Reference::Sine { mean: 45.0, amplitude: 20.0, frequency_hz: 2.0 };
     let began = controller.arm().is_ok()
         && controller.start(Mode::Force).is_ok()

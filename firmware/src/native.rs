@@ -95,6 +95,7 @@ impl Device {
             muscles: options.muscles,
             serial: *b"native\0\0\0\0\0\0",
             started_by: StartedBy::Power,
+            fault: None,
         };
         let server = Server::start(identity, flash, &shared)
             .map_err(|fault| io::Error::other(format!("the store cannot be opened: {fault:?}")))?;

@@ -168,6 +168,11 @@ impl RegulatorState {
         self.predict(dt, 0.0, air, regulator);
     }
 
+    /// A command of somebody else's: only the model follows it.
+    pub fn expect(&mut self, command_pa: f32, regulator: &Regulator) {
+        self.predict(TICK_S, command_pa, &Air::default(), regulator);
+    }
+
     /// The last command again.
     pub fn hold(&mut self, dt: f32, air: &Air, regulator: &Regulator) {
         self.predict(dt, self.command_pa, air, regulator);

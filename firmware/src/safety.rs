@@ -43,48 +43,73 @@ pub const TRANSITIONS: &[(State, Cause, State)] = &[
     (State::Fault, Cause::Clear, State::Disarmed),
 ];
 
+/// In which states a fault is watched for. While running and after a fault every one is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Watched {
+    /// Only while something is controlled or held.
+    Running,
+    /// From arming on.
+    Armed,
+    /// Always: pressure or force in a muscle that should be empty, whoever put it there.
+    Always,
+}
+
 /// How a fault behaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rule {
     /// The fault.
     pub fault: Fault,
-    /// Whether it is watched for while armed, and not only while running.
-    pub while_armed: bool,
+    /// From which state on it is watched for.
+    pub watched: Watched,
     /// Whether the settings may make it hold the last command. Faults that mean too much pressure, or that nothing is
-    /// known of the muscle any more, always vent.
+    /// known of the muscle any more, always vent, and end a hold.
     pub may_hold: bool,
 }
 
-const fn rule(fault: Fault, while_armed: bool, may_hold: bool) -> Rule {
-    Rule { fault, while_armed, may_hold }
+const fn rule(fault: Fault, watched: Watched, may_hold: bool) -> Rule {
+    Rule { fault, watched, may_hold }
 }
 
 /// Every fault, in the order of its code. How long each takes to be noticed is in [`watch`](crate::watch).
 pub const RULES: [Rule; Fault::ALL.len()] = [
-    rule(Fault::SensorRange, true, true),
-    rule(Fault::SensorStuck, false, true),
-    rule(Fault::SensorNoisy, true, true),
-    rule(Fault::SensorsDisagree, false, true),
-    rule(Fault::SensorsSilent, true, false),
-    rule(Fault::PressureNotRising, false, true),
-    rule(Fault::PressureNotFalling, false, false),
-    rule(Fault::OverPressure, true, false),
-    rule(Fault::OverStroke, true, true),
-    rule(Fault::OverSpeed, false, true),
-    rule(Fault::OverForce, true, false),
-    rule(Fault::SetPointSilence, false, true),
-    rule(Fault::LoopOverrun, false, true),
-    rule(Fault::TableMissing, true, true),
-    rule(Fault::TableInvalid, true, true),
-    rule(Fault::BrownOut, true, false),
-    rule(Fault::Watchdog, true, false),
-    rule(Fault::NotANumber, false, false),
-    rule(Fault::HostSilence, false, true),
+    rule(Fault::SensorRange, Watched::Armed, true),
+    rule(Fault::SensorStuck, Watched::Running, true),
+    rule(Fault::SensorNoisy, Watched::Armed, true),
+    rule(Fault::SensorsDisagree, Watched::Running, true),
+    rule(Fault::SensorsSilent, Watched::Armed, false),
+    rule(Fault::PressureNotRising, Watched::Running, true),
+    rule(Fault::PressureNotFalling, Watched::Always, false),
+    rule(Fault::OverPressure, Watched::Always, false),
+    rule(Fault::OverStroke, Watched::Armed, true),
+    rule(Fault::OverSpeed, Watched::Running, true),
+    rule(Fault::OverForce, Watched::Always, false),
+    rule(Fault::SetPointSilence, Watched::Running, true),
+    rule(Fault::LoopOverrun, Watched::Running, true),
+    rule(Fault::TableMissing, Watched::Armed, true),
+    rule(Fault::TableInvalid, Watched::Armed, true),
+    rule(Fault::BrownOut, Watched::Armed, false),
+    rule(Fault::Watchdog, Watched::Armed, false),
+    rule(Fault::NotANumber, Watched::Running, false),
+    rule(Fault::HostSilence, Watched::Running, true),
+    rule(Fault::SettingsInvalid, Watched::Always, false),
+    rule(Fault::NotVented, Watched::Always, false),
+    rule(Fault::HoldEnded, Watched::Running, false),
+    rule(Fault::ClockFailed, Watched::Always, false),
+    rule(Fault::ValveTest, Watched::Always, false),
 ];
 
 /// The rule of a fault.
 pub fn rule_of(fault: Fault) -> Rule {
     RULES[usize::from(fault.code()) % RULES.len()]
+}
+
+/// Whether a fault is watched for in a state.
+pub fn is_watched(fault: Fault, state: State) -> bool {
+    match rule_of(fault).watched {
+        Watched::Always => true,
+        Watched::Armed => state != State::Disarmed,
+        Watched::Running => matches!(state, State::Running | State::Fault),
+    }
 }
 
 /// What a fault does under the settings' `hold_on`.
@@ -97,8 +122,8 @@ pub fn reaction(fault: Fault, hold_on: u32) -> Reaction {
 pub struct Machine {
     state: State,
     faults: Faults,
-    /// Whether the store has not been given the latched fault yet.
-    unsaved: bool,
+    /// Reports that the store has not been given yet: the latched one, and the one that ended a hold.
+    unsaved: [Option<FaultReport>; 2],
 }
 
 impl Machine {
@@ -117,9 +142,21 @@ impl Machine {
         self.faults.latched.map(|report| report.fault)
     }
 
-    /// Takes the latched fault, to be kept, if it has not been taken yet.
+    /// Takes a report that has not been kept yet, in the order in which they happened.
     pub fn take_unsaved(&mut self) -> Option<FaultReport> {
-        if core::mem::take(&mut self.unsaved) { self.faults.latched } else { None }
+        let [first, second] = &mut self.unsaved;
+        first.take().or_else(|| second.take())
+    }
+
+    /// A fault that ended a hold: counted, and kept beside the latched one.
+    pub fn ended_hold(&mut self, report: &FaultReport) {
+        self.count(report.fault);
+        self.unsaved[1] = Some(*report);
+    }
+
+    fn count(&mut self, fault: Fault) {
+        let count = &mut self.faults.counts[usize::from(fault.code()) % RULES.len()];
+        *count = count.saturating_add(1);
     }
 
     /// Where a request would lead.
@@ -150,13 +187,12 @@ impl Machine {
 
     /// A fault: counted each time, latched if it is the first. Returns whether it was.
     pub fn fault(&mut self, report: &FaultReport) -> bool {
-        let count = &mut self.faults.counts[usize::from(report.fault.code()) % RULES.len()];
-        *count = count.saturating_add(1);
+        self.count(report.fault);
         if self.faults.latched.is_some() {
             return false;
         }
         self.faults.latched = Some(*report);
-        self.unsaved = true;
+        self.unsaved[0] = Some(*report);
         // The table has a way to `Fault` from every state.
         let _ = self.request(Cause::Fault);
         true

@@ -10,7 +10,7 @@ use model_core::image::{self, ImageError};
 use model_core::link::endpoints;
 use model_core::link::frame::{self, Exchange, Header, Kind};
 use model_core::link::hello::{self, Hello};
-use model_core::link::messages::{Fault, Refusal, Side, StartedBy, State, StoreFault, TableFault, TableInfo};
+use model_core::link::messages::{Fault, Refusal, Side, StartedBy, StoreFault, TableFault, TableInfo};
 use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 use model_core::table::{MuscleTable, TableError};
 
@@ -18,7 +18,7 @@ use crate::board::Identity;
 use crate::control::{self, Controller};
 use crate::modes::Model;
 use crate::shared::Shared;
-use crate::store::{self, Store};
+use crate::store::{self, Kept, Store};
 use crate::watch::Finding;
 
 use self::session::Session;
@@ -69,7 +69,7 @@ impl<F: NorFlash> Server<F> {
                 store.count_start()?
             }
         };
-        use_settings(&mut store, shared);
+        use_settings(&mut store, damaged, shared)?;
         let counts = frame::Counts::default();
         let mut server = Self {
             identity,
@@ -83,12 +83,12 @@ impl<F: NorFlash> Server<F> {
         for side in Side::ALL {
             damaged |= server.use_kept(side, shared).is_err();
         }
-        let latch = match identity.started_by {
+        let started = match identity.started_by {
             StartedBy::Watchdog => Some(Fault::Watchdog),
             StartedBy::BrownOut => Some(Fault::BrownOut),
-            StartedBy::Power | StartedBy::Request => damaged.then_some(Fault::TableInvalid),
+            StartedBy::Power | StartedBy::Request => None,
         };
-        if let Some(fault) = latch {
+        for fault in [identity.fault, started, damaged.then_some(Fault::TableInvalid)].into_iter().flatten() {
             let finding = Finding { fault, sensor: None, value: 0.0, limit: 0.0 };
             shared.with(|controller| controller.raise(Side::Agonist, &finding));
         }
@@ -137,9 +137,9 @@ impl<F: NorFlash> Server<F> {
     }
 
     /// Keeps what must not be lost and is not asked for: new faults, memories of effects. Called now and then by the link's
-    /// task, and never while running: a flash may stop the processor while it erases.
+    /// task, and never while a muscle is not vented: a flash may stop the processor while it erases.
     pub fn keep(&mut self, shared: &Shared) {
-        if shared.with(|controller| controller.state()) == State::Running {
+        if !shared.with(|controller| controller.is_vented()) {
             return;
         }
         self.keep_fault(shared);
@@ -148,7 +148,7 @@ impl<F: NorFlash> Server<F> {
 
     #[inline(never)]
     fn keep_fault(&mut self, shared: &Shared) {
-        if let Some(mut report) = shared.with(|controller| controller.machine().take_unsaved()) {
+        while let Some(mut report) = shared.with(|controller| controller.machine().take_unsaved()) {
             // A store that fails here has no better place to say so than the next request that needs it.
             let _ = self.store.put_fault(&mut report);
         }
@@ -254,14 +254,25 @@ impl<F: NorFlash> Server<F> {
     }
 }
 
-/// Has the controller use the kept settings, if it can.
+/// Has the controller use the kept settings. What is damaged or of another layout is taken over as far as it can be, and latches a
+/// fault: the device cannot be armed until somebody has looked at the settings in force and sent them.
 #[inline(never)]
-fn use_settings<F: NorFlash>(store: &mut Store<F>, shared: &Shared) {
-    if let Ok(Some(settings)) = store.settings()
-        && control::check_settings(&settings).is_ok()
-    {
-        shared.with(|controller| controller.use_settings(&settings));
+fn use_settings<F: NorFlash>(store: &mut Store<F>, damaged: bool, shared: &Shared) -> Result<(), StoreFault> {
+    let hardware = shared.with(|controller| controller.hardware());
+    let mut settings = hardware.settings;
+    let kept = store.settings(&mut settings)?;
+    let mended = control::mend_settings(&mut settings, hardware);
+    let untrusted = damaged || mended || kept == Kept::Untrusted;
+    if !untrusted && kept != Kept::Whole {
+        store.put_settings(&mut settings)?;
     }
+    shared.with(|controller| {
+        controller.use_settings(&settings);
+        if untrusted {
+            controller.distrust_settings();
+        }
+    });
+    Ok(())
 }
 
 fn table_refusal(error: ImageError) -> Refusal {
@@ -279,3 +290,6 @@ fn persistent_memories(model: &Model) -> usize {
     let any = model.chain.memories().any(|(effect, _)| effect.is_persistent());
     if any { model.chain.memories().count() } else { 0 }
 }
+
+#[cfg(test)]
+mod tests;

@@ -13,6 +13,8 @@ use embassy_sync::signal::Signal;
 use model_core::link::frame::MAX_TOPIC;
 use model_core::link::settings::Settings;
 
+#[cfg(feature = "board")]
+use crate::board::Hardware;
 use crate::board::Outputs;
 use crate::control::Controller;
 #[cfg(feature = "board")]
@@ -65,6 +67,8 @@ pub struct Shared {
     controller: Mutex<RefCell<Controller>>,
     spoken: Room<Waiting>,
     dropped: AtomicU32,
+    /// Times that the receiver lost bytes.
+    line_errors: AtomicU32,
     /// The state changed: there may be something to keep.
     changed: Signal<CriticalSectionRawMutex, ()>,
 }
@@ -81,6 +85,7 @@ impl Shared {
             controller: Mutex::new(RefCell::new(controller)),
             spoken: room!(Waiting, Channel::new()),
             dropped: AtomicU32::new(0),
+            line_errors: AtomicU32::new(0),
             changed: Signal::new(),
         }
     }
@@ -88,9 +93,9 @@ impl Shared {
     /// The one of a board: a static of its own, made in its place and apart from what goes on to use it.
     #[cfg(feature = "board")]
     #[inline(never)]
-    pub fn take(settings: &Settings, seats: [Seat; 2]) -> &'static Self {
+    pub fn take(hardware: &'static Hardware, seats: [Seat; 2]) -> &'static Self {
         static SHARED: static_cell::StaticCell<Shared> = static_cell::StaticCell::new();
-        SHARED.uninit().write(Self::around(Controller::seated(settings, seats)))
+        SHARED.uninit().write(Self::around(Controller::seated(&hardware.settings, hardware, seats)))
     }
 
     /// Enters the controller.
@@ -101,6 +106,16 @@ impl Shared {
     /// Samples that found no room, since the start.
     pub fn telemetry_dropped(&self) -> u32 {
         self.dropped.load(Ordering::Relaxed)
+    }
+
+    /// Times that received bytes were lost, since the start.
+    pub fn line_errors(&self) -> u32 {
+        self.line_errors.load(Ordering::Relaxed)
+    }
+
+    /// Counts what the receiver has lost.
+    pub fn count_line_errors(&self, times: u32) {
+        self.line_errors.fetch_add(times, Ordering::Relaxed);
     }
 
     /// One control step; what it says is put where the telemetry task finds it. A sample without room is dropped and

@@ -9,7 +9,8 @@
 //! | --- | --- |
 //! | 0x10 + side | which slot holds the table in use: [`Selected`], postcard |
 //! | 0x20 + 2·side + slot | image of a table |
-//! | 0x32 | [`Settings`], postcard (0x30 and 0x31 held those of the layouts 1 and 2, which are not read) |
+//! | 0x33, 0x34 | [`Settings`](model_core::link::settings::Settings), postcard, and the sum to expect of them (`store/settings.rs`); 0x31 and 0x32 held those of the layouts 2 and 3 |
+//! | 0x3F | number of the layout, `u16` |
 //! | 0x40 + side | generation of a table, and what its effects remember if it must survive a power cycle: a new table brings its own; postcard |
 //! | 0x50 + n | past fault n of a ring, postcard; 0x5F its next place |
 //! | 0x60 | starts of the device, `u32` |
@@ -29,16 +30,19 @@ use model_core::fields;
 use model_core::fields::{Fields, Walk};
 use model_core::image;
 use model_core::link::messages::{FAULT_LOG, FaultReport, Side, StoreFault, TableInfo};
-use model_core::link::settings::Settings;
 use sequential_storage::Error;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage, SerializationError, Value};
 
 use crate::room::{Room, room};
 
+mod settings;
+
+pub use settings::Kept;
+
 /// Version of the layout. It moves whenever anything that is kept has other fields: postcard's bytes do not say what they are,
 /// so a value of another layout would be read as if it were of this one. Its key moves with it.
-pub const FORMAT: u16 = 3;
+pub const FORMAT: u16 = 4;
 /// Longest item with its key, rounded up to words of a flash of at most 16 bytes.
 const BUFFER: usize = image::MAX_LEN + 16;
 
@@ -116,7 +120,6 @@ type NoCache = Cache<Uncached, Uncached, Uncached, u8>;
 
 const SELECTED: u8 = 0x10;
 const IMAGE: u8 = 0x20;
-const SETTINGS: u8 = 0x32;
 const MEMORIES: u8 = 0x40;
 const PAST_FAULT: u8 = 0x50;
 const PAST_FAULT_NEXT: u8 = 0x5F;
@@ -235,13 +238,18 @@ impl<F: NorFlash> Store<F> {
         self.select(side, selected)
     }
 
-    /// Goes back to the table before. Going back again returns.
+    /// Goes back to the table before the one of a generation. If that is not in use any more because it was gone back from already, nothing
+    /// changes: the request has been repeated.
     ///
     /// # Errors
     /// [`StoreFault::NoPrevious`]; [`StoreFault::Verify`] when its bytes are damaged, and nothing changes then.
-    pub fn roll_back(&mut self, side: Side) -> Result<Selected, StoreFault> {
+    pub fn roll_back(&mut self, side: Side, generation: u32) -> Result<Selected, StoreFault> {
         let now = self.selected(side)?.ok_or(StoreFault::NoPrevious)?;
         let before = now.previous.ok_or(StoreFault::NoPrevious)?;
+        if now.table.generation != generation {
+            let done = before.generation == generation;
+            return if done { Ok(now) } else { Err(StoreFault::NoPrevious) };
+        }
         let slot = 1 - (now.slot & 1);
         if !self.bytes(image_key(side, slot))?.is_some_and(|image| fits(image, &before)) {
             return Err(StoreFault::Verify);
@@ -255,22 +263,6 @@ impl<F: NorFlash> Store<F> {
             Some(kept) if kept == selected => Ok(selected),
             _ => Err(StoreFault::Verify),
         }
-    }
-
-    /// The kept settings.
-    ///
-    /// # Errors
-    /// [`StoreFault::Medium`].
-    pub fn settings(&mut self) -> Result<Option<Settings>, StoreFault> {
-        self.value(SETTINGS)
-    }
-
-    /// Keeps settings.
-    ///
-    /// # Errors
-    /// As the medium fails.
-    pub fn put_settings(&mut self, settings: &mut Settings) -> Result<(), StoreFault> {
-        self.put_value(SETTINGS, settings)
     }
 
     /// Hands what each effect remembered of a muscle since its table was committed to `act`, by its place in the table; gives how
@@ -371,4 +363,4 @@ fn fits(image: &[u8], described: &Described) -> bool {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

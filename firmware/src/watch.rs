@@ -7,9 +7,14 @@
 //! | sensor noisy | the last of `noisy_jumps` jumps within 256 ticks |
 //! | sensors disagree | `disagree_ticks` of table and load cell apart by `disagree_n` |
 //! | pressure not following | `follow_ticks` of pressure and regulator's model apart by `follow_pa` |
+//! | not vented | `debounce_ticks` above `vented_pa` once the command has been to vent for `vent_ticks` |
+//! | hold ended | `hold_ticks` of a held command |
 //! | set-point silence | `silence_ticks` without one |
 //! | host silence | `host_silence_ticks` without a whole frame, while running and not `autonomous` |
 //! | loop overrun | `overrun_ticks` missed in a row |
+//!
+//! Every finding of a tick is reported, not only the first: one that a fault may be held for must not hide one that vents. In which
+//! states each is a fault is in [`safety`](crate::safety).
 //!
 //! Over-speed looks at the filtered speed (time constant 20 ms of the motion tracker). Jumps are forgotten by slices of 64 ticks, so that
 //! no more than 320 ticks are ever looked back on.
@@ -73,6 +78,7 @@ impl Jumps {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct OneSensor {
+    seen: bool,
     out: InARow,
     same: u16,
     last: f32,
@@ -88,7 +94,6 @@ impl OneSensor {
         settings: &Settings,
         value: f32,
         command_pa: f32,
-        first: bool,
     ) -> Option<Finding> {
         if !watch.fitted {
             return None;
@@ -100,7 +105,7 @@ impl OneSensor {
             return found(Fault::SensorRange, value, if value < watch.low { watch.low } else { watch.high });
         }
         let last = core::mem::replace(&mut self.last, value);
-        if first {
+        if !core::mem::replace(&mut self.seen, true) {
             self.command_at_change = command_pa;
             return None;
         }
@@ -135,6 +140,9 @@ pub struct SideWatch {
     disagree: InARow,
     low: InARow,
     high: InARow,
+    not_vented: InARow,
+    /// Ticks since the command is to vent.
+    vented_ticks: u32,
     /// Ticks of the slice in which jumps are being counted, none before the first readings.
     slice: u8,
 }
@@ -155,26 +163,36 @@ pub struct Seen {
 }
 
 impl SideWatch {
-    /// Looks at one tick; gives the first finding, the gravest first.
-    pub fn check(&mut self, seen: &Seen, settings: &Settings) -> Option<Finding> {
+    /// Begins anew, but for how long the muscle has been vented.
+    pub fn restart(&mut self) {
+        *self = Self { vented_ticks: self.vented_ticks, ..Self::default() };
+    }
+
+    /// Looks at one tick and reports every finding, the gravest first.
+    pub fn check(&mut self, seen: &Seen, settings: &Settings, report: &mut dyn FnMut(Finding)) {
         let watch = &settings.watch;
-        let limits = &settings.limits;
-        let plain = |fault, value, limit| Some(Finding { fault, sensor: None, value, limit });
+        self.vented_ticks = if seen.command.vent { self.vented_ticks.saturating_add(1) } else { 0 };
         let silent = self.silent.count(seen.readings.is_none(), watch.debounce_ticks);
         let Some(now) = seen.readings else {
-            return if silent {
-                plain(Fault::SensorsSilent, f32::from(self.silent.0), f32::from(watch.debounce_ticks))
-            } else {
-                None
-            };
+            if silent {
+                let (value, limit) = (f32::from(self.silent.0), f32::from(watch.debounce_ticks));
+                report(Finding { fault: Fault::SensorsSilent, sensor: None, value, limit });
+            }
+            return;
         };
-        let (fits_pressure, fits_stroke, fits_force) =
-            (settings.pressure.fitted, settings.stroke.fitted, settings.force.fitted);
-        let pressure = now.pressure_pa;
-        let command_pa = if seen.command.vent { 0.0 } else { seen.command.pressure_pa };
+        self.next_tick();
+        self.check_sensors(&now, seen.command, settings, report);
+        self.check_limits(&now, seen.speed_m_per_s, settings, report);
+        self.check_pressure(now.pressure_pa, seen.expected_pa, settings, report);
+        let miss = seen.model_n.map_or(0.0, |model| (model - now.force_n).abs());
+        let apart = settings.force.fitted && watch.disagree_n > 0.0 && miss > watch.disagree_n;
+        if self.disagree.count(apart, watch.disagree_ticks) {
+            let fault = Fault::SensorsDisagree;
+            report(Finding { fault, sensor: None, value: miss, limit: watch.disagree_n });
+        }
+    }
 
-        // Every count is kept up each tick, whatever another finds.
-        let first = self.slice == 0;
+    fn next_tick(&mut self) {
         if self.slice == SLICE {
             self.slice = 0;
             for sensor in [&mut self.pressure, &mut self.stroke, &mut self.force] {
@@ -182,53 +200,81 @@ impl SideWatch {
             }
         }
         self.slice += 1;
-        let over_pressure =
-            self.over_pressure.count(fits_pressure && pressure > limits.pressure_pa, watch.debounce_ticks);
-        let out_of_stroke = now.stroke_m < limits.stroke_min_m || now.stroke_m > limits.stroke_max_m;
-        let over_stroke = self.over_stroke.count(fits_stroke && out_of_stroke, watch.debounce_ticks);
-        let too_fast = seen.speed_m_per_s.abs() > limits.speed_m_per_s;
-        let over_speed = self.over_speed.count(fits_stroke && too_fast, watch.debounce_ticks);
-        let over_force =
-            self.over_force.count(fits_force && now.force_n > limits.force_n, watch.debounce_ticks);
-        let miss = seen.model_n.map_or(0.0, |model| (model - now.force_n).abs());
-        let apart = fits_force && watch.disagree_n > 0.0 && miss > watch.disagree_n;
-        let disagree = self.disagree.count(apart, watch.disagree_ticks);
-        let gap = pressure - seen.expected_pa;
-        let low = self.low.count(fits_pressure && gap < -watch.follow_pa, watch.follow_ticks);
-        let high = self.high.count(fits_pressure && gap > watch.follow_pa, watch.follow_ticks);
-        let sensors = [
-            self.pressure.check(Sensor::Pressure, &settings.pressure, settings, pressure, command_pa, first),
-            self.stroke.check(Sensor::Stroke, &settings.stroke, settings, now.stroke_m, command_pa, first),
-            self.force.check(Sensor::Force, &settings.force, settings, now.force_n, command_pa, first),
-        ];
+    }
 
-        if let Some(finding) = sensors.into_iter().flatten().next() {
-            return Some(finding);
+    fn check_sensors(
+        &mut self,
+        now: &Readings,
+        command: Command,
+        settings: &Settings,
+        report: &mut dyn FnMut(Finding),
+    ) {
+        let command_pa = if command.vent { 0.0 } else { command.pressure_pa };
+        let found = [
+            self.pressure.check(Sensor::Pressure, &settings.pressure, settings, now.pressure_pa, command_pa),
+            self.stroke.check(Sensor::Stroke, &settings.stroke, settings, now.stroke_m, command_pa),
+            self.force.check(Sensor::Force, &settings.force, settings, now.force_n, command_pa),
+        ];
+        found.into_iter().flatten().for_each(report);
+    }
+
+    fn check_limits(
+        &mut self,
+        now: &Readings,
+        speed_m_per_s: f32,
+        settings: &Settings,
+        report: &mut dyn FnMut(Finding),
+    ) {
+        let (limits, debounce) = (&settings.limits, settings.watch.debounce_ticks);
+        let (has_stroke, stroke) = (settings.stroke.fitted, now.stroke_m);
+        let stroke_limit =
+            if stroke < limits.stroke_min_m { limits.stroke_min_m } else { limits.stroke_max_m };
+        let out_of_stroke = stroke < limits.stroke_min_m || stroke > limits.stroke_max_m;
+        let over_pressure = settings.pressure.fitted && now.pressure_pa > limits.pressure_pa;
+        let over_force = settings.force.fitted && now.force_n > limits.force_n;
+        let over_speed = has_stroke && speed_m_per_s.abs() > limits.speed_m_per_s;
+        let rows = [
+            (
+                &mut self.over_pressure,
+                over_pressure,
+                Fault::OverPressure,
+                now.pressure_pa,
+                limits.pressure_pa,
+            ),
+            (&mut self.over_force, over_force, Fault::OverForce, now.force_n, limits.force_n),
+            (&mut self.over_stroke, has_stroke && out_of_stroke, Fault::OverStroke, stroke, stroke_limit),
+            (&mut self.over_speed, over_speed, Fault::OverSpeed, speed_m_per_s, limits.speed_m_per_s),
+        ];
+        for (row, over, fault, value, limit) in rows {
+            if row.count(over, debounce) {
+                report(Finding { fault, sensor: None, value, limit });
+            }
         }
-        if over_pressure {
-            return plain(Fault::OverPressure, pressure, limits.pressure_pa);
+    }
+
+    fn check_pressure(
+        &mut self,
+        pressure: f32,
+        expected: f32,
+        settings: &Settings,
+        report: &mut dyn FnMut(Finding),
+    ) {
+        let (watch, fitted) = (&settings.watch, settings.pressure.fitted);
+        let gap = pressure - expected;
+        let late = self.vented_ticks > watch.vent_ticks;
+        let stands = fitted && late && pressure > watch.vented_pa;
+        let (above, below) = (expected + watch.follow_pa, expected - watch.follow_pa);
+        let (follow, debounce) = (watch.follow_ticks, watch.debounce_ticks);
+        let rows = [
+            (&mut self.not_vented, stands, debounce, Fault::NotVented, watch.vented_pa),
+            (&mut self.high, fitted && gap > watch.follow_pa, follow, Fault::PressureNotFalling, above),
+            (&mut self.low, fitted && gap < -watch.follow_pa, follow, Fault::PressureNotRising, below),
+        ];
+        for (row, bad, enough, fault, limit) in rows {
+            if row.count(bad, enough) {
+                report(Finding { fault, sensor: None, value: pressure, limit });
+            }
         }
-        if over_force {
-            return plain(Fault::OverForce, now.force_n, limits.force_n);
-        }
-        if over_stroke {
-            let limit =
-                if now.stroke_m < limits.stroke_min_m { limits.stroke_min_m } else { limits.stroke_max_m };
-            return plain(Fault::OverStroke, now.stroke_m, limit);
-        }
-        if over_speed {
-            return plain(Fault::OverSpeed, seen.speed_m_per_s, limits.speed_m_per_s);
-        }
-        if high {
-            return plain(Fault::PressureNotFalling, pressure, seen.expected_pa + watch.follow_pa);
-        }
-        if low {
-            return plain(Fault::PressureNotRising, pressure, seen.expected_pa - watch.follow_pa);
-        }
-        if disagree {
-            return plain(Fault::SensorsDisagree, miss, watch.disagree_n);
-        }
-        None
     }
 }
 
@@ -249,7 +295,11 @@ mod tests {
     /// Ticks until the first finding of a stream of ticks.
     fn first(ticks: impl IntoIterator<Item = Seen>, settings: &Settings) -> Option<(usize, Finding)> {
         let mut watch = SideWatch::default();
-        ticks.into_iter().enumerate().find_map(|(at, seen)| watch.check(&seen, settings).map(|f| (at + 1, f)))
+        ticks.into_iter().enumerate().find_map(|(at, seen)| {
+            let mut first = None;
+            watch.check(&seen, settings, &mut |finding| first = first.or(Some(finding)));
+            first.map(|finding| (at + 1, finding))
+        })
     }
 
     fn with(change: impl Fn(&mut Seen, &mut Readings, usize)) -> impl Iterator<Item = Seen> {

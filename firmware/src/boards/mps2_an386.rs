@@ -10,7 +10,6 @@
 
 mod bench;
 mod flash;
-mod register;
 mod semihosting;
 mod time;
 mod uart;
@@ -24,13 +23,12 @@ use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::mutex::Mutex;
 use embassy_time::Timer;
-use firmware::board::Identity;
+use firmware::board::{Hardware, Identity};
 use firmware::modes::Seat;
 use firmware::server::Server;
 use firmware::shared::Shared;
 use firmware::tasks;
 use model_core::link::hello::Board;
-use model_core::link::settings::Settings;
 use static_cell::StaticCell;
 
 use self::bench::{Bench, Benches};
@@ -170,6 +168,7 @@ fn spawn(spawner: SendSpawner, shared: &'static Shared, port: &'static Port) -> 
         muscles: 2,
         serial: *b"emulated\0\0\0\0",
         started_by: watchdog::started_by(),
+        fault: None,
     };
     // In a place of its own: a task would keep it twice, as its argument and as its variable.
     static SERVER: StaticCell<Server<FileFlash>> = StaticCell::new();
@@ -197,7 +196,7 @@ fn start() -> Result<(), &'static str> {
     }
     LINK.start();
     start_interrupts();
-    let shared = Shared::take(&Settings::default(), Seat::pair());
+    let shared = Shared::take(&Hardware::SIMULATED, Seat::pair());
     let port: &'static Port = PORT.init_with(|| Mutex::new(Sender(&LINK)));
     spawn(EXECUTOR.start(EXECUTOR_LINE), shared, port)
 }

@@ -1,52 +1,52 @@
-//! Whether settings can be used.
+//! Whether settings can be used: every number in a range that is stated here, every limit where its sensor can reach it.
+//!
+//! A range says what a value can sensibly be on any muscle of up to some metres and some kilonewtons; nothing in it is tuned. What a
+//! board's converters can deliver is [`Hardware`]'s.
 
 use model_core::link::messages::{Field, Refusal};
-use model_core::link::settings::Settings;
+use model_core::link::settings::{Joint, Limits, Regulator, Settings, Watch};
+
+use crate::board::Hardware;
+
+/// A value and the range that it must be in.
+type Bound = (f32, f32, f32);
+
+/// Longest times of the watches, ticks. A reading that is out of range does harm within some tens of milliseconds; a regulator answers
+/// within some tenths of a second; a person who takes a cable away is noticed within a minute.
+const MOST_DEBOUNCE: u16 = 20;
+const MOST_JUMPS: u16 = 64;
+const MOST_FOLLOW: u16 = 2_000;
+const MOST_STUCK: u16 = 10_000;
+const MOST_OVERRUN: u16 = 50;
+const MOST_SILENCE: u32 = 60_000;
+const MOST_HOLD: u32 = 600_000;
+const MOST_VENT: u32 = 30_000;
+/// Largest gains, in the units of the loops: a thousand times what moves a muscle by its whole range at the smallest error that a
+/// sensor resolves.
+const MOST_GAIN: f32 = 1e9;
+/// Largest force, N, length, m, and torque, N·m.
+const MOST_FORCE: f32 = 100e3;
+const MOST_LENGTH: f32 = 2.0;
+const MOST_TORQUE: f32 = 10e3;
+/// Highest pressure of any muscle, Pa.
+const MOST_PRESSURE: f32 = 5e6;
+/// Fastest pressure, Pa/s: from nothing to 10 bar within a tick.
+const MOST_RATE: f32 = 1e9;
 
 /// Looks at every number of new settings.
 ///
 /// # Errors
 /// [`Refusal::Value`] with the group that a wrong number is in.
-pub fn check_settings(settings: &Settings) -> Result<(), Refusal> {
-    let f = &settings.force_loop;
-    let s = &settings.stroke_loop;
-    let j = &settings.joint;
-    let r = &settings.regulator;
-    let l = &settings.limits;
-    let w = &settings.watch;
+pub fn check_settings(settings: &Settings, hardware: &Hardware) -> Result<(), Refusal> {
     let groups = [
-        (Field::ForceLoop, not_negative(&[f.proportional_pa_per_n, f.integral_pa_per_n_s, f.trim_limit_pa])),
-        (
-            Field::StrokeLoop,
-            not_negative(&[s.proportional_n_per_m, s.integral_n_per_m_s, s.damping_n_s_per_m])
-                && finite(&[s.load_n, s.load_stiffness_n_per_m])
-                && positive(&[s.force_limit_n]),
-        ),
-        (
-            Field::Joint,
-            not_negative(&[j.proportional_nm_per_rad, j.integral_nm_per_rad_s, j.damping_nm_s_per_rad])
-                && finite(&[j.rest_stroke_m])
-                && positive(&[j.radius_m, j.torque_limit_nm]),
-        ),
-        (
-            Field::Regulator,
-            positive(&[r.gain, r.rate_pa_per_s, r.command_max_pa])
-                && finite(&[r.offset_pa])
-                && not_negative(&[r.lag_s, r.line_s, r.deadband_pa, r.lead, 1.0 - r.lead]),
-        ),
-        (
-            Field::Limits,
-            positive(&[l.pressure_pa, l.speed_m_per_s, l.force_n, l.slew_pa_per_s])
-                && in_order(l.stroke_min_m, l.stroke_max_m),
-        ),
-        (
-            Field::SensorWatch,
-            [&settings.pressure, &settings.stroke, &settings.force]
-                .into_iter()
-                .all(|sensor| in_order(sensor.low, sensor.high) && positive(&[sensor.jump])),
-        ),
-        (Field::Watch, not_negative(&[w.disagree_n]) && positive(&[w.follow_pa]) && w.host_silence_ticks > 0),
-        (Field::Bands, positive(&[settings.motion_band_m, settings.pressure_band_pa])),
+        (Field::ForceLoop, force_loop(settings, hardware)),
+        (Field::StrokeLoop, stroke_loop(settings)),
+        (Field::Joint, joint(&settings.joint)),
+        (Field::Regulator, regulator(&settings.regulator, hardware)),
+        (Field::Limits, limits(&settings.limits, hardware)),
+        (Field::SensorWatch, sensors(settings, hardware)),
+        (Field::Watch, watch(&settings.watch, hardware)),
+        (Field::Bands, all(&[(settings.motion_band_m, 1e-9, 0.1), (settings.pressure_band_pa, 1e-3, 1e6)])),
     ];
     match groups.into_iter().find(|(_, good)| !good) {
         Some((field, _)) => Err(Refusal::Value(field)),
@@ -54,21 +54,259 @@ pub fn check_settings(settings: &Settings) -> Result<(), Refusal> {
     }
 }
 
-#[inline(never)]
-fn finite(values: &[f32]) -> bool {
-    values.iter().all(|value| value.is_finite())
+/// Puts the board's own value in the place of each group that cannot be used; says whether there was one.
+pub fn mend_settings(settings: &mut Settings, hardware: &Hardware) -> bool {
+    let own = &hardware.settings;
+    let mut mended = false;
+    // Each round mends a group, of which there are eight.
+    for _ in 0..8 {
+        let Err(Refusal::Value(field)) = check_settings(settings, hardware) else { break };
+        match field {
+            Field::ForceLoop => settings.force_loop = own.force_loop,
+            Field::StrokeLoop => settings.stroke_loop = own.stroke_loop,
+            Field::Joint => settings.joint = own.joint,
+            Field::Regulator => settings.regulator = own.regulator,
+            Field::Limits => settings.limits = own.limits,
+            Field::SensorWatch => {
+                (settings.pressure, settings.stroke, settings.force) = (own.pressure, own.stroke, own.force);
+            }
+            Field::Watch => settings.watch = own.watch,
+            Field::Bands => {
+                (settings.motion_band_m, settings.pressure_band_pa) =
+                    (own.motion_band_m, own.pressure_band_pa);
+            }
+            Field::SetPoint | Field::Reference | Field::Rate => *settings = *own,
+        }
+        mended = true;
+    }
+    mended
 }
 
+/// Written so that a number that is none is in no range.
 #[inline(never)]
-fn not_negative(values: &[f32]) -> bool {
-    finite(values) && values.iter().all(|value| *value >= 0.0)
+fn all(bounds: &[Bound]) -> bool {
+    bounds.iter().all(|(value, low, high)| value >= low && value <= high)
 }
 
-#[inline(never)]
-fn positive(values: &[f32]) -> bool {
-    finite(values) && values.iter().all(|value| *value > 0.0)
+fn force_loop(settings: &Settings, hardware: &Hardware) -> bool {
+    let f = &settings.force_loop;
+    all(&[
+        (f.proportional_pa_per_n, 0.0, MOST_GAIN),
+        (f.integral_pa_per_n_s, 0.0, MOST_GAIN),
+        (f.trim_limit_pa, 0.0, hardware.command_ceiling_pa),
+    ])
 }
 
-fn in_order(low: f32, high: f32) -> bool {
-    finite(&[low, high]) && low < high
+fn stroke_loop(settings: &Settings) -> bool {
+    let s = &settings.stroke_loop;
+    all(&[
+        (s.proportional_n_per_m, 0.0, MOST_GAIN),
+        (s.integral_n_per_m_s, 0.0, MOST_GAIN),
+        (s.damping_n_s_per_m, 0.0, MOST_GAIN),
+        (s.load_n, -MOST_FORCE, MOST_FORCE),
+        (s.load_stiffness_n_per_m, -MOST_GAIN, MOST_GAIN),
+        (s.force_limit_n, 1e-3, MOST_FORCE),
+    ])
+}
+
+fn joint(j: &Joint) -> bool {
+    all(&[
+        (j.radius_m, 1e-4, MOST_LENGTH),
+        (j.rest_stroke_m, -MOST_LENGTH, MOST_LENGTH),
+        (j.proportional_nm_per_rad, 0.0, MOST_GAIN),
+        (j.integral_nm_per_rad_s, 0.0, MOST_GAIN),
+        (j.damping_nm_s_per_rad, 0.0, MOST_GAIN),
+        (j.torque_limit_nm, 1e-3, MOST_TORQUE),
+    ])
+}
+
+fn regulator(r: &Regulator, hardware: &Hardware) -> bool {
+    all(&[
+        // A regulator whose gain is further from one is wired or scaled wrongly.
+        (r.gain, 0.1, 10.0),
+        (r.offset_pa, -200e3, 200e3),
+        // Slower than ten seconds nothing is controlled.
+        (r.lag_s, 0.0, 10.0),
+        (r.line_s, 0.0, 10.0),
+        (r.rate_pa_per_s, 1e3, MOST_RATE),
+        (r.deadband_pa, 0.0, 100e3),
+        (r.command_max_pa, 1e3, hardware.command_ceiling_pa),
+        (r.lead, 0.0, 1.0),
+    ])
+}
+
+/// A limit beyond what its converter can deliver would never be crossed.
+fn limits(l: &Limits, hardware: &Hardware) -> bool {
+    let Hardware { pressure, stroke, force, .. } = hardware;
+    all(&[
+        (l.speed_m_per_s, 1e-4, 100.0),
+        (l.slew_pa_per_s, 1e3, MOST_RATE),
+        (l.pressure_pa, 1e3, MOST_PRESSURE),
+        (l.force_n, 1e-3, MOST_FORCE),
+    ]) && l.pressure_pa < pressure.high
+        && l.force_n < force.high
+        && l.stroke_min_m > stroke.low
+        && l.stroke_min_m < l.stroke_max_m
+        && l.stroke_max_m < stroke.high
+}
+
+/// The ends of a watch lie within the converter's, so that a wire that pulls it to either end is noticed.
+fn sensors(settings: &Settings, hardware: &Hardware) -> bool {
+    let sensors = [
+        (&settings.pressure, hardware.pressure),
+        (&settings.stroke, hardware.stroke),
+        (&settings.force, hardware.force),
+    ];
+    sensors.into_iter().all(|(watch, span)| {
+        let width = span.high - span.low;
+        !watch.fitted
+            || (watch.low > span.low
+                && watch.low < watch.high
+                && watch.high < span.high
+                && all(&[(watch.jump, 1e-9, width)])
+                && watch.stuck_ticks <= MOST_STUCK)
+    })
+}
+
+fn watch(w: &Watch, hardware: &Hardware) -> bool {
+    let least_test_pa = 2.0 * w.vented_pa;
+    all(&[
+        (w.disagree_n, 0.0, hardware.force.high),
+        (w.follow_pa, 1e3, hardware.pressure.high),
+        (w.vented_pa, 100.0, 100e3),
+    ]) && (w.valve_test_pa == 0.0 || all(&[(w.valve_test_pa, least_test_pa, 200e3)]))
+        && (1..=MOST_DEBOUNCE).contains(&w.debounce_ticks)
+        && (1..=MOST_JUMPS).contains(&w.noisy_jumps)
+        && (1..=MOST_FOLLOW).contains(&w.disagree_ticks)
+        && (1..=MOST_FOLLOW).contains(&w.follow_ticks)
+        && w.silence_ticks <= MOST_SILENCE
+        && (1..=MOST_SILENCE).contains(&w.host_silence_ticks)
+        && (1..=MOST_OVERRUN).contains(&w.overrun_ticks)
+        && w.hold_ticks <= MOST_HOLD
+        && (100..=MOST_VENT).contains(&w.vent_ticks)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::board::Span;
+
+    const HARDWARE: &Hardware = &Hardware::SIMULATED;
+
+    fn refused(change: impl Fn(&mut Settings)) -> Option<Field> {
+        let mut settings = Settings::DEFAULT;
+        change(&mut settings);
+        match check_settings(&settings, HARDWARE) {
+            Err(Refusal::Value(field)) => Some(field),
+            _ => None,
+        }
+    }
+
+    #[test]
+    fn the_defaults_can_be_used_and_no_field_takes_what_is_no_number_or_has_no_bound() {
+        assert_eq!(refused(|_| ()), None);
+        type Set = fn(&mut Settings, f32);
+        let fields: [(Field, Set); 38] = [
+            (Field::ForceLoop, |s, v| s.force_loop.proportional_pa_per_n = v),
+            (Field::ForceLoop, |s, v| s.force_loop.integral_pa_per_n_s = v),
+            (Field::ForceLoop, |s, v| s.force_loop.trim_limit_pa = v),
+            (Field::StrokeLoop, |s, v| s.stroke_loop.proportional_n_per_m = v),
+            (Field::StrokeLoop, |s, v| s.stroke_loop.integral_n_per_m_s = v),
+            (Field::StrokeLoop, |s, v| s.stroke_loop.damping_n_s_per_m = v),
+            (Field::StrokeLoop, |s, v| s.stroke_loop.load_n = v),
+            (Field::StrokeLoop, |s, v| s.stroke_loop.load_stiffness_n_per_m = v),
+            (Field::StrokeLoop, |s, v| s.stroke_loop.force_limit_n = v),
+            (Field::Joint, |s, v| s.joint.radius_m = v),
+            (Field::Joint, |s, v| s.joint.rest_stroke_m = v),
+            (Field::Joint, |s, v| s.joint.proportional_nm_per_rad = v),
+            (Field::Joint, |s, v| s.joint.integral_nm_per_rad_s = v),
+            (Field::Joint, |s, v| s.joint.damping_nm_s_per_rad = v),
+            (Field::Joint, |s, v| s.joint.torque_limit_nm = v),
+            (Field::Regulator, |s, v| s.regulator.gain = v),
+            (Field::Regulator, |s, v| s.regulator.offset_pa = v),
+            (Field::Regulator, |s, v| s.regulator.lag_s = v),
+            (Field::Regulator, |s, v| s.regulator.line_s = v),
+            (Field::Regulator, |s, v| s.regulator.rate_pa_per_s = v),
+            (Field::Regulator, |s, v| s.regulator.deadband_pa = v),
+            (Field::Regulator, |s, v| s.regulator.command_max_pa = v),
+            (Field::Regulator, |s, v| s.regulator.lead = v),
+            (Field::Limits, |s, v| s.limits.pressure_pa = v),
+            (Field::Limits, |s, v| s.limits.stroke_min_m = v),
+            (Field::Limits, |s, v| s.limits.stroke_max_m = v),
+            (Field::Limits, |s, v| s.limits.speed_m_per_s = v),
+            (Field::Limits, |s, v| s.limits.force_n = v),
+            (Field::Limits, |s, v| s.limits.slew_pa_per_s = v),
+            (Field::SensorWatch, |s, v| s.pressure.jump = v),
+            (Field::SensorWatch, |s, v| s.stroke.low = v),
+            (Field::SensorWatch, |s, v| s.force.jump = v),
+            (Field::Watch, |s, v| s.watch.disagree_n = v),
+            (Field::Watch, |s, v| s.watch.follow_pa = v),
+            (Field::Watch, |s, v| s.watch.vented_pa = v),
+            (Field::Watch, |s, v| s.watch.valve_test_pa = v),
+            (Field::Bands, |s, v| s.motion_band_m = v),
+            (Field::Bands, |s, v| s.pressure_band_pa = v),
+        ];
+        for (at, (field, set)) in fields.into_iter().enumerate() {
+            for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 3.4e38, 1e30, -1e30] {
+                let found = refused(|settings| set(settings, value));
+                // A stroke sensor's end that lies beyond the limits is refused there.
+                let limits = found == Some(Field::Limits);
+                assert!(found == Some(field) || limits, "field {at} takes {value}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_message_may_make_a_watch_blind_or_wait_for_days() {
+        type Change = fn(&mut Settings);
+        let blind: [Change; 11] = [
+            |s| s.watch.debounce_ticks = 65_535,
+            |s| s.watch.debounce_ticks = 0,
+            |s| s.watch.noisy_jumps = 65_535,
+            |s| s.watch.disagree_ticks = 65_535,
+            |s| s.watch.follow_ticks = 65_535,
+            |s| s.watch.silence_ticks = u32::MAX,
+            |s| s.watch.host_silence_ticks = u32::MAX,
+            |s| s.watch.host_silence_ticks = 0,
+            |s| s.watch.overrun_ticks = 65_535,
+            |s| s.watch.hold_ticks = u32::MAX,
+            |s| s.watch.vent_ticks = u32::MAX,
+        ];
+        for (at, change) in blind.into_iter().enumerate() {
+            assert_eq!(refused(change), Some(Field::Watch), "change {at}");
+        }
+        assert_eq!(refused(|s| s.force.stuck_ticks = 65_535), Some(Field::SensorWatch));
+    }
+
+    #[test]
+    fn a_watch_or_a_limit_where_the_board_cannot_read_is_refused() {
+        let potentiometer = Hardware { stroke: Span { low: -0.003, high: 0.053 }, ..Hardware::SIMULATED };
+        let cell = Hardware { force: Span { low: -1_100.0, high: 1_100.0 }, ..Hardware::SIMULATED };
+        for narrow in [potentiometer, cell] {
+            let refused = check_settings(&Settings::DEFAULT, &narrow);
+            assert!(
+                matches!(refused, Err(Refusal::Value(Field::Limits | Field::SensorWatch))),
+                "{refused:?}"
+            );
+        }
+        assert_eq!(refused(|s| s.limits.force_n = 200e3), Some(Field::Limits));
+        assert_eq!(refused(|s| s.limits.stroke_max_m = 5.0), Some(Field::Limits));
+        assert_eq!(refused(|s| s.pressure.high = 20e6), Some(Field::SensorWatch));
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_mended_group_by_group_and_the_rest_is_kept() {
+        let mut settings = Settings::DEFAULT;
+        settings.limits.pressure_pa = 250e3;
+        settings.regulator.line_s = 1e30;
+        settings.watch.debounce_ticks = 65_535;
+        assert!(mend_settings(&mut settings, HARDWARE));
+        assert_eq!(settings.limits.pressure_pa, 250e3);
+        assert_eq!(
+            (settings.regulator, settings.watch),
+            (Settings::DEFAULT.regulator, Settings::DEFAULT.watch)
+        );
+        assert_eq!(check_settings(&settings, HARDWARE), Ok(()));
+        assert!(!mend_settings(&mut settings, HARDWARE), "once");
+    }
 }

@@ -7,7 +7,7 @@ use model_core::scalar::Scalar;
 use super::Controller;
 use crate::board::Command;
 use crate::modes;
-use crate::pair::{Posed, Pull};
+use crate::pair::{self, Posed, Pull};
 use crate::regulator::Wish;
 use crate::tick::TICK_S;
 use crate::watch::Finding;
@@ -47,11 +47,14 @@ impl Controller {
         let mut bad = None;
         for side in Side::ALL {
             let used = self.uses(side);
-            let Self { settings, sides, .. } = self;
+            let Self { settings, sides, hardware, .. } = self;
             let actuator = &mut sides[side.index()];
             let (wish, reached) = wishes[side.index()];
             if !used {
-                actuator.command = Command::VENT;
+                // Its regulator's model is kept up for the watch on what stays in it, where there is a second muscle at all.
+                if pair::SUPPORTED {
+                    actuator.vent(&settings.regulator);
+                }
                 continue;
             }
             if !wish.pressure_pa.is_finite() {
@@ -60,7 +63,7 @@ impl Controller {
             }
             let most =
                 actuator.model.as_ref().map_or(f32::MAX, |model| model.muscle.max_pressure().pascals());
-            let high = most.at_most(settings.limits.pressure_pa);
+            let high = most.at_most(settings.limits.pressure_pa).at_most(hardware.command_ceiling_pa);
             // Without lead a command is what was asked for, as whoever measures the regulator itself wants it.
             if settings.pressure.fitted && settings.regulator.lead > 0.0 {
                 actuator.regulator.observe(TICK_S, actuator.sample.pressure_pa, &settings.regulator);
@@ -79,7 +82,16 @@ impl Controller {
             if !reached || driven.saturated {
                 self.saturated_ticks = self.saturated_ticks.saturating_add(1);
             }
-            actuator.command = Command { pressure_pa: driven.command_pa, vent: false };
+            // What is sent is judged, not only what was wished for: the regulator's model comes between.
+            let sent = driven.command_pa;
+            if !(sent >= 0.0
+                && sent <= hardware.command_ceiling_pa
+                && actuator.regulator.model_pa().is_finite())
+            {
+                bad = Some((side, sent));
+                continue;
+            }
+            actuator.command = Command { pressure_pa: sent, vent: false };
             actuator.sample.wanted_pa = driven.wanted_pa;
         }
         if let Some((side, value)) = bad {

@@ -4,32 +4,22 @@ use model_core::link::messages::{Fault, Field, Mode, Reference, Refusal, SetPoin
 use model_core::link::settings::{FeedForward, Settings};
 
 use super::actuator::Actuator;
+use super::arming::Arming;
 use super::{Controller, News};
 use crate::board::Command;
 use crate::pair::{self, Arm};
 use crate::regulator;
 use crate::safety::Cause;
-use crate::watch::{Finding, SideWatch};
+use crate::watch::Finding;
 
 impl Controller {
-    /// Arms.
-    ///
-    /// # Errors
-    /// As [`Machine::request`](crate::safety::Machine::request).
-    pub fn arm(&mut self) -> Result<(), Refusal> {
-        self.change(Cause::Arm)?;
-        for side in &mut self.sides {
-            side.watch = SideWatch::default();
-        }
-        Ok(())
-    }
-
-    fn change(&mut self, cause: Cause) -> Result<(), Refusal> {
+    pub(super) fn change(&mut self, cause: Cause) -> Result<(), Refusal> {
         let before = self.machine.state();
         let state = self.machine.request(cause)?;
         if state != before {
             self.news = Some(News::State(state));
         }
+        self.arming = Arming::Idle;
         if state != State::Running {
             self.mode = Mode::Vent;
             self.generator.begin(Reference::SetPoint)?;
@@ -75,7 +65,7 @@ impl Controller {
             side.stroke_loop.reset();
             side.guess_pa = side.sample.pressure_pa;
             side.cut = 0.0;
-            side.watch = SideWatch::default();
+            side.watch.restart();
         }
         if mode == Mode::Pair
             && let Some(arms) = self.arms()
@@ -107,6 +97,7 @@ impl Controller {
     }
 
     pub(super) fn vent_now(&mut self) {
+        self.arming = Arming::Idle;
         // In `Fault` with a held command this is the way to let go of it.
         for side in &mut self.sides {
             side.command = Command::VENT;
@@ -116,8 +107,11 @@ impl Controller {
     /// Forgets the latched fault.
     ///
     /// # Errors
-    /// [`Refusal::StillFaulty`] while what caused a fault is still there.
+    /// [`Refusal::StillFaulty`] while what caused a fault is still there, or settings have not been confirmed.
     pub fn clear(&mut self) -> Result<(), Refusal> {
+        if self.machine.state() == State::Fault && self.unconfirmed {
+            return Err(Refusal::StillFaulty(Fault::SettingsInvalid));
+        }
         if self.machine.state() == State::Fault
             && let Some(fault) = self.present
         {

@@ -2,20 +2,20 @@
 
 use embedded_storage_async::nor_flash::NorFlash;
 use model_core::effects::Memory;
-use model_core::image;
+use model_core::image::{self, ImageError};
 use model_core::link::endpoints::Service;
 use model_core::link::messages::{
     DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, PIECE, PastFault, Reference,
-    ReferencePoints, Refusal, SetPoint, Side, Start, State, Status, TableBegin, TableInfo, TablePiece,
-    TableRead, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead, Value,
+    ReferencePoints, Refusal, RollBack, SetPoint, Side, Start, State, Status, TableBegin, TableInfo,
+    TablePiece, TableRead, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead, Value,
 };
 use model_core::link::settings::Settings;
 use model_core::muscle::Held;
 use model_core::single;
 use model_core::units::{Length, Pressure};
 
-use super::Server;
-use crate::common_room::TRACE_CAPACITY;
+use super::{Server, table_refusal};
+use crate::common_room::{Incoming, TRACE_CAPACITY};
 use crate::control::{self, Controller};
 use crate::reference;
 use crate::shared::Shared;
@@ -43,16 +43,16 @@ impl<F: NorFlash> Session<'_, F> {
             frames_bad: self.server.counts.bad,
             telemetry_dropped: self.shared.telemetry_dropped(),
             saturated_ticks: controller.saturated_ticks(),
+            line_errors: self.shared.line_errors(),
         });
         Ok(())
     }
 
-    /// The store may only be written while nothing is controlled.
+    /// The store may only be written while every muscle is vented and nothing is controlled: a flash may stop the processor.
     fn at_rest(&self) -> Result<(), Refusal> {
-        match self.shared.with(|controller| controller.state()) {
-            State::Running => Err(Refusal::WrongState(State::Running)),
-            State::Disarmed | State::Armed | State::Fault => Ok(()),
-        }
+        self.shared.with(|controller| {
+            if controller.is_vented() { Ok(()) } else { Err(Refusal::WrongState(controller.state())) }
+        })
     }
 
     fn drives(&self, side: Side) -> Result<(), Refusal> {
@@ -129,9 +129,10 @@ impl<F: NorFlash> Service for Session<'_, F> {
     }
 
     fn clear_fault(&mut self, (): &(), answer: &mut Status) -> Result<(), Refusal> {
-        // The report goes to the log before it is forgotten.
+        self.status_after(self.shared.with(Controller::clear), answer)?;
+        // What a hold has kept back can be written now.
         self.server.keep(self.shared);
-        self.status_after(self.shared.with(Controller::clear), answer)
+        Ok(())
     }
 
     fn settings(&mut self, (): &(), answer: &mut Settings) -> Result<(), Refusal> {
@@ -140,11 +141,15 @@ impl<F: NorFlash> Service for Session<'_, F> {
     }
 
     fn set_settings(&mut self, request: &Settings, answer: &mut Settings) -> Result<(), Refusal> {
-        control::check_settings(request)?;
+        let hardware = self.shared.with(|controller| controller.hardware());
+        control::check_settings(request, hardware)?;
         self.at_rest()?;
         *answer = *request;
         self.server.store.put_settings(answer).map_err(Refusal::Store)?;
-        self.shared.with(|controller| controller.use_settings(request));
+        self.shared.with(|controller| {
+            controller.use_settings(request);
+            controller.confirm_settings();
+        });
         Ok(())
     }
 
@@ -160,9 +165,21 @@ impl<F: NorFlash> Service for Session<'_, F> {
 
     fn table_commit(&mut self, (): &(), answer: &mut TableInfo) -> Result<(), Refusal> {
         self.at_rest()?;
-        let (side, bytes) = self.server.upload.whole()?;
-        let selected = self.server.store.commit(side, bytes).map_err(Refusal::Store)?;
-        *answer = selected.info();
+        let (side, Incoming { image, table }) = self.server.upload.whole()?;
+        // Built before it is kept: what is selected on flash has been in use.
+        let built = self.shared.with(|controller| controller.use_table(side, table));
+        let kept = match built {
+            Ok(()) => self.server.store.commit(side, image).map_err(Refusal::Store),
+            Err(error) => Err(table_refusal(ImageError::Table(error))),
+        };
+        match kept {
+            Ok(selected) => *answer = selected.info(),
+            Err(refusal) => {
+                // The table before stays the one in use.
+                let _ = self.server.use_kept(side, self.shared);
+                return Err(refusal);
+            }
+        }
         self.server.use_kept(side, self.shared)
     }
 
@@ -174,10 +191,11 @@ impl<F: NorFlash> Service for Session<'_, F> {
         answer.bytes.extend_from_slice(&rest[..rest.len().min(PIECE)]).map_err(|_| Refusal::Range)
     }
 
-    fn table_rollback(&mut self, request: &Side, answer: &mut TableInfo) -> Result<(), Refusal> {
+    fn table_rollback(&mut self, request: &RollBack, answer: &mut TableInfo) -> Result<(), Refusal> {
         self.at_rest()?;
-        *answer = self.server.store.roll_back(*request).map_err(Refusal::Store)?.info();
-        self.server.use_kept(*request, self.shared)
+        let RollBack { side, generation } = *request;
+        *answer = self.server.store.roll_back(side, generation).map_err(Refusal::Store)?.info();
+        self.server.use_kept(side, self.shared)
     }
 
     fn evaluate(&mut self, request: &Evaluate, answer: &mut Evaluated) -> Result<(), Refusal> {
@@ -225,6 +243,7 @@ impl<F: NorFlash> Service for Session<'_, F> {
     }
 
     fn restart(&mut self, (): &(), (): &mut ()) -> Result<(), Refusal> {
+        self.at_rest()?;
         match self.shared.with(|controller| controller.state()) {
             state @ (State::Running | State::Armed) => Err(Refusal::WrongState(state)),
             State::Disarmed | State::Fault => {

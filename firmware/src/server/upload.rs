@@ -69,8 +69,9 @@ impl Upload {
     }
 
     /// The whole image of a table that can be used, and the muscle it is for.
-    pub(super) fn whole(&mut self) -> Result<(Side, &[u8]), Refusal> {
-        let (begun, Incoming { image: bytes, table }) = self.begun()?;
+    pub(super) fn whole(&mut self) -> Result<(Side, &Incoming), Refusal> {
+        let (begun, incoming) = self.begun()?;
+        let Incoming { image: bytes, table } = &mut *incoming;
         if bytes.len() < begun.length as usize {
             return Err(Refusal::Table(TableFault::Incomplete(bytes.len() as u32)));
         }
@@ -82,6 +83,6 @@ impl Upload {
             return Err(Refusal::Table(TableFault::Malformed));
         }
         read_table(bytes, table)?;
-        Ok((begun.side, bytes))
+        Ok((begun.side, incoming))
     }
 }

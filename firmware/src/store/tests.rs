@@ -4,6 +4,7 @@ use super::*;
 use embedded_storage_async::nor_flash::{ErrorType, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use heapless::Vec;
 use model_core::link::messages::{Mode, SideSample, State};
+use model_core::link::settings::Settings;
 
 const PAGE: usize = 2048;
 const PAGES: usize = 6;
@@ -11,18 +12,20 @@ const WORD: usize = 4;
 
 /// Flash in memory that counts its words and erases, and loses power after some of them.
 #[derive(Clone, Debug)]
-struct MockFlash {
+pub(crate) struct MockFlash {
     bytes: Vec<u8, { PAGE * PAGES }>,
     /// Words that may still be written (an erase of a page counts as one).
     left: usize,
     done: usize,
     off: bool,
+    /// Writes that still work, where the flash wears out and is read all the same.
+    lasts: usize,
     /// What a cut leaves of the word or page it hits: 0 nothing happened, 1 half, 2 all of it.
     tear: usize,
 }
 
 #[derive(Debug)]
-struct PowerCut;
+pub(crate) struct PowerCut;
 
 impl NorFlashError for PowerCut {
     fn kind(&self) -> NorFlashErrorKind {
@@ -31,10 +34,16 @@ impl NorFlashError for PowerCut {
 }
 
 impl MockFlash {
-    fn erased() -> Self {
+    pub(crate) fn erased() -> Self {
         let mut bytes = Vec::new();
         bytes.resize(PAGE * PAGES, 0xFF).expect("its own size");
-        Self { bytes, left: usize::MAX, done: 0, off: false, tear: 0 }
+        Self { bytes, left: usize::MAX, done: 0, off: false, lasts: usize::MAX, tear: 0 }
+    }
+
+    /// The same worn out: so many more writes work, and everything is read.
+    pub(crate) fn failing_after(mut self, writes: usize) -> Self {
+        self.lasts = writes;
+        self
     }
 
     /// Counts one operation; false when the power goes with it.
@@ -48,7 +57,7 @@ impl MockFlash {
         true
     }
 
-    fn powered(mut self, left: usize, tear: usize) -> Self {
+    pub(crate) fn powered(mut self, left: usize, tear: usize) -> Self {
         (self.left, self.off, self.done, self.tear) = (left, false, 0, tear);
         self
     }
@@ -99,6 +108,10 @@ impl NorFlash for MockFlash {
     async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), PowerCut> {
         let offset = offset as usize;
         assert!(offset.is_multiple_of(WORD) && bytes.len().is_multiple_of(WORD), "a write is of whole words");
+        if self.lasts == 0 {
+            return Err(PowerCut);
+        }
+        self.lasts = self.lasts.saturating_sub(1);
         for (n, word) in bytes.chunks(WORD).enumerate() {
             if self.off {
                 return Err(PowerCut);
@@ -134,6 +147,13 @@ fn open(flash: MockFlash) -> Store<MockFlash> {
 
 fn kept(store: &mut Store<MockFlash>, side: Side) -> Option<std::vec::Vec<u8>> {
     store.table(side).expect("what is selected is whole").map(<[u8]>::to_vec)
+}
+
+fn settings_of(store: &mut Store<MockFlash>) -> Option<Settings> {
+    let mut settings = Settings::default();
+    let kept = store.settings(&mut settings).expect("readable");
+    assert!(kept != Kept::Untrusted, "nothing is damaged");
+    (kept != Kept::None).then_some(settings)
 }
 
 /// A store with some history, so that an operation meets pages that are nearly full and has to move what is alive.
@@ -189,7 +209,7 @@ fn a_commit_that_loses_power_anywhere_leaves_the_old_table_or_the_new() {
                 let now = kept(store, Side::Agonist);
                 assert!(now == old || now.as_deref() == Some(&new[..]), "after {left} words");
                 assert_eq!(kept(store, Side::Antagonist), other, "the other muscle is not touched");
-                assert_eq!(store.settings().expect("readable"), Some(Settings::default()));
+                assert_eq!(settings_of(store), Some(Settings::default()));
                 // And the store still works.
                 store.commit(Side::Agonist, &table(3)).expect("it takes the next table");
                 assert_eq!(kept(store, Side::Agonist).as_deref(), Some(&table(3)[..]));
@@ -207,7 +227,7 @@ fn a_roll_back_that_loses_power_leaves_one_of_both() {
     let before = store.close();
     let cuts = cut_everywhere(
         &before,
-        |store| store.roll_back(Side::Agonist).is_ok(),
+        |store| store.roll_back(Side::Agonist, 2).is_ok(),
         |store, left| {
             let after = kept(store, Side::Agonist);
             assert!(after == now || after.as_deref() == Some(&previous[..]), "after {left} words");
@@ -226,7 +246,7 @@ fn settings_that_lose_power_are_the_old_or_the_new() {
         &before,
         |store| store.put_settings(&mut { changed }).is_ok(),
         |store, left| {
-            let after = store.settings().expect("readable");
+            let after = settings_of(store);
             assert!(after == Some(changed) || after == Some(Settings::default()), "after {left} words");
         },
     );
@@ -235,12 +255,14 @@ fn settings_that_lose_power_are_the_old_or_the_new() {
 #[test]
 fn rolling_back_returns_and_there_and_back_again() {
     let mut store = open(MockFlash::erased());
-    assert_eq!(store.roll_back(Side::Agonist), Err(StoreFault::NoPrevious));
+    assert_eq!(store.roll_back(Side::Agonist, 0), Err(StoreFault::NoPrevious));
     store.commit(Side::Agonist, &table(1)).expect("room");
-    assert_eq!(store.roll_back(Side::Agonist), Err(StoreFault::NoPrevious));
+    assert_eq!(store.roll_back(Side::Agonist, 1), Err(StoreFault::NoPrevious));
     store.commit(Side::Agonist, &table(2)).expect("room");
     for expected in [1, 2, 1] {
-        let selected = store.roll_back(Side::Agonist).expect("there are two");
+        let selected = store.roll_back(Side::Agonist, 3 - u32::from(expected)).expect("there are two");
+        // The answer was lost and the host asks again.
+        assert_eq!(store.roll_back(Side::Agonist, 3 - u32::from(expected)), Ok(selected));
         assert_eq!(selected.table.generation, u32::from(expected));
         assert_eq!(kept(&mut store, Side::Agonist).as_deref(), Some(&table(expected)[..]));
     }
@@ -363,7 +385,7 @@ fn what_this_format_wrote_is_read_and_written_alike() {
     let mut store = open(flash_of(&fixture));
     assert_eq!(kept(&mut store, Side::Agonist).as_deref(), Some(&table(2)[..]));
     assert!(store.selected(Side::Agonist).expect("readable").is_some_and(|s| s.previous.is_some()));
-    let settings = store.settings().expect("readable").expect("kept");
+    let settings = settings_of(&mut store).expect("kept");
     assert_eq!((settings.regulator.line_s, settings.pressure_band_pa), (4.5e-3, 1_234.0));
     let mut remembered = std::vec::Vec::new();
     store.each_memory(Side::Agonist, &mut |_, one| remembered.push(*one)).expect("readable");
@@ -372,15 +394,59 @@ fn what_this_format_wrote_is_read_and_written_alike() {
     assert_eq!(store.count_start(), Ok(2));
 }
 
-/// A flash that the firmware of format 2 wrote: its settings know no line behind the regulator. They are not read, the device takes its
-/// defaults instead; tables, faults and starts have kept their layout.
+/// Flashes that older firmware wrote: settings are taken over field by field, those that it did not know are the board's own. Tables,
+/// faults and starts have kept their layout.
 #[test]
-fn settings_of_format_2_are_not_taken_for_those_of_today() {
-    let mut store = open(flash_of(include_str!("fixtures/format-2.txt")));
-    assert_eq!(store.settings(), Ok(None));
-    assert_eq!(kept(&mut store, Side::Agonist).as_deref(), Some(&table(2)[..]));
-    assert_eq!(store.past_fault(0), Ok(Some(report())));
-    assert_eq!(store.count_start(), Ok(2));
-    store.put_settings(&mut Settings::default()).expect("room");
-    assert_eq!(store.settings(), Ok(Some(Settings::default())));
+fn settings_of_older_formats_are_taken_over_field_by_field() {
+    let formats =
+        [(include_str!("fixtures/format-2.txt"), 0.0), (include_str!("fixtures/format-3.txt"), 4.5e-3)];
+    for (fixture, line_s) in formats {
+        let mut store = open(flash_of(fixture));
+        let mut settings = Settings::default();
+        settings.watch.hold_ticks = 77;
+        assert_eq!(store.settings(&mut settings), Ok(Kept::Older));
+        assert_eq!((settings.regulator.line_s, settings.pressure_band_pa), (line_s, 1_234.0));
+        assert_eq!(settings.watch.hold_ticks, 77);
+        assert_eq!(kept(&mut store, Side::Agonist).as_deref(), Some(&table(2)[..]));
+        assert_eq!(store.past_fault(0), Ok(Some(report())));
+        assert_eq!(store.count_start(), Ok(2));
+        store.put_settings(&mut settings).expect("room");
+        assert_eq!(settings_of(&mut store), Some(settings));
+    }
+}
+
+/// Every bit of the kept settings: whichever is flipped, neither the settings before nor the board's own come into force unseen.
+#[test]
+fn settings_of_which_a_bit_is_wrong_are_not_trusted() {
+    let mut store = open(MockFlash::erased());
+    let older = Settings::default();
+    let mut newer = older;
+    newer.limits.pressure_pa = 250e3;
+    for settings in [older, newer] {
+        store.put_settings(&mut { settings }).expect("room");
+    }
+    let flash = store.close();
+    let mut bytes = [0; 400];
+    let length = fields::write(&mut newer, &mut bytes).expect("room");
+    let place = flash.bytes.windows(length).position(|w| w == &bytes[..length]).expect("they are there");
+    for bit in 0..8 * length {
+        let mut damaged = flash.clone().powered(usize::MAX, 0);
+        damaged.bytes[place + bit / 8] ^= 1 << (bit % 8);
+        let mut settings = Settings::default();
+        assert_eq!(open(damaged).settings(&mut settings), Ok(Kept::Untrusted), "bit {bit}");
+        assert_eq!(settings, Settings::default());
+    }
+}
+
+#[test]
+fn settings_that_are_gone_or_of_a_newer_layout_are_not_trusted() {
+    let mut settings = Settings::default();
+    let mut lost = open(MockFlash::erased());
+    assert_eq!(lost.settings(&mut settings), Ok(Kept::None), "a new device");
+    lost.put_value(0x3F, &mut { FORMAT }).expect("room");
+    assert_eq!(lost.settings(&mut settings), Ok(Kept::Untrusted), "gone");
+    lost.put_settings(&mut settings).expect("room");
+    assert_eq!(lost.settings(&mut settings), Ok(Kept::Whole), "confirmed");
+    lost.put_value(0x3F, &mut { FORMAT + 1 }).expect("room");
+    assert_eq!(lost.settings(&mut settings), Ok(Kept::Untrusted), "a newer firmware's");
 }

@@ -2,11 +2,13 @@
 
 use std::time::{Duration, Instant};
 
+use model_core::link::Endpoint;
 use model_core::link::endpoints::{
     Arm, Disarm, GetFaults, GetStatus, SetReference, SetReferencePoints, SetTelemetry, SetTo, StartMode, Stop,
 };
 use model_core::link::messages::{
-    Event, REFERENCE_PIECE, Reference, ReferencePoints, Start, State, Status, Telemetry, TelemetryRate,
+    Event, Fault, REFERENCE_PIECE, Reference, ReferencePoints, Refusal, Start, State, Status, Telemetry,
+    TelemetryRate,
 };
 
 use super::course::{Course, Quantity};
@@ -38,6 +40,9 @@ pub enum Ending {
 
 /// Silence of the telemetry after which the device counts as gone.
 const SILENCE: Duration = Duration::from_secs(5);
+
+/// How long arming may take: the air of the run before leaves in two seconds, the test of the dump valve takes as long at most.
+const ARMING: Duration = Duration::from_secs(8);
 
 /// Vents and disarms: allowed in every state, repeated until it is confirmed.
 ///
@@ -89,6 +94,31 @@ pub fn run_asking(
     Ok(ending)
 }
 
+/// Arms, once the last run's air has left the muscle, and waits for the device's own test of its dump valve.
+///
+/// # Errors
+/// As the device refuses, or the fault that the test ended in.
+pub fn arm(client: &mut Client) -> Result<()> {
+    let deadline = Instant::now() + ARMING;
+    let empty = Refusal::StillFaulty(Fault::NotVented);
+    loop {
+        let now = match client.try_call::<Arm>(&())? {
+            Ok(status) => status.state,
+            Err(refusal) if refusal == empty && Instant::now() < deadline => State::Disarmed,
+            Err(refusal) => return Err(words::refused(Arm::NAME, refusal)),
+        };
+        match now {
+            State::Armed | State::Running => return Ok(()),
+            State::Fault => return Err(fault(client)?),
+            State::Disarmed if Instant::now() < deadline => std::thread::sleep(Duration::from_millis(20)),
+            State::Disarmed => {
+                return Err(Error::new(Code::DeviceSilent, "the test of the dump valve does not end")
+                    .help("look at `host device info`"));
+            }
+        }
+    }
+}
+
 fn follow(
     client: &mut Client,
     plan: &Plan,
@@ -105,7 +135,7 @@ fn follow(
         status = client.call::<GetStatus>(&())?;
     }
     if status.state == State::Disarmed {
-        client.call::<Arm>(&())?;
+        arm(client)?;
     }
     if let Course::Points { values, .. } = &plan.course {
         send_points(client, values)?;

@@ -130,6 +130,36 @@ pub fn fault(fault: Fault) -> FaultWords {
              and watch.autonomous=true lets a run go on without a host",
             "ticks",
         ),
+        Fault::SettingsInvalid => (
+            "settings-invalid",
+            "the kept settings are damaged, or another firmware wrote them",
+            "look at `host device settings` and send them again, with --from FILE.toml, --set or --defaults",
+            "",
+        ),
+        Fault::NotVented => (
+            "not-vented",
+            "pressure stands in a muscle that should be empty",
+            "wait until it has left; if it does not, take the supply air away and look at the dump valve and the sensor's zero",
+            "Pa",
+        ),
+        Fault::HoldEnded => (
+            "hold-ended",
+            "a held command was vented after its time",
+            "how long a fault may hold a command is watch.hold_ticks",
+            "ticks",
+        ),
+        Fault::ClockFailed => (
+            "clock-failed",
+            "the board's crystal clock failed",
+            "look at the debug probe's clock and its solder bridges; the board runs on its own oscillator until it restarts",
+            "",
+        ),
+        Fault::ValveTest => (
+            "valve-test",
+            "the regulator did not fill the muscle, or the dump valve did not empty it, in the test before arming",
+            "look at supply air, regulator and dump valve; the test's pressure is watch.valve_test_pa",
+            "Pa",
+        ),
     };
     FaultWords { name, cause, remedy, unit }
 }

@@ -9,8 +9,8 @@ mod settings;
 mod trace;
 
 use clap::{Args, Subcommand};
-use model_core::link::endpoints::{Forget, RollBackTable};
-use model_core::link::messages::ForgetMemory;
+use model_core::link::endpoints::{Forget, GetInfo, RollBackTable};
+use model_core::link::messages::{ForgetMemory, RollBack};
 use serde_json::json;
 
 use super::port::{Muscle, PortOption};
@@ -121,7 +121,12 @@ impl Arguments {
             Action::Identify(arguments) => identify::run(&arguments, console),
             Action::Faults { port, clear, json } => faults::run(&port, clear, json, console),
             Action::Rollback { port, muscle, json } => {
-                let info = port.connect(console)?.call_once::<RollBackTable>(&muscle.side())?;
+                let mut client = port.connect(console)?;
+                let side = muscle.side();
+                // Named by its generation, the table is gone back from once, however often the request is repeated.
+                let now = client.call::<GetInfo>(&())?.tables[side.index()];
+                let generation = now.map_or(0, |table| table.generation);
+                let info = client.call::<RollBackTable>(&RollBack { side, generation })?;
                 let crc = format!("{:08x}", info.crc);
                 console.result(if json {
                     format!(

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use model_core::check;
 use model_core::image;
 use model_core::link::endpoints::{
-    Arm, ClearFault, GetFaults, GetSettings, GetStatus, SetSettings, SetTelemetry, StartMode, Stop,
+    ClearFault, GetFaults, GetSettings, GetStatus, SetSettings, SetTelemetry, StartMode, Stop,
 };
 use model_core::link::hello::Board;
 use model_core::link::messages::{Event, Side, Start, State, Status, Telemetry, TelemetryRate};
@@ -24,7 +24,7 @@ use pam_device::course::{Course, Quantity};
 use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::error::DeviceCode;
 use pam_device::recorder::{Recorder, about_losses, about_start, serial};
-use pam_device::run::{Plan, Steps, vent};
+use pam_device::run::{Plan, Steps, arm, vent};
 use pam_device::{Client, Topic, difference, tables, words};
 use pam_fit::table_file::TableFile;
 
@@ -293,7 +293,10 @@ impl Connected {
     fn obey(&mut self, order: Order) -> Result<Value> {
         match order {
             Order::Connect(_) | Order::Emulate(_) | Order::Disconnect => return Err(none()),
-            Order::Arm => self.status = self.client.call::<Arm>(&())?,
+            Order::Arm => {
+                arm(&mut self.client)?;
+                self.status = self.client.call::<GetStatus>(&())?;
+            }
             Order::Vent => {
                 self.running = None;
                 self.status = vent(&mut self.client)?;

@@ -3,10 +3,10 @@
 use super::frame::{Exchange, Kind};
 use super::messages::{
     DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, PastFault, Reference,
-    ReferencePoints, Refusal, SetPoint, Start, Status, TableBegin, TableInfo, TablePiece, TableRead,
-    TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead,
+    ReferencePoints, Refusal, RollBack, SetPoint, Start, Status, TableBegin, TableInfo, TablePiece,
+    TableRead, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead,
 };
-use super::messages::{Event, Side, Telemetry};
+use super::messages::{Event, Telemetry};
 use super::settings::Settings;
 use crate::fields::{self, Fields};
 use postcard_schema::{Schema, key::hash::fnv1a64::hash_ty_path};
@@ -134,7 +134,7 @@ endpoints! {
     1 info GetInfo: () => DeviceInfo;
     /// What the device is doing.
     2 status GetStatus: () => Status;
-    /// `Disarmed` → `Armed`.
+    /// `Disarmed` → `Armed`, at once or after a test of the dump valve (`watch.valve_test_pa`); refused while pressure stands in a muscle.
     3 arm Arm: () => Status;
     /// `Armed` → `Running`, or another mode while running. The first set-point is what is measured.
     4 start StartMode: Start => Status;
@@ -158,18 +158,18 @@ endpoints! {
     13 clear_fault ClearFault: () => Status;
     /// The settings in force.
     14 settings GetSettings: () => Settings;
-    /// Checks, keeps and uses settings; only while disarmed or armed.
+    /// Checks, keeps and uses settings, and confirms them where they could not be trusted; only while every muscle is vented.
     15 set_settings SetSettings: Settings => Settings;
     /// Begins the upload of a table, in the room of the trace: what that recorded is lost.
     16 table_begin BeginTable: TableBegin => ();
     /// The next piece; the answer is how many bytes are there.
     17 table_piece SendTablePiece: TablePiece => u32;
-    /// Checks the whole table, keeps it, uses it; only while disarmed or armed.
+    /// Checks the whole table, uses it, keeps it; only while every muscle is vented.
     18 table_commit CommitTable: () => TableInfo;
     /// A piece of the kept table; empty behind its end.
     19 table_read ReadTable: TableRead => TablePiece;
-    /// Goes back to the table before; only while disarmed or armed.
-    20 table_rollback RollBackTable: Side => TableInfo;
+    /// Goes back to the table before the one of this generation; asked again, it is done once. Only while every muscle is vented.
+    20 table_rollback RollBackTable: RollBack => TableInfo;
     /// What the table says at some points.
     21 evaluate EvaluateTable: Evaluate => Evaluated;
     /// Arms a trace; an upload that was not finished is forgotten.
@@ -178,9 +178,9 @@ endpoints! {
     23 trace_info GetTrace: () => TraceInfo;
     /// Values of the trace.
     24 trace_read ReadTrace: TraceRead => TracePiece;
-    /// Forgets a muscle's remembered history.
+    /// Forgets a muscle's remembered history; only while every muscle is vented.
     25 forget_memory Forget: ForgetMemory => ();
-    /// Restarts the device after this answer; only while disarmed.
+    /// Restarts the device after this answer; only while disarmed or in a fault, vented.
     26 restart Restart: () => ();
 }
 
@@ -211,7 +211,7 @@ mod tests {
     use super::*;
     use crate::link::frame::{self, Accumulator, Header, MAX_BODY, MAX_TOPIC, MAX_WIRE};
     use crate::link::messages::{
-        Fault, FaultReport, Mode, PIECE, POINTS, Sensor, SideSample, State, TRACE_PIECE, Value,
+        Fault, FaultReport, Mode, PIECE, POINTS, Sensor, Side, SideSample, State, TRACE_PIECE, Value,
     };
 
     #[test]
@@ -229,7 +229,7 @@ mod tests {
     /// and write the new hash here.
     #[test]
     fn the_schema_changes_only_on_purpose() {
-        assert_eq!(SCHEMA_HASH, 0x5f3a_9c85_251e_b90a, "{SCHEMA_HASH:#018x}");
+        assert_eq!(SCHEMA_HASH, 0xb510_199d_7f2b_7f4e, "{SCHEMA_HASH:#018x}");
     }
 
     #[test]

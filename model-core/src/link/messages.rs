@@ -18,8 +18,8 @@ pub use self::device::{DeviceInfo, StartedBy, Status};
 pub use self::refusal::{Field, Refusal, StoreFault, TableFault};
 pub use self::safety::{FAULT_LOG, Fault, FaultReport, Faults, PastFault, Sensor, State};
 pub use self::table::{
-    Evaluate, Evaluated, ForgetMemory, PIECE, POINTS, Point, TableBegin, TableInfo, TablePiece, TableRead,
-    Value,
+    Evaluate, Evaluated, ForgetMemory, PIECE, POINTS, Point, RollBack, TableBegin, TableInfo, TablePiece,
+    TableRead, Value,
 };
 pub use self::telemetry::{Event, SideSample, Telemetry, TelemetryRate};
 pub use self::trace::{

@@ -181,6 +181,14 @@ pub struct Watch {
     pub autonomous: bool,
     /// Ticks missed in a row before the fault.
     pub overrun_ticks: u16,
+    /// Longest time that a fault may hold the last command before it is vented, ticks.
+    pub hold_ticks: u32,
+    /// Largest pressure of a muscle that counts as vented, Pa; above the error of the sensor's zero.
+    pub vented_pa: f32,
+    /// How long a muscle may take to be vented, ticks.
+    pub vent_ticks: u32,
+    /// Pressure of the test of regulator and dump valve before arming, Pa; zero for none. Best below the muscle's deadband.
+    pub valve_test_pa: f32,
 }
 
 fields!(Watch {
@@ -193,7 +201,11 @@ fields!(Watch {
     silence_ticks,
     host_silence_ticks,
     autonomous,
-    overrun_ticks
+    overrun_ticks,
+    hold_ticks,
+    vented_pa,
+    vent_ticks,
+    valve_test_pa
 });
 
 /// Everything a user may choose. One for the device; both muscles of a pair share it.
@@ -296,6 +308,12 @@ impl Settings {
             host_silence_ticks: 1_000,
             autonomous: false,
             overrun_ticks: 5,
+            hold_ticks: 10_000,
+            // Twice the error of a sensor of 1 % and 10 bar.
+            vented_pa: 20e3,
+            // From 7 bar to 20 kPa are 3.6 time constants: enough for a line of half a second.
+            vent_ticks: 2_000,
+            valve_test_pa: 0.0,
         },
         hold_on: 0,
         motion_band_m: 20e-6,

@@ -23,7 +23,8 @@ pub use machine::{Machine, Options, Skipped};
 pub use stations::Watched;
 
 use model_core::image;
-use model_core::link::messages::Side;
+use model_core::link::endpoints::{GetInfo, RollBackTable};
+use model_core::link::messages::{RollBack, Side};
 use model_core::table::MuscleTable;
 use pam_device::Client;
 
@@ -42,4 +43,14 @@ pub fn image_of(table: &MuscleTable) -> Vec<u8> {
 /// When the device refuses it.
 pub fn upload(client: &mut Client, side: Side, table: &MuscleTable) {
     pam_device::tables::write(client, side, &image_of(table), |_| ()).expect("the table is taken");
+}
+
+/// Goes back to the table before, as `host device rollback` does.
+///
+/// # Panics
+/// When the device refuses it.
+pub fn roll_back(client: &mut Client, side: Side) {
+    let table = client.call::<GetInfo>(&()).expect("its tables").tables[side.index()].expect("a table");
+    let request = RollBack { side, generation: table.generation };
+    client.call::<RollBackTable>(&request).expect("there is one before");
 }

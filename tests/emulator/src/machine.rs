@@ -77,6 +77,19 @@ pub fn image() -> Result<PathBuf, Skipped> {
     Ok(built(&["mps2-an386"], "mps2-an386.elf", &ONCE))
 }
 
+/// The image of the Nucleo board, which this emulator cannot run.
+///
+/// # Errors
+/// [`Skipped`] when the emulator is left out.
+///
+/// # Panics
+/// With the reason when it cannot be built.
+pub fn nucleo_image() -> Result<PathBuf, Skipped> {
+    static ONCE: OnceLock<Result<(), String>> = OnceLock::new();
+    available()?;
+    Ok(built(&["nucleo-f446re"], "nucleo-f446re.elf", &ONCE))
+}
+
 /// The controller's image with its log.
 ///
 /// # Errors

@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use model_core::link::endpoints::{
-    Arm, ClearFault, Disarm, GetSettings, GetStatus, SetReference, SetSettings, SetTelemetry, SetTo,
-    StartMode, Stop,
+    ClearFault, Disarm, GetSettings, GetStatus, SetReference, SetSettings, SetTelemetry, SetTo, StartMode,
+    Stop,
 };
 use model_core::link::messages::{
     Event, FaultReport, Mode, Reference, SetPoint, Start, State, Telemetry, TelemetryRate,
@@ -103,7 +103,7 @@ pub fn start(client: &mut Client, mode: Mode) {
     for _ in 0..3 {
         sample(client).expect("no fault while disarmed");
     }
-    client.call::<Arm>(&()).expect("it arms");
+    host::device::run::arm(client).expect("it arms");
     client.call::<StartMode>(&Start { mode }).expect("it starts");
 }
 

@@ -6,10 +6,11 @@ use std::time::Duration;
 use emulator_tests::machine::Folder;
 use emulator_tests::{Machine, Options, Watched, tracking, upload};
 use model_core::link::endpoints::{
-    Arm, ClearFault, GetFaults, GetPastFault, GetStatus, SetReference, SetTelemetry, SetTo, StartMode, Stop,
+    Arm, ClearFault, GetFaults, GetPastFault, GetSettings, GetStatus, SetReference, SetSettings,
+    SetTelemetry, SetTo, StartMode, Stop,
 };
 use model_core::link::messages::{
-    Fault, Mode, PastFault, Reference, Refusal, SetPoint, Side, Start, State, TelemetryRate,
+    Fault, Field, Mode, PastFault, Reference, Refusal, SetPoint, Side, Start, State, TelemetryRate,
 };
 use model_core::link::settings::Settings;
 use model_core::table;
@@ -268,6 +269,57 @@ fn a_damaged_store_latches_a_fault_at_the_next_start() {
     let mut client = machine.client();
     let latched = client.call::<GetFaults>(&()).expect("its faults").latched.map(|report| report.fault);
     assert_eq!(latched, Some(Fault::TableInvalid));
+}
+
+#[test]
+fn settings_of_which_a_bit_is_wrong_stop_the_device_until_they_are_confirmed() {
+    let folder = Folder::new();
+    let station = station();
+    let Some(machine) = board(&folder, &station) else { return };
+    let mut client = machine.client();
+    tracking::set(&mut client, |settings| settings.limits.pressure_pa = 250e3);
+    machine.kill();
+    let path = folder.path().join("pam-store.bin");
+    let mut bytes = std::fs::read(&path).expect("the store's file");
+    let limit = 250e3_f32.to_le_bytes();
+    let place = bytes.windows(4).position(|four| four == limit).expect("the limit is in it");
+    bytes[place + 1] ^= 4;
+    std::fs::write(&path, bytes).expect("the file");
+    let Some(machine) = board(&folder, &station) else { return };
+    let mut client = machine.client();
+    let untrusted = Fault::SettingsInvalid;
+    let latched = client.call::<GetFaults>(&()).expect("its faults").latched.map(|report| report.fault);
+    assert_eq!(latched, Some(untrusted));
+    station.pass(10);
+    assert_eq!(client.try_call::<Arm>(&()).expect("an answer"), Err(Refusal::Latched(untrusted)));
+    let refused = client.try_call::<ClearFault>(&()).expect("an answer");
+    assert_eq!(refused, Err(Refusal::StillFaulty(untrusted)));
+    tracking::set(&mut client, |settings| settings.limits.pressure_pa = 250e3);
+    client.call::<ClearFault>(&()).expect("they are confirmed");
+    client.call::<Arm>(&()).expect("it arms");
+}
+
+#[test]
+fn settings_without_bounds_are_refused_and_change_nothing() {
+    let folder = Folder::new();
+    let station = station();
+    let Some(machine) = board(&folder, &station) else { return };
+    let mut client = machine.client();
+    let before = client.call::<GetSettings>(&()).expect("its settings");
+    type Change = fn(&mut Settings);
+    let blind: [(Field, Change); 4] = [
+        (Field::Regulator, |s| s.regulator.line_s = 1e30),
+        (Field::Regulator, |s| s.regulator.lag_s = 3.4e38),
+        (Field::Watch, |s| s.watch.debounce_ticks = 65_535),
+        (Field::Watch, |s| s.watch.host_silence_ticks = u32::MAX),
+    ];
+    for (field, change) in blind {
+        let mut settings = before;
+        change(&mut settings);
+        let refused = client.try_call::<SetSettings>(&settings).expect("an answer");
+        assert_eq!(refused, Err(Refusal::Value(field)));
+    }
+    assert_eq!(client.call::<GetSettings>(&()).expect("its settings"), before);
 }
 
 #[test]

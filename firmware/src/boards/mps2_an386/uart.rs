@@ -9,7 +9,7 @@ use core::convert::Infallible;
 use embassy_sync::{blocking_mutex::raw::CriticalSectionRawMutex, pipe::Pipe};
 use embedded_io_async::{ErrorType, Read, Write};
 
-use super::register::Register;
+use super::super::register::Register;
 
 const DATA: usize = 0x00;
 const STATE: usize = 0x04;

@@ -8,7 +8,7 @@ use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
 use model_core::link::messages::StartedBy;
 
-use super::register::Register;
+use super::super::register::Register;
 
 const LOAD: Register = Register::at(0x4000_8000);
 const CONTROL: Register = Register::at(0x4000_8008);

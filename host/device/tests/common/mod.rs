@@ -205,6 +205,7 @@ fn status() -> Status {
         frames_bad: 0,
         telemetry_dropped: 0,
         saturated_ticks: 0,
+        line_errors: 0,
     }
 }
 

@@ -57,6 +57,7 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
             "frames_bad": status.frames_bad,
             "telemetry_dropped": status.telemetry_dropped,
             "saturated_ticks": status.saturated_ticks,
+            "line_errors": status.line_errors,
         });
         console.result(format!("{all:#}"));
         return Ok(());

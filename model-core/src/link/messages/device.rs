@@ -74,6 +74,8 @@ pub struct Status {
     pub telemetry_dropped: u32,
     /// Wanted forces that the table could not give, and were limited.
     pub saturated_ticks: u32,
+    /// Times that received bytes were lost: the receiver was not read in time, or the line was disturbed.
+    pub line_errors: u32,
 }
 
 fields!(Status {
@@ -86,5 +88,6 @@ fields!(Status {
     frames_good,
     frames_bad,
     telemetry_dropped,
-    saturated_ticks
+    saturated_ticks,
+    line_errors
 });

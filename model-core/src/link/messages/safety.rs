@@ -68,6 +68,16 @@ codes! {
         NotANumber,
         /// No frame of a host for too long while running: the program that was in charge is gone.
         HostSilence,
+        /// The kept settings are damaged, or another firmware wrote them: look at them and send them again.
+        SettingsInvalid,
+        /// Pressure stands in a muscle that has been vented for long enough to be empty.
+        NotVented,
+        /// A command was held for as long as the settings allow, and was vented.
+        HoldEnded,
+        /// The crystal's clock failed; the processor runs on its own oscillator.
+        ClockFailed,
+        /// The test of regulator and dump valve before arming failed.
+        ValveTest,
     }
 }
 

@@ -63,6 +63,17 @@ pub struct TableRead {
 
 fields!(TableRead { side, offset });
 
+/// Asks to go back to the table before.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct RollBack {
+    /// Muscle.
+    pub side: Side,
+    /// Generation of the table to go back from, so that a request that is repeated goes back once.
+    pub generation: u32,
+}
+
+fields!(RollBack { side, generation });
+
 /// A point to evaluate the table at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Point {

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 
 use model_core::effects::{EffectName, FittedEffect};
 use model_core::link::endpoints::{
-    ArmTrace, EvaluateTable, Forget, GetInfo, GetPastFault, Restart, RollBackTable, SetTo, Stop,
+    ArmTrace, EvaluateTable, Forget, GetInfo, GetPastFault, Restart, SetTo, Stop,
 };
 use model_core::link::messages::{
     Evaluate, ForgetMemory, Mode, PastFault, Point, Reference, SetPoint, Side, TraceArm, Trigger, Variable,
@@ -20,12 +20,12 @@ use virtual_bench::presets;
 use crate::joint::{self, Joint};
 use crate::machine::{self, Folder, Machine, Options, Skipped};
 use crate::tracking::{self, Stretch, Wanted};
-use crate::{fitting, pair, upload};
+use crate::{fitting, pair, roll_back, upload};
 
 /// The most flash that an image without logs may take, bytes.
-pub const FLASH: u32 = 64 * 1024;
+pub const FLASH: u32 = 160 * 1024;
 /// The most memory, static and stack together, bytes.
-pub const RAM: u32 = 16 * 1024;
+pub const RAM: u32 = 48 * 1024;
 
 /// What a board's image takes of the chip, bytes.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,7 +113,7 @@ fn of_one_muscle() -> Result<u32, Skipped> {
         let points = (0..16).map(|n| Point { pressure_pa: 40e3 * n as f32, stroke_m: 1e-3 }).collect();
         client.call::<EvaluateTable>(&Evaluate { side, direction: 1, points }).expect("an evaluation");
     }
-    client.call::<RollBackTable>(&Side::Agonist).expect("there is one before");
+    roll_back(&mut client, Side::Agonist);
     let variables = [Variable::Pressure, Variable::Force, Variable::Command].into_iter().collect();
     let trace = TraceArm { variables, every_ticks: 1, trigger: Trigger::UntilFault };
     client.call::<ArmTrace>(&trace).expect("a trace");

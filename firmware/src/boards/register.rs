@@ -1,4 +1,4 @@
-//! Memory-mapped registers of this board.
+//! Memory-mapped registers.
 
 /// One 32-bit register.
 #[derive(Clone, Copy)]
@@ -20,5 +20,11 @@ impl Register {
     pub fn write(self, value: u32) {
         // SAFETY: as above; these registers change nothing that Rust's memory model knows of.
         unsafe { self.0.write_volatile(value) }
+    }
+
+    /// Sets bits of it.
+    #[allow(dead_code, reason = "not every board needs it")]
+    pub fn set(self, bits: u32) {
+        self.write(self.read() | bits);
     }
 }

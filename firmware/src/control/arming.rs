@@ -1,0 +1,106 @@
+//! Arming: only an empty muscle is armed, and where the settings ask for it only behind a dump valve that has been tried.
+//!
+//! ```text
+//! filling    dump valve closed, regulator at the test's pressure     until half of it is in the muscle
+//! dumping    dump valve open, regulator still at that pressure       until less than half is: the valve alone lets it out
+//! ```
+//! The test is best made below the deadband, where the muscle does not move. The device is disarmed while it lasts.
+
+use model_core::link::messages::{Fault, Refusal, Side, State};
+use model_core::scalar::Scalar;
+
+use super::Controller;
+use crate::board::{Command, Inputs};
+use crate::safety::Cause;
+use crate::watch::Finding;
+
+/// Where the way from disarmed to armed is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Arming {
+    /// Nothing is on its way.
+    #[default]
+    Idle,
+    /// The muscles are being filled; ticks so far.
+    Filling(u16),
+    /// They are being emptied; ticks so far.
+    Dumping(u16),
+}
+
+/// The most that either half of the test may take, ticks: a line of 0.5 s lets a half through in 0.35 s.
+const PATIENCE_TICKS: u16 = 1_000;
+/// Part of the test's pressure that must come, and go again.
+const PART: f32 = 0.5;
+
+impl Controller {
+    /// Arms, or begins the test that arms when it has passed.
+    ///
+    /// # Errors
+    /// As [`Machine::request`](crate::safety::Machine::request); [`Refusal::StillFaulty`] where a muscle is not empty or the
+    /// settings have not been confirmed.
+    pub fn arm(&mut self) -> Result<(), Refusal> {
+        self.machine.allows(Cause::Arm)?;
+        if self.machine.state() == State::Disarmed {
+            if self.unconfirmed {
+                return Err(Refusal::StillFaulty(Fault::SettingsInvalid));
+            }
+            let watch = &self.settings.watch;
+            // `!(…)` so that a pressure that is no number counts as one that stands.
+            let stands = |pressure_pa: f32| !(pressure_pa <= watch.vented_pa);
+            if self.settings.pressure.fitted && self.sides.iter().any(|side| stands(side.sample.pressure_pa))
+            {
+                return Err(Refusal::StillFaulty(Fault::NotVented));
+            }
+            if self.settings.pressure.fitted && watch.valve_test_pa > 0.0 {
+                if self.arming == Arming::Idle {
+                    self.arming = Arming::Filling(0);
+                }
+                return Ok(());
+            }
+        }
+        self.arm_now()
+    }
+
+    fn arm_now(&mut self) -> Result<(), Refusal> {
+        self.change(Cause::Arm)?;
+        for side in &mut self.sides {
+            side.watch.restart();
+        }
+        Ok(())
+    }
+
+    /// One tick of the test, on every muscle that has readings.
+    pub(super) fn test_valves(&mut self, inputs: &Inputs) {
+        let regulator = self.settings.regulator;
+        let pressure_pa = self.settings.watch.valve_test_pa;
+        let enough_pa = PART * pressure_pa;
+        let filling = matches!(self.arming, Arming::Filling(_));
+        let mut waits_for = None;
+        for side in Side::ALL {
+            let Some(now) = inputs.sides[side.index()] else { continue };
+            let filled = now.pressure_pa >= enough_pa;
+            if filled != filling {
+                waits_for = waits_for.or(Some((side, now.pressure_pa)));
+            }
+            let most = regulator.command_max_pa.at_most(self.hardware.command_ceiling_pa);
+            let command = (pressure_pa / regulator.gain - regulator.offset_pa).within(0.0, most);
+            let actuator = &mut self.sides[side.index()];
+            actuator.regulator.expect(if filling { command } else { 0.0 }, &regulator);
+            actuator.command = Command { pressure_pa: command, vent: !filling };
+        }
+        self.arming = match (self.arming, waits_for) {
+            (Arming::Filling(_), None) => Arming::Dumping(0),
+            (Arming::Filling(ticks), Some(_)) if ticks < PATIENCE_TICKS => Arming::Filling(ticks + 1),
+            (Arming::Dumping(ticks), Some(_)) if ticks < PATIENCE_TICKS => Arming::Dumping(ticks + 1),
+            (_, Some((side, value))) => {
+                let finding = Finding { fault: Fault::ValveTest, sensor: None, value, limit: enough_pa };
+                return self.raise(side, &finding);
+            }
+            (_, None) => {
+                self.vent_now();
+                // The state has not changed since the test began, so this is allowed.
+                let _ = self.arm_now();
+                Arming::Idle
+            }
+        };
+    }
+}

@@ -1,0 +1,72 @@
+"""The board with a muscle: sensors on the chip's pins, a regulator and a dump valve on its outputs."""
+
+import random
+from pathlib import Path
+
+from chip import Chip
+from link import ARM, START, Link
+
+ROOT = Path(__file__).resolve().parents[2]
+IMAGE = ROOT / "target/firmware/nucleo-f446re.elf"
+TABLE = Path(__file__).resolve().parent / "example-table.bin"
+
+LAG_S = 0.03
+TICK_S = 0.001
+
+
+class Board:
+    """A muscle at a stroke of 1.5 mm, whose pressure follows the regulator within 30 ms."""
+
+    def __init__(self, cycles=1.0, prepare=None, settle=0.3):
+        self.chip = Chip(IMAGE, cycles)
+        self.random = random.Random(1)
+        self.pressure_pa, self.cable = 0.0, True
+        if prepare:
+            prepare(self.chip)
+        self.chip.at(0.0, self.step)
+        self.restarts = 0
+        self.chip.run(settle)
+        self.link = Link(self.chip)
+
+    def step(self):
+        """A millisecond of the muscle; survives restarts of the chip."""
+        chip = self.chip
+        volts = 0.0 if chip.valve_open else chip.command_volts
+        self.pressure_pa += (volts / 3.3 * 1e6 - self.pressure_pa) * TICK_S / LAG_S
+        noise = self.random.uniform
+        force_n = max(0.0, (self.pressure_pa - 76.5e3) * 1.5e-4)
+        volt = {
+            0: (self.pressure_pa + noise(-300, 300) + 125e3) / 375e3 if self.cable else 0.0,
+            1: (0.0015 + noise(-2e-5, 2e-5) + 0.0028) / (0.050 / 3.3 * 1.112),
+            8: (force_n + noise(-0.5, 0.5) + 1100.0) / (1000.0 / 1.5),
+        }
+        chip.adc.codes = {channel: round(value / 3.3 * 4095) for channel, value in volt.items()}
+        chip.at(chip.now + TICK_S, self.step)
+
+    def run(self, seconds, until=None):
+        return self.chip.run(seconds, until)
+
+    def restarted(self, within=0.5):
+        """Waits for a restart and for the board to be up again."""
+        restarts = self.chip.restarts
+        self.chip.run(within, lambda: len(restarts) > self.restarts)
+        assert len(restarts) > self.restarts, "it does not restart"
+        self.restarts = len(restarts)
+        self.chip.at(self.chip.now, self.step)
+        self.chip.run(0.5)
+        return self.chip.restarts[-1]
+
+    def arm(self):
+        """Arms, which takes the test of the dump valve."""
+        self.link.ask(ARM)
+        for _ in range(40):
+            self.run(0.05)
+            status = self.link.status()
+            if status["state"] != "disarmed":
+                return status
+        return status
+
+    def start(self, mode):
+        status = self.arm()
+        assert status["state"] == "armed", status
+        return self.link.ask(START, bytes([mode]))

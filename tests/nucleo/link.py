@@ -1,0 +1,137 @@
+"""The host's end of the link: frames as docs/src/link.md has them, and the few messages that the tests need."""
+
+import struct
+import zlib
+
+HELLO, INFO, STATUS, ARM, START, STOP, DISARM, SET_POINT = 0, 1, 2, 3, 4, 5, 6, 7
+FAULTS, CLEAR_FAULT, SETTINGS, SET_SETTINGS = 11, 13, 14, 15
+TABLE_BEGIN, TABLE_PIECE, TABLE_COMMIT, TABLE_READ, RESTART = 16, 17, 18, 19, 26
+REQUEST, RESPONSE, REFUSAL = 0, 1, 2
+STATES = ("disarmed", "armed", "running", "fault")
+PRESSURE_MODE, FORCE_MODE = 1, 2
+FAULT_NAMES = (
+    "sensor-range sensor-stuck sensor-noisy sensors-disagree sensors-silent pressure-not-rising pressure-not-falling over-pressure "
+    "over-stroke over-speed over-force set-point-silence loop-overrun table-missing table-invalid brown-out watchdog not-a-number "
+    "host-silence settings-invalid not-vented hold-ended clock-failed valve-test"
+).split()
+
+
+def stuffed(data):
+    """COBS: no zero byte inside."""
+    out, block = bytearray(), bytearray()
+    for byte in data:
+        if byte:
+            block.append(byte)
+        if not byte or len(block) == 254:
+            out += bytes([len(block) + 1]) + block
+            block = bytearray()
+    return bytes(out + bytes([len(block) + 1]) + block)
+
+
+def unstuffed(data):
+    out, at = bytearray(), 0
+    while at < len(data):
+        code = data[at]
+        if code == 0 or at + code > len(data):
+            return None
+        out += data[at + 1 : at + code]
+        at += code
+        if code < 255 and at < len(data):
+            out.append(0)
+    return bytes(out)
+
+
+def frame(kind, number, sequence, body=b""):
+    raw = struct.pack("<BBH", kind, number, sequence & 0xFFFF) + body
+    return stuffed(raw + struct.pack("<I", zlib.crc32(raw))) + b"\0"
+
+
+def varint(number):
+    out = bytearray()
+    while number > 127:
+        out.append(number & 127 | 128)
+        number >>= 7
+    return bytes(out + bytes([number]))
+
+
+class Reader:
+    """Reads postcard's bytes."""
+
+    def __init__(self, data):
+        self.data, self.at = data, 0
+
+    def byte(self):
+        self.at += 1
+        return self.data[self.at - 1]
+
+    def varint(self):
+        number, shift = 0, 0
+        while True:
+            byte = self.byte()
+            number |= (byte & 127) << shift
+            shift += 7
+            if byte < 128:
+                return number
+
+
+class Refused(Exception):
+    """The device says no."""
+
+
+class Link:
+    """One request at a time over a chip's line."""
+
+    def __init__(self, chip):
+        self.chip, self.sequence, self.read = chip, 0, 0
+        self.uart = None
+
+    def frames(self):
+        if self.uart is not self.chip.uart2:
+            self.uart, self.read = self.chip.uart2, 0
+        *whole, rest = bytes(self.uart.sent[self.read :]).split(b"\0")
+        self.read = len(self.uart.sent) - len(rest)
+        for data in whole:
+            raw = unstuffed(data)
+            if raw and len(raw) >= 8 and zlib.crc32(raw[:-4]) == struct.unpack("<I", raw[-4:])[0]:
+                yield raw[0], raw[1], struct.unpack("<H", raw[2:4])[0], raw[4:-4]
+
+    def ask(self, number, body=b"", wait=0.05):
+        """The answer's body, or none."""
+        self.sequence += 1
+        found = []
+
+        def answered():
+            found.extend(one for one in self.frames() if one[1:3] == (number, self.sequence & 0xFFFF))
+            return bool(found)
+
+        self.chip.uart2.send(frame(REQUEST, number, self.sequence, body))
+        end = self.chip.now + wait
+        while self.chip.now < end and not answered():
+            self.chip.run(0.0005)
+        if not found:
+            return None
+        if found[0][0] == REFUSAL:
+            raise Refused(found[0][3])
+        return found[0][3]
+
+    def status(self):
+        reader = Reader(self.ask(STATUS))
+        state, mode = STATES[reader.byte()], reader.byte()
+        fault = FAULT_NAMES[reader.byte()] if reader.byte() else None
+        names = "time_us ticks overruns frames_good frames_bad dropped saturated line_errors".split()
+        return {"state": state, "mode": mode, "fault": fault} | {name: reader.varint() for name in names}
+
+    def hello(self):
+        return self.ask(HELLO)
+
+    def upload(self, image):
+        """Sends a table's image; its sum is taken over its end and then the rest."""
+        check = zlib.crc32(image[-4:] + image[:-4])
+        self.ask(TABLE_BEGIN, b"\0" + varint(len(image)) + varint(check))
+        for at in range(0, len(image), 64):
+            piece = image[at : at + 64]
+            self.ask(TABLE_PIECE, varint(at) + varint(len(piece)) + piece)
+        return self.ask(TABLE_COMMIT, wait=5.0)
+
+    def set_point(self, kind, value):
+        return self.ask(SET_POINT, bytes([kind]) + struct.pack("<f", value))

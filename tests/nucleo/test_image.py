@@ -1,0 +1,283 @@
+"""The Nucleo's own image, executed: boot, link, store, control, and what happens when something fails.
+
+    bash tests/nucleo/run.sh
+"""
+
+import struct
+import unittest
+
+from board import TABLE, Board
+from link import (
+    ARM, CLEAR_FAULT, FORCE_MODE, INFO, PRESSURE_MODE, RESTART, SET_SETTINGS, SETTINGS, STATUS, STOP, TABLE_PIECE, TABLE_READ, Reader,
+    Refused, frame, varint,
+)
+
+# The most instructions of a control tick, all of its interrupts together, in force control with a table.
+MOST_INSTRUCTIONS = 2500
+
+
+class Boot(unittest.TestCase):
+    def test_the_outputs_are_safe_before_any_clock_is_waited_for(self):
+        board = Board()
+        chip = board.chip
+        when, valve_open, volts = chip.outputs[0]
+        self.assertEqual((when, valve_open, volts), (0.0, True, 0.0))
+        self.assertTrue(all(valve_open for _, valve_open, _ in chip.outputs), "nothing closes the valve by itself")
+        self.assertTrue(all(volts == 0.0 for _, _, volts in chip.outputs), "the command is never above 0 V")
+        self.assertEqual(chip.portb.get(0x00) >> 10 & 3, 1, "PB5 is an output")
+        self.assertEqual(chip.dac.get(0x00) & 3, 3, "the converter is on, its buffer off")
+        self.assertTrue(chip.watchdog.runs)
+        self.assertEqual(chip.restarts, [])
+
+    def test_the_image_lies_where_the_chip_looks_for_it(self):
+        board = Board(settle=0.01)
+        self.assertEqual(board.chip.symbols["__vector_table"], 0x08000000)
+        stack, reset = struct.unpack("<II", board.chip.uc.mem_read(0x08000000, 8))
+        self.assertTrue(0x20000000 < stack <= 0x20020000 and stack % 8 == 0, hex(stack))
+        self.assertTrue(reset & 1 and 0x08000000 < reset < 0x08040000, hex(reset))
+
+    def test_it_says_hello_and_who_it_is(self):
+        board = Board()
+        self.assertEqual(board.link.hello()[:4], b"PAM!")
+        info = Reader(board.link.ask(INFO))
+        self.assertEqual((info.varint(), info.byte()), (1000, 1))
+        status = board.link.status()
+        self.assertEqual((status["state"], status["fault"], status["overruns"]), ("disarmed", None, 0))
+
+    def test_flash_is_read_with_prefetch_and_both_caches(self):
+        board = Board()
+        self.assertEqual(board.chip.flash.get(0x00) & 0x70F, 0x705)
+        self.assertFalse(board.chip.flash.stale, "what the caches held of it was forgotten after each write")
+
+
+class Control(unittest.TestCase):
+    def test_fifty_milliseconds_are_fifty_ticks(self):
+        board = Board()
+        before = board.link.status()
+        fed, at = board.chip.watchdog.fed, board.chip.now
+        board.run(0.0500)
+        self.assertAlmostEqual(board.chip.watchdog.fed - fed, (board.chip.now - at) * 1e3, delta=1)
+        board.run(0.45)
+        after = board.link.status()
+        self.assertAlmostEqual(after["ticks"] - before["ticks"], (board.chip.now - at) * 1e3, delta=2)
+        self.assertEqual(after["overruns"], 0)
+
+    def test_a_table_is_taken_and_force_follows(self):
+        board = Board()
+        image = TABLE.read_bytes()
+        board.link.upload(image)
+        self.assertIn(image[:64], board.link.ask(TABLE_READ, b"\0" + varint(0)))
+        board.start(FORCE_MODE)
+        board.link.set_point(1, 40.0)
+        for _ in range(6):
+            board.run(0.05)
+            status = board.link.status()
+        self.assertEqual((status["state"], status["fault"], status["overruns"]), ("running", None, 0))
+        self.assertFalse(board.chip.valve_open)
+        self.assertGreater(board.pressure_pa, 150e3)
+        board.link.ask(STOP)
+        board.run(0.01)
+        self.assertTrue(board.chip.valve_open)
+        self.assertLess(board.chip.command_volts, 0.001, "1 kPa")
+
+    def test_a_jammed_dump_valve_is_found_before_anything_is_armed(self):
+        board = Board()
+        # The regulator does not come: the muscle stays empty.
+        board.chip.dac.volts = lambda: 0.0
+        status = board.arm()
+        self.assertEqual((status["state"], status["fault"]), ("fault", "valve-test"))
+        self.assertTrue(board.chip.valve_open)
+
+    def test_a_tick_takes_few_instructions(self):
+        board = Board()
+        board.link.upload(TABLE.read_bytes())
+        board.start(FORCE_MODE)
+        board.link.set_point(1, 40.0)
+        board.run(0.2)
+        fed = board.chip.watchdog.fed
+        counts = board.chip.count(0.02)
+        ticks = board.chip.watchdog.fed - fed
+        total = sum(count for (line, _), count in counts.items() if line)
+        print(f"\ninstructions of a tick in force control, interrupts together: {total / ticks:.0f}")
+        self.assertEqual(board.link.status()["state"], "running")
+        self.assertGreater(total / ticks, 500)
+        self.assertLessEqual(total / ticks, MOST_INSTRUCTIONS)
+
+
+class Line(unittest.TestCase):
+    def test_no_byte_is_lost_while_something_is_controlled(self):
+        # Slow memory: two cycles for each instruction.
+        board = Board(cycles=2.0)
+        board.link.upload(TABLE.read_bytes())
+        board.start(FORCE_MODE)
+        board.link.set_point(1, 40.0)
+        long = varint(0) + varint(200) + bytes(board.random.randrange(256) for _ in range(200))
+        for _ in range(60):
+            board.run(board.random.uniform(0.0, 0.001))
+            with self.assertRaises(Refused):
+                # No upload has begun: refused, and so it has arrived.
+                self.assertIsNotNone(board.link.ask(TABLE_PIECE, long))
+        status = board.link.status()
+        self.assertEqual((status["line_errors"], status["frames_bad"], status["fault"]), (0, 0, None))
+        self.assertEqual(board.chip.uart2.lost, 0)
+
+    def test_noise_is_counted_and_the_link_goes_on(self):
+        board = Board()
+        board.chip.uart2.send(bytes(board.random.randrange(256) for _ in range(3000)) + b"\0")
+        board.run(0.05)
+        self.assertEqual(board.link.status()["state"], "disarmed")
+        board.chip.uart2.flags |= 1 << 1
+        board.run(0.005)
+        self.assertEqual(board.link.status()["line_errors"], 1, "a byte without its stop bit")
+
+
+class Store(unittest.TestCase):
+    def erase(self, board):
+        """Marks the first sector full, as 128 KiB of settings would, and writes: what is alive moves, and it is erased."""
+        board.chip.uc.mem_write(0x08060000 - 4, bytes(4))
+        board.link.ask(SET_SETTINGS, board.link.ask(SETTINGS), wait=5.0)
+        self.assertIn(6, [sector for sector, _ in board.chip.erased])
+
+    def test_an_erasure_is_survived_and_no_step_is_made_up_for(self):
+        board = Board()
+        chip = board.chip
+        chip.erase_s = 1.2
+        # Bytes that come while the processor stands still: ten times what the ring holds.
+        erase = chip.flash.erase
+
+        def erased(sector):
+            chip.uart2.send(b"\x01" * 10_000)
+            self.fed = chip.watchdog.fed
+            erase(sector)
+
+        chip.flash.erase = erased
+        before = board.link.status()
+        self.erase(board)
+        fed = chip.watchdog.fed
+        chip.run(0.002)
+        self.assertLessEqual(chip.watchdog.fed - fed, 3)
+        board.run(0.05)
+        after = board.link.status()
+        self.assertEqual(chip.restarts, [], "the watchdog was patient")
+        self.assertGreaterEqual(after["overruns"] - before["overruns"], 1190)
+        self.assertGreaterEqual(after["line_errors"], 1)
+        self.assertAlmostEqual(after["ticks"] + after["overruns"], chip.now * 1e3, delta=40)
+        self.assertEqual(after["fault"], None)
+        self.assertFalse(chip.flash.stale)
+        # The watchdog is short again.
+        self.assertEqual(chip.watchdog.reload, 10)
+
+    def test_settings_of_which_a_bit_is_wrong_are_not_used_and_nothing_is_armed_until_they_are_confirmed(self):
+        board = Board()
+        settings = board.link.ask(SETTINGS)
+        flash = bytes(board.chip.uc.mem_read(0x08040000, 0x40000))
+        place = 0x08040000 + flash.rindex(settings) + 40
+        board.link.ask(RESTART)
+        board.chip.uc.mem_write(place, bytes([flash[place - 0x08040000] ^ 0x10]))
+        board.restarted()
+        self.assertEqual(board.link.status()["fault"], "settings-invalid")
+        with self.assertRaises(Refused):
+            board.link.ask(ARM)
+        with self.assertRaises(Refused):
+            board.link.ask(CLEAR_FAULT)
+        board.link.ask(SET_SETTINGS, settings, wait=5.0)
+        board.link.ask(CLEAR_FAULT)
+        self.assertEqual(board.link.status()["state"], "disarmed")
+
+
+class Failures(unittest.TestCase):
+    def running(self, **options):
+        board = Board(**options)
+        board.start(PRESSURE_MODE)
+        board.link.set_point(0, 300e3)
+        board.run(0.2)
+        board.link.ask(STATUS)
+        self.assertFalse(board.chip.valve_open)
+        return board
+
+    def assert_vented_within(self, board, seconds):
+        vented = board.run(seconds, lambda: board.chip.valve_open and board.chip.command_volts < 0.001)
+        self.assertTrue(vented, f"not vented within {seconds * 1e3:.3f} ms")
+
+    def test_a_loop_that_stands_still_is_ended_by_the_watchdog(self):
+        board = self.running()
+        board.chip.tim3.write(0x00, 0)
+        why, _ = board.restarted(within=0.040)
+        self.assertEqual((why, board.chip.valve_open), ("watchdog", True))
+        self.assertEqual(board.link.status()["fault"], "watchdog")
+
+    def test_an_interrupt_that_nobody_expects_vents_at_once(self):
+        board = self.running()
+        board.chip.enabled.add(28)
+        board.chip.pend(28)
+        self.assert_vented_within(board, 20e-6)
+        self.assertEqual(board.restarted(within=0.040)[0], "watchdog")
+
+    def test_a_stack_that_overflows_ends_vented(self):
+        board = self.running()
+        # Deeper than any stack goes: the next push lies below RAM.
+        board.chip.uc.reg_write(board_registers()["sp"], 0x20000000)
+        self.assertEqual(board.restarted(within=0.060)[0], "watchdog")
+        self.assertTrue(board.chip.valve_open)
+
+    def test_a_crystal_that_stops_vents_at_once_and_is_told_after_the_restart(self):
+        board = self.running()
+        board.chip.rcc.lose_crystal()
+        self.assert_vented_within(board, 50e-6)
+        self.assertEqual(board.restarted(within=0.040)[0], "request")
+        status = board.link.status()
+        self.assertEqual((status["state"], status["fault"]), ("fault", "clock-failed"))
+
+    def test_without_a_crystal_it_starts_on_its_own_oscillator_and_says_so(self):
+        board = Board(prepare=lambda chip: setattr(chip, "crystal_dead", True), settle=1.0)
+        self.assertTrue(all(valve_open for _, valve_open, _ in board.chip.outputs))
+        self.assertAlmostEqual(board.chip.hz, 180e6)
+        self.assertEqual(board.link.status()["fault"], "clock-failed")
+
+    def test_a_falling_supply_opens_the_valve_within_microseconds_even_in_a_critical_section(self):
+        board = self.running()
+        chip = board.chip
+        in_section = chip.run(0.01, lambda: chip.uc.reg_read(board_registers()["basepri"]) != 0)
+        self.assertTrue(in_section, "the control step runs in a critical section")
+        chip.power.sag(True)
+        self.assert_vented_within(board, 5e-6)
+        chip.power.sag(False)
+        board.run(0.01)
+        self.assertEqual(board.link.status()["fault"], "brown-out")
+        self.assertTrue(chip.valve_open)
+
+    def test_a_converter_that_is_silent_vents_within_three_ticks(self):
+        board = self.running()
+        board.chip.adc.fails = True
+        self.assert_vented_within(board, 0.0035)
+        board.run(0.01)
+        self.assertEqual(board.link.status()["fault"], "sensors-silent")
+
+    def test_an_open_wire_reads_what_no_sensor_gives(self):
+        board = self.running()
+        board.cable = False
+        self.assert_vented_within(board, 0.005)
+        board.run(0.01)
+        self.assertEqual(board.link.status()["fault"], "sensor-range")
+
+    def test_a_host_that_is_gone_leaves_a_vented_muscle(self):
+        board = self.running()
+        self.assert_vented_within(board, 1.2)
+        self.assertEqual(board.link.status()["fault"], "host-silence")
+
+    def test_half_a_frame_and_then_a_whole_one(self):
+        board = self.running()
+        whole = frame(0, STATUS, 7)
+        board.chip.uart2.send(whole[:-2] + b"\0")
+        board.run(0.005)
+        self.assertEqual(board.link.status()["frames_bad"], 1)
+
+
+def board_registers():
+    from unicorn.arm_const import UC_ARM_REG_BASEPRI, UC_ARM_REG_SP
+
+    return {"sp": UC_ARM_REG_SP, "basepri": UC_ARM_REG_BASEPRI}
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
