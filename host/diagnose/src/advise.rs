@@ -5,9 +5,9 @@ use model_core::muscle::Muscle;
 use rayon::prelude::*;
 
 use super::baselines::cosine;
+use super::experiment::{Motion, Proposal, bench_check};
 use super::linear::{Basis, add_scaled, energy};
 use super::planned::{Place, Protocol, Step, free_stroke, moments, play};
-use super::experiment::{Motion, Proposal, bench_check};
 use super::verdict::{Diagnosis, NextExperiment};
 use pam_data::error::Result;
 use pam_fit::bench::Candidate;
@@ -103,23 +103,11 @@ fn menu(muscle: &Muscle<f64>, low: f64, high: f64) -> Vec<Item> {
         other => other,
     }));
     vec![
-        Item {
-            motion: Motion::Speeds,
-            minutes: 8.0,
-            protocol: speeds,
-        },
-        Item {
-            motion: Motion::Dwells,
-            minutes: 10.0,
-            protocol: dwells,
-        },
+        Item { motion: Motion::Speeds, minutes: 8.0, protocol: speeds },
+        Item { motion: Motion::Dwells, minutes: 10.0, protocol: dwells },
         Item { motion: Motion::NestedLoops, minutes: 6.0, protocol: nested },
         Item { motion: Motion::PressureRamps, minutes: 9.0, protocol: ramps },
-        Item {
-            motion: Motion::Rest,
-            minutes: 38.0,
-            protocol: rest,
-        },
+        Item { motion: Motion::Rest, minutes: 38.0, protocol: rest },
     ]
 }
 

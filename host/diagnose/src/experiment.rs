@@ -98,9 +98,8 @@ pub fn what_would_show(effect: &str) -> Measure {
         "contact-loss" | "pressure-sensor-lag" => Measure::PressureRamps,
         "breakaway-friction" => Measure::FastRests,
         "presliding-hysteresis" | "minor-loop-memory" => Measure::NestedLoops,
-        "viscous-damping" | "rate-power" | "stribeck-friction" | "sensor-delay" | "pressure-lag" | "inertia" => {
-            Measure::FourSpeeds
-        }
+        "viscous-damping" | "rate-power" | "stribeck-friction" | "sensor-delay" | "pressure-lag"
+        | "inertia" => Measure::FourSpeeds,
         "coulomb-friction" | "pressure-friction" | "seal-friction" => Measure::FourPressures,
         "friction-asymmetry" => Measure::RestBothSides,
         "stress-relaxation" | "log-creep" => Measure::LongHolds,

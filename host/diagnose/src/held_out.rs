@@ -166,14 +166,11 @@ fn strictest(rows: &Rows, kind: Kind) -> Groups {
     let tare = |i: usize| (vented.partition_point(|v| *v < i) * 4 / vented.len().max(1)) as u32 % 2;
     let pressure = |i: usize| if rows.vented[i] { rows.levels.len() as u32 + tare(i) } else { rows.level[i] };
     let by_pressure = split(Split::Pressures, rows, &pressure);
-    let by_stroke =
-        split(Split::Cycles, rows, &|i| rows.block[i] / 2 % 4);
+    let by_stroke = split(Split::Cycles, rows, &|i| rows.block[i] / 2 % 4);
     let by_recording = split(Split::Recordings, rows, &|i| rows.recording[i]);
-    let by_run =
-        split(Split::TenthRecordings, rows, &|i| rows.recording[i] % 10);
+    let by_run = split(Split::TenthRecordings, rows, &|i| rows.recording[i] % 10);
     let quarter = rows.blocks.div_ceil(4).max(1) as u32;
-    let by_time =
-        split(Split::Quarters, rows, &|i| rows.block[i] / quarter);
+    let by_time = split(Split::Quarters, rows, &|i| rows.block[i] / quarter);
     // A pressure left out needs a baseline that reaches over pressures.
     if rows.isometric && rows.names.len() >= 4 {
         by_run
@@ -219,8 +216,7 @@ impl Unseen {
             let strokes = strokes(&thin);
             let part = (strokes.end() - strokes.start()) / PARTS;
             let of = |i: usize| ((thin.contexts[i].stroke - strokes.start()) / part).max(0.0) as u32 % 4;
-            split =
-                self::split(Split::StrokeParts, &thin, &of);
+            split = self::split(Split::StrokeParts, &thin, &of);
         }
         Self { rows: thin, stride: stride(rows), kind, split, tares }
     }

@@ -2,8 +2,8 @@
 
 use super::answer::Options;
 use super::candidates::library;
-use super::rows::Rows;
 use super::remark::{Remark, Unjudgeable};
+use super::rows::Rows;
 use super::verdict::{Considered, Diagnosis, HeldOut, Outcome, Pattern, Split, Trace, Unexplained, WhyNot};
 
 /// Fewest rows and half-strokes from which anything is judged.

@@ -121,10 +121,10 @@ impl Known {
         }
         if !diagnosis.judged() {
             // What the bench does is known all the same; what it does to these recordings is not.
-            let words = self
-                .named
-                .iter()
-                .map(|j| Remark::Measured { check: j.measured.check.to_string(), value: j.measured.words.to_string() });
+            let words = self.named.iter().map(|j| Remark::Measured {
+                check: j.measured.check.to_string(),
+                value: j.measured.words.to_string(),
+            });
             diagnosis.remarks.extend(words);
             return Ok(diagnosis);
         }

@@ -8,8 +8,8 @@ use model_core::table::{self, MuscleTable};
 use model_core::units::{Length, Pressure};
 
 use super::linear::{Random, quantile};
-use super::planned::{Place, Protocol, Step, play};
 use super::outcome::Verdict;
+use super::planned::{Place, Protocol, Step, play};
 use super::remark::Remark;
 use super::why::Why;
 use super::{Diagnosis, Options, diagnose, model};
@@ -276,7 +276,12 @@ fn what_is_given_is_fitted_and_judged_by_the_recordings() {
     // … beside another, of which nothing is there; and what is not there is fitted too, and said not to be supported.
     let d = told(&rubbed, &["backlash", "coulomb-friction"]).expect("an answer");
     assert_eq!(names(&d), ["backlash", "coulomb-friction"]);
-    assert!(!d.missing[0].supported && d.missing[1].supported, "{:?} | {:?}", d.missing[0].why, d.missing[1].why);
+    assert!(
+        !d.missing[0].supported && d.missing[1].supported,
+        "{:?} | {:?}",
+        d.missing[0].why,
+        d.missing[1].why
+    );
     assert!((d.missing[1].parameters[0].value - 4.0).abs() < 0.6, "{:?}", d.missing[1].parameters);
     let nothing = recorded(loops(&[0.1, 0.4]), 9, coloured(0.3, 10.0), |_, _, _| 0.0);
     let d = told(&nothing, &["stress-relaxation"]).expect("an answer");

@@ -108,9 +108,14 @@ fn recommendation(d: &Diagnosis) -> Section {
     if !d.judged() {
         steps.push("Correct what the remarks name, and record again.".to_owned());
     } else if d.missing.is_empty() && d.verdict() == Verdict::Consistent {
-        steps.push("Use the table of `host fit`: it describes these recordings within their noise.".to_owned());
+        steps.push(
+            "Use the table of `host fit`: it describes these recordings within their noise.".to_owned(),
+        );
     } else if d.missing.is_empty() {
-        steps.push("Use the table of `host fit`, with the error above. See below where the model is wrong.".to_owned());
+        steps.push(
+            "Use the table of `host fit`, with the error above. See below where the model is wrong."
+                .to_owned(),
+        );
     }
     if let Some(n) = &d.next_experiment {
         steps.push(format!(
@@ -143,7 +148,11 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
     let mut section = Section::new(format!("Effect: {}", m.effect)).summarised();
     section.text(m.summary.clone());
     let candidate = Candidate::from_name(&m.effect);
-    let whose = if m.correction { "It is an error of the bench, not of the muscle." } else { "It belongs to the muscle." };
+    let whose = if m.correction {
+        "It is an error of the bench, not of the muscle."
+    } else {
+        "It belongs to the muscle."
+    };
     let place = place(m.place);
     section.text(format!(
         "It acts on {place}. {whose} Its largest force in these recordings is {} N, {} % of the blocked force.",
@@ -195,10 +204,17 @@ fn alternatives(d: &Diagnosis) -> Section {
     let mut section = Section::new("Alternatives").summarised();
     for m in &d.missing {
         if m.confusable_with.is_empty() {
-            section.text(format!("These recordings distinguish `{}` from all other effects of the library.", m.effect));
+            section.text(format!(
+                "These recordings distinguish `{}` from all other effects of the library.",
+                m.effect
+            ));
         } else {
             let others: Vec<String> = m.confusable_with.iter().map(|c| format!("`{c}`")).collect();
-            section.text(format!("These recordings do not distinguish `{}` from {}.", m.effect, others.join(", ")));
+            section.text(format!(
+                "These recordings do not distinguish `{}` from {}.",
+                m.effect,
+                others.join(", ")
+            ));
         }
         let mut odds: Vec<(String, f64)> = vec![(m.effect.clone(), m.probability)];
         let others = m.confusable_with.iter().filter_map(|c| d.considered.iter().find(|k| k.effect == *c));
@@ -253,8 +269,7 @@ fn controller(d: &Diagnosis, geometry: &Geometry) -> Section {
                 text += " It has a memory, which the controller keeps over a power cycle.";
             }
             if info.depends_on_pressure {
-                text +=
-                    " Its force depends on pressure, so the controller includes it when it solves for the pressure.";
+                text += " Its force depends on pressure, so the controller includes it when it solves for the pressure.";
             }
         }
         section.text(text);

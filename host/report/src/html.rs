@@ -5,8 +5,8 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::figure::Figure;
-use super::page::{Block, Page, Section, Table, Tone};
 use super::inline_markup;
+use super::page::{Block, Page, Section, Table, Tone};
 use super::svg::{self, Layout};
 
 const STYLE: &str = include_str!("page.css");

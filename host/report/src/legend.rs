@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 
 use super::axis::figures;
-use super::colour::Colour;
-use super::figure::{Figure, Layer, Style, Mark};
-use super::marks;
 use super::canvas::{FONT_SIZE, px, text};
+use super::colour::Colour;
+use super::figure::{Figure, Layer, Mark, Style};
 use super::inline_markup;
+use super::marks;
 
 const ROW: f64 = 20.0;
 const SWATCH: f64 = 22.0;

@@ -27,21 +27,21 @@ pub mod document;
 pub mod wording;
 
 mod axis;
+mod canvas;
 mod colour;
+mod downsample;
+mod export;
 mod figure;
 mod html;
 mod legend;
-pub mod symbols;
 mod markdown;
 mod marks;
 mod numbers;
 mod page;
-mod canvas;
-mod export;
 mod svg;
-mod downsample;
+pub mod symbols;
 
 pub use axis::{Axis, Scale, figures, fixed};
 pub use colour::Colour;
-pub use figure::{Figure, Layer, Style, Mark, Panel};
+pub use figure::{Figure, Layer, Mark, Panel, Style};
 pub use page::{Block, Fact, Page, Section, Table, Tone};

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::page::{Block, Page, Table, Tone};
 use super::inline_markup;
+use super::page::{Block, Page, Table, Tone};
 
 impl Page {
     /// The summary as Markdown, for pasting.
@@ -51,8 +51,12 @@ fn summary(page: &Page) -> String {
                     }
                 }
                 Block::Figure(figure) => {
-                    let _ =
-                        writeln!(out, "*Picture:* {} (`{}.svg`)", inline_markup::markdown(&figure.title), figure.id);
+                    let _ = writeln!(
+                        out,
+                        "*Picture:* {} (`{}.svg`)",
+                        inline_markup::markdown(&figure.title),
+                        figure.id
+                    );
                 }
                 Block::Table(one) => table(&mut out, one),
                 Block::Listing(text) => {

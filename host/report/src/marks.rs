@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::figure::{Layer, Style, Mark, bar_half_width};
 use super::canvas::{Frame, px};
 use super::downsample;
+use super::figure::{Layer, Mark, Style, bar_half_width};
 
 /// Which marks come first: regions and fields, then bands, then everything else.
 pub(crate) fn stage(mark: &Mark) -> u8 {

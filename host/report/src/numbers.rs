@@ -25,7 +25,8 @@ fn csv(figure: &Figure) -> String {
     let mut head = None;
     for panel in &figure.panels {
         // Panels with other axes start a table of their own, after an empty line.
-        let (x, y) = (cell(&inline_markup::plain(&panel.x.title())), cell(&inline_markup::plain(&panel.y.title())));
+        let (x, y) =
+            (cell(&inline_markup::plain(&panel.x.title())), cell(&inline_markup::plain(&panel.y.title())));
         let wide = panel.layers.iter().any(|l| !matches!(l.mark, Mark::Series { .. } | Mark::Level(_)));
         let this = format!(
             "{}layer,{x},{y}{}\n",
@@ -45,7 +46,8 @@ fn csv(figure: &Figure) -> String {
 }
 
 fn rows(out: &mut String, panel: &Panel, several: bool, wide: bool) {
-    let title = if several { format!("{},", cell(&inline_markup::plain(&panel.title))) } else { String::new() };
+    let title =
+        if several { format!("{},", cell(&inline_markup::plain(&panel.title))) } else { String::new() };
     for layer in &panel.layers {
         let front = format!("{title}{}", cell(&inline_markup::plain(&layer.name)));
         let mut row = |x: &str, y: Option<f64>, ends: Option<(f64, f64)>| {

@@ -6,12 +6,12 @@
 use std::fmt::Write as _;
 
 use super::axis::{Scale, Tick, linear_ticks, log_ticks};
+use super::canvas::{FONT_SIZE, Frame, px, text};
 use super::colour::{self, Colour};
 use super::figure::{Figure, Panel};
+use super::inline_markup;
 use super::legend;
 use super::marks;
-use super::canvas::{Frame, FONT_SIZE, px, text};
-use super::inline_markup;
 
 /// For what width a picture is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

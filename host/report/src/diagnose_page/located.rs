@@ -30,16 +30,17 @@ const DIRECTIONS: [&str; 2] = ["lengthening", "shortening"];
 fn along(d: &Diagnosis, p: &Profile) -> Panel {
     let (name, unit, scale, offset) = shown(p);
     let region = d.r#where.iter().find(|r| r.coordinate == p.coordinate);
-    let (axis, x, region): (Axis, Vec<f64>, _) = if p.coordinate == "direction" && p.at.len() == DIRECTIONS.len() {
-        // A sign is not a number to read off: two places with names.
-        let half = |sign: f64| if sign < 0.0 { 0.0 } else { 1.0 };
-        let places = (0..DIRECTIONS.len()).map(|i| i as f64).collect();
-        let region = region.map(|r| (half(r.from) - 0.5, half(r.to) + 0.5));
-        (Axis::names("", DIRECTIONS.map(String::from).to_vec()), places, region)
-    } else {
-        let region = region.map(|r| (scale * r.from + offset, scale * r.to + offset));
-        (Axis::new(name.clone(), unit), p.at.iter().map(|v| scale * v + offset).collect(), region)
-    };
+    let (axis, x, region): (Axis, Vec<f64>, _) =
+        if p.coordinate == "direction" && p.at.len() == DIRECTIONS.len() {
+            // A sign is not a number to read off: two places with names.
+            let half = |sign: f64| if sign < 0.0 { 0.0 } else { 1.0 };
+            let places = (0..DIRECTIONS.len()).map(|i| i as f64).collect();
+            let region = region.map(|r| (half(r.from) - 0.5, half(r.to) + 0.5));
+            (Axis::names("", DIRECTIONS.map(String::from).to_vec()), places, region)
+        } else {
+            let region = region.map(|r| (scale * r.from + offset, scale * r.to + offset));
+            (Axis::new(name.clone(), unit), p.at.iter().map(|v| scale * v + offset).collect(), region)
+        };
     let mut panel = Panel::new(axis, Axis::new("residual", "N").from_zero())
         .titled(name)
         .line("rms", Colour::Series(1), &x, &p.rms_before)
@@ -60,11 +61,11 @@ pub(super) fn section(d: &Diagnosis) -> Section {
         return section;
     }
     if d.r#where.is_empty() {
-        section.text(
-            "The error is spread evenly: no region of any coordinate holds more than its share.",
-        );
+        section.text("The error is spread evenly: no region of any coordinate holds more than its share.");
     } else {
-        section.list(d.r#where.iter().take(5).map(|r| format!("{} (p = {})", wording::region(r), figures(r.p, 2))));
+        section.list(
+            d.r#where.iter().take(5).map(|r| format!("{} (p = {})", wording::region(r), figures(r.p, 2))),
+        );
     }
     // The coordinates where it sits come first, then those that also were looked at.
     let rank =

@@ -4,7 +4,8 @@
 #![allow(non_snake_case)]
 
 use pam_diagnose::verdict::{
-    Considered, Diagnosis, HeldOut, Missing, NextExperiment, ParameterValue, PathStep, Profile, Region, Trace, Verdict,
+    Considered, Diagnosis, HeldOut, Missing, NextExperiment, ParameterValue, PathStep, Profile, Region,
+    Trace, Verdict,
 };
 use serde::Serialize;
 
@@ -318,6 +319,10 @@ mod tests {
         if std::env::var("SCHEMA").is_ok_and(|v| v == "overwrite") {
             std::fs::write(path, &text).unwrap();
         }
-        assert_eq!(std::fs::read_to_string(path).unwrap_or_default(), text, "SCHEMA=overwrite writes it anew");
+        assert_eq!(
+            std::fs::read_to_string(path).unwrap_or_default(),
+            text,
+            "SCHEMA=overwrite writes it anew"
+        );
     }
 }

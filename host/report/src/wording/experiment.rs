@@ -32,7 +32,9 @@ fn bench_check(check: BenchCheck) -> &'static str {
         BenchCheck::RigidBar => {
             "put a rigid bar in the muscle's place and load it once: this shows the compliance and play of the frame"
         }
-        BenchCheck::DeadWeights => "hang dead weights on the load cell, with and without pressure in the line",
+        BenchCheck::DeadWeights => {
+            "hang dead weights on the load cell, with and without pressure in the line"
+        }
         BenchCheck::ReferenceGauge => {
             "compare the gauge with a reference at three pressures, and close the valve for a minute"
         }
@@ -60,10 +62,14 @@ pub fn measure(measure: Measure) -> &'static str {
         Measure::NestedLoops => "record nested small loops at two speeds",
         Measure::FourSpeeds => "record loops at four speeds over two decades",
         Measure::FourPressures => "record loops at four pressures and slow pressure ramps at held lengths",
-        Measure::RestBothSides => "hold one length reached from both sides: the gap closes to the true middle",
+        Measure::RestBothSides => {
+            "hold one length reached from both sides: the gap closes to the true middle"
+        }
         Measure::LongHolds => "hold the length for 100 s at two pressures, reached from both sides",
         Measure::FirstStrokes => "record a new specimen's first strokes, and the same again after a day",
-        Measure::RepeatFirst => "repeat the first loops at the end, and again after half an hour of vented rest",
+        Measure::RepeatFirst => {
+            "repeat the first loops at the end, and again after half an hour of vented rest"
+        }
         Measure::FreeStrokeEnd => "record up to the end of the free stroke",
         Measure::Varied => "record several speeds, with holds, and repeat the first pressure at the end",
     }

@@ -44,7 +44,9 @@ pub fn pattern(pattern: &Pattern) -> String {
 pub fn split(split: Split) -> &'static str {
     match split {
         Split::NothingFitted => "none: nothing was fitted",
-        Split::NothingLeftOut => "none: no part of the recordings could be left out, so these are errors on the fitted rows",
+        Split::NothingLeftOut => {
+            "none: no part of the recordings could be left out, so these are errors on the fitted rows"
+        }
         Split::Pressures => "each pressure predicted from the others",
         Split::Cycles => "every fourth cycle predicted from the others, in turn",
         Split::Recordings => "each recording predicted from the others",

@@ -64,7 +64,8 @@ pub fn remark(remark: &Remark) -> String {
 fn unjudgeable(reason: &Unjudgeable) -> String {
     match reason {
         Unjudgeable::FewRows { usable, least } => {
-            let usable = if *usable == 0 { "no row is".to_owned() } else { format!("only {usable} rows are") };
+            let usable =
+                if *usable == 0 { "no row is".to_owned() } else { format!("only {usable} rows are") };
             format!("{usable} usable (direction known, muscle not slack); {least} are needed")
         }
         Unjudgeable::FewStrokes { found, least } => format!(
@@ -157,6 +158,10 @@ pub fn reserve(r: &Reserve) -> String {
         "the effects do not improve the table's prediction of these recordings ({:.3} N with them, {:.3} N without{left_out}). {}",
         r.with,
         r.without,
-        if r.kept { "They were written all the same, because they were given" } else { "The table was written without them" }
+        if r.kept {
+            "They were written all the same, because they were given"
+        } else {
+            "The table was written without them"
+        }
     )
 }

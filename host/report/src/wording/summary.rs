@@ -115,7 +115,8 @@ fn effect(s: &mut String, m: &Missing) {
         let _ = writeln!(s, "  {} = {}{odd}", p.name, with_interval(p.value, p.std, &p.unit));
     }
     if !m.confusable_with.is_empty() {
-        let _ = writeln!(s, "  these recordings do not distinguish it from: {}", m.confusable_with.join(", "));
+        let _ =
+            writeln!(s, "  these recordings do not distinguish it from: {}", m.confusable_with.join(", "));
     }
     if m.correction {
         let _ = writeln!(

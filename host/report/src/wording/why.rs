@@ -35,7 +35,10 @@ fn evidence(e: &Evidence) -> String {
         ),
     };
     let moment = e.moment.as_ref().map_or(String::new(), |m| format!("; it happened {}", moment(m)));
-    format!("it explains {:.0} % of the excess error with the model refitted; {chance}{moment}", 100.0 * e.share)
+    format!(
+        "it explains {:.0} % of the excess error with the model refitted; {chance}{moment}",
+        100.0 * e.share
+    )
 }
 
 fn unseen(u: &UnseenError) -> String {
