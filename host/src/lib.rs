@@ -4,6 +4,7 @@ pub mod cli;
 pub mod commands;
 pub mod console;
 pub mod demo;
+mod documents;
 pub mod error;
 pub mod progress;
 pub mod settings;

@@ -112,7 +112,7 @@ pub fn arm(client: &mut Client) -> Result<()> {
             State::Fault => return Err(fault(client)?),
             State::Disarmed if Instant::now() < deadline => std::thread::sleep(Duration::from_millis(20)),
             State::Disarmed => {
-                return Err(Error::new(Code::DeviceSilent, "the test of the dump valve does not end")
+                return Err(Error::new(DeviceCode::DeviceSilent, "the test of the dump valve does not end")
                     .help("look at `host device info`"));
             }
         }

@@ -14,17 +14,18 @@ pub fn page(a: &Recording, b: &Recording, found: &Comparison) -> Page {
     for c in &found.columns {
         let label = format!("{}, B − A", title(c.name));
         if c.largest == 0.0 {
-            page.fact(label, "the same", "at every row", Tone::Plain);
+            page.fact(label, "equal", "at every row", Tone::Plain);
             continue;
         }
-        let note = format!("rms; {} on average, {} at most", signed(c.mean, c.rms), figures(c.largest, 3));
+        let note =
+            format!("rms difference; mean {}, largest {}", signed(c.mean, c.rms), figures(c.largest, 3));
         page.fact(label, format!("{} {}", figures(c.rms, 3), c.unit), note, Tone::Plain);
     }
     page.push(numbers(found));
     let mut over_time = Section::new("Over time");
     over_time.text(
-        "Both are counted from their own start, and B is read at A's times, joined by straight lines. A recording that began \
-         later in its motion than the other shows as a difference, too.",
+        "Time counts from the start of each recording; B is interpolated linearly at the times of A. A shift in time shows as a \
+         difference.",
     );
     for column in &found.columns {
         over_time_of(&mut over_time, a, b, &names, column, found);
@@ -62,28 +63,30 @@ fn signed(value: f64, rms: f64) -> String {
 fn verdict(a: &Recording, b: &Recording, found: &Comparison) -> String {
     let seconds = fixed(found.overlap, 1);
     let Some(force) = found.columns.iter().find(|c| c.name == "force") else {
-        return format!("Over the {seconds} s that both cover there is no force in both to compare.");
+        return format!(
+            "At least one recording has no force, so forces are not compared ({seconds} s in common)."
+        );
     };
     if force.largest == 0.0 {
-        return format!("Over the {seconds} s that both cover, B reads the same force as A.");
+        return format!("B has the same force as A over the common {seconds} s.");
     }
     // Of both: A may be a tare, of whose noise anything is thousands of percent.
     let largest =
         [a, b].into_iter().flat_map(|r| r.force.iter().flatten()).fold(0.0f64, |m, f| m.max(f.abs()));
     let share = if largest > 0.0 {
-        format!(", {} % of the largest force in either", figures(100.0 * force.mean.abs() / largest, 2))
+        format!(" ({} % of the largest force in either)", figures(100.0 * force.mean.abs() / largest, 2))
     } else {
         String::new()
     };
     format!(
-        "Over the {seconds} s that both cover, B pulls {} N {} than A on average{share}.",
+        "The mean force of B is {} N {} than that of A{share}, over the common {seconds} s.",
         figures(force.mean.abs(), 3),
-        if force.mean < 0.0 { "less" } else { "more" }
+        if force.mean < 0.0 { "lower" } else { "higher" }
     )
 }
 
 fn numbers(found: &Comparison) -> Section {
-    let mut section = Section::new("In numbers").summarised();
+    let mut section = Section::new("Differences").summarised();
     let caption = format!(
         "B − A over {} in {} s",
         counted(fixed(found.rows as f64, 0), "row"),
@@ -122,11 +125,7 @@ fn over_time_of(
         &yb,
     );
     let same = column.largest == 0.0;
-    let reading = if same {
-        "Both are the same at every row."
-    } else {
-        "Where the curves part, the recordings differ."
-    };
+    let reading = if same { "Both are equal at every row." } else { "Both recordings over time." };
     section.figure(Figure::new(column.name, capital(title), reading, both));
     if same {
         return;
@@ -138,7 +137,7 @@ fn over_time_of(
         &column.difference,
     );
     let reading = format!(
-        "The same, subtracted. The largest difference, {} {}, is at {} s.",
+        "Difference over time. The largest, {} {}, is at {} s.",
         figures(column.largest, 3),
         column.unit,
         fixed(column.largest_at, 2)
@@ -148,7 +147,7 @@ fn over_time_of(
 }
 
 fn loops(a: &Recording, b: &Recording, names: &[String; 2]) -> Section {
-    let mut section = Section::new("As loops");
+    let mut section = Section::new("Force against stroke");
     if let (Some(fa), Some(fb)) = (&a.force, &b.force) {
         let millimetres = |r: &Recording| r.stroke.iter().map(|x| x * 1e3).collect::<Vec<_>>();
         let panel = Panel::new(Axis::new("contraction stroke", "mm"), Axis::new("force F", "N"))
@@ -157,7 +156,7 @@ fn loops(a: &Recording, b: &Recording, names: &[String; 2]) -> Section {
         section.figure(Figure::new(
             "loops",
             "Force against stroke",
-            "A loop's height is friction, its place is pressure and elasticity; a loop that moved as a whole had another \
+            "The height of a loop is friction, its position is pressure and elasticity. A loop that is shifted as a whole means another \
              pressure or another zero.",
             panel,
         ));
@@ -221,7 +220,9 @@ mod tests {
         let page = page(&a, &b, &compare(&a, &b).expect("a comparison"));
         let (_, verdict) = page.verdict.clone().expect("a verdict");
         assert!(
-            verdict.contains("B pulls 4.90 N more than A on average, 9.1 % of the largest force in either"),
+            verdict.contains(
+                "The mean force of B is 4.90 N higher than that of A (9.1 % of the largest force in either)"
+            ),
             "{verdict}"
         );
         assert_eq!(page.subtitle, "A: before/run.csv and B: after/run.csv");

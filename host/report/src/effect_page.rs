@@ -58,9 +58,9 @@ pub fn lookalikes<'a>(trace: &Trace, all: &'a [(Trace, super::Figure)]) -> Vec<(
 
 fn whose(candidate: Candidate) -> &'static str {
     if candidate.is_bench() {
-        "It is the bench's: it corrects the recording and is never sent to a controller."
+        "It is an error of the bench: it corrects the recording and is never sent to a controller."
     } else {
-        "It is the muscle's: it goes into the table and to the controller."
+        "It belongs to the muscle: it is stored in the table and sent to the controller."
     }
 }
 
@@ -68,25 +68,24 @@ fn memory(info: &Info) -> &'static str {
     match info.start {
         Start::Known => "Its state at the beginning of a recording is known.",
         Start::Settled => {
-            "It remembers; a recording that begins soon after other work starts with a state nobody recorded, which \
-             fades by itself."
+            "It has a memory that decays. A recording that begins soon after other motion starts in an unknown state."
         }
-        Start::Branch => "It remembers where it last turned; after one full stroke it has found itself.",
+        Start::Branch => "It remembers the last reversal; after one full stroke its state is known.",
         Start::Virgin => {
-            "It remembers for good: a muscle that was worked before the recording brings a past nobody recorded."
+            "It has a permanent memory: the state of a muscle that was used before the recording is unknown."
         }
     }
 }
 
 fn parameters(trace: &Trace) -> Table {
     let mut table = Table::new(
-        "Parameters in SI units, their plausible range, and the value in the picture",
-        &["letter", "parameter", "unit", "from", "to", "drawn with", "what it does"],
+        "Parameters in SI units, their published range, and the value in the picture",
+        &["symbol", "parameter", "unit", "from", "to", "in the picture", "role"],
     );
     for (p, value) in trace.candidate.info().parameters.iter().zip(&trace.parameters) {
         let role = match p.role {
             Role::Amplitude => "scales the force",
-            Role::Shape => "shapes it",
+            Role::Shape => "shapes the force",
         };
         let unit = if p.unit.is_empty() { "–" } else { p.unit };
         let numbers = [p.low, p.high, *value].map(|v| figures(v, 2));
@@ -100,16 +99,16 @@ fn parameters(trace: &Trace) -> Table {
 pub fn page(trace: &Trace, figure: &super::Figure, all: &[(Trace, super::Figure)]) -> Page {
     let info = trace.candidate.info();
     let mut page = Page::new(info.name, info.summary);
-    let mut what = Section::new("What it is").summarised();
+    let mut what = Section::new("Definition").summarised();
     what.text(format!("It acts on {}. {}", place(info.link), whose(trace.candidate)));
     what.listing(info.equation);
     what.table(symbols(info));
     what.table(parameters(trace));
     what.text(memory(info));
     page.push(what);
-    let mut looks = Section::new("What it looks like").summarised();
+    let mut looks = Section::new("Trace").summarised();
     if trace.force.iter().all(|f| *f == 0.0) {
-        looks.text("The demonstration does not excite it: it adds nothing here.");
+        looks.text("The demonstration does not excite it: its force is zero here.");
     } else {
         looks.figure(figure.clone());
         looks.text(alike(trace, all));
@@ -125,8 +124,8 @@ fn alike(trace: &Trace, all: &[(Trace, super::Figure)]) -> String {
         .map(|(other, likeness)| format!("`{}` ({likeness:.2})", other.candidate.name()))
         .collect();
     format!(
-        "After a fit of the base model has taken its part, it looks most like {} on this demonstration. 1 means that one is a \
-         multiple of the other, and that this recording could not tell them apart.",
+        "After a refit of the base model its trace is most similar to {} on this demonstration. At 1 the two are not distinguishable from \
+         this recording.",
         names.join(", ")
     )
 }
@@ -155,7 +154,7 @@ pub fn chapter(trace: &Trace, figure: &super::Figure, all: &[(Trace, super::Figu
     }
     let _ = write!(text, "{}\n\n", memory(info));
     if trace.force.iter().all(|f| *f == 0.0) {
-        text.push_str("The demonstration does not excite it: it adds nothing there.\n");
+        text.push_str("The demonstration does not excite it: its force is zero there.\n");
     } else {
         let _ = write!(text, "![{}]({}.svg)\n\n", figure.title, info.name);
         let _ = write!(text, "{}\n\n{}\n", figure.reading, alike(trace, all));
@@ -168,8 +167,8 @@ pub fn chapter(trace: &Trace, figure: &super::Figure, all: &[(Trace, super::Figu
 #[must_use]
 pub fn contents(all: &[(Trace, super::Figure)]) -> String {
     let mut text = String::from(
-        "# What the model leaves out\n\n\
-         Every effect that `host diagnose` knows, in the order of the chain from the air to the reading. Each has a page with its \
+        "# Library of effects\n\n\
+         Every effect that `host diagnose` can identify, in the order of the chain from the air to the reading. Each has a page with its \
          equation, its parameters and a picture of its trace. These pages are written by `host effects --book`.\n",
     );
     let mut link = None;
@@ -179,8 +178,7 @@ pub fn contents(all: &[(Trace, super::Figure)]) -> String {
             link = Some(info.link);
             let mut title = place(info.link).to_owned();
             title[..1].make_ascii_uppercase();
-            let _ =
-                write!(text, "\n## {title}\n\n| effect | whose | in one sentence |\n| --- | --- | --- |\n");
+            let _ = write!(text, "\n## {title}\n\n| effect | of | in one sentence |\n| --- | --- | --- |\n");
         }
         let whose = if trace.candidate.is_bench() { "bench" } else { "muscle" };
         let _ = writeln!(

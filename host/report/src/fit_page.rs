@@ -2,6 +2,7 @@
 
 mod controller;
 mod curves;
+mod held;
 mod loads;
 mod models;
 mod parameters;
@@ -62,25 +63,26 @@ fn head(page: &mut Page, view: &View<'_>) {
     let s = &view.fit.summary;
     let unseen = s.left_out_pressure_mean_error_pct;
     let mut verdict = format!(
-        "The table describes the load lines to {} % of the blocked force on average, {} % at most",
+        "The table reproduces the measured force to {} % of the blocked force on average, {} % at most",
         figures(s.mean_error_pct, 2),
         figures(s.max_error_pct, 2)
     );
     let mut worst = tone(s.mean_error_pct, GOOD, BAD);
     match unseen {
         Some(unseen) => {
-            verdict += &format!("; a pressure that it has not seen it predicts to {} %.", figures(unseen, 2));
+            verdict +=
+                &format!(". At pressures left out of the fit the mean error is {} %.", figures(unseen, 2));
             if tone(unseen, 2.0 * GOOD, BAD) == Tone::Bad || worst == Tone::Good && unseen > 2.0 * GOOD {
                 worst = tone(unseen, 2.0 * GOOD, BAD);
             }
         }
-        None => verdict += "; with one pressure nothing can be said about others.",
+        None => verdict += ". There is one pressure only: forces at others are not identifiable.",
     }
     page.verdict(worst, verdict);
     page.fact(
         "mean error",
         format!("{} %", figures(s.mean_error_pct, 2)),
-        "of blocked force, mid-lines",
+        "of blocked force",
         tone(s.mean_error_pct, GOOD, BAD),
     );
     page.fact(
@@ -91,16 +93,16 @@ fn head(page: &mut Page, view: &View<'_>) {
     );
     if let Some(unseen) = unseen {
         page.fact(
-            "pressures left out",
+            "error at held-out pressures",
             format!("{} %", figures(unseen, 2)),
-            "each predicted from the others",
+            "of blocked force, each pressure in turn",
             tone(unseen, 2.0 * GOOD, BAD),
         );
     }
     page.fact(
         "deadband P_{0}",
         format!("{} kPa", fixed(s.deadband_kPa, 1)),
-        format!("± {} kPa (95 %)", figures(1.96 * s.deadband_std_kPa, 2)),
+        format!("± {} kPa (95 % confidence interval)", figures(1.96 * s.deadband_std_kPa, 2)),
         Tone::Plain,
     );
     page.fact(
@@ -109,12 +111,12 @@ fn head(page: &mut Page, view: &View<'_>) {
         view.levels.last().map_or(String::new(), |p| format!("at {} kPa", fixed(p / 1e3, 0))),
         Tone::Plain,
     );
-    page.fact("residual", format!("{} N", figures(s.rms_N, 2)), "root mean square, all points", Tone::Plain);
+    page.fact("residual", format!("{} N", figures(s.rms_N, 2)), "rms of all fitted points", Tone::Plain);
 }
 
 fn remarks(view: &View<'_>) -> Section {
     let s = &view.fit.summary;
-    let mut section = Section::new("To be known first").summarised();
+    let mut section = Section::new("Warnings and excluded rows").summarised();
     for warning in &s.warnings {
         section.notice(Tone::Caution, capital(warning));
     }
@@ -122,7 +124,7 @@ fn remarks(view: &View<'_>) -> Section {
         section.notice(
             Tone::Plain,
             format!(
-                "Stress was made to rise with strain. That costs error: {} % mean and {} % at most, against {} % and {} % without.",
+                "Stress was constrained to rise with strain (`--physical`). Error: {} % mean, {} % at most; without the constraint {} % and {} %.",
                 figures(s.mean_error_pct, 2),
                 figures(s.max_error_pct, 2),
                 figures(free.free_mean_error_pct, 2),
@@ -131,18 +133,18 @@ fn remarks(view: &View<'_>) -> Section {
         );
     }
     let rows = &s.rows;
-    let set_aside = [
-        (rows.near_turn, "just after a turn, where friction has not yet turned round"),
-        (rows.unknown_direction, "with a direction of motion that is not known"),
-        (rows.slack, "with the muscle slack"),
-        (rows.clipped, "with the force sensor at the end of its range"),
-        (rows.outliers, "that do not belong to the rest"),
-        (rows.dropouts, "in which the gauge alone fell out"),
+    let excluded = [
+        (rows.near_turn, "just after a reversal, where friction has not yet reversed"),
+        (rows.unknown_direction, "direction of motion unknown"),
+        (rows.slack, "muscle slack"),
+        (rows.clipped, "force sensor at the end of its range"),
+        (rows.outliers, "outliers"),
+        (rows.dropouts, "pressure gauge dropped out"),
     ];
-    let told: Vec<String> = set_aside
+    let named: Vec<String> = excluded
         .iter()
         .filter(|(n, _)| *n > 0)
-        .map(|(n, why)| format!("{} {why}", fixed(*n as f64, 0)))
+        .map(|(n, why)| format!("{} ({why})", fixed(*n as f64, 0)))
         .collect();
     let all = s.samples.max(1) as f64;
     let mut text = format!(
@@ -151,8 +153,8 @@ fn remarks(view: &View<'_>) -> Section {
         fixed(all, 0),
         fixed(100.0 * rows.fitted as f64 / all, 0)
     );
-    if !told.is_empty() {
-        text += &format!(" Set aside: {}.", told.join("; "));
+    if !named.is_empty() {
+        text += &format!(" Excluded: {}.", named.join(", "));
     }
     section.text(text);
     section

@@ -7,7 +7,8 @@ use clap::Args;
 
 use super::reports::Reports;
 use crate::console::Console;
-use pam_data::compare::compare;
+use crate::documents::{bench, text};
+use pam_data::compare::{Comparison, compare};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::{printed, to_standard_output};
@@ -76,12 +77,29 @@ impl Arguments {
         let found = compare(&a, &b)?;
         self.reports.write(console, || compare_page::page(&a, &b, &found))?;
         if self.json {
-            console.result(format!("{:#}", found.to_json()));
+            console.result(text(&to_document(&found))?);
         } else if taken {
             console.note(found.to_text());
         } else {
             console.result(found.to_text());
         }
         Ok(())
+    }
+}
+
+fn to_document(found: &Comparison) -> bench::Compare<'_> {
+    let columns = found.columns.iter().map(|c| bench::Column {
+        name: c.name,
+        unit: c.unit,
+        rms: c.rms,
+        mean: c.mean,
+        largest: c.largest,
+        largest_at_s: c.largest_at,
+    });
+    bench::Compare {
+        schema: "pam-compare/1",
+        rows: found.rows,
+        overlap_s: found.overlap,
+        columns: columns.collect(),
     }
 }

@@ -7,13 +7,13 @@ use clap::Args;
 use model_core::image;
 use model_core::link::endpoints::{GetSettings, SetSettings};
 use model_core::link::messages::Side;
-use serde_json::{Value, json};
 use virtual_bench::plant::Motion;
 
 use crate::console::Console;
 use crate::demo::campaign::{Made, record};
 use crate::demo::page::{Story, page, rms};
 use crate::demo::tracking::{Law, Task, Track, choose, track};
+use crate::documents::{bench, text};
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
@@ -130,9 +130,9 @@ impl Arguments {
         let report = self.output.join("demo.html");
         write_whole(&report, page(&story)?.html().as_bytes())?;
         let figures = figures(&story);
-        write_whole(&self.output.join("demo.json"), format!("{figures:#}\n").as_bytes())?;
+        write_whole(&self.output.join("demo.json"), (text(&figures)? + "\n").as_bytes())?;
         if self.json {
-            console.result(format!("{figures:#}"));
+            console.result(text(&figures)?);
         } else {
             console.result(terminal_table(&story));
             console.result(format!("page with pictures: {}", report.display()));
@@ -224,7 +224,7 @@ impl Arguments {
             recorder.push(sample)?;
         }
         about["losses"] = about_losses(client.losses());
-        about["ended_by"] = json!("time");
+        about["ended_by"] = "time".into();
         recorder.finish(&about)
     }
 }
@@ -301,32 +301,34 @@ fn read_back(told: &Told, table: &TableFile, muscle: &MuscleDescription) -> Resu
     Ok(((squares / f64::from(rows)).sqrt(), rows as usize))
 }
 
-fn figures(story: &Story<'_>) -> Value {
+fn figures<'a>(story: &Story<'a>) -> bench::Demo<'a> {
     let percent = |newtons: f64| 100.0 * newtons / story.blocked_force;
-    let laws: Vec<Value> = Law::ALL
+    let tracking = Law::ALL
         .iter()
         .map(|law| {
             let of = |task| rms(story.tracks, |t| t.law == *law && t.task == task);
-            json!({
-                "feed_forward": law.key(),
-                "sine_rms_N": of(Task::Sine), "sine_rms_pct": percent(of(Task::Sine)),
-                "steps_rms_N": of(Task::Steps), "steps_rms_pct": percent(of(Task::Steps)),
-                "rms_pct": percent(rms(story.tracks, |t| t.law == *law)),
-            })
+            bench::Tracking {
+                feed_forward: law.key(),
+                sine_rms_N: of(Task::Sine),
+                sine_rms_pct: percent(of(Task::Sine)),
+                steps_rms_N: of(Task::Steps),
+                steps_rms_pct: percent(of(Task::Steps)),
+                rms_pct: percent(rms(story.tracks, |t| t.law == *law)),
+            }
         })
         .collect();
-    json!({
-        "schema": "pam-demo/1",
-        "muscle": story.muscle,
-        "controller": story.controller,
-        "fit_mean_error_pct": story.fit.summary.mean_error_pct,
-        "deadband_kPa": story.fit.summary.deadband_kPa,
-        "blocked_force_N": story.blocked_force,
-        "tracking": laws,
-        "telemetry_rows": story.telemetry.1,
-        "telemetry_rms_N": story.telemetry.0,
-        "seconds": story.seconds,
-    })
+    bench::Demo {
+        schema: "pam-demo/1",
+        muscle: story.muscle,
+        controller: story.controller,
+        fit_mean_error_pct: story.fit.summary.mean_error_pct,
+        deadband_kPa: story.fit.summary.deadband_kPa,
+        blocked_force_N: story.blocked_force,
+        tracking,
+        telemetry_rows: story.telemetry.1,
+        telemetry_rms_N: story.telemetry.0,
+        seconds: story.seconds,
+    }
 }
 
 fn terminal_table(story: &Story<'_>) -> String {

@@ -11,10 +11,10 @@ mod trace;
 use clap::{Args, Subcommand};
 use model_core::link::endpoints::{Forget, GetInfo, RollBackTable};
 use model_core::link::messages::{ForgetMemory, RollBack};
-use serde_json::json;
 
 use super::port::{Muscle, PortOption};
 use crate::console::Console;
+use crate::documents::{device as document, text};
 use pam_data::error::Result;
 
 pub(crate) use settings::changed;
@@ -129,11 +129,13 @@ impl Arguments {
                 let info = client.call::<RollBackTable>(&RollBack { side, generation })?;
                 let crc = format!("{:08x}", info.crc);
                 console.result(if json {
-                    format!(
-                        "{:#}",
-                        json!({ "schema": "pam-rollback/1", "crc": crc, "bytes": info.length,
-                            "generation": info.generation, "has_previous": info.has_previous })
-                    )
+                    text(&document::Rollback {
+                        schema: "pam-rollback/1",
+                        crc,
+                        bytes: info.length,
+                        generation: info.generation,
+                        has_previous: info.has_previous,
+                    })?
                 } else {
                     format!("back to the table with check sum {crc}")
                 });
@@ -143,7 +145,7 @@ impl Arguments {
                 let side = muscle.side();
                 port.connect(console)?.call_once::<Forget>(&ForgetMemory { side })?;
                 console.result(if json {
-                    format!("{:#}", json!({ "schema": "pam-forget/1", "muscle": side.index() + 1 }))
+                    text(&document::Forget { schema: "pam-forget/1", muscle: side.index() + 1 })?
                 } else {
                     format!("the history of muscle {} is forgotten", side.index() + 1)
                 });

@@ -3,10 +3,9 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use clap::Args;
-use serde_json::json;
-
 use crate::console::Console;
+use crate::documents::{effects as document, text};
+use clap::Args;
 use pam_data::error::{DataCode, Error, Result, nearest};
 use pam_data::output::{printed, to_standard_output, write_whole};
 use pam_fit::bench::Candidate;
@@ -46,8 +45,8 @@ impl Arguments {
             let mut all: Vec<Candidate> = Candidate::all().collect();
             all.sort_by_key(|c| (c.info().link, c.is_bench()));
             if self.json {
-                let all: Vec<_> = all.iter().map(|c| to_json(*c)).collect();
-                console.result(format!("{:#}", json!({ "schema": "pam-effects/1", "effects": all })));
+                let effects = all.iter().map(|c| to_document(*c)).collect();
+                console.result(text(&document::Effects { schema: "pam-effects/1", effects })?);
             } else {
                 console.result(list(&all));
             }
@@ -57,7 +56,7 @@ impl Arguments {
         let taken =
             to_standard_output(&[("--json", printed(self.json)), ("--report", self.report.as_deref())])?;
         if self.json {
-            console.result(format!("{:#}", to_json(candidate)));
+            console.result(text(&to_document(candidate))?);
         } else if taken {
             console.note(explain(candidate));
         } else {
@@ -112,9 +111,9 @@ fn list(all: &[Candidate]) -> String {
 fn explain(candidate: Candidate) -> String {
     let info = candidate.info();
     let whose = if candidate.is_bench() {
-        "of the bench: corrects the recording, never sent to a controller"
+        "error of the bench: corrects the recording, never sent to a controller"
     } else {
-        "of the muscle: goes into the table and to the controller"
+        "effect of the muscle: stored in the table and sent to the controller"
     };
     let mut text = format!(
         "{}\n  {}\n\n  acts on {}\n  {whose}\n\n  {}\n\n",
@@ -131,35 +130,36 @@ fn explain(candidate: Candidate) -> String {
         );
     }
     text.push('\n');
-    for letter in &symbols(info).rows {
-        let _ = writeln!(text, "  {:8} {}", letter[0], letter[1]);
+    for symbol in &symbols(info).rows {
+        let _ = writeln!(text, "  {:8} {}", symbol[0], symbol[1]);
     }
     text + &format!("\n  source: {}", info.source)
 }
 
-fn to_json(candidate: Candidate) -> serde_json::Value {
+fn to_document(candidate: Candidate) -> document::Effect {
     let info = candidate.info();
-    let parameters: Vec<_> = info
-        .parameters
-        .iter()
-        .map(|p| {
-            json!({ "name": p.name, "letter": p.letter, "unit": p.unit, "low": p.low, "high": p.high,
-            "amplitude": p.role == model_core::effects::Role::Amplitude })
-        })
-        .collect();
-    let letters: serde_json::Map<_, _> =
-        symbols(info).rows.into_iter().map(|r| (r[0].clone(), json!(r[1]))).collect();
-    json!({
-        "schema": "pam-effect/1",
-        "effect": info.name,
-        "place": effect_page::place(info.link),
-        "bench": candidate.is_bench(),
-        "summary": info.summary,
-        "equation": info.equation,
-        "parameters": parameters,
-        "letters": letters,
-        "source": info.source,
-    })
+    document::Effect {
+        schema: "pam-effect/1",
+        effect: info.name,
+        place: effect_page::place(info.link),
+        bench: candidate.is_bench(),
+        summary: info.summary,
+        equation: info.equation,
+        parameters: info
+            .parameters
+            .iter()
+            .map(|p| document::Parameter {
+                name: p.name,
+                letter: p.letter,
+                unit: p.unit,
+                low: p.low,
+                high: p.high,
+                amplitude: p.role == model_core::effects::Role::Amplitude,
+            })
+            .collect(),
+        letters: symbols(info).rows.into_iter().map(|r| (r[0].clone(), r[1].clone())).collect(),
+        source: info.source,
+    }
 }
 
 fn book(folder: &std::path::Path, console: &Console) -> Result<()> {

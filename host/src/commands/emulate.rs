@@ -4,11 +4,11 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use serde_json::json;
 
 use super::run::{interrupts, positive};
 use crate::console::Console;
 use crate::demo::campaign::muscle;
+use crate::documents::{bench, line};
 use pam_data::error::Result;
 use pam_device::emulated::{Emulated, Kind, Stand};
 
@@ -49,7 +49,8 @@ impl Arguments {
         let emulated = Emulated::start(Stand::swinging(muscle(&self.muscle)?), only, 1.0)?;
         if self.json {
             let (port, words) = (emulated.address().to_string(), emulated.words());
-            console.result(json!({ "schema": "pam-emulate/1", "port": port, "controller": words }));
+            let document = bench::Emulate { schema: "pam-emulate/1", port: &port, controller: &words };
+            console.result(line(&document)?);
         } else {
             console.result(emulated.address());
         }

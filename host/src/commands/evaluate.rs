@@ -2,14 +2,13 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
-use serde_json::{Value, json};
-
 use super::recordings::Recordings;
 use crate::console::Console;
-use pam_data::error::{DataCode, Error, Result};
+use crate::documents::{evaluate as document, text};
+use clap::{Args, ValueEnum};
+use pam_data::error::{Error, Result};
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::output::write_whole;
+use pam_data::output::{json_of, write_whole};
 use pam_data::progress::Progress;
 use pam_evaluate::hold_out::{HeldOut, Score, Split, Spot, hold_out};
 use pam_evaluate::other_length::{Carried, unseen_length};
@@ -124,10 +123,9 @@ impl Arguments {
         }
         let lengths = (0..cases.len()).map(|i| by_others(&cases, i)).collect::<Result<Vec<_>>>()?;
         if let Some(path) = &self.json {
-            let all: Vec<Value> = cases.iter().zip(&lengths).map(|(c, l)| to_json(c, l.as_ref())).collect();
-            let text = serde_json::to_string_pretty(&json!({ "schema": "pam-evaluate/1", "muscles": all }))
-                .map_err(|e| Error::new(DataCode::FileUnwritable, e.to_string()))?;
-            write_whole(path, format!("{text}\n").as_bytes())?;
+            let muscles = cases.iter().zip(&lengths).map(|(c, l)| to_document(c, l.as_ref())).collect();
+            let json = text(&document::Evaluate { schema: "pam-evaluate/1", muscles })?;
+            write_whole(path, (json + "\n").as_bytes())?;
             if path.as_os_str() == "-" {
                 return Ok(());
             }
@@ -162,9 +160,9 @@ fn percent(score: &Score, blocked: f64) -> (f64, f64) {
 
 fn to_text(cases: &[Case], lengths: &[Option<Carried>], published: Option<&str>) -> String {
     let mut text = format!(
-        "Errors on what the fit did not see: mean |F − F_model| in N, and in percent of the blocked force at the highest pressure.\n\
+        "Errors on held-out data: mean |F − F_model| in N, and in percent of the blocked force at the highest pressure.\n\
          {:<22} {:>8} {:>17} {:>17} {:>17} {:>17}\n",
-        "muscle", "F_B N", "unseen runs", "same, published", "unseen contract.", "unseen length"
+        "muscle", "F_B N", "held-out runs", "same, published", "held-out contr.", "other lengths"
     );
     let cell = |s: Option<&Score>, blocked: f64| {
         s.map_or("–".to_owned(), |s| format!("{:.2} N  {:.2} %", s.mean(), percent(s, blocked).0))
@@ -261,34 +259,43 @@ fn places(what: &str, spots: &[Spot]) -> String {
     text
 }
 
-fn to_json(case: &Case, length: Option<&Carried>) -> Value {
+fn to_document(case: &Case, length: Option<&Carried>) -> document::Muscle {
     let blocked = case.runs.as_ref().or(case.contractions.as_ref()).map_or(f64::NAN, |h| h.blocked);
     let score = |s: &Score| {
-        let (mean, rms) = percent(s, blocked);
-        json!({ "rows": s.rows, "mean_N": s.mean(), "rms_N": s.rms(), "mean_pct": mean, "rms_pct": rms, "bias_N": s.bias() })
+        let (mean_pct, rms_pct) = percent(s, blocked);
+        let (mean, rms) = (s.mean(), s.rms());
+        document::Score { rows: s.rows, mean_N: mean, rms_N: rms, mean_pct, rms_pct, bias_N: s.bias() }
     };
-    let spots = |spots: &[Spot]| -> Vec<Value> {
+    let spots = |spots: &[Spot]| -> Vec<document::Spot> {
         spots
             .iter()
-            .map(|s| {
-                json!({ "left_out": s.left_out, "contraction": s.contraction as f64 * 1e-3, "direction": s.direction,
-                        "bias_N": s.score.bias(), "rms_N": s.score.rms(), "rows": s.score.rows })
+            .map(|s| document::Spot {
+                left_out: s.left_out.clone(),
+                contraction: s.contraction as f64 * 1e-3,
+                direction: s.direction,
+                bias_N: s.score.bias(),
+                rms_N: s.score.rms(),
+                rows: s.score.rows,
             })
             .collect()
     };
     let held = |h: &Option<HeldOut>| {
-        h.as_ref().map(|h| {
-            json!({ "table": score(&h.table), "published": h.published.as_ref().map(score), "where": spots(&h.spots),
-                    "adjusted": h.whole.summary.adjusted })
+        h.as_ref().map(|h| document::HeldOut {
+            table: score(&h.table),
+            published: h.published.as_ref().map(score),
+            r#where: spots(&h.spots),
+            adjusted: json_of(&h.whole.summary.adjusted),
         })
     };
-    json!({
-        "muscle": case.muscle.name,
-        "blocked_force_N": blocked,
-        "unseen_runs": held(&case.runs),
-        "unseen_contractions": held(&case.contractions),
-        "unseen_length": length.map(|l| {
-            json!({ "end_effect_mm": l.end_effect * 1e3, "table": score(&l.score), "where": spots(&l.spots) })
+    document::Muscle {
+        muscle: case.muscle.name.clone(),
+        blocked_force_N: blocked,
+        unseen_runs: held(&case.runs),
+        unseen_contractions: held(&case.contractions),
+        unseen_length: length.map(|l| document::OtherLength {
+            end_effect_mm: l.end_effect * 1e3,
+            table: score(&l.score),
+            r#where: spots(&l.spots),
         }),
-    })
+    }
 }

@@ -7,10 +7,11 @@ use model_core::check;
 use model_core::image;
 use model_core::link::endpoints::{GetInfo, Restart};
 use model_core::link::messages::Side;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::port::{Muscle, PortOption};
 use crate::console::Console;
+use crate::documents::{device as document, text};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::{printed, to_standard_output, write_whole};
 use pam_data::progress::Progress;
@@ -82,18 +83,23 @@ impl Arguments {
         let side = self.muscle.side();
         let mut client = self.port.connect(console)?;
         let before = tables::read(&mut client, side)?;
-        let mut done = json!({ "schema": "pam-flash/1", "port": client.port(), "crc": format!("{:08x}", check::of_image(image)) });
-        let difference = self.compare(before.as_deref(), &file, console);
-        done["difference"] = difference;
+        let mut done = document::Flash {
+            schema: "pam-flash/1",
+            port: client.port().to_string(),
+            crc: format!("{:08x}", check::of_image(image)),
+            difference: self.compare(before.as_deref(), &file, console),
+            written: false,
+            backup: None,
+            generation: None,
+            confirmed_after_restart: None,
+        };
         if before.as_deref() == Some(image) {
             console.note("the device already has this table");
-            done["written"] = Value::Bool(false);
         } else if self.dry_run {
             console.note("nothing was written");
-            done["written"] = Value::Bool(false);
         } else {
             if let Some(before) = &before {
-                done["backup"] = self.keep(path, before, &client, console)?;
+                done.backup = Some(self.keep(path, before, &client, console)?);
             }
             let progress = ProgressLine::new(console, "flash");
             progress.total(image.len() as u64);
@@ -103,22 +109,18 @@ impl Arguments {
                 "written and read back: {} bytes, check sum {:08x}, generation {}",
                 kept.length, kept.crc, kept.generation
             ));
-            done["written"] = Value::Bool(true);
-            done["generation"] = json!(kept.generation);
+            done.written = true;
+            done.generation = Some(kept.generation);
             if self.restart {
                 client = self.after_restart(client, side, image, console)?;
-                done["confirmed_after_restart"] = Value::Bool(true);
+                done.confirmed_after_restart = Some(true);
             }
         }
         drop(client);
         if self.json {
-            console.result(format!("{done:#}"));
-        } else if done["written"] == true {
-            console.result(format!(
-                "{} is in use on {}",
-                path.display(),
-                done["port"].as_str().unwrap_or_default()
-            ));
+            console.result(text(&done)?);
+        } else if done.written {
+            console.result(format!("{} is in use on {}", path.display(), done.port));
         }
         Ok(())
     }
@@ -142,7 +144,7 @@ impl Arguments {
     }
 
     /// Writes the device's table to a file; its name holds its check sum, so that it never replaces another.
-    fn keep(&self, path: &Path, before: &[u8], client: &Client, console: &Console) -> Result<Value> {
+    fn keep(&self, path: &Path, before: &[u8], client: &Client, console: &Console) -> Result<String> {
         let table = match image::read(before) {
             Ok(table) => table,
             // What this version cannot read cannot become a table file; the bytes themselves are kept.
@@ -152,7 +154,7 @@ impl Arguments {
                     .clone()
                     .unwrap_or_else(|| path.with_extension(format!("{:08x}.image", check::of_image(before))));
                 write_whole(&to, before)?;
-                return Ok(json!(to.display().to_string()));
+                return Ok(to.display().to_string());
             }
         };
         let about = About {
@@ -167,7 +169,7 @@ impl Arguments {
             .unwrap_or_else(|| path.with_extension(format!("{:08x}.pam", check::of_image(before))));
         TableFile { table, about }.write(&to)?;
         console.note(format!("the device's table is kept in {}", to.display()));
-        Ok(json!(to.display().to_string()))
+        Ok(to.display().to_string())
     }
 
     fn after_restart(

@@ -1,4 +1,4 @@
-//! `host plan`: before anything is recorded, what a protocol can and cannot tell apart.
+//! `host plan`: which effects a planned protocol can identify.
 
 use std::path::PathBuf;
 
@@ -6,6 +6,7 @@ use clap::Args;
 use model_core::muscle::Muscle;
 
 use crate::console::Console;
+use crate::documents::{bench, text};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::write_whole;
 use pam_diagnose::advise::isolability;
@@ -40,13 +41,12 @@ impl Arguments {
         let protocol = planned::read(&self.protocol)?;
         let rows = isolability(&protocol, &muscle).map_err(|e| e.file(&self.protocol))?;
         if let Some(path) = &self.json {
-            let json =
-                serde_json::to_string_pretty(&serde_json::json!({ "schema": "pam-plan/1", "effects": rows }))
-                    .map_err(|e| Error::new(DataCode::FileUnwritable, e.to_string()))?;
+            let effects = rows.iter().map(bench::Planned::of).collect();
+            let json = text(&bench::Plan { schema: "pam-plan/1", effects })?;
             write_whole(path, (json + "\n").as_bytes())?;
         }
         if self.json.as_deref() != Some(std::path::Path::new("-")) {
-            console.result(format!("{:<26}{:>9}   cannot be told from", "effect", "visible"));
+            console.result(format!("{:<26}{:>9}   not distinguished from (cosine)", "effect", "visible"));
             for r in &rows {
                 let others: Vec<String> =
                     r.not_told_from.iter().map(|(n, c)| format!("{n} ({c:.2})")).collect();
@@ -55,8 +55,8 @@ impl Arguments {
                 console.result(format!("{:<26}{seen:>9}   {}", r.effect, others.join(", ")));
             }
             console.note(
-                "visible: share of the effect's trace that tables free over pressure cannot imitate; numbers behind names are \
-                 cosines after the tables are refitted",
+                "visible: share of the effect's energy that the tables cannot absorb; cosine: similarity of two effects after the tables \
+                 are refitted (1: not identifiable)",
             );
         }
         Ok(())

@@ -2,11 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
-use serde_json::json;
-
 use super::recordings::Recordings;
 use crate::console::Console;
+use crate::documents::{predict as document, text};
+use clap::Args;
 use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::{to_standard_output, write_whole};
@@ -19,9 +18,9 @@ use pam_fit::table_file::TableFile;
 #[command(after_help = "Examples:\n  \
     host predict --table mini.pam new.csv -o predicted.csv\n  \
     host predict --table mini.pam first.csv second.csv --json scores.json\n\n\
-    The column force_model_band_N is half the width of the 95 % interval of the table's own force (of its base model, where it \
-    carries effects); readings scatter beyond it by what the table does not describe.\n\n\
-    Several recordings are one history: effects with a memory run through them in order. The output is one table; with \
+    The column force_model_band_N is the half-width of the 95 % confidence interval of the table's force (of its base model, \
+    where it has effects). Single readings scatter more.\n\n\
+    Several recordings are one history: effects with a memory continue from one to the next. The output is one table; with \
     several recordings its first column is `file`.")]
 pub struct Arguments {
     /// The table.
@@ -49,7 +48,7 @@ impl Arguments {
         {
             return Err(Error::new(
                 DataCode::CallInvalid,
-                "the output would take the place of a recording that is read",
+                "the output would overwrite a recording that is read",
             )
             .file(path)
             .help("name another file behind -o"));
@@ -76,29 +75,25 @@ impl Arguments {
                 .recordings
                 .iter()
                 .zip(&prediction.recordings)
-                .map(|(r, p)| {
-                    let mut one = json!({ "file": r.name, "samples": r.len(), "rms_N": p.rms });
-                    if let Some(bands) = &p.bands {
-                        one["band_N"] = json!(bands.mean);
-                        one["inside_pct"] = json!(bands.inside.map(|share| 100.0 * share));
-                    }
-                    one
+                .map(|(r, p)| document::Recording {
+                    band_N: p.bands.as_ref().map(|b| b.mean),
+                    file: r.name.clone(),
+                    inside_pct: p.bands.as_ref().map(|b| b.inside.map(|share| 100.0 * share)),
+                    rms_N: p.rms,
+                    samples: r.len(),
                 })
                 .collect();
-            let json =
-                json!({ "schema": "pam-predict/1", "rms_N": prediction.rms, "recordings": recordings });
-            let text = serde_json::to_string_pretty(&json)
-                .map_err(|e| Error::new(DataCode::FileUnwritable, e.to_string()))?;
-            write_whole(path, format!("{text}\n").as_bytes())?;
+            let document = document::Predict { recordings, rms_N: prediction.rms, schema: "pam-predict/1" };
+            write_whole(path, (text(&document)? + "\n").as_bytes())?;
         }
         for (recording, p) in campaign.recordings.iter().zip(&prediction.recordings) {
-            let unscored = if recording.force.is_some() { "not scored" } else { "no force to compare with" };
+            let unscored = if recording.force.is_some() { "not scored" } else { "no force column" };
             let rms = p.rms.map_or(unscored.to_owned(), |r| format!("rms {r:.3} N"));
             let band = p.bands.as_ref().map_or(String::new(), |bands| {
                 let inside = bands.inside.filter(|_| p.rms.is_some()).map_or(String::new(), |share| {
-                    format!(", {:.1} % of the readings inside their 95 % band", 100.0 * share)
+                    format!(", {:.1} % of the readings inside their 95 % interval", 100.0 * share)
                 });
-                format!(", force ± {:.3} N{inside}", bands.mean)
+                format!(", force ± {:.3} N (95 %){inside}", bands.mean)
             });
             console.note(format!("{}: {}, {rms}{band}", recording.name, counted(recording.len(), "row")));
         }

@@ -12,6 +12,7 @@ use serde_json::json;
 use super::port::PortOption;
 use super::run::{begin, end, interrupts, not_there, positive};
 use crate::console::Console;
+use crate::documents::{bench, text};
 use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::progress::Progress;
@@ -215,10 +216,13 @@ impl RecoverArguments {
                     None => format!("{} held nothing and is removed", file.display()),
                 });
             }
-            done.push(json!({ "part": file.display().to_string(), "recording": name.map(|n| n.display().to_string()) }));
+            done.push(bench::Recovered {
+                part: file.display().to_string(),
+                recording: name.map(|n| n.display().to_string()),
+            });
         }
         if self.json {
-            console.result(format!("{:#}", json!({ "schema": "pam-recover/1", "recovered": done })));
+            console.result(text(&bench::Recover { schema: "pam-recover/1", recovered: done })?);
         }
         Ok(())
     }

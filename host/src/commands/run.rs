@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 
 use super::port::PortOption;
 use crate::console::Console;
+use crate::documents::{device, line};
 use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::progress::Progress;
@@ -380,7 +381,7 @@ impl VentArguments {
         let status = vent(&mut self.port.connect(console)?)?;
         let state = words::state(status.state);
         console.result(if self.json {
-            json!({ "schema": "pam-vent/1", "vented": true, "state": state }).to_string()
+            line(&device::Vent { schema: "pam-vent/1", vented: true, state })?
         } else {
             format!("vented; the device is {state}")
         });

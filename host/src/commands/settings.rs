@@ -1,9 +1,9 @@
 //! `host settings`: which settings files count here, and what they say.
 
 use clap::Args;
-use serde_json::json;
 
 use crate::console::Console;
+use crate::documents::{bench, text};
 use crate::settings::{NAME, all_settings, files};
 use pam_data::error::Result;
 
@@ -50,14 +50,16 @@ impl Arguments {
         let files = files()?;
         let settings = all_settings(command)?;
         if self.json {
-            let all: Vec<_> = settings
-                .iter()
-                .map(|s| json!({ "command": s.command, "option": s.option, "values": s.values, "file": s.file, "line": s.line }))
-                .collect();
-            console.result(format!(
-                "{:#}",
-                json!({ "schema": "pam-settings/1", "files": files, "settings": all })
-            ));
+            let all = settings.iter().map(|s| bench::Setting {
+                command: &s.command,
+                option: &s.option,
+                values: &s.values,
+                file: s.file.display().to_string(),
+                line: s.line,
+            });
+            let files = files.iter().map(|f| f.display().to_string()).collect();
+            let document = bench::SettingsFiles { schema: "pam-settings/1", files, settings: all.collect() };
+            console.result(text(&document)?);
             return Ok(());
         }
         if files.is_empty() {

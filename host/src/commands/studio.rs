@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex};
 use clap::Args;
 
 use crate::console::Console;
+use crate::documents::{bench, line};
 use crate::studio::keeper::Order;
 use crate::studio::server::serve;
 use pam_data::error::{DataCode, Error, Result};
@@ -54,7 +55,8 @@ impl Arguments {
         .map_err(|e| Error::new(DataCode::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
         let ready = |address: &str| {
             if self.json {
-                console.result(serde_json::json!({ "schema": "pam-studio/1", "address": address }));
+                // A document of two strings can always be written.
+                console.result(line(&bench::Studio { schema: "pam-studio/1", address }).unwrap_or_default());
             } else {
                 console.result(format!("open {address}"));
             }

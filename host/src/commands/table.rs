@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 use model_core::muscle::Muscle;
-use serde_json::{Value, json};
 
 use crate::console::Console;
+use crate::documents::{table as document, text};
 use pam_data::counted::counted;
 use pam_data::error::Result;
-use pam_data::output::{json_of, printed, to_standard_output, write_whole};
+use pam_data::output::{printed, to_standard_output, write_whole};
 use pam_fit::table_export::{self, Format};
 use pam_fit::table_file::TableFile;
 
@@ -99,15 +99,14 @@ impl Arguments {
         match self.action {
             Action::Show(file) => {
                 let table = TableFile::read(&file.table)?;
-                console.result(if file.json { pretty(&to_json(&table)) } else { to_text(&table) });
+                console.result(if file.json { text(&to_document(&table))? } else { to_text(&table) });
             }
             Action::Check(file) => {
                 let table = TableFile::read(&file.table)?;
                 let remarks = remarks(&table);
                 if file.json {
-                    console.result(pretty(
-                        &json!({ "schema": "pam-check/1", "valid": true, "remarks": remarks }),
-                    ));
+                    let check = document::Check { schema: "pam-check/1", valid: true, remarks };
+                    console.result(text(&check)?);
                 } else {
                     console.result(format!("{}: valid", file.table.display()));
                     for remark in remarks {
@@ -124,7 +123,7 @@ impl Arguments {
                     None => Format::of(&export.output)?,
                 };
                 let bytes = match format {
-                    Format::Json => format!("{}\n", pretty(&to_json(&table))).into_bytes(),
+                    Format::Json => (text(&to_document(&table))? + "\n").into_bytes(),
                     Format::Csv => table_export::csv(&table).into_bytes(),
                     Format::C => table_export::c_header(&table).into_bytes(),
                     Format::Matlab => table_export::matlab(&table),
@@ -133,8 +132,8 @@ impl Arguments {
                 if export.json {
                     let (table, output) =
                         (export.table.display().to_string(), export.output.display().to_string());
-                    let told = json!({ "schema": "pam-export/1", "table": table, "output": output, "bytes": bytes.len() });
-                    console.result(pretty(&told));
+                    let bytes = bytes.len();
+                    console.result(text(&document::Export { schema: "pam-export/1", table, output, bytes })?);
                 }
             }
         }
@@ -142,22 +141,18 @@ impl Arguments {
     }
 }
 
-fn pretty(value: &Value) -> String {
-    format!("{value:#}")
-}
-
-/// What is odd about a valid table.
+/// Properties of a valid table that limit its use.
 fn remarks(file: &TableFile) -> Vec<String> {
     let mut remarks = Vec::new();
     let table = &file.table;
     if table.nodes.len() == 1 {
-        remarks.push("only one pressure: nothing is known about others".to_owned());
+        remarks.push("one pressure only: forces at other pressures are not identifiable".to_owned());
     }
     if table.friction.iter().all(|k| *k == 0.0) {
-        remarks.push("no friction: the recordings showed no hysteresis, or only one direction".to_owned());
+        remarks.push("no friction: the recordings have no hysteresis, or one direction only".to_owned());
     }
     if table.friction.iter().any(|k| *k < 0.0) {
-        remarks.push("a negative k_F: friction that drives is not physical".to_owned());
+        remarks.push("negative k_F: not physical".to_owned());
     }
     if let Ok(muscle) = Muscle::<f64>::build(table) {
         let (low, high) = (table.tested.contraction_low, table.tested.contraction_high);
@@ -175,7 +170,7 @@ fn remarks(file: &TableFile) -> Vec<String> {
         }
         if falling {
             remarks.push(
-                "inside the tested range the force falls with rising pressure somewhere: the inverse may not find a pressure there"
+                "the force falls with rising pressure in a part of the tested range: the inverse may not find a pressure there"
                     .to_owned(),
             );
         }
@@ -183,73 +178,73 @@ fn remarks(file: &TableFile) -> Vec<String> {
     remarks
 }
 
-fn to_json(file: &TableFile) -> Value {
+fn to_document(file: &TableFile) -> document::TableDocument<'_> {
+    let (t, a) = (&file.table, &file.about);
+    let g = &t.geometry;
+    document::TableDocument {
+        schema: "pam-table/1",
+        muscle: &a.muscle,
+        date: &a.date,
+        tool: &a.tool,
+        kind: match t.kind {
+            model_core::table::Kind::Contractile => "contractile",
+            model_core::table::Kind::Push => "push",
+        },
+        rest_length_mm: g.rest_length.millimetres(),
+        braid_angle_deg: g.braid_angle.degrees(),
+        bladder_outer_diameter_mm: g.outer_diameter.millimetres(),
+        bladder_wall_mm: g.wall.millimetres(),
+        tip_correction: g.tip_correction,
+        order: t.order(),
+        deadband_kPa: t.deadband.kilopascals(),
+        goes_slack: t.goes_slack,
+        blocked_force_N: t.blocked_force.newtons(),
+        max_pressure_kPa: t.max_pressure.kilopascals(),
+        tested: document::Tested {
+            pressure_kPa: [t.tested.pressure_low.kilopascals(), t.tested.pressure_high.kilopascals()],
+            contraction: [t.tested.contraction_low, t.tested.contraction_high],
+        },
+        pressures: (0..t.nodes.len()).map(|i| node(file, i)).collect(),
+        effects: t.effects.iter().map(effect).collect(),
+        corrections: a
+            .corrections
+            .iter()
+            .map(|c| document::Correction { effect: &c.effect, parameters: &c.parameters })
+            .collect(),
+        fit: document::Fit {
+            samples: a.fit.samples,
+            rms_N: a.fit.rms_newtons,
+            mean_error_pct: a.fit.mean_error_percent,
+            max_error_pct: a.fit.max_error_percent,
+            left_out_pressure_mean_error_pct: a.fit.left_out_percent,
+            warnings: &a.fit.warnings,
+        },
+        sources: a
+            .sources
+            .iter()
+            .map(|s| document::Source { path: &s.path, sha256: &s.sha256, samples: s.samples })
+            .collect(),
+    }
+}
+
+fn node(file: &TableFile, i: usize) -> document::Node {
     let t = &file.table;
-    let kpa = |p: f32| json_of(&(p / 1e3));
-    let nodes: Vec<Value> = (0..t.nodes.len())
-        .map(|i| {
-            let e: Vec<f32> = t.elastic.iter().map(|c| c[i] / 1e6).collect();
-            json!({ "pressure_kPa": kpa(t.nodes[i]), "E_MPa": json_of(&e), "k_F": json_of(&t.friction[i]) })
-        })
-        .collect();
-    let effects: Vec<Value> = t
-        .effects
-        .iter()
-        .map(|e| {
-            let info = e.effect.info();
-            let parameters: Vec<Value> = info
-                .parameters
-                .iter()
-                .zip(&e.parameters)
-                .map(|(p, v)| json!({ "name": p.name, "value": json_of(v), "unit": p.unit }))
-                .collect();
-            json!({ "effect": info.name, "parameters": parameters })
-        })
-        .collect();
-    let a = &file.about;
-    let corrections: Vec<Value> = a
-        .corrections
-        .iter()
-        .map(|c| json!({ "effect": c.effect, "parameters": json_of(&c.parameters) }))
-        .collect();
-    let sources: Vec<Value> = a
-        .sources
-        .iter()
-        .map(|s| json!({ "path": s.path, "sha256": s.sha256, "samples": s.samples }))
-        .collect();
-    json!({
-        "schema": "pam-table/1",
-        "muscle": a.muscle,
-        "date": a.date,
-        "tool": a.tool,
-        "kind": match t.kind { model_core::table::Kind::Contractile => "contractile", model_core::table::Kind::Push => "push" },
-        "rest_length_mm": json_of(&t.geometry.rest_length.millimetres()),
-        "braid_angle_deg": json_of(&t.geometry.braid_angle.degrees()),
-        "bladder_outer_diameter_mm": json_of(&t.geometry.outer_diameter.millimetres()),
-        "bladder_wall_mm": json_of(&t.geometry.wall.millimetres()),
-        "tip_correction": t.geometry.tip_correction,
-        "order": t.order(),
-        "deadband_kPa": json_of(&t.deadband.kilopascals()),
-        "goes_slack": t.goes_slack,
-        "blocked_force_N": json_of(&t.blocked_force.newtons()),
-        "max_pressure_kPa": json_of(&t.max_pressure.kilopascals()),
-        "tested": {
-            "pressure_kPa": json_of(&[t.tested.pressure_low.kilopascals(), t.tested.pressure_high.kilopascals()]),
-            "contraction": json_of(&[t.tested.contraction_low, t.tested.contraction_high]),
-        },
-        "pressures": nodes,
-        "effects": effects,
-        "corrections": corrections,
-        "fit": {
-            "samples": a.fit.samples,
-            "rms_N": a.fit.rms_newtons,
-            "mean_error_pct": a.fit.mean_error_percent,
-            "max_error_pct": a.fit.max_error_percent,
-            "left_out_pressure_mean_error_pct": a.fit.left_out_percent,
-            "warnings": a.fit.warnings,
-        },
-        "sources": sources,
-    })
+    document::Node {
+        pressure_kPa: t.nodes[i] / 1e3,
+        E_MPa: t.elastic.iter().map(|c| c[i] / 1e6).collect(),
+        k_F: t.friction[i],
+    }
+}
+
+fn effect(e: &model_core::effects::FittedEffect) -> document::Effect {
+    let info = e.effect.info();
+    let values = info.parameters.iter().zip(&e.parameters);
+    document::Effect {
+        effect: info.name,
+        parameters: values
+            .map(|(p, v)| document::Parameter { name: p.name, value: *v, unit: p.unit })
+            .collect(),
+    }
 }
 
 fn to_text(file: &TableFile) -> String {

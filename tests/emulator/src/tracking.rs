@@ -103,7 +103,7 @@ pub fn start(client: &mut Client, mode: Mode) {
     for _ in 0..3 {
         sample(client).expect("no fault while disarmed");
     }
-    host::device::run::arm(client).expect("it arms");
+    pam_device::run::arm(client).expect("it arms");
     client.call::<StartMode>(&Start { mode }).expect("it starts");
 }
 

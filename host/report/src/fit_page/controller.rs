@@ -1,4 +1,4 @@
-//! What a controller with this table will produce, and how far that may be from what was wanted.
+//! The force that a controller with this table produces, and its error.
 
 use super::super::{Axis, Colour, Figure, Panel, Section, figures, fixed};
 use super::view::{Banded, View};
@@ -9,14 +9,14 @@ const PLACES: [f64; 3] = [0.0, 1.0 / 3.0, 2.0 / 3.0];
 const STEPS: usize = 60;
 
 pub(super) fn section(view: &View<'_>) -> Section {
-    let mut section = Section::new("What a controller will produce");
+    let mut section = Section::new("Force under control");
     let places: Vec<Place> = PLACES.iter().map(|share| Place::new(view, *share)).collect();
     let blocked = view.fit.summary.blocked_force_N;
     let worst = places.iter().flat_map(Place::halves).fold(0.0, f64::max);
     section.text(format!(
-        "The controller has the table only: for a wanted force it takes the pressure at which the table gives that force. What the \
-         muscle then pulls differs by what the table's numbers leave open, at most ± {} N here ({} % of the blocked force, \
-         95 %), and by what the model does not describe, ± {} N for a single moment. The valve's own error comes on top.",
+        "For a force setpoint the controller takes the pressure at which the table gives that force. The 95 % confidence interval of \
+         the table adds an error of at most ± {} N ({} % of the blocked force). Single readings scatter by ± {} N (95 %) about the \
+         model. The valve's error is not included.",
         figures(worst, 2),
         figures(100.0 * worst / blocked.max(f64::MIN_POSITIVE), 2),
         figures(pam_fit::band::HALF_95 * view.fit.summary.rms_N, 2)
@@ -68,7 +68,7 @@ fn pressure_for_force(view: &View<'_>, places: &[Place]) -> Figure {
         let mut panel = Panel::new(Axis::new("pressure P", "kPa"), Axis::new("force F", "N").from_zero())
             .titled(place.title.clone());
         for (i, (name, kpa, force, _)) in place.branches.iter().enumerate() {
-            let band = if i == 0 { "95 % interval" } else { "" };
+            let band = if i == 0 { "95 % confidence interval" } else { "" };
             panel = panel.band(band, Colour::Series(i), kpa, &force.low, &force.high).line(
                 *name,
                 Colour::Series(i),
@@ -79,14 +79,14 @@ fn pressure_for_force(view: &View<'_>, places: &[Place]) -> Figure {
         panel
     });
     let note = if view.fit.prepared.design.friction {
-        "For one force there are two pressures, as the muscle shortens or lengthens: friction lies between them."
+        "Friction gives two pressures for one force: one while shortening, one while lengthening."
     } else {
-        "Friction was not found, so there is one pressure for each force."
+        "No friction was found: each force has one pressure."
     };
     Figure::multiples(
         "controller",
-        "Which force a pressure gives",
-        format!("Read from the force to the pressure, this is what the controller does. {note}"),
+        "Force against pressure at three contractions",
+        format!("The controller reads the pressure for a force from these curves. {note}"),
         panels.collect(),
     )
     .shared(true, true)
@@ -95,11 +95,11 @@ fn pressure_for_force(view: &View<'_>, places: &[Place]) -> Figure {
 fn error_of_force(view: &View<'_>, places: &[Place]) -> Figure {
     let panels = places.iter().map(|place| {
         let mut panel =
-            Panel::new(Axis::new("wanted force", "N").from_zero(), Axis::new("produced − wanted", "N"))
+            Panel::new(Axis::new("force setpoint", "N").from_zero(), Axis::new("force error", "N"))
                 .titled(place.title.clone());
         if let Some((_, _, force, readings)) = place.branches.first() {
             let low: Vec<f64> = readings.iter().map(|h| -h).collect();
-            panel = panel.band("95 % of single moments", Colour::Muted, &force.middle, &low, readings);
+            panel = panel.band("95 % of single readings", Colour::Muted, &force.middle, &low, readings);
         }
         for (i, (name, _, force, _)) in place.branches.iter().enumerate() {
             let off =
@@ -111,16 +111,17 @@ fn error_of_force(view: &View<'_>, places: &[Place]) -> Figure {
     });
     let spread = match view.fit.summary.left_out_pressure_mean_error_pct {
         Some(unseen) => format!(
-            " At pressures between the tested ones the table was off by {} % of the blocked force on average when they were left \
-             out in turn.",
+            " At held-out pressures the mean error was {} % of the blocked force.",
             figures(unseen, 2)
         ),
         None => String::new(),
     };
     Figure::multiples(
         "controller-error",
-        "How far the produced force may be from the wanted one",
-        format!("Inside: what the table's numbers leave open. Outside: with what the model does not describe.{spread}"),
+        "Expected error of the force",
+        format!(
+            "Inner band: 95 % confidence interval of the table. Outer band: 95 % of single readings.{spread}"
+        ),
         panels.collect(),
     )
     .shared(true, true)

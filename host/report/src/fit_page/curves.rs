@@ -9,7 +9,7 @@ use pam_fit::fit::uncertainty;
 const PLACES: usize = 90;
 
 pub(super) fn section(view: &View<'_>) -> Section {
-    let mut section = Section::new("What was fitted");
+    let mut section = Section::new("Fitted curves");
     section.figure(over_pressure(view));
     section.figure(stress(view));
     section
@@ -40,7 +40,7 @@ fn over_pressure(view: &View<'_>) -> Figure {
         };
         let ring: Vec<f64> = at_nodes.iter().map(|c| take(c) * scale).collect();
         Panel::new(axis(), y)
-            .band("95 % interval", Colour::Series(0), &kpa, &edge(-1.0), &edge(1.0))
+            .band("95 % confidence interval", Colour::Series(0), &kpa, &edge(-1.0), &edge(1.0))
             .line("fitted curve", Colour::Series(0), &kpa, &values)
             .rings("nodes of the table", Colour::Series(0), &node_kpa, &ring)
     };
@@ -59,8 +59,8 @@ fn over_pressure(view: &View<'_>) -> Figure {
     Figure::multiples(
         "curves",
         "Elastic coefficients and friction against pressure",
-        "The band is the 95 % interval; it widens where data are few (last panel). The bladder is one material: coefficients \
-         that change with pressure stand in for physics that the equations lack.",
+        "The band is the 95 % confidence interval; it widens where data are few (last panel). The bladder is one material: \
+         coefficients that change with pressure compensate for physics that the equations lack.",
         panels,
     )
     .shared(true, false)
@@ -112,7 +112,7 @@ fn stress(view: &View<'_>) -> Figure {
             (at.map(|e| 100.0 * e).collect(), banded.collect())
         };
         let drawn = |panel: Panel, x: &[f64], y: &Banded| {
-            let band = if group == 0 { "95 % interval" } else { "" };
+            let band = if group == 0 { "95 % confidence interval" } else { "" };
             panel.band(band, view.colour(group), x, &y.low, &y.high).line(
                 view.name(group),
                 view.colour(group),
@@ -130,18 +130,18 @@ fn stress(view: &View<'_>) -> Figure {
         }
     }
     let warning = if falls.is_empty() {
-        "Here it rises everywhere.".to_owned()
+        "It rises everywhere here.".to_owned()
     } else {
         format!(
-            "Here it falls somewhere at {}: the coefficients absorb something else there, such as the rounded ends.",
+            "It falls in a part of the range at {}: the coefficients absorb another effect there, such as rounded ends.",
             falls.join(", ")
         )
     };
     Figure::multiples(
         "stress-strain",
-        "Stress against strain of the bladder, as fitted",
+        "Fitted stress against strain of the bladder",
         format!(
-            "In a real bladder the stress rises with the strain, and is the same curve at every pressure. {warning}"
+            "In a real bladder stress rises with strain and is the same curve at every pressure. {warning}"
         ),
         vec![axial, radial],
     )

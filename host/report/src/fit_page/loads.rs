@@ -1,6 +1,7 @@
 //! Load lines, loops, blocked force and free contraction, the deadband line.
 
 use super::super::{Axis, Colour, Figure, Mark, Panel, Section, fixed};
+use super::held;
 use super::view::{Banded, View};
 use pam_data::counted::counted;
 use pam_fit::fit::basis::columns;
@@ -13,9 +14,14 @@ pub(super) fn contraction_axis() -> Axis {
 }
 
 pub(super) fn section(view: &View<'_>) -> Section {
-    let mut section = Section::new("Load lines");
-    section.figure(load_lines(view));
-    section.figure(loops(view));
+    let mut section = Section::new("Force of the muscle");
+    if view.held_length() {
+        section.figure(held::load_lines(view));
+        section.figure(held::branches(view));
+    } else {
+        section.figure(load_lines(view));
+        section.figure(loops(view));
+    }
     section.figure(ends(view));
     section.figure(deadband(view));
     section
@@ -41,15 +47,15 @@ fn load_lines(view: &View<'_>) -> Figure {
     }
     Figure::new(
         "load-lines",
-        "Loops and their mid-lines",
-        "Force against contraction as measured, one colour a pressure. The upper branch of a loop is lengthening, the lower one \
-         shortening; half their distance is friction, the dashed mid-line is what the elastic model has to meet.",
+        "Force against contraction, one loop per pressure",
+        "Measured force. The upper branch of a loop is lengthening, the lower one shortening; half their distance is friction. The \
+         elastic model is fitted to the dashed mid-line.",
         panel,
     )
 }
 
 /// Points with a break wherever the course leaves the wanted ones, or goes over to another recording.
-fn broken(points: impl Iterator<Item = Option<(f64, f64, u32)>>) -> (Vec<f64>, Vec<f64>) {
+pub(super) fn broken(points: impl Iterator<Item = Option<(f64, f64, u32)>>) -> (Vec<f64>, Vec<f64>) {
     let (mut x, mut y) = (Vec::new(), Vec::new());
     let mut last = None;
     for point in points {
@@ -91,7 +97,7 @@ fn loops(view: &View<'_>) -> Figure {
         };
         for (i, (direction, name)) in branches.iter().enumerate() {
             let line = view.banded(pressure, &strokes, *direction);
-            let band = if i == 0 { "95 % interval of the table" } else { "" };
+            let band = if i == 0 { "95 % confidence interval of the table" } else { "" };
             panel = panel.band(band, Colour::Series(i), &at, &line.low, &line.high).line(
                 *name,
                 Colour::Series(i),
@@ -104,13 +110,13 @@ fn loops(view: &View<'_>) -> Figure {
     let more = view.levels.len().saturating_sub(PANELS);
     let left = match more {
         0 => String::new(),
-        n => format!(" Left out here: {} between them.", counted(n, "pressure")),
+        n => format!(" Not shown: {} between them.", counted(n, "pressure")),
     };
     Figure::multiples(
         "loops",
-        "The full model on the loops",
+        "Table against measurement, pressure by pressure",
         format!(
-            "Each line should run through the middle of its branch's dots. The shade about it is what the table's numbers leave open.{left}"
+            "Each line should run through the middle of its branch's dots. The band is the 95 % confidence interval of the table.{left}"
         ),
         panels.collect(),
     )
@@ -183,7 +189,7 @@ fn repeat(view: &View<'_>, group: usize, number: usize, branches: [(usize, usize
 }
 
 fn ends(view: &View<'_>) -> Figure {
-    let all = repeats(view);
+    let all = if view.held_length() { Vec::new() } else { repeats(view) };
     let most = all.iter().map(|r| r.number).max().unwrap_or(0).min(8);
     let kpa: Vec<f64> = view.levels.iter().map(|p| p / 1e3).collect();
     let s = &view.fit.summary.pressures;
@@ -204,7 +210,7 @@ fn ends(view: &View<'_>) -> Figure {
     let panel = |title: &str, y: Axis, line: &Banded| {
         Panel::new(pressure(), y.from_zero())
             .titled(title)
-            .band("95 % interval of the table", Colour::Muted, &kpa, &line.low, &line.high)
+            .band("95 % confidence interval of the table", Colour::Muted, &kpa, &line.low, &line.high)
             .line("table", Colour::Muted, &kpa, &line.middle)
     };
     let mut panels = [
@@ -229,9 +235,9 @@ fn ends(view: &View<'_>) -> Figure {
     }
     Figure::multiples(
         "blocked-free",
-        "Blocked force and free contraction against pressure, loop by loop",
-        "Rings of one pressure should lie on each other. Where they climb from loop to loop the muscle is still running in \
-         (Mullins softening); where they scatter, the test does not repeat.",
+        "Blocked force and free contraction against pressure",
+        "Rings are single loops; those of one pressure should coincide. A trend from loop to loop is run-in (Mullins softening); \
+         scatter is poor repeatability.",
         panels.to_vec(),
     )
 }
@@ -241,9 +247,11 @@ fn deadband(view: &View<'_>) -> Figure {
     let area = columns(&view.fit.prepared.braid, 0.0).area;
     let (p0, half) = (s.deadband_kPa, 1.96 * s.deadband_std_kPa);
     let top = view.levels.last().map_or(1.0, |p| p / 1e3);
-    let all = repeats(view);
-    let (x, y): (Vec<f64>, Vec<f64>) =
-        all.iter().filter_map(|r| Some((view.levels[r.group] / 1e3, r.blocked?))).unzip();
+    let (x, y): (Vec<f64>, Vec<f64>) = if view.held_length() {
+        held::at_rest_length(view)
+    } else {
+        repeats(view).iter().filter_map(|r| Some((view.levels[r.group] / 1e3, r.blocked?))).unzip()
+    };
     let line: Vec<f64> = [p0, top].iter().map(|p| 1e3 * (p - p0) * area).collect();
     let ends = [p0 - half, top];
     let low: Vec<f64> = ends.iter().map(|p| (1e3 * (p - p0 - half) * area).max(0.0)).collect();
@@ -252,15 +260,15 @@ fn deadband(view: &View<'_>) -> Figure {
         Axis::new("pressure P", "kPa").from_zero(),
         Axis::new("blocked force without friction", "N").from_zero(),
     )
-    .band("95 % interval", Colour::Series(0), &ends, &low, &high)
+    .band("95 % confidence interval", Colour::Series(0), &ends, &low, &high)
     .line("(P − P_{0}) g(L_{0})", Colour::Series(0), &[p0, top], &line)
     .with(format!("P_{{0}} = {} kPa", fixed(p0, 1)), Colour::Ink, Mark::Moment(p0))
-    .points("each loop", Colour::Muted, &x, &y);
+    .points("measured", Colour::Muted, &x, &y);
     Figure::new(
         "deadband",
-        "The deadband line",
-        "At rest length every elastic term vanishes, so the blocked force is a straight line whose foot is the deadband. Dots \
-         off the line mean another geometry than the one described, or a force or pressure zero that is off.",
+        "Deadband: blocked force against pressure",
+        "At rest length all elastic terms vanish, so the blocked force is a straight line that begins at the deadband P_{0}. Dots \
+         off the line mean a wrong geometry, or a wrong zero of force or pressure.",
         panel,
     )
 }

@@ -1,16 +1,17 @@
 //! The thesis's models and the table side by side: errors, load lines, error against contraction.
 
 use super::super::{Axis, Colour, Figure, Mark, Panel, Section, Table, figures};
+use super::held;
 use super::loads::{PANELS, contraction_axis};
 use super::view::View;
 
 /// The models of the thesis and the table, side by side.
 pub(super) fn section(view: &View<'_>) -> Section {
-    let mut section = Section::new("Models side by side").summarised();
+    let mut section = Section::new("Comparison of models").summarised();
     let s = &view.fit.summary;
     let mut table = Table::new(
-        "Error of the mid-line, percent of blocked force (thesis, eq. 24)",
-        &["model", "mean", "largest", "what is fitted"],
+        "Error of the mid-line in percent of blocked force",
+        &["model", "mean", "largest", "fitted parameters"],
     );
     for model in &s.models {
         let cells = [model.mean_error_pct, model.max_error_pct].map(|v| figures(v, 2));
@@ -22,24 +23,30 @@ pub(super) fn section(view: &View<'_>) -> Section {
         ]);
     }
     section.table(table);
-    section.figure(each(view));
-    section.figure(against_midline(view));
-    section.figure(error_lines(view));
+    if view.held_length() {
+        section.figure(held::each_model(view));
+        section.figure(held::models(view));
+        section.figure(held::errors(view));
+    } else {
+        section.figure(each(view));
+        section.figure(against_midline(view));
+        section.figure(error_lines(view));
+    }
     section
 }
 
 fn what(model: &str) -> &'static str {
     match model {
-        "gaylord" => "nothing: pressure and braid alone",
+        "gaylord" => "none: pressure and braid only",
         "gaylord-corrected" => "the deadband",
-        "linear" => "the deadband; E of the material",
+        "linear" => "deadband; E of the material is given",
         "m1-linear-part" | "m2-linear-part" => "E_{k} per pressure, on the straight part of the load line",
         "m2" | "m3" | "m4" => "E_{k} per pressure, on the whole load line",
-        "m4-tip" => "the same with rounded tips, L′",
-        "m4-friction" => "E_{k} and k_{F} per pressure, judged on both branches",
+        "m4-tip" => "the same with rounded ends, L′",
+        "m4-friction" => "E_{k} and k_{F} per pressure; error of both branches",
         "yeoh" => "one hyperelastic wall for all pressures: P_{0} and three constants",
-        "material" => "the deadband; the wall from the material's modulus alone",
-        "table" => "everything at once, curves over pressure: this goes to the controller",
+        "material" => "deadband; the wall from the material's modulus",
+        "table" => "all, as curves over pressure: used by the controller",
         _ => "",
     }
 }
@@ -71,16 +78,17 @@ fn each(view: &View<'_>) -> Figure {
     });
     Figure::multiples(
         "each-model",
-        "Each model by itself",
-        "Dots are the measured mid-lines, lines what one model makes of them: lines that miss in the same way at every pressure \
-         lack physics, lines that miss at some lack a constant that follows the pressure.",
+        "Each model alone",
+        "Dots are measured mid-lines, lines are one model. A model that is wrong in the same way at every pressure lacks physics; one \
+         that is wrong at some pressures lacks a constant that depends on pressure.",
         panels.collect(),
     )
     .shared(true, true)
 }
 
 /// Models that are drawn together, with their colours.
-const DRAWN: [(&str, usize); 5] = [("gaylord", 6), ("linear", 1), ("m2", 2), ("m4", 3), ("yeoh", 4)];
+pub(super) const DRAWN: [(&str, usize); 5] =
+    [("gaylord", 6), ("linear", 1), ("m2", 2), ("m4", 3), ("yeoh", 4)];
 
 fn against_midline(view: &View<'_>) -> Figure {
     let panels = view.some(PANELS).into_iter().filter_map(|group| {
@@ -104,14 +112,15 @@ fn against_midline(view: &View<'_>) -> Figure {
         let strokes: Vec<f64> = of.iter().map(|i| view.fit.midline[*i].stroke).collect();
         let pressure = view.levels[group];
         let line = view.banded(pressure, &strokes, 0.0);
-        panel = panel.band("95 % interval of the table", Colour::Series(0), &x, &line.low, &line.high);
+        panel =
+            panel.band("95 % confidence interval of the table", Colour::Series(0), &x, &line.low, &line.high);
         Some(panel.line("table", Colour::Series(0), &x, &line.middle))
     });
     Figure::multiples(
         "models",
-        "Models against the mid-line, pressure by pressure",
-        "Dots are measured, lines are models. The fewer constants a model has, the more its distance from the dots tells about \
-         the physics; that a flexible one lies on them proves little.",
+        "Models against measurement, pressure by pressure",
+        "Dots are measured mid-lines, lines are models. The fewer constants a model has, the more its distance from the dots says about \
+         the physics.",
         panels.collect(),
     )
 }
@@ -138,8 +147,8 @@ fn error_lines(view: &View<'_>) -> Figure {
     Figure::new(
         "errors",
         "Error of the table against contraction",
-        "Each line dives where model and measurement cross; what counts is how high its arches are, and whether all of \
-         them rise at the same contraction: there the model lacks something.",
+        "Error in percent of the blocked force. A line dips where model and measurement cross. Where the lines of all pressures rise at \
+         the same contraction, the model lacks something.",
         panel,
     )
 }

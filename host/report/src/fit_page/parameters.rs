@@ -1,4 +1,4 @@
-//! The numbers: values with intervals, what is not determined and why, how they depend on each other.
+//! Parameters: values with intervals, which are not identifiable and why, correlations.
 
 use super::super::{Axis, Colour, Figure, Mark, Panel, Section, Table, Tone, figures, fixed};
 use super::curves::with_interval;
@@ -8,7 +8,7 @@ pub(super) fn section(view: &View<'_>) -> Section {
     let mut section = Section::new("Parameters").summarised();
     let s = &view.fit.summary;
     section.text(format!(
-        "P_{{0}} = {} kPa. Intervals are of 95 %, found by leaving out {} stretches of the motion in turn.",
+        "P_{{0}} = {} kPa. ± is the half-width of the 95 % confidence interval, from leaving out {} stretches of the motion in turn.",
         with_interval(s.deadband_kPa, s.deadband_std_kPa),
         view.fit.uncertain.blocks
     ));
@@ -20,13 +20,13 @@ pub(super) fn section(view: &View<'_>) -> Section {
         head.push("k_{F}".into());
     }
     let mut table =
-        Table { caption: "Values with 95 % intervals; n. d.: not determined".into(), head, rows: Vec::new() };
+        Table { caption: "Values ± half-width of the 95 % confidence interval; n. i.: not identifiable (interval includes zero)".into(), head, rows: Vec::new() };
     for p in &s.pressures {
         let mut row = vec![fixed(p.pressure_kPa, 0)];
         for (value, std) in p.E_MPa.iter().zip(&p.E_std_MPa) {
             let mut cell = with_interval(*value, *std);
             if !(value.abs() > 1.96 * std) {
-                cell += " (n. d.)";
+                cell += " (n. i.)";
             }
             row.push(cell);
         }
@@ -36,17 +36,17 @@ pub(super) fn section(view: &View<'_>) -> Section {
         table.row(row);
     }
     section.table(table);
-    words(view, &mut section);
+    identifiability(view, &mut section);
     section.figure(correlations(view));
     let mut pressures = Table::new(
-        "Pressure by pressure",
+        "Errors by pressure, percent of blocked force",
         &[
             "P (kPa)",
             "F_{B} (N)",
             "free contraction",
             "mean error (%)",
             "largest (%)",
-            "left out (%)",
+            "held out (%)",
             "rows",
         ],
     );
@@ -65,31 +65,34 @@ pub(super) fn section(view: &View<'_>) -> Section {
     section
 }
 
-/// What is not determined, said in words with the reason and a remedy.
-fn words(view: &View<'_>, section: &mut Section) {
+/// Which parameters are not identifiable, and why.
+fn identifiability(view: &View<'_>, section: &mut Section) {
     let s = &view.fit.summary;
     match s.condition {
         Some(condition) => section.text(format!(
             "The elastic columns have a condition number of {}: {}",
             figures(condition, 2),
             if condition > 300.0 {
-                "over this stroke they look alike, so single E_{k} mean little. Their sum, which is what the controller uses, \
-                 is determined far better than each of them."
+                "over this stroke they are similar, so single E_{k} are poorly determined. Their sum, which the controller uses, is \
+                 determined much better."
             } else {
-                "low enough that each E_{k} has a meaning of its own."
+                "low enough to identify each E_{k}."
             }
         )),
-        None => section.text("The elastic columns depend on each other: not all E_{k} can be found from this stroke."),
+        None => section.text("The elastic columns are linearly dependent: not all E_{k} are identifiable from this stroke."),
     }
     if s.not_determined.is_empty() {
-        section.notice(Tone::Good, "Every coefficient is determined: none of the 95 % intervals holds zero.");
+        section.notice(
+            Tone::Good,
+            "All coefficients are identifiable: no 95 % confidence interval includes zero.",
+        );
         return;
     }
     let list: Vec<String> = s.not_determined.iter().map(|n| in_symbols(&n.to_string())).collect();
     section.notice(
         Tone::Caution,
         format!(
-            "*Not determined:* {}. The force inside the recorded range is not affected; do not read these numbers as material \
+            "*Not identifiable:* {}. The force inside the recorded range is not affected. Do not use these numbers as material \
              constants, and do not extrapolate.",
             list.join("; ")
         ),
@@ -119,7 +122,7 @@ fn correlations(view: &View<'_>) -> Figure {
     Figure::new(
         "correlations",
         format!("Correlation of the parameters at {}", view.name(view.levels.len() / 2)),
-        "A full colour off the diagonal means that two numbers trade against each other: an error in one is made good by the other.",
+        "A strong colour off the diagonal marks two parameters that compensate each other.",
         panel,
     )
 }

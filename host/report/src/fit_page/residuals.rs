@@ -1,13 +1,13 @@
-//! What the table leaves: against every coordinate, over time, and its memory.
+//! Residuals: against every coordinate, over time, and their autocorrelation.
 
 use super::super::{Axis, Colour, Figure, Mark, Panel, Section, Table, fixed};
 use super::view::View;
 
 pub(super) fn section(view: &View<'_>) -> Section {
-    let mut section = Section::new("What the table leaves");
+    let mut section = Section::new("Residuals");
     section.text(
-        "Residuals are measured minus computed force, with the friction of the direction in which the muscle moved. What is \
-         random about them is noise; what is not is physics that the model lacks, and `host diagnose` looks for its name.",
+        "Residuals are measured minus computed force, with friction in the direction of motion. A random part is noise; a \
+         systematic part is physics that the model lacks, which `host diagnose` identifies.",
     );
     section.figure(coordinates(view));
     section.figure(time(view));
@@ -59,8 +59,10 @@ fn coordinates(view: &View<'_>) -> Figure {
         ("contraction ΔL/L_{0}", "%", of(&|i| view.contraction(points[i].stroke))),
         ("pressure P", "kPa", of(&|i| points[i].pressure / 1e3)),
         ("force F", "N", of(&|i| points[i].force)),
-        ("speed of shortening", "mm/s", of(&|i| 1e3 * speed[i])),
     ];
+    if !view.held_length() {
+        coordinates.push(("speed of shortening", "mm/s", of(&|i| 1e3 * speed[i])));
+    }
     // A temperature of each point is that of its first row.
     let warm = |i: usize| {
         let p = &points[i];
@@ -82,8 +84,7 @@ fn coordinates(view: &View<'_>) -> Figure {
     Figure::multiples(
         "residuals",
         "Residuals against each coordinate",
-        "The mean line should stay at zero. Where it does not, the force depends on that coordinate in a way that the model \
-         does not have.",
+        "The mean should stay at zero. Where it does not, the force depends on that coordinate in a way that the model lacks.",
         panels.collect(),
     )
     .shared(false, true)
@@ -128,15 +129,15 @@ fn time(view: &View<'_>) -> Figure {
     panel = panel.line("mean", Colour::Series(1), &at, &mean);
     if starts.len() <= 30 {
         for (i, start) in starts.iter().enumerate().skip(1) {
-            let name = if i == 1 { "a new recording" } else { "" };
+            let name = if i == 1 { "next recording" } else { "" };
             panel = panel.with(name, Colour::Muted, Mark::Moment(*start));
         }
     }
     Figure::new(
         "residuals-time",
         "Residuals over time",
-        "A slow slope is drift, warming or run-in; a step is something that slipped; a pattern that repeats with every stroke \
-         depends on the motion, not on time.",
+        "A slow slope is drift, warming or run-in. A step is a slip. A pattern that repeats with every stroke depends on the \
+         motion, not on time.",
         panel,
     )
 }
@@ -164,16 +165,16 @@ fn memory(view: &View<'_>) -> Figure {
     let bound = 1.96 / (used.len().max(1) as f64).sqrt();
     let correlation = view.fit.uncertain.correlation;
     let panel =
-        Panel::new(Axis::new("distance in points", ""), Axis::new("autocorrelation", "").range(-1.0, 1.05))
+        Panel::new(Axis::new("lag in points", ""), Axis::new("autocorrelation", "").range(-1.0, 1.05))
             .bars("residuals", Colour::Series(0), &lags, &values)
-            .with("95 % of what independent residuals would show", Colour::Alarm, Mark::Level(bound))
+            .with("95 % limit for independent residuals", Colour::Alarm, Mark::Level(bound))
             .with("", Colour::Alarm, Mark::Level(-bound));
     Figure::new(
         "autocorrelation",
-        "Memory of the residuals",
+        "Autocorrelation of the residuals",
         format!(
-            "Bars that stay high mean that neighbours err together, so {} points are worth about {} independent ones. All \
-             intervals of this report allow for that.",
+            "High bars mean that neighbouring points have correlated errors: {} points are worth about {} independent ones. All \
+             intervals of this report include this.",
             fixed(used.len() as f64, 0),
             fixed(used.len() as f64 / correlation.max(1.0), 0)
         ),
@@ -187,8 +188,8 @@ fn outliers(view: &View<'_>, section: &mut Section) {
         return;
     }
     let mut table = Table::new(
-        "Readings that do not belong to the rest; they were not fitted",
-        &["recording", "row", "time (s)", "force (N)", "off by (N)"],
+        "Outliers, excluded from the fit",
+        &["recording", "row", "time (s)", "force (N)", "residual (N)"],
     );
     const MOST: usize = 25;
     for o in all.iter().take(MOST) {

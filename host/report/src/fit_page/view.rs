@@ -18,6 +18,8 @@ pub(super) struct View<'a> {
     pub levels: &'a [f64],
     /// m.
     pub l0: f64,
+    /// Strokes of the tested lengths, m, ascending, where every recording was held at one length; otherwise empty.
+    pub lengths: Vec<f64>,
     /// `F − F_model` of every point by the table itself, N.
     pub residual: Vec<f64>,
     muscle: Option<model_core::muscle::Muscle<f64>>,
@@ -51,13 +53,35 @@ impl<'a> View<'a> {
         let uncertainty = Some(fit.stored_uncertainty());
         let about = About { uncertainty, ..About::default() };
         let band = ForceBand::of(&TableFile { table: fit.table.clone(), about });
-        let mut view = Self { fit, campaign, levels, l0, residual: Vec::new(), muscle, band };
+        let lengths = lengths(&fit.prepared.points.list, l0, fit.prepared.points.stroke_noise);
+        let mut view = Self { fit, campaign, levels, l0, lengths, residual: Vec::new(), muscle, band };
         view.residual = view
             .points()
             .iter()
             .map(|p| p.force - view.force(p.pressure, p.stroke, view.direction(p)))
             .collect();
         view
+    }
+
+    /// Whether every recording was held at one length: then force is drawn against pressure.
+    pub fn held_length(&self) -> bool {
+        !self.lengths.is_empty()
+    }
+
+    /// The tested length nearest to a stroke.
+    pub fn length_of(&self, stroke: f64) -> usize {
+        let off = |i: &usize| (self.lengths[*i] - stroke).abs();
+        (0..self.lengths.len()).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
+    }
+
+    /// A tested length with its contraction.
+    pub fn length_name(&self, length: usize) -> String {
+        let Some(stroke) = self.lengths.get(length) else { return String::new() };
+        format!("{} mm ({} %)", fixed(1e3 * (self.l0 - stroke), 1), fixed(self.contraction(*stroke), 1))
+    }
+
+    pub fn length_colour(&self, length: usize) -> Colour {
+        Colour::ordered(length, self.lengths.len())
     }
 
     pub fn points(&self) -> &'a [Point] {
@@ -154,5 +178,71 @@ impl<'a> View<'a> {
         worst.map_or(String::new(), |c| {
             format!("at {}, contraction {} %", self.name(c.group as usize), figures(100.0 * c.contraction, 2))
         })
+    }
+}
+
+/// A length counts as held within this share of the rest length, or within six deviations of the stroke's noise; lengths that differ by
+/// less are one length.
+const HELD: f64 = 0.003;
+
+/// The mean stroke of each tested length; empty where a recording moved.
+fn lengths(points: &[Point], l0: f64, noise: f64) -> Vec<f64> {
+    let mut ranges: std::collections::BTreeMap<u32, (f64, f64, f64, f64)> = std::collections::BTreeMap::new();
+    for p in points {
+        let (low, high, sum, count) =
+            ranges.entry(p.recording).or_insert((f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0));
+        (*low, *high) = (low.min(p.stroke), high.max(p.stroke));
+        (*sum, *count) = (*sum + p.stroke, *count + 1.0);
+    }
+    let tolerance = (HELD * l0).max(6.0 * noise);
+    if ranges.is_empty() || !ranges.values().all(|(low, high, ..)| high - low <= tolerance) {
+        return Vec::new();
+    }
+    let mut means: Vec<(f64, f64)> =
+        ranges.values().map(|(_, _, sum, count)| (sum / count, *count)).collect();
+    means.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut groups: Vec<(f64, f64, f64)> = Vec::new();
+    for (mean, count) in means {
+        match groups.last_mut() {
+            Some((last, sum, n)) if mean - *last <= HELD * l0 => {
+                (*last, *sum, *n) = (mean, *sum + mean * count, *n + count);
+            }
+            _ => groups.push((mean, mean * count, count)),
+        }
+    }
+    groups.into_iter().map(|(_, sum, count)| sum / count).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(recording: u32, stroke: f64) -> Point {
+        Point {
+            recording,
+            first_row: 0,
+            rows: 1,
+            block: 0,
+            direction: 1.0,
+            time: 0.0,
+            pressure: 2e5,
+            stroke,
+            force: 1.0,
+            force_range: (1.0, 1.0),
+            since_turn: 1.0,
+            dropout: false,
+        }
+    }
+
+    #[test]
+    fn recordings_at_held_length_are_grouped_by_length_and_a_moving_one_is_none() {
+        let mut points =
+            vec![point(0, 0.0), point(0, 1e-4), point(1, 0.02), point(2, 0.0201), point(3, 0.05)];
+        let found = lengths(&points, 0.2, 0.0);
+        assert_eq!(found.len(), 3);
+        assert!((found[1] - 0.02005).abs() < 1e-9 && (found[2] - 0.05).abs() < 1e-9, "{found:?}");
+        points.push(point(3, 0.06));
+        assert!(lengths(&points, 0.2, 0.0).is_empty());
+        assert!(lengths(&[], 0.2, 0.0).is_empty());
     }
 }

@@ -2,10 +2,10 @@
 
 use model_core::link::endpoints::{ClearFault, GetFaults, GetPastFault};
 use model_core::link::messages::{FAULT_LOG, Fault, FaultReport, PastFault};
-use serde_json::json;
 
 use crate::commands::port::PortOption;
 use crate::console::Console;
+use crate::documents::{device as document, text};
 use pam_data::error::Result;
 use pam_device::words;
 
@@ -22,21 +22,34 @@ pub(super) fn run(port: &PortOption, clear: bool, json: bool, console: &Console)
     if json {
         let one = |r: &FaultReport| {
             let w = words::fault(r.fault);
-            json!({ "fault": w.name, "cause": w.cause, "remedy": w.remedy, "time_s": r.time_us as f64 * 1e-6,
-                "value": r.value, "limit": r.limit, "muscle": words::side(r.side), "mode": words::mode(r.mode),
-                "last": { "pressure_Pa": r.last.pressure_pa, "stroke_m": r.last.stroke_m, "force_N": r.last.force_n } })
+            document::Fault {
+                fault: w.name,
+                cause: w.cause,
+                remedy: w.remedy,
+                time_s: r.time_us as f64 * 1e-6,
+                value: r.value,
+                limit: r.limit,
+                muscle: words::side(r.side),
+                mode: words::mode(r.mode),
+                last: document::Last {
+                    pressure_Pa: r.last.pressure_pa,
+                    stroke_m: r.last.stroke_m,
+                    force_N: r.last.force_n,
+                },
+            }
         };
-        let counts: serde_json::Map<String, serde_json::Value> = Fault::ALL
+        let counts = Fault::ALL
             .iter()
             .zip(faults.counts)
             .filter(|(_, n)| *n > 0)
-            .map(|(f, n)| (words::fault(*f).name.to_owned(), json!(n)))
+            .map(|(f, n)| (words::fault(*f).name.to_owned(), n.into()))
             .collect();
-        console.result(format!(
-            "{:#}",
-            json!({ "schema": "pam-faults/1", "latched": faults.latched.as_ref().map(one), "counts": counts,
-                "past": past.iter().map(one).collect::<Vec<_>>() })
-        ));
+        console.result(text(&document::Faults {
+            schema: "pam-faults/1",
+            latched: faults.latched.as_ref().map(one),
+            counts,
+            past: past.iter().map(one).collect(),
+        })?);
     } else {
         match &faults.latched {
             Some(report) => {

@@ -3,11 +3,11 @@
 use std::sync::atomic::Ordering;
 
 use clap::Args;
-use serde_json::json;
 
 use crate::commands::port::PortOption;
 use crate::commands::run::interrupts;
 use crate::console::Console;
+use crate::documents::{device::Regulator, text};
 use pam_data::error::{DataCode, Error, Result};
 use pam_device::regulator;
 
@@ -47,12 +47,18 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         console.note("kept in the settings; lag and line are inverted from here on");
     }
     if arguments.json {
-        console.result(format!(
-            "{:#}",
-            json!({ "schema": "pam-regulator/1", "gain": found.gain, "offset_Pa": found.offset_pa,
-                "lag_s": found.lag_s, "line_s": found.line_s, "rate_Pa_per_s": found.rate_pa_per_s, "rate_limited": found.rate_limited,
-                "deadband_Pa": found.deadband_pa, "misfit_rms_Pa": found.misfit_pa, "kept": !arguments.dry_run })
-        ));
+        console.result(text(&Regulator {
+            schema: "pam-regulator/1",
+            gain: found.gain,
+            offset_Pa: found.offset_pa,
+            lag_s: found.lag_s,
+            line_s: found.line_s,
+            rate_Pa_per_s: found.rate_pa_per_s,
+            rate_limited: found.rate_limited,
+            deadband_Pa: found.deadband_pa,
+            misfit_rms_Pa: found.misfit_pa,
+            kept: !arguments.dry_run,
+        })?);
         return Ok(());
     }
     console.result(format!("gain      {:8.4}", found.gain));

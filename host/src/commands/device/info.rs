@@ -3,10 +3,10 @@
 use model_core::link::endpoints::{GetInfo, GetSettings, GetStatus};
 use model_core::link::hello::Board;
 use model_core::link::{LINK_VERSION, SCHEMA_HASH};
-use serde_json::json;
 
 use crate::commands::port::PortOption;
 use crate::console::Console;
+use crate::documents::{device as document, text};
 use pam_data::counted::counted;
 use pam_data::error::Result;
 use pam_device::{Client, Patience, Port, recorder, words};
@@ -38,28 +38,30 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
     let status = client.call::<GetStatus>(&())?;
     if json {
         let settings = client.call::<GetSettings>(&())?;
-        let mut all = recorder::about_device(&hello, &info, &settings);
-        all["schema"] = json!("pam-device/1");
-        all["link_schema"] = json!(format!("{:016x}", hello.schema_hash));
-        all["muscles"] = json!(info.muscles);
-        all["table_capacity"] = json!(info.table_capacity);
-        all["trace_capacity"] = json!(info.trace_capacity);
-        all["reference_capacity"] = json!(info.reference_capacity);
-        all["started_by"] = json!(words::started_by(info.started_by));
-        all["status"] = json!({
-            "state": words::state(status.state),
-            "mode": words::mode(status.mode),
-            "fault": status.fault.map(|f| words::fault(f).name),
-            "time_s": status.time_us as f64 * 1e-6,
-            "ticks": status.ticks,
-            "overruns": status.overruns,
-            "frames_good": status.frames_good,
-            "frames_bad": status.frames_bad,
-            "telemetry_dropped": status.telemetry_dropped,
-            "saturated_ticks": status.saturated_ticks,
-            "line_errors": status.line_errors,
-        });
-        console.result(format!("{all:#}"));
+        let device = recorder::about_device(&hello, &info, &settings);
+        console.result(text(&document::Info {
+            schema: "pam-device/1",
+            device: device.as_object().cloned().unwrap_or_default(),
+            link_schema: format!("{:016x}", hello.schema_hash),
+            muscles: info.muscles,
+            table_capacity: info.table_capacity,
+            trace_capacity: info.trace_capacity,
+            reference_capacity: info.reference_capacity,
+            started_by: words::started_by(info.started_by),
+            status: document::Status {
+                state: words::state(status.state),
+                mode: words::mode(status.mode),
+                fault: status.fault.map(|f| words::fault(f).name),
+                time_s: status.time_us as f64 * 1e-6,
+                ticks: status.ticks,
+                overruns: status.overruns,
+                frames_good: status.frames_good,
+                frames_bad: status.frames_bad,
+                telemetry_dropped: status.telemetry_dropped,
+                saturated_ticks: status.saturated_ticks,
+                line_errors: status.line_errors,
+            },
+        })?);
         return Ok(());
     }
     console.result(format!(

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use model_core::link::SCHEMA_HASH;
 use model_core::link::hello::Board;
-use serde_json::json;
 
 use crate::console::Console;
+use crate::documents::{device as document, text};
 use pam_data::error::Result;
 use pam_device::{Client, Patience, Port, available, recorder};
 
@@ -19,36 +19,34 @@ pub(super) fn run(json: bool, console: &Console) -> Result<()> {
             Ok(client) => {
                 let hello = client.hello();
                 let (major, minor, patch) = hello.release;
-                json!({
-                    "port": name,
-                    "controller": true,
-                    "board": Board::from_code(hello.board).map_or("unknown", Board::name),
-                    "serial": recorder::serial(hello),
-                    "release": format!("{major}.{minor}.{patch}"),
-                    "same_schema": hello.schema_hash == SCHEMA_HASH,
+                document::Port::Controller(document::Controller {
+                    port: name,
+                    controller: true,
+                    board: Board::from_code(hello.board).map_or("unknown", Board::name),
+                    serial: recorder::serial(hello),
+                    release: format!("{major}.{minor}.{patch}"),
+                    same_schema: hello.schema_hash == SCHEMA_HASH,
                 })
             }
-            Err(e) => json!({ "port": name, "controller": false, "why": e.cause() }),
+            Err(e) => document::Port::Other(document::Other {
+                port: name,
+                controller: false,
+                why: e.cause().to_string(),
+            }),
         });
     }
     if json {
-        console.result(format!("{:#}", json!({ "schema": "pam-ports/1", "ports": rows })));
+        console.result(text(&document::Ports { schema: "pam-ports/1", ports: rows })?);
     } else if rows.is_empty() {
         console.result("there is no serial device; an emulated one is named tcp:HOST:PORT");
     } else {
         for row in rows {
-            let text = |key: &str| row[key].as_str().unwrap_or_default().to_owned();
-            console.result(if row["controller"] == true {
-                let differs = if row["same_schema"] == true { "" } else { ", speaks another schema" };
-                format!(
-                    "{}: {}, release {}, serial {}{differs}",
-                    text("port"),
-                    text("board"),
-                    text("release"),
-                    text("serial")
-                )
-            } else {
-                format!("{}: no controller ({})", text("port"), text("why"))
+            console.result(match row {
+                document::Port::Controller(c) => {
+                    let differs = if c.same_schema { "" } else { ", uses another link schema" };
+                    format!("{}: {}, release {}, serial {}{differs}", c.port, c.board, c.release, c.serial)
+                }
+                document::Port::Other(o) => format!("{}: no controller ({})", o.port, o.why),
             });
         }
     }

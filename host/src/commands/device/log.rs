@@ -8,10 +8,11 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use model_core::link::endpoints::GetStatus;
 use model_core::link::messages::Event;
-use serde_json::{Value, json};
 
 use crate::commands::port::PortOption;
 use crate::console::Console;
+use crate::documents::device::{LogLine, More};
+use crate::documents::line;
 use pam_data::error::{DataCode, Error, Result};
 use pam_device::{Topic, log_table::LogTable, words};
 
@@ -32,13 +33,11 @@ pub(super) struct Arguments {
 }
 
 /// A line: device time where it is known, what kind, text, and what else a program wants to know.
-fn say(console: &Console, as_json: bool, time_s: Option<f64>, kind: &str, text: &str, more: Value) {
+fn say(console: &Console, as_json: bool, time_s: Option<f64>, kind: &str, text: &str, more: More) {
     if as_json {
-        let mut line = json!({ "schema": "pam-log/1", "time_s": time_s, "event": kind, "text": text });
-        if let (Some(line), Value::Object(more)) = (line.as_object_mut(), more) {
-            line.extend(more);
-        }
-        console.result(line);
+        let document = LogLine { schema: "pam-log/1", time_s, event: kind, text, more };
+        // A document of words can always be written.
+        console.result(line(&document).unwrap_or_default());
         return;
     }
     let time = time_s.map_or_else(|| " ".repeat(14), |t| format!("{t:12.3} s"));
@@ -67,7 +66,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
                 last = Some((status.state, status.mode));
                 let (state, mode) = (words::state(status.state), words::mode(status.mode));
                 let text = format!("{state} in {mode} mode");
-                let more = json!({ "state": state, "mode": mode });
+                let more = More { state: Some(state), mode: Some(mode), ..More::default() };
                 tell(Some(status.time_us as f64 * 1e-6), "state", &text, more);
             }
         }
@@ -75,16 +74,16 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             Some(Topic::Event(Event::Fault(report))) => {
                 let fault = words::fault(report.fault);
                 let time = Some(report.time_us as f64 * 1e-6);
-                let more = json!({ "fault": fault.name, "remedy": fault.remedy });
+                let more = More { fault: Some(fault.name), remedy: Some(fault.remedy), ..More::default() };
                 let mark = if arguments.json { "" } else { "FAULT " };
                 tell(time, "fault", &format!("{mark}{}", words::report(&report)), more);
                 if !arguments.json {
-                    tell(None, "remedy", &format!("what to do: {}", fault.remedy), Value::Null);
+                    tell(None, "remedy", &format!("what to do: {}", fault.remedy), More::default());
                 }
             }
             Some(Topic::Event(Event::State(_))) => asked = None,
             Some(Topic::Event(Event::TraceFull)) => {
-                tell(None, "trace-full", "trace full: host device trace --read", Value::Null);
+                tell(None, "trace-full", "trace full: host device trace --read", More::default());
             }
             Some(Topic::Log(frame)) => match &table {
                 Some(table) => {
@@ -93,7 +92,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
                         line.time_s,
                         "log",
                         &format!("{} {}", line.level, line.text),
-                        json!({ "level": line.level }),
+                        More { level: Some(line.level.clone()), ..More::default() },
                     );
                 }
                 None => untold += 1,

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 use model_core::link::endpoints::{GetSettings, SetSettings};
 use model_core::link::settings::Settings;
-use serde_json::json;
 
 use crate::commands::port::PortOption;
 use crate::console::Console;
+use crate::documents::{device as document, text};
 use pam_data::error::{DataCode, Error, Result, nearest};
 use pam_data::output::json_of;
 use pam_device::error::DeviceCode;
@@ -64,9 +64,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         console.note("written and read back");
     }
     if arguments.json {
-        let mut all = json_of(&now);
-        all["schema"] = json!("pam-device-settings/1");
-        console.result(format!("{all:#}"));
+        let settings = json_of(&now).as_object().cloned().unwrap_or_default();
+        console.result(text(&document::Settings { schema: "pam-device-settings/1", settings })?);
     } else {
         let text = toml::to_string(&now).map_err(|e| {
             Error::new(DeviceCode::DeviceVerify, format!("the settings cannot be printed: {e}"))

@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use model_core::link::endpoints::{ArmTrace, GetInfo, GetTrace, ReadTrace};
 use model_core::link::messages::{TraceArm, TraceInfo, TraceRead, Trigger, Variable};
-use serde_json::json;
 
 use crate::commands::port::PortOption;
 use crate::console::Console;
+use crate::documents::{device as document, text};
 use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result, nearest};
 use pam_data::output::write_whole;
@@ -129,7 +129,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     }
     let ticks_per_s = client.call::<GetInfo>(&())?.ticks_per_s;
     let columns = read_columns(&mut client, &trace, ticks_per_s)?;
-    let text = if arguments.json { as_json(&trace, &columns) } else { as_csv(&columns) };
+    let text = if arguments.json { as_json(&trace, &columns)? } else { as_csv(&columns) };
     write_whole(&arguments.output, text.as_bytes())?;
     console.note(format!(
         "{} of {}",
@@ -197,11 +197,15 @@ fn as_csv(columns: &Columns) -> String {
     text
 }
 
-fn as_json(trace: &TraceInfo, columns: &Columns) -> String {
-    let lists: serde_json::Map<_, _> = columns.iter().map(|(name, c)| (name.clone(), json!(c))).collect();
-    let all = json!({ "schema": "pam-trace/1", "records": trace.records, "every_ticks": trace.every_ticks,
-        "first_tick": trace.first_tick, "columns": lists });
-    format!("{all:#}\n")
+fn as_json(trace: &TraceInfo, columns: &Columns) -> Result<String> {
+    let document = document::Trace {
+        schema: "pam-trace/1",
+        records: trace.records,
+        every_ticks: trace.every_ticks,
+        first_tick: trace.first_tick,
+        columns: columns.iter().map(|(name, c)| (name.as_str(), c.as_slice())).collect(),
+    };
+    Ok(text(&document)? + "\n")
 }
 
 #[cfg(test)]

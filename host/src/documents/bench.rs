@@ -1,0 +1,136 @@
+//! Documents of commands that need no device.
+
+// Field names carry their unit as the JSON does: N is not n.
+#![allow(non_snake_case)]
+
+use serde::Serialize;
+
+use pam_diagnose::advise::Isolability;
+
+/// `host compare --json`: B minus A.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Compare<'a> {
+    pub schema: &'static str,
+    pub rows: usize,
+    pub overlap_s: f64,
+    pub columns: Vec<Column<'a>>,
+}
+
+/// One quantity.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Column<'a> {
+    pub name: &'a str,
+    pub unit: &'a str,
+    pub rms: f64,
+    pub mean: f64,
+    pub largest: f64,
+    pub largest_at_s: f64,
+}
+
+/// `host plan --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Plan<'a> {
+    pub schema: &'static str,
+    pub effects: Vec<Planned<'a>>,
+}
+
+/// What a protocol shows of one effect.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Planned<'a> {
+    pub effect: &'a str,
+    /// Share of its energy that tables free over pressure cannot imitate.
+    pub visible: f64,
+    /// Effects that the protocol does not distinguish from it, with the cosine.
+    pub not_told_from: &'a [(String, f64)],
+}
+
+impl<'a> Planned<'a> {
+    pub(crate) fn of(row: &'a Isolability) -> Self {
+        Self { effect: &row.effect, visible: row.visible, not_told_from: &row.not_told_from }
+    }
+}
+
+/// `host settings --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct SettingsFiles<'a> {
+    pub schema: &'static str,
+    pub files: Vec<String>,
+    pub settings: Vec<Setting<'a>>,
+}
+
+/// One setting.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Setting<'a> {
+    pub command: &'a str,
+    pub option: &'a str,
+    pub values: &'a [String],
+    pub file: String,
+    pub line: u64,
+}
+
+/// `host demo --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Demo<'a> {
+    pub schema: &'static str,
+    pub muscle: &'a str,
+    pub controller: &'a str,
+    pub fit_mean_error_pct: f64,
+    pub deadband_kPa: f64,
+    pub blocked_force_N: f64,
+    pub tracking: Vec<Tracking>,
+    pub telemetry_rows: usize,
+    pub telemetry_rms_N: f64,
+    pub seconds: f64,
+}
+
+/// Force tracking with one feed-forward; percent of the blocked force.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Tracking {
+    pub feed_forward: &'static str,
+    pub sine_rms_N: f64,
+    pub sine_rms_pct: f64,
+    pub steps_rms_N: f64,
+    pub steps_rms_pct: f64,
+    pub rms_pct: f64,
+}
+
+/// `host emulate --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Emulate<'a> {
+    pub schema: &'static str,
+    pub port: &'a str,
+    pub controller: &'a str,
+}
+
+/// `host studio --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Studio<'a> {
+    pub schema: &'static str,
+    pub address: &'a str,
+}
+
+/// `host recover --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Recover {
+    pub schema: &'static str,
+    pub recovered: Vec<Recovered>,
+}
+
+/// One recording that was cut off; null where it held nothing.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Recovered {
+    pub part: String,
+    pub recording: Option<String>,
+}

@@ -1,0 +1,231 @@
+//! Documents of commands that talk to a controller.
+
+// Field names carry their unit as the JSON does: N is not n.
+#![allow(non_snake_case)]
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+/// `host device info --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(crate) struct Info {
+    pub schema: &'static str,
+    /// Identity, tables and settings, as every recording holds them.
+    #[serde(flatten)]
+    pub device: Map<String, Value>,
+    pub link_schema: String,
+    pub muscles: u8,
+    pub table_capacity: u32,
+    pub trace_capacity: u32,
+    pub reference_capacity: u32,
+    pub started_by: &'static str,
+    pub status: Status,
+}
+
+/// The present state.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Status {
+    pub state: &'static str,
+    pub mode: &'static str,
+    pub fault: Option<&'static str>,
+    pub time_s: f64,
+    pub ticks: u64,
+    pub overruns: u32,
+    pub frames_good: u32,
+    pub frames_bad: u32,
+    pub telemetry_dropped: u32,
+    pub saturated_ticks: u32,
+    pub line_errors: u32,
+}
+
+/// `host device faults --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Faults {
+    pub schema: &'static str,
+    pub latched: Option<Fault>,
+    /// Since the start, by fault.
+    pub counts: BTreeMap<String, u32>,
+    pub past: Vec<Fault>,
+}
+
+/// A fault.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Fault {
+    pub fault: &'static str,
+    pub cause: &'static str,
+    pub remedy: &'static str,
+    pub time_s: f64,
+    pub value: f32,
+    pub limit: f32,
+    pub muscle: &'static str,
+    pub mode: &'static str,
+    pub last: Last,
+}
+
+/// The last readings before a fault.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Last {
+    pub pressure_Pa: f32,
+    pub stroke_m: f32,
+    pub force_N: f32,
+}
+
+/// `host device list --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Ports {
+    pub schema: &'static str,
+    pub ports: Vec<Port>,
+}
+
+/// A serial device.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(untagged)]
+pub(crate) enum Port {
+    /// A controller answers there.
+    Controller(Controller),
+    /// None does.
+    Other(Other),
+}
+
+/// A controller.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Controller {
+    pub port: String,
+    pub controller: bool,
+    pub board: &'static str,
+    pub serial: String,
+    pub release: String,
+    pub same_schema: bool,
+}
+
+/// A serial device without a controller.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Other {
+    pub port: String,
+    pub controller: bool,
+    pub why: String,
+}
+
+/// `host device identify --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Regulator {
+    pub schema: &'static str,
+    pub gain: f64,
+    pub offset_Pa: f64,
+    pub lag_s: f64,
+    pub line_s: f64,
+    pub rate_Pa_per_s: f64,
+    pub rate_limited: bool,
+    pub deadband_Pa: Option<f64>,
+    pub misfit_rms_Pa: f64,
+    pub kept: bool,
+}
+
+/// `host device settings --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(crate) struct Settings {
+    pub schema: &'static str,
+    /// By group and name.
+    #[serde(flatten)]
+    pub settings: Map<String, Value>,
+}
+
+/// `host device rollback --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Rollback {
+    pub schema: &'static str,
+    pub crc: String,
+    pub bytes: u32,
+    pub generation: u32,
+    pub has_previous: bool,
+}
+
+/// `host device forget --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Forget {
+    pub schema: &'static str,
+    pub muscle: usize,
+}
+
+/// One line of `host device log --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(crate) struct LogLine<'a> {
+    pub schema: &'static str,
+    /// Time of the device.
+    pub time_s: Option<f64>,
+    pub event: &'a str,
+    pub text: &'a str,
+    #[serde(flatten)]
+    pub more: More,
+}
+
+/// What a line holds beside its text.
+#[derive(Debug, Default, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(crate) struct More {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub state: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mode: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fault: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remedy: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub level: Option<String>,
+}
+
+/// `host device trace --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Trace<'a> {
+    pub schema: &'static str,
+    pub records: u32,
+    pub every_ticks: u16,
+    pub first_tick: u64,
+    pub columns: BTreeMap<&'a str, &'a [f64]>,
+}
+
+/// `host flash --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Flash {
+    pub schema: &'static str,
+    pub port: String,
+    pub crc: String,
+    /// Between the device's table and the new one; null where there is none to compare with.
+    pub difference: Value,
+    pub written: bool,
+    /// Where the device's former table was saved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub backup: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub generation: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub confirmed_after_restart: Option<bool>,
+}
+
+/// `host vent --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Vent {
+    pub schema: &'static str,
+    pub vented: bool,
+    pub state: &'static str,
+}

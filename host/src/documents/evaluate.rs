@@ -1,0 +1,74 @@
+//! `host evaluate --json`, `pam-evaluate/1`.
+
+// Field names carry their unit as the JSON does: N is not n.
+#![allow(non_snake_case)]
+
+use serde::Serialize;
+use serde_json::Value;
+
+/// Errors on held-out data.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Evaluate {
+    pub schema: &'static str,
+    pub muscles: Vec<Muscle>,
+}
+
+/// One muscle.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Muscle {
+    pub muscle: String,
+    pub blocked_force_N: f64,
+    pub unseen_runs: Option<HeldOut>,
+    pub unseen_contractions: Option<HeldOut>,
+    pub unseen_length: Option<OtherLength>,
+}
+
+/// Everything of one kind left out in turn.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct HeldOut {
+    pub table: Score,
+    /// Of the published formula on the same rows.
+    pub published: Option<Score>,
+    pub r#where: Vec<Spot>,
+    /// Fitted dimensions and lengths of the fit to all rows.
+    pub adjusted: Value,
+}
+
+/// Predicted from the tables of muscles of other lengths.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct OtherLength {
+    pub end_effect_mm: f64,
+    pub table: Score,
+    pub r#where: Vec<Spot>,
+}
+
+/// Errors of measured minus computed force.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Score {
+    pub rows: f64,
+    /// Mean absolute error.
+    pub mean_N: f64,
+    pub rms_N: f64,
+    /// Percent of the blocked force.
+    pub mean_pct: f64,
+    pub rms_pct: f64,
+    /// Mean error with its sign.
+    pub bias_N: f64,
+}
+
+/// The error at one contraction and direction of what was left out.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Spot {
+    pub left_out: String,
+    pub contraction: f64,
+    pub direction: i8,
+    pub bias_N: f64,
+    pub rms_N: f64,
+    pub rows: f64,
+}
