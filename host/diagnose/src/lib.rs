@@ -47,6 +47,7 @@ pub mod model;
 mod moment;
 mod named;
 mod noise;
+mod options;
 pub mod planned;
 mod rest;
 mod rows;
@@ -59,5 +60,6 @@ mod tests;
 mod trial;
 pub mod verdict;
 
-pub use answer::{Options, diagnose};
+pub use answer::diagnose;
+pub use options::Options;
 pub use verdict::Diagnosis;

@@ -24,7 +24,7 @@ pub(crate) fn place(candidate: &Candidate, trial: &Trial) -> Option<usize> {
 /// Where in the campaign a moment lies.
 pub(crate) fn in_words(moment: f64, rows: &Rows) -> String {
     let name = |row: usize| &rows.names[rows.recording[row] as usize];
-    let after = rows.contexts.partition_point(|c| c.time < moment);
+    let after = rows.contexts().partition_point(|c| c.time < moment);
     if after == 0 {
         return format!("before {} began", name(0));
     }
@@ -34,7 +34,7 @@ pub(crate) fn in_words(moment: f64, rows: &Rows) -> String {
     if rows.recording[after] != rows.recording[after - 1] {
         return format!("between {} and {}", name(after - 1), name(after));
     }
-    let local = rows.local_time[after] - (rows.contexts[after].time - moment);
+    let local = rows.local_time[after] - (rows.contexts()[after].time - moment);
     format!("in {}, {local:.1} s after its first reading", name(after))
 }
 
@@ -51,7 +51,7 @@ pub(crate) fn deviation(
         let mut trial = taken.trial.clone();
         trial.shapes[place] = moment;
         let trace = trial::trace(&trial, library, rows);
-        baselines::projected(&[trace], &rows.root_weight, &base.span).swap_remove(0)
+        baselines::projected(&[trace], rows.root_weight(), &base.span).swap_remove(0)
     };
     let moment = taken.trial.shapes[place];
     let mut unexplained = found.full.residual.clone();
@@ -62,8 +62,13 @@ pub(crate) fn deviation(
         all - dot(&unexplained, &trace).powi(2) / energy(&trace).max(f64::MIN_POSITIVE)
     };
     // The moments that can be told apart lie between one reading that counts and the next.
-    let mut times: Vec<f64> =
-        rows.contexts.iter().zip(&rows.root_weight).filter(|(_, w)| **w > 0.0).map(|(c, _)| c.time).collect();
+    let mut times: Vec<f64> = rows
+        .contexts()
+        .iter()
+        .zip(rows.root_weight())
+        .filter(|(_, w)| **w > 0.0)
+        .map(|(c, _)| c.time)
+        .collect();
     times.dedup();
     let gaps = times.len().checked_sub(1).filter(|g| *g > 0)?;
     let here = times.partition_point(|t| *t < moment).clamp(1, gaps);
