@@ -42,79 +42,104 @@ fn settable(value: f64) -> f64 {
     }
 }
 
-/// Recordings that tell effects apart, cheapest first, for a muscle and its pressures (Pa).
-fn menu(muscle: &Muscle<f64>, low: f64, high: f64) -> Vec<Item> {
-    let levels = MENU_PRESSURES.map(|part| settable((part * high + (1.0 - part) * low) * 1e-3));
-    let slow = settable((free_stroke(muscle, high) * 1e3 / SLOW_STROKE).max(1e-3));
-    let set = |p: f64| Step::Pressure { to_kpa: p, rate_kpa_s: Some(50.0), settle_s: 2.0 };
-    let loops = |part: f64, speed: f64, count: u32| Step::Cycles {
-        to: Place { free: Some(part), ..Place::default() },
-        speed_mm_s: settable(speed),
-        count,
-    };
-    let go = |part: f64, speed: f64| Step::Move {
-        to: Place { free: Some(part), ..Place::default() },
-        speed_mm_s: settable(speed),
-    };
-    let each = |name: &str, inner: &dyn Fn(f64) -> Vec<Step>| {
-        let mut step =
-            vec![Step::File { name: "tare_before".into() }, Step::Tare { seconds: 10.0 }, Step::EndFile];
-        for p in levels {
-            step.extend([set(p), Step::File { name: format!("{name}_{p:.0}kPa") }]);
+/// What the protocols of the menu are made of, for one muscle.
+struct Bench {
+    /// Two pressures, kPa.
+    levels: [f64; 2],
+    /// A slow speed, mm/s.
+    slow: f64,
+}
+
+impl Bench {
+    fn new(muscle: &Muscle<f64>, low: f64, high: f64) -> Self {
+        Self {
+            levels: MENU_PRESSURES.map(|part| settable((part * high + (1.0 - part) * low) * 1e-3)),
+            slow: settable((free_stroke(muscle, high) * 1e3 / SLOW_STROKE).max(1e-3)),
+        }
+    }
+
+    /// Loops to a part of the free stroke, at a multiple of the slow speed.
+    fn loops(&self, part: f64, times: f64, count: u32) -> Step {
+        let to = Place { free: Some(part), ..Place::default() };
+        Step::Cycles { to, speed_mm_s: settable(times * self.slow), count }
+    }
+
+    /// A way to a part of the free stroke.
+    fn go(&self, part: f64, times: f64) -> Step {
+        let to = Place { free: Some(part), ..Place::default() };
+        Step::Move { to, speed_mm_s: settable(times * self.slow) }
+    }
+
+    /// The same steps at both pressures, with tares before and after.
+    fn each(&self, name: &str, inner: impl Fn(f64) -> Vec<Step>) -> Protocol {
+        let tare =
+            |name: &str| [Step::File { name: name.into() }, Step::Tare { seconds: 10.0 }, Step::EndFile];
+        let mut step = tare("tare_before").to_vec();
+        for p in self.levels {
+            step.push(Step::Pressure { to_kpa: p, rate_kpa_s: Some(50.0), settle_s: 2.0 });
+            step.push(Step::File { name: format!("{name}_{p:.0}kPa") });
             step.extend(inner(p));
             step.push(Step::EndFile);
         }
-        step.extend([Step::File { name: "tare_after".into() }, Step::Tare { seconds: 10.0 }, Step::EndFile]);
+        step.extend(tare("tare_after"));
         Protocol { name: name.to_owned(), sample_hz: 20.0, step }
-    };
-    let speeds = each("speeds", &|_| {
-        [0.3, 1.0, 4.0, 16.0].map(|v| loops(0.9, v * slow, if v < 1.0 { 1 } else { 2 })).to_vec()
-    });
-    let dwells = each("dwells", &|_| {
-        let mut s = vec![loops(0.9, 2.0 * slow, 1)];
-        for hold in [1.0, 10.0, 100.0] {
-            s.extend([
-                go(0.5, 2.0 * slow),
-                Step::Hold { seconds: hold },
-                go(0.9, 2.0 * slow),
-                go(0.5, 2.0 * slow),
-                Step::Hold { seconds: hold },
-                go(0.1, 2.0 * slow),
-            ]);
-        }
-        s
-    });
-    let nested = each("nested", &|_| {
-        [0.9, 0.25, 0.75, 0.4, 0.6, 0.25, 0.9, 0.0, 0.9, 0.25, 0.75, 0.4, 0.6, 0.25, 0.9, 0.0]
-            .iter()
-            .enumerate()
-            .map(|(i, p)| go(*p, if i < 8 { slow } else { 8.0 * slow }))
-            .collect()
-    });
-    let ramps = each("ramps", &|p| {
-        let mut s = Vec::new();
-        for part in [0.0, 0.3, 0.6] {
-            s.push(go(part, 4.0 * slow));
-            for to in [0.4 * p, p, 0.4 * p, p] {
-                let rate = settable(p / 20.0);
-                s.push(Step::Pressure { to_kpa: settable(to), rate_kpa_s: Some(rate), settle_s: 2.0 });
+    }
+
+    fn speeds(&self) -> Protocol {
+        self.each("speeds", |_| {
+            [0.3, 1.0, 4.0, 16.0].map(|v| self.loops(0.9, v, if v < 1.0 { 1 } else { 2 })).to_vec()
+        })
+    }
+
+    fn dwells(&self) -> Protocol {
+        self.each("dwells", |_| {
+            let mut steps = vec![self.loops(0.9, 2.0, 1)];
+            for seconds in [1.0, 10.0, 100.0] {
+                for turn in [0.9, 0.1] {
+                    steps.extend([self.go(0.5, 2.0), Step::Hold { seconds }, self.go(turn, 2.0)]);
+                }
             }
-        }
-        s
-    });
-    let mut rest = each("rest", &|_| vec![loops(0.9, slow, 3)]);
-    let again = rest.step.clone();
-    rest.step.push(Step::Rest { seconds: 1800.0 });
-    rest.step.extend(again.into_iter().map(|s| match s {
-        Step::File { name } => Step::File { name: format!("{name}_again") },
-        other => other,
-    }));
+            steps
+        })
+    }
+
+    fn nested(&self) -> Protocol {
+        let places = [0.9, 0.25, 0.75, 0.4, 0.6, 0.25, 0.9, 0.0];
+        self.each("nested", |_| {
+            [1.0, 8.0].iter().flat_map(|times| places.map(|p| self.go(p, *times))).collect()
+        })
+    }
+
+    fn ramps(&self) -> Protocol {
+        self.each("ramps", |p| {
+            let rate_kpa_s = Some(settable(p / 20.0));
+            let to = |to: f64| Step::Pressure { to_kpa: settable(to), rate_kpa_s, settle_s: 2.0 };
+            let ramps = || [0.4 * p, p, 0.4 * p, p].map(to);
+            [0.0, 0.3, 0.6].iter().flat_map(|x| std::iter::once(self.go(*x, 4.0)).chain(ramps())).collect()
+        })
+    }
+
+    fn rest(&self) -> Protocol {
+        let mut rest = self.each("rest", |_| vec![self.loops(0.9, 1.0, 3)]);
+        let again = rest.step.clone();
+        rest.step.push(Step::Rest { seconds: 1800.0 });
+        rest.step.extend(again.into_iter().map(|s| match s {
+            Step::File { name } => Step::File { name: format!("{name}_again") },
+            other => other,
+        }));
+        rest
+    }
+}
+
+/// Recordings that tell effects apart, cheapest first, for a muscle and its pressures (Pa).
+fn menu(muscle: &Muscle<f64>, low: f64, high: f64) -> Vec<Item> {
+    let bench = Bench::new(muscle, low, high);
     vec![
-        Item { motion: Motion::Speeds, minutes: 8.0, protocol: speeds },
-        Item { motion: Motion::Dwells, minutes: 10.0, protocol: dwells },
-        Item { motion: Motion::NestedLoops, minutes: 6.0, protocol: nested },
-        Item { motion: Motion::PressureRamps, minutes: 9.0, protocol: ramps },
-        Item { motion: Motion::Rest, minutes: 38.0, protocol: rest },
+        Item { motion: Motion::Speeds, minutes: 8.0, protocol: bench.speeds() },
+        Item { motion: Motion::Dwells, minutes: 10.0, protocol: bench.dwells() },
+        Item { motion: Motion::NestedLoops, minutes: 6.0, protocol: bench.nested() },
+        Item { motion: Motion::PressureRamps, minutes: 9.0, protocol: bench.ramps() },
+        Item { motion: Motion::Rest, minutes: 38.0, protocol: bench.rest() },
     ]
 }
 

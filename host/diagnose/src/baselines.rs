@@ -11,6 +11,8 @@
 mod plan;
 mod reach;
 
+use model_core::effects::Context;
+
 use self::plan::{Part, Plan};
 pub(crate) use self::reach::{Give, Reach, cosine, keeps, projected};
 use super::criteria::baseline::{DISTINCT_DIRECTION, FRICTION_LIMITS, LINEARISATIONS};
@@ -76,136 +78,158 @@ impl Baseline {
 
     /// Weighted mean square of the residual, N².
     pub(crate) fn per_row(&self, rows: &Rows) -> f64 {
-        energy(&self.residual) / energy(&rows.root_weight).max(1e-12)
+        energy(&self.residual) / energy(rows.root_weight()).max(1e-12)
     }
 }
 
 /// Weighted root mean square of the measured force itself, N: the error of a model that knows nothing.
 pub(crate) fn measured_rms(rows: &Rows) -> f64 {
-    let sum: f64 = rows.force.iter().zip(&rows.root_weight).map(|(f, w)| (f * w).powi(2)).sum();
-    (sum / energy(&rows.root_weight).max(1e-12)).sqrt()
+    let sum: f64 = rows.force.iter().zip(rows.root_weight()).map(|(f, w)| (f * w).powi(2)).sum();
+    (sum / energy(rows.root_weight()).max(1e-12)).sqrt()
+}
+
+/// What friction and friction-free force a round of the fit is linearised about.
+struct Iterate {
+    friction: Vec<f64>,
+    quasi: Vec<f64>,
 }
 
 /// Fits a baseline together with given effect columns (N per unit amplitude, unweighted).
+///
+/// It begins from the model that the rows are linearised about, where there is one.
 pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
-    let n = rows.len();
     let plan = Plan::new(rows, kind);
     let live: Vec<f64> = rows.vented.iter().map(|v| if *v { 0.0 } else { 1.0 }).collect();
-    // From what was fitted before, where there is anything.
-    let begun = rows.contexts.iter().any(|c| c.quasi != 0.0);
-    let mut friction: Vec<f64> = rows.contexts.iter().map(|c| c.friction).collect();
-    let mut quasi: Vec<f64> =
-        rows.contexts.iter().map(|c| if begun { c.quasi } else { c.pressure * c.area }).collect();
-    let mut out: Option<Baseline> = None;
-    for _ in 0..if begun { LINEARISATIONS.1 } else { LINEARISATIONS.0 } {
-        let factor: Vec<f64> =
-            (0..n).map(|i| live[i] * (1.0 - friction[i] * rows.contexts[i].direction)).collect();
-        let column = |part: &Part| -> Vec<f64> {
-            let (shapes, contexts, w) = (&rows.shapes, &rows.contexts, &rows.root_weight);
-            let of = |value: &dyn Fn(usize) -> f64| (0..n).map(|i| value(i) * w[i]).collect::<Vec<f64>>();
-            match *part {
-                Part::Deadband => of(&|i| -factor[i] * shapes[i].area),
-                Part::Elastic(k, f) => of(&|i| factor[i] * shapes[i].elastic[k] * plan.functions[f][i]),
-                Part::Yeoh(k) => of(&|i| factor[i] * shapes[i].yeoh[k]),
-                Part::Friction(f) => {
-                    of(&|i| -live[i] * contexts[i].direction * quasi[i] * plan.functions[f][i])
-                }
-                Part::Area => of(&|i| factor[i] * shapes[i].area * contexts[i].pressure),
-                Part::AreaSlope => of(&|i| factor[i] * shapes[i].area_slope * contexts[i].pressure),
-                Part::Settling => of(&|i| -live[i] * rows.sign[i] * quasi[i] * rows.settling[i]),
-                Part::Unsettled | Part::Rest(..) | Part::Ramping => {
-                    of(&|i| -live[i] * friction[i] * quasi[i] * part.departure(rows, i))
-                }
-            }
-        };
-        let mut joint = Basis::default();
-        for part in &plan.hard {
-            joint.push(column(part));
-        }
-        let hard = joint.clone();
-        for part in &plan.soft {
-            joint.push_beyond(column(part), DISTINCT_DIRECTION);
-        }
-        let soft = joint.columns(hard.rank(), n);
-        let of_friction: Vec<bool> = joint.kept()[hard.rank()..]
-            .iter()
-            .map(|j| matches!(plan.soft[j - plan.hard.len()], Part::Friction(_)))
-            .collect();
-        let keep = match kind {
-            Kind::Soft(give) => keeps(give, &of_friction, energy(&rows.root_weight)),
-            _ => Vec::new(),
-        };
-        // With friction's coefficients counted from zero, not from the last round, so that a prior holds for the whole.
-        let y: Vec<f64> = (0..n)
-            .map(|i| {
-                let pressed = factor[i] * rows.shapes[i].area * rows.contexts[i].pressure;
-                let rubbed = live[i] * rows.contexts[i].direction * quasi[i] * friction[i];
-                (rows.force[i] - pressed - rubbed) * rows.root_weight[i]
-            })
-            .collect();
-        let mut span = Reach { hard, soft, of_friction, keep, ..Reach::default() };
-        let mut white = y.clone();
-        span.whiten(&mut white);
-        for effect in effects {
-            let mut core = weighted(effect, &rows.root_weight);
-            span.hard.project_out(&mut core);
-            let mut z = core.clone();
-            span.whiten(&mut z);
-            span.chosen.push(z);
-            span.chosen_core.push(core);
-        }
-        let amplitudes = span.chosen.solve(&white);
-        let mut freed = y.clone();
-        for (effect, a) in effects.iter().zip(&amplitudes) {
-            for i in 0..n {
-                freed[i] -= a * effect[i] * rows.root_weight[i];
-            }
-        }
-        let mut core = y;
-        span.hard.project_out(&mut core);
-        let mut coefficients = joint.along(&freed);
-        for (c, keep) in coefficients[span.hard.rank()..].iter_mut().zip(&span.keep) {
-            *c *= 1.0 - keep * keep;
-        }
-        let solution = joint.unravel(&coefficients);
-        let fitted = values(rows, &plan, &solution, &live);
-        quasi.clone_from(&fitted.quasi);
-        friction.clone_from(&fitted.friction);
-        let raw_residual: Vec<f64> = (0..n)
-            .map(|i| {
-                let added: f64 = effects.iter().zip(&amplitudes).map(|(e, a)| a * e[i]).sum();
-                rows.force[i] - fitted.force[i] - added
-            })
-            .collect();
-        let nodes = |order: usize| -> Vec<f64> {
-            let parts = plan.hard.iter().zip(&solution);
-            parts.filter(|(p, _)| matches!(p, Part::Elastic(k, _) if *k == order)).map(|(_, v)| *v).collect()
-        };
-        out = Some(Baseline {
-            kind,
-            residual: white,
-            core,
-            raw_residual,
-            amplitudes,
-            deadband: fitted.deadband,
-            quasi: fitted.quasi,
-            gaylord: fitted.gaylord,
-            friction: fitted.friction,
-            stiffness: fitted.stiffness,
-            elastic_nodes: (0..ORDERS).map(nodes).collect(),
-            friction_nodes: plan
-                .hard
-                .iter()
-                .zip(&solution)
-                .filter(|(p, _)| matches!(p, Part::Friction(_)))
-                .map(|(_, v)| *v)
-                .collect(),
-            span,
-        });
+    let contexts = rows.contexts();
+    let begun = contexts.iter().any(|c| c.quasi != 0.0);
+    let first = Iterate {
+        friction: contexts.iter().map(|c| c.friction).collect(),
+        quasi: contexts.iter().map(|c| if begun { c.quasi } else { c.pressure * c.area }).collect(),
+    };
+    let mut fitted = round(rows, kind, effects, &plan, &live, &first);
+    for _ in 1..if begun { LINEARISATIONS.1 } else { LINEARISATIONS.0 } {
+        let about = Iterate { friction: fitted.friction, quasi: fitted.quasi };
+        fitted = round(rows, kind, effects, &plan, &live, &about);
     }
-    let mut fitted = out.unwrap_or_else(|| unreachable!("the loop above runs"));
     fitted.span.chosen.project_out(&mut fitted.residual);
     fitted
+}
+
+/// One column of a baseline, weighted.
+fn column(rows: &Rows, plan: &Plan, live: &[f64], at: &Iterate, factor: &[f64], part: &Part) -> Vec<f64> {
+    let (shapes, contexts, w) = (&rows.shapes, rows.contexts(), rows.root_weight());
+    let Iterate { friction, quasi } = at;
+    let of = |value: &dyn Fn(usize) -> f64| (0..rows.len()).map(|i| value(i) * w[i]).collect::<Vec<f64>>();
+    match *part {
+        Part::Deadband => of(&|i| -factor[i] * shapes[i].area),
+        Part::Elastic(k, f) => of(&|i| factor[i] * shapes[i].elastic[k] * plan.functions[f][i]),
+        Part::Yeoh(k) => of(&|i| factor[i] * shapes[i].yeoh[k]),
+        Part::Friction(f) => of(&|i| -live[i] * contexts[i].direction * quasi[i] * plan.functions[f][i]),
+        Part::Area => of(&|i| factor[i] * shapes[i].area * contexts[i].pressure),
+        Part::AreaSlope => of(&|i| factor[i] * shapes[i].area_slope * contexts[i].pressure),
+        Part::Settling => of(&|i| -live[i] * rows.sign[i] * quasi[i] * rows.at_rest().settling[i]),
+        Part::Unsettled | Part::Rest(..) | Part::Ramping => {
+            of(&|i| -live[i] * friction[i] * quasi[i] * part.departure(rows, i))
+        }
+    }
+}
+
+/// What the baseline and the effects beside it express, and the basis of all its columns.
+fn reach(
+    rows: &Rows,
+    kind: Kind,
+    effects: &[Vec<f64>],
+    plan: &Plan,
+    column: impl Fn(&Part) -> Vec<f64>,
+) -> (Reach, Basis) {
+    let mut joint = Basis::default();
+    for part in &plan.hard {
+        joint.push(column(part));
+    }
+    let hard = joint.clone();
+    for part in &plan.soft {
+        joint.push_beyond(column(part), DISTINCT_DIRECTION);
+    }
+    let soft = joint.columns(hard.rank(), rows.len());
+    let of_friction: Vec<bool> = joint.kept()[hard.rank()..]
+        .iter()
+        .map(|j| matches!(plan.soft[j - plan.hard.len()], Part::Friction(_)))
+        .collect();
+    let keep = match kind {
+        Kind::Soft(give) => keeps(give, &of_friction, energy(rows.root_weight())),
+        _ => Vec::new(),
+    };
+    let mut span = Reach { hard, soft, of_friction, keep, ..Reach::default() };
+    for effect in effects {
+        let mut core = weighted(effect, rows.root_weight());
+        span.hard.project_out(&mut core);
+        let mut z = core.clone();
+        span.whiten(&mut z);
+        span.chosen.push(z);
+        span.chosen_core.push(core);
+    }
+    (span, joint)
+}
+
+/// One round of the fit: least squares with the friction linearised about the last round.
+fn round(rows: &Rows, kind: Kind, effects: &[Vec<f64>], plan: &Plan, live: &[f64], at: &Iterate) -> Baseline {
+    let n = rows.len();
+    let (contexts, w) = (rows.contexts(), rows.root_weight());
+    let Iterate { friction, quasi } = at;
+    let factor: Vec<f64> = (0..n).map(|i| live[i] * (1.0 - friction[i] * contexts[i].direction)).collect();
+    let (span, joint) = reach(rows, kind, effects, plan, |p| column(rows, plan, live, at, &factor, p));
+    // With friction's coefficients counted from zero, not from the last round, so that a prior holds for the whole.
+    let y: Vec<f64> = (0..n)
+        .map(|i| {
+            let pressed = factor[i] * rows.shapes[i].area * contexts[i].pressure;
+            let rubbed = live[i] * contexts[i].direction * quasi[i] * friction[i];
+            (rows.force[i] - pressed - rubbed) * w[i]
+        })
+        .collect();
+    let mut white = y.clone();
+    span.whiten(&mut white);
+    let amplitudes = span.chosen.solve(&white);
+    let mut freed = y.clone();
+    for (effect, a) in effects.iter().zip(&amplitudes) {
+        for i in 0..n {
+            freed[i] -= a * effect[i] * w[i];
+        }
+    }
+    let mut core = y;
+    span.hard.project_out(&mut core);
+    let mut coefficients = joint.along(&freed);
+    for (c, keep) in coefficients[span.hard.rank()..].iter_mut().zip(&span.keep) {
+        *c *= 1.0 - keep * keep;
+    }
+    let solution = joint.unravel(&coefficients);
+    let fitted = values(rows, plan, &solution, live);
+    let raw_residual: Vec<f64> = (0..n)
+        .map(|i| {
+            let added: f64 = effects.iter().zip(&amplitudes).map(|(e, a)| a * e[i]).sum();
+            rows.force[i] - fitted.force[i] - added
+        })
+        .collect();
+    let nodes = |wanted: &dyn Fn(&Part) -> bool| -> Vec<f64> {
+        plan.hard.iter().zip(&solution).filter(|(p, _)| wanted(p)).map(|(_, v)| *v).collect()
+    };
+    let orders = 0..ORDERS;
+    Baseline {
+        kind,
+        residual: white,
+        core,
+        raw_residual,
+        amplitudes,
+        deadband: fitted.deadband,
+        quasi: fitted.quasi,
+        gaylord: fitted.gaylord,
+        friction: fitted.friction,
+        stiffness: fitted.stiffness,
+        elastic_nodes: orders
+            .map(|k| nodes(&|p| matches!(p, Part::Elastic(order, _) if *order == k)))
+            .collect(),
+        friction_nodes: nodes(&|p| matches!(p, Part::Friction(_))),
+        span,
+    }
 }
 
 /// A baseline's forces at every row.
@@ -235,7 +259,7 @@ fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
             v.deadband = *c;
         }
         for i in 0..n {
-            let (shape, context) = (&rows.shapes[i], &rows.contexts[i]);
+            let (shape, context) = (&rows.shapes[i], rows.contexts()[i]);
             match *part {
                 Part::Deadband => {
                     v.gaylord[i] -= c * shape.area;
@@ -263,43 +287,44 @@ fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
         }
     }
     for i in 0..n {
-        let (shape, context) = (&rows.shapes[i], &rows.contexts[i]);
+        let (shape, context) = (&rows.shapes[i], rows.contexts()[i]);
         v.gaylord[i] += context.pressure * shape.area;
         v.stiffness[i] += context.pressure * shape.area_slope;
         v.quasi[i] = v.gaylord[i] + elastic[i];
         v.friction[i] = v.friction[i].clamp(FRICTION_LIMITS.0, FRICTION_LIMITS.1);
-        let late = settling * rows.sign[i] * rows.settling[i];
+        let late = settling * rows.sign[i] * rows.at_rest().settling[i];
         let direction = context.direction + departure[i];
         v.force[i] = live[i] * v.quasi[i] * (1.0 - v.friction[i] * direction - late);
     }
     v
 }
 
-/// Rows at which the muscle hangs slack (no force although the pressure would give some) lose their weight; returns how
-/// many. A slack muscle's force is its floor, not the model's.
-pub(crate) fn mask_slack(rows: &mut Rows, fitted: &Baseline) -> usize {
+/// The rows without those at which the muscle hangs slack (no force although the pressure would give some), and how many these are. A
+/// slack muscle's force is its floor, not the model's.
+pub(crate) fn without_slack(rows: &Rows, fitted: &Baseline) -> (Rows, usize) {
     let strongest = rows.force.iter().copied().fold(0.0, f64::max);
-    let mut masked = 0;
-    for i in 0..rows.len() {
+    let slack = |i: usize| {
         let slack = fitted.quasi[i] < SLACK_MODEL * strongest && rows.force[i] < NO_LOAD * strongest;
-        if slack && !rows.vented[i] && rows.root_weight[i] > 0.0 {
-            rows.root_weight[i] = 0.0;
-            masked += 1;
-        }
-    }
-    masked
+        slack && !rows.vented[i] && rows.root_weight()[i] > 0.0
+    };
+    (rows.without(slack), (0..rows.len()).filter(|i| slack(*i)).count())
 }
 
-/// Writes the baseline's forces and slopes into the rows' contexts, where effects look for them.
-pub(crate) fn into_contexts(rows: &mut Rows, fitted: &Baseline) {
-    for (i, c) in rows.contexts.iter_mut().enumerate() {
+/// The rows linearised about a baseline: its forces and slopes stand in their contexts, where effects look for them.
+pub(crate) fn linearised(rows: &Rows, fitted: &Baseline) -> Rows {
+    let about = |(i, c): (usize, &Context<f64>)| {
         let live = if rows.vented[i] { 0.0 } else { 1.0 };
-        c.corrected_pressure = c.pressure - fitted.deadband;
-        c.friction = fitted.friction[i];
-        c.gaylord = live * fitted.gaylord[i];
-        c.quasi = live * fitted.quasi[i];
-        c.elastic = c.quasi - c.gaylord;
-        c.stiffness = live * fitted.stiffness[i];
-        c.pressure_slope = c.area;
-    }
+        let (quasi, gaylord) = (live * fitted.quasi[i], live * fitted.gaylord[i]);
+        Context {
+            corrected_pressure: c.pressure - fitted.deadband,
+            friction: fitted.friction[i],
+            gaylord,
+            quasi,
+            elastic: quasi - gaylord,
+            stiffness: live * fitted.stiffness[i],
+            pressure_slope: c.area,
+            ..*c
+        }
+    };
+    rows.with_contexts(rows.contexts().iter().enumerate().map(about).collect())
 }

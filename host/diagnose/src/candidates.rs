@@ -2,12 +2,9 @@
 
 use model_core::effects::{Axis, Context, Imitates, Info, MEMORY, Parameter, Role, Traits, Vented};
 
-use super::criteria::candidates::{
-    CHANGE_POINTS, LAW_ERROR, LOGARITHMIC_RANGE, LOW_END, RANGE_OVERSHOOT, SHAPE_GRID,
-};
+use super::criteria::candidates::{CHANGE_POINTS, LAW_ERROR, LOGARITHMIC_RANGE, RANGE_OVERSHOOT, SHAPE_GRID};
 use super::linear::Sign;
 use super::rows::Rows;
-use super::trial::Trial;
 use pam_fit::bench::{self, Span, read_when_vented};
 
 /// The equations of a candidate.
@@ -86,7 +83,7 @@ impl Candidate {
     }
 
     /// Its shape parameters, with ranges that the recordings reach.
-    fn shapes(&self) -> impl Iterator<Item = Parameter> + '_ {
+    pub(super) fn shapes(&self) -> impl Iterator<Item = Parameter> + '_ {
         self.info.parameters.iter().filter(|p| p.role == Role::Shape).map(|p| {
             let (low, high) = self.span.range(p);
             Parameter { low, high, ..*p }
@@ -171,19 +168,10 @@ impl Candidate {
         (self.traits.consistent)(amplitudes, shapes)
     }
 
-    /// Whether a trial stays within what is known of the effect: no shape at the low end of its range, where a law becomes a simpler one (a
-    /// memory a rate, a breakaway plain friction), and no lag beyond what anybody has seen. Other sizes go by the muscle and the bench.
-    pub(super) fn keeps_within_the_known(&self, trial: &Trial) -> bool {
-        let amplitudes = self.info.parameters.iter().zip(&trial.amplitudes);
-        let seen =
-            amplitudes.filter(|(p, _)| p.unit == "s").all(|(p, a)| a.abs() <= p.low.abs().max(p.high.abs()));
-        seen && self.shapes().zip(&trial.shapes).all(|(p, s)| unplace(&p, *s) > LOW_END)
-    }
-
     /// Its force per unit of each amplitude, N, over the rows in order.
     pub(crate) fn columns(&self, shapes: &[f64], rows: &Rows) -> Vec<Vec<f64>> {
         let mut memory = [0.0; MEMORY];
-        let mut columns = self.law.columns(&rows.contexts, shapes, &mut memory);
+        let mut columns = self.law.columns(rows.contexts(), shapes, &mut memory);
         for (amplitude, column) in columns.iter_mut().enumerate() {
             let vented_too = read_when_vented(self.traits, amplitude);
             for (value, vented) in column.iter_mut().zip(&rows.vented) {
@@ -205,7 +193,8 @@ fn place(p: &Parameter, u: f64) -> f64 {
     }
 }
 
-fn unplace(p: &Parameter, value: f64) -> f64 {
+/// The share of a parameter's range at which a value stands.
+pub(super) fn unplace(p: &Parameter, value: f64) -> f64 {
     if p.low > 0.0 && p.high > LOGARITHMIC_RANGE * p.low {
         (value / p.low).ln() / (p.high / p.low).ln()
     } else {
@@ -218,7 +207,7 @@ fn unplace(p: &Parameter, value: f64) -> f64 {
 ///
 /// `added` are laws beyond the catalogue.
 pub(crate) fn library(rows: &Rows, added: &[Law]) -> Vec<Candidate> {
-    let span = Span::of(&rows.contexts).unwrap_or(Span {
+    let span = Span::of(rows.contexts()).unwrap_or(Span {
         time: (0.0, 1.0),
         contraction: (0.0, 1.0),
         stroke: (0.0, 1.0),

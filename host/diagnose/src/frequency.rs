@@ -10,6 +10,7 @@ use super::criteria::location::{
     LINE_NEIGHBOURS, LINE_PERIODS, LINE_SHUFFLES, LINE_WIDTH, LONGEST_STRETCH, SHORTEST_STRETCH, STRETCHES,
 };
 use super::linear::{Random, median};
+use super::locate::shuffled;
 use super::rows::Rows;
 
 /// A line in the spectrum of the misfit.
@@ -118,16 +119,7 @@ pub(crate) fn line(
         .into_par_iter()
         .map(|s| {
             let mut random = Random(seed.wrapping_mul(1000).wrapping_add(s as u64));
-            let mut order: Vec<usize> = (0..blocks.len()).collect();
-            for i in (1..order.len()).rev() {
-                order.swap(i, random.below(i + 1));
-            }
-            let mut shuffled = Vec::with_capacity(residual.len());
-            for o in order {
-                let (from, to) = blocks[o];
-                let shift = random.below(to - from);
-                shuffled.extend((0..to - from).map(|k| residual[from + (k + shift) % (to - from)]));
-            }
+            let shuffled = shuffled(residual, blocks, &mut random);
             usize::from(strongest(&power(&shuffled, length), lowest).is_some_and(|s| s.1 >= height))
         })
         .sum();

@@ -15,7 +15,7 @@ use super::held_out::Unseen;
 use super::linear::energy;
 use super::rows::Rows;
 use super::search::search;
-use super::select::{Found, Taken, look, refit, rivals};
+use super::select::{Found, Joint, Taken, look, refit, rivals};
 use super::trial::Trial;
 use super::verdict::{HeldOut, Missing, Why};
 use super::why::UnseenError;
@@ -59,7 +59,7 @@ pub(super) fn check(given: &[Law]) -> Result<()> {
 
 /// Fits the given members of the library beside the base, each beside the others.
 pub(super) fn fitted(
-    rows: &mut Rows,
+    rows: &Rows,
     library: &[Candidate],
     blocked: f64,
     step: f64,
@@ -68,7 +68,7 @@ pub(super) fn fitted(
     // The search as it always is, which may take nothing: noise, base and a first look at every effect.
     let everything: Vec<usize> = (0..library.len()).collect();
     let mut found = search(rows, library, blocked, step, &everything);
-    let weight = energy(&rows.root_weight).max(1e-12);
+    let weight = energy(rows.root_weight()).max(1e-12);
     let scale = Scale {
         weight,
         independent: found.noise.independent.max(rows.blocks as f64),
@@ -78,6 +78,7 @@ pub(super) fn fitted(
     let noise_energy = scale.sigma * scale.sigma * weight;
     let mut chosen: Vec<Trial> = Vec::new();
     for &index in given {
+        let rows = &found.rows;
         let ground = Ground::new(&found.full, scale);
         let (best, p) = if chosen.is_empty() {
             (found.first_look.clone(), found.first_p.clone())
@@ -98,28 +99,36 @@ pub(super) fn fitted(
         }
         let share = trial.gain / found.above;
         chosen.push(trial.clone());
-        (found.full, found.traces) = refit(rows, kind, &mut chosen, library);
+        let joint = refit(rows, kind, chosen, library);
+        chosen = joined(&mut found, joint);
         found.bare = metric;
         let p = place.map_or(1.0, |i| p[i]);
-        found.taken.push(Taken { trial, p, share, rivals, rms: found.full.rms(rows) });
+        found.taken.push(Taken { trial, p, share, rivals, rms: found.full.rms(&found.rows) });
     }
     // What was fitted first did not know of what came after it.
     for place in 0..chosen.len().saturating_sub(1) {
         let mut others = chosen.clone();
         let own = others.remove(place);
-        let (without, _) = refit(rows, found.full.kind, &mut others, library);
-        let again = Ground::new(&without, scale).refine(&own, library, rows);
+        let without = refit(&found.rows, found.full.kind, others, library);
+        let again = Ground::new(&without.base, scale).refine(&own, library, &without.rows);
         if again.gain > 0.0 {
             chosen[place] = again;
         }
-        (found.full, found.traces) = refit(rows, found.full.kind, &mut chosen, library);
+        let joint = refit(&without.rows, found.full.kind, chosen, library);
+        chosen = joined(&mut found, joint);
     }
     for (taken, trial) in found.taken.iter_mut().zip(chosen) {
         taken.trial = trial;
-        taken.rms = found.full.rms(rows);
+        taken.rms = found.full.rms(&found.rows);
     }
-    let held = Unseen::new(rows, found.full.kind, &found.traces).held_out(&found.traces, scale.sigma);
+    let held = Unseen::new(&found.rows, found.full.kind, &found.traces).held_out(&found.traces, scale.sigma);
     (found, held)
+}
+
+/// Enters a joint fit into what was found; gives the effects with its amplitudes.
+fn joined(found: &mut Found, joint: Joint) -> Vec<Trial> {
+    (found.rows, found.full, found.traces) = (joint.rows, joint.base, joint.traces);
+    joint.trials
 }
 
 /// The best of an effect where it is not worth its free numbers: something of it rather than nothing.
@@ -137,8 +146,8 @@ fn forced(index: usize, ground: &Ground<'_>, library: &[Candidate], rows: &Rows)
 }
 
 /// Marks the names as given, and says what the recordings say of each.
-pub(super) fn judge(missing: &mut [Missing], found: &Found, rows: &Rows, held: &HeldOut) {
-    let unseen_rows = Unseen::new(rows, found.full.kind, &found.traces);
+pub(super) fn judge(missing: &mut [Missing], found: &Found, held: &HeldOut) {
+    let unseen_rows = Unseen::new(&found.rows, found.full.kind, &found.traces);
     for (i, (m, taken)) in missing.iter_mut().zip(&found.taken).enumerate() {
         let trial = &taken.trial;
         let sized = trial.amplitudes.iter().any(|a| *a != 0.0);

@@ -87,7 +87,7 @@ impl<'a> Ground<'a> {
         let z: Vec<Vec<f64>> = columns
             .iter()
             .map(|c| {
-                let mut v = weighted(c, &rows.root_weight);
+                let mut v = weighted(c, rows.root_weight());
                 span.hard.project_out(&mut v);
                 v
             })
@@ -121,7 +121,7 @@ impl<'a> Ground<'a> {
     ) -> Trial {
         let given = self.chosen.given;
         let (columns, products, z) = self.products(candidate, shapes, rows);
-        let weight = &rows.root_weight;
+        let weight = rows.root_weight();
         let before: f64 =
             columns.iter().map(|c| c.iter().zip(weight).map(|(v, w)| (v * w).powi(2)).sum::<f64>()).sum();
         let after: f64 = z.iter().map(|v| energy(v)).sum();
@@ -202,8 +202,8 @@ impl<'a> Ground<'a> {
             } else {
                 columns[0][i]
             };
-            trial.size += (raw * rows.root_weight[i]).powi(2);
-            if rows.root_weight[i] > 0.0 {
+            trial.size += (raw * rows.root_weight()[i]).powi(2);
+            if rows.root_weight()[i] > 0.0 {
                 trial.peak = trial.peak.max(raw.abs());
             }
         }
@@ -276,10 +276,10 @@ impl<'a> Ground<'a> {
     pub(crate) fn scan(&self, library: &[Candidate], rows: &Rows) -> Vec<Trial> {
         let work: Vec<(usize, Vec<f64>)> =
             library.iter().enumerate().flat_map(|(i, c)| c.grid().into_iter().map(move |g| (i, g))).collect();
-        rows.progress.stage("trying every effect", work.len() as u64);
+        rows.progress().stage("trying every effect", work.len() as u64);
         let attempt = |(i, shapes): &(usize, Vec<f64>)| {
             let trial = self.attempt(*i, &library[*i], shapes, rows, false);
-            rows.progress.step();
+            rows.progress().step();
             trial
         };
         work.par_iter().map(attempt).collect()

@@ -30,7 +30,7 @@ struct Groups {
 fn split(split: Split, rows: &Rows, key: &dyn Fn(usize) -> u32) -> Groups {
     let group: Vec<u32> = (0..rows.len()).map(key).collect();
     let mut groups: Vec<u32> =
-        group.iter().zip(&rows.root_weight).filter(|(_, w)| **w > 0.0).map(|(g, _)| *g).collect();
+        group.iter().zip(rows.root_weight()).filter(|(_, w)| **w > 0.0).map(|(g, _)| *g).collect();
     groups.sort_unstable();
     groups.dedup();
     Groups { split, group, groups }
@@ -42,48 +42,22 @@ fn stride(rows: &Rows) -> usize {
 
 /// Every n-th row, with columns over them.
 pub(super) fn thin(rows: &Rows, traces: &[Vec<f64>]) -> (Rows, Vec<Vec<f64>>) {
-    let keep: Vec<usize> = (0..rows.len()).step_by(stride(rows)).collect();
-    let pick = |v: &Vec<f64>| keep.iter().map(|i| v[*i]).collect::<Vec<f64>>();
-    let pick_u = |v: &Vec<u32>| keep.iter().map(|i| v[*i]).collect::<Vec<u32>>();
-    let thinned = Rows {
-        progress: rows.progress.clone(),
-        contexts: keep.iter().map(|i| rows.contexts[*i]).collect(),
-        shapes: keep.iter().map(|i| rows.shapes[*i]).collect(),
-        force: pick(&rows.force),
-        root_weight: pick(&rows.root_weight),
-        vented: keep.iter().map(|i| rows.vented[*i]).collect(),
-        recording: pick_u(&rows.recording),
-        block: pick_u(&rows.block),
-        cycle: pick_u(&rows.cycle),
-        level: pick_u(&rows.level),
-        levels: rows.levels.clone(),
-        steady: rows.steady,
-        isometric: rows.isometric,
-        sign: pick(&rows.sign),
-        still: pick(&rows.still),
-        settling: pick(&rows.settling),
-        unsettled: pick(&rows.unsettled),
-        rest: pick_u(&rows.rest),
-        on_ramp: keep.iter().map(|i| rows.on_ramp[*i]).collect(),
-        largest: pick(&rows.largest),
-        local_time: pick(&rows.local_time),
-        blocks: rows.blocks,
-        ..Rows::default()
-    };
-    (thinned, traces.iter().map(pick).collect())
+    let stride = stride(rows);
+    let pick = |v: &Vec<f64>| v.iter().step_by(stride).copied().collect::<Vec<f64>>();
+    (rows.thinned(stride), traces.iter().map(pick).collect())
 }
 
 /// Rows that belong to a turn: set aside for their direction alone. Slack rows and ramps beyond the tested pressures, set aside
 /// for other reasons, say nothing about a model that does not claim them.
 fn claimed(rows: &Rows) -> Vec<bool> {
-    let sure = || (0..rows.len()).filter(|i| rows.root_weight[*i] > 0.0);
+    let sure = || (0..rows.len()).filter(|i| rows.root_weight()[*i] > 0.0);
     let strongest = sure().map(|i| rows.force[i]).fold(0.0, f64::max);
-    let low = sure().map(|i| rows.contexts[i].pressure).fold(f64::INFINITY, f64::min);
-    let high = sure().map(|i| rows.contexts[i].pressure).fold(f64::NEG_INFINITY, f64::max);
+    let low = sure().map(|i| rows.contexts()[i].pressure).fold(f64::INFINITY, f64::min);
+    let high = sure().map(|i| rows.contexts()[i].pressure).fold(f64::NEG_INFINITY, f64::max);
     (0..rows.len())
         .map(|i| {
-            let pressure = rows.contexts[i].pressure;
-            rows.root_weight[i] > 0.0
+            let pressure = rows.contexts()[i].pressure;
+            rows.root_weight()[i] > 0.0
                 || (rows.force[i] > NO_LOAD * strongest && low <= pressure && pressure <= high)
         })
         .collect()
@@ -92,38 +66,34 @@ fn claimed(rows: &Rows) -> Vec<bool> {
 /// The strokes that the fitted rows hold. Beyond them a polynomial promises nothing, whatever stands beside it.
 fn strokes(rows: &Rows) -> RangeInclusive<f64> {
     let fitted =
-        || rows.contexts.iter().zip(&rows.root_weight).filter(|(_, w)| **w > 0.0).map(|(c, _)| c.stroke);
+        || rows.contexts().iter().zip(rows.root_weight()).filter(|(_, w)| **w > 0.0).map(|(c, _)| c.stroke);
     fitted().fold(f64::INFINITY, f64::min)..=fitted().fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Sums of squares on rows that the fit did not see: on the sure rows, and with those about the turns.
 fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Groups, tares: bool) -> [f64; 2] {
     let claimed = claimed(rows);
-    rows.progress.stage("predicting what was left out", split.groups.len() as u64);
+    rows.progress().stage("predicting what was left out", split.groups.len() as u64);
     let parts: Vec<([f64; 2], [f64; 2])> = split
         .groups
         .par_iter()
         .map(|g| {
-            rows.progress.step();
-            let mut blind = rows.clone();
-            for (w, group) in blind.root_weight.iter_mut().zip(&split.group) {
-                if group == g {
-                    *w = 0.0;
-                }
-            }
+            rows.progress().step();
+            let blind = rows.without(|i| split.group[i] == *g);
             let reach = strokes(&blind);
             let fitted = baselines::fit(&blind, kind, traces);
             let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
             for i in 0..rows.len() {
                 // Where friction rests was fitted: nothing predicts it.
-                let within = reach.contains(&rows.contexts[i].stroke);
-                let judged = if rows.vented[i] { tares } else { rows.sign[i] != 0.0 && rows.rest[i] == 0 };
+                let within = reach.contains(&rows.contexts()[i].stroke);
+                let judged =
+                    if rows.vented[i] { tares } else { rows.sign[i] != 0.0 && rows.at_rest().rest[i] == 0 };
                 if split.group[i] == *g && within && judged && claimed[i] {
                     let square = fitted.raw_residual[i].powi(2);
                     if square.is_finite() {
                         sums[1] += square;
                         counts[1] += 1.0;
-                        if rows.root_weight[i] > 0.0 {
+                        if rows.root_weight()[i] > 0.0 {
                             sums[0] += square;
                             counts[0] += 1.0;
                         }
@@ -143,7 +113,7 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Groups, tares:
 /// Whether what the base leaves of an effect's trace sits in one group.
 fn seen_once(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Groups) -> bool {
     let base = baselines::fit(rows, kind, &[]);
-    baselines::projected(traces, &rows.root_weight, &base.span).iter().any(|trace| {
+    baselines::projected(traces, rows.root_weight(), &base.span).iter().any(|trace| {
         let of = |g: &u32| {
             trace.iter().zip(&split.group).filter(|(_, h)| *h == g).map(|(v, _)| v * v).sum::<f64>()
         };
@@ -208,7 +178,8 @@ impl Unseen {
             // What a virgin muscle's first stroke alone shows no other stroke can foretell.
             let strokes = strokes(&thin);
             let part = (strokes.end() - strokes.start()) / STROKE_PARTS;
-            let of = |i: usize| ((thin.contexts[i].stroke - strokes.start()) / part).max(0.0) as u32 % FOLDS;
+            let of =
+                |i: usize| ((thin.contexts()[i].stroke - strokes.start()) / part).max(0.0) as u32 % FOLDS;
             split = self::split(Split::StrokeParts, &thin, &of);
         }
         Self { rows: thin, stride: stride(rows), kind, split, tares }

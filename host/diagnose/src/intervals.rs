@@ -98,7 +98,7 @@ fn by_strokes(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<Option<f6
     // The bare baseline's span, not the full one's, which holds the amplitudes themselves.
     let base = baselines::fit(rows, found.full.kind, &[]);
     let columns: Vec<Vec<f64>> = tangents.iter().map(|t| t.column.clone()).collect();
-    let z: Vec<Vec<f64>> = baselines::projected(&columns, &rows.root_weight, &base.span);
+    let z: Vec<Vec<f64>> = baselines::projected(&columns, rows.root_weight(), &base.span);
     let n = z.len();
     let mut apart = Basis::default();
     let told: Vec<bool> = z.iter().map(|z| apart.push_beyond(z.clone(), IDENTIFIABLE)).collect();
@@ -128,11 +128,13 @@ fn by_strokes(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<Option<f6
 fn by_groups(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<f64> {
     let mut columns: Vec<Vec<f64>> = tangents.iter().map(|t| t.column.clone()).collect();
     columns.extend(found.traces.iter().cloned());
-    let (mut thin, mut columns) = thin(rows, &columns);
+    let (thin, mut columns) = thin(rows, &columns);
     // What is left to the tangents is how far the estimate is off.
+    let mut force = thin.force.clone();
     for trace in columns.split_off(tangents.len()) {
-        thin.force.iter_mut().zip(&trace).for_each(|(f, t)| *f -= t);
+        force.iter_mut().zip(&trace).for_each(|(f, t)| *f -= t);
     }
+    let thin = thin.with_force(force);
     let moved = |rows: &Rows| baselines::fit(rows, found.full.kind, &columns).amplitudes;
     let quarter = thin.blocks.div_ceil(FOLDS as usize).max(1) as u32;
     let quarters: Vec<u32> = thin.block.iter().map(|b| b / quarter).collect();
@@ -146,25 +148,15 @@ fn by_groups(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<f64> {
 
 /// Variances of estimates, one group left out at a time; empty where there are too few groups to tell, or too many to try.
 fn jackknife(rows: &Rows, group: &[u32], estimate: &(dyn Fn(&Rows) -> Vec<f64> + Sync)) -> Vec<f64> {
-    let seen = group.iter().zip(&rows.root_weight).filter(|(_, w)| **w > 0.0);
+    let seen = group.iter().zip(rows.root_weight()).filter(|(_, w)| **w > 0.0);
     let mut groups: Vec<u32> = seen.map(|(g, _)| *g).collect();
     groups.sort_unstable();
     groups.dedup();
     if !(FEWEST_GROUPS..=MOST_LEVELS).contains(&groups.len()) {
         return Vec::new();
     }
-    let without: Vec<Vec<f64>> = groups
-        .par_iter()
-        .map(|g| {
-            let mut blind = rows.clone();
-            for (w, of) in blind.root_weight.iter_mut().zip(group) {
-                if of == g {
-                    *w = 0.0;
-                }
-            }
-            estimate(&blind)
-        })
-        .collect();
+    let without: Vec<Vec<f64>> =
+        groups.par_iter().map(|g| estimate(&rows.without(|i| group[i] == *g))).collect();
     let n = without.len() as f64;
     (0..without[0].len())
         .map(|i| {

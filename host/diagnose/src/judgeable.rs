@@ -1,10 +1,10 @@
 //! What can be judged at all, and what is said where nothing can.
 
-use super::answer::Options;
 use super::candidates::library;
 use super::criteria::judgement::{
     CONSTANT_FORCE, DEAD_GAUGE, FEWEST_BLOCKS, FEWEST_ROWS, FORCE_SCALE, ONE_WAY_ROWS,
 };
+use super::options::Options;
 use super::remark::{Remark, Unjudgeable};
 use super::rows::Rows;
 use super::verdict::{Considered, Diagnosis, HeldOut, Outcome, Pattern, Split, Trace, Unexplained, WhyNot};
@@ -12,7 +12,7 @@ use super::verdict::{Considered, Diagnosis, HeldOut, Outcome, Pattern, Split, Tr
 /// The scale of forces: what the highest pressure would give at rest length, or the largest force seen.
 pub(super) fn blocked_force(rows: &Rows) -> f64 {
     let strongest = rows.force.iter().copied().fold(0.0, f64::max);
-    let by_pressure = rows.contexts.iter().map(|c| c.pressure * c.area).fold(0.0, f64::max);
+    let by_pressure = rows.contexts().iter().map(|c| c.pressure * c.area).fold(0.0, f64::max);
     // An outlier must not set the scale.
     if by_pressure > 0.0 { strongest.min(FORCE_SCALE * by_pressure) } else { strongest }
 }
@@ -25,7 +25,7 @@ pub(super) fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<Unjudgeable>
     if rows.blocks < FEWEST_BLOCKS {
         return Some(Unjudgeable::FewStrokes { found: rows.blocks, least: FEWEST_BLOCKS });
     }
-    let judged = || rows.root_weight.iter().zip(&rows.contexts).filter(|(w, _)| **w > 0.0);
+    let judged = || rows.root_weight().iter().zip(rows.contexts()).filter(|(w, _)| **w > 0.0);
     let highest = judged().map(|(_, c)| c.pressure).fold(f64::NEG_INFINITY, f64::max);
     if highest <= DEAD_GAUGE {
         return Some(Unjudgeable::NoPressure { highest });
@@ -33,7 +33,7 @@ pub(super) fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<Unjudgeable>
     let (lo, hi) = rows
         .force
         .iter()
-        .zip(&rows.root_weight)
+        .zip(rows.root_weight())
         .filter(|(_, w)| **w > 0.0)
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (f, _)| (l.min(*f), h.max(*f)));
     if !(hi - lo > CONSTANT_FORCE * blocked.abs().max(1e-9)) || !(blocked > 0.0) {

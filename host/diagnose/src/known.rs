@@ -5,7 +5,6 @@ use std::borrow::Cow;
 use model_core::braid::Braid;
 use model_core::effects::MEMORY;
 
-use super::answer::Asked;
 use super::baselines::{self, Baseline, Kind};
 use super::candidates::Candidate;
 use super::criteria::baseline::TABLE_ORDER;
@@ -13,7 +12,9 @@ use super::criteria::judgement::{CHECK_DEVIATIONS, CHECK_RESOLUTION, CHECKED_PRO
 use super::held_out::Unseen;
 use super::locate::locate;
 use super::rows::{self, Rows};
-use super::verdict::{Considered, Missing, Outcome, ParameterValue, PathStep, Remark, Verdict, Why, WhyNot};
+use super::verdict::{
+    Considered, Diagnosis, Missing, Outcome, ParameterValue, PathStep, Remark, Verdict, Why, WhyNot,
+};
 use pam_data::error::Result;
 use pam_data::recording::Campaign;
 use pam_fit::bench::{BenchName, Candidate as Law};
@@ -43,13 +44,13 @@ impl Known {
         if checks.is_empty() {
             return Ok(known);
         }
-        let (mut rows, fitted) = as_read(campaign, braid)?;
-        baselines::into_contexts(&mut rows, &fitted);
+        let (rows, fitted) = as_read(campaign, braid)?;
+        let rows = baselines::linearised(&rows, &fitted);
         let blocked = rows.force.iter().copied().fold(0.0, f64::max);
         for measured in checks.measured() {
             let peak = |parameters: &[f64]| {
-                let trace = Law::Bench(measured.fault).trace(&rows.contexts, parameters, &mut [0.0; MEMORY]);
-                let counts = trace.iter().zip(&rows.root_weight).filter(|(_, w)| **w > 0.0);
+                let trace = Law::Bench(measured.fault).trace(rows.contexts(), parameters, &mut [0.0; MEMORY]);
+                let counts = trace.iter().zip(rows.root_weight()).filter(|(_, w)| **w > 0.0);
                 counts.map(|(f, _)| f.abs()).fold(0.0, f64::max)
             };
             let further: Vec<f64> = measured
@@ -93,15 +94,14 @@ impl Known {
         self.named.iter().any(is) || (!given.iter().any(|g| candidate.is(*g)) && self.absent.iter().any(is))
     }
 
-    /// Enters what is known into the answer that was given without it.
+    /// Enters what is known into the answer that was given without it, beside a baseline of this kind.
     pub(super) fn enter(
         self,
-        asked: Asked,
+        (mut diagnosis, kind): (Diagnosis, Kind),
         given: &[Law],
         freed: &Campaign,
         braid: &Braid<f64>,
-    ) -> Result<super::Diagnosis> {
-        let Asked { mut diagnosis, kind } = asked;
+    ) -> Result<Diagnosis> {
         for j in self.absent.iter().filter(|j| !given.contains(&Law::Bench(j.measured.fault))) {
             diagnosis.considered.push(Considered {
                 effect: j.measured.fault.info().name.into(),
@@ -171,9 +171,9 @@ impl Known {
 
 /// Recordings with one bladder for all pressures.
 fn as_read(campaign: &Campaign, braid: &Braid<f64>) -> Result<(Rows, Baseline)> {
-    let mut rows = rows::prepare(campaign, braid)?;
+    let (rows, _) = rows::prepare(campaign, braid)?;
     let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
-    baselines::mask_slack(&mut rows, &fitted);
+    let (rows, _) = baselines::without_slack(&rows, &fitted);
     let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
     Ok((rows, fitted))
 }

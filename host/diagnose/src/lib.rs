@@ -51,6 +51,7 @@ pub mod model;
 mod moment;
 mod named;
 mod noise;
+mod options;
 pub mod outcome;
 pub mod planned;
 pub mod remark;
@@ -67,5 +68,6 @@ pub mod verdict;
 pub mod why;
 pub mod why_not;
 
-pub use answer::{Options, diagnose};
+pub use answer::diagnose;
+pub use options::Options;
 pub use verdict::Diagnosis;

@@ -18,7 +18,7 @@ struct Coordinate {
 }
 
 fn coordinates(rows: &Rows) -> Vec<Coordinate> {
-    let c = &rows.contexts;
+    let c = rows.contexts();
     let of = |name, unit, discrete, f: &dyn Fn(usize) -> f64| Coordinate {
         name,
         unit,
@@ -114,7 +114,7 @@ fn smoothed(rows: &Rows, residual: &[f64], half: usize) -> Vec<f64> {
     let n = rows.len();
     let mut prefix = vec![(0.0, 0.0); n + 1];
     for i in 0..n {
-        let w = rows.root_weight[i];
+        let w = rows.root_weight()[i];
         prefix[i + 1] = (prefix[i].0 + residual[i] * w, prefix[i].1 + w * w);
     }
     let mut out = vec![0.0; n];
@@ -124,7 +124,7 @@ fn smoothed(rows: &Rows, residual: &[f64], half: usize) -> Vec<f64> {
             for (j, o) in out.iter_mut().enumerate().take(i).skip(from) {
                 let (a, b) = (j.saturating_sub(half).max(from), (j + half + 1).min(i));
                 let w = prefix[b].1 - prefix[a].1;
-                if w > 0.0 && rows.root_weight[j] > 0.0 {
+                if w > 0.0 && rows.root_weight()[j] > 0.0 {
                     *o = (prefix[b].0 - prefix[a].0) / w;
                 }
             }
@@ -145,102 +145,145 @@ pub(crate) fn locate(
     seed: u64,
 ) -> (Vec<Region>, Vec<Profile>) {
     let smooth = smoothed(rows, before, REGION_SMOOTHING);
-    let local: Vec<f64> = smooth.iter().map(|s| s * s).collect();
+    let mut excess: Vec<f64> = smooth.iter().map(|s| s * s).collect();
     // Noise that the smoothing leaves; independent rows would leave a fifth.
     let floor = (SMOOTHED_NOISE * sigma * sigma)
-        .min(SMOOTHED_NOISE_MOST * local.iter().sum::<f64>() / rows.effective().max(1) as f64);
+        .min(SMOOTHED_NOISE_MOST * excess.iter().sum::<f64>() / rows.effective().max(1) as f64);
+    for (e, w) in excess.iter_mut().zip(rows.root_weight()) {
+        *e = if *w > 0.0 { *e - floor } else { 0.0 };
+    }
     let mut regions = Vec::new();
     let mut profiles = Vec::new();
     let blocks = block_ranges(rows);
-    let steady = (energy(before) / energy(&rows.root_weight).max(1e-12)).sqrt();
+    let steady = (energy(before) / energy(rows.root_weight()).max(1e-12)).sqrt();
     for c in coordinates(rows) {
-        let edges = edges(&c.values, &rows.root_weight, c.discrete);
+        let edges = edges(&c.values, rows.root_weight(), c.discrete);
         if edges.len() < 3 {
             continue;
         }
-        let bins = edges.len() - 1;
-        let bin: Vec<usize> = c.values.iter().map(|v| bin_of(&edges, *v)).collect();
-        let mut in_energy = vec![0.0; bins];
-        let mut in_rows = vec![0.0; bins];
-        let mut sums = vec![[0.0; 4]; bins];
-        for i in 0..rows.len() {
-            let w = rows.root_weight[i];
-            if w > 0.0 {
-                in_energy[bin[i]] += local[i] - floor;
-                in_rows[bin[i]] += 1.0;
-                let s = &mut sums[bin[i]];
-                s[0] += before[i] * w;
-                s[1] += before[i] * before[i];
-                s[2] += after[i] * after[i];
-                s[3] += w * w;
-            }
+        let binned = Binned::new(rows, &c, edges);
+        profiles.push(binned.profile(rows, &c, before, after));
+        if !(steady < 1e-12) {
+            regions.extend(binned.region(rows, &c, &excess, &blocks, seed));
         }
-        in_energy.iter_mut().for_each(|e| *e = e.max(0.0));
-        profiles.push(Profile {
-            coordinate: c.name.into(),
-            unit: c.unit.into(),
-            at: edges.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect(),
-            mean_before: sums.iter().map(|s| s[0] / s[3].max(1e-12)).collect(),
-            rms_before: sums.iter().map(|s| (s[1] / s[3].max(1e-12)).sqrt()).collect(),
-            rms_after: sums.iter().map(|s| (s[2] / s[3].max(1e-12)).sqrt()).collect(),
-        });
-        let (a, b, excess) = best_run(&in_energy, &in_rows);
-        if excess <= 0.0 || steady < 1e-12 {
-            continue;
-        }
-        // Whole blocks change places and are turned round in themselves, so both what belongs to a block and what belongs
-        // to a place within it are torn from the coordinate, while the residual's own correlation stays.
-        let mut random = Random(seed);
-        let mut as_good = 0;
-        let mut shuffled = vec![0.0; rows.len()];
-        for _ in 0..REGION_SHUFFLES {
-            let mut order: Vec<usize> = (0..blocks.len()).collect();
-            for i in (1..order.len()).rev() {
-                order.swap(i, random.below(i + 1));
-            }
-            let mut to = 0;
-            for o in order {
-                let (from, until) = blocks[o];
-                let shift = random.below(until - from);
-                for k in 0..until - from {
-                    let i = from + (k + shift) % (until - from);
-                    shuffled[to] = if rows.root_weight[i] > 0.0 { local[i] - floor } else { 0.0 };
-                    to += 1;
-                }
-            }
-            let mut e = vec![0.0; bins];
-            for i in 0..rows.len() {
-                e[bin[i]] += shuffled[i];
-            }
-            e.iter_mut().for_each(|v| *v = v.max(0.0));
-            if best_run(&e, &in_rows).2 >= excess {
-                as_good += 1;
-            }
-        }
-        let total: f64 = in_energy.iter().sum();
-        let share = in_energy[a..b].iter().sum::<f64>() / total;
-        let part = in_rows[a..b].iter().sum::<f64>() / in_rows.iter().sum::<f64>();
-        let (from, to) = if c.discrete {
-            let at: Vec<f64> = distinct_between(&c.values, &rows.root_weight, edges[a], edges[b], b == bins);
-            (at.first().copied().unwrap_or(edges[a]), at.last().copied().unwrap_or(edges[b]))
-        } else {
-            (edges[a], edges[b])
-        };
-        regions.push(Region {
-            coordinate: c.name.into(),
-            from,
-            to,
-            share,
-            rows: part,
-            p: (f64::from(as_good) + 1.0) / (REGION_SHUFFLES as f64 + 1.0),
-            unit: c.unit.into(),
-        });
     }
     let strength = |r: &Region| (r.share - r.rows) / (r.rows * (1.0 - r.rows)).max(REGION_VARIANCE).sqrt();
     regions.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     regions.retain(|r| r.p <= REGION_ALPHA);
     regions.truncate(MOST_REGIONS);
     (regions, profiles)
+}
+
+/// The rows in the bins of a coordinate.
+struct Binned {
+    edges: Vec<f64>,
+    /// The bin of each row.
+    bin: Vec<usize>,
+    /// Rows that count in each bin.
+    rows_in: Vec<f64>,
+}
+
+impl Binned {
+    fn new(rows: &Rows, c: &Coordinate, edges: Vec<f64>) -> Self {
+        let bin: Vec<usize> = c.values.iter().map(|v| bin_of(&edges, *v)).collect();
+        let mut rows_in = vec![0.0; edges.len() - 1];
+        for (bin, w) in bin.iter().zip(rows.root_weight()) {
+            if *w > 0.0 {
+                rows_in[*bin] += 1.0;
+            }
+        }
+        Self { edges, bin, rows_in }
+    }
+
+    /// Means over the rows of each bin, for a picture.
+    fn profile(&self, rows: &Rows, c: &Coordinate, before: &[f64], after: &[f64]) -> Profile {
+        let mut sums = vec![[0.0; 4]; self.rows_in.len()];
+        for i in 0..rows.len() {
+            let w = rows.root_weight()[i];
+            if w > 0.0 {
+                let s = &mut sums[self.bin[i]];
+                s[0] += before[i] * w;
+                s[1] += before[i] * before[i];
+                s[2] += after[i] * after[i];
+                s[3] += w * w;
+            }
+        }
+        Profile {
+            coordinate: c.name.into(),
+            unit: c.unit.into(),
+            at: self.edges.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect(),
+            mean_before: sums.iter().map(|s| s[0] / s[3].max(1e-12)).collect(),
+            rms_before: sums.iter().map(|s| (s[1] / s[3].max(1e-12)).sqrt()).collect(),
+            rms_after: sums.iter().map(|s| (s[2] / s[3].max(1e-12)).sqrt()).collect(),
+        }
+    }
+
+    /// Energy above the noise in each bin.
+    fn energy_in(&self, excess: &[f64]) -> Vec<f64> {
+        let mut energy = vec![0.0; self.rows_in.len()];
+        for (bin, e) in self.bin.iter().zip(excess) {
+            energy[*bin] += e;
+        }
+        energy.iter_mut().for_each(|e| *e = e.max(0.0));
+        energy
+    }
+
+    /// The region that stands out, with how often whole blocks, shuffled, concentrate as much.
+    fn region(
+        &self,
+        rows: &Rows,
+        c: &Coordinate,
+        excess: &[f64],
+        blocks: &[(usize, usize)],
+        seed: u64,
+    ) -> Option<Region> {
+        let energy_in = self.energy_in(excess);
+        let (a, b, strength) = best_run(&energy_in, &self.rows_in);
+        if strength <= 0.0 {
+            return None;
+        }
+        let mut random = Random(seed);
+        let mut as_good = 0;
+        for _ in 0..REGION_SHUFFLES {
+            let shuffled = shuffled(excess, blocks, &mut random);
+            as_good += usize::from(best_run(&self.energy_in(&shuffled), &self.rows_in).2 >= strength);
+        }
+        let share = energy_in[a..b].iter().sum::<f64>() / energy_in.iter().sum::<f64>();
+        let part = self.rows_in[a..b].iter().sum::<f64>() / self.rows_in.iter().sum::<f64>();
+        let (low, high) = (self.edges[a], self.edges[b]);
+        let (from, to) = if c.discrete {
+            let last = b == self.rows_in.len();
+            let at = distinct_between(&c.values, rows.root_weight(), low, high, last);
+            (at.first().copied().unwrap_or(low), at.last().copied().unwrap_or(high))
+        } else {
+            (low, high)
+        };
+        Some(Region {
+            coordinate: c.name.into(),
+            from,
+            to,
+            share,
+            rows: part,
+            p: (as_good as f64 + 1.0) / (REGION_SHUFFLES as f64 + 1.0),
+            unit: c.unit.into(),
+        })
+    }
+}
+
+/// Values with whole blocks in another order, each turned round in itself: both what belongs to a block and what belongs to a place
+/// within it are torn from the coordinate, while the residual's own correlation stays.
+pub(crate) fn shuffled(values: &[f64], blocks: &[(usize, usize)], random: &mut Random) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..blocks.len()).collect();
+    for i in (1..order.len()).rev() {
+        order.swap(i, random.below(i + 1));
+    }
+    let mut shuffled = Vec::with_capacity(values.len());
+    for o in order {
+        let (from, until) = blocks[o];
+        let shift = random.below(until - from);
+        shuffled.extend((0..until - from).map(|k| values[from + (k + shift) % (until - from)]));
+    }
+    shuffled
 }
 
 fn distinct_between(values: &[f64], weight: &[f64], from: f64, to: f64, last: bool) -> Vec<f64> {

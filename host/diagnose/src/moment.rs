@@ -25,7 +25,7 @@ pub(crate) fn place(candidate: &Candidate, trial: &Trial) -> Option<usize> {
 /// Where in the campaign a moment lies.
 pub(crate) fn of(moment: f64, rows: &Rows) -> Moment {
     let name = |row: usize| rows.names[rows.recording[row] as usize].clone();
-    let after = rows.contexts.partition_point(|c| c.time < moment);
+    let after = rows.contexts().partition_point(|c| c.time < moment);
     if after == 0 {
         return Moment::Before(name(0));
     }
@@ -35,7 +35,7 @@ pub(crate) fn of(moment: f64, rows: &Rows) -> Moment {
     if rows.recording[after] != rows.recording[after - 1] {
         return Moment::Between(name(after - 1), name(after));
     }
-    let local = rows.local_time[after] - (rows.contexts[after].time - moment);
+    let local = rows.local_time[after] - (rows.contexts()[after].time - moment);
     Moment::In(name(after), local)
 }
 
@@ -52,7 +52,7 @@ pub(crate) fn deviation(
         let mut trial = taken.trial.clone();
         trial.shapes[place] = moment;
         let trace = trial::trace(&trial, library, rows);
-        baselines::projected(&[trace], &rows.root_weight, &base.span).swap_remove(0)
+        baselines::projected(&[trace], rows.root_weight(), &base.span).swap_remove(0)
     };
     let moment = taken.trial.shapes[place];
     let mut unexplained = found.full.residual.clone();
@@ -63,8 +63,13 @@ pub(crate) fn deviation(
         all - dot(&unexplained, &trace).powi(2) / energy(&trace).max(f64::MIN_POSITIVE)
     };
     // The moments that can be told apart lie between one reading that counts and the next.
-    let mut times: Vec<f64> =
-        rows.contexts.iter().zip(&rows.root_weight).filter(|(_, w)| **w > 0.0).map(|(c, _)| c.time).collect();
+    let mut times: Vec<f64> = rows
+        .contexts()
+        .iter()
+        .zip(rows.root_weight())
+        .filter(|(_, w)| **w > 0.0)
+        .map(|(c, _)| c.time)
+        .collect();
     times.dedup();
     let gaps = times.len().checked_sub(1).filter(|g| *g > 0)?;
     let here = times.partition_point(|t| *t < moment).clamp(1, gaps);

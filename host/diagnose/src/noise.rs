@@ -42,7 +42,7 @@ fn runs(rows: &Rows) -> Vec<u32> {
     let mut places: Vec<(f64, u32)> = Vec::new();
     let (mut last, mut run) = (None, 0);
     let mut of_row = Vec::with_capacity(rows.len());
-    for (recording, context) in rows.recording.iter().zip(&rows.contexts) {
+    for (recording, context) in rows.recording.iter().zip(rows.contexts()) {
         if last != Some(*recording) {
             last = Some(*recording);
             let here = |p: &&mut (f64, u32)| (p.0 - context.contraction).abs() < SAME_LENGTH;
@@ -72,20 +72,20 @@ fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
         count: f64,
     }
     let range = rows
-        .contexts
+        .contexts()
         .iter()
-        .zip(&rows.root_weight)
+        .zip(rows.root_weight())
         .filter(|(_, w)| **w > 0.0)
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (c, _)| {
             (l.min(c.contraction), h.max(c.contraction))
         });
-    let top = rows.contexts.iter().map(|c| c.pressure).fold(1.0, f64::max);
+    let top = rows.contexts().iter().map(|c| c.pressure).fold(1.0, f64::max);
     let width = ((range.1 - range.0) / REPEAT_BINS).max(1e-6);
     let runs = runs(rows);
     let mut cells: BTreeMap<(u32, i8, i32, i32, u32), Cell> = BTreeMap::new();
     for i in 0..rows.len() {
-        let c = &rows.contexts[i];
-        if rows.root_weight[i] > 0.0 && !rows.vented[i] && (c.speed != 0.0 || rows.isometric) {
+        let c = rows.contexts()[i];
+        if rows.root_weight()[i] > 0.0 && !rows.vented[i] && (c.speed != 0.0 || rows.isometric) {
             // Repeats at another speed are no repeats.
             // (At held length the place on the staircase takes the speed's part, and the run the cycle's.)
             let speed = if rows.isometric {
@@ -143,8 +143,8 @@ pub(crate) fn correlation_time(rows: &Rows, residual: &[f64], step: f64) -> f64 
         let (mut product, mut count) = (0.0, 0.0);
         for i in lag..n {
             if rows.recording[i] == rows.recording[i - lag]
-                && rows.root_weight[i] > 0.0
-                && rows.root_weight[i - lag] > 0.0
+                && rows.root_weight()[i] > 0.0
+                && rows.root_weight()[i - lag] > 0.0
             {
                 product += residual[i] * residual[i - lag];
                 count += 1.0;
@@ -164,7 +164,7 @@ pub(crate) fn correlation_time(rows: &Rows, residual: &[f64], step: f64) -> f64 
 /// Estimates the noise from a residual (of the most flexible thing there is, weighted).
 pub(crate) fn estimate(rows: &Rows, residual: &[f64], step: f64) -> Noise {
     let effective = rows.effective().max(1) as f64;
-    let rms = (energy(residual) / energy(&rows.root_weight).max(1e-12)).sqrt();
+    let rms = (energy(residual) / energy(rows.root_weight()).max(1e-12)).sqrt();
     let repeats = from_repeats(rows, residual);
     let sigma = repeats.unwrap_or(rms).min(rms);
     let memory = correlation_time(rows, residual, step);

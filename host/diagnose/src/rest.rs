@@ -15,8 +15,8 @@ use super::criteria::rest_friction::{
     NO_LAW_RATIO, PRESSURE_SMOOTHING, REST_JUMP, REST_LAW_LEAVES, RESTING_AFTER, RESTING_ROWS,
     SETTLING_TIMES,
 };
-use super::remark::RestFriction;
-use super::rows::Rows;
+use super::remark;
+use super::rows::{RestFriction, Rows};
 
 mod steps;
 
@@ -36,7 +36,7 @@ pub(crate) enum AtRest {
     },
 }
 
-impl From<AtRest> for RestFriction {
+impl From<AtRest> for remark::RestFriction {
     fn from(law: AtRest) -> Self {
         match law {
             AtRest::Fades(time) => Self::Fades(time),
@@ -48,7 +48,7 @@ impl From<AtRest> for RestFriction {
 /// Rows of each stay at one length.
 fn holds(rows: &Rows) -> Vec<(usize, usize)> {
     let n = rows.len();
-    let held = |i: usize| rows.contexts[i].speed == 0.0 && !rows.vented[i];
+    let held = |i: usize| rows.contexts()[i].speed == 0.0 && !rows.vented[i];
     let mut found = Vec::new();
     let mut from = 0;
     while from < n {
@@ -71,7 +71,7 @@ fn smoothed(rows: &Rows, half: usize) -> Vec<f64> {
         .map(|i| {
             let (a, b) = (i.saturating_sub(half), (i + half + 1).min(n));
             let same = (a..b).filter(|j| rows.recording[*j] == rows.recording[i]);
-            let (sum, count) = same.fold((0.0, 0.0), |(s, c), j| (s + rows.contexts[j].pressure, c + 1.0));
+            let (sum, count) = same.fold((0.0, 0.0), |(s, c), j| (s + rows.contexts()[j].pressure, c + 1.0));
             sum / count
         })
         .collect()
@@ -124,7 +124,7 @@ fn directions(rows: &Rows, holds: &[(usize, usize)], pressures: &[Vec<f64>], law
 
 /// What is left of a row, N, where friction acts in a direction.
 fn left_of(rows: &Rows, fitted: &Baseline, i: usize, direction: f64) -> f64 {
-    fitted.raw_residual[i] + fitted.quasi[i] * fitted.friction[i] * (direction - rows.contexts[i].direction)
+    fitted.raw_residual[i] + fitted.quasi[i] * fitted.friction[i] * (direction - rows.contexts()[i].direction)
 }
 
 /// What a law leaves of the rows at rest: the friction is that of the moving rows, and the part of the force that stays the same
@@ -133,46 +133,70 @@ fn left(rows: &Rows, fitted: &Baseline, holds: &[(usize, usize)], directions: &[
     let mut sum = 0.0;
     for ((from, to), way) in holds.iter().zip(directions) {
         for i in *from..*to {
-            let w = if rows.on_ramp[i] { 0.0 } else { rows.root_weight[i] };
+            let w = if rows.on_ramp[i] { 0.0 } else { rows.root_weight()[i] };
             sum += (w * left_of(rows, fitted, i, way[i - from])).powi(2);
         }
     }
     sum
 }
 
-/// Finds out what friction does at rest and lets the rows' directions say so; `None` where it stays as the model holds it.
-pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
-    rows.settling = vec![0.0; rows.len()];
-    rows.unsettled = vec![0.0; rows.len()];
-    rows.rest = vec![0; rows.len()];
-    let resting =
-        rows.still.iter().zip(&rows.root_weight).filter(|(s, w)| **s > RESTING_AFTER && **w > 0.0).count();
-    if !rows.isometric && resting * RESTING_ROWS < rows.effective() {
-        return None;
-    }
+/// Finds out what friction does at rest: the rows whose directions say so, and the law; none where it stays as the model holds it.
+pub(crate) fn settle_friction(rows: &Rows) -> (Rows, Option<AtRest>) {
     let holds = holds(rows);
-    if holds.is_empty() {
-        return None;
-    }
+    let Some(moving) = moving(rows, &holds) else { return (rows.clone(), None) };
     // Friction and bladder as the moving rows have them; of a muscle that was held throughout, as all rows have them.
-    let mut moving = rows.clone();
-    if !rows.isometric {
-        for (from, to) in &holds {
-            moving.root_weight[*from..*to].fill(0.0);
-        }
-        if moving.effective() < FEWEST_MOVING_ROWS {
-            return None;
-        }
-    }
     let fitted = baselines::fit(&moving, Kind::Flexible(TABLE_ORDER), &[]);
     let pressures: Vec<Vec<f64>> = PRESSURE_SMOOTHING.iter().map(|h| smoothed(rows, *h)).collect();
     let stays: Vec<Vec<f64>> =
-        holds.iter().map(|(a, b)| rows.contexts[*a..*b].iter().map(|c| c.direction).collect()).collect();
+        holds.iter().map(|(a, b)| rows.contexts()[*a..*b].iter().map(|c| c.direction).collect()).collect();
     let held = left(rows, &fitted, &holds, &stays);
+    let Some((best, energy)) = best_law(rows, &fitted, &holds, &pressures) else {
+        return (rows.clone(), None);
+    };
+    let law = (energy < REST_LAW_LEAVES * held).then_some(best);
+    let chosen = law.map_or(stays, |law| directions(rows, &holds, &pressures, law));
+    let rest = if rows.isometric {
+        vec![0; rows.len()]
+    } else {
+        let doubted = match law {
+            Some(law) => matches!(law, AtRest::Follows { .. }),
+            None => held > NO_LAW_RATIO * fitted.per_row(&moving) * weight_at(rows, &holds),
+        };
+        let steps = steps::of(rows, &fitted, &holds, &chosen);
+        rests(rows, &holds, &chosen, &steps, doubted)
+    };
+    (settled(rows, &holds, &chosen, law, rest), law)
+}
+
+/// The rows by which friction and bladder are known, where there are rests to look at and enough motion beside them.
+fn moving(rows: &Rows, holds: &[(usize, usize)]) -> Option<Rows> {
+    let counts = rows.still.iter().zip(rows.root_weight());
+    let resting = counts.filter(|(s, w)| **s > RESTING_AFTER && **w > 0.0).count();
+    if holds.is_empty() || !rows.isometric && resting * RESTING_ROWS < rows.effective() {
+        return None;
+    }
+    if rows.isometric {
+        return Some(rows.clone());
+    }
+    let mut at_rest = vec![false; rows.len()];
+    for (from, to) in holds {
+        at_rest[*from..*to].fill(true);
+    }
+    let moving = rows.without(|i| at_rest[i]);
+    (moving.effective() >= FEWEST_MOVING_ROWS).then_some(moving)
+}
+
+/// The law that leaves least of the rows at rest, and what it leaves: the best of a grid, varied twice.
+fn best_law(
+    rows: &Rows,
+    fitted: &Baseline,
+    holds: &[(usize, usize)],
+    pressures: &[Vec<f64>],
+) -> Option<(AtRest, f64)> {
     let best_of = |laws: Vec<AtRest>| {
         let tried: Vec<f64> = laws
             .par_iter()
-            .map(|l| left(rows, &fitted, &holds, &directions(rows, &holds, &pressures, *l)))
+            .map(|l| left(rows, fitted, holds, &directions(rows, holds, pressures, *l)))
             .collect();
         laws.into_iter().zip(tried).min_by(|a, b| a.1.total_cmp(&b.1))
     };
@@ -183,76 +207,81 @@ pub(crate) fn settle_friction(rows: &mut Rows) -> Option<AtRest> {
     };
     // Of a muscle that was held throughout the direction comes from the pressure: there it is followed or not.
     let first = SETTLING_TIMES.iter().filter(|_| !rows.isometric).map(|t| AtRest::Fades(*t));
-    let (mut best, mut energy) =
-        best_of(first.chain((0..PRESSURE_SMOOTHING.len()).flat_map(follows)).collect())?;
+    let mut best = best_of(first.chain((0..PRESSURE_SMOOTHING.len()).flat_map(follows)).collect())?;
     for factors in NEARBY_FACTORS {
-        let near = match best {
-            AtRest::Fades(time) => factors.iter().map(|f| AtRest::Fades(time * f)).collect(),
-            AtRest::Follows { carries, over, smoothing } => factors
-                .iter()
-                .chain(&[1.0])
-                .flat_map(|f| {
-                    factors.iter().chain(&[1.0]).map(move |g| AtRest::Follows {
-                        carries: carries * f,
-                        over: over * g,
-                        smoothing,
-                    })
+        best = best_of(nearby(best.0, &factors)).filter(|(_, e)| *e < best.1).unwrap_or(best);
+    }
+    Some(best)
+}
+
+/// A law with its numbers varied by factors.
+fn nearby(law: AtRest, factors: &[f64]) -> Vec<AtRest> {
+    match law {
+        AtRest::Fades(time) => factors.iter().map(|f| AtRest::Fades(time * f)).collect(),
+        AtRest::Follows { carries, over, smoothing } => factors
+            .iter()
+            .chain(&[1.0])
+            .flat_map(|f| {
+                factors.iter().chain(&[1.0]).map(move |g| AtRest::Follows {
+                    carries: carries * f,
+                    over: over * g,
+                    smoothing,
                 })
-                .collect(),
-        };
-        if let Some((b, e)) = best_of(near).filter(|(_, e)| *e < energy) {
-            (best, energy) = (b, e);
-        }
+            })
+            .collect(),
     }
-    let law = (energy < REST_LAW_LEAVES * held).then_some(best);
-    let chosen = law.map_or(stays, |law| directions(rows, &holds, &pressures, law));
-    if !rows.isometric {
-        let moved = fitted.per_row(&moving);
-        let doubted = match law {
-            Some(law) => matches!(law, AtRest::Follows { .. }),
-            None => held > NO_LAW_RATIO * moved * weight_at(rows, &holds),
-        };
-        let steps = steps::of(rows, &fitted, &holds, &chosen);
-        number_rests(rows, &holds, &chosen, &steps, doubted);
-    }
-    let law = law?;
-    for ((from, to), way) in holds.iter().zip(&chosen) {
+}
+
+/// The rows with the directions of a law, and with what is fitted beside it.
+fn settled(
+    rows: &Rows,
+    holds: &[(usize, usize)],
+    directions: &[Vec<f64>],
+    law: Option<AtRest>,
+    rest: Vec<u32>,
+) -> Rows {
+    let n = rows.len();
+    let mut found = RestFriction { settling: vec![0.0; n], unsettled: vec![0.0; n], rest };
+    let Some(law) = law else { return rows.with_rest_friction(found) };
+    let mut contexts = rows.contexts().to_vec();
+    for ((from, to), way) in holds.iter().zip(directions) {
         for i in (*from..*to).filter(|i| !rows.on_ramp[*i]) {
             if !rows.isometric {
-                rows.unsettled[i] = rows.contexts[i].direction - way[i - from];
+                found.unsettled[i] = contexts[i].direction - way[i - from];
             }
-            rows.contexts[i].direction = way[i - from];
+            contexts[i].direction = way[i - from];
             if let AtRest::Fades(time) = law
                 && rows.still[i] > 0.0
             {
                 // How a settling departs from an exponential is fitted beside it.
-                rows.settling[i] = (-3.0 * rows.still[i] / time).exp() - (-rows.still[i] / time).exp();
+                found.settling[i] = (-3.0 * rows.still[i] / time).exp() - (-rows.still[i] / time).exp();
             }
         }
     }
-    Some(law)
+    rows.with_contexts(contexts).with_rest_friction(found)
 }
 
 /// The weight of the rows at rest.
 fn weight_at(rows: &Rows, holds: &[(usize, usize)]) -> f64 {
     let resting = holds.iter().flat_map(|(from, to)| *from..*to).filter(|i| !rows.on_ramp[*i]);
-    resting.map(|i| rows.root_weight[i].powi(2)).sum()
+    resting.map(|i| rows.root_weight()[i].powi(2)).sum()
 }
 
-/// Static friction lets go by jumps too small and too quick for the pressure's samples to tell when: between those that a law sees or
+/// Numbers of the stretches over which friction rests at an unknown place. Static friction lets go by jumps too small and too quick for the pressure's samples to tell when: between those that a law sees or
 /// the force itself shows, where friction rests is fitted; where no law is doubted, only after such a step. A force that steps more often
 /// than that beats, and no friction lets go by it.
-fn number_rests(
-    rows: &mut Rows,
+fn rests(
+    rows: &Rows,
     holds: &[(usize, usize)],
     directions: &[Vec<f64>],
     steps: &[Vec<bool>],
     doubted: bool,
-) {
+) -> Vec<u32> {
     let most = MOST_RESTS + holds.len();
     let stepped = steps.iter().flatten().filter(|step| **step).count();
     let lets_go = stepped + if doubted { holds.len() } else { 0 } <= most;
     let mut jump = REST_JUMP;
+    let mut numbers = vec![0; rows.len()];
     // A direction lies within ±1: no change of it is a jump at last.
     loop {
         let mut number = 0;
@@ -266,11 +295,11 @@ fn number_rests(
                     number += 1;
                     known = false;
                 }
-                rows.rest[i] = if known || rows.on_ramp[i] { 0 } else { number };
+                numbers[i] = if known || rows.on_ramp[i] { 0 } else { number };
             }
         }
         if number as usize <= most {
-            return;
+            return numbers;
         }
         jump *= 2.0;
     }

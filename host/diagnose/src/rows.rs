@@ -7,11 +7,14 @@ mod readings;
 mod sleeve;
 mod tares;
 
+use std::ops::Deref;
+use std::sync::Arc;
+
 use model_core::braid::Braid;
 use model_core::effects::Context;
 
 pub(crate) use self::blocks::typical_step;
-use self::gather::Gathering;
+use self::levels::Levels;
 pub(crate) use self::sleeve::{ORDERS, Shape, YEOH};
 use super::criteria::motion::{
     HOLD_DRIFT, MOTION_NOISE, MOTION_PRESSURE_FLOOR, MOTION_PRESSURE_SHARE, MOTION_STROKE_FLOOR,
@@ -25,20 +28,15 @@ use pam_data::error::Result;
 use pam_data::progress::SharedProgress;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::{Campaign, Recording};
+use pam_fit::fit::screen::Clip;
 
-/// All recordings of a campaign as one sequence of rows.
+/// What was recorded, row by row. Nothing changes it.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Rows {
-    /// Who watches how far the work on them has come.
-    pub progress: SharedProgress,
-    /// Motion and geometry of each row; the base model's parts are filled in by a fitted baseline.
-    pub contexts: Vec<Context<f64>>,
+pub(crate) struct Recorded {
     /// The sleeve at each row.
     pub shapes: Vec<Shape>,
     /// Measured force, N.
     pub force: Vec<f64>,
-    /// Square root of each row's weight; zero where the direction is in doubt or the muscle is slack.
-    pub root_weight: Vec<f64>,
     /// Whether the muscle was vented: the model's force is zero there, what is read is the bench's.
     pub vented: Vec<bool>,
     /// Which recording a row belongs to.
@@ -57,12 +55,6 @@ pub(crate) struct Rows {
     pub sign: Vec<f64>,
     /// Time since the braid last moved, s.
     pub still: Vec<f64>,
-    /// How a settling of friction at rest departs from an exponential; all zeros where it does not settle.
-    pub settling: Vec<f64>,
-    /// At rest, the direction that the model holds less the one that friction was found to have settled to; zero elsewhere.
-    pub unsettled: Vec<f64>,
-    /// Number of the stretch of a hold over which friction rests somewhere in its gap, nobody knows where; zero elsewhere.
-    pub rest: Vec<u32>,
     /// Whether the pressure ramps at held length, where friction turns by a share that is fitted.
     pub on_ramp: Vec<bool>,
     /// Largest contraction so far in the campaign.
@@ -75,18 +67,65 @@ pub(crate) struct Rows {
     pub names: Vec<String>,
     /// Raw samples behind the rows.
     pub samples: usize,
-    /// Things worth saying about the data.
-    pub remarks: Vec<Remark>,
     /// Whether temperature was measured throughout.
     pub has_temperature: bool,
     /// Whether the length never moved.
     pub isometric: bool,
 }
 
+/// What friction does at rest, row by row; all zeros where it stays as the model holds it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct RestFriction {
+    /// How a settling of friction departs from an exponential.
+    pub settling: Vec<f64>,
+    /// At rest, the direction that the model holds less the one that friction was found to have settled to.
+    pub unsettled: Vec<f64>,
+    /// Number of the stretch of a hold over which friction rests at an unknown place in its gap; zero elsewhere.
+    pub rest: Vec<u32>,
+}
+
+/// The rows of a campaign: what was recorded, a mask, and the model about which effects are linearised.
+///
+/// A value of it never changes. What masks rows or moves the linearisation gives another value, which shares what stays.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rows {
+    recorded: Arc<Recorded>,
+    /// Motion and geometry of each row, with the parts of the base model about which effects are linear.
+    contexts: Arc<Vec<Context<f64>>>,
+    /// Square root of each row's weight; zero where the direction is in doubt or the muscle is slack.
+    root_weight: Arc<Vec<f64>>,
+    rest_friction: Arc<RestFriction>,
+    progress: SharedProgress,
+}
+
+impl Deref for Rows {
+    type Target = Recorded;
+
+    fn deref(&self) -> &Recorded {
+        &self.recorded
+    }
+}
+
 impl Rows {
     /// Number of rows.
     pub(crate) fn len(&self) -> usize {
         self.force.len()
+    }
+    /// Motion and geometry of each row, with the parts of the base model about which effects are linear.
+    pub(crate) fn contexts(&self) -> &[Context<f64>] {
+        &self.contexts
+    }
+    /// Square root of each row's weight; zero where the direction is in doubt or the muscle is slack.
+    pub(crate) fn root_weight(&self) -> &[f64] {
+        &self.root_weight
+    }
+    /// What friction does at rest.
+    pub(crate) fn at_rest(&self) -> &RestFriction {
+        &self.rest_friction
+    }
+    /// Who watches how far the work on them has come.
+    pub(crate) fn progress(&self) -> &SharedProgress {
+        &self.progress
     }
     /// Which blocks a recording begins with.
     pub(crate) fn first_strokes(&self) -> Vec<bool> {
@@ -102,37 +141,132 @@ impl Rows {
     pub(crate) fn effective(&self) -> usize {
         self.root_weight.iter().filter(|w| **w > 0.0).count()
     }
+
+    /// The same rows, with progress reported to someone.
+    pub(crate) fn watched(self, progress: SharedProgress) -> Self {
+        Self { progress, ..self }
+    }
+    /// The same rows about another model, or with another motion.
+    pub(crate) fn with_contexts(&self, contexts: Vec<Context<f64>>) -> Self {
+        Self { contexts: Arc::new(contexts), ..self.clone() }
+    }
+    /// The same rows, with what friction does at rest.
+    pub(crate) fn with_rest_friction(&self, rest_friction: RestFriction) -> Self {
+        Self { rest_friction: Arc::new(rest_friction), ..self.clone() }
+    }
+    /// The same rows, of which some no longer count.
+    pub(crate) fn without(&self, masked: impl Fn(usize) -> bool) -> Self {
+        let weights = self.root_weight.iter().enumerate();
+        let root_weight = weights.map(|(i, w)| if masked(i) { 0.0 } else { *w }).collect();
+        Self { root_weight: Arc::new(root_weight), ..self.clone() }
+    }
+    /// The same rows with other forces.
+    pub(crate) fn with_force(&self, force: Vec<f64>) -> Self {
+        Self { recorded: Arc::new(Recorded { force, ..Recorded::clone(&self.recorded) }), ..self.clone() }
+    }
+    /// Every n-th row. Names, remarks and the number of samples stay behind.
+    pub(crate) fn thinned(&self, stride: usize) -> Self {
+        fn pick<T: Clone>(stride: usize, column: &[T]) -> Vec<T> {
+            column.iter().step_by(stride).cloned().collect()
+        }
+        let recorded = Recorded {
+            shapes: pick(stride, &self.shapes),
+            force: pick(stride, &self.force),
+            vented: pick(stride, &self.vented),
+            recording: pick(stride, &self.recording),
+            block: pick(stride, &self.block),
+            cycle: pick(stride, &self.cycle),
+            level: pick(stride, &self.level),
+            levels: self.levels.clone(),
+            steady: self.steady,
+            sign: pick(stride, &self.sign),
+            still: pick(stride, &self.still),
+            on_ramp: pick(stride, &self.on_ramp),
+            largest: pick(stride, &self.largest),
+            local_time: pick(stride, &self.local_time),
+            blocks: self.blocks,
+            isometric: self.isometric,
+            ..Recorded::default()
+        };
+        let rest_friction = RestFriction {
+            settling: pick(stride, &self.at_rest().settling),
+            unsettled: pick(stride, &self.at_rest().unsettled),
+            rest: pick(stride, &self.at_rest().rest),
+        };
+        Self {
+            recorded: Arc::new(recorded),
+            contexts: Arc::new(pick(stride, &self.contexts)),
+            root_weight: Arc::new(pick(stride, &self.root_weight)),
+            rest_friction: Arc::new(rest_friction),
+            progress: self.progress.clone(),
+        }
+    }
 }
 
-/// Prepares a campaign. The result depends on the data alone.
+/// Prepares a campaign, with remarks on its data. The result depends on the data alone.
 ///
 /// # Errors
 /// A recording without force.
-pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
+pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<(Rows, Vec<Remark>)> {
     let screened = Screened::of(campaign);
     let campaign = screened.campaign.as_ref();
     let pressures = range(campaign, |r| &r.pressure);
     let thresholds = thresholds(campaign, braid, pressures);
-    let total = campaign.samples();
-    let mut rows = Rows { samples: total, has_temperature: total > 0, ..Rows::default() };
-    rows.isometric = held(campaign, thresholds.stroke);
+    let isometric = held(campaign, thresholds.stroke);
     let ends = readings::ends(campaign);
-    rows.remarks.extend(ends.iter().map(|end| Remark::SensorEnd { rows: end.rows, force: end.force }));
-    rows.remarks.extend(screened.remark().map(Remark::Screening));
-    let mut gathering = Gathering::begin(&mut rows, braid, thresholds, &ends, campaign.beginning());
-    for (index, recording) in campaign.recordings.iter().enumerate() {
-        gathering.add(recording, &screened.read(index), campaign.pause_before(index))?;
-    }
-    let (readable, spiked) = gathering.end();
+    let gathered = gather::gather(campaign, &screened, braid, thresholds, &ends, isometric)?;
+    let remarks = remarks(&screened, &ends, gathered.spiked, campaign.samples());
+    let levels = Levels::find(&gathered.contexts, &gathered.piece, pressures);
+    let vented = tares::vented(&gathered.contexts);
+    let levels = tares::without_vented(levels, &gathered.contexts);
+    let root_weight = tares::weights(&gathered, &vented, &levels);
+    let level = levels.of_rows(&gathered.contexts);
+    let block = blocks::merge(&gathered, &vented);
+    let cycle = blocks::cycles(&gathered, &level);
+    let root_weight = readings::blurred(&gathered.force, root_weight, &block, &gathered.recording);
+    let blocks = block.last().map_or(0, |last| *last as usize + 1);
+    let n = gathered.force.len();
+    let recorded = Recorded {
+        shapes: gathered.shapes,
+        force: gathered.force,
+        vented,
+        recording: gathered.recording,
+        block,
+        cycle,
+        level,
+        levels: levels.pressures,
+        steady: levels.steady,
+        sign: gathered.sign,
+        still: gathered.still,
+        on_ramp: gathered.on_ramp,
+        largest: gathered.largest,
+        local_time: gathered.local_time,
+        blocks,
+        names: gathered.names,
+        samples: campaign.samples(),
+        has_temperature: gathered.has_temperature,
+        isometric,
+    };
+    let stays = RestFriction { settling: vec![0.0; n], unsettled: vec![0.0; n], rest: vec![0; n] };
+    let rows = Rows {
+        recorded: Arc::new(recorded),
+        contexts: Arc::new(gathered.contexts),
+        root_weight: Arc::new(root_weight),
+        rest_friction: Arc::new(stays),
+        progress: SharedProgress::default(),
+    };
+    Ok((rows, remarks))
+}
+
+/// What is worth saying about the data.
+fn remarks(screened: &Screened<'_>, ends: &[Clip], spiked: usize, total: usize) -> Vec<Remark> {
+    let mut remarks: Vec<Remark> =
+        ends.iter().map(|end| Remark::SensorEnd { rows: end.rows, force: end.force }).collect();
+    remarks.extend(screened.remark().map(Remark::Screening));
     if spiked * SPIKES_MENTIONED > total {
-        rows.remarks.push(Remark::Spikes { excluded: spiked, total });
+        remarks.push(Remark::Spikes { excluded: spiked, total });
     }
-    levels::find(&mut rows, pressures);
-    tares::mark_vented(&mut rows, &readable);
-    blocks::merge(&mut rows);
-    blocks::number_cycles(&mut rows);
-    readings::blur(&mut rows);
-    Ok(rows)
+    remarks
 }
 
 /// The range of a column over all recordings, without its few farthest values.

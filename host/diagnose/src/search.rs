@@ -19,12 +19,12 @@ use super::linear::energy;
 use super::noise::{self, Noise};
 use super::remark::{Refusal, Remark};
 use super::rows::{ORDERS, Rows};
-use super::select::{Found, Taken, best_of_each, look, refit, rivals, worth_naming};
+use super::select::{Found, Joint, Taken, best_of_each, look, refit, rivals, worth_naming};
 use super::trial::Trial;
 
 /// Searches for what is missing. Candidates in `refused` are looked at and may be rivals, but are not taken.
 pub(crate) fn search(
-    rows: &mut Rows,
+    rows: &Rows,
     library: &[Candidate],
     blocked: f64,
     step: f64,
@@ -40,7 +40,8 @@ pub(crate) fn search(
 
 /// A forward selection under way.
 struct Search<'a> {
-    rows: &'a mut Rows,
+    /// The rows, linearised about the present baseline.
+    rows: Rows,
     library: &'a [Candidate],
     blocked: f64,
     /// The middle distance in time between rows, s.
@@ -65,16 +66,10 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     /// The baseline and the noise before any effect.
-    fn begin(
-        rows: &'a mut Rows,
-        library: &'a [Candidate],
-        blocked: f64,
-        step: f64,
-        refused: &[usize],
-    ) -> Self {
+    fn begin(rows: &Rows, library: &'a [Candidate], blocked: f64, step: f64, refused: &[usize]) -> Self {
         let order = if rows.isometric { TABLE_ORDER } else { ORDERS };
         let flexible = baselines::fit(rows, Kind::Flexible(order), &[]);
-        let weight = energy(&rows.root_weight).max(1e-12);
+        let weight = energy(rows.root_weight()).max(1e-12);
         let noise = noise::estimate(rows, &flexible.residual, step);
         let scale = Scale {
             weight,
@@ -85,10 +80,10 @@ impl<'a> Search<'a> {
         let row = scale.sigma * (weight / scale.independent).sqrt();
         let first = Give { elastic: FIRST_GIVE.0 * blocked, friction: FIRST_GIVE.1 * blocked, row };
         let begun = baselines::fit(rows, Kind::Soft(first), &[]);
-        baselines::into_contexts(rows, &begun);
         let kind = Kind::Soft(Ground::new(&begun, scale).give);
-        let full = baselines::fit(rows, kind, &[]);
-        baselines::into_contexts(rows, &full);
+        let rows = baselines::linearised(rows, &begun);
+        let full = baselines::fit(&rows, kind, &[]);
+        let rows = baselines::linearised(&rows, &full);
         let mut search = Self {
             rows,
             library,
@@ -118,7 +113,7 @@ impl<'a> Search<'a> {
     /// Looks for one more effect: whether another look may be worth it.
     fn next(&mut self) -> ControlFlow<()> {
         let ground = Ground::new(&self.full, self.scale);
-        let (best, p) = look(self.library, self.rows, &ground, self.blocked);
+        let (best, p) = look(self.library, &self.rows, &ground, self.blocked);
         if self.first_look.is_none() {
             self.first_look = Some((best.clone(), p.clone()));
         }
@@ -139,8 +134,8 @@ impl<'a> Search<'a> {
             return ControlFlow::Continue(());
         }
         let beside = Kind::Soft(winner.give);
-        let metric = baselines::fit(self.rows, beside, &[]);
-        let rivals = rivals(&winner, &best, self.library, self.rows, &ground, &metric.span);
+        let metric = baselines::fit(&self.rows, beside, &[]);
+        let rivals = rivals(&winner, &best, self.library, &self.rows, &ground, &metric.span);
         let open: Vec<String> =
             rivals.iter().filter(|r| r.1 > CONFUSABLE).map(|r| self.library[r.0].name().to_owned()).collect();
         if open.len() > MOST_RIVALS {
@@ -161,7 +156,7 @@ impl<'a> Search<'a> {
             && !self.chosen.iter().any(|c| c.candidate == t.candidate)
             && !self.barred.contains(&t.candidate)
             && !self.taken.iter().any(rival)
-            && worth_naming(t, self.library, self.rows, ground)
+            && worth_naming(t, self.library, &self.rows, ground)
     }
 
     /// Which of the best of each candidate is to be judged.
@@ -177,12 +172,12 @@ impl<'a> Search<'a> {
     /// The winner; or, where it explains the misfit only at the edge of what is known of it, the best that explains the same within what
     /// is known. That there is something to explain has been shown by the winner: its score stands.
     fn within_the_known(&self, winner: &Trial, best: &[Trial], ground: &Ground<'_>) -> Trial {
-        let known = |t: &Trial| self.library[t.candidate].keeps_within_the_known(t);
+        let known = |t: &Trial| t.keeps_within_the_known(&self.library[t.candidate]);
         if known(winner) {
             return winner.clone();
         }
-        let metric = baselines::fit(self.rows, Kind::Soft(winner.give), &[]);
-        let rivals = rivals(winner, best, self.library, self.rows, ground, &metric.span);
+        let metric = baselines::fit(&self.rows, Kind::Soft(winner.give), &[]);
+        let rivals = rivals(winner, best, self.library, &self.rows, ground, &metric.span);
         let alike = |t: &Trial| rivals.iter().any(|r| r.0 == t.candidate && r.1 >= ALIKE);
         best.iter()
             .filter(|t| known(t) && alike(t) && self.is_open(t, ground))
@@ -228,7 +223,7 @@ impl<'a> Search<'a> {
         // A few readings that come a sample late at a turn make a likelihood of any size, and move little.
         let relief = if by_blocks { winner.relief } else { 0.0 };
         let moved = (winner.gain.max(relief) / self.scale.weight).sqrt();
-        let shown = self.library[winner.candidate].shown_vented(self.rows);
+        let shown = self.library[winner.candidate].shown_vented(&self.rows);
         let least = match (by_blocks || shown, narrow) {
             (true, true) => NARROW_FLOOR,
             (true, false) => 1.0,
@@ -241,21 +236,21 @@ impl<'a> Search<'a> {
     fn take(&mut self, winner: Trial, p: f64, rivals: Vec<(usize, f64, f64)>, metric: Baseline) {
         let name = self.library[winner.candidate].name();
         let beside = Kind::Soft(winner.give);
-        let seen = self.rows.contexts.clone();
-        self.chosen.push(winner.clone());
-        let (with, traces) = refit(self.rows, beside, &mut self.chosen, self.library);
+        let chosen = self.chosen.iter().chain([&winner]).cloned().collect();
+        let joint = refit(&self.rows, beside, chosen, self.library);
         // One step of a linear problem promised this; the whole refit has to keep a good part of it.
-        let kept = energy(&with.residual) <= winner.before - KEPT_GAIN * winner.gain;
+        let kept = energy(&joint.base.residual) <= winner.before - KEPT_GAIN * winner.gain;
         // What the effect leaves tells anew how many rows are independent: a wandering zero that flexible tables had followed from
         // pressure to pressure shows itself only now.
-        let left = noise::estimate(self.rows, &with.residual, self.step);
+        let left = noise::estimate(&joint.rows, &joint.base.residual, self.step);
         let independent = left.independent.max(FEWEST_INDEPENDENT);
         let score = winner.score * (independent / self.scale.independent).min(1.0);
         let slow = self.library[winner.candidate].traits.slow;
         let least = if slow { LEAST_SCORE_ALONE } else { LEAST_SCORE };
         if !kept || score < least {
+            // The effects before it keep the amplitudes of this joint fit, until the next one.
+            self.chosen = joint.trials;
             self.chosen.pop();
-            self.rows.contexts = seen;
             self.barred.push(winner.candidate);
             self.remarks.push(Remark::Refused {
                 effect: name.to_owned(),
@@ -265,13 +260,19 @@ impl<'a> Search<'a> {
         }
         self.kind = beside;
         self.bare = metric;
-        (self.full, self.traces) = (with, traces);
+        self.joined(joint);
         self.noise = Noise { sigma: self.noise.sigma, ..left };
         let share = winner.gain / self.above;
-        self.taken.push(Taken { trial: winner, p, share, rivals, rms: self.full.rms(self.rows) });
+        self.taken.push(Taken { trial: winner, p, share, rivals, rms: self.full.rms(&self.rows) });
         if self.chosen.len() > 1 {
             self.exchange();
         }
+    }
+
+    /// What a joint fit makes of the effects.
+    fn joined(&mut self, joint: Joint) {
+        (self.rows, self.full, self.chosen, self.traces) =
+            (joint.rows, joint.base, joint.trials, joint.traces);
     }
 
     /// Tries to replace each effect taken by another beside the rest; a better one takes its place.
@@ -279,9 +280,10 @@ impl<'a> Search<'a> {
         for position in 0..self.chosen.len().saturating_sub(1) {
             let mut others: Vec<Trial> = self.chosen.clone();
             others.remove(position);
-            let (without, _) = refit(self.rows, self.kind, &mut others, self.library);
-            let ground = Ground::new(&without, self.scale);
-            let best = best_of_each(&ground.scan(self.library, self.rows), self.library);
+            let without = refit(&self.rows, self.kind, others, self.library);
+            let rows = &without.rows;
+            let ground = Ground::new(&without.base, self.scale);
+            let best = best_of_each(&ground.scan(self.library, rows), self.library);
             let present = self.chosen[position].candidate;
             let own = best.iter().find(|t| t.candidate == present).map_or(0.0, |t| t.score);
             let challenger = best
@@ -289,9 +291,8 @@ impl<'a> Search<'a> {
                 .filter(|t| !self.chosen.iter().any(|c| c.candidate == t.candidate))
                 .max_by(|a, b| a.score.total_cmp(&b.score));
             if let Some(c) = challenger {
-                let refined = ground.refine(c, self.library, self.rows);
-                let (mine, _) =
-                    ground.left_under(&self.chosen[position], self.library, self.rows, refined.give);
+                let refined = ground.refine(c, self.library, rows);
+                let (mine, _) = ground.left_under(&self.chosen[position], self.library, rows, refined.give);
                 // It must leave clearly less than the present one does.
                 if refined.score > own + LEAST_SCORE && refined.before - refined.gain < EXCHANGE_LEAVES * mine
                 {
@@ -302,9 +303,9 @@ impl<'a> Search<'a> {
                     self.chosen[position] = refined;
                 }
             }
-            (self.full, self.traces) = refit(self.rows, self.kind, &mut self.chosen, self.library);
+            self.joined(refit(&without.rows, self.kind, self.chosen.clone(), self.library));
         }
-        let rms = self.full.rms(self.rows);
+        let rms = self.full.rms(&self.rows);
         for t in &mut self.taken {
             t.rms = rms;
         }
@@ -319,14 +320,14 @@ impl<'a> Search<'a> {
             .filter(|(c, _)| c.amplitudes.iter().any(|a| *a != 0.0))
             .unzip();
         if self.chosen.len() < all {
-            (self.full, self.traces) = refit(self.rows, self.kind, &mut self.chosen, self.library);
+            self.joined(refit(&self.rows, self.kind, self.chosen.clone(), self.library));
         }
         for (t, c) in self.taken.iter_mut().zip(&self.chosen) {
             t.trial.amplitudes.clone_from(&c.amplitudes);
             t.trial.shapes.clone_from(&c.shapes);
         }
         let (first_look, first_p) = self.first_look.unwrap_or_default();
-        let Self { bare, full, taken, above, traces, noise, remarks, .. } = self;
-        Found { bare, full, taken, first_look, first_p, above, traces, noise, remarks }
+        let Self { rows, bare, full, taken, above, traces, noise, remarks, .. } = self;
+        Found { rows, bare, full, taken, first_look, first_p, above, traces, noise, remarks }
     }
 }

@@ -34,6 +34,8 @@ pub(crate) struct Taken {
 /// What the search found.
 #[derive(Clone, Debug)]
 pub(crate) struct Found {
+    /// The rows, linearised about the last baseline.
+    pub rows: Rows,
     /// The baseline without effects, in the metric of the last one.
     pub bare: Baseline,
     /// The baseline with the effects fitted beside it.
@@ -55,16 +57,17 @@ pub(crate) struct Found {
 }
 
 impl Found {
-    /// Takes back the last effect.
-    pub(crate) fn drop_last(&mut self, rows: &mut Rows, library: &[Candidate]) {
+    /// Without the effect that was taken last.
+    pub(crate) fn without_last(mut self, library: &[Candidate]) -> Self {
         self.taken.pop();
-        let mut left: Vec<Trial> = self.taken.iter().map(|t| t.trial.clone()).collect();
+        let left: Vec<Trial> = self.taken.iter().map(|t| t.trial.clone()).collect();
         let kind = left.last().map_or(self.bare.kind, |t| Kind::Soft(t.give));
-        (self.full, self.traces) = refit(rows, kind, &mut left, library);
-        self.bare = baselines::fit(rows, kind, &[]);
-        for (t, l) in self.taken.iter_mut().zip(&left) {
+        let joint = refit(&self.rows, kind, left, library);
+        self.bare = baselines::fit(&joint.rows, kind, &[]);
+        for (t, l) in self.taken.iter_mut().zip(&joint.trials) {
             t.trial.amplitudes.clone_from(&l.amplitudes);
         }
+        Self { rows: joint.rows, full: joint.base, traces: joint.traces, ..self }
     }
 }
 
@@ -103,9 +106,9 @@ pub(crate) fn look(
     let mut best = best_of_each(&all, library);
     let mut order: Vec<usize> = (0..best.len()).collect();
     order.sort_by(|a, b| best[*b].score.total_cmp(&best[*a].score));
-    rows.progress.stage("refining the best", order.len() as u64);
+    rows.progress().stage("refining the best", order.len() as u64);
     for (rank, i) in order.into_iter().enumerate() {
-        rows.progress.step();
+        rows.progress().step();
         if best[i].gain > 0.0 {
             best[i] = if rank < REFINED {
                 ground.refine(&best[i], library, rows)
@@ -115,7 +118,7 @@ pub(crate) fn look(
         }
     }
     forbid_cancelling(&mut best, blocked);
-    rows.progress.stage("weighing them against chance and each other", 0);
+    rows.progress().stage("weighing them against chance and each other", 0);
     let p = p_values(&best, &all);
     (best, p)
 }
@@ -129,39 +132,36 @@ fn forbid_cancelling(trials: &mut [Trial], blocked: f64) {
     }
 }
 
+/// A baseline fitted together with effects.
+#[derive(Clone, Debug)]
+pub(crate) struct Joint {
+    /// The rows, linearised about the model that the effects see.
+    pub rows: Rows,
+    /// The baseline.
+    pub base: Baseline,
+    /// The effects, with the amplitudes of the joint fit.
+    pub trials: Vec<Trial>,
+    /// Their traces, N.
+    pub traces: Vec<Vec<f64>>,
+}
+
 /// Refits the baseline with the effects of `trials` beside it, renewing what the effects see of the model.
 ///
 /// A law of first order goes by the model's slope. Where the slope changes fast, that of the new baseline may serve it worse than the one
 /// by which the effect was found; then that one stays.
-pub(crate) fn refit(
-    rows: &mut Rows,
-    kind: Kind,
-    trials: &mut [Trial],
-    library: &[Candidate],
-) -> (Baseline, Vec<Vec<f64>>) {
-    let seen = rows.contexts.clone();
+pub(crate) fn refit(rows: &Rows, kind: Kind, trials: Vec<Trial>, library: &[Candidate]) -> Joint {
     let first = fitted_beside(rows, kind, trials, library);
-    baselines::into_contexts(rows, &first.0);
-    let found: Vec<Vec<f64>> = trials.iter().map(|t| t.amplitudes.clone()).collect();
-    let second = fitted_beside(rows, kind, trials, library);
-    if energy(&second.0.residual) <= WORSE * energy(&first.0.residual) {
-        baselines::into_contexts(rows, &second.0);
-        return second;
-    }
-    rows.contexts = seen;
-    for (trial, amplitudes) in trials.iter_mut().zip(found) {
-        trial.amplitudes = amplitudes;
+    let renewed = baselines::linearised(rows, &first.base);
+    let second = fitted_beside(&renewed, kind, first.trials.clone(), library);
+    if energy(&second.base.residual) <= WORSE * energy(&first.base.residual) {
+        let rows = baselines::linearised(&second.rows, &second.base);
+        return Joint { rows, ..second };
     }
     first
 }
 
-/// The baseline with effects beside it as they see the model now, and their traces; the trials get their amplitudes.
-fn fitted_beside(
-    rows: &Rows,
-    kind: Kind,
-    trials: &mut [Trial],
-    library: &[Candidate],
-) -> (Baseline, Vec<Vec<f64>>) {
+/// The baseline with effects beside it as they see the model now.
+fn fitted_beside(rows: &Rows, kind: Kind, mut trials: Vec<Trial>, library: &[Candidate]) -> Joint {
     let mut columns = Vec::new();
     let mut owner = Vec::new();
     for (t, trial) in trials.iter().enumerate() {
@@ -172,11 +172,11 @@ fn fitted_beside(
             }
         }
     }
-    let with = baselines::fit(rows, kind, &columns);
+    let base = baselines::fit(rows, kind, &columns);
     let mut traces = vec![vec![0.0; rows.len()]; trials.len()];
     for (j, (t, k)) in owner.iter().enumerate() {
         let sign = library[trials[*t].candidate].signs()[*k];
-        let a = with.amplitudes[j];
+        let a = base.amplitudes[j];
         let allowed = match sign {
             Sign::Free => a,
             Sign::Positive => a.max(0.0),
@@ -185,7 +185,7 @@ fn fitted_beside(
         trials[*t].amplitudes[*k] = allowed;
         add_scaled(&mut traces[*t], allowed, &columns[j]);
     }
-    (with, traces)
+    Joint { rows: rows.clone(), base, trials, traces }
 }
 
 /// Whether an effect may be named at all: what tables imitate has to be large, or to show beyond them.

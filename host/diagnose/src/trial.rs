@@ -1,7 +1,8 @@
 //! What came of trying one candidate beside a baseline.
 
 use super::baselines::{Give, Reach, projected};
-use super::candidates::Candidate;
+use super::candidates::{Candidate, unplace};
+use super::criteria::candidates::LOW_END;
 use super::rows::Rows;
 
 /// A candidate tried beside a baseline at one set of shapes.
@@ -39,6 +40,17 @@ pub(crate) struct Trial {
     pub peak: f64,
 }
 
+impl Trial {
+    /// Whether it stays within what is known of the effect: no shape at the low end of its range, where a law becomes a simpler one (a
+    /// memory a rate, a breakaway plain friction), and no lag beyond what anybody has seen. Other sizes go by the muscle and the bench.
+    pub(super) fn keeps_within_the_known(&self, candidate: &Candidate) -> bool {
+        let amplitudes = candidate.info.parameters.iter().zip(&self.amplitudes);
+        let seen =
+            amplitudes.filter(|(p, _)| p.unit == "s").all(|(p, a)| a.abs() <= p.low.abs().max(p.high.abs()));
+        seen && candidate.shapes().zip(&self.shapes).all(|(p, s)| unplace(&p, *s) > LOW_END)
+    }
+}
+
 /// The fitted trace of a trial over the rows, N.
 pub(crate) fn trace(trial: &Trial, library: &[Candidate], rows: &Rows) -> Vec<f64> {
     let columns = library[trial.candidate].columns(&trial.shapes, rows);
@@ -48,5 +60,5 @@ pub(crate) fn trace(trial: &Trial, library: &[Candidate], rows: &Rows) -> Vec<f6
 /// The weighted trace of a trial (of its first column where it has no amplitude) freed of what the baseline expresses.
 pub(crate) fn projected_trace(trial: &Trial, library: &[Candidate], rows: &Rows, span: &Reach) -> Vec<f64> {
     let column = trace(trial, library, rows);
-    projected(&[column], &rows.root_weight, span).swap_remove(0)
+    projected(&[column], rows.root_weight(), span).swap_remove(0)
 }

@@ -51,7 +51,7 @@ impl Part {
     /// By how much friction's direction departs at a row from what the model holds, per unit of a part of this kind.
     pub(super) fn departure(self, rows: &Rows, i: usize) -> f64 {
         match self {
-            Self::Unsettled => rows.unsettled[i],
+            Self::Unsettled => rows.at_rest().unsettled[i],
             Self::Rest(from, to) if (from..to).contains(&i) => 1.0,
             Self::Ramping if rows.on_ramp[i] => rows.sign[i],
             _ => 0.0,
@@ -87,7 +87,7 @@ impl Plan {
             functions.extend(vec![vec![0.0; n]; levels.len()]);
             let mut at = vec![0.0; levels.len()];
             for i in 0..n {
-                cardinal(levels, &cubics, rows.contexts[i].pressure, &mut at);
+                cardinal(levels, &cubics, rows.contexts()[i].pressure, &mut at);
                 for (f, a) in functions[first..].iter_mut().zip(&at) {
                     f[i] = *a;
                 }
@@ -101,7 +101,8 @@ impl Plan {
                 .chain(over.map(Part::Friction))
                 .collect::<Vec<Part>>()
         };
-        let mut hard: Vec<Part> = rests(&rows.rest).map(|(from, to)| Part::Rest(from, to)).collect();
+        let mut hard: Vec<Part> =
+            rests(&rows.at_rest().rest).map(|(from, to)| Part::Rest(from, to)).collect();
         hard.push(Part::Deadband);
         let mut soft = Vec::new();
         if let Kind::Flexible(order) = kind {
@@ -118,7 +119,7 @@ impl Plan {
                 }
             };
             for degree in 0..rows.levels.len().clamp(1, FRICTION_POWERS) {
-                functions.push(rows.contexts.iter().map(|c| u(c.pressure).powi(degree as i32)).collect());
+                functions.push(rows.contexts().iter().map(|c| u(c.pressure).powi(degree as i32)).collect());
             }
             hard.extend((0..ORDERS).map(|k| Part::Elastic(k, 0)));
             hard.extend((0..YEOH).map(Part::Yeoh));
@@ -133,10 +134,10 @@ impl Plan {
         if rows.isometric {
             hard.extend([Part::Area, Part::AreaSlope]);
         }
-        if rows.settling.iter().any(|s| *s != 0.0) {
+        if rows.at_rest().settling.iter().any(|s| *s != 0.0) {
             hard.push(Part::Settling);
         }
-        if rows.unsettled.iter().any(|u| *u != 0.0) {
+        if rows.at_rest().unsettled.iter().any(|u| *u != 0.0) {
             hard.push(Part::Unsettled);
         }
         if rows.on_ramp.iter().any(|r| *r) {

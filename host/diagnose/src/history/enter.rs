@@ -4,8 +4,9 @@ use model_core::braid::{Braid, Geometry};
 
 use super::criteria::LEAST_GAIN;
 use super::{Found, History, found};
-use crate::answer::{Options, diagnose as statically};
+use crate::answer::diagnose as statically;
 use crate::baselines::{self, Kind};
+use crate::options::Options;
 use crate::remark::Remark;
 use crate::rows;
 use crate::verdict::{Diagnosis, HeldOut, Missing, Outcome, ParameterValue, Split, Verdict, Why};
@@ -79,9 +80,9 @@ fn without_memory(campaign: &Campaign, found: &Found) -> Campaign {
 
 /// Misfit of the model as it was on the recordings as they are, N.
 fn misfit(campaign: &Campaign, braid: &Braid<f64>) -> Result<Option<f64>> {
-    let mut rows = rows::prepare(campaign, braid)?;
+    let (rows, _) = rows::prepare(campaign, braid)?;
     let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
-    baselines::mask_slack(&mut rows, &fitted);
+    let (rows, _) = baselines::without_slack(&rows, &fitted);
     let misfit = baselines::fit(&rows, Kind::Flexible(4), &[]).rms(&rows);
     Ok((misfit.is_finite() && misfit > 0.0).then_some(misfit))
 }

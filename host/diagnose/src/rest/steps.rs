@@ -24,7 +24,7 @@ pub(super) fn of(
             let gap = 2.0 * (fitted.quasi[from + i] * fitted.friction[from + i]).abs();
             (STEP_NOISE * noise).max(STEP_OF_GAP * gap)
         };
-        let time = |i: usize| rows.contexts[from + i].time;
+        let time = |i: usize| rows.contexts()[from + i].time;
         let mut steps = vec![false; left.len()];
         let mut near = vec![false; left.len()];
         for within in STEP_ROWS {

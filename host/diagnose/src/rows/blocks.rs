@@ -1,17 +1,18 @@
 //! Half-strokes and cycles: the pieces of a recording that are tested and left out whole.
 
 use super::Rows;
+use super::gather::Gathered;
 use crate::criteria::rows::{LONGEST_BLOCK, SHORTEST_BLOCK, TYPICAL_BLOCK};
 use crate::linear::{median, quantile};
 
 /// Half-strokes become blocks; those that are very short join the one before, those very long are cut, so that blocks
 /// outlast the noise's memory and are still many.
-pub(super) fn merge(rows: &mut Rows) {
-    let n = rows.len();
+pub(super) fn merge(rows: &Gathered, vented: &[bool]) -> Vec<u32> {
+    let n = rows.piece.len();
     let mut spans: Vec<f64> = Vec::new();
     let mut from = 0;
     for i in 1..=n {
-        if i == n || rows.block[i] != rows.block[from] {
+        if i == n || rows.piece[i] != rows.piece[from] {
             spans.push(rows.local_time[i - 1] - rows.local_time[from]);
             from = i;
         }
@@ -21,22 +22,21 @@ pub(super) fn merge(rows: &mut Rows) {
     let (shortest, longest) = (SHORTEST_BLOCK * typical, LONGEST_BLOCK * typical);
     let mut number = 0_u32;
     let mut start = 0;
-    let mut fresh = vec![0_u32; n];
+    let mut merged = vec![0_u32; n];
     for i in 0..n {
         if i > 0 {
             let age = rows.local_time[i - 1] - rows.local_time[start];
             let other_recording = rows.recording[i] != rows.recording[i - 1];
-            let other_piece = rows.block[i] != rows.block[i - 1];
-            let vent = rows.vented[i] != rows.vented[i - 1];
+            let other_piece = rows.piece[i] != rows.piece[i - 1];
+            let vent = vented[i] != vented[i - 1];
             if other_recording || vent || (other_piece && age >= shortest) || age >= longest {
                 number += 1;
                 start = i;
             }
         }
-        fresh[i] = number;
+        merged[i] = number;
     }
-    rows.block = fresh;
-    rows.blocks = if n == 0 { 0 } else { number as usize + 1 };
+    merged
 }
 
 /// The middle distance in time between rows, s.
@@ -52,17 +52,18 @@ pub(crate) fn typical_step(rows: &Rows) -> f64 {
 }
 
 /// Cycles within a stay at one pressure level, from 1, where the recording does not number them itself.
-pub(super) fn number_cycles(rows: &mut Rows) {
+pub(super) fn cycles(rows: &Gathered, level: &[u32]) -> Vec<u32> {
     if rows.cycle.iter().any(|c| *c > 0) {
-        return;
+        return rows.cycle.clone();
     }
-    let (mut base, mut level, mut recording) = (0.0, u32::MAX, u32::MAX);
-    for i in 0..rows.len() {
-        if rows.level[i] != level || rows.recording[i] != recording {
-            level = rows.level[i];
-            recording = rows.recording[i];
-            base = rows.contexts[i].cycles;
+    let (mut base, mut stay) = (0.0, None);
+    let cycle = |i: usize| {
+        let cycles = rows.contexts[i].cycles;
+        let here = Some((level[i], rows.recording[i]));
+        if stay != here {
+            (base, stay) = (cycles, here);
         }
-        rows.cycle[i] = (rows.contexts[i].cycles - base).max(0.0).floor() as u32 + 1;
-    }
+        (cycles - base).max(0.0).floor() as u32 + 1
+    };
+    (0..level.len()).map(cycle).collect()
 }

@@ -4,20 +4,80 @@ use model_core::braid::Braid;
 use model_core::effects::Context;
 use model_core::units::Length;
 
-use super::{Rows, readings, sleeve};
+use super::readings;
+use super::sleeve::{self, Shape};
 use crate::criteria::baseline::TABLE_ORDER;
 use crate::criteria::rows::TARGET_ROWS;
 use crate::kinematics::{Kinematics, Recorded, Thresholds, kinematics};
 use pam_data::error::Result;
-use pam_data::recording::{Recording, UNKNOWN_PAUSE};
+use pam_data::recording::dropouts::Screened;
+use pam_data::recording::{Campaign, Recording, UNKNOWN_PAUSE};
 use pam_fit::fit::screen::Clip;
 
+/// The rows of a campaign before levels, blocks and weights are known.
+#[derive(Default)]
+pub(super) struct Gathered {
+    pub contexts: Vec<Context<f64>>,
+    pub shapes: Vec<Shape>,
+    pub force: Vec<f64>,
+    /// The weight of each row's reading where its direction is known; zero elsewhere.
+    pub judged: Vec<f64>,
+    /// The weight of each row's reading where friction does not matter.
+    pub readable: Vec<f64>,
+    pub on_ramp: Vec<bool>,
+    pub recording: Vec<u32>,
+    /// Half-stroke or hold of each row, counted over the campaign.
+    pub piece: Vec<u32>,
+    /// Cycle as the recording numbers it; zero where it does not.
+    pub cycle: Vec<u32>,
+    pub sign: Vec<f64>,
+    pub still: Vec<f64>,
+    pub largest: Vec<f64>,
+    pub local_time: Vec<f64>,
+    pub names: Vec<String>,
+    pub has_temperature: bool,
+    /// Outliers among the readings.
+    pub spiked: usize,
+}
+
+/// Averages all recordings of a campaign into rows.
+///
+/// # Errors
+/// A recording without force.
+pub(super) fn gather(
+    campaign: &Campaign,
+    screened: &Screened<'_>,
+    braid: &Braid<f64>,
+    thresholds: Thresholds,
+    ends: &[Clip],
+    isometric: bool,
+) -> Result<Gathered> {
+    let total = campaign.samples();
+    let mut gathering = Gathering {
+        rows: Gathered { has_temperature: total > 0, ..Gathered::default() },
+        braid,
+        thresholds,
+        ends,
+        isometric,
+        per_row: total.div_ceil(TARGET_ROWS).max(1),
+        clock: campaign.beginning(),
+        turns: 0,
+        pieces: 0,
+        largest: f64::NEG_INFINITY,
+    };
+    for (index, recording) in campaign.recordings.iter().enumerate() {
+        gathering.add(recording, &screened.read(index), campaign.pause_before(index))?;
+    }
+    Ok(gathering.rows)
+}
+
 /// A campaign's recordings on their way into rows.
-pub(super) struct Gathering<'a> {
-    rows: &'a mut Rows,
+struct Gathering<'a> {
+    rows: Gathered,
     braid: &'a Braid<f64>,
     thresholds: Thresholds,
     ends: &'a [Clip],
+    isometric: bool,
     /// Samples in a row at most.
     per_row: usize,
     /// The campaign's time at the beginning of the present recording, s.
@@ -28,10 +88,6 @@ pub(super) struct Gathering<'a> {
     pieces: u32,
     /// The largest stroke so far, m.
     largest: f64,
-    /// Outliers so far.
-    spiked: usize,
-    /// The weight of each row's reading where friction does not matter.
-    readable: Vec<f64>,
 }
 
 /// Sums over the samples of a row, then their means.
@@ -61,41 +117,12 @@ struct Readings<'a> {
     read: &'a [bool],
 }
 
-impl<'a> Gathering<'a> {
-    /// No row yet; the first reading is at `beginning` on the clock of the campaign, s.
-    pub(super) fn begin(
-        rows: &'a mut Rows,
-        braid: &'a Braid<f64>,
-        thresholds: Thresholds,
-        ends: &'a [Clip],
-        beginning: f64,
-    ) -> Self {
-        let per_row = rows.samples.div_ceil(TARGET_ROWS).max(1);
-        Self {
-            rows,
-            braid,
-            thresholds,
-            ends,
-            per_row,
-            clock: beginning,
-            turns: 0,
-            pieces: 0,
-            largest: f64::NEG_INFINITY,
-            spiked: 0,
-            readable: Vec::new(),
-        }
-    }
-
-    /// The rows' readable weights, and the number of outliers.
-    pub(super) fn end(self) -> (Vec<f64>, usize) {
-        (self.readable, self.spiked)
-    }
-
+impl Gathering<'_> {
     /// Appends a recording, `pause` seconds after the one before where that is known. What is not `read` of its pressure says nothing.
     ///
     /// # Errors
     /// A recording without force.
-    pub(super) fn add(&mut self, recording: &Recording, read: &[bool], pause: Option<f64>) -> Result<()> {
+    fn add(&mut self, recording: &Recording, read: &[bool], pause: Option<f64>) -> Result<()> {
         let first = self.rows.names.is_empty();
         self.rows.names.push(recording.name.clone());
         let force = recording.require_force()?;
@@ -179,7 +206,7 @@ impl<'a> Gathering<'a> {
                 continue;
             }
             if spike[j] {
-                self.spiked += 1;
+                self.rows.spiked += 1;
             } else if self.ends.iter().all(|end| force[j] != end.force) {
                 average.force += force[j];
                 average.good += 1.0;
@@ -233,19 +260,16 @@ impl<'a> Gathering<'a> {
         rows.force.push(mean.force);
         // Just after a turn of the pressure at held length the model only guesses how far friction has turned; where the muscle
         // also moves, its strokes and what ramps are steady are what is judged.
-        let on_ramp = k.on_ramp[i] && !rows.isometric;
-        let judged = k.sure[i] && (rows.isometric || !k.ramped[i] || on_ramp);
+        let on_ramp = k.on_ramp[i] && !self.isometric;
+        let judged = k.sure[i] && (self.isometric || !k.ramped[i] || on_ramp);
         rows.on_ramp.push(on_ramp);
         let read = (mean.good / self.per_row as f64).sqrt();
-        self.readable.push(if k.held[i] { read } else { 0.0 });
-        rows.root_weight.push(if judged { read } else { 0.0 });
+        rows.readable.push(if k.held[i] { read } else { 0.0 });
+        rows.judged.push(if judged { read } else { 0.0 });
         rows.recording.push(rows.names.len() as u32 - 1);
-        rows.block.push(self.pieces);
+        rows.piece.push(self.pieces);
         rows.sign.push(k.direction[i]);
         rows.still.push(mean.still);
-        rows.settling.push(0.0);
-        rows.unsettled.push(0.0);
-        rows.rest.push(0);
         rows.largest.push(self.largest / braid.rest_length());
         rows.local_time.push(local);
     }

@@ -1,6 +1,5 @@
 //! Readings that say less than others: outliers, ends of the sensor's range, moments that are not known well enough.
 
-use super::Rows;
 use crate::criteria::rows::{FLANK_STEP, NEGLIGIBLE_ERROR, NO_LOAD, SIMULTANEITY, SPIKE_NOISE, SPIKE_RANGE};
 use crate::kinematics::white_noise;
 use crate::linear::median;
@@ -33,16 +32,15 @@ pub(super) fn ends(campaign: &Campaign) -> Vec<Clip> {
     [low, high].into_iter().flatten().filter(|c| c.force.abs() > NO_LOAD * strongest).collect()
 }
 
-/// Where the force runs from one branch to the other within a few rows, each of them says as little as the moment of its reading is
-/// known.
-pub(super) fn blur(rows: &mut Rows) {
-    let strongest = rows.force.iter().copied().fold(0.0, f64::max);
-    let step = |i: usize| (rows.force[i + 1] - rows.force[i]).abs();
-    let n = rows.len();
-    let mut weights = rows.root_weight.clone();
+/// Weights where the force runs from one branch to the other within a few rows: each of them says as little as the moment of its
+/// reading is known.
+pub(super) fn blurred(force: &[f64], mut weights: Vec<f64>, block: &[u32], recording: &[u32]) -> Vec<f64> {
+    let strongest = force.iter().copied().fold(0.0, f64::max);
+    let step = |i: usize| (force[i + 1] - force[i]).abs();
+    let n = force.len();
     let mut from = 0;
     for i in 1..=n {
-        if i < n && rows.block[i] == rows.block[from] && rows.recording[i] == rows.recording[from] {
+        if i < n && block[i] == block[from] && recording[i] == recording[from] {
             continue;
         }
         let mut steps: Vec<f64> = (from..i - 1).map(step).collect();
@@ -53,5 +51,5 @@ pub(super) fn blur(rows: &mut Rows) {
         }
         from = i;
     }
-    rows.root_weight = weights;
+    weights
 }

@@ -2,22 +2,25 @@
 
 use std::ops::Range;
 
-use super::Rows;
+use super::gather::Gathered;
+use super::levels::Levels;
+use model_core::effects::Context;
+
 use crate::criteria::rows::{
     AT_REST_LENGTH, LEVEL_REACH, SAME_ZERO, SAME_ZERO_NOISE, TARE_ROWS, VENTED_PRESSURE, VENTED_SHARE,
 };
 
 /// The stretches of rows in which a muscle stays vented.
-fn tares(rows: &Rows) -> impl Iterator<Item = Range<usize>> + '_ {
+fn tares<'a>(vented: &'a [bool], recording: &'a [u32]) -> impl Iterator<Item = Range<usize>> + 'a {
     let mut from = 0;
-    let together = |i: usize| (rows.vented[i], rows.recording[i]);
-    (1..=rows.len()).filter_map(move |i| {
-        if i < rows.len() && together(i) == together(from) {
+    let together = |i: usize| (vented[i], recording[i]);
+    (1..=vented.len()).filter_map(move |i| {
+        if i < vented.len() && together(i) == together(from) {
             return None;
         }
         let stretch = from..i;
         from = i;
-        rows.vented[stretch.start].then_some(stretch)
+        vented[stretch.start].then_some(stretch)
     })
 }
 
@@ -37,44 +40,43 @@ fn zeros_agree<'a>(tares: impl Iterator<Item = &'a [f64]>) -> bool {
     most - least <= SAME_ZERO * most.abs().max(least.abs()) + SAME_ZERO_NOISE * doubt
 }
 
+/// The highest pressure, and the one below which a muscle is vented, Pa.
+fn limit(contexts: &[Context<f64>]) -> (f64, f64) {
+    let highest = contexts.iter().map(|c| c.pressure).fold(0.0, f64::max);
+    (highest, (VENTED_SHARE * highest).min(VENTED_PRESSURE))
+}
+
 /// Rows without pressure worth the name: the muscle cannot pull, so what is read comes from the bench.
-/// Which way friction would act does not matter there: `readable` weights count while the length is held.
-pub(super) fn mark_vented(rows: &mut Rows, readable: &[f64]) {
-    let highest = rows.contexts.iter().map(|c| c.pressure).fold(0.0, f64::max);
-    let limit = (VENTED_SHARE * highest).min(VENTED_PRESSURE);
-    rows.vented = rows.contexts.iter().map(|c| c.pressure < limit).collect();
-    if rows.vented.iter().all(|v| *v) {
-        rows.vented.fill(false);
+pub(super) fn vented(contexts: &[Context<f64>]) -> Vec<bool> {
+    let (_, limit) = limit(contexts);
+    let vented: Vec<bool> = contexts.iter().map(|c| c.pressure < limit).collect();
+    if vented.iter().all(|v| *v) { vec![false; vented.len()] } else { vented }
+}
+
+/// The levels at which the muscle was not vented.
+pub(super) fn without_vented(levels: Levels, contexts: &[Context<f64>]) -> Levels {
+    let (highest, limit) = limit(contexts);
+    let mut pressures = levels.pressures;
+    pressures.retain(|l| *l >= limit || highest <= limit);
+    if pressures.is_empty() {
+        pressures.push(highest);
     }
-    if zeros_agree(tares(rows).map(|tare| &rows.force[tare])) {
-        for i in (0..rows.len()).filter(|i| rows.vented[*i]) {
+    Levels { pressures, ..levels }
+}
+
+/// Weights of the rows. Which way friction would act does not matter while the muscle is vented: readable weights count there while
+/// the length is held. Ramps below the lowest pressure worked at lead where no table reaches.
+pub(super) fn weights(rows: &Gathered, vented: &[bool], levels: &Levels) -> Vec<f64> {
+    let agree = zeros_agree(tares(vented, &rows.recording).map(|tare| &rows.force[tare]));
+    let weight = |i: usize| {
+        let context = &rows.contexts[i];
+        if vented[i] {
             // Stretched beyond its rest length even a vented muscle pulls.
-            if rows.contexts[i].contraction >= -AT_REST_LENGTH {
-                rows.root_weight[i] = rows.root_weight[i].max(readable[i]);
-            }
+            let slack = agree && context.contraction >= -AT_REST_LENGTH;
+            return if slack { rows.judged[i].max(rows.readable[i]) } else { rows.judged[i] };
         }
-    }
-    rows.levels.retain(|l| *l >= limit || highest <= limit);
-    if rows.levels.is_empty() {
-        rows.levels.push(highest);
-    }
-    let last = rows.levels.len() as u32 - 1;
-    if rows.steady {
-        // Ramps below the lowest pressure worked at lead where no table reaches.
-        for i in 0..rows.len() {
-            if rows.contexts[i].pressure < LEVEL_REACH * rows.levels[0] && !rows.vented[i] {
-                rows.root_weight[i] = 0.0;
-            }
-        }
-    }
-    let levels = rows.levels.clone();
-    for (level, context) in rows.level.iter_mut().zip(&rows.contexts) {
-        let p = context.pressure;
-        *level = levels
-            .iter()
-            .enumerate()
-            .min_by(|a, b| (a.1 - p).abs().total_cmp(&(b.1 - p).abs()))
-            .map_or(0, |(i, _)| i as u32)
-            .min(last);
-    }
+        let below = levels.steady && context.pressure < LEVEL_REACH * levels.pressures[0];
+        if below { 0.0 } else { rows.judged[i] }
+    };
+    (0..vented.len()).map(weight).collect()
 }
