@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::advise::what_would_show;
+use super::next_experiment::revealing_experiment;
 use super::verdict::{Diagnosis, Verdict};
 
 /// The diagnosis in words.
@@ -122,7 +122,7 @@ fn could_be_hidden(s: &mut String, d: &Diagnosis) {
             Some(h) => format!("{} up to {h:.1} N", c.effect),
             None => format!("{} of any size", c.effect),
         };
-        let measure = what_would_show(&c.effect);
+        let measure = revealing_experiment(&c.effect);
         match by_measure.iter_mut().find(|m| m.0 == measure) {
             Some(known) => known.1.push(size),
             None => by_measure.push((measure, vec![size])),

@@ -1,8 +1,8 @@
-//! The names: what was taken and how sure that is; what was looked at and why it was not taken.
+//! Findings: the selected effects with parameters and probabilities, and the other candidates with the reason against each.
 
-use super::advise::experiment;
 use super::calibration;
-use super::candidates::{Candidate, place_in_words};
+use super::candidates::{Candidate, link_in_words};
+use super::change_point;
 use super::criteria::judgement::{ABSURD_SIZE, DETECTION, DETECTION_ROWS, RELEVANT_SIZE};
 use super::criteria::selection::{
     CONCEALED, FAMILY_ALPHA, LEAST_SCORE, LEAST_SHARE, MOST_REPORTED, REPORTED_RIVAL, SELECTION_FLOOR,
@@ -10,25 +10,26 @@ use super::criteria::selection::{
 };
 use super::intervals::deviations;
 use super::linear::energy;
-use super::moment;
+use super::next_experiment::experiment;
 use super::rows::Rows;
-use super::select::Found;
+use super::selection_step::Selection;
 use super::verdict::{Considered, Missing, ParameterValue};
 
-/// The effects that were taken, with parameters and intervals, what they cannot be told from, and how probable they are.
-pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<Missing> {
-    let deviations = deviations(found, library, rows);
-    let explained =
-        ((energy(&found.bare.residual) - energy(&found.full.residual)) / found.above).clamp(0.0, 1.0);
-    let total: f64 = found.taken.iter().map(|t| t.share.max(0.0)).sum::<f64>().max(1e-12);
-    found
-        .taken
+/// The selected effects with parameters and intervals, what they cannot be distinguished from, and their probabilities.
+pub(crate) fn missing(selection: &Selection, library: &[Candidate], rows: &Rows) -> Vec<Missing> {
+    let deviations = deviations(selection, library, rows);
+    let explained = ((energy(&selection.base_alone.residual) - energy(&selection.joint.residual))
+        / selection.excess_energy)
+        .clamp(0.0, 1.0);
+    let total: f64 = selection.selected.iter().map(|t| t.share.max(0.0)).sum::<f64>().max(1e-12);
+    selection
+        .selected
         .iter()
         .zip(&deviations)
         .map(|(t, d)| {
-            let candidate = &library[t.trial.candidate];
+            let candidate = &library[t.fit.candidate];
             let info = candidate.info;
-            let values = t.trial.amplitudes.iter().chain(&t.trial.shapes);
+            let values = t.fit.amplitudes.iter().chain(&t.fit.shapes);
             let parameters = info
                 .parameters
                 .iter()
@@ -62,16 +63,16 @@ pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<
                 format!(
                     "it lives in too few half-strokes for a test by whole blocks (p = {:.2}), but is {} as likely as chance",
                     t.p,
-                    times(t.trial.score / 2.0)
+                    times(t.fit.score / 2.0)
                 )
             };
             let mut why = format!(
                 "it takes {:.0} % of the misfit above noise with the base refitted; {chance}",
                 share * 100.0
             );
-            if let Some(shape) = moment::place(candidate, &t.trial) {
+            if let Some(shape) = change_point::place(candidate, &t.fit) {
                 why.push_str("; it happened ");
-                why.push_str(&moment::in_words(t.trial.shapes[shape], rows));
+                why.push_str(&change_point::in_words(t.fit.shapes[shape], rows));
             }
             Missing {
                 effect: info.name.into(),
@@ -80,14 +81,14 @@ pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<
                 share_explained: share,
                 parameters,
                 confusable_with: confusable,
-                place: place_in_words(info.link).into(),
+                place: link_in_words(info.link).into(),
                 correction: candidate.of_the_bench(),
                 checked: false,
                 given: false,
                 supported: true,
                 summary: info.summary.into(),
                 source: info.source.into(),
-                peak_N: t.trial.peak,
+                peak_N: t.fit.peak,
                 p: t.p,
                 why,
             }
@@ -95,9 +96,9 @@ pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<
         .collect()
 }
 
-/// The effects that were looked at and not named: what they would take, how large they could be unseen, and what would show them.
+/// The candidates that were not selected: the share they would explain, the size at which they could be hidden, and what would show them.
 pub(crate) fn considered(
-    found: &Found,
+    selection: &Selection,
     library: &[Candidate],
     missing: &[Missing],
     sigma: f64,
@@ -105,19 +106,19 @@ pub(crate) fn considered(
 ) -> Vec<Considered> {
     let named: Vec<&str> = missing.iter().map(|m| m.effect.as_str()).collect();
     let confusable: Vec<&String> = missing.iter().flat_map(|m| &m.confusable_with).collect();
-    found
-        .first_look
+    selection
+        .first_scan
         .iter()
-        .zip(&found.first_p)
+        .zip(&selection.first_p)
         .filter(|(t, _)| !named.contains(&library[t.candidate].name()))
         .map(|(t, p)| {
             let name = library[t.candidate].name();
-            let gain = (t.gain / found.above).clamp(0.0, 1.0);
+            let gain = (t.gain / selection.excess_energy).clamp(0.0, 1.0);
             // The trace that noise could hide, given how much of it the base leaves; and below the size from which an effect that
             // tables imitate is named at all it could be there anyway.
             let hidden = (t.size > 0.0 && t.peak > 0.0).then(|| {
                 let detectable = DETECTION * sigma
-                    / (found.noise.independent.max(DETECTION_ROWS)).sqrt()
+                    / (selection.noise.independent.max(DETECTION_ROWS)).sqrt()
                     / t.visible.max(1e-12).sqrt();
                 // What moves the force by less than the model's own inexactness is not named either.
                 let nameable = SELECTION_FLOOR * blocked / t.visible.max(1e-12).sqrt();
@@ -144,7 +145,7 @@ pub(crate) fn considered(
             } else if *p > FAMILY_ALPHA && t.score < LEAST_SCORE {
                 format!("no more than chance gives over all effects looked at (p = {p:.2}); {could_be}")
             } else if missing.is_empty() && gain >= LEAST_SHARE {
-                let refused = if found.remarks.iter().any(|r| r.contains(name)) {
+                let refused = if selection.remarks.iter().any(|r| r.contains(name)) {
                     "was not confirmed (see the remarks)"
                 } else {
                     "the misfit is so small that the model's own inexactness may make it"
@@ -167,7 +168,7 @@ pub(crate) fn considered(
         .collect()
 }
 
-/// A ratio by its logarithm, as a person says it: beyond a million nobody tells one from the next.
+/// A ratio in words, from its logarithm.
 fn times(logarithm: f64) -> String {
     if logarithm < 1e6_f64.ln() {
         format!("{:.0} times", logarithm.exp())

@@ -1,32 +1,35 @@
-//! Effects that the user knows to be there: fitted with the base by the same steps as names that are found, whatever the evidence; and
-//! what the recordings themselves say of them.
+//! Effects that the user gives as known: fitted with the base like selected ones, whatever the evidence, and then compared with what the
+//! recordings support.
 
 use model_core::effects::Imitates;
 use rayon::prelude::*;
 
 use super::baselines::{self, Kind};
+use super::candidate_fit::CandidateFit;
+use super::candidate_scoring::Scorer;
 use super::candidates::Candidate;
 use super::criteria::candidates::LEAST_SIGMA;
-use super::criteria::selection::{FAMILY_ALPHA, LEAST_EXCESS, LEAST_SCORE, LEAST_SCORE_ALONE, MAX_NAMED};
+use super::criteria::selection::{FAMILY_ALPHA, LEAST_EXCESS, LEAST_SCORE, LEAST_SCORE_ALONE, MOST_SELECTED};
 use super::criteria::uncertainty::HELD_OUT_LEAVES;
-use super::evidence::Scale;
-use super::ground::Ground;
-use super::held_out::Unseen;
+use super::cross_validation::HeldOutRows;
+use super::forward_selection::forward_selection;
+use super::likelihood::Scale;
 use super::linear::energy;
 use super::rows::Rows;
-use super::search::search;
-use super::select::{Found, Joint, Taken, look, refit, rivals};
-use super::trial::Trial;
+use super::selection_step::{JointFit, SelectedEffect, Selection, refit, rivals, scan_step};
 use super::verdict::{HeldOut, Missing};
 use pam_data::error::{DataCode, Error, Result};
 use pam_fit::bench::Candidate as Law;
 
-/// Refuses what cannot be given: too many effects, one twice, or a part of the base model.
+/// Refuses what cannot be given: too many effects, the same one twice, or a part of the base model.
 pub(super) fn check(given: &[Law]) -> Result<()> {
     let refused = |why: String, help: &str| Err(Error::new(DataCode::CallInvalid, why).help(help.to_owned()));
-    if given.len() > MAX_NAMED {
+    if given.len() > MOST_SELECTED {
         return refused(
-            format!("{} effects are given; {MAX_NAMED} are the most that recordings can bear", given.len()),
+            format!(
+                "{} effects are given; {MOST_SELECTED} are the most that recordings can bear",
+                given.len()
+            ),
             "give those that matter most",
         );
     }
@@ -63,95 +66,99 @@ pub(super) fn fitted(
     blocked: f64,
     step: f64,
     given: &[usize],
-) -> (Found, HeldOut) {
-    // The search as it always is, which may take nothing: noise, base and a first look at every effect.
+) -> (Selection, HeldOut) {
+    // The usual selection, with every candidate refused: it gives noise, base and a first scan of all effects.
     let everything: Vec<usize> = (0..library.len()).collect();
-    let mut found = search(rows, library, blocked, step, &everything);
+    let mut selection = forward_selection(rows, library, blocked, step, &everything);
     let weight = energy(rows.root_weight()).max(1e-12);
     let scale = Scale {
         weight,
-        independent: found.noise.independent.max(rows.blocks as f64),
-        sigma: found.noise.sigma.max(LEAST_SIGMA * blocked),
+        independent: selection.noise.independent.max(rows.blocks as f64),
+        sigma: selection.noise.sigma.max(LEAST_SIGMA * blocked),
         blocked,
     };
     let noise_energy = scale.sigma * scale.sigma * weight;
-    let mut chosen: Vec<Trial> = Vec::new();
+    let mut chosen: Vec<CandidateFit> = Vec::new();
     for &index in given {
-        let rows = &found.rows;
-        let ground = Ground::new(&found.full, scale);
+        let rows = &selection.rows;
+        let scorer = Scorer::new(&selection.joint, scale);
         let (best, p) = if chosen.is_empty() {
-            (found.first_look.clone(), found.first_p.clone())
+            (selection.first_scan.clone(), selection.first_p.clone())
         } else {
-            look(library, rows, &ground, blocked)
+            scan_step(library, rows, &scorer, blocked)
         };
         let place = best.iter().position(|t| t.candidate == index);
-        let trial = place
+        let fit = place
             .map(|i| best[i].clone())
             .filter(|t| t.gain > 0.0)
-            .unwrap_or_else(|| forced(index, &ground, library, rows));
-        let kind = Kind::Soft(trial.give);
+            .unwrap_or_else(|| forced(index, &scorer, library, rows));
+        let kind = Kind::Soft(fit.prior);
         let metric = baselines::fit(rows, kind, &[]);
-        let mut rivals = rivals(&trial, &best, library, rows, &ground, &metric.span);
+        let mut rivals = rivals(&fit, &best, library, rows, &scorer, &metric.span);
         rivals.retain(|r| !given.contains(&r.0));
         if chosen.is_empty() {
-            found.above = (trial.before - noise_energy).max(LEAST_EXCESS * trial.before).max(1e-12);
+            selection.excess_energy = (fit.before - noise_energy).max(LEAST_EXCESS * fit.before).max(1e-12);
         }
-        let share = trial.gain / found.above;
-        chosen.push(trial.clone());
+        let share = fit.gain / selection.excess_energy;
+        chosen.push(fit.clone());
         let joint = refit(rows, kind, chosen, library);
-        chosen = joined(&mut found, joint);
-        found.bare = metric;
+        chosen = joined(&mut selection, joint);
+        selection.base_alone = metric;
         let p = place.map_or(1.0, |i| p[i]);
-        found.taken.push(Taken { trial, p, share, rivals, rms: found.full.rms(&found.rows) });
+        selection.selected.push(SelectedEffect {
+            fit,
+            p,
+            share,
+            rivals,
+            rms: selection.joint.rms(&selection.rows),
+        });
     }
-    // What was fitted first did not know of what came after it.
+    // Each effect is fitted once more beside all others.
     for place in 0..chosen.len().saturating_sub(1) {
         let mut others = chosen.clone();
         let own = others.remove(place);
-        let without = refit(&found.rows, found.full.kind, others, library);
-        let again = Ground::new(&without.base, scale).refine(&own, library, &without.rows);
+        let without = refit(&selection.rows, selection.joint.kind, others, library);
+        let again = Scorer::new(&without.base, scale).refine(&own, library, &without.rows);
         if again.gain > 0.0 {
             chosen[place] = again;
         }
-        let joint = refit(&without.rows, found.full.kind, chosen, library);
-        chosen = joined(&mut found, joint);
+        let joint = refit(&without.rows, selection.joint.kind, chosen, library);
+        chosen = joined(&mut selection, joint);
     }
-    for (taken, trial) in found.taken.iter_mut().zip(chosen) {
-        taken.trial = trial;
-        taken.rms = found.full.rms(&found.rows);
+    for (selected, fit) in selection.selected.iter_mut().zip(chosen) {
+        selected.fit = fit;
+        selected.rms = selection.joint.rms(&selection.rows);
     }
-    let held = Unseen::new(&found.rows, found.full.kind, &found.traces).held_out(&found.traces, scale.sigma);
-    (found, held)
+    let held = HeldOutRows::new(&selection.rows, selection.joint.kind, &selection.traces)
+        .held_out(&selection.traces, scale.sigma);
+    (selection, held)
 }
 
 /// Enters a joint fit into what was found; gives the effects with its amplitudes.
-fn joined(found: &mut Found, joint: Joint) -> Vec<Trial> {
-    (found.rows, found.full, found.traces) = (joint.rows, joint.base, joint.traces);
-    joint.trials
+fn joined(selection: &mut Selection, joint: JointFit) -> Vec<CandidateFit> {
+    (selection.rows, selection.joint, selection.traces) = (joint.rows, joint.base, joint.traces);
+    joint.fits
 }
 
-/// The best of an effect where it is not worth its free numbers: something of it rather than nothing.
-fn forced(index: usize, ground: &Ground<'_>, library: &[Candidate], rows: &Rows) -> Trial {
+/// The best fit of an effect whose score is below zero.
+fn forced(index: usize, scorer: &Scorer<'_>, library: &[Candidate], rows: &Rows) -> CandidateFit {
     let candidate = &library[index];
-    let tried: Vec<Trial> = candidate
-        .grid()
-        .par_iter()
-        .map(|shapes| ground.attempt(index, candidate, shapes, rows, false))
-        .collect();
+    let tried: Vec<CandidateFit> =
+        candidate.grid().par_iter().map(|shapes| scorer.fit(index, candidate, shapes, rows, false)).collect();
     let best = tried.iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
     let Some(best) = best else { unreachable!("a grid has at least one point") };
-    let refined = ground.refine(best, library, rows);
-    if refined.gain > 0.0 { refined } else { ground.attempt(index, candidate, &best.shapes, rows, true) }
+    let refined = scorer.refine(best, library, rows);
+    if refined.gain > 0.0 { refined } else { scorer.fit(index, candidate, &best.shapes, rows, true) }
 }
 
-/// Marks the names as given, and says what the recordings say of each.
-pub(super) fn judge(missing: &mut [Missing], found: &Found, held: &HeldOut) {
-    let unseen_rows = Unseen::new(&found.rows, found.full.kind, &found.traces);
-    for (i, (m, taken)) in missing.iter_mut().zip(&found.taken).enumerate() {
-        let trial = &taken.trial;
-        let sized = trial.amplitudes.iter().any(|a| *a != 0.0);
-        let likely = trial.score >= if taken.p <= FAMILY_ALPHA { LEAST_SCORE } else { LEAST_SCORE_ALONE };
-        let mut others = found.traces.clone();
+/// Marks the effects as given, and enters whether the recordings support each.
+pub(super) fn judge(missing: &mut [Missing], selection: &Selection, held: &HeldOut) {
+    let unseen_rows = HeldOutRows::new(&selection.rows, selection.joint.kind, &selection.traces);
+    for (i, (m, selected)) in missing.iter_mut().zip(&selection.selected).enumerate() {
+        let fit = &selected.fit;
+        let sized = fit.amplitudes.iter().any(|a| *a != 0.0);
+        let likely = fit.score >= if selected.p <= FAMILY_ALPHA { LEAST_SCORE } else { LEAST_SCORE_ALONE };
+        let mut others = selection.traces.clone();
         others.remove(i);
         let without = if others.is_empty() { held.rms_before_N } else { unseen_rows.error(&others) };
         let helps = held.rms_after_N < HELD_OUT_LEAVES * without;
