@@ -5,7 +5,7 @@
 //! ```
 //! Each `SET` is a directory as `trials generate` and `trials answer` make it (`answers/ID.json`, `sealed/ID/truth.json`); use development
 //! sets only. Fits `logit p = A + B logit(belief) + C logit(explained)` by penalised maximum likelihood and prints the constants of
-//! `host/src/diagnose/calibration.rs`, with log score and calibration error found by leaving out every fifth trial in turn.
+//! `host/diagnose/src/criteria/uncertainty.rs`, with log score and calibration error found by leaving out every fifth trial in turn.
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -1,20 +1,20 @@
-//! What the model can say without any further effect: the production baseline, whose tables are free over pressure, and
+//! The base model without any effect: the production baseline, whose tables are free over pressure, and
 //! the stiff one, which knows a single bladder.
 //!
 //! ```text
 //! F = ( (P − P0) g + Σ_k E_k(P) c_k ) (1 − k_F(P) s) + effects
 //! ```
-//! The flexible tables swallow physics (static effects lose more than 97 % of their trace in them); the stiff baseline keeps
+//! The flexible tables absorb physics (static effects lose more than 97 % of their trace in them); the stiff baseline keeps
 //! it, but is itself wrong where a real bladder is. Both are linear once `k_F` is linearised about the last iterate, so a fit
 //! is three or four orthogonal least-squares solutions.
 
+mod absorbable;
 mod plan;
-mod reach;
 
 use model_core::effects::Context;
 
+pub(crate) use self::absorbable::{Absorbable, PriorDeviations, cosine, keeps, projected};
 use self::plan::{Part, Plan};
-pub(crate) use self::reach::{Give, Reach, cosine, keeps, projected};
 use super::criteria::baseline::{DISTINCT_DIRECTION, FRICTION_LIMITS, LINEARISATIONS};
 use super::criteria::rows::{NO_LOAD, SLACK_MODEL};
 use super::linear::{Basis, energy, weighted};
@@ -29,7 +29,7 @@ pub(crate) enum Kind {
     Stiff,
     /// One bladder that may differ a little between pressures: the stiff baseline, and beyond it the flexible one's columns with
     /// a prior of zero mean on each.
-    Soft(Give),
+    Soft(PriorDeviations),
 }
 
 impl Kind {
@@ -45,7 +45,7 @@ pub(crate) struct Baseline {
     /// Which.
     pub kind: Kind,
     /// What the baseline and the effects beside it express.
-    pub span: Reach,
+    pub span: Absorbable,
     /// What is to be explained, weighted and freed of the hard columns only.
     pub core: Vec<f64>,
     /// Measured less fitted, times the square root of the weight, whitened, N.
@@ -82,7 +82,7 @@ impl Baseline {
     }
 }
 
-/// Weighted root mean square of the measured force itself, N: the error of a model that knows nothing.
+/// Weighted root mean square of the measured force itself, N: the error of a model that always predicts zero.
 pub(crate) fn measured_rms(rows: &Rows) -> f64 {
     let sum: f64 = rows.force.iter().zip(rows.root_weight()).map(|(f, w)| (f * w).powi(2)).sum();
     (sum / energy(rows.root_weight()).max(1e-12)).sqrt()
@@ -141,7 +141,7 @@ fn reach(
     effects: &[Vec<f64>],
     plan: &Plan,
     column: impl Fn(&Part) -> Vec<f64>,
-) -> (Reach, Basis) {
+) -> (Absorbable, Basis) {
     let mut joint = Basis::default();
     for part in &plan.hard {
         joint.push(column(part));
@@ -156,10 +156,10 @@ fn reach(
         .map(|j| matches!(plan.soft[j - plan.hard.len()], Part::Friction(_)))
         .collect();
     let keep = match kind {
-        Kind::Soft(give) => keeps(give, &of_friction, energy(rows.root_weight())),
+        Kind::Soft(prior) => keeps(prior, &of_friction, energy(rows.root_weight())),
         _ => Vec::new(),
     };
-    let mut span = Reach { hard, soft, of_friction, keep, ..Reach::default() };
+    let mut span = Absorbable { hard, soft, of_friction, keep, ..Absorbable::default() };
     for effect in effects {
         let mut core = weighted(effect, rows.root_weight());
         span.hard.project_out(&mut core);
@@ -310,7 +310,7 @@ pub(crate) fn without_slack(rows: &Rows, fitted: &Baseline) -> (Rows, usize) {
     (rows.without(slack), (0..rows.len()).filter(|i| slack(*i)).count())
 }
 
-/// The rows linearised about a baseline: its forces and slopes stand in their contexts, where effects look for them.
+/// The rows linearised about a baseline: their contexts then hold its forces and slopes, which effects use.
 pub(crate) fn linearised(rows: &Rows, fitted: &Baseline) -> Rows {
     let about = |(i, c): (usize, &Context<f64>)| {
         let live = if rows.vented[i] { 0.0 } else { 1.0 };

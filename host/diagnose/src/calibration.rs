@@ -1,7 +1,7 @@
 //! From belief to probability: how often names of the same standing were right on the development set.
 //!
-//! The search believes in a name as much as its rivals allow (`select`). How often such a name is right is a matter of experience,
-//! and is learned where truths are known, by a command that prints these constants:
+//! The weights of its rivals give the belief in a selected effect (`selection_step`). How often such an effect is right is learned
+//! from trials with known truth, by a command that prints the constants:
 //!
 //! ```text
 //! cargo run --release -p pam-diagnose --example calibrate_diagnosis -- SET…

@@ -62,7 +62,7 @@ pub(crate) struct Candidate {
     pub info: &'static Info,
     /// What is to be known of it beside its equations.
     pub traits: &'static Traits,
-    /// What the recordings can show of shapes on their own axes.
+    /// The range of the recordings on the axes of shapes.
     span: Span,
 }
 
@@ -108,18 +108,18 @@ impl Candidate {
             .collect()
     }
 
-    /// Whether a vented muscle shows it by itself: a weight, or an offset.
+    /// Whether a tare shows it by itself: a weight, or an offset.
     pub(crate) fn shown_vented(&self, rows: &Rows) -> bool {
         self.traits.vented == Vented::Constant && rows.vented.contains(&true)
     }
 
-    /// How inexact its law is, as a share of its trace. A weight or an offset is what it is where a vented muscle shows it; elsewhere it
-    /// is judged by how friction scales with the pull, and that law is no more exact than others.
+    /// How inexact its law is, as a share of its trace. A constant that a vented muscle shows is exact; elsewhere it is identified by how
+    /// friction scales with the pull, and that law is no more exact than others.
     pub(super) fn law_error(&self, rows: &Rows) -> f64 {
         if self.shown_vented(rows) { 0.0 } else { LAW_ERROR }
     }
 
-    /// The grid of shapes that is looked at first.
+    /// The grid of shapes that is scanned first.
     pub(crate) fn grid(&self) -> Vec<Vec<f64>> {
         let shapes: Vec<Parameter> = self.shapes().collect();
         let points = match shapes.len() {
@@ -130,7 +130,7 @@ impl Candidate {
         };
         let mut grid = vec![Vec::new()];
         for p in shapes {
-            // A moment cannot be found by walking from a far one: the trace changes where it lies, not how large it is.
+            // A change point cannot be refined from far away: the trace moves with it instead of growing.
             let points = if p.axis == Axis::Time { CHANGE_POINTS } else { points };
             let axis: Vec<f64> = (0..points).map(|i| place(&p, (i as f64 + 0.5) / points as f64)).collect();
             grid = grid
@@ -163,8 +163,8 @@ impl Candidate {
         near
     }
 
-    /// Whether numbers that were fitted freely can belong to one and the same thing.
-    pub(super) fn holds_together(&self, amplitudes: &[f64], shapes: &[f64]) -> bool {
+    /// Whether parameters that were fitted freely can belong to one cause.
+    pub(super) fn is_consistent(&self, amplitudes: &[f64], shapes: &[f64]) -> bool {
         (self.traits.consistent)(amplitudes, shapes)
     }
 
@@ -202,8 +202,8 @@ pub(super) fn unplace(p: &Parameter, value: f64) -> f64 {
     }
 }
 
-/// All effects that are looked at, in the order of the library. What cannot be told from a part of the base model in any
-/// recording stays out: the gauge's offset is the deadband, and a higher elastic order is offered by the baselines.
+/// All candidate effects, in the order of the library. What is part of the base model is no candidate: the gauge's offset is the
+/// deadband, and the baselines offer a higher elastic order.
 ///
 /// `added` are laws beyond the catalogue.
 pub(crate) fn library(rows: &Rows, added: &[Law]) -> Vec<Candidate> {

@@ -1,4 +1,4 @@
-//! How sure the parameters of the named effects are.
+//! Confidence intervals of the parameters of the selected effects.
 //!
 //! Noise is the smaller part of it. Model error repeats itself from stroke to stroke and looks like certainty: it shows where parts of the
 //! campaign that should agree do not, and laws themselves are not exact. So the variance of a parameter is
@@ -8,20 +8,20 @@
 //! ```
 //! where the first is the scatter of whole half-strokes' scores and the next three are jackknives over groups left out. The last is what a
 //! law is off by where another law of the same thing made the recordings: of 57 effects given by name (two development sets of trials) 35
-//! intervals of 95 % held the truth by half-strokes alone, 45 with the groups, 53 with both. A moment has an interval [of its own](super::moment).
+//! intervals of 95 % held the truth by half-strokes alone, 45 with the groups, 53 with both. A moment has an interval [of its own](super::change_point).
 
 use rayon::prelude::*;
 
 use super::baselines;
+use super::candidate_fit::{self, CandidateFit};
 use super::candidates::Candidate;
+use super::change_point;
 use super::criteria::rows::MOST_LEVELS;
 use super::criteria::uncertainty::{FEWEST_GROUPS, FOLDS, IDENTIFIABLE, LAW_DEVIATION, TANGENT_STEP};
-use super::held_out::thin;
+use super::cross_validation::thin;
 use super::linear::{Basis, dot, energy, solve_symmetric};
-use super::moment;
 use super::rows::Rows;
-use super::select::Found;
-use super::trial::{self, Trial};
+use super::selection_step::Selection;
 
 /// One free number of the named effects, with what the force changes by per unit of it.
 struct Tangent {
@@ -30,26 +30,27 @@ struct Tangent {
     column: Vec<f64>,
 }
 
-fn tangents(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<Tangent> {
+fn tangents(selection: &Selection, library: &[Candidate], rows: &Rows) -> Vec<Tangent> {
     let mut tangents = Vec::new();
-    for (effect, taken) in found.taken.iter().enumerate() {
-        let trial = &taken.trial;
-        let candidate = &library[trial.candidate];
-        let sized = trial.amplitudes.iter().map(|a| *a != 0.0).collect::<Vec<_>>();
+    for (effect, selected) in selection.selected.iter().enumerate() {
+        let fit = &selected.fit;
+        let candidate = &library[fit.candidate];
+        let sized = fit.amplitudes.iter().map(|a| *a != 0.0).collect::<Vec<_>>();
         if !sized.contains(&true) {
             continue;
         }
-        for (parameter, column) in candidate.columns(&trial.shapes, rows).into_iter().enumerate() {
+        for (parameter, column) in candidate.columns(&fit.shapes, rows).into_iter().enumerate() {
             if sized[parameter] {
                 tangents.push(Tangent { effect, parameter, column });
             }
         }
-        let value =
-            |shapes: &[f64]| trial::trace(&Trial { shapes: shapes.to_vec(), ..trial.clone() }, library, rows);
-        let moment = moment::place(candidate, trial);
-        for (j, s) in trial.shapes.iter().enumerate().filter(|(j, _)| moment != Some(*j)) {
+        let value = |shapes: &[f64]| {
+            candidate_fit::trace(&CandidateFit { shapes: shapes.to_vec(), ..fit.clone() }, library, rows)
+        };
+        let moment = change_point::place(candidate, fit);
+        for (j, s) in fit.shapes.iter().enumerate().filter(|(j, _)| moment != Some(*j)) {
             let h = TANGENT_STEP * s.abs().max(1e-9);
-            let (mut up, mut down) = (trial.shapes.clone(), trial.shapes.clone());
+            let (mut up, mut down) = (fit.shapes.clone(), fit.shapes.clone());
             up[j] += h;
             down[j] -= h;
             let (up, down) = (value(&up), value(&down));
@@ -58,45 +59,45 @@ fn tangents(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<Tangent> {
             if column.iter().all(|c| *c == 0.0) {
                 continue;
             }
-            tangents.push(Tangent { effect, parameter: trial.amplitudes.len() + j, column });
+            tangents.push(Tangent { effect, parameter: fit.amplitudes.len() + j, column });
         }
     }
     tangents
 }
 
 /// Standard deviations of all parameters of the chosen effects; none where the recordings do not determine it.
-pub(crate) fn deviations(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<Vec<Option<f64>>> {
-    let tangents = tangents(found, library, rows);
+pub(crate) fn deviations(selection: &Selection, library: &[Candidate], rows: &Rows) -> Vec<Vec<Option<f64>>> {
+    let tangents = tangents(selection, library, rows);
     let mut result: Vec<Vec<Option<f64>>> =
-        found.taken.iter().map(|t| vec![None; t.trial.amplitudes.len() + t.trial.shapes.len()]).collect();
+        selection.selected.iter().map(|t| vec![None; t.fit.amplitudes.len() + t.fit.shapes.len()]).collect();
     if tangents.is_empty() {
         return result;
     }
-    let by_strokes = by_strokes(found, &tangents, rows);
-    let by_groups = by_groups(found, &tangents, rows);
+    let by_strokes = by_strokes(selection, &tangents, rows);
+    let by_groups = by_groups(selection, &tangents, rows);
     for (i, t) in tangents.iter().enumerate() {
         let Some(strokes) = by_strokes[i] else { continue };
-        let trial = &found.taken[t.effect].trial;
-        let value = trial.amplitudes.iter().chain(&trial.shapes).nth(t.parameter).copied().unwrap_or(0.0);
+        let fit = &selection.selected[t.effect].fit;
+        let value = fit.amplitudes.iter().chain(&fit.shapes).nth(t.parameter).copied().unwrap_or(0.0);
         let variance = strokes.max(by_groups[i]) + (LAW_DEVIATION * value).powi(2);
         if variance.is_finite() {
             result[t.effect][t.parameter] = Some(variance.sqrt());
         }
     }
-    for (deviations, taken) in result.iter_mut().zip(&found.taken) {
-        let trial = &taken.trial;
-        if let Some(shape) = moment::place(&library[trial.candidate], trial) {
-            deviations[trial.amplitudes.len() + shape] =
-                moment::deviation(found, taken, shape, library, rows);
+    for (deviations, selected) in result.iter_mut().zip(&selection.selected) {
+        let fit = &selected.fit;
+        if let Some(shape) = change_point::place(&library[fit.candidate], fit) {
+            deviations[fit.amplitudes.len() + shape] =
+                change_point::deviation(selection, selected, shape, library, rows);
         }
     }
     result
 }
 
 /// Variances by the scatter of whole half-strokes: amplitudes exactly, shapes by their linearised traces.
-fn by_strokes(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<Option<f64>> {
+fn by_strokes(selection: &Selection, tangents: &[Tangent], rows: &Rows) -> Vec<Option<f64>> {
     // The bare baseline's span, not the full one's, which holds the amplitudes themselves.
-    let base = baselines::fit(rows, found.full.kind, &[]);
+    let base = baselines::fit(rows, selection.joint.kind, &[]);
     let columns: Vec<Vec<f64>> = tangents.iter().map(|t| t.column.clone()).collect();
     let z: Vec<Vec<f64>> = baselines::projected(&columns, rows.root_weight(), &base.span);
     let n = z.len();
@@ -115,7 +116,7 @@ fn by_strokes(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<Option<f6
             let mut per_block = vec![0.0; rows.blocks];
             for k in 0..rows.len() {
                 let influence: f64 = row.iter().zip(&kept).map(|(r, j)| r * z[*j][k]).sum();
-                per_block[rows.block[k] as usize] += influence * found.full.residual[k];
+                per_block[rows.block[k] as usize] += influence * selection.joint.residual[k];
             }
             let m = rows.blocks.max(2) as f64;
             let variance = energy(&per_block) * m / (m - 1.0).max(1.0);
@@ -125,9 +126,9 @@ fn by_strokes(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<Option<f6
 }
 
 /// Variances with a pressure, a recording or a quarter of the time left out: the largest of the three jackknives.
-fn by_groups(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<f64> {
+fn by_groups(selection: &Selection, tangents: &[Tangent], rows: &Rows) -> Vec<f64> {
     let mut columns: Vec<Vec<f64>> = tangents.iter().map(|t| t.column.clone()).collect();
-    columns.extend(found.traces.iter().cloned());
+    columns.extend(selection.traces.iter().cloned());
     let (thin, mut columns) = thin(rows, &columns);
     // What is left to the tangents is how far the estimate is off.
     let mut force = thin.force.clone();
@@ -135,7 +136,7 @@ fn by_groups(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<f64> {
         force.iter_mut().zip(&trace).for_each(|(f, t)| *f -= t);
     }
     let thin = thin.with_force(force);
-    let moved = |rows: &Rows| baselines::fit(rows, found.full.kind, &columns).amplitudes;
+    let moved = |rows: &Rows| baselines::fit(rows, selection.joint.kind, &columns).amplitudes;
     let quarter = thin.blocks.div_ceil(FOLDS as usize).max(1) as u32;
     let quarters: Vec<u32> = thin.block.iter().map(|b| b / quarter).collect();
     let mut largest = vec![0.0_f64; tangents.len()];
@@ -146,7 +147,7 @@ fn by_groups(found: &Found, tangents: &[Tangent], rows: &Rows) -> Vec<f64> {
     largest
 }
 
-/// Variances of estimates, one group left out at a time; empty where there are too few groups to tell, or too many to try.
+/// Jackknife variances of estimates, one group left out at a time; empty where there are too few groups, or too many.
 fn jackknife(rows: &Rows, group: &[u32], estimate: &(dyn Fn(&Rows) -> Vec<f64> + Sync)) -> Vec<f64> {
     let seen = group.iter().zip(rows.root_weight()).filter(|(_, w)| **w > 0.0);
     let mut groups: Vec<u32> = seen.map(|(g, _)| *g).collect();

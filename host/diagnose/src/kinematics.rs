@@ -4,17 +4,17 @@
 //! Turning points are found with a threshold above the stroke's noise (never by the sign of a smoothed speed), and the
 //! samples about each turn are marked as unsure.
 
-mod course;
 mod holds;
 mod onset;
 mod ramps;
-mod series;
+mod signal;
+mod stroke_path;
 
-use self::course::Course;
 use self::holds::{Holds, holds};
 use self::onset::{Leg, Motion, Onset, onset};
-pub(crate) use self::series::white_noise;
-use self::series::{extremes, slopes};
+pub(crate) use self::signal::white_noise;
+use self::signal::{extremes, slopes};
+use self::stroke_path::StrokePath;
 use super::criteria::motion::RAMP_NOISE;
 use super::linear::median;
 
@@ -99,7 +99,7 @@ pub(crate) fn kinematics(recorded: Recorded<'_>, rested: f64, thresholds: Thresh
     let mut all = [&starts[..], &resumed[..]].concat();
     all.sort_by_key(|o| o.row);
     let mut k = Kinematics::of_rows(held);
-    let mut course = Course::begin(&recorded, thresholds, &all, rested);
+    let mut course = StrokePath::begin(&recorded, thresholds, &all, rested);
     for row in 0..n {
         course.go(row, &mut k);
     }

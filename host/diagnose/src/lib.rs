@@ -1,73 +1,77 @@
-//! Left-out physics: where simulation and recordings differ, what is missing, how sure that is, what would tell.
+//! Model discrepancy: where recordings and model differ, which physical effect explains it, how sure that is, which experiment decides.
 //!
 //! ```text
-//! recordings → rows → two baselines → noise → where → which effects → joint refit → what remains → answer
+//! recordings → rows → rest friction → base model, noise → forward selection → cross-validation → location → verdict
 //! ```
-//! | file | what |
-//! | --- | --- |
-//! | `kinematics`, `rows` | block averages that keep turns, with the motion in each |
-//! | `baselines` | tables free over pressure, one bladder for all pressures, and one that may differ a little |
-//! | `rest` | what friction does while the length is held |
-//! | `noise` | what repeats tell; tests by whole blocks |
-//! | `known` | what checks of the bench measured is taken out first |
-//! | `locate`, `frequency` | where the misfit sits; whether it beats in time |
-//! | `evidence` | how strongly the recordings speak for an effect |
-//! | `candidates` | the library of effects as columns |
-//! | `select` | which effects, and when to abstain |
-//! | [`history`] | what the muscle remembers over a campaign of isometric staircases, before the search |
-//! | `given` | effects that the user knows to be there |
-//! | `named`, `calibration` | names with their parameters and probabilities; what could be hidden |
-//! | `intervals` | how sure the parameters are |
-//! | `held_out` | the improvement on rows that the fit had not seen |
-//! | [`model`] | the table refitted beside the named effects |
-//! | [`advise`], [`planned`] | the recording that would tell; what a planned protocol can tell |
-//! | [`verdict`], [`outcome`], [`remark`], [`why`], [`why_not`], [`experiment`], [`reserve`] | the answer as values |
+//! [`diagnose`] is that chain; `diagnosis` reads as its summary. Every number that decides stands in [`criteria`]; what is to be known of
+//! an effect stands in the effect's file ([`model_core::effects`], `pam_fit::bench`).
 //!
-//! There are no sentences here: the report writes them.
+//! | stage | module | what it does |
+//! | --- | --- | --- |
+//! | rows | `kinematics`, `rows` | averages samples between reversals, with the motion in each; finds levels, blocks, vented rows |
+//! | | `bench_checks` | corrects faults that checks of the bench measured, and enters them into the answer |
+//! | | `preconditions` | says what can be judged |
+//! | base model | `baselines` | tables free over pressure; one bladder for all pressures; one that may differ a little |
+//! | | `rest_friction` | finds the law of friction at held length |
+//! | | `noise` | estimates noise from repeats; tests by whole blocks |
+//! | candidates | `candidates` | the library of effects as columns |
+//! | | `candidate_fit`, `candidate_scoring` | one candidate fitted beside a base; all of them scanned and refined |
+//! | | `likelihood` | how strongly the recordings support a candidate |
+//! | selection | `forward_selection`, `selection_step` | which effects are selected, and when none is |
+//! | | `cross_validation`, `confirmation` | the error on held-out rows, which a selected effect must reduce |
+//! | | `known_effects` | effects that the user gives as known |
+//! | findings | `findings`, `calibration` | parameters and probabilities; what could be hidden |
+//! | | `intervals`, `change_point` | confidence intervals |
+//! | | `location`, `spectrum`, `table_evidence` | where the error is: along coordinates, in time, in the tables |
+//! | | [`history`] | what the muscle remembers over a campaign of isometric staircases, before the search |
+//! | answer | [`verdict`], [`outcome`], [`remark`], [`why`], [`why_not`], [`experiment`], [`reserve`] | the answer as values; the report writes the sentences |
+//! | | [`refitted_table`] | the table refitted beside the selected effects |
+//! | | [`next_experiment`], [`isolability`], [`protocol_simulation`] | the experiment that decides; what a planned protocol can show |
 //!
 //! Everything is computed in a fixed order with fixed seeds: the same recordings give the same answer on any number of threads.
 
-pub mod advise;
-mod answer;
 mod baselines;
+mod bench_checks;
 mod calibration;
+mod candidate_fit;
+mod candidate_scoring;
 mod candidates;
-mod confirm;
+mod change_point;
+mod confirmation;
 pub mod criteria;
-mod evidence;
+mod cross_validation;
+mod diagnosis;
 pub mod experiment;
-mod frequency;
-mod given;
-mod ground;
-mod held_out;
+mod findings;
+mod forward_selection;
 pub mod history;
 mod intervals;
-mod judgeable;
+pub mod isolability;
 mod kinematics;
-mod known;
+mod known_effects;
+mod likelihood;
 mod linear;
-mod locate;
-pub mod model;
-mod moment;
-mod named;
+mod location;
+pub mod next_experiment;
 mod noise;
 mod options;
 pub mod outcome;
-pub mod planned;
+mod preconditions;
+pub mod protocol_simulation;
+pub mod refitted_table;
 pub mod remark;
 pub mod reserve;
-mod rest;
+mod rest_friction;
 mod rows;
-mod search;
-mod select;
-mod tables;
+mod selection_step;
+mod spectrum;
+mod table_evidence;
 #[cfg(test)]
 mod tests;
-mod trial;
 pub mod verdict;
 pub mod why;
 pub mod why_not;
 
-pub use answer::diagnose;
+pub use diagnosis::diagnose;
 pub use options::Options;
 pub use verdict::Diagnosis;

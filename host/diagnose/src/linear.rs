@@ -90,7 +90,7 @@ impl Basis {
         self.push_beyond(column, DEPENDENT_COLUMN)
     }
 
-    /// The same for a column that has to stand out by more than a share of itself.
+    /// The same with another bound on how dependent a column may be.
     pub(crate) fn push_beyond(&mut self, mut column: Vec<f64>, dependent: f64) -> bool {
         let index = self.offered;
         self.offered += 1;

@@ -1,5 +1,4 @@
-//! What noise is, told by the recordings themselves: repeats give its size, their correlation in time gives how many
-//! rows are worth one; tests go by whole blocks.
+//! Noise: repeats give its size, its correlation in time the number of rows per independent row; tests use whole blocks.
 
 use std::collections::BTreeMap;
 
@@ -16,18 +15,18 @@ use super::rows::Rows;
 pub(crate) struct Noise {
     /// Standard deviation of a row, N.
     pub sigma: f64,
-    /// Whether repeats of cycles told it (else it is what no smooth function of the state can express).
+    /// Whether repeats of cycles gave it (else it is the residual of the most flexible model).
     pub from_repeats: bool,
     /// Correlation time, s.
     pub memory: f64,
-    /// How many independent rows the recordings are worth.
+    /// How many independent rows the recordings amount to.
     pub independent: f64,
 }
 
 impl Noise {
-    /// Whether it is more, and lasts longer, than instruments scatter: then strokes under the same conditions differ for a reason.
+    /// Whether it is larger and lasts longer than what instruments scatter: then strokes under the same conditions differ by physics.
     /// `step` is the time between rows, s, `blocked` the blocked force, N.
-    pub(crate) fn has_a_reason(&self, step: f64, blocked: f64) -> bool {
+    pub(crate) fn exceeds_instruments(&self, step: f64, blocked: f64) -> bool {
         self.sigma > INSTRUMENT_NOISE * blocked && self.memory > INSTRUMENT_MEMORY * step
     }
 
@@ -37,7 +36,7 @@ impl Noise {
     }
 }
 
-/// The how manieth recording of its held length each row belongs to, from 1.
+/// For each row, the number of its recording among those of the same held length, from 1.
 fn runs(rows: &Rows) -> Vec<u32> {
     let mut places: Vec<(f64, u32)> = Vec::new();
     let (mut last, mut run) = (None, 0);
@@ -161,7 +160,7 @@ pub(crate) fn correlation_time(rows: &Rows, residual: &[f64], step: f64) -> f64 
     2.0 * sum * step
 }
 
-/// Estimates the noise from a residual (of the most flexible thing there is, weighted).
+/// Estimates the noise from the weighted residual of the most flexible model.
 pub(crate) fn estimate(rows: &Rows, residual: &[f64], step: f64) -> Noise {
     let effective = rows.effective().max(1) as f64;
     let rms = (energy(residual) / energy(rows.root_weight()).max(1e-12)).sqrt();

@@ -12,9 +12,9 @@ pub struct Options {
     pub muscle: String,
     /// Checks of the bench on which the recordings were made.
     pub checks: Checks,
-    /// Effects that are known to be there: fitted whatever the evidence, and nothing else is searched for.
+    /// Effects that are known to be there: they are fitted whatever the evidence, and no other is selected.
     pub given: Vec<Candidate>,
-    /// Who watches how far it has come; nobody by default.
+    /// Receives progress; nothing by default.
     pub progress: SharedProgress,
     /// Effects beyond the catalogue, whose equations a test brings.
     #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The rows that everything else works on: block averages of the recordings that keep turns, with the motion in each.
+//! The rows of a campaign: averages of the recordings between reversals, with the motion in each.
 
 mod blocks;
 mod gather;
@@ -123,11 +123,11 @@ impl Rows {
     pub(crate) fn at_rest(&self) -> &RestFriction {
         &self.rest_friction
     }
-    /// Who watches how far the work on them has come.
+    /// Receives the progress of the work on them.
     pub(crate) fn progress(&self) -> &SharedProgress {
         &self.progress
     }
-    /// Which blocks a recording begins with.
+    /// Which blocks are the first of a recording.
     pub(crate) fn first_strokes(&self) -> Vec<bool> {
         let mut first = vec![false; self.blocks];
         for recording in 0..self.names.len() as u32 {
@@ -258,7 +258,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<(Rows, 
     Ok((rows, remarks))
 }
 
-/// What is worth saying about the data.
+/// Remarks on the data.
 fn remarks(screened: &Screened<'_>, ends: &[Clip], spiked: usize, total: usize) -> Vec<Remark> {
     let mut remarks: Vec<Remark> =
         ends.iter().map(|end| Remark::SensorEnd { rows: end.rows, force: end.force }).collect();

@@ -11,10 +11,10 @@ use model_core::units::{Length, Pressure};
 
 use super::linear::{Random, quantile};
 use super::outcome::Verdict;
-use super::planned::{Place, Protocol, Step, play};
+use super::protocol_simulation::{Place, Protocol, Step, play};
 use super::remark::Remark;
 use super::why::Why;
-use super::{Diagnosis, Options, diagnose, model};
+use super::{Diagnosis, Options, diagnose, refitted_table};
 use pam_data::muscle_description::{Kind, MuscleDescription};
 use pam_data::recording::{Campaign, Recording};
 use pam_fit::fit::{Options as FitOptions, fit};
@@ -413,7 +413,7 @@ fn an_effect_that_tables_share_out_between_pressures_is_written_into_the_table()
         max_pressure_kPa: None,
         max_contraction: None,
     };
-    let mut with = model::refit(&now, &muscle, &diagnosis).expect("a table").file;
+    let mut with = refitted_table::refit(&now, &muscle, &diagnosis).expect("a table").file;
     assert_eq!(with.table.effects.len(), 1);
     // The worn muscle after all that it went through; the readings about each turn, a jump of friction, are not what this is about.
     let history = Campaign::new(now.recordings.iter().chain(&later.recordings).cloned().collect());

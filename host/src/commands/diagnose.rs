@@ -17,7 +17,7 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::{to_standard_output, write_whole};
 use pam_data::progress::SharedProgress;
 use pam_diagnose::remark::Remark;
-use pam_diagnose::{Options, advise, model};
+use pam_diagnose::{Options, next_experiment::next_experiment, refitted_table};
 use pam_fit::checks::Checks;
 use pam_fit::predict::predict;
 
@@ -100,7 +100,7 @@ impl Arguments {
         let confusable = answer.missing.iter().any(|m| !m.confusable_with.is_empty());
         let refitted = (self.output.is_some() || confusable).then(|| {
             options.progress.stage("fitting the table with the named effects", 0);
-            model::refit(&campaign, &muscle, &answer)
+            refitted_table::refit(&campaign, &muscle, &answer)
         });
         // The line of progress goes before anything else is said.
         drop(options);
@@ -134,14 +134,13 @@ impl Arguments {
         &self,
         console: &Console,
         campaign: &pam_data::recording::Campaign,
-        mut refitted: model::Refitted,
+        mut refitted: refitted_table::Refitted,
         answer: &mut pam_diagnose::Diagnosis,
     ) -> Result<()> {
         let tested = refitted.file.table.tested;
         let (low, high) = (tested.pressure_low.pascals(), tested.pressure_high.pascals());
         if let Ok(muscle) = Muscle::<f64>::build(&refitted.file.table) {
-            answer.next_experiment =
-                advise::next_experiment(answer, &muscle, f64::from(low), f64::from(high))?;
+            answer.next_experiment = next_experiment(answer, &muscle, f64::from(low), f64::from(high))?;
         }
         if let (Some(path), Some(next)) = (&self.next, &answer.next_experiment) {
             write_whole(path, next.protocol.as_bytes())?;

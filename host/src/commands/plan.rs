@@ -9,8 +9,8 @@ use crate::console::Console;
 use crate::documents::{bench, text};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::write_whole;
-use pam_diagnose::advise::isolability;
-use pam_diagnose::planned;
+use pam_diagnose::isolability::isolability;
+use pam_diagnose::protocol_simulation;
 use pam_fit::table_file::TableFile;
 
 /// Arguments of `host plan`.
@@ -38,7 +38,7 @@ impl Arguments {
         let file = TableFile::read(&self.table)?;
         let muscle = Muscle::<f64>::build(&file.table)
             .map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
-        let protocol = planned::read(&self.protocol)?;
+        let protocol = protocol_simulation::read(&self.protocol)?;
         let rows = isolability(&protocol, &muscle).map_err(|e| e.file(&self.protocol))?;
         if let Some(path) = &self.json {
             let effects = rows.iter().map(bench::Planned::of).collect();

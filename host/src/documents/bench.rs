@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-use pam_diagnose::advise::Isolability;
+use pam_diagnose::isolability::Isolability;
 
 /// `host compare --json`: B minus A.
 #[derive(Debug, Serialize)]

@@ -6,7 +6,7 @@ use model_core::link::settings::{FeedForward, Settings};
 use model_core::table::MuscleTable;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Reader};
-use pam_diagnose::model;
+use pam_diagnose::refitted_table;
 use pam_fit::fit::{self, Options};
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
@@ -167,7 +167,7 @@ pub fn tables(case: &Case) -> Tables {
     let geometry = muscle.geometry();
     let options = pam_diagnose::Options { muscle: muscle.name.clone(), ..Default::default() };
     let answer = pam_diagnose::diagnose(&campaign, &geometry, &options).expect("a diagnosis");
-    let refitted = model::refit(&campaign, &muscle, &answer).expect("a table");
+    let refitted = refitted_table::refit(&campaign, &muscle, &answer).expect("a table");
     Tables {
         plain,
         diagnosed: refitted.file.table.clone(),

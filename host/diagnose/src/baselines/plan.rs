@@ -41,7 +41,7 @@ pub(super) enum Part {
     /// How much of friction does not settle at rest: a friction that needs speed leaves a rest's gap half closed for another reason,
     /// and what it leaves must not be taken for settling.
     Unsettled,
-    /// Where in the gap between the branches friction rests over these rows: what a wandering pressure made of it nobody measured.
+    /// Where in the gap between the branches friction rests over these rows: drift of the pressure moves it, and that is not measured.
     Rest(usize, usize),
     /// How much further than at a turn of the stroke, or less far, friction turns while the pressure ramps at held length.
     Ramping,
@@ -129,7 +129,7 @@ impl Plan {
                 soft = tables(TABLE_ORDER, over);
             }
         }
-        // At a few held lengths a tenth of a degree in the braid's angle, or a millimetre in the mounting, cannot be told from a
+        // At a few held lengths a tenth of a degree in the braid's angle, or a millimetre in the mounting, cannot be distinguished from a
         // scale of the effective area; where the muscle moves it shows in the shape and is held against the geometry.
         if rows.isometric {
             hard.extend([Part::Area, Part::AreaSlope]);

@@ -21,15 +21,15 @@ criteria! {
     /// The powers are held constant this far beyond the tested range, in half-ranges.
     FRICTION_RANGE: f64 = 1.2, "u_max", "1", Judgement;
     /// Free tables: prior deviation of elastic surface and friction, in blocked forces; so large that it does not bind.
-    FREE_GIVE: f64 = 1e3, "V_free/F_b", "1", Derived("a thousand blocked forces bind nothing");
+    FREE_DEVIATION: f64 = 1e3, "V_free/F_b", "1", Derived("a thousand blocked forces bind nothing");
     /// Free tables: deviation of a row, in blocked forces.
     FREE_ROW: f64 = 1e-3, "s_free/F_b", "1", Judgement;
     /// Elastic surface and friction differ between pressures by this at first, in blocked forces.
-    FIRST_GIVE: ((f64, f64)) = (1e-3, 5e-4), "V_1/F_b", "1", Judgement;
+    FIRST_DEVIATIONS: ((f64, f64)) = (1e-3, 5e-4), "V_1/F_b", "1", Judgement;
     /// Deviations of the elastic surface between pressures that are compared, in blocked forces.
-    ELASTIC_GIVES: ([f64; 6]) = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2], "V_e/F_b", "1", Derived("half decades from noise to a wholly different bladder");
+    ELASTIC_DEVIATIONS: ([f64; 6]) = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2], "V_e/F_b", "1", Derived("half decades from noise to a wholly different bladder");
     /// The same of the friction.
-    FRICTION_GIVES: ([f64; 4]) = [1e-4, 5e-4, 2.5e-3, 1e-2], "V_f/F_b", "1", Derived("factors of about five over the same range");
+    FRICTION_DEVIATIONS: ([f64; 4]) = [1e-4, 5e-4, 2.5e-3, 1e-2], "V_f/F_b", "1", Derived("factors of about five over the same range");
     /// Their expected values (elastic, friction); the prior is normal in the logarithm with a deviation of 1/sqrt 2.
-    EXPECTED_GIVE: ((f64, f64)) = (7e-4, 3e-4), "V_0/F_b", "1", Judgement;
+    EXPECTED_DEVIATIONS: ((f64, f64)) = (7e-4, 3e-4), "V_0/F_b", "1", Judgement;
 }

@@ -35,13 +35,13 @@ criteria! {
     /// A further effect must also explain this share of all excess error.
     FURTHER_SHARE: f64 = 0.1, "q_further", "1", Judgement;
     /// Effects that are selected at most.
-    MAX_NAMED: usize = 3, "n_max", "1", Judgement;
+    MOST_SELECTED: usize = 3, "n_max", "1", Judgement;
     /// An effect is not selected where one that is concealed scores this many times as much.
     SHADOW: f64 = 2.0, "D_hidden/D", "1", Judgement;
     /// Independent rows of any campaign, at least.
     FEWEST_INDEPENDENT: f64 = 8.0, "n_min", "1", Judgement;
     /// Candidates that may fail in the joint fit before the selection ends.
-    MOST_BARRED: usize = 4, "n_barred", "1", Cost;
+    MOST_EXCLUDED: usize = 4, "n_barred", "1", Cost;
     /// Selections that may fail on held-out rows before none is made.
     MOST_REFUSED: usize = 3, "n_refused", "1", Cost;
     /// Evidence comes from the first strokes where they hold more than this share of it.

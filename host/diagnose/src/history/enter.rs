@@ -4,8 +4,8 @@ use model_core::braid::{Braid, Geometry};
 
 use super::criteria::LEAST_GAIN;
 use super::{Found, History, found};
-use crate::answer::diagnose as statically;
 use crate::baselines::{self, Kind};
+use crate::diagnosis::diagnose as statically;
 use crate::options::Options;
 use crate::remark::Remark;
 use crate::rows;

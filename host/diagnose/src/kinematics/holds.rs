@@ -1,7 +1,7 @@
 //! Where the length is held.
 
 use super::onset::Onset;
-use super::series::slopes;
+use super::signal::slopes;
 use crate::criteria::motion::{
     DWELL_RATIO, HOLD_DRIFT, PACE_PARTS, PACE_ROWS, REST_SPEED, REST_SPEED_MOST, REST_SPEED_NOISE,
     SLOPE_HALF_ROWS, SLOPE_ROWS, SPEED_PRECISION,

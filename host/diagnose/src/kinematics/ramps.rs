@@ -5,7 +5,7 @@ use crate::criteria::motion::{RAMP_SETTLES, RAMP_STEADY};
 use crate::linear::median;
 
 /// A ramp begins before it has passed the threshold by which it is found: back to where the pressure left what it had been about the
-/// hold's beginning, be it that the muscle still moved. And a hold begins and ends within `margin` rows of where the motion's slope says.
+/// hold's beginning, even while the muscle still moved. A hold begins and ends within `margin` rows of what the slope of the stroke gives.
 pub(super) fn mark_ramps_from_their_start(k: &mut Kinematics, pressure: &[f64], noise: f64, margin: usize) {
     let n = pressure.len();
     let mut from = 0;

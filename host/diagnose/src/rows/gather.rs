@@ -118,7 +118,7 @@ struct Readings<'a> {
 }
 
 impl Gathering<'_> {
-    /// Appends a recording, `pause` seconds after the one before where that is known. What is not `read` of its pressure says nothing.
+    /// Appends a recording, `pause` seconds after the one before where that is known. Samples whose pressure was not `read` do not count.
     ///
     /// # Errors
     /// A recording without force.
@@ -215,7 +215,7 @@ impl Gathering<'_> {
         if average.good > 0.0 {
             average.force /= average.good;
         } else if !read[samples.start] {
-            // It weighs nothing, yet what follows the force must not see it jump.
+            // It has no weight, but effects that follow the force must not see a jump.
             average.force = mean(force);
         }
         average

@@ -1,4 +1,4 @@
-//! Readings that say less than others: outliers, ends of the sensor's range, moments that are not known well enough.
+//! Readings of less weight: outliers, ends of the sensor's range, readings on steep flanks.
 
 use crate::criteria::rows::{FLANK_STEP, NEGLIGIBLE_ERROR, NO_LOAD, SIMULTANEITY, SPIKE_NOISE, SPIKE_RANGE};
 use crate::kinematics::white_noise;
@@ -32,8 +32,8 @@ pub(super) fn ends(campaign: &Campaign) -> Vec<Clip> {
     [low, high].into_iter().flatten().filter(|c| c.force.abs() > NO_LOAD * strongest).collect()
 }
 
-/// Weights where the force runs from one branch to the other within a few rows: each of them says as little as the moment of its
-/// reading is known.
+/// Weights, reduced where the force runs from one branch to the other within a few rows: there the time skew between force and stroke
+/// dominates the error.
 pub(super) fn blurred(force: &[f64], mut weights: Vec<f64>, block: &[u32], recording: &[u32]) -> Vec<f64> {
     let strongest = force.iter().copied().fold(0.0, f64::max);
     let step = |i: usize| (force[i + 1] - force[i]).abs();

@@ -46,7 +46,7 @@ fn limit(contexts: &[Context<f64>]) -> (f64, f64) {
     (highest, (VENTED_SHARE * highest).min(VENTED_PRESSURE))
 }
 
-/// Rows without pressure worth the name: the muscle cannot pull, so what is read comes from the bench.
+/// Rows without pressure: the muscle cannot pull, so what is read comes from the bench.
 pub(super) fn vented(contexts: &[Context<f64>]) -> Vec<bool> {
     let (_, limit) = limit(contexts);
     let vented: Vec<bool> = contexts.iter().map(|c| c.pressure < limit).collect();

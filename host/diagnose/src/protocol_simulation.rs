@@ -1,4 +1,4 @@
-//! Protocols before they are run: their motion with our own model, and what effects would look like in it.
+//! Simulation of a protocol: its motion with our own model, and the contexts in which effects act.
 //!
 //! The file is the virtual bench's, read by its own types: `name`, `sample_Hz` and `[[step]]` tables with `do = "pressure" | "move" | "cycles" | "hold" |
 //! "tare" | "rest" | "sine" | "file" | "end-file"`; a place is `to_mm`, `to_contraction` or `to_free` (part of the free stroke).
@@ -122,7 +122,7 @@ impl Player<'_> {
         if !(0.0..=1e6).contains(&seconds) {
             return Err("a time must be from 0 to 1e6 s");
         }
-        // What nobody records need not be played.
+        // Only what is recorded is simulated.
         if self.open.is_none() {
             self.time += seconds;
             return Ok(());

@@ -2,24 +2,28 @@
 
 use rayon::prelude::*;
 
-use crate::criteria::baseline::{FREE_GIVE, FREE_ROW};
+use crate::criteria::baseline::{FREE_DEVIATION, FREE_ROW};
 use crate::linear::{Basis, add_scaled, dot, energy, weighted};
 
 /// How much one bladder may differ between pressures, and how unsure a row is: what a soft baseline takes for granted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Give {
+pub(crate) struct PriorDeviations {
     /// Rms that the elastic surface may differ by from one pressure to the next, N.
     pub elastic: f64,
     /// The same of the friction, N.
     pub friction: f64,
-    /// Standard deviation of a row by which a sum over rows is judged, N: noise times the root of how many rows are worth one.
+    /// Standard deviation of a row for sums over rows, N: noise times the root of the rows per independent row.
     pub row: f64,
 }
 
-impl Give {
+impl PriorDeviations {
     /// Tables that are free at every pressure.
     pub(crate) fn free(blocked: f64) -> Self {
-        Self { elastic: FREE_GIVE * blocked, friction: FREE_GIVE * blocked, row: FREE_ROW * blocked }
+        Self {
+            elastic: FREE_DEVIATION * blocked,
+            friction: FREE_DEVIATION * blocked,
+            row: FREE_ROW * blocked,
+        }
     }
 }
 
@@ -28,7 +32,7 @@ impl Give {
 /// In the soft directions a misfit is partly the bladder's own: the whitened space shrinks them by `keep`, so that inner products
 /// there are those of generalised least squares with the prior integrated out.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Reach {
+pub(crate) struct Absorbable {
     /// Columns with free coefficients, weighted.
     pub hard: Basis,
     /// Unit directions of the flexible tables beyond, orthogonal to the hard ones.
@@ -43,7 +47,7 @@ pub(crate) struct Reach {
     pub chosen_core: Vec<Vec<f64>>,
 }
 
-impl Reach {
+impl Absorbable {
     /// Takes out of a weighted column what the baseline can express.
     pub(crate) fn project_out(&self, v: &mut [f64]) {
         self.whiten(v);
@@ -66,7 +70,7 @@ impl Reach {
 }
 
 /// Every column weighted and freed of what a baseline expresses.
-pub(crate) fn projected(columns: &[Vec<f64>], root_weight: &[f64], span: &Reach) -> Vec<Vec<f64>> {
+pub(crate) fn projected(columns: &[Vec<f64>], root_weight: &[f64], span: &Absorbable) -> Vec<Vec<f64>> {
     columns
         .par_iter()
         .map(|c| {
@@ -77,16 +81,16 @@ pub(crate) fn projected(columns: &[Vec<f64>], root_weight: &[f64], span: &Reach)
         .collect()
 }
 
-/// What remains of each soft direction, when the bladder may differ as much as `give` says.
-pub(crate) fn keeps(give: Give, of_friction: &[bool], weight: f64) -> Vec<f64> {
+/// What remains of each soft direction under a prior.
+pub(crate) fn keeps(prior: PriorDeviations, of_friction: &[bool], weight: f64) -> Vec<f64> {
     let friction = of_friction.iter().filter(|f| **f).count().max(1) as f64;
     let elastic = of_friction.iter().filter(|f| !**f).count().max(1) as f64;
-    let noise = give.row * give.row;
+    let noise = prior.row * prior.row;
     of_friction
         .iter()
         .map(|f| {
             let own =
-                weight * if *f { give.friction.powi(2) / friction } else { give.elastic.powi(2) / elastic };
+                weight * if *f { prior.friction.powi(2) / friction } else { prior.elastic.powi(2) / elastic };
             (noise / (noise + own).max(1e-300)).sqrt()
         })
         .collect()

@@ -5,7 +5,7 @@ use model_core::muscle::Muscle;
 
 use super::criteria::judgement::{CHECKED_COST, PREDICTIVE_COST, REFIT_ROUNDS};
 use super::history;
-use super::planned::moments;
+use super::protocol_simulation::moments;
 use super::reserve::Reserve;
 use super::verdict::{Diagnosis, Verdict};
 use pam_data::error::Result;
@@ -83,7 +83,7 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
         warnings.clone_from(&again.summary.warnings);
     }
     let after = predict(&with, campaign)?.rms.unwrap_or(f64::INFINITY);
-    // What a check has measured is there, even where tables would swallow it.
+    // A fault that a check measured is there, even where tables absorb it.
     let measured = diagnosis.missing.iter().all(|m| m.checked);
     let foretells = left_out.is_some_and(|(plain, with)| with <= plain);
     let better = after < before

@@ -1,39 +1,39 @@
-//! The ground on which candidates are tried: a baseline with the effects chosen so far, the best of each looked for in its shapes.
+//! Scoring of candidates beside a baseline with the effects selected so far: scan of all shapes, refinement of the best.
 
 use model_core::effects::Parameter;
 use rayon::prelude::*;
 
-use super::baselines::{Baseline, Give, keeps};
+use super::baselines::{Baseline, PriorDeviations, keeps};
+use super::candidate_fit::CandidateFit;
 use super::candidates::Candidate;
 use super::criteria::candidates::{
     AMPLITUDE_BEYOND, INVISIBLE, MOST_AMPLITUDES, REFINEMENT_GAIN, REFINEMENT_HALVINGS, REFINEMENT_STEP,
     REFINEMENT_STEPS, SYSTEMATIC_ROWS,
 };
-use super::evidence::{Products, Scale, Target, Weighed, weigh, weigh_at};
+use super::likelihood::{Hypothesis, Products, Scale, Target, likelihood, likelihood_at};
 use super::linear::{add_scaled, dot, energy, weighted};
 use super::rows::Rows;
-use super::trial::Trial;
 
-/// A baseline against which candidates are weighed.
-pub(crate) struct Ground<'a> {
+/// A baseline beside which candidates are scored.
+pub(crate) struct Scorer<'a> {
     base: &'a Baseline,
-    /// What evidence is weighed with.
+    /// What the likelihood is scaled with.
     pub scale: Scale,
     target: Target<'a>,
     /// Twice the negative log-likelihood without any further effect.
     pub deviance: f64,
     /// The sizes of its soft directions without any further effect.
-    pub give: Give,
+    pub prior: PriorDeviations,
     /// What is left without any further effect, N².
     pub left: f64,
-    /// What is to be explained in the metric of that give, freed of the effects chosen.
+    /// What is to be explained in the metric of that prior, freed of the effects chosen.
     residual: Vec<f64>,
     chosen: Products,
 }
 
-/// A residual in the metric of a give: inner products with it are those in the whitened space.
-fn in_metric(base: &Baseline, core: &[f64], give: Give, weight: f64) -> Vec<f64> {
-    let keep = keeps(give, &base.span.of_friction, weight);
+/// A residual in the metric of a prior: inner products with it are those in the whitened space.
+fn in_metric(base: &Baseline, core: &[f64], prior: PriorDeviations, weight: f64) -> Vec<f64> {
+    let keep = keeps(prior, &base.span.of_friction, weight);
     let mut r = core.to_vec();
     for (q, keep) in base.span.soft.iter().zip(&keep) {
         let c = dot(q, core);
@@ -42,7 +42,7 @@ fn in_metric(base: &Baseline, core: &[f64], give: Give, weight: f64) -> Vec<f64>
     r
 }
 
-impl<'a> Ground<'a> {
+impl<'a> Scorer<'a> {
     /// Of a soft baseline, with the effects fitted beside it.
     pub(crate) fn new(base: &'a Baseline, scale: Scale) -> Self {
         let target = Target {
@@ -57,25 +57,25 @@ impl<'a> Ground<'a> {
             components: columns.iter().map(|a| base.span.components(a)).collect(),
             given: columns.len(),
         };
-        let null = weigh(&scale, &target, &chosen, &[], 0);
+        let null = likelihood(&scale, &target, &chosen, &[], 0);
         let mut freed = base.core.clone();
         for (a, c) in null.given.iter().zip(columns) {
             add_scaled(&mut freed, -a, c);
         }
-        let residual = in_metric(base, &freed, null.give, scale.weight);
+        let residual = in_metric(base, &freed, null.prior, scale.weight);
         Self {
             base,
             scale,
             target,
             deviance: null.deviance,
-            give: null.give,
+            prior: null.prior,
             left: null.before,
             residual,
             chosen,
         }
     }
 
-    /// A candidate's columns, their products with everything else, and the columns freed of the hard ones.
+    /// A candidate's columns, their inner products with all other columns, and the columns with the hard ones projected out.
     fn products(
         &self,
         candidate: &Candidate,
@@ -110,15 +110,15 @@ impl<'a> Ground<'a> {
         (columns, products, z)
     }
 
-    /// Tries a candidate at given shapes; with its scores block by block where `whole`.
-    pub(crate) fn attempt(
+    /// Fits a candidate at given shapes; with its scores block by block where `whole`.
+    pub(crate) fn fit(
         &self,
         index: usize,
         candidate: &Candidate,
         shapes: &[f64],
         rows: &Rows,
         whole: bool,
-    ) -> Trial {
+    ) -> CandidateFit {
         let given = self.chosen.given;
         let (columns, products, z) = self.products(candidate, shapes, rows);
         let weight = rows.root_weight();
@@ -128,12 +128,12 @@ impl<'a> Ground<'a> {
         let within: f64 = products.components[given..].iter().map(|c| energy(c)).sum();
         // What is left of the columns where the bladder may differ as much as it does without them.
         let share = |e: f64| if before > 0.0 { (e / before).max(0.0) } else { 0.0 };
-        let mut trial = Trial {
+        let mut fit = CandidateFit {
             candidate: index,
             shapes: shapes.to_vec(),
             amplitudes: vec![0.0; columns.len()],
             score: 0.0,
-            give: self.give,
+            prior: self.prior,
             gain: 0.0,
             before: self.left,
             relief: 0.0,
@@ -145,38 +145,38 @@ impl<'a> Ground<'a> {
             size: 0.0,
             peak: 0.0,
         };
-        if trial.visible < INVISIBLE {
-            self.measure(&mut trial, &columns, rows);
-            return trial;
+        if fit.visible < INVISIBLE {
+            self.measure(&mut fit, &columns, rows);
+            return fit;
         }
         let signs = candidate.signs();
         let most = if candidate.info.alternatives { 1 } else { MOST_AMPLITUDES };
-        let w = weigh(&self.scale, &self.target, &products, &signs, most);
-        // Ten times beyond what anybody has seen is another thing under this name.
+        let w = likelihood(&self.scale, &self.target, &products, &signs, most);
+        // Far beyond the known range another cause has this name.
         let known = candidate.info.parameters.iter();
         let within = |(p, a): (&Parameter, &f64)| a.abs() <= AMPLITUDE_BEYOND * p.low.abs().max(p.high.abs());
         let plausible =
-            known.zip(&w.amplitudes).all(within) && candidate.holds_together(&w.amplitudes, shapes);
+            known.zip(&w.amplitudes).all(within) && candidate.is_consistent(&w.amplitudes, shapes);
         if plausible && w.gain > 0.0 {
             let free = w.amplitudes.iter().filter(|a| **a != 0.0).count() + shapes.len();
-            trial.gain = w.gain;
-            trial.before = w.before;
-            trial.give = w.give;
-            trial.score = self.deviance - w.deviance - free as f64 * self.scale.independent.max(2.0).ln();
-            trial.amplitudes.clone_from(&w.amplitudes);
-            (trial.relief, trial.unrelieved) = self.relief(&products, &w);
+            fit.gain = w.gain;
+            fit.before = w.before;
+            fit.prior = w.prior;
+            fit.score = self.deviance - w.deviance - free as f64 * self.scale.independent.max(2.0).ln();
+            fit.amplitudes.clone_from(&w.amplitudes);
+            (fit.relief, fit.unrelieved) = self.relief(&products, &w);
         }
-        self.measure(&mut trial, &columns, rows);
-        trial.score -= self.inexactness(&trial, candidate.law_error(rows));
-        if whole && trial.gain > 0.0 {
-            self.score_blocks(&mut trial, &z, &w.given, rows);
+        self.measure(&mut fit, &columns, rows);
+        fit.score -= self.inexactness(&fit, candidate.law_error(rows));
+        if whole && fit.gain > 0.0 {
+            self.score_blocks(&mut fit, &z, &w.given, rows);
         }
-        trial.singles = z.iter().map(|v| self.single(v, rows)).collect();
-        trial
+        fit.singles = z.iter().map(|v| self.single(v, rows)).collect();
+        fit
     }
 
     /// What columns with their amplitudes take where one bladder serves all pressures, and what there was.
-    fn relief(&self, products: &Products, w: &Weighed) -> (f64, f64) {
+    fn relief(&self, products: &Products, w: &Hypothesis) -> (f64, f64) {
         let given = products.given;
         let mut before = self.target.energy;
         for (i, g) in w.given.iter().enumerate() {
@@ -193,58 +193,57 @@ impl<'a> Ground<'a> {
         (taken, before.max(0.0))
     }
 
-    /// How large a trial's trace is.
-    fn measure(&self, trial: &mut Trial, columns: &[Vec<f64>], rows: &Rows) {
+    /// How large the trace of a fit is.
+    fn measure(&self, fit: &mut CandidateFit, columns: &[Vec<f64>], rows: &Rows) {
         for i in 0..rows.len() {
             // What has no amplitude yet keeps the proportion of peak to size of its first column.
-            let raw: f64 = if trial.gain > 0.0 {
-                trial.amplitudes.iter().zip(columns).map(|(a, c)| a * c[i]).sum()
+            let raw: f64 = if fit.gain > 0.0 {
+                fit.amplitudes.iter().zip(columns).map(|(a, c)| a * c[i]).sum()
             } else {
                 columns[0][i]
             };
-            trial.size += (raw * rows.root_weight()[i]).powi(2);
+            fit.size += (raw * rows.root_weight()[i]).powi(2);
             if rows.root_weight()[i] > 0.0 {
-                trial.peak = trial.peak.max(raw.abs());
+                fit.peak = fit.peak.max(raw.abs());
             }
         }
-        trial.size = (trial.size / self.scale.weight.max(1e-12)).sqrt();
+        fit.size = (fit.size / self.scale.weight.max(1e-12)).sqrt();
     }
 
-    /// What it costs that no law is exact: where nearly all of a trace has to be cancelled by the base, the little that is left of
-    /// it is no larger than the law's own error.
-    fn inexactness(&self, trial: &Trial, law_error: f64) -> f64 {
-        if trial.gain <= 0.0 {
+    /// The penalty for an inexact law: where the base cancels nearly all of a trace, what remains is no larger than the law's own error.
+    fn inexactness(&self, fit: &CandidateFit, law_error: f64) -> f64 {
+        if fit.gain <= 0.0 {
             return 0.0;
         }
         let floor = self.scale.sigma * self.scale.sigma * self.scale.weight;
-        let left = (trial.before - trial.gain).max(floor).max(1e-300);
-        let own = (law_error * trial.size).powi(2) * self.scale.weight;
+        let left = (fit.before - fit.gain).max(floor).max(1e-300);
+        let own = (law_error * fit.size).powi(2) * self.scale.weight;
         self.scale.independent.min(SYSTEMATIC_ROWS) * (own / left).ln_1p()
     }
 
-    /// Energy of columns in the ground's own metric.
+    /// Energy of columns in the scorer's metric.
     fn seen(&self, components: &[Vec<f64>], energy: f64) -> f64 {
-        let keep = keeps(self.give, &self.base.span.of_friction, self.scale.weight);
+        let keep = keeps(self.prior, &self.base.span.of_friction, self.scale.weight);
         let lost = |c: &Vec<f64>| c.iter().zip(&keep).map(|(c, k)| c * c * (1.0 - k * k)).sum::<f64>();
         energy - components.iter().map(lost).sum::<f64>()
     }
 
-    /// What a trial leaves, N², where the bladder differs as much as another hypothesis has it; and what there was.
+    /// What a fit leaves, N², where the bladder differs as much as another hypothesis has it; and what there was.
     pub(crate) fn left_under(
         &self,
-        trial: &Trial,
+        fit: &CandidateFit,
         library: &[Candidate],
         rows: &Rows,
-        give: Give,
+        prior: PriorDeviations,
     ) -> (f64, f64) {
-        let candidate = &library[trial.candidate];
-        let (_, products, _) = self.products(candidate, &trial.shapes, rows);
+        let candidate = &library[fit.candidate];
+        let (_, products, _) = self.products(candidate, &fit.shapes, rows);
         let most = if candidate.info.alternatives { 1 } else { MOST_AMPLITUDES };
-        let w = weigh_at(&self.scale, &self.target, &products, &candidate.signs(), most, give);
+        let w = likelihood_at(&self.scale, &self.target, &products, &candidate.signs(), most, prior);
         ((w.before - w.gain).max(0.0), w.before)
     }
 
-    /// Block by block, a column against the residual in the ground's own metric, per unit norm.
+    /// Block by block, a column against the residual in the scorer's metric, per unit norm.
     fn single(&self, v: &[f64], rows: &Rows) -> Vec<f64> {
         let mut scores = vec![0.0; rows.blocks];
         let norm = energy(v).sqrt();
@@ -256,38 +255,37 @@ impl<'a> Ground<'a> {
         scores
     }
 
-    /// Block by block, the fitted trace against the residual, both in the metric of the trial's own give.
-    fn score_blocks(&self, trial: &mut Trial, z: &[Vec<f64>], given: &[f64], rows: &Rows) {
+    /// Block by block, the fitted trace against the residual, both in the metric of the fit's own prior.
+    fn score_blocks(&self, fit: &mut CandidateFit, z: &[Vec<f64>], given: &[f64], rows: &Rows) {
         let mut fitted = vec![0.0; rows.len()];
-        for (a, v) in trial.amplitudes.iter().zip(z) {
+        for (a, v) in fit.amplitudes.iter().zip(z) {
             add_scaled(&mut fitted, *a, v);
         }
         let mut core = self.base.core.clone();
         for (a, c) in given.iter().zip(&self.base.span.chosen_core) {
             add_scaled(&mut core, -a, c);
         }
-        let residual = in_metric(self.base, &core, trial.give, self.scale.weight);
+        let residual = in_metric(self.base, &core, fit.prior, self.scale.weight);
         for i in 0..rows.len() {
-            trial.scores[rows.block[i] as usize] += fitted[i] * residual[i];
+            fit.scores[rows.block[i] as usize] += fitted[i] * residual[i];
         }
     }
 
     /// Every candidate at every grid point, in a fixed order.
-    pub(crate) fn scan(&self, library: &[Candidate], rows: &Rows) -> Vec<Trial> {
+    pub(crate) fn scan(&self, library: &[Candidate], rows: &Rows) -> Vec<CandidateFit> {
         let work: Vec<(usize, Vec<f64>)> =
             library.iter().enumerate().flat_map(|(i, c)| c.grid().into_iter().map(move |g| (i, g))).collect();
         rows.progress().stage("trying every effect", work.len() as u64);
-        let attempt = |(i, shapes): &(usize, Vec<f64>)| {
-            let trial = self.attempt(*i, &library[*i], shapes, rows, false);
+        let fit = |(i, shapes): &(usize, Vec<f64>)| {
+            let fit = self.fit(*i, &library[*i], shapes, rows, false);
             rows.progress().step();
-            trial
+            fit
         };
-        work.par_iter().map(attempt).collect()
+        work.par_iter().map(fit).collect()
     }
 
-    /// Walks uphill in the shapes from a trial, halving the step, until the steps are small against the range; with scores
-    /// by blocks.
-    pub(crate) fn refine(&self, start: &Trial, library: &[Candidate], rows: &Rows) -> Trial {
+    /// Coordinate search in the shapes from a fit, with a step that halves; with scores by blocks.
+    pub(crate) fn refine(&self, start: &CandidateFit, library: &[Candidate], rows: &Rows) -> CandidateFit {
         let candidate = &library[start.candidate];
         let mut best = start.clone();
         let mut step = (0.5 / candidate.grid().len() as f64).max(REFINEMENT_STEP);
@@ -296,7 +294,7 @@ impl<'a> Ground<'a> {
                 let better = candidate
                     .neighbours(&best.shapes, step)
                     .par_iter()
-                    .map(|s| self.attempt(start.candidate, candidate, s, rows, false))
+                    .map(|s| self.fit(start.candidate, candidate, s, rows, false))
                     .collect::<Vec<_>>()
                     .into_iter()
                     .max_by(|a, b| a.score.total_cmp(&b.score));
@@ -307,6 +305,6 @@ impl<'a> Ground<'a> {
             }
             step *= 0.5;
         }
-        self.attempt(start.candidate, candidate, &best.shapes, rows, true)
+        self.fit(start.candidate, candidate, &best.shapes, rows, true)
     }
 }

@@ -1,26 +1,26 @@
-//! Which effects: one look at all of them, tests by whole blocks over the whole family, what cannot be told apart.
+//! One step of forward selection: scan of all candidates, family-wise tests by whole blocks, rivals.
 
 use rayon::prelude::*;
 
-use super::baselines::{self, Baseline, Give, Kind, cosine};
+use super::baselines::{self, Baseline, Kind, PriorDeviations, cosine};
+use super::candidate_fit::{self, CandidateFit};
+use super::candidate_scoring::Scorer;
 use super::candidates::Candidate;
 use super::criteria::selection::{
     CONCEALED, LARGEST_PEAK, LEAST_SHARE, NEGLIGIBLE_RIVAL, PARALLEL, REFINED, RIVAL_COST, RIVAL_FLOOR,
     RIVAL_SHARPNESS, SELECTION_FLOOR, SIGN_FLIPS, STATIC_MOVED, STATIC_PEAK, TWIN_OF_TABLES, WORSE,
 };
-use super::evidence::Scale;
-use super::ground::Ground;
+use super::likelihood::Scale;
 use super::linear::{Sign, add_scaled, energy};
 use super::noise::{Noise, family_p};
 use super::remark::Remark;
 use super::rows::Rows;
-use super::trial::{self, Trial};
 
-/// An effect taken, with its standing among its rivals at that step.
+/// A selected effect, with its standing among its rivals at that step.
 #[derive(Clone, Debug)]
-pub(crate) struct Taken {
-    /// The trial that won.
-    pub trial: Trial,
+pub(crate) struct SelectedEffect {
+    /// The fit that won.
+    pub fit: CandidateFit,
     /// Family-wise p.
     pub p: f64,
     /// Share of all misfit above noise.
@@ -31,23 +31,23 @@ pub(crate) struct Taken {
     pub rms: f64,
 }
 
-/// What the search found.
+/// The selected effects.
 #[derive(Clone, Debug)]
-pub(crate) struct Found {
+pub(crate) struct Selection {
     /// The rows, linearised about the last baseline.
     pub rows: Rows,
     /// The baseline without effects, in the metric of the last one.
-    pub bare: Baseline,
+    pub base_alone: Baseline,
     /// The baseline with the effects fitted beside it.
-    pub full: Baseline,
+    pub joint: Baseline,
     /// The effects.
-    pub taken: Vec<Taken>,
-    /// Every candidate's best trial on the bare baseline.
-    pub first_look: Vec<Trial>,
+    pub selected: Vec<SelectedEffect>,
+    /// Every candidate's best fit beside the bare baseline.
+    pub first_scan: Vec<CandidateFit>,
     /// Family-wise p of each of these.
     pub first_p: Vec<f64>,
-    /// The energy above noise before anything was taken, N².
-    pub above: f64,
+    /// The energy above noise before any effect, N².
+    pub excess_energy: f64,
     /// Effect columns with amplitudes applied.
     pub traces: Vec<Vec<f64>>,
     /// The noise at the end.
@@ -56,25 +56,25 @@ pub(crate) struct Found {
     pub remarks: Vec<Remark>,
 }
 
-impl Found {
-    /// Without the effect that was taken last.
+impl Selection {
+    /// Without the effect that was selected last.
     pub(crate) fn without_last(mut self, library: &[Candidate]) -> Self {
-        self.taken.pop();
-        let left: Vec<Trial> = self.taken.iter().map(|t| t.trial.clone()).collect();
-        let kind = left.last().map_or(self.bare.kind, |t| Kind::Soft(t.give));
+        self.selected.pop();
+        let left: Vec<CandidateFit> = self.selected.iter().map(|t| t.fit.clone()).collect();
+        let kind = left.last().map_or(self.base_alone.kind, |t| Kind::Soft(t.prior));
         let joint = refit(&self.rows, kind, left, library);
-        self.bare = baselines::fit(&joint.rows, kind, &[]);
-        for (t, l) in self.taken.iter_mut().zip(&joint.trials) {
-            t.trial.amplitudes.clone_from(&l.amplitudes);
+        self.base_alone = baselines::fit(&joint.rows, kind, &[]);
+        for (t, l) in self.selected.iter_mut().zip(&joint.fits) {
+            t.fit.amplitudes.clone_from(&l.amplitudes);
         }
-        Self { rows: joint.rows, full: joint.base, traces: joint.traces, ..self }
+        Self { rows: joint.rows, joint: joint.base, traces: joint.traces, ..self }
     }
 }
 
-/// Best trial of each candidate out of a scan.
-pub(super) fn best_of_each(trials: &[Trial], library: &[Candidate]) -> Vec<Trial> {
-    let mut best: Vec<Option<&Trial>> = vec![None; library.len()];
-    for t in trials {
+/// Best fit of each candidate out of a scan.
+pub(super) fn best_of_each(fits: &[CandidateFit], library: &[Candidate]) -> Vec<CandidateFit> {
+    let mut best: Vec<Option<&CandidateFit>> = vec![None; library.len()];
+    for t in fits {
         let b = &mut best[t.candidate];
         if b.is_none_or(|x| (t.score, t.visible) > (x.score, x.visible)) {
             *b = Some(t);
@@ -83,8 +83,8 @@ pub(super) fn best_of_each(trials: &[Trial], library: &[Candidate]) -> Vec<Trial
     best.into_iter().flatten().cloned().collect::<Vec<_>>()
 }
 
-/// Family-wise p of the best trials, given everything that was looked at.
-fn p_values(best: &[Trial], all: &[Trial]) -> Vec<f64> {
+/// Family-wise p of the best fits, over all candidates and shapes that were scanned.
+fn p_values(best: &[CandidateFit], all: &[CandidateFit]) -> Vec<f64> {
     let mut views: Vec<&[f64]> = best.iter().map(|t| t.scores.as_slice()).collect();
     for t in all {
         views.extend(t.singles.iter().map(Vec::as_slice));
@@ -95,14 +95,14 @@ fn p_values(best: &[Trial], all: &[Trial]) -> Vec<f64> {
 }
 
 /// One step: every candidate beside the present baseline, the best refined.
-pub(crate) fn look(
+pub(crate) fn scan_step(
     library: &[Candidate],
     rows: &Rows,
-    ground: &Ground<'_>,
+    scorer: &Scorer<'_>,
     blocked: f64,
-) -> (Vec<Trial>, Vec<f64>) {
-    let mut all = ground.scan(library, rows);
-    forbid_cancelling(&mut all, blocked);
+) -> (Vec<CandidateFit>, Vec<f64>) {
+    let mut all = scorer.scan(library, rows);
+    reject_cancelling(&mut all, blocked);
     let mut best = best_of_each(&all, library);
     let mut order: Vec<usize> = (0..best.len()).collect();
     order.sort_by(|a, b| best[*b].score.total_cmp(&best[*a].score));
@@ -111,21 +111,21 @@ pub(crate) fn look(
         rows.progress().step();
         if best[i].gain > 0.0 {
             best[i] = if rank < REFINED {
-                ground.refine(&best[i], library, rows)
+                scorer.refine(&best[i], library, rows)
             } else {
-                ground.attempt(best[i].candidate, &library[best[i].candidate], &best[i].shapes, rows, true)
+                scorer.fit(best[i].candidate, &library[best[i].candidate], &best[i].shapes, rows, true)
             };
         }
     }
-    forbid_cancelling(&mut best, blocked);
+    reject_cancelling(&mut best, blocked);
     rows.progress().stage("weighing them against chance and each other", 0);
     let p = p_values(&best, &all);
     (best, p)
 }
 
-/// Takes away the gain of trials whose trace is implausibly large beside the little that is seen of it.
-fn forbid_cancelling(trials: &mut [Trial], blocked: f64) {
-    for t in trials {
+/// Sets the gain of fits to zero whose trace is implausibly large beside the little that is seen of it.
+fn reject_cancelling(fits: &mut [CandidateFit], blocked: f64) {
+    for t in fits {
         if t.gain > 0.0 && t.peak > LARGEST_PEAK * blocked && t.visible < CONCEALED {
             (t.gain, t.score) = (0.0, 0.0);
         }
@@ -134,105 +134,116 @@ fn forbid_cancelling(trials: &mut [Trial], blocked: f64) {
 
 /// A baseline fitted together with effects.
 #[derive(Clone, Debug)]
-pub(crate) struct Joint {
+pub(crate) struct JointFit {
     /// The rows, linearised about the model that the effects see.
     pub rows: Rows,
     /// The baseline.
     pub base: Baseline,
     /// The effects, with the amplitudes of the joint fit.
-    pub trials: Vec<Trial>,
+    pub fits: Vec<CandidateFit>,
     /// Their traces, N.
     pub traces: Vec<Vec<f64>>,
 }
 
-/// Refits the baseline with the effects of `trials` beside it, renewing what the effects see of the model.
+/// Refits the baseline with the effects of `fits` beside it, renewing what the effects see of the model.
 ///
 /// A law of first order goes by the model's slope. Where the slope changes fast, that of the new baseline may serve it worse than the one
 /// by which the effect was found; then that one stays.
-pub(crate) fn refit(rows: &Rows, kind: Kind, trials: Vec<Trial>, library: &[Candidate]) -> Joint {
-    let first = fitted_beside(rows, kind, trials, library);
+pub(crate) fn refit(rows: &Rows, kind: Kind, fits: Vec<CandidateFit>, library: &[Candidate]) -> JointFit {
+    let first = fitted_beside(rows, kind, fits, library);
     let renewed = baselines::linearised(rows, &first.base);
-    let second = fitted_beside(&renewed, kind, first.trials.clone(), library);
+    let second = fitted_beside(&renewed, kind, first.fits.clone(), library);
     if energy(&second.base.residual) <= WORSE * energy(&first.base.residual) {
         let rows = baselines::linearised(&second.rows, &second.base);
-        return Joint { rows, ..second };
+        return JointFit { rows, ..second };
     }
     first
 }
 
 /// The baseline with effects beside it as they see the model now.
-fn fitted_beside(rows: &Rows, kind: Kind, mut trials: Vec<Trial>, library: &[Candidate]) -> Joint {
+fn fitted_beside(rows: &Rows, kind: Kind, mut fits: Vec<CandidateFit>, library: &[Candidate]) -> JointFit {
     let mut columns = Vec::new();
     let mut owner = Vec::new();
-    for (t, trial) in trials.iter().enumerate() {
-        for (k, column) in library[trial.candidate].columns(&trial.shapes, rows).into_iter().enumerate() {
-            if trial.amplitudes.get(k).is_some_and(|a| *a != 0.0) {
+    for (t, fit) in fits.iter().enumerate() {
+        for (k, column) in library[fit.candidate].columns(&fit.shapes, rows).into_iter().enumerate() {
+            if fit.amplitudes.get(k).is_some_and(|a| *a != 0.0) {
                 columns.push(column);
                 owner.push((t, k));
             }
         }
     }
     let base = baselines::fit(rows, kind, &columns);
-    let mut traces = vec![vec![0.0; rows.len()]; trials.len()];
+    let mut traces = vec![vec![0.0; rows.len()]; fits.len()];
     for (j, (t, k)) in owner.iter().enumerate() {
-        let sign = library[trials[*t].candidate].signs()[*k];
+        let sign = library[fits[*t].candidate].signs()[*k];
         let a = base.amplitudes[j];
         let allowed = match sign {
             Sign::Free => a,
             Sign::Positive => a.max(0.0),
             Sign::Negative => a.min(0.0),
         };
-        trials[*t].amplitudes[*k] = allowed;
+        fits[*t].amplitudes[*k] = allowed;
         add_scaled(&mut traces[*t], allowed, &columns[j]);
     }
-    Joint { rows: rows.clone(), base, trials, traces }
+    JointFit { rows: rows.clone(), base, fits, traces }
 }
 
 /// Whether an effect may be named at all: what tables imitate has to be large, or to show beyond them.
-pub(super) fn worth_naming(t: &Trial, library: &[Candidate], rows: &Rows, ground: &Ground<'_>) -> bool {
-    let Scale { weight, blocked, .. } = ground.scale;
+pub(super) fn is_selectable(
+    t: &CandidateFit,
+    library: &[Candidate],
+    rows: &Rows,
+    scorer: &Scorer<'_>,
+) -> bool {
+    let Scale { weight, blocked, .. } = scorer.scale;
     let moved = (t.gain.max(t.relief) / weight).sqrt();
     let table = t.beyond_tables < TWIN_OF_TABLES;
     t.beyond_tables >= CONCEALED
         || (!table && t.peak >= STATIC_PEAK * blocked && moved >= STATIC_MOVED * blocked)
-        || seen_past_tables(t, library, rows, ground)
+        || is_visible_beyond_tables(t, library, rows, scorer)
 }
 
 /// Whether what the freest tables leave of the recordings is of an effect's making, however little of its trace that is.
-fn seen_past_tables(trial: &Trial, library: &[Candidate], rows: &Rows, ground: &Ground<'_>) -> bool {
-    let Scale { sigma, weight, blocked, .. } = ground.scale;
-    let (left, before) = ground.left_under(trial, library, rows, Give::free(blocked));
-    let above = before - sigma * sigma * weight;
-    let taken = before - left;
-    taken >= LEAST_SHARE * above && taken >= weight * (SELECTION_FLOOR * blocked).powi(2)
+fn is_visible_beyond_tables(
+    fit: &CandidateFit,
+    library: &[Candidate],
+    rows: &Rows,
+    scorer: &Scorer<'_>,
+) -> bool {
+    let Scale { sigma, weight, blocked, .. } = scorer.scale;
+    let (left, before) = scorer.left_under(fit, library, rows, PriorDeviations::free(blocked));
+    let excess_energy = before - sigma * sigma * weight;
+    let selected = before - left;
+    selected >= LEAST_SHARE * excess_energy && selected >= weight * (SELECTION_FLOOR * blocked).powi(2)
 }
 
 /// The weight of each rival against the winner, from what each leaves of the misfit above noise where the bladder differs between
 /// pressures as much as it does beside the winner.
 pub(crate) fn rivals(
-    winner: &Trial,
-    best: &[Trial],
+    winner: &CandidateFit,
+    best: &[CandidateFit],
     library: &[Candidate],
     rows: &Rows,
-    ground: &Ground<'_>,
-    span: &baselines::Reach,
+    scorer: &Scorer<'_>,
+    span: &baselines::Absorbable,
 ) -> Vec<(usize, f64, f64)> {
-    let mine = trial::projected_trace(winner, library, rows, span);
-    let numbers = |t: &Trial| (t.amplitudes.iter().filter(|a| **a != 0.0).count() + t.shapes.len()) as f64;
-    let scale = &ground.scale;
+    let mine = candidate_fit::projected_trace(winner, library, rows, span);
+    let numbers =
+        |t: &CandidateFit| (t.amplitudes.iter().filter(|a| **a != 0.0).count() + t.shapes.len()) as f64;
+    let scale = &scorer.scale;
     let noise_energy = scale.sigma * scale.sigma * scale.weight;
     let excess = |e: f64| (e - noise_energy).max(0.0);
-    let (own_left, before) = ground.left_under(winner, library, rows, winner.give);
+    let (own_left, before) = scorer.left_under(winner, library, rows, winner.prior);
     let floor = RIVAL_FLOOR * excess(before) + noise_energy * (2.0 / scale.independent.max(2.0)).sqrt();
     let mut rivals: Vec<(usize, f64, f64)> = best
         .par_iter()
         .filter(|t| t.candidate != winner.candidate && t.gain > 0.0)
         .map(|t| {
-            let (left, _) = ground.left_under(t, library, rows, winner.give);
+            let (left, _) = scorer.left_under(t, library, rows, winner.prior);
             let worse = ((excess(left) + floor) / (excess(own_left) + floor)).ln();
             let weight =
                 (-RIVAL_SHARPNESS * worse - RIVAL_COST * (numbers(t) - numbers(winner))).min(0.0).exp();
-            let c = cosine(&mine, &trial::projected_trace(t, library, rows, span));
+            let c = cosine(&mine, &candidate_fit::projected_trace(t, library, rows, span));
             (t.candidate, weight, c)
         })
         .collect();

@@ -1,45 +1,47 @@
-//! Forward selection with exchange: what is taken next, whether it is enough, and what the whole refit makes of it.
+//! Forward selection with exchange: the next effect, whether its evidence is sufficient, and the joint refit.
 
 use std::ops::ControlFlow;
 
 use model_core::effects::{Link, Start};
 
-use super::baselines::{self, Baseline, Give, Kind};
+use super::baselines::{self, Baseline, Kind, PriorDeviations};
+use super::candidate_fit::CandidateFit;
+use super::candidate_scoring::Scorer;
 use super::candidates::Candidate;
-use super::criteria::baseline::{FIRST_GIVE, TABLE_ORDER};
+use super::criteria::baseline::{FIRST_DEVIATIONS, TABLE_ORDER};
 use super::criteria::candidates::LEAST_SIGMA;
 use super::criteria::selection::{
     ALIKE, ALONE_FLOOR, CONFUSABLE, EXCHANGE_LEAVES, FAMILY_ALPHA, FEWEST_INDEPENDENT, FIRST_STROKES,
-    FURTHER_SHARE, KEPT_GAIN, LEAST_EXCESS, LEAST_SCORE, LEAST_SCORE_ALONE, LEAST_SHARE, MAX_NAMED,
-    MOST_BARRED, MOST_RIVALS, NARROW_FLOOR, NARROW_PEAK, NARROW_SCORE, SELECTION_FLOOR, SHADOW,
+    FURTHER_SHARE, KEPT_GAIN, LEAST_EXCESS, LEAST_SCORE, LEAST_SCORE_ALONE, LEAST_SHARE, MOST_EXCLUDED,
+    MOST_RIVALS, MOST_SELECTED, NARROW_FLOOR, NARROW_PEAK, NARROW_SCORE, SELECTION_FLOOR, SHADOW,
 };
-use super::evidence::Scale;
-use super::ground::Ground;
+use super::likelihood::Scale;
 use super::linear::energy;
 use super::noise::{self, Noise};
 use super::remark::{Refusal, Remark};
 use super::rows::{ORDERS, Rows};
-use super::select::{Found, Joint, Taken, best_of_each, look, refit, rivals, worth_naming};
-use super::trial::Trial;
+use super::selection_step::{
+    JointFit, SelectedEffect, Selection, best_of_each, is_selectable, refit, rivals, scan_step,
+};
 
-/// Searches for what is missing. Candidates in `refused` are looked at and may be rivals, but are not taken.
-pub(crate) fn search(
+/// Selects the effects that are missing. Candidates in `refused` are scored and may be rivals, but are not selected.
+pub(crate) fn forward_selection(
     rows: &Rows,
     library: &[Candidate],
     blocked: f64,
     step: f64,
     refused: &[usize],
-) -> Found {
-    let mut search = Search::begin(rows, library, blocked, step, refused);
-    while search.chosen.len() < MAX_NAMED
-        && search.barred.len() < refused.len() + MOST_BARRED
+) -> Selection {
+    let mut search = ForwardSelection::begin(rows, library, blocked, step, refused);
+    while search.chosen.len() < MOST_SELECTED
+        && search.excluded.len() < refused.len() + MOST_EXCLUDED
         && search.next().is_continue()
     {}
     search.end()
 }
 
 /// A forward selection under way.
-struct Search<'a> {
+struct ForwardSelection<'a> {
     /// The rows, linearised about the present baseline.
     rows: Rows,
     library: &'a [Candidate],
@@ -47,24 +49,24 @@ struct Search<'a> {
     /// The middle distance in time between rows, s.
     step: f64,
     noise: Noise,
-    /// What evidence is weighed with; fixed at the beginning.
+    /// What the likelihood is scaled with; fixed at the beginning.
     scale: Scale,
     kind: Kind,
-    bare: Baseline,
-    full: Baseline,
-    /// The effects so far, and how each came to be taken.
-    chosen: Vec<Trial>,
-    taken: Vec<Taken>,
+    base_alone: Baseline,
+    joint: Baseline,
+    /// The effects so far, and the standing of each when it was selected.
+    chosen: Vec<CandidateFit>,
+    selected: Vec<SelectedEffect>,
     traces: Vec<Vec<f64>>,
-    /// The energy above noise before anything was taken, N².
-    above: f64,
-    first_look: Option<(Vec<Trial>, Vec<f64>)>,
-    /// Candidates that are not taken (again).
-    barred: Vec<usize>,
+    /// The energy above noise before any effect, N².
+    excess_energy: f64,
+    first_scan: Option<(Vec<CandidateFit>, Vec<f64>)>,
+    /// Candidates that are not eligible.
+    excluded: Vec<usize>,
     remarks: Vec<Remark>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> ForwardSelection<'a> {
     /// The baseline and the noise before any effect.
     fn begin(rows: &Rows, library: &'a [Candidate], blocked: f64, step: f64, refused: &[usize]) -> Self {
         let order = if rows.isometric { TABLE_ORDER } else { ORDERS };
@@ -78,12 +80,16 @@ impl<'a> Search<'a> {
             blocked,
         };
         let row = scale.sigma * (weight / scale.independent).sqrt();
-        let first = Give { elastic: FIRST_GIVE.0 * blocked, friction: FIRST_GIVE.1 * blocked, row };
+        let first = PriorDeviations {
+            elastic: FIRST_DEVIATIONS.0 * blocked,
+            friction: FIRST_DEVIATIONS.1 * blocked,
+            row,
+        };
         let begun = baselines::fit(rows, Kind::Soft(first), &[]);
-        let kind = Kind::Soft(Ground::new(&begun, scale).give);
+        let kind = Kind::Soft(Scorer::new(&begun, scale).prior);
         let rows = baselines::linearised(rows, &begun);
-        let full = baselines::fit(&rows, kind, &[]);
-        let rows = baselines::linearised(&rows, &full);
+        let joint = baselines::fit(&rows, kind, &[]);
+        let rows = baselines::linearised(&rows, &joint);
         let mut search = Self {
             rows,
             library,
@@ -92,50 +98,50 @@ impl<'a> Search<'a> {
             noise,
             scale,
             kind,
-            bare: full.clone(),
-            full,
+            base_alone: joint.clone(),
+            joint,
             chosen: Vec::new(),
-            taken: Vec::new(),
+            selected: Vec::new(),
             traces: Vec::new(),
-            above: 0.0,
-            first_look: None,
-            barred: refused.to_vec(),
+            excess_energy: 0.0,
+            first_scan: None,
+            excluded: refused.to_vec(),
             remarks: Vec::new(),
         };
-        search.above = search.above_noise(energy(&search.bare.residual));
+        search.excess_energy = search.excess_of(energy(&search.base_alone.residual));
         search
     }
 
-    fn above_noise(&self, energy: f64) -> f64 {
+    fn excess_of(&self, energy: f64) -> f64 {
         (energy - self.noise.sigma.powi(2) * self.scale.weight).max(LEAST_EXCESS * energy).max(1e-12)
     }
 
-    /// Looks for one more effect: whether another look may be worth it.
+    /// One step: selects or excludes a candidate, or ends the selection.
     fn next(&mut self) -> ControlFlow<()> {
-        let ground = Ground::new(&self.full, self.scale);
-        let (best, p) = look(self.library, &self.rows, &ground, self.blocked);
-        if self.first_look.is_none() {
-            self.first_look = Some((best.clone(), p.clone()));
+        let scorer = Scorer::new(&self.joint, self.scale);
+        let (best, p) = scan_step(self.library, &self.rows, &scorer, self.blocked);
+        if self.first_scan.is_none() {
+            self.first_scan = Some((best.clone(), p.clone()));
         }
-        let Some(at) = self.winner(&best, &ground) else { return ControlFlow::Break(()) };
+        let Some(at) = self.winner(&best, &scorer) else { return ControlFlow::Break(()) };
         if self.chosen.is_empty() {
-            self.above = self.above_noise(best[at].before);
+            self.excess_energy = self.excess_of(best[at].before);
         }
-        if !self.is_enough(&best[at], p[at]) {
+        if !self.is_sufficient(&best[at], p[at]) {
             return ControlFlow::Break(());
         }
-        let winner = self.within_the_known(&best[at], &best, &ground);
-        if let Some(memory) = self.found_itself_beside(&winner) {
+        let winner = self.best_within_known_range(&best[at], &best, &scorer);
+        if let Some(memory) = self.memory_of_unknown_start(&winner) {
             self.remarks.push(Remark::Refused {
                 effect: self.library[winner.candidate].name().to_owned(),
                 why: Refusal::UnknownMemory(memory.to_owned()),
             });
-            self.barred.push(winner.candidate);
+            self.excluded.push(winner.candidate);
             return ControlFlow::Continue(());
         }
-        let beside = Kind::Soft(winner.give);
+        let beside = Kind::Soft(winner.prior);
         let metric = baselines::fit(&self.rows, beside, &[]);
-        let rivals = rivals(&winner, &best, self.library, &self.rows, &ground, &metric.span);
+        let rivals = rivals(&winner, &best, self.library, &self.rows, &scorer, &metric.span);
         let open: Vec<String> =
             rivals.iter().filter(|r| r.1 > CONFUSABLE).map(|r| self.library[r.0].name().to_owned()).collect();
         if open.len() > MOST_RIVALS {
@@ -150,46 +156,54 @@ impl<'a> Search<'a> {
     }
 
     /// Whether a candidate may be judged at all.
-    fn is_open(&self, t: &Trial, ground: &Ground<'_>) -> bool {
-        let rival = |k: &Taken| k.rivals.iter().any(|r| r.0 == t.candidate && r.1 > CONFUSABLE);
+    fn is_eligible(&self, t: &CandidateFit, scorer: &Scorer<'_>) -> bool {
+        let rival = |k: &SelectedEffect| k.rivals.iter().any(|r| r.0 == t.candidate && r.1 > CONFUSABLE);
         t.gain > 0.0
             && !self.chosen.iter().any(|c| c.candidate == t.candidate)
-            && !self.barred.contains(&t.candidate)
-            && !self.taken.iter().any(rival)
-            && worth_naming(t, self.library, &self.rows, ground)
+            && !self.excluded.contains(&t.candidate)
+            && !self.selected.iter().any(rival)
+            && is_selectable(t, self.library, &self.rows, scorer)
     }
 
     /// Which of the best of each candidate is to be judged.
-    fn winner(&self, best: &[Trial], ground: &Ground<'_>) -> Option<usize> {
-        let open = best.iter().enumerate().filter(|(_, t)| self.is_open(t, ground));
+    fn winner(&self, best: &[CandidateFit], scorer: &Scorer<'_>) -> Option<usize> {
+        let open = best.iter().enumerate().filter(|(_, t)| self.is_eligible(t, scorer));
         let (at, winner) = open.max_by(|a, b| a.1.score.total_cmp(&b.1.score))?;
-        // Where something that tables imitate explains far more, naming the next best would be naming a shadow of it.
+        // Where an effect that the tables conceal explains far more, the next best is only correlated with it.
         let best_of_all = best.iter().map(|t| t.score).fold(0.0, f64::max);
         let shadow = best_of_all > (winner.score + LEAST_SCORE_ALONE).max(SHADOW * winner.score);
         (!self.chosen.is_empty() || !shadow).then_some(at)
     }
 
     /// The winner; or, where it explains the misfit only at the edge of what is known of it, the best that explains the same within what
-    /// is known. That there is something to explain has been shown by the winner: its score stands.
-    fn within_the_known(&self, winner: &Trial, best: &[Trial], ground: &Ground<'_>) -> Trial {
-        let known = |t: &Trial| t.keeps_within_the_known(&self.library[t.candidate]);
+    /// is known. The winner has shown that there is something to explain: its score stays.
+    fn best_within_known_range(
+        &self,
+        winner: &CandidateFit,
+        best: &[CandidateFit],
+        scorer: &Scorer<'_>,
+    ) -> CandidateFit {
+        let known = |t: &CandidateFit| t.is_within_known_range(&self.library[t.candidate]);
         if known(winner) {
             return winner.clone();
         }
-        let metric = baselines::fit(&self.rows, Kind::Soft(winner.give), &[]);
-        let rivals = rivals(winner, best, self.library, &self.rows, ground, &metric.span);
-        let alike = |t: &Trial| rivals.iter().any(|r| r.0 == t.candidate && r.1 >= ALIKE);
+        let metric = baselines::fit(&self.rows, Kind::Soft(winner.prior), &[]);
+        let rivals = rivals(winner, best, self.library, &self.rows, scorer, &metric.span);
+        let alike = |t: &CandidateFit| rivals.iter().any(|r| r.0 == t.candidate && r.1 >= ALIKE);
         best.iter()
-            .filter(|t| known(t) && alike(t) && self.is_open(t, ground))
+            .filter(|t| known(t) && alike(t) && self.is_eligible(t, scorer))
             .max_by(|a, b| a.score.total_cmp(&b.score))
-            .map_or_else(|| winner.clone(), |t| Trial { score: winner.score.max(t.score), ..t.clone() })
+            .map_or_else(
+                || winner.clone(),
+                |t| CandidateFit { score: winner.score.max(t.score), ..t.clone() },
+            )
     }
 
     /// The effect chosen whose memory has to find itself in the very strokes by which a law of friction would be named.
-    fn found_itself_beside(&self, winner: &Trial) -> Option<&'static str> {
+    fn memory_of_unknown_start(&self, winner: &CandidateFit) -> Option<&'static str> {
         let info = self.library[winner.candidate].info;
         let of_friction = info.link == Link::Friction && !info.persistent;
-        let branch = |t: &&Trial| self.library[t.candidate].info.start == Start::Branch;
+        let branch = |t: &&CandidateFit| self.library[t.candidate].info.start == Start::Branch;
         let memory = self.chosen.iter().find(branch).filter(|_| of_friction)?;
         let first = self.rows.first_strokes();
         let within: f64 = winner.scores.iter().zip(&first).filter(|(_, first)| **first).map(|(s, _)| s).sum();
@@ -199,13 +213,13 @@ impl<'a> Search<'a> {
 
     /// The share it takes of what the bladder's own differences leave; or, for an effect that spares the bladder these
     /// differences, of what one bladder leaves.
-    fn of_rest(&self, winner: &Trial) -> f64 {
-        let spared = winner.relief / self.above_noise(winner.unrelieved);
-        (winner.gain / self.above_noise(winner.before)).max(spared)
+    fn of_rest(&self, winner: &CandidateFit) -> f64 {
+        let spared = winner.relief / self.excess_of(winner.unrelieved);
+        (winner.gain / self.excess_of(winner.before)).max(spared)
     }
 
     /// Whether it is beyond chance, explains enough, and is large enough to matter.
-    fn is_enough(&self, winner: &Trial, p: f64) -> bool {
+    fn is_sufficient(&self, winner: &CandidateFit, p: f64) -> bool {
         // What lives in a few strokes can never give a large sum over blocks in units of its scatter: six strokes that all agree
         // happen by chance once in 64. There the likelihood counts, whose independent rows are those that the residual's own
         // correlation leaves.
@@ -215,7 +229,7 @@ impl<'a> Search<'a> {
         let worth = if self.chosen.is_empty() {
             of_rest >= LEAST_SHARE
         } else {
-            winner.gain / self.above >= FURTHER_SHARE && of_rest >= LEAST_SHARE
+            winner.gain / self.excess_energy >= FURTHER_SHARE && of_rest >= LEAST_SHARE
         };
         // A wall at the end of the stroke is high and narrow.
         let narrow =
@@ -232,13 +246,13 @@ impl<'a> Search<'a> {
         significant && worth && moved >= least * SELECTION_FLOOR * self.blocked
     }
 
-    /// Fits everything together with it, and keeps it if it then still does what it promised; else it is barred.
-    fn take(&mut self, winner: Trial, p: f64, rivals: Vec<(usize, f64, f64)>, metric: Baseline) {
+    /// Refits all effects jointly with it. It is selected if it keeps most of its gain; else it is excluded.
+    fn take(&mut self, winner: CandidateFit, p: f64, rivals: Vec<(usize, f64, f64)>, metric: Baseline) {
         let name = self.library[winner.candidate].name();
-        let beside = Kind::Soft(winner.give);
+        let beside = Kind::Soft(winner.prior);
         let chosen = self.chosen.iter().chain([&winner]).cloned().collect();
         let joint = refit(&self.rows, beside, chosen, self.library);
-        // One step of a linear problem promised this; the whole refit has to keep a good part of it.
+        // The gain is that of a linear step; the joint refit has to keep a good part of it.
         let kept = energy(&joint.base.residual) <= winner.before - KEPT_GAIN * winner.gain;
         // What the effect leaves tells anew how many rows are independent: a wandering zero that flexible tables had followed from
         // pressure to pressure shows itself only now.
@@ -249,9 +263,9 @@ impl<'a> Search<'a> {
         let least = if slow { LEAST_SCORE_ALONE } else { LEAST_SCORE };
         if !kept || score < least {
             // The effects before it keep the amplitudes of this joint fit, until the next one.
-            self.chosen = joint.trials;
+            self.chosen = joint.fits;
             self.chosen.pop();
-            self.barred.push(winner.candidate);
+            self.excluded.push(winner.candidate);
             self.remarks.push(Remark::Refused {
                 effect: name.to_owned(),
                 why: if kept { Refusal::SlowDrift } else { Refusal::LostInRefit },
@@ -259,31 +273,31 @@ impl<'a> Search<'a> {
             return;
         }
         self.kind = beside;
-        self.bare = metric;
+        self.base_alone = metric;
         self.joined(joint);
         self.noise = Noise { sigma: self.noise.sigma, ..left };
-        let share = winner.gain / self.above;
-        self.taken.push(Taken { trial: winner, p, share, rivals, rms: self.full.rms(&self.rows) });
+        let share = winner.gain / self.excess_energy;
+        self.selected.push(SelectedEffect { fit: winner, p, share, rivals, rms: self.joint.rms(&self.rows) });
         if self.chosen.len() > 1 {
             self.exchange();
         }
     }
 
     /// What a joint fit makes of the effects.
-    fn joined(&mut self, joint: Joint) {
-        (self.rows, self.full, self.chosen, self.traces) =
-            (joint.rows, joint.base, joint.trials, joint.traces);
+    fn joined(&mut self, joint: JointFit) {
+        (self.rows, self.joint, self.chosen, self.traces) =
+            (joint.rows, joint.base, joint.fits, joint.traces);
     }
 
-    /// Tries to replace each effect taken by another beside the rest; a better one takes its place.
+    /// Tries to exchange each selected effect for a better one beside the rest.
     fn exchange(&mut self) {
         for position in 0..self.chosen.len().saturating_sub(1) {
-            let mut others: Vec<Trial> = self.chosen.clone();
+            let mut others: Vec<CandidateFit> = self.chosen.clone();
             others.remove(position);
             let without = refit(&self.rows, self.kind, others, self.library);
             let rows = &without.rows;
-            let ground = Ground::new(&without.base, self.scale);
-            let best = best_of_each(&ground.scan(self.library, rows), self.library);
+            let scorer = Scorer::new(&without.base, self.scale);
+            let best = best_of_each(&scorer.scan(self.library, rows), self.library);
             let present = self.chosen[position].candidate;
             let own = best.iter().find(|t| t.candidate == present).map_or(0.0, |t| t.score);
             let challenger = best
@@ -291,43 +305,54 @@ impl<'a> Search<'a> {
                 .filter(|t| !self.chosen.iter().any(|c| c.candidate == t.candidate))
                 .max_by(|a, b| a.score.total_cmp(&b.score));
             if let Some(c) = challenger {
-                let refined = ground.refine(c, self.library, rows);
-                let (mine, _) = ground.left_under(&self.chosen[position], self.library, rows, refined.give);
+                let refined = scorer.refine(c, self.library, rows);
+                let (mine, _) = scorer.left_under(&self.chosen[position], self.library, rows, refined.prior);
                 // It must leave clearly less than the present one does.
                 if refined.score > own + LEAST_SCORE && refined.before - refined.gain < EXCHANGE_LEAVES * mine
                 {
-                    let taken = &mut self.taken[position];
-                    taken.rivals.retain(|r| r.0 != refined.candidate);
-                    taken.rivals.insert(0, (present, CONFUSABLE, 0.0));
-                    taken.trial = refined.clone();
+                    let selected = &mut self.selected[position];
+                    selected.rivals.retain(|r| r.0 != refined.candidate);
+                    selected.rivals.insert(0, (present, CONFUSABLE, 0.0));
+                    selected.fit = refined.clone();
                     self.chosen[position] = refined;
                 }
             }
             self.joined(refit(&without.rows, self.kind, self.chosen.clone(), self.library));
         }
-        let rms = self.full.rms(&self.rows);
-        for t in &mut self.taken {
+        let rms = self.joint.rms(&self.rows);
+        for t in &mut self.selected {
             t.rms = rms;
         }
     }
 
-    /// What was found, without what the joint fit brought to nothing: that was not there.
-    fn end(mut self) -> Found {
+    /// The selection, without effects whose amplitudes the joint fit set to zero.
+    fn end(mut self) -> Selection {
         let all = self.chosen.len();
-        (self.chosen, self.taken) = std::mem::take(&mut self.chosen)
+        (self.chosen, self.selected) = std::mem::take(&mut self.chosen)
             .into_iter()
-            .zip(std::mem::take(&mut self.taken))
+            .zip(std::mem::take(&mut self.selected))
             .filter(|(c, _)| c.amplitudes.iter().any(|a| *a != 0.0))
             .unzip();
         if self.chosen.len() < all {
             self.joined(refit(&self.rows, self.kind, self.chosen.clone(), self.library));
         }
-        for (t, c) in self.taken.iter_mut().zip(&self.chosen) {
-            t.trial.amplitudes.clone_from(&c.amplitudes);
-            t.trial.shapes.clone_from(&c.shapes);
+        for (t, c) in self.selected.iter_mut().zip(&self.chosen) {
+            t.fit.amplitudes.clone_from(&c.amplitudes);
+            t.fit.shapes.clone_from(&c.shapes);
         }
-        let (first_look, first_p) = self.first_look.unwrap_or_default();
-        let Self { rows, bare, full, taken, above, traces, noise, remarks, .. } = self;
-        Found { rows, bare, full, taken, first_look, first_p, above, traces, noise, remarks }
+        let (first_scan, first_p) = self.first_scan.unwrap_or_default();
+        let Self { rows, base_alone, joint, selected, excess_energy, traces, noise, remarks, .. } = self;
+        Selection {
+            rows,
+            base_alone,
+            joint,
+            selected,
+            first_scan,
+            first_p,
+            excess_energy,
+            traces,
+            noise,
+            remarks,
+        }
     }
 }

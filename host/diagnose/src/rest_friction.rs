@@ -1,10 +1,10 @@
-//! What friction does while the length is held: it stays, fades, or follows the wandering of the pressure.
+//! Friction at held length: it stays, fades, or follows the drift of the pressure.
 //!
 //! The model holds the sign of the last motion. On a real bench the air's ripple shakes the braid, so that friction ends near
-//! the middle of the gap between the branches, and a regulator that wanders by a few kilopascals turns it round: static friction
+//! the middle of the gap between the branches, and a regulator that drifts by a few kilopascals reverses it: static friction
 //! carries small changes of pressure (a play of half-width `h`), what goes beyond lets the strands slip, and over a change `b`
 //! the friction follows to the other branch. That is no missing physics of the model in motion; but left out, every effect that
-//! lives in rests would be mistaken for it. Which of the three it is, and how fast, is what the rows at rest say.
+//! acts at rest would be mistaken for it. The rows at rest decide which of the three it is, and how fast.
 
 use rayon::prelude::*;
 
@@ -20,9 +20,9 @@ use super::rows::{RestFriction, Rows};
 
 mod steps;
 
-/// What friction does at rest.
+/// The law of friction at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum AtRest {
+pub(crate) enum RestLaw {
     /// It fades: `s → s e^(−t/τ)`, `t` since the braid last moved, s.
     Fades(f64),
     /// It follows the pressure.
@@ -36,11 +36,11 @@ pub(crate) enum AtRest {
     },
 }
 
-impl From<AtRest> for remark::RestFriction {
-    fn from(law: AtRest) -> Self {
+impl From<RestLaw> for remark::RestFriction {
+    fn from(law: RestLaw) -> Self {
         match law {
-            AtRest::Fades(time) => Self::Fades(time),
-            AtRest::Follows { carries, over, .. } => Self::Follows { carries, over },
+            RestLaw::Fades(time) => Self::Fades(time),
+            RestLaw::Follows { carries, over, .. } => Self::Follows { carries, over },
         }
     }
 }
@@ -79,7 +79,7 @@ fn smoothed(rows: &Rows, half: usize) -> Vec<f64> {
 
 /// How far every change of pressure goes beyond what static friction carries: what a play of half-width `carries` lets through.
 /// The play has its memory: it follows the pressure through motion and over pauses too.
-fn let_through(pressure: &[f64], carries: f64) -> Vec<f64> {
+fn slip_beyond_play(pressure: &[f64], carries: f64) -> Vec<f64> {
     let mut carried = 0.0;
     let mut last = pressure.first().copied().unwrap_or(0.0);
     pressure
@@ -94,16 +94,16 @@ fn let_through(pressure: &[f64], carries: f64) -> Vec<f64> {
 }
 
 /// The friction's direction in every hold under a law.
-fn directions(rows: &Rows, holds: &[(usize, usize)], pressures: &[Vec<f64>], law: AtRest) -> Vec<Vec<f64>> {
+fn directions(rows: &Rows, holds: &[(usize, usize)], pressures: &[Vec<f64>], law: RestLaw) -> Vec<Vec<f64>> {
     match law {
-        AtRest::Fades(time) => holds
+        RestLaw::Fades(time) => holds
             .iter()
             .map(|(from, to)| {
                 (*from..*to).map(|i| rows.sign[i] * (-rows.still[i].max(0.0) / time).exp()).collect()
             })
             .collect(),
-        AtRest::Follows { carries, over, smoothing } => {
-            let slips = let_through(&pressures[smoothing], carries);
+        RestLaw::Follows { carries, over, smoothing } => {
+            let slips = slip_beyond_play(&pressures[smoothing], carries);
             holds
                 .iter()
                 .map(|(from, to)| {
@@ -140,8 +140,8 @@ fn left(rows: &Rows, fitted: &Baseline, holds: &[(usize, usize)], directions: &[
     sum
 }
 
-/// Finds out what friction does at rest: the rows whose directions say so, and the law; none where it stays as the model holds it.
-pub(crate) fn settle_friction(rows: &Rows) -> (Rows, Option<AtRest>) {
+/// Finds the law of friction at rest: the rows with its directions, and the law; none where friction stays as the model holds it.
+pub(crate) fn settle_rest_friction(rows: &Rows) -> (Rows, Option<RestLaw>) {
     let holds = holds(rows);
     let Some(moving) = moving(rows, &holds) else { return (rows.clone(), None) };
     // Friction and bladder as the moving rows have them; of a muscle that was held throughout, as all rows have them.
@@ -159,7 +159,7 @@ pub(crate) fn settle_friction(rows: &Rows) -> (Rows, Option<AtRest>) {
         vec![0; rows.len()]
     } else {
         let doubted = match law {
-            Some(law) => matches!(law, AtRest::Follows { .. }),
+            Some(law) => matches!(law, RestLaw::Follows { .. }),
             None => held > NO_LAW_RATIO * fitted.per_row(&moving) * weight_at(rows, &holds),
         };
         let steps = steps::of(rows, &fitted, &holds, &chosen);
@@ -192,8 +192,8 @@ fn best_law(
     fitted: &Baseline,
     holds: &[(usize, usize)],
     pressures: &[Vec<f64>],
-) -> Option<(AtRest, f64)> {
-    let best_of = |laws: Vec<AtRest>| {
+) -> Option<(RestLaw, f64)> {
+    let best_of = |laws: Vec<RestLaw>| {
         let tried: Vec<f64> = laws
             .par_iter()
             .map(|l| left(rows, fitted, holds, &directions(rows, holds, pressures, *l)))
@@ -202,11 +202,11 @@ fn best_law(
     };
     let follows = |smoothing: usize| {
         CARRIED_PRESSURES.iter().flat_map(move |h| {
-            FOLLOWING_PRESSURES.iter().map(move |b| AtRest::Follows { carries: *h, over: *b, smoothing })
+            FOLLOWING_PRESSURES.iter().map(move |b| RestLaw::Follows { carries: *h, over: *b, smoothing })
         })
     };
     // Of a muscle that was held throughout the direction comes from the pressure: there it is followed or not.
-    let first = SETTLING_TIMES.iter().filter(|_| !rows.isometric).map(|t| AtRest::Fades(*t));
+    let first = SETTLING_TIMES.iter().filter(|_| !rows.isometric).map(|t| RestLaw::Fades(*t));
     let mut best = best_of(first.chain((0..PRESSURE_SMOOTHING.len()).flat_map(follows)).collect())?;
     for factors in NEARBY_FACTORS {
         best = best_of(nearby(best.0, &factors)).filter(|(_, e)| *e < best.1).unwrap_or(best);
@@ -215,14 +215,14 @@ fn best_law(
 }
 
 /// A law with its numbers varied by factors.
-fn nearby(law: AtRest, factors: &[f64]) -> Vec<AtRest> {
+fn nearby(law: RestLaw, factors: &[f64]) -> Vec<RestLaw> {
     match law {
-        AtRest::Fades(time) => factors.iter().map(|f| AtRest::Fades(time * f)).collect(),
-        AtRest::Follows { carries, over, smoothing } => factors
+        RestLaw::Fades(time) => factors.iter().map(|f| RestLaw::Fades(time * f)).collect(),
+        RestLaw::Follows { carries, over, smoothing } => factors
             .iter()
             .chain(&[1.0])
             .flat_map(|f| {
-                factors.iter().chain(&[1.0]).map(move |g| AtRest::Follows {
+                factors.iter().chain(&[1.0]).map(move |g| RestLaw::Follows {
                     carries: carries * f,
                     over: over * g,
                     smoothing,
@@ -237,7 +237,7 @@ fn settled(
     rows: &Rows,
     holds: &[(usize, usize)],
     directions: &[Vec<f64>],
-    law: Option<AtRest>,
+    law: Option<RestLaw>,
     rest: Vec<u32>,
 ) -> Rows {
     let n = rows.len();
@@ -250,7 +250,7 @@ fn settled(
                 found.unsettled[i] = contexts[i].direction - way[i - from];
             }
             contexts[i].direction = way[i - from];
-            if let AtRest::Fades(time) = law
+            if let RestLaw::Fades(time) = law
                 && rows.still[i] > 0.0
             {
                 // How a settling departs from an exponential is fitted beside it.
@@ -267,9 +267,9 @@ fn weight_at(rows: &Rows, holds: &[(usize, usize)]) -> f64 {
     resting.map(|i| rows.root_weight()[i].powi(2)).sum()
 }
 
-/// Numbers of the stretches over which friction rests at an unknown place. Static friction lets go by jumps too small and too quick for the pressure's samples to tell when: between those that a law sees or
+/// Numbers of the stretches over which friction rests at an unknown place. Static friction slips in steps too small and too quick for the pressure's samples: between those that a law predicts or
 /// the force itself shows, where friction rests is fitted; where no law is doubted, only after such a step. A force that steps more often
-/// than that beats, and no friction lets go by it.
+/// than that is periodic, which is no slip of friction.
 fn rests(
     rows: &Rows,
     holds: &[(usize, usize)],

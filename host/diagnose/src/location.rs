@@ -1,4 +1,4 @@
-//! Where the misfit sits: its energy above the noise along every coordinate, with a p-value from shuffled blocks.
+//! Location of the error: its energy above the noise along every coordinate, with a p-value from shuffled blocks.
 
 use super::criteria::location::{
     BINS, DISCRETE_BINS, MOST_REGIONS, REGION_ALPHA, REGION_ROWS, REGION_SHUFFLES, REGION_SMOOTHING,
@@ -134,7 +134,7 @@ fn smoothed(rows: &Rows, residual: &[f64], half: usize) -> Vec<f64> {
     out
 }
 
-/// The misfit along every coordinate: regions that stand out, strongest first, and profiles for pictures.
+/// The error along every coordinate: significant regions, strongest first, and profiles for pictures.
 ///
 /// `before` and `after` are weighted residuals without and with the named effects.
 pub(crate) fn locate(

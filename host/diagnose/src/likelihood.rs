@@ -1,18 +1,18 @@
-//! How strongly the recordings speak for an effect beside a baseline whose bladder may differ a little between pressures.
+//! The likelihood of an effect beside a baseline whose bladder may differ a little between pressures.
 //!
 //! ```text
 //! y = hard·b + Σ_j u_j q_j + effects·a + noise        u_j ~ N(0, V_j),  noise of n independent rows ~ N(0, σ²)
 //! D = n ln σ² + n S/(W σ²) + Σ_j ln(1 + V_j/σ_e²) + prior(V)        σ_e² = σ² W/n
 //! ```
 //! `q_j` are the directions of the flexible tables beyond one bladder for all pressures, `S` the least squares left in the metric
-//! in which `u` is integrated out, `W` the rows' weight and `n` how many independent rows they are worth. `D` is twice the negative
+//! in which `u` is integrated out, `W` the rows' weight and `n` how many independent rows they amount to. `D` is twice the negative
 //! logarithm of the likelihood. For every hypothesis the size of `V` (how much bladder and friction may differ between pressures) and
-//! `σ²` (not below the pure error of repeats) take their best values: an effect that lets one bladder serve all pressures earns
-//! what the tables need not give any more, and an effect that the tables imitate earns nothing.
+//! `σ²` (not below the pure error of repeats) take their best values: an effect that lets one bladder serve all pressures gains
+//! what the tables need not explain any more, and an effect that the tables imitate gains nothing.
 //! The integral is the usual one of mixed models (D. A. Harville, J. American Statistical Association 72 (1977) 320–338).
 
-use super::baselines::{Give, keeps};
-use super::criteria::baseline::{ELASTIC_GIVES, EXPECTED_GIVE, FRICTION_GIVES};
+use super::baselines::{PriorDeviations, keeps};
+use super::criteria::baseline::{ELASTIC_DEVIATIONS, EXPECTED_DEVIATIONS, FRICTION_DEVIATIONS};
 use super::linear::{Sign, amplitudes, solve_symmetric};
 
 /// What evidence is weighed with.
@@ -54,12 +54,12 @@ pub(crate) struct Target<'a> {
 
 /// A hypothesis at its best.
 #[derive(Clone, Debug)]
-pub(crate) struct Weighed {
+pub(crate) struct Hypothesis {
     /// Twice the negative log-likelihood.
     pub deviance: f64,
     /// How much the bladder differs between pressures under it.
-    pub give: Give,
-    /// Amplitudes of the columns that are asked about.
+    pub prior: PriorDeviations,
+    /// Amplitudes of the columns in question.
     pub amplitudes: Vec<f64>,
     /// Energy left without them, N².
     pub before: f64,
@@ -70,20 +70,25 @@ pub(crate) struct Weighed {
 }
 
 /// Weighs columns against what is to be explained; at most `most` of them at once.
-pub(crate) fn weigh(
+pub(crate) fn likelihood(
     scale: &Scale,
     target: &Target<'_>,
     products: &Products,
     signs: &[Sign],
     most: u32,
-) -> Weighed {
-    let gives = ELASTIC_GIVES.iter().flat_map(|e| FRICTION_GIVES.iter().map(move |f| (*e, *f)));
-    let mut best: Option<Weighed> = None;
+) -> Hypothesis {
+    let gives = ELASTIC_DEVIATIONS.iter().flat_map(|e| FRICTION_DEVIATIONS.iter().map(move |f| (*e, *f)));
+    let mut best: Option<Hypothesis> = None;
     for (elastic, friction) in gives {
-        let prior = (elastic / EXPECTED_GIVE.0).ln().powi(2) + (friction / EXPECTED_GIVE.1).ln().powi(2);
-        let mut w = Weighed {
+        let prior =
+            (elastic / EXPECTED_DEVIATIONS.0).ln().powi(2) + (friction / EXPECTED_DEVIATIONS.1).ln().powi(2);
+        let mut w = Hypothesis {
             deviance: f64::INFINITY,
-            give: Give { elastic: elastic * scale.blocked, friction: friction * scale.blocked, row: 0.0 },
+            prior: PriorDeviations {
+                elastic: elastic * scale.blocked,
+                friction: friction * scale.blocked,
+                row: 0.0,
+            },
             amplitudes: vec![0.0; signs.len()],
             before: target.energy,
             gain: 0.0,
@@ -91,8 +96,8 @@ pub(crate) fn weigh(
         };
         let mut variance = scale.sigma * scale.sigma;
         for _ in 0..2 {
-            w.give.row = (variance * scale.weight / scale.independent).sqrt();
-            let keep = keeps(w.give, target.of_friction, scale.weight);
+            w.prior.row = (variance * scale.weight / scale.independent).sqrt();
+            let keep = keeps(w.prior, target.of_friction, scale.weight);
             solve_at(&keep, target, products, signs, most, &mut w);
             let left = (w.before - w.gain).max(0.0);
             variance = (left / scale.weight).max(scale.sigma * scale.sigma).max(1e-300);
@@ -111,23 +116,23 @@ pub(crate) fn weigh(
 }
 
 /// The same where the bladder differs as much as another hypothesis has it.
-pub(crate) fn weigh_at(
+pub(crate) fn likelihood_at(
     scale: &Scale,
     target: &Target<'_>,
     products: &Products,
     signs: &[Sign],
     most: u32,
-    give: Give,
-) -> Weighed {
-    let mut w = Weighed {
+    prior: PriorDeviations,
+) -> Hypothesis {
+    let mut w = Hypothesis {
         deviance: f64::INFINITY,
-        give,
+        prior,
         amplitudes: vec![0.0; signs.len()],
         before: target.energy,
         gain: 0.0,
         given: vec![0.0; products.given],
     };
-    let keep = keeps(give, target.of_friction, scale.weight);
+    let keep = keeps(prior, target.of_friction, scale.weight);
     solve_at(&keep, target, products, signs, most, &mut w);
     w
 }
@@ -139,7 +144,7 @@ fn solve_at(
     products: &Products,
     signs: &[Sign],
     most: u32,
-    into: &mut Weighed,
+    into: &mut Hypothesis,
 ) {
     let total = products.moment.len();
     let taken: Vec<f64> = keep.iter().map(|k| 1.0 - k * k).collect();
@@ -225,14 +230,14 @@ mod tests {
         let nothing = Products::default();
         // A surface of 5 N rms that differs between pressures.
         let t = target(50.0, 5.0, 1.0);
-        let null = weigh(&scale, &t, &nothing, &[], 0);
+        let null = likelihood(&scale, &t, &nothing, &[], 0);
         // An effect with the same proportion of soft to beyond explains both parts at once.
-        let fits = weigh(&scale, &t, &effect(10.0, 1.0, &t, 5.0), &[Sign::Free], 1);
+        let fits = likelihood(&scale, &t, &effect(10.0, 1.0, &t, 5.0), &[Sign::Free], 1);
         assert!((fits.amplitudes[0] - 5.0).abs() < 0.05, "{:?}", fits.amplitudes);
         assert!(null.deviance - fits.deviance > 50.0, "{} {}", null.deviance, fits.deviance);
-        assert!(fits.give.elastic < 0.1 * null.give.elastic);
+        assert!(fits.prior.elastic < 0.1 * null.prior.elastic);
         // One that lies in the tables wholly saves them a little, and is far less believed.
-        let lies = weigh(&scale, &t, &effect(10.0, 0.0, &t, 5.0), &[Sign::Free], 1);
+        let lies = likelihood(&scale, &t, &effect(10.0, 0.0, &t, 5.0), &[Sign::Free], 1);
         assert!(fits.deviance < lies.deviance - 20.0);
     }
 
@@ -247,7 +252,7 @@ mod tests {
             components: vec![vec![], vec![]],
             given: 1,
         };
-        let w = weigh(&scale, &t, &p, &[Sign::Free], 1);
+        let w = likelihood(&scale, &t, &p, &[Sign::Free], 1);
         assert!((w.before - 9.0).abs() < 1e-12 && (w.gain - 9.0).abs() < 1e-12);
         assert!((w.given[0] - 2.0).abs() < 1e-12);
     }

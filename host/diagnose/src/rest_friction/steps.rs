@@ -1,4 +1,4 @@
-//! Where static friction lets go at held length: the force steps, at once or in a burst of small slips.
+//! Slips of static friction at held length: the force steps, at once or in a burst of small slips.
 
 use super::left_of;
 use crate::baselines::Baseline;

@@ -1,13 +1,13 @@
-//! What came of trying one candidate beside a baseline.
+//! The fit of one candidate beside a baseline.
 
-use super::baselines::{Give, Reach, projected};
+use super::baselines::{Absorbable, PriorDeviations, projected};
 use super::candidates::{Candidate, unplace};
 use super::criteria::candidates::LOW_END;
 use super::rows::Rows;
 
-/// A candidate tried beside a baseline at one set of shapes.
+/// A candidate fitted beside a baseline at one set of shapes.
 #[derive(Clone, Debug)]
-pub(crate) struct Trial {
+pub(crate) struct CandidateFit {
     /// Index into the library.
     pub candidate: usize,
     /// Its shapes.
@@ -17,7 +17,7 @@ pub(crate) struct Trial {
     /// How much less the deviance is with it than without, less what its free numbers cost.
     pub score: f64,
     /// How much bladder and friction differ between pressures beside it.
-    pub give: Give,
+    pub prior: PriorDeviations,
     /// Energy that it takes from the weighted residual, N².
     pub gain: f64,
     /// The energy that is there without it, N².
@@ -40,10 +40,10 @@ pub(crate) struct Trial {
     pub peak: f64,
 }
 
-impl Trial {
+impl CandidateFit {
     /// Whether it stays within what is known of the effect: no shape at the low end of its range, where a law becomes a simpler one (a
-    /// memory a rate, a breakaway plain friction), and no lag beyond what anybody has seen. Other sizes go by the muscle and the bench.
-    pub(super) fn keeps_within_the_known(&self, candidate: &Candidate) -> bool {
+    /// memory a rate, a breakaway plain friction), and no lag beyond its known range. Other sizes depend on muscle and bench.
+    pub(super) fn is_within_known_range(&self, candidate: &Candidate) -> bool {
         let amplitudes = candidate.info.parameters.iter().zip(&self.amplitudes);
         let seen =
             amplitudes.filter(|(p, _)| p.unit == "s").all(|(p, a)| a.abs() <= p.low.abs().max(p.high.abs()));
@@ -51,14 +51,19 @@ impl Trial {
     }
 }
 
-/// The fitted trace of a trial over the rows, N.
-pub(crate) fn trace(trial: &Trial, library: &[Candidate], rows: &Rows) -> Vec<f64> {
-    let columns = library[trial.candidate].columns(&trial.shapes, rows);
-    (0..rows.len()).map(|i| trial.amplitudes.iter().zip(&columns).map(|(a, c)| a * c[i]).sum()).collect()
+/// The fitted trace of a candidate over the rows, N.
+pub(crate) fn trace(fit: &CandidateFit, library: &[Candidate], rows: &Rows) -> Vec<f64> {
+    let columns = library[fit.candidate].columns(&fit.shapes, rows);
+    (0..rows.len()).map(|i| fit.amplitudes.iter().zip(&columns).map(|(a, c)| a * c[i]).sum()).collect()
 }
 
-/// The weighted trace of a trial (of its first column where it has no amplitude) freed of what the baseline expresses.
-pub(crate) fn projected_trace(trial: &Trial, library: &[Candidate], rows: &Rows, span: &Reach) -> Vec<f64> {
-    let column = trace(trial, library, rows);
+/// The weighted trace of a candidate (of its first column where it has no amplitude) freed of what the baseline expresses.
+pub(crate) fn projected_trace(
+    fit: &CandidateFit,
+    library: &[Candidate],
+    rows: &Rows,
+    span: &Absorbable,
+) -> Vec<f64> {
+    let column = trace(fit, library, rows);
     projected(&[column], rows.root_weight(), span).swap_remove(0)
 }

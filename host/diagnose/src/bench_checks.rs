@@ -1,4 +1,4 @@
-//! What checks of the bench measured: known before anything is asked of the recordings, and taken out of them first.
+//! Faults that checks of the bench measured: the recordings are corrected for them before the diagnosis.
 
 use std::borrow::Cow;
 
@@ -9,8 +9,8 @@ use super::baselines::{self, Baseline, Kind};
 use super::candidates::Candidate;
 use super::criteria::baseline::TABLE_ORDER;
 use super::criteria::judgement::{CHECK_DEVIATIONS, CHECK_RESOLUTION, CHECKED_PROBABILITY, MATERIAL_FAULT};
-use super::held_out::Unseen;
-use super::locate::locate;
+use super::cross_validation::HeldOutRows;
+use super::location::locate;
 use super::rows::{self, Rows};
 use super::verdict::{
     Considered, Diagnosis, Missing, Outcome, ParameterValue, PathStep, Remark, Verdict, Why, WhyNot,
@@ -29,16 +29,16 @@ struct Judged {
     at_most: f64,
 }
 
-/// What is known from checks.
-pub(super) struct Known {
+/// What checks of the bench measured.
+pub(super) struct BenchChecks {
     named: Vec<Judged>,
     absent: Vec<Judged>,
     /// The recordings as they were read, with one bladder for all pressures; only where something is named.
     before: Option<(Rows, Baseline)>,
 }
 
-impl Known {
-    /// Weighs what checks measured against the recordings.
+impl BenchChecks {
+    /// Compares what checks measured with the recordings.
     pub(super) fn of(checks: &Checks, campaign: &Campaign, braid: &Braid<f64>) -> Result<Self> {
         let mut known = Self { named: Vec::new(), absent: Vec::new(), before: None };
         if checks.is_empty() {
@@ -67,7 +67,7 @@ impl Known {
             if !(judged.measured.is_sure() && judged.peak >= MATERIAL_FAULT * blocked) {
                 known.absent.push(judged);
             } else if judged.measured.fault != BenchName::Backlash {
-                // No reading can be freed of a play: the recordings have to say.
+                // A play cannot be removed from a reading: the recordings decide.
                 known.named.push(judged);
             }
         }
@@ -77,7 +77,7 @@ impl Known {
         Ok(known)
     }
 
-    /// The recordings without the faults that were measured.
+    /// The recordings, corrected for the faults that were measured.
     pub(super) fn free<'a>(&self, campaign: &'a Campaign) -> Cow<'a, Campaign> {
         if self.named.is_empty() {
             return Cow::Borrowed(campaign);
@@ -86,15 +86,15 @@ impl Known {
         Cow::Owned(checks::freed(campaign, &faults))
     }
 
-    /// Whether a check has said all there is to say about an effect.
+    /// Whether a check of the bench settles an effect, so that the recordings need not.
     ///
-    /// What the user gives as known is fitted even where a check found nothing of it that matters.
+    /// An effect that the user gives as known is fitted even where a check found it immaterial.
     pub(super) fn settles(&self, candidate: &Candidate, given: &[Law]) -> bool {
         let is = |j: &Judged| candidate.is(Law::Bench(j.measured.fault));
         self.named.iter().any(is) || (!given.iter().any(|g| candidate.is(*g)) && self.absent.iter().any(is))
     }
 
-    /// Enters what is known into the answer that was given without it, beside a baseline of this kind.
+    /// Enters the measured faults into the answer that was found without them, with the kind of its last baseline.
     pub(super) fn enter(
         self,
         (mut diagnosis, kind): (Diagnosis, Kind),
@@ -116,7 +116,7 @@ impl Known {
             });
         }
         if !diagnosis.judged() {
-            // What the bench does is known all the same; what it does to these recordings is not.
+            // The fault is known all the same; its share of these recordings is not.
             let words = self.named.iter().map(|j| Remark::Measured {
                 check: j.measured.check.to_string(),
                 value: j.measured.words.to_string(),
@@ -140,7 +140,7 @@ impl Known {
             ..missing(j, share * j.peak * j.peak / all.max(1e-300))
         });
         for entry in entries {
-            // What moves the force most is said first, whoever found it.
+            // Sorted by peak force, whether a check or the recordings found it.
             let at = diagnosis.missing.iter().position(|m| m.peak_N < entry.peak_N);
             diagnosis.missing.insert(at.unwrap_or(diagnosis.missing.len()), entry);
         }
@@ -152,8 +152,8 @@ impl Known {
         };
         diagnosis.path.splice(0..0, self.named.iter().map(step));
         diagnosis.misfit_rms_N = baselines::fit(&rows, Kind::Flexible(TABLE_ORDER), &[]).rms(&rows);
-        let unseen = Unseen::new(&rows, kind, &[]).held_out(&[], diagnosis.noise_N);
-        // What is named may have asked for another split; its errors are not to be compared with this one's.
+        let unseen = HeldOutRows::new(&rows, kind, &[]).held_out(&[], diagnosis.noise_N);
+        // Selected effects may need another split, whose errors are not comparable with this one's.
         if unseen.split == diagnosis.held_out.split {
             diagnosis.held_out.rms_before_N = unseen.rms_before_N;
             diagnosis.held_out.with_turns_before_N = unseen.with_turns_before_N;
@@ -178,7 +178,7 @@ fn as_read(campaign: &Campaign, braid: &Braid<f64>) -> Result<(Rows, Baseline)> 
     Ok((rows, fitted))
 }
 
-/// The probability that a value so many standard deviations from none is chance, by Chebyshev's inequality: no law of errors is assumed.
+/// The probability that a value is zero and its deviation chance, by Chebyshev's inequality, which assumes no distribution.
 fn chance(measured: &Measured) -> f64 {
     let worst = measured
         .parameters

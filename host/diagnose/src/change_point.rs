@@ -1,28 +1,28 @@
-//! How well a moment is known: when something slipped.
+//! The confidence interval of a change point: when something slipped.
 //!
-//! A trace that begins at a moment does not change smoothly with it, so no tangent tells how sure it is. The misfit is profiled instead: the
-//! moment is moved reading by reading, the amplitude fitted anew, until the likelihood ratio of the true moment would be exceeded once in
-//! twenty. For a step in noise that is where twice the logarithm has fallen by `−2 ln(1 − √0.95)`
+//! A trace does not change smoothly with its change point, so no tangent gives an interval. The likelihood is profiled instead: the change
+//! point moves reading by reading with the amplitude refitted, until the likelihood ratio exceeds its 95 % quantile. For a step in
+//! noise that is where twice the logarithm has fallen by `−2 ln(1 − √0.95)`
 //! (B. E. Hansen, Econometrica 68 (2000) 575–603).
 
 use super::baselines;
 use super::candidates::Candidate;
 use model_core::effects::Axis;
 
+use super::candidate_fit::{self, CandidateFit};
 use super::criteria::uncertainty::{CHANGE_POINT_RATIO, CHANGE_POINT_SCAN, NORMAL_95};
 use super::linear::{add_scaled, dot, energy};
 use super::rows::Rows;
-use super::select::{Found, Taken};
-use super::trial::{self, Trial};
+use super::selection_step::{SelectedEffect, Selection};
 use super::why::Moment;
 
-/// Where in an effect's shapes its moment stands, if it has one.
-pub(crate) fn place(candidate: &Candidate, trial: &Trial) -> Option<usize> {
-    let axis = |shape: usize| candidate.info.parameters.get(trial.amplitudes.len() + shape).map(|p| p.axis);
-    (0..trial.shapes.len()).find(|s| axis(*s) == Some(Axis::Time))
+/// The index of a change point among an effect's shapes, if it has one.
+pub(crate) fn place(candidate: &Candidate, fit: &CandidateFit) -> Option<usize> {
+    let axis = |shape: usize| candidate.info.parameters.get(fit.amplitudes.len() + shape).map(|p| p.axis);
+    (0..fit.shapes.len()).find(|s| axis(*s) == Some(Axis::Time))
 }
 
-/// Where in the campaign a moment lies.
+/// Where in the campaign a change point lies.
 pub(crate) fn of(moment: f64, rows: &Rows) -> Moment {
     let name = |row: usize| rows.names[rows.recording[row] as usize].clone();
     let after = rows.contexts().partition_point(|c| c.time < moment);
@@ -39,30 +39,30 @@ pub(crate) fn of(moment: f64, rows: &Rows) -> Moment {
     Moment::In(name(after), local)
 }
 
-/// The standard deviation that makes an interval of the moment's, s; none where the recordings do not determine it.
+/// The standard deviation of a change point, s; none where the recordings do not determine it.
 pub(crate) fn deviation(
-    found: &Found,
-    taken: &Taken,
+    selection: &Selection,
+    selected: &SelectedEffect,
     place: usize,
     library: &[Candidate],
     rows: &Rows,
 ) -> Option<f64> {
-    let base = baselines::fit(rows, found.full.kind, &[]);
+    let base = baselines::fit(rows, selection.joint.kind, &[]);
     let at = |moment: f64| {
-        let mut trial = taken.trial.clone();
-        trial.shapes[place] = moment;
-        let trace = trial::trace(&trial, library, rows);
+        let mut fit = selected.fit.clone();
+        fit.shapes[place] = moment;
+        let trace = candidate_fit::trace(&fit, library, rows);
         baselines::projected(&[trace], rows.root_weight(), &base.span).swap_remove(0)
     };
-    let moment = taken.trial.shapes[place];
-    let mut unexplained = found.full.residual.clone();
+    let moment = selected.fit.shapes[place];
+    let mut unexplained = selection.joint.residual.clone();
     add_scaled(&mut unexplained, 1.0, &at(moment));
     let all = energy(&unexplained);
     let left = |moment: f64| {
         let trace = at(moment);
         all - dot(&unexplained, &trace).powi(2) / energy(&trace).max(f64::MIN_POSITIVE)
     };
-    // The moments that can be told apart lie between one reading that counts and the next.
+    // Change points are distinguishable by the gaps between readings that count.
     let mut times: Vec<f64> = rows
         .contexts()
         .iter()
@@ -74,9 +74,9 @@ pub(crate) fn deviation(
     let gaps = times.len().checked_sub(1).filter(|g| *g > 0)?;
     let here = times.partition_point(|t| *t < moment).clamp(1, gaps);
     let least = left(moment);
-    let row = least / found.noise.independent.max(1.0);
+    let row = least / selection.noise.independent.max(1.0);
     let possible = |gap: usize| left(0.5 * (times[gap - 1] + times[gap])) - least < CHANGE_POINT_RATIO * row;
-    // Where the likelihood has several tops, what lies beyond a dip is possible too: all of the campaign is looked over first.
+    // The likelihood may have several maxima: the whole campaign is scanned first.
     let elsewhere: Vec<usize> =
         (1..=gaps).step_by(gaps.div_ceil(CHANGE_POINT_SCAN)).filter(|gap| possible(*gap)).collect();
     let [first, last] = [elsewhere.first(), elsewhere.last()].map(|gap| gap.map_or(here, |gap| *gap));
@@ -87,7 +87,7 @@ pub(crate) fn deviation(
     deviation.is_finite().then_some(deviation)
 }
 
-/// The farthest step from here, of so many, that is still possible; looked for in strides that double, then halve.
+/// The farthest possible step out of `steps`, found by strides that double, then halve.
 fn farthest(steps: usize, possible: impl Fn(usize) -> bool) -> usize {
     let (mut inside, mut stride) = (0, 1);
     while inside + stride <= steps && possible(inside + stride) {

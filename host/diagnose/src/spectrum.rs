@@ -1,4 +1,4 @@
-//! Whether the misfit repeats in time: a hum, a beat of the mains with the sampling, a regulator that swings.
+//! Lines in the spectrum of the residual: mains hum, its alias with the sampling, an oscillating regulator.
 //!
 //! Mean power of overlapping windowed stretches (P. D. Welch, IEEE Trans. Audio and Electroacoustics 15 (1967) 70–73); a line is a
 //! frequency whose power stands out from its neighbours'. How far it does by chance is told by the same recordings with their
@@ -10,7 +10,7 @@ use super::criteria::location::{
     LINE_NEIGHBOURS, LINE_PERIODS, LINE_SHUFFLES, LINE_WIDTH, LONGEST_STRETCH, SHORTEST_STRETCH, STRETCHES,
 };
 use super::linear::{Random, median};
-use super::locate::shuffled;
+use super::location::shuffled;
 use super::rows::Rows;
 
 /// A line in the spectrum of the misfit.

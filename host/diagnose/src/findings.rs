@@ -1,7 +1,8 @@
-//! The names: what was taken and how sure that is; what was looked at and why it was not taken.
+//! Findings: the selected effects with parameters and probabilities, and the other candidates with the reason against each.
 
 use super::calibration;
 use super::candidates::Candidate;
+use super::change_point;
 use super::criteria::judgement::{ABSURD_SIZE, DETECTION, DETECTION_ROWS, RELEVANT_SIZE};
 use super::criteria::selection::{
     CONCEALED, FAMILY_ALPHA, LEAST_SCORE, LEAST_SHARE, MOST_REPORTED, REPORTED_RIVAL, SELECTION_FLOOR,
@@ -9,26 +10,26 @@ use super::criteria::selection::{
 };
 use super::intervals::deviations;
 use super::linear::energy;
-use super::moment;
 use super::rows::Rows;
-use super::select::Found;
+use super::selection_step::Selection;
 use super::verdict::{Considered, Missing, ParameterValue, Why, WhyNot};
 use super::why::{Chance, Evidence};
 
-/// The effects that were taken, with parameters and intervals, what they cannot be told from, and how probable they are.
-pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<Missing> {
-    let deviations = deviations(found, library, rows);
-    let explained =
-        ((energy(&found.bare.residual) - energy(&found.full.residual)) / found.above).clamp(0.0, 1.0);
-    let total: f64 = found.taken.iter().map(|t| t.share.max(0.0)).sum::<f64>().max(1e-12);
-    found
-        .taken
+/// The selected effects with parameters and intervals, what they cannot be distinguished from, and their probabilities.
+pub(crate) fn missing(selection: &Selection, library: &[Candidate], rows: &Rows) -> Vec<Missing> {
+    let deviations = deviations(selection, library, rows);
+    let explained = ((energy(&selection.base_alone.residual) - energy(&selection.joint.residual))
+        / selection.excess_energy)
+        .clamp(0.0, 1.0);
+    let total: f64 = selection.selected.iter().map(|t| t.share.max(0.0)).sum::<f64>().max(1e-12);
+    selection
+        .selected
         .iter()
         .zip(&deviations)
         .map(|(t, d)| {
-            let candidate = &library[t.trial.candidate];
+            let candidate = &library[t.fit.candidate];
             let info = candidate.info;
-            let values = t.trial.amplitudes.iter().chain(&t.trial.shapes);
+            let values = t.fit.amplitudes.iter().chain(&t.fit.shapes);
             let parameters = info
                 .parameters
                 .iter()
@@ -55,10 +56,10 @@ pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<
             let chance = if t.p <= FAMILY_ALPHA {
                 Chance::Tested { effects: library.len(), p: t.p }
             } else {
-                Chance::FewStrokes { p: t.p, log_ratio: t.trial.score / 2.0 }
+                Chance::FewStrokes { p: t.p, log_ratio: t.fit.score / 2.0 }
             };
-            let moment =
-                moment::place(candidate, &t.trial).map(|shape| moment::of(t.trial.shapes[shape], rows));
+            let moment = change_point::place(candidate, &t.fit)
+                .map(|shape| change_point::of(t.fit.shapes[shape], rows));
             Missing {
                 effect: info.name.into(),
                 probability: calibration::probability(belief, explained),
@@ -73,7 +74,7 @@ pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<
                 supported: true,
                 summary: info.summary.into(),
                 source: info.source.into(),
-                peak_N: t.trial.peak,
+                peak_N: t.fit.peak,
                 p: t.p,
                 why: Why::Found(Evidence { share, chance, moment }),
             }
@@ -81,9 +82,9 @@ pub(crate) fn missing(found: &Found, library: &[Candidate], rows: &Rows) -> Vec<
         .collect()
 }
 
-/// The effects that were looked at and not named: what they would take, how large they could be unseen, and what would show them.
+/// The candidates that were not selected: the share they would explain, the size at which they could be hidden, and what would show them.
 pub(crate) fn considered(
-    found: &Found,
+    selection: &Selection,
     library: &[Candidate],
     missing: &[Missing],
     sigma: f64,
@@ -91,19 +92,19 @@ pub(crate) fn considered(
 ) -> Vec<Considered> {
     let named: Vec<&str> = missing.iter().map(|m| m.effect.as_str()).collect();
     let confusable: Vec<&String> = missing.iter().flat_map(|m| &m.confusable_with).collect();
-    found
-        .first_look
+    selection
+        .first_scan
         .iter()
-        .zip(&found.first_p)
+        .zip(&selection.first_p)
         .filter(|(t, _)| !named.contains(&library[t.candidate].name()))
         .map(|(t, p)| {
             let name = library[t.candidate].name();
-            let gain = (t.gain / found.above).clamp(0.0, 1.0);
+            let gain = (t.gain / selection.excess_energy).clamp(0.0, 1.0);
             // The trace that noise could hide, given how much of it the base leaves; and below the size from which an effect that
             // tables imitate is named at all it could be there anyway.
             let hidden = (t.size > 0.0 && t.peak > 0.0).then(|| {
                 let detectable = DETECTION * sigma
-                    / (found.noise.independent.max(DETECTION_ROWS)).sqrt()
+                    / (selection.noise.independent.max(DETECTION_ROWS)).sqrt()
                     / t.visible.max(1e-12).sqrt();
                 // What moves the force by less than the model's own inexactness is not named either.
                 let nameable = SELECTION_FLOOR * blocked / t.visible.max(1e-12).sqrt();
@@ -122,7 +123,7 @@ pub(crate) fn considered(
             } else if *p > FAMILY_ALPHA && t.score < LEAST_SCORE {
                 WhyNot::Chance(*p)
             } else if missing.is_empty() && gain >= LEAST_SHARE {
-                if found.remarks.iter().any(|r| r.refuses(name)) {
+                if selection.remarks.iter().any(|r| r.refuses(name)) {
                     WhyNot::Refused
                 } else {
                     WhyNot::WithinInexactness

@@ -1,4 +1,4 @@
-//! What can be judged at all, and what is said where nothing can.
+//! Preconditions of a diagnosis, and the answer where they are not met.
 
 use super::candidates::library;
 use super::criteria::judgement::{
@@ -17,7 +17,7 @@ pub(super) fn blocked_force(rows: &Rows) -> f64 {
     if by_pressure > 0.0 { strongest.min(FORCE_SCALE * by_pressure) } else { strongest }
 }
 
-pub(super) fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<Unjudgeable> {
+pub(super) fn unmet_precondition(rows: &Rows, blocked: f64) -> Option<Unjudgeable> {
     let effective = rows.effective();
     if effective < FEWEST_ROWS {
         return Some(Unjudgeable::FewRows { usable: effective, least: FEWEST_ROWS });
@@ -42,7 +42,7 @@ pub(super) fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<Unjudgeable>
     None
 }
 
-pub(super) fn what_can_be_judged(rows: &Rows) -> Vec<Remark> {
+pub(super) fn limitations(rows: &Rows) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if rows.isometric {
         remarks.push(Remark::HeldLength);
@@ -64,7 +64,7 @@ pub(super) fn what_can_be_judged(rows: &Rows) -> Vec<Remark> {
     remarks
 }
 
-pub(super) fn no_judgement(
+pub(super) fn not_judged(
     rows: &Rows,
     options: &Options,
     mut remarks: Vec<Remark>,

@@ -1,4 +1,4 @@
-//! The course of a motion, row by row: which way it goes, since when, and how long it rested.
+//! The path of the stroke, row by row: direction, time since the last reversal, time at rest.
 
 use std::iter::Peekable;
 use std::slice;
@@ -6,8 +6,8 @@ use std::slice;
 use super::onset::Onset;
 use super::{Kinematics, Recorded, Thresholds};
 
-/// Where a motion is.
-pub(super) struct Course<'a> {
+/// The state of the motion at a row.
+pub(super) struct StrokePath<'a> {
     recorded: &'a Recorded<'a>,
     thresholds: Thresholds,
     /// Beginnings of strokes that are still to come.
@@ -34,7 +34,7 @@ pub(super) struct Course<'a> {
     still_pressure: f64,
 }
 
-impl<'a> Course<'a> {
+impl<'a> StrokePath<'a> {
     /// Before the first row; the muscle stood for `rested` seconds.
     pub(super) fn begin(
         recorded: &'a Recorded<'a>,
@@ -62,7 +62,7 @@ impl<'a> Course<'a> {
         }
     }
 
-    /// Goes on to a row, of which `k` knows whether the length is held, and says of it what is known then.
+    /// Advances to a row, of which `k` knows whether the length is held, and enters its motion into `k`.
     pub(super) fn go(&mut self, row: usize, k: &mut Kinematics) {
         let Recorded { time, stroke, pressure, .. } = *self.recorded;
         let held = k.held[row];

@@ -47,8 +47,8 @@ pub(super) fn thin(rows: &Rows, traces: &[Vec<f64>]) -> (Rows, Vec<Vec<f64>>) {
     (rows.thinned(stride), traces.iter().map(pick).collect())
 }
 
-/// Rows that belong to a turn: set aside for their direction alone. Slack rows and ramps beyond the tested pressures, set aside
-/// for other reasons, say nothing about a model that does not claim them.
+/// Rows within the model's claim: all that count, and those about a reversal, which are masked for their direction alone. Slack rows and
+/// ramps beyond the tested pressures stay out.
 fn claimed(rows: &Rows) -> Vec<bool> {
     let sure = || (0..rows.len()).filter(|i| rows.root_weight()[*i] > 0.0);
     let strongest = sure().map(|i| rows.force[i]).fold(0.0, f64::max);
@@ -63,7 +63,7 @@ fn claimed(rows: &Rows) -> Vec<bool> {
         .collect()
 }
 
-/// The strokes that the fitted rows hold. Beyond them a polynomial promises nothing, whatever stands beside it.
+/// The range of strokes of the fitted rows. Beyond it a polynomial extrapolates.
 fn strokes(rows: &Rows) -> RangeInclusive<f64> {
     let fitted =
         || rows.contexts().iter().zip(rows.root_weight()).filter(|(_, w)| **w > 0.0).map(|(c, _)| c.stroke);
@@ -84,7 +84,7 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Groups, tares:
             let fitted = baselines::fit(&blind, kind, traces);
             let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
             for i in 0..rows.len() {
-                // Where friction rests was fitted: nothing predicts it.
+                // The place where friction rests was fitted there and cannot be predicted.
                 let within = reach.contains(&rows.contexts()[i].stroke);
                 let judged =
                     if rows.vented[i] { tares } else { rows.sign[i] != 0.0 && rows.at_rest().rest[i] == 0 };
@@ -123,7 +123,7 @@ fn seen_once(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Groups) -> bo
 
 /// The strictest split that recordings allow.
 fn strictest(rows: &Rows, kind: Kind) -> Groups {
-    // The vented stretches say by themselves what a load cell reads without a muscle: half of them from the other half.
+    // Vented rows show what a load cell reads without a muscle: half of the tares predict the other half.
     let vented: Vec<usize> = (0..rows.len()).filter(|i| rows.vented[*i]).collect();
     let tare = |i: usize| (vented.partition_point(|v| *v < i) * 4 / vented.len().max(1)) as u32 % 2;
     let pressure = |i: usize| if rows.vented[i] { rows.levels.len() as u32 + tare(i) } else { rows.level[i] };
@@ -151,7 +151,7 @@ fn strictest(rows: &Rows, kind: Kind) -> Groups {
 }
 
 /// How rows are left out, and what predicts them from the rest.
-pub(super) struct Unseen {
+pub(super) struct HeldOutRows {
     rows: Rows,
     stride: usize,
     kind: Kind,
@@ -160,14 +160,14 @@ pub(super) struct Unseen {
     tares: bool,
 }
 
-impl Unseen {
+impl HeldOutRows {
     /// For effects of these traces, by the strictest split that the recordings allow.
     pub(super) fn new(rows: &Rows, kind: Kind, traces: &[Vec<f64>]) -> Self {
         // Directions with a prior are made for the pressures they were fitted to; a pressure left out asks for one bladder, where
         // there is one.
         let kind = match kind {
             Kind::Flexible(m) => Kind::Flexible(m.min(TABLE_ORDER)),
-            Kind::Soft(give) if give.elastic > ONE_BLADDER * strongest(rows) => Kind::Flexible(TABLE_ORDER),
+            Kind::Soft(prior) if prior.elastic > ONE_BLADDER * strongest(rows) => Kind::Flexible(TABLE_ORDER),
             Kind::Soft(_) | Kind::Stiff => Kind::Stiff,
         };
         let (thin, traces) = thin(rows, traces);

@@ -1,6 +1,7 @@
-//! The tables as evidence: they swallow physics, and keep its pattern over pressure.
+//! The tables as evidence: they absorb physics, and keep its pattern over pressure.
 
 use super::baselines::Baseline;
+use super::candidate_fit::CandidateFit;
 use super::candidates::Candidate;
 use super::criteria::judgement::{
     FEWEST_LEVELS_READ, INVERSE_ADVANTAGE, INVERSE_PART, INVERSE_SHARE, MOST_LISTED, STRAIGHT_CHANGE,
@@ -9,19 +10,24 @@ use super::criteria::judgement::{
 use super::criteria::selection::LEAST_SCORE;
 use super::remark::Remark;
 use super::rows::Rows;
-use super::select::Found;
-use super::trial::Trial;
+use super::selection_step::Selection;
 
-/// What to say where the tables differ between pressures more than a bladder does, and nothing can be named for it.
-pub(super) fn in_the_tables(found: &Found, library: &[Candidate], concealed: f64, blocked: f64) -> Remark {
-    let mut able: Vec<&Trial> = found.first_look.iter().filter(|t| t.score >= LEAST_SCORE).collect();
+/// The remark where the tables differ between pressures more than a bladder does, and no effect is selected.
+pub(super) fn absorbed_by_tables(
+    selection: &Selection,
+    library: &[Candidate],
+    concealed: f64,
+    blocked: f64,
+) -> Remark {
+    let mut able: Vec<&CandidateFit> =
+        selection.first_scan.iter().filter(|t| t.score >= LEAST_SCORE).collect();
     able.sort_by(|a, b| b.score.total_cmp(&a.score));
     let names = able.iter().take(MOST_LISTED).map(|t| library[t.candidate].name().to_owned());
     Remark::Concealed { rms: concealed, share: concealed / blocked, candidates: names.collect() }
 }
 
-/// What the fitted tables themselves betray: flexible tables swallow physics, and keep its pattern over pressure.
-pub(super) fn tables_as_evidence(production: &Baseline, rows: &Rows) -> Vec<Remark> {
+/// Remarks on patterns over pressure in the fitted tables: flexible tables absorb physics, and keep its pattern.
+pub(super) fn patterns_over_pressure(production: &Baseline, rows: &Rows) -> Vec<Remark> {
     let mut remarks = Vec::new();
     let levels = &rows.levels;
     if !rows.steady || levels.len() < FEWEST_LEVELS_READ {

@@ -1,0 +1,92 @@
+//! The cheapest next recording that separates effects which the present recordings cannot.
+
+mod menu;
+
+use model_core::effects::{Context, MEMORY};
+use model_core::muscle::Muscle;
+use rayon::prelude::*;
+
+use self::menu::menu;
+use super::criteria::planning::{EXPECTED_NOISE, RIVAL_GRID, RIVAL_GRID_SEVERAL, WORTHWHILE_DIFFERENCE};
+use super::experiment::{Motion, Proposal, bench_check};
+use super::isolability::tables;
+use super::linear::{add_scaled, energy};
+use super::protocol_simulation::{moments, play};
+use super::verdict::{Diagnosis, NextExperiment};
+use pam_data::error::Result;
+use pam_fit::bench::Candidate;
+
+fn trace(law: Candidate, shape: &[f64], amplitudes: &[f64], contexts: &[Context<f64>]) -> Vec<f64> {
+    let mut memory = [0.0; MEMORY];
+    let columns = law.columns(contexts, shape, &mut memory);
+    let mut sum = vec![0.0; contexts.len()];
+    for (a, c) in amplitudes.iter().zip(&columns) {
+        add_scaled(&mut sum, *a, c);
+    }
+    for v in &mut sum {
+        if !v.is_finite() {
+            *v = 0.0;
+        }
+    }
+    sum
+}
+
+/// The recording of the menu in which the named effect and those it is confused with differ most for its cost.
+///
+/// # Errors
+/// None in practice; a protocol of the menu that cannot be played is passed over.
+pub fn next_experiment(
+    diagnosis: &Diagnosis,
+    muscle: &Muscle<f64>,
+    low: f64,
+    high: f64,
+) -> Result<Option<NextExperiment>> {
+    let Some(first) = diagnosis.missing.iter().find(|m| !m.confusable_with.is_empty()) else {
+        return Ok(None);
+    };
+    let Some(law) = Candidate::from_name(&first.effect) else { return Ok(None) };
+    let rivals: Vec<Candidate> =
+        first.confusable_with.iter().filter_map(|n| Candidate::from_name(n)).collect();
+    let values: Vec<f64> = first.parameters.iter().map(|p| p.value).collect();
+    let (amplitudes, shape) = values.split_at(law.amplitudes().len().min(values.len()));
+    let tried: Vec<Option<(f64, f64, String, Motion)>> = menu(muscle, low, high)
+        .par_iter()
+        .map(|item| {
+            let campaign = play(&item.protocol, muscle).ok()?;
+            let contexts = moments(muscle, &campaign);
+            let basis = tables(&contexts);
+            let mine = trace(law, shape, amplitudes, &contexts);
+            // The rival is free to take its best shape and size: what then still differs is what would be seen.
+            let mut least = f64::INFINITY;
+            for rival in &rivals {
+                let span = pam_fit::bench::Span::of(&contexts)?;
+                let mut best = f64::INFINITY;
+                for shape in
+                    rival.grid(if rival.shapes().len() < 2 { RIVAL_GRID } else { RIVAL_GRID_SEVERAL }, &span)
+                {
+                    let mut with = basis.clone();
+                    for c in rival.columns(&contexts, &shape, &mut [0.0; MEMORY]) {
+                        if c.iter().all(|v| v.is_finite()) {
+                            with.push(c);
+                        }
+                    }
+                    let mut left = mine.clone();
+                    with.project_out(&mut left);
+                    best = best.min((energy(&left) / left.len().max(1) as f64).sqrt());
+                }
+                least = least.min(best);
+            }
+            let text = item.protocol.to_toml().ok()?;
+            Some((least / item.minutes.sqrt(), least, text, item.motion))
+        })
+        .collect();
+    let best = tried.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0));
+    let mut separates = vec![first.effect.clone()];
+    separates.extend(first.confusable_with.iter().cloned());
+    Ok(best.map(|(_, difference, protocol, motion)| {
+        let floor = WORTHWHILE_DIFFERENCE * diagnosis.noise_N.max(EXPECTED_NOISE * diagnosis.blocked_force_N);
+        let check = bench_check(&separates);
+        let proposal = Proposal { motion, check, motion_separates: check.is_none() || !(difference < floor) };
+        NextExperiment { separates, protocol, expected_difference_N: difference, proposal }
+    }))
+}
