@@ -4,6 +4,8 @@ pub(crate) mod bench;
 pub(crate) mod device;
 pub(crate) mod effects;
 pub(crate) mod evaluate;
+#[cfg(test)]
+mod fit;
 pub(crate) mod predict;
 pub(crate) mod table;
 
@@ -66,6 +68,7 @@ mod tests {
         published::<super::effects::Effect>("pam-effect-1");
         published::<super::effects::Effects>("pam-effects-1");
         published::<super::evaluate::Evaluate>("pam-evaluate-1");
+        published::<super::fit::Fit>("pam-fit-1");
         published::<super::predict::Predict>("pam-predict-1");
         published::<super::table::Check>("pam-check-1");
         published::<super::table::Export>("pam-export-1");

@@ -37,6 +37,7 @@ pub fn page(fit: &Fit, campaign: &Campaign, options: &Options) -> Page {
         ),
     );
     head(&mut page, &view);
+    page.push(loads::overview(&view));
     page.push(remarks(&view));
     page.push(loads::section(&view));
     page.push(models::section(&view));
@@ -78,6 +79,11 @@ fn head(page: &mut Page, view: &View<'_>) {
         }
         None => verdict += ". There is one pressure only: forces at others are not identifiable.",
     }
+    verdict += match worst {
+        Tone::Bad => " Do not use it for control before the warnings below are resolved.",
+        Tone::Caution if !s.warnings.is_empty() => " Read the warnings below before you use it.",
+        Tone::Caution | Tone::Good | Tone::Plain => "",
+    };
     page.verdict(worst, verdict);
     page.fact(
         "mean error",

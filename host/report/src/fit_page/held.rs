@@ -2,7 +2,7 @@
 
 use super::super::{Axis, Colour, Figure, Mark, Panel};
 use super::loads::{PANELS, broken};
-use super::models::DRAWN;
+use super::models::{DRAWN, within_reach};
 use super::view::{Banded, View};
 
 /// Pressures along a curve of the table.
@@ -112,11 +112,12 @@ pub(super) fn branches(view: &View<'_>) -> Figure {
 /// Every model by itself, all lengths in each panel.
 pub(super) fn each_model(view: &View<'_>) -> Figure {
     let panels = view.fit.models.iter().map(|model| {
+        let computed = within_reach(view, &model.force);
         let mut panel = Panel::new(pressure(), force()).titled(model.name);
         for length in shown(view) {
             let of = midline(view, length);
             let (x, measured) = middle(view, &of);
-            let computed: Vec<f64> = of.iter().map(|i| model.force[*i]).collect();
+            let computed: Vec<f64> = of.iter().map(|i| computed[*i]).collect();
             let colour = view.length_colour(length);
             panel = panel.points(if length == 0 { "measured" } else { "" }, colour, &x, &measured).line(
                 view.length_name(length),
@@ -150,7 +151,8 @@ pub(super) fn models(view: &View<'_>) -> Figure {
         );
         for (name, colour) in DRAWN {
             if let Some(model) = view.fit.models.iter().find(|m| m.name == name) {
-                let y: Vec<f64> = of.iter().map(|i| model.force[*i]).collect();
+                let computed = within_reach(view, &model.force);
+                let y: Vec<f64> = of.iter().map(|i| computed[*i]).collect();
                 panel = panel.dashes(name, Colour::Series(colour), &x, &y);
             }
         }

@@ -13,15 +13,16 @@ pub(super) fn contraction_axis() -> Axis {
     Axis::new("contraction ΔL/L_{0}", "%")
 }
 
+/// The picture that stands first.
+pub(super) fn overview(view: &View<'_>) -> Section {
+    let mut section = Section::new("Measured and fitted force");
+    section.figure(if view.held_length() { held::load_lines(view) } else { load_lines(view) });
+    section
+}
+
 pub(super) fn section(view: &View<'_>) -> Section {
     let mut section = Section::new("Force of the muscle");
-    if view.held_length() {
-        section.figure(held::load_lines(view));
-        section.figure(held::branches(view));
-    } else {
-        section.figure(load_lines(view));
-        section.figure(loops(view));
-    }
+    section.figure(if view.held_length() { held::branches(view) } else { loops(view) });
     section.figure(ends(view));
     section.figure(deadband(view));
     section
@@ -236,8 +237,12 @@ fn ends(view: &View<'_>) -> Figure {
     Figure::multiples(
         "blocked-free",
         "Blocked force and free contraction against pressure",
-        "Rings are single loops; those of one pressure should coincide. A trend from loop to loop is run-in (Mullins softening); \
-         scatter is poor repeatability.",
+        if most == 0 {
+            "Computed by the table. A gap means that the force does not reach zero within the tested contractions."
+        } else {
+            "Rings are single loops; those of one pressure should coincide. A trend from loop to loop is run-in (Mullins softening); \
+             scatter is poor repeatability."
+        },
         panels.to_vec(),
     )
 }

@@ -14,7 +14,7 @@ pub(super) fn section(view: &View<'_>) -> Section {
         &["model", "mean", "largest", "fitted parameters"],
     );
     for model in &s.models {
-        let cells = [model.mean_error_pct, model.max_error_pct].map(|v| figures(v, 2));
+        let cells = [model.mean_error_pct, model.max_error_pct].map(error);
         table.row([
             format!("`{}`", model.name),
             cells[0].clone(),
@@ -33,6 +33,18 @@ pub(super) fn section(view: &View<'_>) -> Section {
         section.figure(error_lines(view));
     }
     section
+}
+
+/// An error in percent; beyond ten times the blocked force its digits carry nothing.
+fn error(percent: f64) -> String {
+    if percent <= 1e3 { figures(percent, 2) } else { "> 1000".to_owned() }
+}
+
+/// A model's forces with gaps where they are far beyond what was measured: one model that fails must not set the scale of all.
+pub(super) fn within_reach(view: &View<'_>, force: &[f64]) -> Vec<f64> {
+    const FAR: f64 = 1.5;
+    let largest = view.fit.midline.iter().fold(0.0_f64, |m, p| m.max(p.force.abs()));
+    force.iter().map(|f| if f.abs() <= FAR * largest { *f } else { f64::NAN }).collect()
 }
 
 fn what(model: &str) -> &'static str {
@@ -60,6 +72,7 @@ fn each(view: &View<'_>) -> Figure {
     let at = |of: &[usize], column: &[f64]| -> Vec<f64> { of.iter().map(|i| column[*i]).collect() };
     let average: Vec<f64> = mid.iter().map(|m| m.force).collect();
     let panels = view.fit.models.iter().map(|model| {
+        let force = within_reach(view, &model.force);
         let panel = Panel::new(contraction_axis(), Axis::new("force F", "N")).titled(model.name).points(
             "F_{AVG}",
             Colour::Muted,
@@ -68,7 +81,7 @@ fn each(view: &View<'_>) -> Figure {
         );
         groups.iter().fold(panel, |panel, group| {
             let of: Vec<usize> = shown.iter().copied().filter(|i| mid[*i].group as usize == *group).collect();
-            let (x, y) = (at(&of, &contraction), at(&of, &model.force));
+            let (x, y) = (at(&of, &contraction), at(&of, &force));
             if view.fit.prepared.pressures.held {
                 panel.line(view.name(*group), view.colour(*group), &x, &y)
             } else {
@@ -105,7 +118,8 @@ fn against_midline(view: &View<'_>) -> Figure {
             .points("F_{AVG}", Colour::Muted, &x, &average);
         for (name, colour) in DRAWN {
             if let Some(model) = view.fit.models.iter().find(|m| m.name == name) {
-                let y: Vec<f64> = of.iter().map(|i| model.force[*i]).collect();
+                let force = within_reach(view, &model.force);
+                let y: Vec<f64> = of.iter().map(|i| force[*i]).collect();
                 panel = panel.dashes(name, Colour::Series(colour), &x, &y);
             }
         }

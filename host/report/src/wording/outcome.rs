@@ -18,9 +18,9 @@ pub fn verdict(d: &Diagnosis) -> String {
         Verdict::Explained if d.missing.iter().any(|m| !m.supported) => {
             "With the effects that were given, no error stands above the noise. The recordings do not support all of them.".to_owned()
         }
-        Verdict::Explained => format!("The model lacks {}. This explains the excess error.", list(&names)),
+        Verdict::Explained => format!("The model lacks {}. This explains its error above the noise.", list(&names)),
         Verdict::PartlyExplained => {
-            format!("The model lacks {}. This explains a part of the excess error.", list(&names))
+            format!("The model lacks {}. This explains a part of its error above the noise.", list(&names))
         }
         Verdict::Unexplained => {
             "The model lacks something, but no effect of the library explains it well enough to be named.".to_owned()

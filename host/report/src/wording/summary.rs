@@ -81,11 +81,11 @@ fn head(s: &mut String, d: &Diagnosis) {
                 "CONSISTENT: no error stands above the noise and the model's stated inexactness.",
             Verdict::Explained if d.missing.iter().any(|m| !m.supported) =>
                 "AS GIVEN: with the effects that were given, no error stands above the noise. The recordings do not support all of them.",
-            Verdict::Explained => "EXPLAINED: the effects below explain the model's excess error.",
+            Verdict::Explained => "EXPLAINED: the effects below explain the model's error above the noise.",
             Verdict::PartlyExplained =>
-                "PARTLY EXPLAINED: the effects below explain a part of the model's excess error.",
+                "PARTLY EXPLAINED: the effects below explain a part of the model's error above the noise.",
             Verdict::Unexplained =>
-                "UNEXPLAINED: the model has an excess error that no effect of the library explains well enough to be named.",
+                "UNEXPLAINED: the model has an error above the noise that no effect of the library explains well enough to be named.",
         }
     );
     if judged {

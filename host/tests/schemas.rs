@@ -1,0 +1,132 @@
+//! What the commands print as JSON is valid by the published schemas.
+
+#![allow(clippy::unwrap_used, reason = "what fails here fails the test")]
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+
+use pam_device::emulated::{Emulated, Kind, Stand};
+use serde_json::Value;
+use virtual_bench::presets;
+use virtual_bench::recording::Columns;
+
+mod bench_campaign;
+
+fn host(folder: &Path, arguments: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_host"))
+        .args(arguments)
+        .current_dir(folder)
+        .env("XDG_CONFIG_HOME", folder)
+        .env_remove("PAM_SETTINGS")
+        .env_remove("PAM_PORT")
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {said}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn schemas() -> BTreeMap<String, Value> {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/schema");
+    let files = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path());
+    let named = |path: std::path::PathBuf| {
+        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+        (name, serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap())
+    };
+    files.map(named).collect()
+}
+
+/// `pam-fit/1` has its schema in `pam-fit-1.json`.
+fn valid(all: &BTreeMap<String, Value>, call: &str, text: &str) -> String {
+    let document: Value = serde_json::from_str(text).unwrap_or_else(|e| panic!("{call}: {e}: {text}"));
+    let name =
+        document["schema"].as_str().unwrap_or_else(|| panic!("{call} names no schema")).replace('/', "-");
+    let schema = all.get(&name).unwrap_or_else(|| panic!("{call}: there is no schema {name}"));
+    let validator = jsonschema::validator_for(schema).unwrap();
+    let errors: Vec<String> =
+        validator.iter_errors(&document).map(|e| format!("{} at {}", e, e.instance_path())).collect();
+    assert!(errors.is_empty(), "{call} is no {name}: {errors:#?}");
+    name
+}
+
+/// Loops of the miniature muscle at three pressures, with its description.
+fn campaign(folder: &Path) -> Vec<String> {
+    let spec = presets::miniature();
+    std::fs::write(folder.join("m.toml"), spec.description()).unwrap();
+    let levels = &presets::miniature_pressures()[1..4];
+    let files = bench_campaign::files(&spec, levels, 5, 10.0);
+    let write = |file: &virtual_bench::recording::Recording| {
+        let name = format!("{}.csv", file.name);
+        std::fs::write(folder.join(&name), file.csv(Columns::default())).unwrap();
+        name
+    };
+    files.iter().map(write).collect()
+}
+
+#[test]
+fn results_of_recordings_and_tables_are_valid() {
+    let all = schemas();
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let recordings = campaign(folder);
+    std::fs::write(
+        folder.join("p.toml"),
+        "name = \"p\"\nsample_Hz = 10.0\n[[step]]\ndo = \"pressure\"\nto_kPa = 300.0\n[[step]]\ndo = \"file\"\nname = \"a\"\n\
+         [[step]]\ndo = \"cycles\"\nto_free = 0.8\nspeed_mm_s = 0.5\ncount = 2\n[[step]]\ndo = \"end-file\"\n",
+    )
+    .unwrap();
+    let own = |call: &str, with: bool| {
+        let mut words: Vec<&str> = call.split(' ').collect();
+        if with {
+            words.extend(recordings.iter().map(String::as_str));
+        }
+        valid(&all, call, &host(folder, &words))
+    };
+    let mut seen = vec![
+        own("fit --quiet --muscle m.toml -o t.pam --json -", true),
+        own("fit --quiet --muscle m.toml --physical --fit-geometry --json -", true),
+        own("diagnose --quiet --muscle m.toml --json -", true),
+        own("diagnose --quiet --muscle m.toml --with backlash --json -", true),
+        own("predict --quiet --table t.pam --json -", true),
+        own("evaluate --quiet --muscle m.toml --leave-out runs --json -", true),
+        own("plan --quiet --table t.pam p.toml --json -", false),
+        own("table show t.pam --json", false),
+        own("table check t.pam --json", false),
+        own("table export t.pam -o t.h --json", false),
+        own("effects --json", false),
+        own("effects backlash --json", false),
+        own("settings --json", false),
+        own("device list --json", false),
+    ];
+    let (a, b) = (&recordings[0], &recordings[1]);
+    seen.push(valid(&all, "compare", &host(folder, &["compare", "--quiet", a, b, "--json"])));
+    seen.sort();
+    seen.dedup();
+    assert_eq!(seen.len(), 13, "{seen:?}");
+}
+
+#[test]
+fn results_of_a_controller_are_valid() {
+    let all = schemas();
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let stand = Stand::swinging(presets::miniature());
+    let emulated = Emulated::start(stand, Some(Kind::Native), 1.0).unwrap();
+    let table =
+        pam_fit::table_file::TableFile { table: model_core::table::example(), about: Default::default() };
+    table.write(folder.join("t.pam")).unwrap();
+    let port = emulated.address().to_string();
+    for call in [
+        "device info --json",
+        "device settings --json",
+        "device faults --json",
+        "flash t.pam --json --quiet",
+        "flash t.pam --json --quiet",
+        "device forget --json",
+        "vent --json",
+    ] {
+        let words: Vec<&str> = call.split(' ').chain(["--port", &port]).collect();
+        valid(&all, call, &host(folder, &words));
+    }
+}
