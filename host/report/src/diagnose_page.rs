@@ -1,5 +1,6 @@
 //! The report of a diagnosis, for an engineer who has never heard of the effect.
 
+mod history;
 mod located;
 
 use model_core::braid::Geometry;
@@ -27,6 +28,7 @@ pub fn page(d: &Diagnosis, geometry: &Geometry, campaign: &Campaign) -> Page {
     );
     head(&mut page, d);
     page.push(wrong(d));
+    page.push(history::section(d.history.as_ref()));
     page.push(located::section(d));
     for missing in &d.missing {
         page.push(what_it_is(d, missing));

@@ -23,7 +23,7 @@ use pam_fit::predict::predict;
 use crate::progress::ProgressLine;
 use pam_data::recording::Reader;
 use pam_fit::table_file::{self, TableFile};
-use pam_report::diagnose_page;
+use pam_report::{diagnose_page, history_text};
 
 /// Arguments of `host diagnose`.
 #[derive(Debug, Args)]
@@ -122,7 +122,8 @@ impl Arguments {
         }
         self.reports.write(console, || diagnose_page::page(&answer, &geometry, &campaign))?;
         if self.json.as_deref() != Some(std::path::Path::new("-")) {
-            let words = summary(&answer);
+            let history = answer.history.as_ref().map(|h| format!("\n{}", history_text::text(h)));
+            let words = summary(&answer) + &history.unwrap_or_default();
             if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
         }
         console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));

@@ -46,7 +46,7 @@ criteria! {
     RAMP: "ΔP_r" = 60.0, "kPa", "least pressure over which the bladder's carried part builds up", "width of the knee at full length";
     BALANCE_START: "P_b0" = 115.0, "kPa", "start value of the stress-free pressure, and its value where it is not identifiable", "best common value of eleven muscles";
     BALANCE_MOST: "P_b,max" = 200.0, "kPa", "largest stress-free pressure", "above it no muscle of the kind begins to pull";
-    BALANCE_MOVES: "ΔP_b" = 2.0, "kPa", "the search for the stress-free pressure ends at smaller steps", "a tenth of its usual standard error";
+    BALANCE_MOVES: "ΔP_b" = 0.5, "kPa", "the search for the stress-free pressure ends at smaller steps", "a tenth of its usual standard error";
     NEAR_BALANCE: "r_b" = 1.5, "", "P_b is identifiable when a mounting pulls from less than this times P_b", "the sign of p_el must be seen";
     DAMPING: "d" = 0.9, "", "share of each Gauss-Newton step that is taken", "steps across the knee overshoot";
     VENT_TIME: "t_v" = 2.0, "s", "time after the last row until a muscle counts as vented", "emptying of the last pulse";

@@ -94,7 +94,7 @@ pub(super) fn shifted_curves(layer: &Layer<'_>, columns: &[Vec<f64>], start: &[f
         .filter(|r| has_others(points, *r))
         .map(|r| {
             let others: Vec<bool> = points.run.iter().map(|k| *k != r).collect();
-            let fit = shift_fit::fit(points, &layer.spline, &others, columns, Some(start), 3);
+            let fit = shift_fit::fit(points, &layer.spline, &others, columns, start, 3);
             let (from, to) = points.runs[r].points;
             let predict = |i| shift_fit::predict(points, &layer.spline, columns, &fit, i);
             (r, (from..to).map(predict).collect())
