@@ -58,7 +58,11 @@ pub fn text(history: &History) -> String {
             s,
             "  memory of the bladder: the carried part of the pressure relaxes by {} % in all ({} % a decade); it is zero at {} kPa{}",
             with_half(&history.law.relaxed_share, 100.0, 0),
-            with_half(&history.law.relaxed_share, 100.0 / history.law.time_constants_s.len().max(1) as f64, 1),
+            with_half(
+                &history.law.relaxed_share,
+                100.0 / history.law.time_constants_s.len().max(1) as f64,
+                1
+            ),
             with_half(&history.law.balance_pressure, 1.0, 0),
             if history.law.balance_identifiable { "" } else { " (assumed: not identifiable here)" }
         );
@@ -73,7 +77,9 @@ pub fn text(history: &History) -> String {
         let shares: Vec<String> = history
             .layers
             .iter()
-            .map(|l| format!("{} {:.0} % (entered last {:.0} %)", l.layer, 100.0 * l.in_order, 100.0 * l.last_in))
+            .map(|l| {
+                format!("{} {:.0} % (entered last {:.0} %)", l.layer, 100.0 * l.in_order, 100.0 * l.last_in)
+            })
             .collect();
         let _ = writeln!(s, "  of the squared error of unseen runs: {}", shares.join(", "));
     }

@@ -97,10 +97,8 @@ impl Points {
 
 /// The length that a recording held throughout, as a stroke in metres.
 fn held(recording: &Recording) -> Option<f64> {
-    let (low, high) = recording
-        .stroke
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(*s), h.max(*s)));
+    let (low, high) =
+        recording.stroke.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(*s), h.max(*s)));
     (high - low <= SAME_LENGTH).then_some(0.5 * (low + high))
 }
 

@@ -94,7 +94,8 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
     // What the search calls a memory in recordings freed of it is the rest of the same.
     diagnosis.missing.retain(|m| !NAMES.contains(&m.effect.as_str()));
     diagnosis.missing.insert(0, memory(&answer, peak));
-    let rest_agrees = !diagnosis.judged || matches!(diagnosis.verdict, Verdict::Consistent | Verdict::Explained);
+    let rest_agrees =
+        !diagnosis.judged || matches!(diagnosis.verdict, Verdict::Consistent | Verdict::Explained);
     let well = unseen.gain >= EXPLAINED || resolved;
     if !rest_agrees {
         diagnosis.remarks.insert(

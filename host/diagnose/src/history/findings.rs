@@ -57,7 +57,8 @@ impl Visits {
             .map(|run| {
                 [1, -1].map(|direction| {
                     let own = (run.points.0..run.points.1).filter(|i| points.direction[*i] == direction);
-                    let mut own: Vec<(f64, f64)> = own.map(|i| (points.pressure[i], points.force[i])).collect();
+                    let mut own: Vec<(f64, f64)> =
+                        own.map(|i| (points.pressure[i], points.force[i])).collect();
                     own.sort_by(|a, b| a.0.total_cmp(&b.0));
                     grid.iter().map(|p| between(&own, *p, NEIGHBOURS * step, least)).collect()
                 })
@@ -97,7 +98,9 @@ pub(super) fn first_run_deficit(points: &Points, visits: &Visits) -> Option<Cont
 /// The same of later runs: what runs differ by without run-in, N.
 pub(super) fn later_differences(points: &Points, visits: &Visits) -> Vec<f64> {
     shortened(points)
-        .flat_map(|m| points.mountings[m].runs.windows(2).skip(1).map(|w| visits.difference((w[1], 0), (w[0], 0))))
+        .flat_map(|m| {
+            points.mountings[m].runs.windows(2).skip(1).map(|w| visits.difference((w[1], 0), (w[0], 0)))
+        })
         .filter(|d| d.is_finite())
         .collect()
 }
@@ -122,7 +125,9 @@ pub(super) fn gap(points: &Points, visits: &Visits) -> (Option<Contrast>, Option
         points.mountings[m].runs.get(k).map_or(f64::NAN, |r| visits.difference((*r, 1), (*r, 0)))
     };
     let by_run: Vec<f64> = (1..most)
-        .map(|k| mean(&short.iter().map(|m| own(*m, k)).collect::<Vec<_>>()).unwrap_or(f64::NAN) - own(full, k))
+        .map(|k| {
+            mean(&short.iter().map(|m| own(*m, k)).collect::<Vec<_>>()).unwrap_or(f64::NAN) - own(full, k)
+        })
         .collect();
     (Contrast::of(&by_mounting), Contrast::of(&by_run))
 }
@@ -156,9 +161,8 @@ pub(super) fn plateau_creep(points: &Points) -> Option<Contrast> {
     let of = |run: usize| {
         let (from, to) = points.runs[run].points;
         let highest = points.pressure[from..to].iter().copied().fold(0.0, f64::max);
-        let held: Vec<usize> = (from..to)
-            .filter(|i| points.direction[*i] == 1 && points.pressure[*i] > highest - top)
-            .collect();
+        let held: Vec<usize> =
+            (from..to).filter(|i| points.direction[*i] == 1 && points.pressure[*i] > highest - top).collect();
         if held.len() < 6 {
             return f64::NAN;
         }
@@ -191,8 +195,11 @@ pub(super) fn full_length_slope(points: &Points) -> Option<f64> {
     use super::criteria::{THRESHOLD_FROM, THRESHOLD_TO};
     let full = points.longest();
     let spline = super::shift_fit::static_spline(points.highest());
-    let curve =
-        super::shift_fit::static_curve(points, &spline, (0..points.len()).filter(|i| points.mounting[*i] == full))?;
+    let curve = super::shift_fit::static_curve(
+        points,
+        &spline,
+        (0..points.len()).filter(|i| points.mounting[*i] == full),
+    )?;
     let at = |share: f64| spline.at(share * points.highest()).value(&curve);
     let run = (THRESHOLD_TO - THRESHOLD_FROM) * points.highest();
     Some((at(THRESHOLD_TO) - at(THRESHOLD_FROM)) / run).filter(|s| s.is_finite())

@@ -1,7 +1,9 @@
 //! From the fits to the answer: the rules of the verdict, and each finding in words.
 
+use super::Fits;
 use super::answer::{
-    Course, ErrorSize, Estimate, Finding, FindingKind, History, LayerShare, MemoryLaw, Mounting, RunError, UnseenRuns,
+    Course, ErrorSize, Estimate, Finding, FindingKind, History, LayerShare, MemoryLaw, Mounting, RunError,
+    UnseenRuns,
 };
 use super::campaign::Points;
 use super::criteria::{LEAST_GAIN, LEAST_SHARE, TIMES, t_quantile};
@@ -9,7 +11,6 @@ use super::findings::{self, Contrast, Visits};
 use super::law::Law;
 use super::shift_fit::knot_step;
 use super::unseen::{Sizes, Unseen};
-use super::Fits;
 use pam_data::recording::Campaign;
 
 /// A muscle that had been loaded this long before the first run was not rested, s.
@@ -60,9 +61,14 @@ fn why_not(points: &Points, fits: &Fits<'_>, law: &Law, half: f64) -> Vec<String
         why.push(format!("the relaxed share is {share:.3}; {LEAST_SHARE} is the least that is named"));
     }
     if !(share > half) {
-        why.push(format!("the relaxed share {share:.3} is within its 95 % interval of none (± {half:.3}, by runs)"));
+        why.push(format!(
+            "the relaxed share {share:.3} is within its 95 % interval of none (± {half:.3}, by runs)"
+        ));
     }
-    let statics = [(&fits.by_direction, "a curve for each mounting and direction"), (&fits.plain, "a curve for each mounting")];
+    let statics = [
+        (&fits.by_direction, "a curve for each mounting and direction"),
+        (&fits.plain, "a curve for each mounting"),
+    ];
     for (one, words) in statics {
         let gained = gain(one.sizes(points, counts), after);
         if !(gained >= LEAST_GAIN) {
@@ -255,9 +261,12 @@ fn first_run(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool) -> 
 fn creep(points: &Points, fits: &Fits<'_>, named: bool, half: f64) -> Finding {
     let (law, _) = fits.best();
     let share = law.fit.theta[0];
-    let plateau = findings::plateau_creep(points)
-        .filter(|p| p.units > 2)
-        .map(|p| format!("; at the top pressure the force of shortened mountings creeps by {} a decade", plus_minus(&p)));
+    let plateau = findings::plateau_creep(points).filter(|p| p.units > 2).map(|p| {
+        format!(
+            "; at the top pressure the force of shortened mountings creeps by {} a decade",
+            plus_minus(&p)
+        )
+    });
     Finding {
         kind: FindingKind::Creep,
         found: named,
@@ -305,8 +314,9 @@ fn gap(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool) -> Option
         match (found, named) {
             (false, _) => "; its interval includes none".to_owned(),
             (true, false) => String::new(),
-            (true, true) if rubs =>
-                format!("{after}, and friction of {friction:.4} ± {error:.4} of the pressure is needed beside it"),
+            (true, true) if rubs => format!(
+                "{after}, and friction of {friction:.4} ± {error:.4} of the pressure is needed beside it"
+            ),
             (true, true) => format!("{after}: the memory explains it, dry friction is not needed"),
         }
     );
@@ -348,7 +358,8 @@ fn layers(points: &Points, fits: &Fits<'_>) -> Vec<LayerShare> {
         _ => layers.push(("memory", share(none - memory, none), share(none - memory, none))),
     }
     layers.push(("not explained", share(left, none), share(left, none)));
-    let entry = |(layer, in_order, last_in): (&str, f64, f64)| LayerShare { layer: layer.into(), in_order, last_in };
+    let entry =
+        |(layer, in_order, last_in): (&str, f64, f64)| LayerShare { layer: layer.into(), in_order, last_in };
     layers.into_iter().map(entry).collect()
 }
 

@@ -16,7 +16,8 @@ use rayon::prelude::*;
 
 use super::campaign::Points;
 use super::criteria::{
-    BALANCE_MOST, BALANCE_MOVES, BALANCE_START, DAMPING, LOADED, NEAR_BALANCE, PAUSES, RAMP, THRESHOLD_FROM, THRESHOLD_TO,
+    BALANCE_MOST, BALANCE_MOVES, BALANCE_START, DAMPING, LOADED, NEAR_BALANCE, PAUSES, RAMP, THRESHOLD_FROM,
+    THRESHOLD_TO,
 };
 use super::memory::Clockwork;
 use super::shift_fit::{self, ShiftFit};
@@ -150,9 +151,9 @@ impl<'a> Layer<'a> {
         let mut curves: Option<Vec<Vec<f64>>> = None;
         for _ in 0..MOST_STEPS {
             let shifts: Vec<f64> = (0..p.len()).map(|i| shift_fit::shift(&columns, &theta, i)).collect();
-            let slopes = curves.take().unwrap_or_else(|| {
-                shift_fit::solve(p, &self.spline, use_point, &shifts, &[], None).1
-            });
+            let slopes = curves
+                .take()
+                .unwrap_or_else(|| shift_fit::solve(p, &self.spline, use_point, &shifts, &[], None).1);
             let share = theta[0];
             let moves_balance = self.balance_is_free && share > TELLS_BALANCE;
             let mut derivatives = columns.clone();
@@ -161,7 +162,8 @@ impl<'a> Layer<'a> {
                 let slope = above.iter().zip(&below).map(|(a, b)| share * (a - b) / (2.0 * NUDGE));
                 derivatives.push(slope.collect());
             }
-            let (change, next) = shift_fit::solve(p, &self.spline, use_point, &shifts, &derivatives, Some(&slopes));
+            let (change, next) =
+                shift_fit::solve(p, &self.spline, use_point, &shifts, &derivatives, Some(&slopes));
             theta.iter_mut().zip(&change).for_each(|(t, c)| *t += DAMPING * c);
             let mut moved = 0.0;
             if let Some(c) = change.last().filter(|_| moves_balance) {
@@ -197,8 +199,7 @@ impl<'a> Layer<'a> {
         let choices: Vec<Choice> = (0..self.clocks.len())
             .flat_map(|pause| LOADED.iter().map(move |loaded| Choice { pause, loaded: *loaded }))
             .collect();
-        let fits: Vec<Law> =
-            choices.par_iter().map(|c| self.fit_at(use_point, *c, further, start)).collect();
+        let fits: Vec<Law> = choices.par_iter().map(|c| self.fit_at(use_point, *c, further, start)).collect();
         let first = Choice { pause: 0, loaded: 0.0 };
         fits.into_iter()
             .min_by(|a, b| a.squares.total_cmp(&b.squares))

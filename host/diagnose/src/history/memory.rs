@@ -43,8 +43,12 @@ fn step(dt: f64, time: f64) -> [f64; 3] {
 impl Clockwork {
     /// The steps over a campaign. `pause` is what is assumed between runs, s; the bench's clock is used instead where it is known.
     pub(super) fn new(points: &Points, pause: f64, times: &[f64]) -> Self {
-        let mut clockwork =
-            Self { nodes: Vec::new(), steps: Vec::new(), times: times.to_vec(), since: vec![0.0; points.len()] };
+        let mut clockwork = Self {
+            nodes: Vec::new(),
+            steps: Vec::new(),
+            times: times.to_vec(),
+            since: vec![0.0; points.len()],
+        };
         for mounting in &points.mountings {
             let mut start = 0.0;
             let mut last = 0.0;

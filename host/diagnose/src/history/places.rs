@@ -38,9 +38,7 @@ pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Re
         .filter(|m| m.runs.len() > 1)
         .filter_map(|m| m.runs.first().copied())
         .collect();
-    let p_first = chance(points, &energy, true, share(&first) * all, |e| {
-        first.iter().map(|r| e[*r]).sum()
-    });
+    let p_first = chance(points, &energy, true, share(&first) * all, |e| first.iter().map(|r| e[*r]).sum());
     let rows = |runs: &[usize]| count(runs) / points.len() as f64;
     let told = |runs: &[usize], p: f64| share(runs) >= CONCENTRATED * rows(runs) && p <= SURE;
     let mut found = Vec::new();

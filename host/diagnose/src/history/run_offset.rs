@@ -48,8 +48,7 @@ pub(super) fn offsets(layer: &Layer<'_>, law: &Law) -> Vec<f64> {
 
 fn offset(points: &Points, spline: &Spline, shifted: &[f64], run: usize) -> Option<f64> {
     let mounting = points.runs[run].mounting;
-    let mut band =
-        Banded::penalty(spline.len(), super::criteria::SMOOTHNESS, super::criteria::RIDGE);
+    let mut band = Banded::penalty(spline.len(), super::criteria::SMOOTHNESS, super::criteria::RIDGE);
     let mut weights = vec![0.0; spline.len()];
     let mut reached = f64::NEG_INFINITY;
     for i in (0..points.len()).filter(|i| points.mounting[*i] == mounting && points.run[*i] != run) {

@@ -160,7 +160,13 @@ pub(super) fn fit(
 }
 
 /// What a fit predicts at a point, N.
-pub(super) fn predict(points: &Points, spline: &Spline, columns: &[Vec<f64>], fit: &ShiftFit, i: usize) -> f64 {
+pub(super) fn predict(
+    points: &Points,
+    spline: &Spline,
+    columns: &[Vec<f64>],
+    fit: &ShiftFit,
+    i: usize,
+) -> f64 {
     let local = spline.at(points.pressure[i] + shift(columns, &fit.theta, i));
     local.value(&fit.curves[points.mounting[i]])
 }

@@ -116,7 +116,8 @@ impl Banded {
                 let from = i.saturating_sub(3).max(j.saturating_sub(3));
                 let known: f64 = (from..j).map(|k| self.rows[i][i - k] * self.rows[j][j - k]).sum();
                 let rest = self.rows[i][d] - known;
-                self.rows[i][d] = if d == 0 { rest.max(f64::MIN_POSITIVE).sqrt() } else { rest / self.rows[j][0] };
+                self.rows[i][d] =
+                    if d == 0 { rest.max(f64::MIN_POSITIVE).sqrt() } else { rest / self.rows[j][0] };
             }
         }
         Factor { rows: self.rows }

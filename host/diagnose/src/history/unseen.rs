@@ -119,7 +119,8 @@ pub(super) fn with_memory(layer: &Layer<'_>, full: &Law, further: &[Vec<f64>], h
             let others: Vec<bool> = points.run.iter().map(|k| *k != r).collect();
             let mut law = layer.fit(&others, choice, further, Some(full));
             let (from, to) = points.runs[r].points;
-            let own = (from..to).map(|i| if has_others(points, r) { layer.predict(&law, i) } else { f64::NAN });
+            let own =
+                (from..to).map(|i| if has_others(points, r) { layer.predict(&law, i) } else { f64::NAN });
             let own = own.collect();
             // The shifts of all points are not asked for again.
             law.columns.clear();

