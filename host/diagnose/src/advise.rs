@@ -5,9 +5,10 @@ use model_core::muscle::Muscle;
 use rayon::prelude::*;
 
 use super::baselines::cosine;
+use super::history::is_from_history;
 use super::linear::{Basis, add_scaled, energy};
 use super::planned::{Place, Protocol, Step, free_stroke, moments, play};
-use super::verdict::{Diagnosis, NextExperiment};
+use super::verdict::{Diagnosis, Missing, NextExperiment};
 use pam_data::error::Result;
 use pam_fit::bench::Candidate;
 
@@ -243,7 +244,8 @@ pub fn next_experiment(
     low: f64,
     high: f64,
 ) -> Result<Option<NextExperiment>> {
-    let Some(first) = diagnosis.missing.iter().find(|m| !m.confusable_with.is_empty()) else {
+    let open = |m: &&Missing| !m.confusable_with.is_empty() && !is_from_history(m);
+    let Some(first) = diagnosis.missing.iter().find(open) else {
         return Ok(None);
     };
     let Some(law) = Candidate::from_name(&first.effect) else { return Ok(None) };

@@ -11,6 +11,7 @@ use super::effect_trace::Demonstration;
 use super::letters::letters;
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
 use pam_data::recording::Campaign;
+use pam_diagnose::history::is_from_history;
 use pam_diagnose::verdict::{Diagnosis, Missing, Verdict};
 use pam_fit::bench::Candidate;
 
@@ -148,7 +149,8 @@ fn wrong(d: &Diagnosis) -> Section {
 fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
     let mut section = Section::new(format!("What it is: {}", m.effect)).summarised();
     section.text(m.summary.clone());
-    let candidate = Candidate::from_name(&m.effect);
+    // The history's law is told in its own chapter: the catalogue's equation of that name is another.
+    let candidate = Candidate::from_name(&m.effect).filter(|_| !is_from_history(m));
     let whose = if m.correction { "It is the bench's, not the muscle's." } else { "It is the muscle's." };
     let place = candidate.map_or(m.place.as_str(), |c| place(c.info().link));
     section.text(format!(
@@ -234,6 +236,16 @@ fn controller(d: &Diagnosis, geometry: &Geometry) -> Section {
     let mut section = Section::new("What it changes in the controller").summarised();
     let area = geometry.build().ok().map(|b| b.posture(Length::ZERO).area).filter(|a| *a > 0.0);
     for m in &d.missing {
+        if is_from_history(m) {
+            section.text(format!(
+                "`{}`: nothing yet. In these recordings it makes up to {} N ({} % of blocked force); it was found at held length, and no table \
+                 carries this law.",
+                m.effect,
+                figures(m.peak_N, 2),
+                percent(m.peak_N, d.blocked_force_N)
+            ));
+            continue;
+        }
         if m.correction {
             section.text(format!(
                 "`{}`: nothing. It is an error of the bench; it is taken out of the recordings before the table is fitted, and the \

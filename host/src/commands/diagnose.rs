@@ -16,6 +16,7 @@ use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::{to_standard_output, write_whole};
 use pam_data::progress::SharedProgress;
+use pam_diagnose::history::is_from_history;
 use pam_diagnose::{Options, advise, model, summary::summary};
 use pam_fit::checks::Checks;
 use pam_fit::predict::predict;
@@ -96,7 +97,7 @@ impl Arguments {
                 answer.misfit_rms_N = rms;
             }
         }
-        let confusable = answer.missing.iter().any(|m| !m.confusable_with.is_empty());
+        let confusable = answer.missing.iter().any(|m| !m.confusable_with.is_empty() && !is_from_history(m));
         let refitted = (self.output.is_some() || confusable).then(|| {
             options.progress.stage("fitting the table beside what was found", 0);
             model::refit(&campaign, &muscle, &answer)

@@ -30,7 +30,8 @@ const RESOLVED: f64 = 1.5e-3;
 const EXPLAINED: f64 = 0.8;
 
 /// Whether an entry was found by the history layer: its parameters are not those of the catalogue's effect of that name.
-pub(crate) fn is_from_history(missing: &Missing) -> bool {
+#[must_use]
+pub fn is_from_history(missing: &Missing) -> bool {
     missing.parameters.iter().any(|p| p.name == RELAXED_SHARE)
 }
 
@@ -107,6 +108,11 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
             ),
         );
     }
+    diagnosis.remarks.push(
+        "the memory is not written into a table: it was found at held length, and the catalogue's laws of that name are driven by another \
+         load; a run repeated at one mounting after a vented hour tells how much of it comes back"
+            .to_owned(),
+    );
     diagnosis.verdict = if well && rest_agrees { Verdict::Explained } else { Verdict::PartlyExplained };
     diagnosis.judged = true;
     diagnosis.unexplained.share = left;
@@ -124,6 +130,11 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
         with_turns_after_N: unseen.with_memory.rms_N,
     };
     diagnosis.history = Some(answer);
+}
+
+/// How often chance alone gives a share so many standard errors from none, by Chebyshev's inequality: no law of errors is assumed.
+fn chance(share: &super::answer::Estimate) -> f64 {
+    share.half().map_or(1.0, |h| (h / 1.96 / share.value.abs().max(f64::MIN_POSITIVE)).powi(2).min(1.0))
 }
 
 /// The memory as an entry of what is missing.
@@ -175,7 +186,7 @@ fn memory(history: &History, peak: f64) -> Missing {
                  Viscoelastic Materials, 1976"
             .into(),
         peak_N: peak,
-        p: 0.05,
+        p: chance(&history.law.relaxed_share),
         why: format!(
             "unseen runs: {:.2} → {:.2} % of the largest force (rms), squared error less by {:.0} % ({:.0} % is the least); a single time \
              constant leaves {:.2} times as much; {}",

@@ -193,3 +193,21 @@ fn one_mounting_tells_a_share_but_no_stress_free_pressure() {
     assert!(!h.law.balance_identifiable && h.law.balance_pressure.low.is_none());
     assert_eq!(h.mountings.len(), 1);
 }
+
+#[test]
+fn of_many_runs_groups_are_left_out_and_each_run_is_predicted() {
+    let h = asked(&campaign(Truth { runs: 20, ..MEMORY }, 8));
+    assert_eq!(h.runs.len(), 60);
+    assert_eq!(h.unseen.with_memory.points, h.points);
+    assert!(h.named && h.unseen.gain > 0.5, "{:?}", h.unseen);
+}
+
+/// Run by hand, in release: `cargo test --release -p pam-diagnose --lib thirty_thousand -- --ignored --nocapture`.
+#[test]
+#[ignore = "prints a time"]
+fn thirty_thousand_settled_rows() {
+    let c = campaign(Truth { runs: 100, ..MEMORY }, 9);
+    let start = std::time::Instant::now();
+    let h = asked(&c);
+    println!("{} settled rows of {} runs: {:.2} s", h.points, h.runs.len(), start.elapsed().as_secs_f64());
+}
