@@ -38,8 +38,7 @@ mod tests;
 mod unseen;
 
 pub use answer::History;
-pub use enter::diagnose;
-pub(crate) use enter::is_from_history;
+pub use enter::{diagnose, is_from_history};
 
 use model_core::braid::Geometry;
 use pam_data::recording::Campaign;

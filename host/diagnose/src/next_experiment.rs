@@ -9,10 +9,11 @@ use rayon::prelude::*;
 use self::menu::menu;
 use super::criteria::planning::{EXPECTED_NOISE, RIVAL_GRID, RIVAL_GRID_SEVERAL, WORTHWHILE_DIFFERENCE};
 use super::experiment::{Motion, Proposal, bench_check};
+use super::history::is_from_history;
 use super::isolability::tables;
 use super::linear::{add_scaled, energy};
 use super::protocol_simulation::{moments, play};
-use super::verdict::{Diagnosis, NextExperiment};
+use super::verdict::{Diagnosis, Missing, NextExperiment};
 use pam_data::error::Result;
 use pam_fit::bench::Candidate;
 
@@ -41,7 +42,8 @@ pub fn next_experiment(
     low: f64,
     high: f64,
 ) -> Result<Option<NextExperiment>> {
-    let Some(first) = diagnosis.missing.iter().find(|m| !m.confusable_with.is_empty()) else {
+    let open = |m: &&Missing| !m.confusable_with.is_empty() && !is_from_history(m);
+    let Some(first) = diagnosis.missing.iter().find(open) else {
         return Ok(None);
     };
     let Some(law) = Candidate::from_name(&first.effect) else { return Ok(None) };

@@ -79,6 +79,8 @@ pub enum Refusal {
 pub enum Remark {
     /// Beside a memory of the muscle, the static model between mountings leaves this error, N rms, without a name.
     StaticMisfit(f64),
+    /// The memory that was found is not written into a table.
+    MemoryNotInTable,
     /// Nothing can be judged.
     NotJudged(Unjudgeable),
     /// The length was held throughout.

@@ -1,5 +1,6 @@
 //! The report of a diagnosis, for an engineer who has never heard of the effect.
 
+mod history;
 mod located;
 
 use model_core::braid::Geometry;
@@ -11,6 +12,7 @@ use super::symbols::symbols;
 use super::wording;
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
 use pam_data::recording::Campaign;
+use pam_diagnose::history::is_from_history;
 use pam_diagnose::verdict::{Diagnosis, Missing, Pattern, Verdict};
 use pam_fit::bench::Candidate;
 
@@ -28,6 +30,7 @@ pub fn page(d: &Diagnosis, geometry: &Geometry, campaign: &Campaign) -> Page {
     );
     head(&mut page, d);
     page.push(recommendation(d));
+    page.push(history::section(d.history.as_ref()));
     page.push(located::section(d));
     for missing in &d.missing {
         page.push(what_it_is(d, missing));
@@ -147,7 +150,8 @@ fn recommendation(d: &Diagnosis) -> Section {
 fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
     let mut section = Section::new(format!("Effect: {}", m.effect)).summarised();
     section.text(m.summary.clone());
-    let candidate = Candidate::from_name(&m.effect);
+    // The law of the history has a section of its own: the catalogue's equation of that name is another.
+    let candidate = Candidate::from_name(&m.effect).filter(|_| !is_from_history(m));
     let whose = if m.correction {
         "It is an error of the bench, not of the muscle."
     } else {
@@ -244,6 +248,16 @@ fn controller(d: &Diagnosis, geometry: &Geometry) -> Section {
     let mut section = Section::new("Changes in the controller").summarised();
     let area = geometry.build().ok().map(|b| b.posture(Length::ZERO).area).filter(|a| *a > 0.0);
     for m in &d.missing {
+        if is_from_history(m) {
+            section.text(format!(
+                "`{}`: nothing yet. In these recordings it makes up to {} N ({} % of blocked force); it was found at held length, and no table \
+                 carries this law.",
+                m.effect,
+                figures(m.peak_N, 2),
+                percent(m.peak_N, d.blocked_force_N)
+            ));
+            continue;
+        }
         if m.correction {
             section.text(format!(
                 "`{}`: none. It is an error of the bench: the recordings are corrected for it before the table is fitted.",

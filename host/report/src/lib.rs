@@ -21,6 +21,7 @@ pub mod diagnose_page;
 pub mod effect_page;
 pub mod effect_trace;
 pub mod fit_page;
+pub mod history_text;
 pub mod inline_markup;
 
 pub mod document;

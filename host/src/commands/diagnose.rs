@@ -16,6 +16,7 @@ use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::{to_standard_output, write_whole};
 use pam_data::progress::SharedProgress;
+use pam_diagnose::history::is_from_history;
 use pam_diagnose::remark::Remark;
 use pam_diagnose::{Options, next_experiment::next_experiment, refitted_table};
 use pam_fit::checks::Checks;
@@ -24,7 +25,7 @@ use pam_fit::predict::predict;
 use crate::progress::ProgressLine;
 use pam_data::recording::Reader;
 use pam_fit::table_file::{self, TableFile};
-use pam_report::{diagnose_page, document, wording};
+use pam_report::{diagnose_page, document, history_text, wording};
 
 /// Arguments of `host diagnose`.
 #[derive(Debug, Args)]
@@ -97,7 +98,7 @@ impl Arguments {
                 answer.misfit_rms_N = rms;
             }
         }
-        let confusable = answer.missing.iter().any(|m| !m.confusable_with.is_empty());
+        let confusable = answer.missing.iter().any(|m| !m.confusable_with.is_empty() && !is_from_history(m));
         let refitted = (self.output.is_some() || confusable).then(|| {
             options.progress.stage("fitting the table with the named effects", 0);
             refitted_table::refit(&campaign, &muscle, &answer)
@@ -123,7 +124,8 @@ impl Arguments {
         }
         self.reports.write(console, || diagnose_page::page(&answer, &geometry, &campaign))?;
         if self.json.as_deref() != Some(std::path::Path::new("-")) {
-            let words = wording::summary(&answer);
+            let history = answer.history.as_ref().map(|h| format!("\n{}", history_text::text(h)));
+            let words = wording::summary(&answer) + &history.unwrap_or_default();
             if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
         }
         console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));

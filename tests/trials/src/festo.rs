@@ -2,6 +2,7 @@
 //! says is put beside what is written about these recordings; what it predicts of unseen ones beside the lab's own formula.
 
 use crate::answer::{Answer, run_limited};
+use crate::festo_history;
 use crate::queue::in_order;
 use crate::tool;
 use serde_json::Value;
@@ -175,6 +176,7 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
         }
         beside(&mut text, asked);
     }
+    let _ = writeln!(text, "\n{}", remembered(&cases[per_form..], &asked[per_form..]).trim_end());
     text.push_str(
         "\n## Recordings it has not seen\n\nMean error in percent of the blocked force at the highest pressure, of the settled points: each run, each \
          contraction, each length predicted from all others (`host evaluate`), beside the laboratory's published formula on the rows of \
@@ -192,6 +194,40 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
     }
     std::fs::write(output.join("festo.md"), &text)?;
     println!("{text}");
+    Ok(())
+}
+
+/// The section on what the muscles remember, of answers to settled points.
+fn remembered(cases: &[Case], asked: &[Asked]) -> String {
+    let told: Vec<festo_history::Told<'_>> = cases
+        .iter()
+        .zip(asked)
+        .map(|(case, a)| festo_history::Told {
+            year: case.0,
+            label: &a.label,
+            answer: a.answer.as_ref().ok().map(|(_, whole)| whole),
+        })
+        .collect();
+    festo_history::section(&told)
+}
+
+/// Asks about settled points only, and writes the section on what the muscles remember into `page`.
+pub fn run_history(
+    data: &Path,
+    output: &Path,
+    host: &Path,
+    page: Option<&Path>,
+) -> Result<(), Box<dyn Error>> {
+    std::fs::create_dir_all(output)?;
+    let cases: Vec<Case> =
+        SETS.iter().flat_map(|s| s.muscles.iter().map(|m| (s.year, m.0, m.1, "settled"))).collect();
+    let asked = in_order(&cases, |c| Ok(diagnose(data, output, host, *c)))?;
+    let section = remembered(&cases, &asked);
+    if let Some(page) = page {
+        let old = std::fs::read_to_string(page)?;
+        std::fs::write(page, festo_history::replaced(&old, &section))?;
+    }
+    println!("{section}");
     Ok(())
 }
 

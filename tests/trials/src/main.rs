@@ -5,6 +5,7 @@ mod answer;
 mod baselines;
 mod clopper;
 mod festo;
+mod festo_history;
 mod fitted;
 mod generate;
 mod inject;
@@ -171,6 +172,8 @@ enum Command {
     Semi(Real),
     /// Ask about the real recordings of the 10 mm fluidic muscle as they are, and set the answers beside what is written about them.
     Festo(Real),
+    /// The same for settled points only: writes the section of the page on what the muscles remember.
+    FestoHistory(Real),
     /// Generate, answer and score in one go; each goes on where an earlier run was broken off.
     Prove {
         /// dev or final.
@@ -216,6 +219,9 @@ fn main() -> ExitCode {
         }
         Command::Festo(real) => {
             festo::run(&real.data, &real.output, &real.host).and_then(|()| real.copy_to_book("festo.md"))
+        }
+        Command::FestoHistory(real) => {
+            festo::run_history(&real.data, &real.output, &real.host, real.page.as_deref())
         }
         Command::Prove { set, what, tool, check } => prove(&set, &what, &tool, check),
     };

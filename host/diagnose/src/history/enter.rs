@@ -31,7 +31,8 @@ const RESOLVED: f64 = 1.5e-3;
 const EXPLAINED: f64 = 0.8;
 
 /// Whether an entry was found by the history layer: its parameters are not those of the catalogue's effect of that name.
-pub(crate) fn is_from_history(missing: &Missing) -> bool {
+#[must_use]
+pub fn is_from_history(missing: &Missing) -> bool {
     missing.parameters.iter().any(|p| p.name == RELAXED_SHARE)
 }
 
@@ -101,6 +102,7 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
     if !rest_agrees {
         diagnosis.remarks.insert(0, Remark::StaticMisfit(diagnosis.misfit_rms_N));
     }
+    diagnosis.remarks.push(Remark::MemoryNotInTable);
     let verdict = if well && rest_agrees { Verdict::Explained } else { Verdict::PartlyExplained };
     diagnosis.outcome = Outcome::Judged(verdict);
     diagnosis.unexplained.share = left;
@@ -114,6 +116,11 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
         with_turns_after_N: unseen.with_memory.rms_N,
     };
     diagnosis.history = Some(answer);
+}
+
+/// How often chance alone gives a share so many standard errors from none, by Chebyshev's inequality: no law of errors is assumed.
+fn chance(share: &super::answer::Estimate) -> f64 {
+    share.half().map_or(1.0, |h| (h / 1.96 / share.value.abs().max(f64::MIN_POSITIVE)).powi(2).min(1.0))
 }
 
 /// The memory as an entry of what is missing.
@@ -165,7 +172,7 @@ fn memory(history: &History, peak: f64) -> Missing {
                  Viscoelastic Materials, 1976"
             .into(),
         peak_N: peak,
-        p: 0.05,
+        p: chance(&history.law.relaxed_share),
         why: Why::Memory {
             without_pct: history.unseen.without_memory.rms_pct,
             with_pct: history.unseen.with_memory.rms_pct,

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use super::campaign::Points;
 use super::criteria::{
-    BALANCE_MOST, BALANCE_MOVES, BALANCE_START, LOADED, NEAR_BALANCE, PAUSES, RAMP, THRESHOLD_FROM,
+    BALANCE_MOST, BALANCE_MOVES, BALANCE_START, DAMPING, LOADED, NEAR_BALANCE, PAUSES, RAMP, THRESHOLD_FROM,
     THRESHOLD_TO,
 };
 use super::memory::Clockwork;
@@ -25,6 +25,16 @@ use super::spline::Spline;
 
 /// Below this the carried part has no sign of its own, kPa.
 const NO_SIGN: f64 = 1.0;
+/// Most steps of a fit.
+const MOST_STEPS: usize = 10;
+/// Below this relaxed share nothing tells the stress-free pressure.
+const TELLS_BALANCE: f64 = 0.05;
+/// Step of the numeric derivative in the stress-free pressure, kPa.
+const NUDGE: f64 = 1.0;
+/// Longest step of the stress-free pressure, kPa.
+const BALANCE_STEP: f64 = 30.0;
+/// The relaxed share has settled when it changes by less.
+const SETTLED_SHARE: f64 = 2e-3;
 
 /// What is assumed of times that nobody recorded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,7 +124,16 @@ impl<'a> Layer<'a> {
         if carried.abs() < NO_SIGN { NO_SIGN } else { carried }
     }
 
-    /// The law at one choice of unrecorded times.
+    /// Shift per unit of `c`, kPa.
+    fn column(&self, balance: f64, choice: Choice) -> Vec<f64> {
+        let mut column = self.unit_state(balance, choice);
+        for (q, m) in column.iter_mut().zip(&self.points.mounting) {
+            *q *= self.carried(*m, balance);
+        }
+        column
+    }
+
+    /// The law at one choice of unrecorded times: Gauss–Newton in `c`, further coefficients and, where it is free, `P_b`.
     fn fit_at(&self, use_point: &[bool], choice: Choice, further: &[Vec<f64>], start: Option<&Law>) -> Law {
         let p = self.points;
         let first = self.thresholds[p.longest()].clamp(0.5 * BALANCE_START, 1.3 * BALANCE_START);
@@ -123,34 +142,42 @@ impl<'a> Layer<'a> {
             None if self.balance_is_free => first,
             None => BALANCE_START,
         };
-        let rounds = if self.balance_is_free { 3 } else { 0 };
-        let mut theta: Option<Vec<f64>> = start.map(|law| {
-            let c = law.fit.theta[0];
-            let own = [c, c * law.balance / 100.0];
-            own.into_iter().chain(law.fit.theta[1..].iter().copied()).collect()
-        });
-        for _ in 0..rounds {
-            let z = self.unit_state(balance, choice);
-            let shifts = (0..p.len()).map(|i| z[i] * self.thresholds[p.mounting[i]]).collect();
-            let mut columns = vec![shifts, z.iter().map(|z| -100.0 * z).collect()];
-            columns.extend_from_slice(further);
-            let fit = shift_fit::fit(p, &self.spline, use_point, &columns, theta.as_deref(), 4);
-            let share = fit.theta[0];
-            let next =
-                if share > 0.05 { (100.0 * fit.theta[1] / share).clamp(0.0, BALANCE_MOST) } else { 100.0 };
-            let moved = (next - balance).abs();
-            balance = next;
-            theta = Some(fit.theta);
-            if !(moved >= BALANCE_MOVES) {
+        let mut theta = start.map_or_else(|| vec![0.0; 1 + further.len()], |law| law.fit.theta.clone());
+        let mut columns = vec![self.column(balance, choice)];
+        columns.extend_from_slice(further);
+        if start.is_none() {
+            theta = shift_fit::fit(p, &self.spline, use_point, &columns, &theta, 2).theta;
+        }
+        let mut curves: Option<Vec<Vec<f64>>> = None;
+        for _ in 0..MOST_STEPS {
+            let shifts: Vec<f64> = (0..p.len()).map(|i| shift_fit::shift(&columns, &theta, i)).collect();
+            let slopes = curves
+                .take()
+                .unwrap_or_else(|| shift_fit::solve(p, &self.spline, use_point, &shifts, &[], None).1);
+            let share = theta[0];
+            let moves_balance = self.balance_is_free && share > TELLS_BALANCE;
+            let mut derivatives = columns.clone();
+            if moves_balance {
+                let [above, below] = [1.0, -1.0].map(|s| self.column(balance + s * NUDGE, choice));
+                let slope = above.iter().zip(&below).map(|(a, b)| share * (a - b) / (2.0 * NUDGE));
+                derivatives.push(slope.collect());
+            }
+            let (change, next) =
+                shift_fit::solve(p, &self.spline, use_point, &shifts, &derivatives, Some(&slopes));
+            theta.iter_mut().zip(&change).for_each(|(t, c)| *t += DAMPING * c);
+            let mut moved = 0.0;
+            if let Some(c) = change.last().filter(|_| moves_balance) {
+                let to = (balance + DAMPING * c.clamp(-BALANCE_STEP, BALANCE_STEP)).clamp(0.0, BALANCE_MOST);
+                moved = to - balance;
+                balance = to;
+                columns[0] = self.column(balance, choice);
+            }
+            curves = Some(next);
+            if change[0].abs() < SETTLED_SHARE && moved.abs() < BALANCE_MOVES {
                 break;
             }
         }
-        let z = self.unit_state(balance, choice);
-        let mut columns = vec![(0..p.len()).map(|i| z[i] * self.carried(p.mounting[i], balance)).collect()];
-        columns.extend_from_slice(further);
-        let from = start.map(|law| law.fit.theta.clone());
-        let steps = if from.is_some() { 3 } else { 5 };
-        let fit = shift_fit::fit(p, &self.spline, use_point, &columns, from.as_deref(), steps);
+        let fit = shift_fit::fit(p, &self.spline, use_point, &columns, &theta, 1);
         let squares = (0..p.len())
             .filter(|i| use_point[*i])
             .map(|i| (shift_fit::predict(p, &self.spline, &columns, &fit, i) - p.force[i]).powi(2))

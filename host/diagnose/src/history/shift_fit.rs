@@ -1,7 +1,7 @@
 //! A free static curve for each mounting on a pressure that is shifted: `F = S_m(P + Σ q_j θ_j)`.
 //!
 //! Gauss–Newton in which the splines stay linear: at `θ`, with `B` at the shifted pressures and `S′` the present slope,
-//! `min ‖y + S′·(qθ) − B w − S′ q θ_new‖²`. The splines are evaluated at the shifted pressure: made linear about no shift, the knee of the
+//! `min ‖y − B w − S′ q Δθ‖²`. The splines are evaluated at the shifted pressure: made linear about no shift, the knee of the
 //! curve would be lost. Bands of four and a border of `J` columns: `O(rows (4 + J)²)`.
 
 use super::campaign::Points;
@@ -40,7 +40,7 @@ pub(super) fn static_spline(highest: f64) -> Spline {
 }
 
 /// `Σ q_j θ_j` at a point.
-fn shift(columns: &[Vec<f64>], theta: &[f64], i: usize) -> f64 {
+pub(super) fn shift(columns: &[Vec<f64>], theta: &[f64], i: usize) -> f64 {
     columns.iter().zip(theta).map(|(q, t)| q[i] * t).sum()
 }
 
@@ -51,15 +51,17 @@ struct Block {
     moment: Vec<f64>,
 }
 
-/// Solves once: the curves, and the coefficients where `free`.
-fn solve(
+/// Solves once about present shifts of pressure: the curves, and the change of the coefficients where slopes are given.
+///
+/// `columns` are the derivatives of the shift in each coefficient, kPa.
+pub(super) fn solve(
     points: &Points,
     spline: &Spline,
     use_point: &[bool],
+    shifts: &[f64],
     columns: &[Vec<f64>],
-    at: &[f64],
     slopes: Option<&[Vec<f64>]>,
-) -> ShiftFit {
+) -> (Vec<f64>, Vec<Vec<f64>>) {
     let (count, free) = (spline.len(), if slopes.is_some() { columns.len() } else { 0 });
     let mut blocks: Vec<Block> = (0..points.mountings.len())
         .map(|_| Block {
@@ -72,14 +74,12 @@ fn solve(
     let mut right = vec![0.0; free];
     let mut own = vec![0.0; free];
     for i in (0..points.len()).filter(|i| use_point[*i]) {
-        let moved = shift(columns, at, i);
-        let local = spline.at(points.pressure[i] + moved);
+        let local = spline.at(points.pressure[i] + shifts[i]);
         let slope = slopes.map_or(0.0, |curves| local.slope(&curves[points.mounting[i]]));
-        let target = points.force[i] + slope * moved;
         let block = &mut blocks[points.mounting[i]];
         block.band.add(&local, 1.0);
         for k in 0..4 {
-            block.moment[local.first + k] += local.value[k] * target;
+            block.moment[local.first + k] += local.value[k] * points.force[i];
         }
         for (o, q) in own.iter_mut().zip(columns) {
             *o = slope * q[i];
@@ -88,12 +88,18 @@ fn solve(
             for k in 0..4 {
                 block.border[j][local.first + k] += local.value[k] * own[j];
             }
-            right[j] += own[j] * target;
+            right[j] += own[j] * points.force[i];
             for l in 0..free {
                 gram[j][l] += own[j] * own[l];
             }
         }
     }
+    border(blocks, gram, right)
+}
+
+/// Eliminates the splines of each mounting, then the coefficients.
+fn border(blocks: Vec<Block>, mut gram: Vec<Vec<f64>>, mut right: Vec<f64>) -> (Vec<f64>, Vec<Vec<f64>>) {
+    let free = right.len();
     let mut solved = Vec::with_capacity(blocks.len());
     for block in blocks {
         let factor = block.band.factor();
@@ -112,20 +118,17 @@ fn solve(
         row[j] += PRIOR;
     }
     let chosen: Vec<usize> = (0..free).collect();
-    let theta = match free {
-        0 => at.to_vec(),
-        _ => crate::linear::solve_symmetric(&gram, &right, &chosen).unwrap_or_else(|| at.to_vec()),
-    };
+    let change = crate::linear::solve_symmetric(&gram, &right, &chosen).unwrap_or_else(|| vec![0.0; free]);
     let curves = solved
         .into_iter()
         .map(|(mut alone, along)| {
-            for (column, t) in along.iter().zip(&theta) {
+            for (column, t) in along.iter().zip(&change) {
                 alone.iter_mut().zip(column).for_each(|(w, c)| *w -= t * c);
             }
             alone
         })
         .collect();
-    ShiftFit { theta, curves }
+    (change, curves)
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -138,22 +141,22 @@ pub(super) fn fit(
     spline: &Spline,
     use_point: &[bool],
     columns: &[Vec<f64>],
-    start: Option<&[f64]>,
+    start: &[f64],
     steps: usize,
 ) -> ShiftFit {
-    let mut theta = start.map_or_else(|| vec![0.0; columns.len()], <[f64]>::to_vec);
+    let mut theta = start.to_vec();
+    let shifts = |theta: &[f64]| (0..points.len()).map(|i| shift(columns, theta, i)).collect::<Vec<f64>>();
+    let (_, mut curves) = solve(points, spline, use_point, &shifts(&theta), &[], None);
     if !columns.is_empty() {
-        let mut now = solve(points, spline, use_point, columns, &theta, None);
         for step in 0..steps {
-            let next = solve(points, spline, use_point, columns, &theta, Some(&now.curves));
+            let (change, next) = solve(points, spline, use_point, &shifts(&theta), columns, Some(&curves));
             let share = if step + 1 < steps { DAMPING } else { 1.0 };
-            for (t, n) in theta.iter_mut().zip(&next.theta) {
-                *t += share * (n - *t);
-            }
-            now = next;
+            theta.iter_mut().zip(change).for_each(|(t, c)| *t += share * c);
+            curves = next;
         }
+        curves = solve(points, spline, use_point, &shifts(&theta), &[], None).1;
     }
-    solve(points, spline, use_point, columns, &theta, None)
+    ShiftFit { theta, curves }
 }
 
 /// What a fit predicts at a point, N.

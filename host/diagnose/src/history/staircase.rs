@@ -29,7 +29,16 @@ const TURN: f64 = 0.04;
 
 /// The settled points of a recording, and whether rows were averaged into them.
 pub(super) fn settled(recording: &Recording, force: &[f64]) -> (Vec<Point>, bool) {
-    let directions = directions(recording);
+    let told = recording.direction.as_deref().filter(|d| d.iter().any(|d| *d != 0));
+    let directions = told.map_or_else(|| vec![0; recording.len()], held_directions);
+    let (mut points, averaged) = averages(recording, force, &directions);
+    if told.is_none() {
+        turns(&mut points);
+    }
+    (points, averaged)
+}
+
+fn averages(recording: &Recording, force: &[f64], directions: &[i8]) -> (Vec<Point>, bool) {
     let mut steps: Vec<f64> = recording.time.windows(2).map(|w| w[1] - w[0]).collect();
     let interval = crate::linear::median(&mut steps);
     if !(interval < SETTLED_INTERVAL) {
@@ -79,47 +88,41 @@ fn mean((_, sum, n): (i64, Point, f64)) -> Point {
     Point { time: sum.time / n, pressure: sum.pressure / n, force: sum.force / n, ..sum }
 }
 
-/// Direction of the drive at each row: as the bench says, else by the turns of the pressure (not by its samples: ripple flips those).
-fn directions(recording: &Recording) -> Vec<i8> {
-    if let Some(told) = &recording.direction
-        && told.iter().any(|d| *d != 0)
-    {
-        let mut last = told.iter().copied().find(|d| *d != 0).unwrap_or(1);
-        return told
-            .iter()
-            .map(|d| {
-                if *d != 0 {
-                    last = *d;
-                }
-                last
-            })
-            .collect();
-    }
-    let p = &recording.pressure;
-    let (low, high) = p.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-    let turn = TURN * (high - low);
-    let mut directions = vec![1; p.len()];
-    let (mut extreme, mut now, mut begun) = (0, 0_i8, false);
-    for i in 0..p.len() {
-        let moved = p[i] - p[extreme];
-        if !begun {
-            if moved.abs() > turn {
-                (now, begun) = (if moved > 0.0 { 1 } else { -1 }, true);
-                directions[..=i].fill(now);
-                extreme = i;
+/// What the bench says of each row; where it says nothing, what it said last.
+fn held_directions(told: &[i8]) -> Vec<i8> {
+    let mut last = told.iter().copied().find(|d| *d != 0).unwrap_or(1);
+    told.iter()
+        .map(|d| {
+            if *d != 0 {
+                last = *d;
             }
-        } else if moved * f64::from(now) >= 0.0 {
+            last
+        })
+        .collect()
+}
+
+/// Direction of the drive at settled points, by the turns of their pressure: single rows would turn with each ring.
+fn turns(points: &mut [Point]) {
+    let range = points
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.pressure), h.max(p.pressure)));
+    let turn = TURN * (range.1 - range.0);
+    let (mut extreme, mut now) = (0, 0_i8);
+    for i in 0..points.len() {
+        let moved = points[i].pressure - points[extreme].pressure;
+        let onward = moved * f64::from(now) >= 0.0 && now != 0;
+        if onward {
             extreme = i;
-            directions[i] = now;
         } else if moved.abs() > turn {
-            now = -now;
-            directions[extreme + 1..=i].fill(now);
+            let from = if now == 0 { 0 } else { extreme + 1 };
+            now = if moved > 0.0 { 1 } else { -1 };
+            points[from..i].iter_mut().for_each(|p| p.direction = now);
             extreme = i;
-        } else {
-            directions[i] = now;
         }
+        points[i].direction = now;
     }
-    directions
+    // Nothing turned: it fills, or stays.
+    points.iter_mut().filter(|p| p.direction == 0).for_each(|p| p.direction = 1);
 }
 
 /// Period and phase (after the first row) of a valve's pulses, s, from the autocorrelation of |dP/dt|.
@@ -193,7 +196,7 @@ mod tests {
             .map(|t| {
                 let pulse = (t / period).floor();
                 let since = t - pulse * period;
-                let level = if *t < 15.0 { pulse } else { 30.0 / period - pulse };
+                let level = if *t < 15.0 { pulse } else { 2.0 * (15.0 / period).floor() - pulse };
                 let ring = (-since / 0.05).exp() * (125.0 * since).cos();
                 1e4 * (level + ring)
             })
@@ -217,8 +220,8 @@ mod tests {
     #[test]
     fn direction_turns_once_whatever_the_ripple() {
         let r = staircase(100.0, 0.5);
-        let d = directions(&r);
-        assert_eq!(d.windows(2).filter(|w| w[0] != w[1]).count(), 1);
-        assert_eq!((d[0], d[d.len() - 1]), (1, -1));
+        let (points, _) = settled(&r, r.force.as_deref().expect("force"));
+        assert_eq!(points.windows(2).filter(|w| w[0].direction != w[1].direction).count(), 1);
+        assert_eq!((points[0].direction, points[points.len() - 1].direction), (1, -1));
     }
 }

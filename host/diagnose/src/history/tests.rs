@@ -1,1 +1,6 @@
-//! Tests.
+//! Synthetic campaigns whose truth is known, nulls, and the Festo recordings where they are at hand.
+//!
+//! The synthetic muscle is integrated here in small steps from the law's equations, apart from the code under test.
+
+mod festo;
+mod synthetic;

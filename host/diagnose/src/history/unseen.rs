@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 
 use super::campaign::Points;
-use super::criteria::NESTED_RUNS;
+use super::criteria::{MOST_FOLDS, NESTED_RUNS};
 use super::law::{Law, Layer};
-use super::shift_fit;
+use super::shift_fit::{self, ShiftFit};
 
 /// What each run's points are predicted to be from the other runs, N; not a number where no other run can say it.
 #[derive(Clone, Debug)]
@@ -47,7 +47,7 @@ impl Unseen {
         Sizes { rms: (squares / n).sqrt(), mean: sum / n, count }
     }
 
-    /// Standard error of a quantity over delete-one-run folds (jackknife): `√((n−1)/n Σ(θ_j − θ̄)²)`.
+    /// Standard error of a quantity over delete-one-run folds (of many runs, delete-a-group) (jackknife): `√((n−1)/n Σ(θ_j − θ̄)²)`.
     pub(super) fn standard_error(&self, quantity: impl Fn(&Law) -> f64) -> f64 {
         let values: Vec<f64> = self.folds.iter().map(quantity).collect();
         jackknife(&values)
@@ -86,23 +86,31 @@ pub(super) fn static_curves(points: &Points, by_direction: bool) -> Unseen {
     Unseen { predicted, folds: Vec::new() }
 }
 
+/// Which runs are left out together: each alone, of many runs every so many-th, which lie in different mountings.
+fn groups(points: &Points) -> Vec<Vec<usize>> {
+    let runs = points.runs.len();
+    let count = runs.min(MOST_FOLDS as usize);
+    (0..count).map(|g| (g..runs).step_by(count).collect()).collect()
+}
+
 /// A curve for each mounting on pressures that are shifted by given columns alone (without memory).
 pub(super) fn shifted_curves(layer: &Layer<'_>, columns: &[Vec<f64>], start: &[f64]) -> Vec<f64> {
     let points = layer.points;
-    let folds: Vec<(usize, Vec<f64>)> = (0..points.runs.len())
+    let fits: Vec<(Vec<usize>, ShiftFit)> = groups(points)
         .into_par_iter()
-        .filter(|r| has_others(points, *r))
-        .map(|r| {
-            let others: Vec<bool> = points.run.iter().map(|k| *k != r).collect();
-            let fit = shift_fit::fit(points, &layer.spline, &others, columns, Some(start), 3);
-            let (from, to) = points.runs[r].points;
-            let predict = |i| shift_fit::predict(points, &layer.spline, columns, &fit, i);
-            (r, (from..to).map(predict).collect())
+        .map(|group| {
+            let others: Vec<bool> = points.run.iter().map(|k| !group.contains(k)).collect();
+            let fit = shift_fit::fit(points, &layer.spline, &others, columns, start, 3);
+            (group, fit)
         })
         .collect();
     let mut predicted = vec![f64::NAN; points.len()];
-    for (r, own) in folds {
-        predicted[points.runs[r].points.0..points.runs[r].points.1].copy_from_slice(&own);
+    for (group, fit) in fits {
+        for r in group.into_iter().filter(|r| has_others(points, *r)) {
+            for i in points.runs[r].points.0..points.runs[r].points.1 {
+                predicted[i] = shift_fit::predict(points, &layer.spline, columns, &fit, i);
+            }
+        }
     }
     predicted
 }
@@ -113,21 +121,26 @@ pub(super) fn with_memory(layer: &Layer<'_>, full: &Law, further: &[Vec<f64>], h
     let points = layer.points;
     let nested = !held && (points.runs.len() as f64) < NESTED_RUNS;
     let choice = (!nested).then_some(full.choice);
-    let folds: Vec<(Law, Vec<f64>)> = (0..points.runs.len())
+    let folds: Vec<(Law, Vec<(usize, f64)>)> = groups(points)
         .into_par_iter()
-        .map(|r| {
-            let others: Vec<bool> = points.run.iter().map(|k| *k != r).collect();
+        .map(|group| {
+            let others: Vec<bool> = points.run.iter().map(|k| !group.contains(k)).collect();
             let mut law = layer.fit(&others, choice, further, Some(full));
-            let (from, to) = points.runs[r].points;
-            let own =
-                (from..to).map(|i| if has_others(points, r) { layer.predict(&law, i) } else { f64::NAN });
-            let own = own.collect();
+            let own = group.iter().filter(|r| has_others(points, **r));
+            let own = own.flat_map(|r| points.runs[*r].points.0..points.runs[*r].points.1);
+            let own = own.map(|i| (i, layer.predict(&law, i))).collect();
             // The shifts of all points are not asked for again.
             law.columns.clear();
             (law, own)
         })
         .collect();
-    let (folds, own): (Vec<Law>, Vec<Vec<f64>>) = folds.into_iter().unzip();
-    // Points lie run after run.
-    Unseen { predicted: own.concat(), folds }
+    let mut predicted = vec![f64::NAN; points.len()];
+    let folds = folds
+        .into_iter()
+        .map(|(law, own)| {
+            own.into_iter().for_each(|(i, force)| predicted[i] = force);
+            law
+        })
+        .collect();
+    Unseen { predicted, folds }
 }

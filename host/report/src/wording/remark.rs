@@ -13,6 +13,11 @@ pub fn remark(remark: &Remark) -> String {
             "the static model leaves {rms:.2} N rms between mountings, which has no name: geometry, end effects and mounted lengths (±1 mm \
              by tape measure) are not identifiable from one muscle"
         ),
+        Remark::MemoryNotInTable => {
+            "the memory is not written into a table: it was found at held length only. To measure its recovery, repeat a run at one mounting \
+             after a vented hour"
+                .to_owned()
+        }
         Remark::HeldLength => {
             "the length was held throughout: speed, viscous friction, inertia and first strokes are not identifiable".to_owned()
         }
