@@ -249,12 +249,12 @@ def guards(url):
         {"Host": "evil.example", "x-studio-token": token},
         {"Origin": "http://evil.example", "x-studio-token": token},
     ]
-    for address in ["/", "/report/fit", "/report/fit?token=" + "0" * 32]:
+    for address, code in [("/?token=" + "0" * 32, 403), ("/api/stream", 403), ("/report/fit", 404), ("/report/" + token, 404)]:
         try:
             urllib.request.urlopen(base + address)
             raise AssertionError(f"{address} is served without the token")
         except urllib.error.HTTPError as error:
-            assert error.code == 403, error.code
+            assert error.code == code, (address, error.code)
     for headers in tries:
         try:
             urllib.request.urlopen(urllib.request.Request(base + "/api/order", data=b'{"do":"arm"}', headers=headers))

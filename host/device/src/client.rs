@@ -1,6 +1,7 @@
 //! A conversation with a controller: hello, typed calls, topics, and what was lost on the way.
 
 use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use model_core::link::endpoints::{EVENT, Endpoint, GetStatus, LOG, TELEMETRY};
@@ -10,7 +11,7 @@ use model_core::link::messages::{Event, Refusal, Telemetry};
 use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 
 use super::heard::{Heard, lost, version_error};
-use super::{Address, Port, words};
+use super::{Address, Port, VentLine, words};
 use crate::error::DeviceCode;
 use pam_data::error::{DataCode, Error, Result};
 
@@ -87,6 +88,8 @@ pub struct Client {
     losses: Losses,
     patience: Patience,
     spoke: Instant,
+    /// Held while a frame is written, so that those of a [`VentLine`] do not fall into its middle.
+    writing: Arc<Mutex<()>>,
 }
 
 impl std::fmt::Debug for Client {
@@ -144,6 +147,7 @@ impl Client {
             losses: Losses::default(),
             patience,
             spoke: Instant::now(),
+            writing: Arc::default(),
         };
         let mut heard = Heard::default();
         let mut attempt = 0;
@@ -187,6 +191,14 @@ impl Client {
     #[must_use]
     pub fn port(&self) -> &str {
         self.port.name()
+    }
+
+    /// A second writer on this line that vents the controller whatever this conversation is waiting for.
+    ///
+    /// # Errors
+    /// [`DeviceCode::DevicePort`] when the system gives no second handle of the port.
+    pub fn vent_line(&self) -> Result<VentLine> {
+        Ok(VentLine::new(self.port.second_handle()?, Arc::clone(&self.writing)))
     }
 
     /// What did not arrive so far.
@@ -326,6 +338,7 @@ impl Client {
 
     fn send(&mut self, bytes: &[u8]) -> Result<()> {
         self.spoke = Instant::now();
+        let _turn = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         self.port.write_all(bytes).map_err(|e| lost(&self.port, &e))
     }
 

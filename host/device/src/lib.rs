@@ -8,6 +8,7 @@
 //! | tables: upload in pieces, read back | [`tables`] |
 //! | what is asked over time | [`course`] |
 //! | a run from start to vent | [`mod@run`] |
+//! | venting while the conversation waits for something else | [`VentLine`] |
 //! | the pressure regulator, found from steps | [`regulator`] |
 //! | log lines of the firmware in words | [`log_table`] |
 //! | telemetry to a recording | [`recorder`] |
@@ -30,8 +31,10 @@ pub mod recorder;
 pub mod regulator;
 pub mod run;
 pub mod tables;
+mod vent_line;
 pub mod words;
 
 pub use address::Address;
 pub use client::{Client, Losses, Patience, Topic};
 pub use port::{Port, available, plugged_in};
+pub use vent_line::VentLine;

@@ -63,6 +63,22 @@ impl Port {
         Ok(Self { line: Line::Tcp(stream), name })
     }
 
+    /// Another handle of the same line.
+    ///
+    /// # Errors
+    /// [`DeviceCode::DevicePort`] when the system gives none.
+    pub(super) fn second_handle(&self) -> Result<Self> {
+        let refused = |reason: String| {
+            Error::new(DeviceCode::DevicePort, format!("the port cannot be opened a second time: {reason}"))
+                .value(&self.name)
+        };
+        let line = match &self.line {
+            Line::Serial(line) => Line::Serial(line.try_clone().map_err(|e| refused(e.to_string()))?),
+            Line::Tcp(stream) => Line::Tcp(stream.try_clone().map_err(|e| refused(e.to_string()))?),
+        };
+        Ok(Self { line, name: self.name.clone() })
+    }
+
     /// The address as the user wrote it.
     #[must_use]
     pub fn name(&self) -> &str {

@@ -6,8 +6,7 @@ use std::sync::{Arc, Mutex};
 use clap::Args;
 
 use crate::console::Console;
-use crate::studio::keeper::Order;
-use crate::studio::server::serve;
+use crate::studio::server::{First, serve};
 use pam_data::error::{DataCode, Error, Result};
 
 /// Arguments of `host studio`.
@@ -41,7 +40,7 @@ impl Arguments {
     /// # Errors
     /// A port that cannot be used, a device that cannot be reached.
     pub fn run(self, console: &Console) -> Result<()> {
-        let first = self.emulate.map(Order::Emulate).or(self.port.map(Order::Connect));
+        let first = self.emulate.map(First::Emulate).or(self.port.map(First::Connect));
         let (send, stop) = tokio::sync::oneshot::channel::<()>();
         let send = Arc::new(Mutex::new(Some(send)));
         ctrlc::set_handler(move || {

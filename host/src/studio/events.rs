@@ -1,4 +1,4 @@
-//! What the page is told without asking: samples, faults, and between what its sensors can read.
+//! What the page receives by itself: samples, faults, and the ranges of the sensors.
 
 use model_core::link::messages::{Mode, SideSample, State, Telemetry};
 use model_core::link::settings::Settings;
