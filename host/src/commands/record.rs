@@ -16,7 +16,7 @@ use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::progress::Progress;
 use pam_device::error::DeviceCode;
-use pam_device::recorder::{Recorder, about_losses, about_start, rescue};
+use pam_device::recorder::{Recorder, about_losses, about_start, recover};
 use pam_device::{Client, Topic, words};
 
 use crate::progress::ProgressLine;
@@ -188,11 +188,12 @@ fn watch(
 #[command(
     arg_required_else_help = true,
     after_help = "Example:\n  host recover run.csv.part run.mcap.part\n\n\
-    A recording is named NAME.part while it grows. This takes away the sample that was being written when the program was \
-    killed, ends the file and gives it its name. The next recording of the same name does so by itself."
+    A recording is named NAME.part while it grows. What is whole in it goes to a file of its own, also behind damage; what is \
+    missing is said in bytes and samples, and the original is then kept as NAME.part.original. The next recording of the same \
+    name does so by itself. A damaged recording of another name stays, and what is whole in it goes to NAME.rescued-N."
 )]
 pub struct RecoverArguments {
-    /// Recordings that were cut off.
+    /// Recordings that were cut off or damaged.
     #[arg(required = true, value_name = "NAME.part")]
     files: Vec<PathBuf>,
     /// Print JSON.
@@ -204,18 +205,23 @@ impl RecoverArguments {
     /// Makes whole recordings.
     ///
     /// # Errors
-    /// Files that are no `.part`, or cannot be read or written.
+    /// Files in which nothing is whole, or that cannot be read or written.
     pub fn run(self, console: &Console) -> Result<()> {
         let mut done = Vec::new();
         for file in &self.files {
-            let name = rescue(file)?;
+            let found = recover(file)?;
             if !self.json {
-                console.result(match &name {
+                console.result(match &found.recording {
                     Some(name) => format!("{} is now {}", file.display(), name.display()),
-                    None => format!("{} held nothing and is removed", file.display()),
+                    None => format!("{} was empty and is removed", file.display()),
                 });
             }
-            done.push(json!({ "part": file.display().to_string(), "recording": name.map(|n| n.display().to_string()) }));
+            if let Some(loss) = found.loss() {
+                console.warning(loss);
+            }
+            let mut found = found.to_json();
+            found["part"] = json!(file.display().to_string());
+            done.push(found);
         }
         if self.json {
             console.result(format!("{:#}", json!({ "schema": "pam-recover/1", "recovered": done })));

@@ -337,8 +337,14 @@ pub(super) fn begin(files: &[PathBuf], about: &Value, console: &Console) -> Resu
         return Ok(None);
     }
     let recorder = Recorder::create(files, about)?;
-    for file in recorder.rescued() {
-        console.note(format!("a recording that was cut off under this name is now {}", file.display()));
+    for file in recorder.recovered() {
+        if let Some(recording) = &file.recording {
+            console
+                .note(format!("a recording that was cut off under this name is now {}", recording.display()));
+        }
+        if let Some(loss) = file.loss() {
+            console.warning(loss);
+        }
     }
     Ok(Some(recorder))
 }

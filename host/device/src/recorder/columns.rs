@@ -27,9 +27,14 @@ pub(super) struct Column {
 }
 
 impl Column {
+    /// A cell of this column, for its type.
+    pub fn sample_cell(&self) -> Cell {
+        (self.cell)(&blank())
+    }
+
     /// The type in JSON's words.
     pub fn kind(&self) -> &'static str {
-        match (self.cell)(&blank()) {
+        match self.sample_cell() {
             Cell::Time(_) | Cell::Number(_) => "number",
             Cell::Count(_) => "integer",
             Cell::Word(_) => "string",
@@ -52,6 +57,12 @@ fn blank() -> Telemetry {
 /// A recording without a single sample still has a header: that of a board with one muscle.
 pub(super) fn plain_header() -> String {
     header(&blank())
+}
+
+/// The header of a board with two muscles.
+pub(super) fn second_header() -> String {
+    let sides = [SideSample::default(), SideSample::default()].into_iter().collect();
+    header(&Telemetry { sides, ..blank() })
 }
 
 fn side(sample: &Telemetry, number: usize, pick: fn(&SideSample) -> f32) -> Cell {
