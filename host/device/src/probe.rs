@@ -15,7 +15,7 @@ use pam_data::error::{DataCode, Error, Result};
 /// # Errors
 /// A file that cannot be read, no probe or more than one, a chip that the probe's library does not know, a failed write.
 pub fn program(firmware: &Path, chip: &str, console: &Console) -> Result<()> {
-    let image = std::fs::read(firmware).map_err(|e| Error::unreadable(firmware, &e))?;
+    let image = pam_data::bounds::read(firmware, pam_data::bounds::WHOLE)?;
     if !image.starts_with(b"\x7fELF") {
         return Err(Error::new(DataCode::FileUnreadable, "this is no ELF file")
             .file(firmware)
