@@ -15,7 +15,7 @@ use pam_data::compare::compare;
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::recording::{Campaign, Reader, Recording};
+use pam_data::recording::{Campaign, Hashes, Reader, Recording};
 use pam_fit::fit::{Options, fit};
 use pam_fit::table_file::{self, About, TableFile};
 use pam_report::{diagnose_page, fit_page};
@@ -235,11 +235,14 @@ impl Analysis {
         Ok(value)
     }
 
-    fn read(&self, muscle: &str) -> Result<(MuscleDescription, Campaign, Vec<PathBuf>)> {
+    fn read(&self, muscle: &str) -> Result<(MuscleDescription, Campaign, Vec<PathBuf>, Vec<String>)> {
         let muscle = MuscleDescription::parse(muscle)?;
         let files: Vec<PathBuf> = self.known().recordings.iter().map(|r| r.1.clone()).collect();
-        let campaign = Reader::of(&muscle).campaign(&files)?;
-        Ok((muscle, campaign, files))
+        let hashes = Arc::new(Hashes::default());
+        let campaign =
+            Reader { hashes: Some(Arc::clone(&hashes)), ..Reader::of(&muscle) }.campaign(&files)?;
+        let hashes = hashes.of(&files)?;
+        Ok((muscle, campaign, files, hashes))
     }
 
     /// Fits all recordings; the table is then what `flash` sends. Each fit has a table file and a report of its own, and both become
@@ -248,10 +251,9 @@ impl Analysis {
     /// # Errors
     /// As [`fit`], and for a muscle description that is not right.
     pub fn fit(&self, muscle: &str) -> Result<Value> {
-        let (muscle, campaign, files) = self.read(muscle)?;
+        let (muscle, campaign, files, hashes) = self.read(muscle)?;
         let options = Options::default();
         let fitted = fit(&campaign, &muscle, &options)?;
-        let hashes = files.iter().map(table_file::sha256).collect::<Result<Vec<_>>>()?;
         let about = About {
             muscle: muscle.name.clone(),
             date: date::now_utc(),
@@ -282,7 +284,7 @@ impl Analysis {
     /// # Errors
     /// As [`pam_diagnose::diagnose`].
     pub fn diagnose(&self, muscle: &str) -> Result<Value> {
-        let (muscle, campaign, _) = self.read(muscle)?;
+        let (muscle, campaign, ..) = self.read(muscle)?;
         let geometry = muscle.geometry();
         let answer = pam_diagnose::diagnose(
             &campaign,
