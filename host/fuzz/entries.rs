@@ -8,9 +8,9 @@ use model_core::image;
 use model_core::link::frame::{Accumulator, Header, MAX_BODY, MAX_WIRE, encode_bytes};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Import, Reader, Recording};
-use pam_device::course::{Course, Quantity};
 use pam_device::log_table::LogTable;
 use pam_device::recorder::recover;
+use pam_device::setpoint_profile::{Quantity, SetpointProfile};
 use pam_fit::table_file::TableFile;
 
 /// Frames on the wire: what is taken for a frame is encoded to the same bytes again.
@@ -119,6 +119,6 @@ pub fn setpoint_profile(bytes: &[u8]) {
         return;
     }
     for quantity in [Quantity::Force, Quantity::Pressure, Quantity::Angle { stiffness_nm_per_rad: 1.0 }] {
-        let _ = Course::parse(text, quantity);
+        let _ = SetpointProfile::parse(text, quantity);
     }
 }

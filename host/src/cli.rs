@@ -86,7 +86,7 @@ enum Command {
     Table(commands::table::Arguments),
     /// Send a table to a controller, or program its chip.
     Flash(commands::flash::Arguments),
-    /// Let a controller follow a course of force, pressure or stroke, and record it.
+    /// Let a controller follow a setpoint profile of force, pressure or stroke, and record it.
     Run(commands::run::Arguments),
     /// Record what a controller measures, as CSV or MCAP.
     Record(commands::record::Arguments),

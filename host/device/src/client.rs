@@ -10,8 +10,8 @@ use model_core::link::hello::{self, Hello};
 use model_core::link::messages::{Event, Refusal, Telemetry};
 use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 
-use super::heard::{Heard, lost, version_error};
-use super::{Address, Port, VentLine, words};
+use super::line_activity::{LineActivity, lost, version_error};
+use super::{Address, Port, VentLine, messages};
 use crate::error::DeviceCode;
 use pam_data::error::{DataCode, Error, Result};
 
@@ -149,7 +149,7 @@ impl Client {
             spoke: Instant::now(),
             writing: Arc::default(),
         };
-        let mut heard = Heard::default();
+        let mut heard = LineActivity::default();
         let mut attempt = 0;
         while attempt < patience.tries.max(1) || (heard.frames > 0 && attempt < patience.noisy_tries) {
             attempt += 1;
@@ -214,7 +214,7 @@ impl Client {
     pub fn call<E: Endpoint>(&mut self, request: &E::Request) -> Result<E::Response> {
         match self.ask::<E>(request, self.patience.answer, self.patience.tries)? {
             Ok(response) => Ok(response),
-            Err(refusal) => Err(words::refused(E::NAME, refusal)),
+            Err(refusal) => Err(messages::refused(E::NAME, refusal)),
         }
     }
 
@@ -225,7 +225,7 @@ impl Client {
     pub fn call_once<E: Endpoint>(&mut self, request: &E::Request) -> Result<E::Response> {
         match self.ask::<E>(request, self.patience.slow_answer, 1)? {
             Ok(response) => Ok(response),
-            Err(refusal) => Err(words::refused(E::NAME, refusal)),
+            Err(refusal) => Err(messages::refused(E::NAME, refusal)),
         }
     }
 
@@ -272,7 +272,7 @@ impl Client {
             if left.is_zero() {
                 return Ok(None);
             }
-            self.pump(left, &mut Heard::default())?;
+            self.pump(left, &mut LineActivity::default())?;
         }
     }
 
@@ -298,7 +298,8 @@ impl Client {
             })?;
             self.send(&wire[..length])?;
             attempt += 1;
-            let Some(answer) = self.await_answer(E::ID, sequence, patience, &mut Heard::default())? else {
+            let Some(answer) = self.await_answer(E::ID, sequence, patience, &mut LineActivity::default())?
+            else {
                 continue;
             };
             return match answer.header.kind {
@@ -348,7 +349,7 @@ impl Client {
         id: u8,
         sequence: u16,
         patience: Duration,
-        heard: &mut Heard,
+        heard: &mut LineActivity,
     ) -> Result<Option<Answer>> {
         let deadline = Instant::now() + patience;
         loop {
@@ -365,7 +366,7 @@ impl Client {
     }
 
     /// Reads once, sorts what came: topics into their queue, answers to the caller.
-    fn pump(&mut self, patience: Duration, heard: &mut Heard) -> Result<Vec<Answer>> {
+    fn pump(&mut self, patience: Duration, heard: &mut LineActivity) -> Result<Vec<Answer>> {
         let mut buffer = [0; 2048];
         let count = match self.port.read(&mut buffer, patience) {
             Ok(count) => count,

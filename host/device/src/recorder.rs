@@ -23,7 +23,7 @@ pub use recover::{Recovered, Tally, recover};
 
 use self::mcap::Encoder;
 use self::part::{Part, part_of};
-use super::words;
+use super::messages;
 use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::write_whole;
@@ -157,10 +157,10 @@ impl Recorder {
         let value = match event {
             Event::Fault(report) => json!({
                 "time_s": report.time_us as f64 * 1e-6, "event": "fault",
-                "text": words::report(report), "remedy": words::fault(report.fault).remedy,
+                "text": messages::report(report), "remedy": messages::fault(report.fault).remedy,
             }),
             Event::State(state) => json!({
-                "time_s": self.last_time_us.map(|t| t as f64 * 1e-6), "event": "state", "text": words::state(*state),
+                "time_s": self.last_time_us.map(|t| t as f64 * 1e-6), "event": "state", "text": messages::state(*state),
             }),
             Event::TraceFull => json!({
                 "time_s": self.last_time_us.map(|t| t as f64 * 1e-6), "event": "trace-full", "text": "the trace is full",

@@ -9,7 +9,7 @@ use model_core::link::endpoints::{Disarm, Endpoint, Stop};
 use model_core::link::frame::{Header, Kind, MAX_WIRE, encode};
 
 use super::Port;
-use super::heard::lost;
+use super::line_activity::lost;
 use pam_data::error::{DataCode, Error, Result};
 
 /// How long a frame that the conversation is writing at this moment may delay the vent. The longest frame takes 6 ms at 1 Mbaud; a

@@ -15,7 +15,7 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::{printed, to_standard_output, write_whole};
 use pam_data::progress::Progress;
 use pam_device::error::DeviceCode;
-use pam_device::{Client, difference, recorder, tables};
+use pam_device::{Client, recorder, table_diff, tables};
 
 use crate::progress::ProgressLine;
 use pam_data::date::now_utc;
@@ -130,7 +130,7 @@ impl Arguments {
         };
         match image::read(before) {
             Ok(table) => {
-                let difference = difference::between(&table, &file.table);
+                let difference = table_diff::between(&table, &file.table);
                 console.note(format!("device → {}:\n{}", file.about.muscle, difference.to_text()));
                 difference.to_json()
             }

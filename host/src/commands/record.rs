@@ -17,7 +17,7 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::progress::Progress;
 use pam_device::error::DeviceCode;
 use pam_device::recorder::{Recorder, about_losses, about_start, recover};
-use pam_device::{Client, Topic, words};
+use pam_device::{Client, Topic, messages};
 
 use crate::progress::ProgressLine;
 use pam_data::date::now_utc;
@@ -115,7 +115,7 @@ impl Arguments {
         }
         watched?;
         kept?;
-        quiet?.map_err(|refusal| words::refused("telemetry", refusal))?;
+        quiet?.map_err(|refusal| messages::refused("telemetry", refusal))?;
         if losses.samples > 0 {
             console.warning(format!(
                 "{} lost on the way, in {}",
@@ -143,7 +143,7 @@ fn watch(
 ) -> Result<Ending> {
     client
         .try_call::<SetTelemetry>(&TelemetryRate { every_ticks })?
-        .map_err(|refusal| words::refused("telemetry", refusal))?;
+        .map_err(|refusal| messages::refused("telemetry", refusal))?;
     let (mut first, mut last) = (None, 0);
     let mut heard = Instant::now();
     while !stop() {
@@ -173,7 +173,7 @@ fn watch(
                 let status = client.call::<GetStatus>(&())?;
                 return Err(Error::new(
                     DeviceCode::DeviceSilent,
-                    format!("the device answers, but sends no telemetry; it is {}", words::state(status.state)),
+                    format!("the device answers, but sends no telemetry; it is {}", messages::state(status.state)),
                 )
                 .help("it may have restarted: `host device info` shows for how long it runs, and whether ticks are counted"));
             }

@@ -11,8 +11,8 @@ use super::analysis::Analysis;
 use super::server::{Shared, ended_in_fault};
 use super::session::{Connected, Order, Request};
 use pam_data::error::{DataCode, Error, Result};
-use pam_device::course::{Course, Quantity};
 use pam_device::error::DeviceCode;
+use pam_device::setpoint_profile::{Quantity, SetpointProfile};
 use pam_device::{Address, available};
 
 /// What the page may post.
@@ -26,7 +26,7 @@ pub(super) enum Posted {
     Disconnect,
     Arm,
     Vent,
-    Follow { quantity: String, course: String },
+    Follow { quantity: String, profile: String },
     Faults,
     Clear,
     Settings { set: Vec<String> },
@@ -110,7 +110,7 @@ impl Shared {
                 let vent = Arc::clone(&self.vent);
                 self.apart(move |_| vent.now().map(|()| Value::Null)).await
             }
-            Posted::Follow { quantity, course } => self.follow(&quantity, course).await,
+            Posted::Follow { quantity, profile } => self.follow(&quantity, profile).await,
             Posted::Faults => self.order(Order::Faults).await,
             Posted::Clear => self.order(Order::Clear).await,
             Posted::Settings { set } => self.order(Order::Settings(set)).await,
@@ -145,21 +145,24 @@ impl Shared {
         }
     }
 
-    async fn follow(&self, quantity: &str, course: String) -> Result<Value> {
+    async fn follow(&self, quantity: &str, profile: String) -> Result<Value> {
         let quantity = match quantity {
             "force" => Quantity::Force,
             "pressure" => Quantity::Pressure,
             "stroke" => Quantity::Stroke,
             _ => {
-                return Err(Error::new(DataCode::CallInvalid, "a course is of force, pressure or stroke"));
+                return Err(Error::new(
+                    DataCode::CallInvalid,
+                    "a setpoint profile is of force, pressure or stroke",
+                ));
             }
         };
-        // A page may not read files of this machine by naming them as a course.
-        if course.trim_start().starts_with('@') {
-            return Err(Error::new(DataCode::CallInvalid, "the page takes no course from a file")
+        // A page may not read files of this machine by naming them as a profile.
+        if profile.trim_start().starts_with('@') {
+            return Err(Error::new(DataCode::CallInvalid, "the page takes no setpoint profile from a file")
                 .help("use host run"));
         }
-        let course = Course::parse(&course, quantity)?;
-        self.order(Order::Follow(quantity, course)).await
+        let profile = SetpointProfile::parse(&profile, quantity)?;
+        self.order(Order::Follow(quantity, profile)).await
     }
 }

@@ -18,7 +18,7 @@ use super::events::tell;
 use super::vent::Vent;
 use pam_data::error::{DataCode, Error, Result};
 use pam_device::Address;
-use pam_device::course::{Course, Quantity};
+use pam_device::setpoint_profile::{Quantity, SetpointProfile};
 
 /// What the page may request of the controller, except to vent: that has its own path ([`Vent`]).
 #[derive(Debug)]
@@ -31,8 +31,8 @@ pub enum Order {
     Disconnect,
     /// Arm.
     Arm,
-    /// Follow a course.
-    Follow(Quantity, Course),
+    /// Follow a setpoint profile.
+    Follow(Quantity, SetpointProfile),
     /// Faults in words.
     Faults,
     /// Forget the latched fault.

@@ -209,7 +209,7 @@ click("disconnect", () => order("disconnect"));
 click("emulate", async () => { unseen(); message("starting …"); const r = await order("emulate", { muscle: $("bench").value }); if (r) message("connected: " + r.controller); });
 $("mishap").addEventListener("change", () => order("mishap", { code: Number($("mishap").value) }));
 click("arm", () => order("arm"));
-click("follow", () => order("follow", { quantity: $("quantity").value, course: $("course").value }));
+click("follow", () => order("follow", { quantity: $("quantity").value, profile: $("profile").value }));
 click("record", async () => { if (typeof state.recording === "number") { const r = await order("end-record"); if (r) recordings(r); } else order("record"); });
 click("clear", () => order("clear"));
 click("hold", () => {

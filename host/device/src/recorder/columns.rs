@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use model_core::link::messages::{Mode, SideSample, State, Telemetry};
 
-use crate::words;
+use crate::messages;
 
 /// One value of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,8 +86,8 @@ pub(super) const COLUMNS: &[Column] = &[
     column!("table_N", "force by the table at the measured pressure and stroke, N", |s| side(s, 0, |x| x
         .model_n)),
     column!("asked", "what was asked for, in the SI unit of the mode", |s| Cell::Number(s.asked)),
-    column!("state", "disarmed, armed, running or fault", |s| Cell::Word(words::state(s.state))),
-    column!("mode", "what is controlled", |s| Cell::Word(words::mode(s.mode))),
+    column!("state", "disarmed, armed, running or fault", |s| Cell::Word(messages::state(s.state))),
+    column!("mode", "what is controlled", |s| Cell::Word(messages::mode(s.mode))),
     column!("tick", "number of the control loop's tick", |s| Cell::Count(s.tick)),
 ];
 

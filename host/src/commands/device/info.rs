@@ -9,7 +9,7 @@ use crate::commands::port::PortOption;
 use crate::console::Console;
 use pam_data::counted::counted;
 use pam_data::error::Result;
-use pam_device::{Client, Patience, Port, recorder, words};
+use pam_device::{Client, Patience, Port, messages, recorder};
 
 pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()> {
     // The versions are told even when they do not fit, and then the refusal.
@@ -45,11 +45,11 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
         all["table_capacity"] = json!(info.table_capacity);
         all["trace_capacity"] = json!(info.trace_capacity);
         all["reference_capacity"] = json!(info.reference_capacity);
-        all["started_by"] = json!(words::started_by(info.started_by));
+        all["started_by"] = json!(messages::started_by(info.started_by));
         all["status"] = json!({
-            "state": words::state(status.state),
-            "mode": words::mode(status.mode),
-            "fault": status.fault.map(|f| words::fault(f).name),
+            "state": messages::state(status.state),
+            "mode": messages::mode(status.mode),
+            "fault": status.fault.map(|f| messages::fault(f).name),
             "time_s": status.time_us as f64 * 1e-6,
             "ticks": status.ticks,
             "overruns": status.overruns,
@@ -63,13 +63,13 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
     }
     console.result(format!(
         "{}{} in {} mode, {:.1} s and {} ticks at {} Hz since its start ({}), {}",
-        words::state(status.state),
-        status.fault.map(|f| format!(" ({})", words::fault(f).cause)).unwrap_or_default(),
-        words::mode(status.mode),
+        messages::state(status.state),
+        status.fault.map(|f| format!(" ({})", messages::fault(f).cause)).unwrap_or_default(),
+        messages::mode(status.mode),
         status.time_us as f64 * 1e-6,
         status.ticks,
         info.ticks_per_s,
-        words::started_by(info.started_by),
+        messages::started_by(info.started_by),
         counted(status.overruns, "overrun"),
     ));
     for (number, table) in info.tables.iter().take(usize::from(info.muscles)).enumerate() {

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use crate::commands::port::PortOption;
 use crate::console::Console;
 use pam_data::error::{DataCode, Error, Result};
-use pam_device::{Topic, log_table::LogTable, words};
+use pam_device::{Topic, log_table::LogTable, messages};
 
 /// Arguments of `host device log`.
 #[derive(Debug, Args)]
@@ -65,7 +65,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             asked = Some(Instant::now());
             if last != Some((status.state, status.mode)) {
                 last = Some((status.state, status.mode));
-                let (state, mode) = (words::state(status.state), words::mode(status.mode));
+                let (state, mode) = (messages::state(status.state), messages::mode(status.mode));
                 let text = format!("{state} in {mode} mode");
                 let more = json!({ "state": state, "mode": mode });
                 tell(Some(status.time_us as f64 * 1e-6), "state", &text, more);
@@ -73,11 +73,11 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         }
         match client.topic(Duration::from_millis(100))? {
             Some(Topic::Event(Event::Fault(report))) => {
-                let fault = words::fault(report.fault);
+                let fault = messages::fault(report.fault);
                 let time = Some(report.time_us as f64 * 1e-6);
                 let more = json!({ "fault": fault.name, "remedy": fault.remedy });
                 let mark = if arguments.json { "" } else { "FAULT " };
-                tell(time, "fault", &format!("{mark}{}", words::report(&report)), more);
+                tell(time, "fault", &format!("{mark}{}", messages::report(&report)), more);
                 if !arguments.json {
                     tell(None, "remedy", &format!("what to do: {}", fault.remedy), Value::Null);
                 }

@@ -21,12 +21,12 @@ use super::{Order, no_controller, report};
 use crate::demo::campaign::muscle;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::json_of;
-use pam_device::course::Quantity;
 use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::error::DeviceCode;
 use pam_device::recorder::{Recorder, about_losses, about_start, serial};
 use pam_device::run::{Plan, Steps, vent};
-use pam_device::{Address, Client, Topic, VentLine, difference, tables, words};
+use pam_device::setpoint_profile::Quantity;
+use pam_device::{Address, Client, Topic, VentLine, messages, table_diff, tables};
 use pam_fit::table_file::TableFile;
 
 /// Time between two batches of telemetry to the page.
@@ -130,8 +130,8 @@ impl Connected {
         {
             self.fault = Some(format!(
                 "{}. What to do: {}.",
-                words::report(&latched),
-                words::fault(latched.fault).remedy
+                messages::report(&latched),
+                messages::fault(latched.fault).remedy
             ));
         }
         Ok(())
@@ -150,8 +150,8 @@ impl Connected {
             "serial": serial(hello),
             "release": format!("{major}.{minor}.{patch}"),
             "emulated": self.emulated.as_ref().map(|e| if e.0.kind() == Kind::Qemu { "QEMU" } else { "in this process" }),
-            "state": words::state(self.status.state),
-            "mode": words::mode(self.status.mode),
+            "state": messages::state(self.status.state),
+            "mode": messages::mode(self.status.mode),
             "fault": self.fault,
             "lost": losses.samples, "bad_frames": losses.bad_frames,
             "recording": self.recorder.as_ref().map(|r| r.0.rows()),
@@ -229,7 +229,7 @@ impl Connected {
         match order {
             Order::Replace(_) | Order::IsConnected(_) | Order::Disconnect => return Err(no_controller()),
             Order::Arm => self.status = self.client.call::<Arm>(&())?,
-            Order::Follow(quantity, course) => {
+            Order::Follow(quantity, profile) => {
                 if self.status.state == State::Disarmed {
                     return Err(Error::new(DeviceCode::DeviceRefused, "the controller is disarmed")
                         .help("arm it first"));
@@ -238,12 +238,12 @@ impl Connected {
                     self.client.call::<Stop>(&())?;
                 }
                 self.status = self.client.call::<StartMode>(&Start { mode: quantity.mode() })?;
-                let plan = Plan { quantity, course, seconds: None, every_ticks: 1 };
+                let plan = Plan { quantity, profile, seconds: None, every_ticks: 1 };
                 self.running = Some((quantity, Steps::begin(&mut self.client, &plan)?, None));
             }
             Order::Faults => {
                 let faults = self.client.call::<GetFaults>(&())?;
-                return Ok(json!({ "latched": faults.latched.as_ref().map(words::report) }));
+                return Ok(json!({ "latched": faults.latched.as_ref().map(messages::report) }));
             }
             Order::Clear => {
                 let cleared = self.client.call_once::<ClearFault>(&());
@@ -300,7 +300,7 @@ impl Connected {
         let before = tables::read(&mut self.client, Side::Agonist)?;
         let Some(before) = before else { return Ok(json!({ "text": "the device has no table yet" })) };
         let old = image::read(&before).map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
-        Ok(json!({ "text": difference::between(&old, &new.table).to_text() }))
+        Ok(json!({ "text": table_diff::between(&old, &new.table).to_text() }))
     }
 
     fn flash(&mut self, path: &std::path::Path) -> Result<Value> {

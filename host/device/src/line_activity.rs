@@ -1,4 +1,4 @@
-//! What a line lets one hear when there is no controller at its end, or another one than expected: errors in words.
+//! What arrives on a line before the first hello, and the error that it shows: no controller, or not the expected one.
 
 use model_core::link::hello::{Board, Hello};
 use model_core::link::{LINK_VERSION, SCHEMA_HASH};
@@ -10,7 +10,7 @@ use pam_data::error::Error;
 
 /// What came before any hello, to tell a silent line from a foreign peer.
 #[derive(Default)]
-pub(super) struct Heard {
+pub(super) struct LineActivity {
     /// Everything that arrived.
     pub bytes: usize,
     /// Whole frames.
@@ -20,7 +20,7 @@ pub(super) struct Heard {
     first: Vec<u8>,
 }
 
-impl Heard {
+impl LineActivity {
     /// Takes note of what arrived.
     pub fn take(&mut self, bytes: &[u8]) {
         self.bytes += bytes.len();
