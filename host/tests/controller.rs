@@ -188,7 +188,7 @@ fn a_run_is_a_recording_that_the_readers_of_recordings_read() {
     // Seven times what this muscle can do.
     let said = bench.done(&["run", "--force", "1000", "--seconds", "0.5"]);
     assert!(
-        said.contains("of 0.50 s what was asked was out of reach: more than the muscle can pull"),
+        said.contains("of 0.50 s the setpoint could not be reached: more than the muscle can pull"),
         "{said}"
     );
     let said = bench.done(&["run", "--force=-200", "--seconds", "0.5"]);

@@ -135,25 +135,12 @@ pub fn plausible(kind: u8, body: &[u8]) -> bool {
     let ends = match kind {
         kind::HEADER => fields.text().and_then(|_| fields.text()).map(|_| ()),
         kind::METADATA => fields.text().and_then(|_| map(&mut fields)),
-        kind::CHANNEL => fields
-            .take::<4>()
-            .and_then(|_| fields.text())
-            .and_then(|_| fields.text())
-            .and_then(|_| map(&mut fields)),
-        kind::SCHEMA => (|| {
-            fields.u16()?;
-            (fields.text()?, fields.text()?);
-            let length = fields.u32()? as usize;
-            fields.0 = fields.0.split_at_checked(length)?.1;
-            Some(())
-        })(),
         kind::ATTACHMENT => (|| {
             (fields.u64()?, fields.u64()?, fields.text()?, fields.text()?);
             let length = usize::try_from(fields.u64()?).ok()?;
             fields.0 = fields.0.split_at_checked(length)?.1;
             fields.u32().map(|_| ())
         })(),
-        kind::MESSAGE => return message(body).is_some(),
         _ => None,
     };
     ends.is_some() && fields.0.is_empty()

@@ -171,10 +171,10 @@ impl Client {
                 _ => {
                     return Err(Error::new(
                         DeviceCode::DeviceForeign,
-                        "it speaks in frames like ours, but its hello is not a controller's",
+                        "the peer uses this frame format, but its hello is not that of a controller",
                     )
                     .value(client.port.name())
-                    .help("is this the controller's own port?"));
+                    .help("check that this is the port of the controller"));
                 }
             }
         }
@@ -283,8 +283,8 @@ impl Client {
         tries: u32,
     ) -> Result<Result<E::Response, Refusal>> {
         let unreadable = || {
-            Error::new(DeviceCode::DeviceForeign, format!("the answer to `{}` cannot be read", E::NAME))
-                .help("the device said the same schema as this program, so this is a fault in one of them: please report it")
+            Error::new(DeviceCode::DeviceForeign, format!("the answer to `{}` cannot be decoded", E::NAME))
+                .help("the device and this program use the same schema, so this is a defect in one of them: report it")
         };
         let mut wire = [0; MAX_WIRE];
         let bad = self.accumulator.counts().bad;
@@ -307,12 +307,9 @@ impl Client {
                 _ => postcard::from_bytes(&answer.body).map(Ok).map_err(|_| unreadable()),
             };
         }
-        Err(Error::new(
-            DeviceCode::DeviceSilent,
-            format!("the device does not answer `{}` any more", E::NAME),
-        )
-        .value(self.port.name())
-        .help("look at cable and supply; when it answers again it is disarmed, or vented by its own watch"))
+        Err(Error::new(DeviceCode::DeviceSilent, format!("the device no longer answers `{}`", E::NAME))
+            .value(self.port.name())
+            .help("check the cable and the supply; a running controller without its host vents by itself"))
     }
 
     /// How often a question may be asked, when so many frames were bad before it was asked first.

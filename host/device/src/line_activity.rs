@@ -33,20 +33,20 @@ impl LineActivity {
         if self.bytes == 0 {
             return Error::new(DeviceCode::DeviceSilent, "nothing answers on this port")
                 .value(port.name())
-                .help("is the controller powered, flashed, and is this its port? `host device list` shows the ports here");
+                .help("check that the controller is powered and flashed, and that this is its port; `host device list` shows the ports");
         }
         if self.echoes > 0 {
-            return Error::new(DeviceCode::DeviceForeign, "the line only sends back what it is sent")
+            return Error::new(DeviceCode::DeviceForeign, "the line echoes what it is sent")
                 .value(port.name())
-                .help("are transmit and receive joined, or is a terminal program on the other end?");
+                .help("check whether transmit and receive are connected, or a terminal program is at the other end");
         }
         if self.frames > 0 {
             return Error::new(
                 DeviceCode::DeviceSilent,
-                "a controller is there, but it does not answer hello",
+                "a controller is connected, but it does not answer hello",
             )
             .value(port.name())
-            .help("is another program talking to it? close it, or restart the controller");
+            .help("close any other program that uses the port, or restart the controller");
         }
         let shown = String::from_utf8_lossy(&self.first);
         let printable = shown.chars().filter(|c| c.is_ascii_graphic() || c.is_ascii_whitespace()).count();
@@ -63,15 +63,15 @@ impl LineActivity {
             ),
         )
         .value(port.name())
-        .help("is it the right port? if it is the right board, flash it first: host flash --firmware ELF --chip CHIP")
+        .help("check the port; if it is the right board, flash it first: host flash --firmware ELF --chip CHIP")
     }
 }
 
 /// The line is gone in the middle of a conversation.
 pub(super) fn lost(port: &Port, reason: &std::io::Error) -> Error {
-    Error::new(DeviceCode::DeviceSilent, format!("the connection to the device is gone: {reason}"))
+    Error::new(DeviceCode::DeviceSilent, format!("the connection to the device is lost: {reason}"))
         .value(port.name())
-        .help("look at cable and supply, then try again; a running controller without its host stops itself within a second, unless it was set otherwise")
+        .help("check the cable and the supply, then try again; a running controller without its host stops within a second by default")
 }
 
 /// It is a controller, of another schema.

@@ -53,8 +53,8 @@ pub struct Line {
 struct Bytes<'a>(&'a [u8]);
 
 fn short() -> Error {
-    Error::new(DeviceCode::DeviceForeign, "a log line does not fit this image")
-        .help("give --elf the very image that runs on the device, built with firmware/build --log")
+    Error::new(DeviceCode::DeviceForeign, "a log line does not match this image")
+        .help("give --elf the image that runs on the device, built with firmware/build --log")
 }
 
 impl Bytes<'_> {
@@ -228,12 +228,9 @@ impl LogTable {
                 self.format(variant, bytes)?
             }
             _ => {
-                return Err(Error::new(
-                    DeviceCode::DeviceForeign,
-                    "a log line holds a type that is not read here",
-                )
-                .value(format!("{:?}", parameter.ty))
-                .help("log numbers, texts, and types that derive defmt::Format"));
+                return Err(Error::new(DeviceCode::DeviceForeign, "a log line contains an unsupported type")
+                    .value(format!("{:?}", parameter.ty))
+                    .help("log numbers, texts, and types that derive defmt::Format"));
             }
         })
     }

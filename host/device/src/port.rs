@@ -149,7 +149,7 @@ fn connect(host: &str, port: u16, name: &str) -> Result<TcpStream> {
     let failed = |reason: String| {
         Error::new(DeviceCode::DevicePort, reason)
             .value(name)
-            .help("is the emulator running, and is this the port of its link?")
+            .help("check that the emulator is running and that this is its port")
     };
     let addresses = (host, port)
         .to_socket_addrs()
@@ -178,7 +178,7 @@ fn serial_error(name: &str, error: &serialport::Error) -> Error {
         ErrorKind::NoDevice | ErrorKind::Io(io::ErrorKind::NotFound) => {
             let others = available();
             if others.is_empty() {
-                "no serial device is plugged in; an emulated one is named tcp:HOST:PORT".to_owned()
+                "no serial device is connected; the port of an emulated device is tcp:HOST:PORT".to_owned()
             } else {
                 format!("serial devices here: {}", others.join(", "))
             }

@@ -86,7 +86,7 @@ impl Recorder {
         let (mut streams, mut recovered) = (Vec::new(), Vec::new());
         for (number, path) in paths.iter().enumerate() {
             if paths[..number].contains(path) {
-                return Err(Error::new(DataCode::CallInvalid, "this file is named twice").file(path));
+                return Err(Error::new(DataCode::CallInvalid, "this file is given twice").file(path));
             }
             let (part, kept) = Part::create(path)?;
             recovered.extend(kept);
@@ -183,7 +183,8 @@ impl Recorder {
         for stream in &mut self.streams {
             if let Err(error) = stream.flush() {
                 let paths = stream.part.path().display().to_string();
-                let error = error.help(format!("make room; what was recorded until then is in {paths}"));
+                let error =
+                    error.help(format!("free disk space; the recording up to this point is in {paths}"));
                 self.failed = Some(Error::new(error.code(), error.cause()).file(&paths));
                 return Err(error);
             }
@@ -241,10 +242,10 @@ impl Recorder {
         };
         match (trouble, paths.into_iter().next()) {
             (None, Some(first)) => Ok(first),
-            (Some(error), _) => {
-                Err(error
-                    .help(format!("{} until then in it; make room and go on", counted(self.rows, "row"))))
-            }
+            (Some(error), _) => Err(error.help(format!(
+                "it holds {} up to this point; free disk space and continue",
+                counted(self.rows, "row")
+            ))),
             (None, None) => {
                 Err(Error::new(DataCode::FileUnwritable, "the recording has no file").file(&self.side))
             }

@@ -130,9 +130,9 @@ fn steps(client: &mut Client, low_pa: f64, high_pa: f64, stop: &dyn Fn() -> bool
     let found = from_samples(&samples).ok_or_else(|| {
         Error::new(
             DeviceCode::DeviceVerify,
-            "the pressure does not follow its command, so no regulator can be found",
+            "the pressure does not follow its command, so the regulator cannot be identified",
         )
-        .help("is the supply air open, and is the pressure sensor where the muscle is?")
+        .help("check that the air supply is open and that the pressure sensor is connected to this muscle")
     })?;
     Ok(Found { line_s: found.line_s / fill(client, stroke_m)?, ..found })
 }
@@ -326,7 +326,7 @@ impl Found {
         if client.call_once::<SetSettings>(&wanted)? != wanted {
             return Err(Error::new(
                 DeviceCode::DeviceVerify,
-                "the device keeps other settings than it was sent",
+                "the settings read back from the device differ from those sent",
             ));
         }
         Ok(())

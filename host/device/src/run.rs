@@ -49,7 +49,7 @@ pub fn vent(client: &mut Client) -> Result<Status> {
     match disarmed.and(stopped) {
         Ok(_) => client.call::<GetStatus>(&()),
         Err(e) => Err(Error::new(e.code(), format!("the device may not have vented: {}", e.cause()))
-            .help("take the supply air away from the muscle by hand")),
+            .help("shut off the air supply of the muscle by hand")),
     }
 }
 
@@ -153,7 +153,7 @@ fn follow(
                     DeviceCode::DeviceSilent,
                     format!("the device answers, but sends no telemetry; it is {}", messages::state(status.state)),
                 )
-                .help("its control loop may be waiting for its sensors: `host device info` shows whether ticks are counted"));
+                .help("its control loop may be waiting for sensors: `host device info` shows whether ticks advance"));
             }
             None => {}
         }
@@ -166,7 +166,7 @@ fn fault(client: &mut Client) -> Result<Error> {
     Ok(match faults.latched {
         Some(report) => messages::stopped(&report),
         None => {
-            Error::new(DeviceCode::DeviceFault, "the device is stopped by a fault that it no longer names")
+            Error::new(DeviceCode::DeviceFault, "the device is stopped by a fault that it no longer reports")
                 .help("clear it with `host device faults --clear`")
         }
     })

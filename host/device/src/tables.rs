@@ -43,7 +43,7 @@ pub fn read(client: &mut Client, side: Side) -> Result<Option<Vec<u8>>> {
                 kept.crc
             ),
         )
-        .help("send the table again; if it comes back, the device's memory is failing"));
+        .help("send the table again; if the error returns, the memory of the device is failing"));
     }
     Ok(Some(image))
 }
@@ -124,7 +124,9 @@ pub fn write(
             DeviceCode::DeviceVerify,
             format!("the table read back differs from the one sent, first at byte {at} of {}", image.len()),
         )
-        .help("nothing was armed; send it again, and if it comes back the device's memory is failing"));
+        .help(
+            "nothing was armed; send it again; if the error returns, the memory of the device is failing",
+        ));
     }
     Ok(kept)
 }

@@ -47,7 +47,7 @@ fn a_peer_that_is_not_our_firmware_is_named_in_words() {
     assert!(error.cause().contains("`login:"), "{error}");
     let error = connect(&common::tcp(Vice::Echo)).unwrap_err();
     assert_eq!(error.code(), DeviceCode::DeviceForeign);
-    assert!(error.cause().contains("sends back"), "{error}");
+    assert!(error.cause().contains("echoes"), "{error}");
 }
 
 #[test]

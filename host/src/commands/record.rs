@@ -118,7 +118,7 @@ impl Arguments {
         quiet?.map_err(|refusal| messages::refused("telemetry", refusal))?;
         if losses.samples > 0 {
             console.warning(format!(
-                "{} lost on the way, in {}",
+                "{} lost on the line, in {}",
                 counted(losses.samples, "sample"),
                 counted(losses.gaps, "gap")
             ));
@@ -155,9 +155,9 @@ fn watch(
                 if sample.time_us < last {
                     return Err(Error::new(
                         DeviceCode::DeviceSilent,
-                        "the device restarted while it was recorded",
+                        "the device restarted during the recording",
                     )
-                    .help("`host device faults` says whether a fault did it; look at its supply"));
+                    .help("`host device faults` shows whether a fault caused it; check the power supply"));
                 }
                 last = sample.time_us;
                 let elapsed = last - *first.get_or_insert(last);
@@ -175,7 +175,7 @@ fn watch(
                     DeviceCode::DeviceSilent,
                     format!("the device answers, but sends no telemetry; it is {}", messages::state(status.state)),
                 )
-                .help("it may have restarted: `host device info` shows for how long it runs, and whether ticks are counted"));
+                .help("it may have restarted: `host device info` shows its time since start and whether ticks advance"));
             }
             None => {}
         }

@@ -97,7 +97,7 @@ impl Asked {
             (_, Some(_), ..) => Quantity::Pressure,
             (_, _, Some(_), _) => Quantity::Stroke,
             (.., Some(stiffness_nm_per_rad)) => Quantity::Angle { stiffness_nm_per_rad },
-            _ => return Err(Error::new(DataCode::CallInvalid, "nothing is asked for")),
+            _ => return Err(Error::new(DataCode::CallInvalid, "no setpoint profile is given")),
         };
         let text = self.text().unwrap_or_default();
         Ok((quantity, SetpointProfile::parse(text, quantity)?))
@@ -187,7 +187,7 @@ impl Arguments {
         let kept = kept?;
         if losses.samples > 0 {
             console.warning(format!(
-                "{} lost on the way, in {}",
+                "{} lost on the line, in {}",
                 counted(losses.samples, "sample"),
                 counted(losses.gaps, "gap")
             ));
@@ -199,7 +199,7 @@ impl Arguments {
                 "more than the muscle can do there at the highest pressure allowed, or less than at none",
             );
             console.warning(format!(
-                "for {:.2} of {:.2} s what was asked was out of reach: {why}",
+                "for {:.2} of {:.2} s the setpoint could not be reached: {why}",
                 saturated.min(lasted) / ticks,
                 lasted / ticks
             ));
@@ -300,8 +300,11 @@ fn choose_feed_forward(client: &mut Client, source: Source) -> Result<()> {
     };
     let kept = client.call_once::<SetSettings>(&settings)?;
     if kept != settings {
-        return Err(Error::new(DeviceCode::DeviceVerify, "the device keeps other settings than it was sent")
-            .help("see `host device settings`"));
+        return Err(Error::new(
+            DeviceCode::DeviceVerify,
+            "the settings read back from the device differ from those sent",
+        )
+        .help("see `host device settings`"));
     }
     Ok(())
 }
@@ -314,7 +317,7 @@ pub(super) fn positive<const N: usize>(options: [(&str, Option<f64>); N]) -> Res
         {
             return Err(Error::new(DataCode::CallInvalid, format!("{option} must be above zero"))
                 .value(value.to_string())
-                .help("leave the option out to go on at the controller's own rate until Ctrl-C"));
+                .help("omit the option to record at the rate of the controller until Ctrl-C"));
         }
     }
     Ok(())
@@ -324,9 +327,9 @@ pub(super) fn positive<const N: usize>(options: [(&str, Option<f64>); N]) -> Res
 pub(super) fn not_there(files: &[PathBuf], replace: bool) -> Result<()> {
     // A device such as /dev/null takes any number of recordings.
     match files.iter().find(|f| f.is_file()) {
-        Some(there) if !replace => Err(Error::new(DataCode::CallInvalid, "the recording is there already")
+        Some(there) if !replace => Err(Error::new(DataCode::CallInvalid, "the recording already exists")
             .file(there)
-            .help("name another one with -o, or replace it with --replace")),
+            .help("choose another name with -o, or replace it with --replace")),
         _ => Ok(()),
     }
 }
@@ -352,7 +355,10 @@ pub(super) fn begin(files: &[PathBuf], about: &Value, console: &Console) -> Resu
 /// Ends it.
 pub(super) fn end(recorder: Recorder, about: &Value, console: &Console) -> Result<PathBuf> {
     if recorder.skipped() > 0 {
-        console.warning(format!("{} without numbers left out", counted(recorder.skipped(), "sample")));
+        console.warning(format!(
+            "{} left out: not finite, or not later than the one before",
+            counted(recorder.skipped(), "sample")
+        ));
     }
     recorder.finish(about)
 }
@@ -362,7 +368,7 @@ pub(super) fn interrupts() -> Result<Arc<AtomicBool>> {
     let flag = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&flag);
     ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))
-        .map_err(|e| Error::new(DataCode::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
+        .map_err(|e| Error::new(DataCode::CallInvalid, format!("Ctrl-C cannot be handled: {e}")))?;
     Ok(flag)
 }
 

@@ -50,7 +50,7 @@ impl Arguments {
                 let _ = send.send(());
             }
         })
-        .map_err(|e| Error::new(DataCode::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
+        .map_err(|e| Error::new(DataCode::CallInvalid, format!("Ctrl-C cannot be handled: {e}")))?;
         let ready = |address: &str| {
             if self.json {
                 console.result(serde_json::json!({ "schema": "pam-studio/1", "address": address }));

@@ -136,7 +136,10 @@ pub struct Track {
 pub fn choose(client: &mut Client, law: Law, gain: f64) -> Result<()> {
     let wanted = law.settings(client.call::<GetSettings>(&())?, gain);
     if client.call_once::<SetSettings>(&wanted)? != wanted {
-        return Err(Error::new(DeviceCode::DeviceVerify, "the device keeps other settings than it was sent"));
+        return Err(Error::new(
+            DeviceCode::DeviceVerify,
+            "the settings read back from the device differ from those sent",
+        ));
     }
     Ok(())
 }

@@ -51,7 +51,7 @@ impl Vent {
         })?;
         line.send().map_err(|e| {
             Error::new(e.code(), format!("the request to vent cannot be sent: {}", e.cause()))
-                .help("take the supply air away from the muscle by hand")
+                .help("shut off the air supply of the muscle by hand")
         })
     }
 

@@ -50,7 +50,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let stop = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&stop);
     ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))
-        .map_err(|e| Error::new(DataCode::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
+        .map_err(|e| Error::new(DataCode::CallInvalid, format!("Ctrl-C cannot be handled: {e}")))?;
     let mut client = arguments.port.connect(console)?;
     let tell = |time_s, kind, text: &str, more| say(console, arguments.json, time_s, kind, text, more);
     let begin = Instant::now();

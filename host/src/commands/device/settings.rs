@@ -62,7 +62,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         if answered != wanted || now != wanted {
             return Err(Error::new(
                 DeviceCode::DeviceVerify,
-                "the device keeps other settings than it was sent",
+                "the settings read back from the device differ from those sent",
             )
             .help("look at them with `host device settings`"));
         }

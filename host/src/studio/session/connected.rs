@@ -287,7 +287,7 @@ impl Connected {
             if kept != settings || read != settings {
                 return Err(Error::new(
                     DeviceCode::DeviceVerify,
-                    "the device keeps other settings than it was sent",
+                    "the settings read back from the device differ from those sent",
                 ));
             }
         }

@@ -10,7 +10,7 @@ use serde_json::json;
 use super::super::mcap::{END, Encoder};
 use super::Tally;
 use super::window::Window;
-use pam_data::mcap_records::{Chunk, HEAD, LARGEST, MAGIC, channel, head, kind, message, plausible};
+use pam_data::mcap_records::{Chunk, HEAD, LARGEST, MAGIC, head, kind, message, plausible};
 
 /// Largest record beside chunks that is taken over: the header, metadata, the attached side file.
 const LARGEST_OTHER: u64 = 4 << 20;
@@ -80,11 +80,6 @@ impl<W: Write> Copy<'_, W> {
         match record[0] {
             kind::HEADER if self.headed => return Ok(false),
             kind::HEADER => self.headed = true,
-            kind::CHANNEL => self.channels |= channel(&record[HEAD..]).is_some(),
-            kind::MESSAGE => {
-                self.channels()?;
-                counted = self.count(&record[HEAD..]);
-            }
             kind::CHUNK => {
                 let Some(chunk) = Chunk::parse(&record[HEAD..]) else { return Ok(false) };
                 if chunk.iter().any(|(kind, _)| kind == kind::CHANNEL) {
@@ -162,9 +157,8 @@ fn look<R: Read>(source: &mut Window<R>) -> io::Result<Found> {
         kind::CHUNK if Chunk::parse(body).is_some_and(|c| c.intact() == Some(true)) => Found::Keep(whole),
         kind::DATA_END if length == 4 && followed => Found::End,
         kind::MESSAGE_INDEX if followed => Found::Pass(whole),
-        kind::HEADER | kind::SCHEMA | kind::CHANNEL | kind::MESSAGE | kind::METADATA | kind::ATTACHMENT
-            if followed && plausible(kind, body) =>
-        {
+        // Messages and channels stand in chunks; beside them nothing would show that they are damaged chunks.
+        kind::HEADER | kind::METADATA | kind::ATTACHMENT if followed && plausible(kind, body) => {
             Found::Keep(whole)
         }
         _ => Found::Damage,
