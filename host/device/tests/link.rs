@@ -143,5 +143,5 @@ fn a_device_that_goes_away_is_reported_as_gone() {
     server.join().unwrap();
     let error = client.call::<GetStatus>(&()).unwrap_err();
     assert_eq!(error.code(), DeviceCode::DeviceSilent);
-    assert!(error.cause().contains("gone"), "{error}");
+    assert!(error.cause().contains("lost"), "{error}");
 }

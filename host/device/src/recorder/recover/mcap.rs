@@ -156,13 +156,19 @@ fn look<R: Read>(source: &mut Window<R>) -> io::Result<Found> {
     Ok(match kind {
         kind::CHUNK if Chunk::parse(body).is_some_and(|c| c.intact() == Some(true)) => Found::Keep(whole),
         kind::DATA_END if length == 4 && followed => Found::End,
-        kind::MESSAGE_INDEX if followed => Found::Pass(whole),
+        kind::MESSAGE_INDEX if followed && index(body) => Found::Pass(whole),
         // Messages and channels stand in chunks; beside them nothing would show that they are damaged chunks.
         kind::HEADER | kind::METADATA | kind::ATTACHMENT if followed && plausible(kind, body) => {
             Found::Keep(whole)
         }
         _ => Found::Damage,
     })
+}
+
+/// Whether this is an index of messages: a channel, a length, and as many pairs of a time and a place as the length says.
+fn index(body: &[u8]) -> bool {
+    let length = body.get(2..6).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
+    length.is_some_and(|length| length % 16 == 0 && length as usize + 6 == body.len())
 }
 
 /// Goes on to the next chunk that is whole, or to the end: bytes passed over, and messages that can be counted among them.
