@@ -180,7 +180,7 @@ def story(url, driver):
     assert page.js("return state.lost") == 0
     drawn = page.js("return perf.frames")
     page.until(f"perf.frames > {drawn} + 10")
-    passed("follows_a_course_and_records_without_loss")
+    passed("follows_a_setpoint_profile_and_records_without_loss")
     reads_where_one_points(page)
     page.mishap(1)
     page.until("!document.getElementById('fault').hidden")
@@ -217,7 +217,7 @@ def story(url, driver):
     page.state("armed")
     page.click("follow")
     page.state("running")
-    page.js("document.getElementById('course').focus()")
+    page.js("document.getElementById('profile').focus()")
     page.key("\ue00c")
     page.state("disarmed")
     passed("vents_by_one_key_wherever_the_cursor_is")
@@ -249,12 +249,12 @@ def guards(url):
         {"Host": "evil.example", "x-studio-token": token},
         {"Origin": "http://evil.example", "x-studio-token": token},
     ]
-    for address in ["/", "/report/fit", "/report/fit?token=" + "0" * 32]:
+    for address, code in [("/?token=" + "0" * 32, 403), ("/api/stream", 403), ("/report/fit", 404), ("/report/" + token, 404)]:
         try:
             urllib.request.urlopen(base + address)
             raise AssertionError(f"{address} is served without the token")
         except urllib.error.HTTPError as error:
-            assert error.code == 403, error.code
+            assert error.code == code, (address, error.code)
     for headers in tries:
         try:
             urllib.request.urlopen(urllib.request.Request(base + "/api/order", data=b'{"do":"arm"}', headers=headers))

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::commands;
-use crate::console::{Colour, Console};
+use crate::console::{Colour, Console, unprinted};
 use crate::settings::{all_settings, apply};
 use pam_data::error::Result;
 
@@ -86,7 +86,7 @@ enum Command {
     Table(commands::table::Arguments),
     /// Send a table to a controller, or program its chip.
     Flash(commands::flash::Arguments),
-    /// Let a controller follow a course of force, pressure or stroke, and record it.
+    /// Let a controller follow a setpoint profile of force, pressure or stroke, and record it.
     Run(commands::run::Arguments),
     /// Record what a controller measures, as CSV or MCAP.
     Record(commands::record::Arguments),
@@ -174,7 +174,8 @@ pub fn main() -> ExitCode {
         Colours::Never => Colour::Never,
     };
     let console = Console::new(cli.output.quiet, cli.output.verbose, colour);
-    match cli.command.run(&console) {
+    let outcome = cli.command.run(&console);
+    match outcome.and(unprinted().map_or(Ok(()), Err)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             console.error(&error);

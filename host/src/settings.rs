@@ -20,7 +20,8 @@ use clap::{Arg, ArgAction, Command};
 use toml::de::{DeTable, DeValue};
 
 use crate::error::HostCode;
-use pam_data::error::{Error, Result, nearest};
+use pam_data::bounds;
+use pam_data::error::{DataCode, Error, Result, nearest};
 use pam_data::toml_words::toml_error;
 
 /// The name of the file.
@@ -107,7 +108,9 @@ pub fn files() -> Result<Vec<PathBuf>> {
 /// [`DataCode::FileUnreadable`]; [`HostCode::SettingsInvalid`] with the line for text that is no TOML, an option that no command has, a
 /// value that it cannot take.
 pub fn read(file: &Path, command: &Command) -> Result<Vec<Setting>> {
-    let text = std::fs::read_to_string(file).map_err(|e| Error::unreadable(file, &e))?;
+    let text = bounds::read_text(file, bounds::WRITTEN)?.map_err(|()| {
+        Error::new(DataCode::FileUnreadable, "is binary, not text").file(file).help("settings are TOML")
+    })?;
     let parsed = DeTable::parse(&text).map_err(|e| {
         toml_error(HostCode::SettingsInvalid, &text, &e)
             .file(file)

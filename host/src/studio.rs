@@ -2,12 +2,23 @@
 //!
 //! | part | where |
 //! | --- | --- |
-//! | who may ask: loopback, origin, token | [`server`] |
-//! | the thread that talks to the controller and keeps it safe | [`keeper`] |
-//! | recordings, fit, diagnosis, comparison | [`workshop`] |
+//! | who may use it: loopback, origin, token | `access` |
+//! | connections with bounds on number, time and size | `connections` |
+//! | the page and its requests | [`server`], `orders` |
+//! | the path of a vent, which nothing else uses | [`vent`] |
+//! | the thread that talks to the controller and keeps it safe | [`session`] |
+//! | samples, states and faults for the page | `events` |
+//! | recordings, fit, diagnosis, comparison | [`analysis`] |
 //! | the page itself, committed as it is served | `studio/page.html`, `studio.css`, `studio.js`, `plot.js` |
 
-pub mod keeper;
+mod access;
+pub mod analysis;
+mod connections;
+mod events;
+mod orders;
 pub mod server;
-mod told;
-pub mod workshop;
+pub mod session;
+pub mod vent;
+
+#[cfg(test)]
+mod tests;

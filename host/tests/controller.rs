@@ -188,7 +188,7 @@ fn a_run_is_a_recording_that_the_readers_of_recordings_read() {
     // Seven times what this muscle can do.
     let said = bench.done(&["run", "--force", "1000", "--seconds", "0.5"]);
     assert!(
-        said.contains("of 0.50 s what was asked was out of reach: more than the muscle can pull"),
+        said.contains("of 0.50 s the setpoint could not be reached: more than the muscle can pull"),
         "{said}"
     );
     let said = bench.done(&["run", "--force=-200", "--seconds", "0.5"]);
@@ -199,7 +199,7 @@ fn a_run_is_a_recording_that_the_readers_of_recordings_read() {
     TableFile { table, about: About::default() }.write(bench.folder.join("narrow.pam")).unwrap();
     bench.done(&["flash", "narrow.pam"]);
     let said = bench.done(&["run", "--force", "50", "--seconds", "0.5", "--json"]);
-    assert!(said.contains("beyond what its table was tested at (up to 220 kPa"), "{said}");
+    assert!(said.contains("outside the tested range of its table (up to 220 kPa"), "{said}");
     let told = serde_json::Deserializer::from_str(&said).into_iter::<serde_json::Value>().next();
     let reach = told.unwrap().unwrap()["reach"].clone();
     let seconds = |name: &str| reach[name].as_f64().unwrap();
@@ -215,7 +215,7 @@ fn a_broken_load_cell_stops_a_run_in_words_and_the_rows_until_then_are_kept() {
     assert_eq!(status, 1);
     assert!(
         said.contains("error[device::fault]")
-            && said.contains("a sensor reads what it cannot read (load cell)"),
+            && said.contains("a sensor reading is out of range (load cell)"),
         "{said}"
     );
     assert!(said.contains("broken wire"), "the remedy is told: {said}");

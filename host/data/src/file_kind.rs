@@ -3,6 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
+use crate::bounds;
 use crate::error::{DataCode, Error, Result};
 
 /// So much of a file is looked at: names of columns and keys stand near its beginning.
@@ -74,6 +75,8 @@ impl FileKind {
     /// What a file is; `None` where it cannot be read or is none of ours.
     #[must_use]
     pub fn of_file(path: &Path) -> Option<Self> {
+        // A pipe was read already, and would hold this program up for ever.
+        std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?;
         let mut bytes = Vec::new();
         std::fs::File::open(path).ok()?.take(LOOKED_AT).read_to_end(&mut bytes).ok()?;
         Self::of_bytes(&bytes)
@@ -130,13 +133,8 @@ impl FileKind {
     /// # Errors
     /// [`DataCode::FileUnreadable`]; the kind's own failure for a file that is no text.
     pub fn read_text(self, path: &Path) -> Result<String> {
-        std::fs::read_to_string(path).map_err(|reason| {
-            if reason.kind() == std::io::ErrorKind::InvalidData {
-                self.wanted(path, Error::new(self.code(), "the file is binary, not text"))
-            } else {
-                Error::unreadable(path, &reason)
-            }
-        })
+        bounds::read_text(path, bounds::WRITTEN)?
+            .map_err(|()| self.wanted(path, Error::new(self.code(), "the file is binary, not text")))
     }
 }
 

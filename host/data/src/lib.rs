@@ -1,10 +1,12 @@
 //! What the other libraries of the host stand on: recordings in SI units, campaigns, muscle descriptions, failures, whole files.
 
+pub mod bounds;
 pub mod compare;
 pub mod counted;
 pub mod date;
 pub mod error;
 pub mod file_kind;
+pub mod mcap_records;
 pub mod muscle_description;
 pub mod output;
 pub mod possible;

@@ -1,42 +1,138 @@
 //! Files that appear whole or not at all.
 
+use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::fs;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use crate::error::{DataCode, Error, Result};
 use crate::file_kind::FileKind;
 
-/// Writes a file under a temporary name beside `path`, then renames it: a reader sees the old file or the new one.
-/// A path of `-` is standard output.
+/// Writes a file that appears at `path` whole: a reader sees the old file or the new one, and a program that is killed leaves the old
+/// one and nothing else. A new file that takes an old one's place has its permissions. A path of `-` is standard output.
 ///
 /// # Errors
 /// [`DataCode::FileUnwritable`], or [`DataCode::CallInvalid`] where a file of another kind stands there that no command makes again, such as a
 /// recording that was given behind `--json`; what stood at `path` is untouched then.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     if path == Path::new("-") {
-        let mut out = std::io::stdout().lock();
-        // A reader that stopped reading is no failure.
-        let _ = out.write_all(bytes).and_then(|()| out.flush());
-        return Ok(());
+        return print(bytes);
     }
-    let name = path
-        .file_name()
-        .ok_or_else(|| Error::new(DataCode::CallInvalid, "the output's path names no file").file(path))?;
+    if path.file_name().is_none() {
+        return Err(Error::new(DataCode::CallInvalid, "the output's path names no file").file(path));
+    }
+    let unwritable = |e: io::Error| Error::unwritable(path, &e);
+    let old = fs::metadata(path).ok();
     // A device such as /dev/null or a named pipe must be written itself, not replaced by a file.
-    if fs::metadata(path).is_ok_and(|m| !m.is_file()) {
-        return fs::write(path, bytes).map_err(|e| Error::unwritable(path, &e));
+    if old.as_ref().is_some_and(|m| !m.is_file()) {
+        return fs::write(path, bytes).map_err(unwritable);
     }
     keeps_its_kind(path, bytes)?;
-    let mut temporary = PathBuf::from(path);
-    temporary.set_file_name(format!(".{}.{}.part", name.to_string_lossy(), std::process::id()));
-    let written = fs::File::create(&temporary)
-        .and_then(|mut f| f.write_all(bytes).and_then(|()| f.sync_all()))
-        .and_then(|()| fs::rename(&temporary, path));
-    written.map_err(|e| {
-        let _ = fs::remove_file(&temporary);
-        Error::unwritable(path, &e)
-    })
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let fill = |file: &mut fs::File| {
+        if let Some(old) = &old {
+            file.set_permissions(old.permissions())?;
+        }
+        file.write_all(bytes).and_then(|()| file.sync_all())
+    };
+    let mut name = OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(".");
+    let mut temporary = tempfile::Builder::new();
+    temporary.prefix(&name).suffix(".part");
+    if let Some(mut file) = unnamed::create(folder) {
+        fill(&mut file).map_err(unwritable)?;
+        // Where nothing stands yet, the file is never seen under any other name.
+        if old.is_none() && unnamed::link(&file, path).is_ok() {
+            return Ok(());
+        }
+        if let Ok(named) = temporary.make_in(folder, |name| unnamed::link(&file, name)) {
+            return named.persist(path).map(drop).map_err(|e| unwritable(e.error));
+        }
+    }
+    #[cfg(unix)]
+    temporary.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut named = temporary.tempfile_in(folder).map_err(unwritable)?;
+    fill(named.as_file_mut()).map_err(unwritable)?;
+    named.persist(path).map(drop).map_err(|e| unwritable(e.error))
+}
+
+/// Writes to standard output. A reader that stopped reading (`| head`) is no failure; a full disk is.
+///
+/// # Errors
+/// [`DataCode::FileUnwritable`].
+pub fn print(bytes: &[u8]) -> Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Error::new(DataCode::FileUnwritable, format!("standard output cannot be written: {e}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Files without a name, which vanish with the program that writes them: Linux has them on most of its file systems.
+#[cfg(target_os = "linux")]
+mod unnamed {
+    use std::fs::File;
+    use std::io;
+    use std::os::fd::AsRawFd;
+    use std::path::Path;
+
+    use rustix::fs::{AtFlags, CWD, Mode, OFlags, linkat, open};
+
+    pub(super) fn create(folder: &Path) -> Option<File> {
+        let flags = OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC;
+        open(folder, flags, Mode::from_raw_mode(0o666)).ok().map(File::from)
+    }
+
+    /// Gives it a name that no other file has.
+    pub(super) fn link(file: &File, path: &Path) -> io::Result<()> {
+        let open = format!("/proc/self/fd/{}", file.as_raw_fd());
+        Ok(linkat(CWD, open, CWD, path, AtFlags::SYMLINK_FOLLOW)?)
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+mod unnamed {
+    use std::fs::File;
+    use std::io;
+    use std::path::Path;
+
+    pub(super) fn create(_: &Path) -> Option<File> {
+        None
+    }
+
+    pub(super) fn link(_: &File, _: &Path) -> io::Result<()> {
+        Err(io::ErrorKind::Unsupported.into())
+    }
+}
+
+/// While this lives, other runs of this program write no results into the same folders: the table, the report and the JSON that
+/// stand there afterwards are those of one run.
+#[derive(Debug)]
+pub struct Turn {
+    _locked: Vec<fs::File>,
+}
+
+impl Turn {
+    /// Waits for the folders of these files. One that cannot be locked, as on some network drives, is not waited for.
+    #[must_use]
+    pub fn of<'a>(paths: impl IntoIterator<Item = Option<&'a Path>>) -> Self {
+        let folder = |path: &Path| {
+            let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            fs::canonicalize(folder).ok()
+        };
+        // In one order for all, so that no two runs wait for each other.
+        let folders: BTreeSet<PathBuf> =
+            paths.into_iter().flatten().filter(|p| *p != Path::new("-")).filter_map(folder).collect();
+        let lock = |folder: PathBuf| {
+            let file = fs::File::open(folder).ok()?;
+            file.lock().ok().map(|()| file)
+        };
+        Self { _locked: folders.into_iter().filter_map(lock).collect() }
+    }
 }
 
 /// Whether one of a call's results, each with the option that says where it goes, goes to standard output: words for people must not
@@ -119,6 +215,51 @@ mod tests {
         assert_eq!(write_whole(&missing, b"x").expect_err("no folder").exit_status(), 1);
         assert_eq!(fs::read_dir(&folder).expect("a folder").count(), 1, "no temporary file stays");
         fs::remove_dir_all(&folder).expect("removed");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_new_file_has_the_old_ones_permissions_and_follows_no_prepared_name() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("a.txt");
+        let other = folder.path().join("other");
+        fs::write(&other, b"untouched").expect("written");
+        // What another user could guess: the name that a program with this number would take.
+        let guessed = folder.path().join(format!(".a.txt.{}.part", std::process::id()));
+        std::os::unix::fs::symlink(&other, &guessed).expect("linked");
+        let mode = || fs::metadata(&file).expect("there").permissions().mode() & 0o7777;
+        write_whole(&file, b"one").expect("written");
+        let usual = fs::metadata(&other).expect("there").permissions().mode() & 0o7777;
+        assert_eq!(mode(), usual, "as any other new file");
+        for wanted in [0o600, 0o640, 0o444] {
+            fs::set_permissions(&file, fs::Permissions::from_mode(wanted)).expect("set");
+            write_whole(&file, b"two").expect("replaced");
+            assert_eq!(mode(), wanted);
+        }
+        assert_eq!(fs::read(&other).expect("readable"), b"untouched");
+        assert_eq!(fs::read_dir(&folder).expect("a folder").count(), 3);
+    }
+
+    #[test]
+    fn the_results_of_one_run_are_written_together() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = |name: &str| folder.path().join(name);
+        std::thread::scope(|scope| {
+            for run in 0..4 {
+                let (table, report) = (path("t"), path("r"));
+                scope.spawn(move || {
+                    for round in 0..20 {
+                        let text = format!("{run} {round}");
+                        let _turn = Turn::of([Some(table.as_path()), None, Some(report.as_path())]);
+                        write_whole(&table, text.as_bytes()).expect("written");
+                        write_whole(&report, text.as_bytes()).expect("written");
+                        let read = |p: &Path| fs::read(p).expect("readable");
+                        assert_eq!(read(&table), read(&report));
+                    }
+                });
+            }
+        });
     }
 
     #[test]

@@ -39,4 +39,4 @@ pub use head::has_decimal_commas;
 pub use import::Import;
 pub use noise::white_noise;
 pub use quantity::{Named, Quantity, Unit, named};
-pub use read::Reader;
+pub use read::{Hashes, Reader};

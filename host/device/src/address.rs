@@ -1,6 +1,7 @@
 //! Where a device is.
 
 use std::fmt;
+use std::net::ToSocketAddrs;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -28,6 +29,29 @@ pub enum Address {
         /// Port.
         port: u16,
     },
+}
+
+impl Address {
+    /// Whether both name the same end point, also under different names of one computer or one serial device.
+    #[must_use]
+    pub fn same_place(&self, other: &Self) -> bool {
+        if self == other {
+            return true;
+        }
+        match (self, other) {
+            (Self::Serial(a), Self::Serial(b)) => {
+                std::fs::canonicalize(a).is_ok_and(|a| std::fs::canonicalize(b).is_ok_and(|b| a == b))
+            }
+            (Self::Tcp { host: a, port }, Self::Tcp { host: b, port: other }) if port == other => {
+                let all = |host: &str| {
+                    (host, *port).to_socket_addrs().map(Iterator::collect::<Vec<_>>).unwrap_or_default()
+                };
+                let there = all(b);
+                all(a).iter().any(|address| there.contains(address))
+            }
+            _ => false,
+        }
+    }
 }
 
 impl FromStr for Address {
@@ -77,6 +101,15 @@ mod tests {
             let address: Address = text.parse().unwrap();
             assert_eq!(address.to_string(), text);
         }
+    }
+
+    #[test]
+    fn one_place_under_two_names_is_recognised() {
+        let at = |text: &str| text.parse::<Address>().unwrap();
+        assert!(at("tcp:localhost:4000").same_place(&at("tcp:127.0.0.1:4000")));
+        assert!(!at("tcp:localhost:4000").same_place(&at("tcp:127.0.0.1:4001")));
+        assert!(at("/dev/null").same_place(&at("/dev/../dev/null")));
+        assert!(!at("/dev/null").same_place(&at("/dev/zero")));
     }
 
     #[test]

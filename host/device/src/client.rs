@@ -1,6 +1,7 @@
 //! A conversation with a controller: hello, typed calls, topics, and what was lost on the way.
 
 use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use model_core::link::endpoints::{EVENT, Endpoint, GetStatus, LOG, TELEMETRY};
@@ -9,8 +10,8 @@ use model_core::link::hello::{self, Hello};
 use model_core::link::messages::{Event, Refusal, Telemetry};
 use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 
-use super::heard::{Heard, lost, version_error};
-use super::{Address, Port, words};
+use super::line_activity::{LineActivity, lost, version_error};
+use super::{Address, Port, VentLine, messages};
 use crate::error::DeviceCode;
 use pam_data::error::{DataCode, Error, Result};
 
@@ -87,6 +88,8 @@ pub struct Client {
     losses: Losses,
     patience: Patience,
     spoke: Instant,
+    /// Held while a frame is written, so that those of a [`VentLine`] do not fall into its middle.
+    writing: Arc<Mutex<()>>,
 }
 
 impl std::fmt::Debug for Client {
@@ -144,8 +147,9 @@ impl Client {
             losses: Losses::default(),
             patience,
             spoke: Instant::now(),
+            writing: Arc::default(),
         };
-        let mut heard = Heard::default();
+        let mut heard = LineActivity::default();
         let mut attempt = 0;
         while attempt < patience.tries.max(1) || (heard.frames > 0 && attempt < patience.noisy_tries) {
             attempt += 1;
@@ -167,10 +171,10 @@ impl Client {
                 _ => {
                     return Err(Error::new(
                         DeviceCode::DeviceForeign,
-                        "it speaks in frames like ours, but its hello is not a controller's",
+                        "the peer uses this frame format, but its hello is not that of a controller",
                     )
                     .value(client.port.name())
-                    .help("is this the controller's own port?"));
+                    .help("check that this is the port of the controller"));
                 }
             }
         }
@@ -189,6 +193,14 @@ impl Client {
         self.port.name()
     }
 
+    /// A second writer on this line that vents the controller whatever this conversation is waiting for.
+    ///
+    /// # Errors
+    /// [`DeviceCode::DevicePort`] when the system gives no second handle of the port.
+    pub fn vent_line(&self) -> Result<VentLine> {
+        Ok(VentLine::new(self.port.second_handle()?, Arc::clone(&self.writing)))
+    }
+
     /// What did not arrive so far.
     #[must_use]
     pub fn losses(&self) -> Losses {
@@ -202,7 +214,7 @@ impl Client {
     pub fn call<E: Endpoint>(&mut self, request: &E::Request) -> Result<E::Response> {
         match self.ask::<E>(request, self.patience.answer, self.patience.tries)? {
             Ok(response) => Ok(response),
-            Err(refusal) => Err(words::refused(E::NAME, refusal)),
+            Err(refusal) => Err(messages::refused(E::NAME, refusal)),
         }
     }
 
@@ -213,7 +225,7 @@ impl Client {
     pub fn call_once<E: Endpoint>(&mut self, request: &E::Request) -> Result<E::Response> {
         match self.ask::<E>(request, self.patience.slow_answer, 1)? {
             Ok(response) => Ok(response),
-            Err(refusal) => Err(words::refused(E::NAME, refusal)),
+            Err(refusal) => Err(messages::refused(E::NAME, refusal)),
         }
     }
 
@@ -260,7 +272,7 @@ impl Client {
             if left.is_zero() {
                 return Ok(None);
             }
-            self.pump(left, &mut Heard::default())?;
+            self.pump(left, &mut LineActivity::default())?;
         }
     }
 
@@ -271,8 +283,8 @@ impl Client {
         tries: u32,
     ) -> Result<Result<E::Response, Refusal>> {
         let unreadable = || {
-            Error::new(DeviceCode::DeviceForeign, format!("the answer to `{}` cannot be read", E::NAME))
-                .help("the device said the same schema as this program, so this is a fault in one of them: please report it")
+            Error::new(DeviceCode::DeviceForeign, format!("the answer to `{}` cannot be decoded", E::NAME))
+                .help("the device and this program use the same schema, so this is a defect in one of them: report it")
         };
         let mut wire = [0; MAX_WIRE];
         let bad = self.accumulator.counts().bad;
@@ -286,7 +298,8 @@ impl Client {
             })?;
             self.send(&wire[..length])?;
             attempt += 1;
-            let Some(answer) = self.await_answer(E::ID, sequence, patience, &mut Heard::default())? else {
+            let Some(answer) = self.await_answer(E::ID, sequence, patience, &mut LineActivity::default())?
+            else {
                 continue;
             };
             return match answer.header.kind {
@@ -294,12 +307,9 @@ impl Client {
                 _ => postcard::from_bytes(&answer.body).map(Ok).map_err(|_| unreadable()),
             };
         }
-        Err(Error::new(
-            DeviceCode::DeviceSilent,
-            format!("the device does not answer `{}` any more", E::NAME),
-        )
-        .value(self.port.name())
-        .help("look at cable and supply; when it answers again it is disarmed, or vented by its own watch"))
+        Err(Error::new(DeviceCode::DeviceSilent, format!("the device no longer answers `{}`", E::NAME))
+            .value(self.port.name())
+            .help("check the cable and the supply; a running controller without its host vents by itself"))
     }
 
     /// How often a question may be asked, when so many frames were bad before it was asked first.
@@ -326,6 +336,7 @@ impl Client {
 
     fn send(&mut self, bytes: &[u8]) -> Result<()> {
         self.spoke = Instant::now();
+        let _turn = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         self.port.write_all(bytes).map_err(|e| lost(&self.port, &e))
     }
 
@@ -335,7 +346,7 @@ impl Client {
         id: u8,
         sequence: u16,
         patience: Duration,
-        heard: &mut Heard,
+        heard: &mut LineActivity,
     ) -> Result<Option<Answer>> {
         let deadline = Instant::now() + patience;
         loop {
@@ -352,7 +363,7 @@ impl Client {
     }
 
     /// Reads once, sorts what came: topics into their queue, answers to the caller.
-    fn pump(&mut self, patience: Duration, heard: &mut Heard) -> Result<Vec<Answer>> {
+    fn pump(&mut self, patience: Duration, heard: &mut LineActivity) -> Result<Vec<Answer>> {
         let mut buffer = [0; 2048];
         let count = match self.port.read(&mut buffer, patience) {
             Ok(count) => count,

@@ -10,7 +10,7 @@ error_codes! {
             "`host device list` shows the ports here";
         /// The device does not answer, or stopped answering.
         DeviceSilent = "device::silent", Input,
-            "look at cable and supply, then try again";
+            "check the cable and the supply, then try again";
         /// Something answers, and it is not a controller of ours.
         DeviceForeign = "device::foreign", Input,
             "is this the controller's port? if it is its board, flash the firmware first";
@@ -22,7 +22,7 @@ error_codes! {
             "`host device info` shows what it is doing, `host device settings` what it allows";
         /// What the device keeps is not what it was sent.
         DeviceVerify = "device::verify", Input,
-            "send it again; if it comes back, the device's memory is failing";
+            "send it again; if the error returns, the memory of the device is failing";
         /// The device stopped because of a fault.
         DeviceFault = "device::fault", Input,
             "`host device faults` tells it in words, with the remedy";

@@ -6,32 +6,37 @@
 //! | bytes with time-outs | [`Port`] |
 //! | hello, typed calls, topics, losses | [`Client`] |
 //! | tables: upload in pieces, read back | [`tables`] |
-//! | what is asked over time | [`course`] |
+//! | setpoints over time | [`setpoint_profile`] |
 //! | a run from start to vent | [`mod@run`] |
+//! | venting while the conversation waits for something else | [`VentLine`] |
 //! | the pressure regulator, found from steps | [`regulator`] |
 //! | log lines of the firmware in words | [`log_table`] |
 //! | telemetry to a recording | [`recorder`] |
-//! | refusals and faults in words, with their remedy | [`words`] |
+//! | messages about refusals and faults, with their remedy | [`messages`] |
+//! | what changes from one table to another | [`table_diff`] |
+//! | why a setpoint could not be reached | [`reachability`] |
 
 mod address;
 mod client;
-pub mod course;
-pub mod difference;
 #[cfg(feature = "emulated")]
 pub mod emulated;
 pub mod error;
-mod heard;
+mod line_activity;
 pub mod log_table;
+pub mod messages;
 mod port;
 #[cfg(feature = "probe")]
 pub mod probe;
-pub mod reach;
+pub mod reachability;
 pub mod recorder;
 pub mod regulator;
 pub mod run;
+pub mod setpoint_profile;
+pub mod table_diff;
 pub mod tables;
-pub mod words;
+mod vent_line;
 
 pub use address::Address;
 pub use client::{Client, Losses, Patience, Topic};
 pub use port::{Port, available, plugged_in};
+pub use vent_line::VentLine;

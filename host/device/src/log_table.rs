@@ -53,8 +53,8 @@ pub struct Line {
 struct Bytes<'a>(&'a [u8]);
 
 fn short() -> Error {
-    Error::new(DeviceCode::DeviceForeign, "a log line does not fit this image")
-        .help("give --elf the very image that runs on the device, built with firmware/build --log")
+    Error::new(DeviceCode::DeviceForeign, "a log line does not match this image")
+        .help("give --elf the image that runs on the device, built with firmware/build --log")
 }
 
 impl Bytes<'_> {
@@ -85,7 +85,7 @@ impl LogTable {
     /// # Errors
     /// [`DataCode::FileUnreadable`] for a file that is no image, or one without logs.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|e| Error::unreadable(path, &e))?;
+        let bytes = pam_data::bounds::read(path, pam_data::bounds::WHOLE)?;
         Self::parse(&bytes).map_err(|why| {
             Error::new(DataCode::FileUnreadable, why)
                 .file(path)
@@ -93,7 +93,20 @@ impl LogTable {
         })
     }
 
-    fn parse(bytes: &[u8]) -> std::result::Result<Self, String> {
+    /// Of log lines that are known otherwise: number, level as `defmt_info`, and format of each.
+    #[must_use]
+    pub fn of_formats(formats: &[(u16, &str, &str)], timestamp: Option<&str>) -> Self {
+        let entry = |(number, tag, data): &(u16, &str, &str)| {
+            (*number, Symbol { tag: (*tag).to_owned(), data: (*data).to_owned() })
+        };
+        Self { entries: formats.iter().map(entry).collect(), timestamp: timestamp.map(str::to_owned) }
+    }
+
+    /// The log lines of an image.
+    ///
+    /// # Errors
+    /// Why the bytes are no image, or one without logs.
+    pub fn parse(bytes: &[u8]) -> std::result::Result<Self, String> {
         let elf = object::File::parse(bytes).map_err(|e| format!("this is no ELF image: {e}"))?;
         let section = elf.section_by_name(".defmt").ok_or("the image was built without logs")?.index();
         let (mut entries, mut timestamp) = (BTreeMap::new(), None);
@@ -215,12 +228,9 @@ impl LogTable {
                 self.format(variant, bytes)?
             }
             _ => {
-                return Err(Error::new(
-                    DeviceCode::DeviceForeign,
-                    "a log line holds a type that is not read here",
-                )
-                .value(format!("{:?}", parameter.ty))
-                .help("log numbers, texts, and types that derive defmt::Format"));
+                return Err(Error::new(DeviceCode::DeviceForeign, "a log line contains an unsupported type")
+                    .value(format!("{:?}", parameter.ty))
+                    .help("log numbers, texts, and types that derive defmt::Format"));
             }
         })
     }

@@ -63,6 +63,22 @@ impl Port {
         Ok(Self { line: Line::Tcp(stream), name })
     }
 
+    /// Another handle of the same line.
+    ///
+    /// # Errors
+    /// [`DeviceCode::DevicePort`] when the system gives none.
+    pub(super) fn second_handle(&self) -> Result<Self> {
+        let refused = |reason: String| {
+            Error::new(DeviceCode::DevicePort, format!("the port cannot be opened a second time: {reason}"))
+                .value(&self.name)
+        };
+        let line = match &self.line {
+            Line::Serial(line) => Line::Serial(line.try_clone().map_err(|e| refused(e.to_string()))?),
+            Line::Tcp(stream) => Line::Tcp(stream.try_clone().map_err(|e| refused(e.to_string()))?),
+        };
+        Ok(Self { line, name: self.name.clone() })
+    }
+
     /// The address as the user wrote it.
     #[must_use]
     pub fn name(&self) -> &str {
@@ -133,7 +149,7 @@ fn connect(host: &str, port: u16, name: &str) -> Result<TcpStream> {
     let failed = |reason: String| {
         Error::new(DeviceCode::DevicePort, reason)
             .value(name)
-            .help("is the emulator running, and is this the port of its link?")
+            .help("check that the emulator is running and that this is its port")
     };
     let addresses = (host, port)
         .to_socket_addrs()
@@ -162,7 +178,7 @@ fn serial_error(name: &str, error: &serialport::Error) -> Error {
         ErrorKind::NoDevice | ErrorKind::Io(io::ErrorKind::NotFound) => {
             let others = available();
             if others.is_empty() {
-                "no serial device is plugged in; an emulated one is named tcp:HOST:PORT".to_owned()
+                "no serial device is connected; the port of an emulated device is tcp:HOST:PORT".to_owned()
             } else {
                 format!("serial devices here: {}", others.join(", "))
             }

@@ -15,7 +15,7 @@ use pam_data::error::{DataCode, Error, Result};
 /// # Errors
 /// A file that cannot be read, no probe or more than one, a chip that the probe's library does not know, a failed write.
 pub fn program(firmware: &Path, chip: &str, console: &Console) -> Result<()> {
-    let image = std::fs::read(firmware).map_err(|e| Error::unreadable(firmware, &e))?;
+    let image = pam_data::bounds::read(firmware, pam_data::bounds::WHOLE)?;
     if !image.starts_with(b"\x7fELF") {
         return Err(Error::new(DataCode::FileUnreadable, "this is no ELF file")
             .file(firmware)
@@ -49,12 +49,12 @@ pub fn program(firmware: &Path, chip: &str, console: &Console) -> Result<()> {
     };
     let opened = probe.open().map_err(|e| {
         failed("the probe cannot be opened", &e)
-            .help("is another program using it? may this user open USB devices?")
+            .help("close any other program that uses it, and check that this user may open USB devices")
     })?;
     let mut session: Session = opened.attach(chip, Permissions::default()).map_err(|e| {
         failed("the chip cannot be reached", &e)
             .value(chip)
-            .help("is the board powered, and is this its chip? an F446RE Nucleo's is STM32F446RETx")
+            .help("check that the board is powered and that this is its chip; the chip of an F446RE Nucleo is STM32F446RETx")
     })?;
     console.note(format!("writing {} to {chip}", firmware.display()));
     let mut options = DownloadOptions::default();

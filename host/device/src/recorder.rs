@@ -3,13 +3,14 @@
 //!
 //! Rows go to `NAME.part` while they arrive, piece by piece, and the file gets its name when it has ended. A program that is
 //! killed leaves the `.part` with every piece until then, and what was known at the start in `NAME.part.json`; a disk that is
-//! full ends the file after the last piece that fitted. [`rescue`] makes a whole recording of a `.part`, and the next recording
+//! full ends the file after the last piece that fitted. [`recover()`] makes a whole recording of a `.part`, and the next recording
 //! of the same name does so before it begins.
 
 mod about;
 mod columns;
 mod mcap;
 mod part;
+mod recover;
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -18,11 +19,11 @@ use model_core::link::messages::{Event, Telemetry};
 use serde_json::{Value, json};
 
 pub use about::{about_device, about_losses, about_start, serial};
-pub use part::rescue;
+pub use recover::{Recovered, Tally, recover};
 
 use self::mcap::Encoder;
 use self::part::{Part, part_of};
-use super::words;
+use super::messages;
 use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::write_whole;
@@ -68,7 +69,7 @@ pub struct Recorder {
     last_time_us: Option<u64>,
     skipped: u64,
     flushed: Instant,
-    rescued: Vec<PathBuf>,
+    recovered: Vec<Recovered>,
     failed: Option<Error>,
 }
 
@@ -82,13 +83,13 @@ impl Recorder {
         let first =
             paths.first().ok_or_else(|| Error::new(DataCode::CallInvalid, "a recording needs a file"))?;
         let begun_ns = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64);
-        let (mut streams, mut rescued) = (Vec::new(), Vec::new());
+        let (mut streams, mut recovered) = (Vec::new(), Vec::new());
         for (number, path) in paths.iter().enumerate() {
             if paths[..number].contains(path) {
-                return Err(Error::new(DataCode::CallInvalid, "this file is named twice").file(path));
+                return Err(Error::new(DataCode::CallInvalid, "this file is given twice").file(path));
             }
             let (part, kept) = Part::create(path)?;
-            rescued.extend(kept);
+            recovered.extend(kept);
             let form = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
                 Form::Mcap(Box::new(Encoder::new(about, begun_ns).map_err(|e| encoding(path, &e))?))
             } else {
@@ -108,7 +109,7 @@ impl Recorder {
             last_time_us: None,
             skipped: 0,
             flushed: Instant::now(),
-            rescued,
+            recovered,
             failed: None,
         };
         begun.flush()?;
@@ -156,10 +157,10 @@ impl Recorder {
         let value = match event {
             Event::Fault(report) => json!({
                 "time_s": report.time_us as f64 * 1e-6, "event": "fault",
-                "text": words::report(report), "remedy": words::fault(report.fault).remedy,
+                "text": messages::report(report), "remedy": messages::fault(report.fault).remedy,
             }),
             Event::State(state) => json!({
-                "time_s": self.last_time_us.map(|t| t as f64 * 1e-6), "event": "state", "text": words::state(*state),
+                "time_s": self.last_time_us.map(|t| t as f64 * 1e-6), "event": "state", "text": messages::state(*state),
             }),
             Event::TraceFull => json!({
                 "time_s": self.last_time_us.map(|t| t as f64 * 1e-6), "event": "trace-full", "text": "the trace is full",
@@ -182,7 +183,8 @@ impl Recorder {
         for stream in &mut self.streams {
             if let Err(error) = stream.flush() {
                 let paths = stream.part.path().display().to_string();
-                let error = error.help(format!("make room; what was recorded until then is in {paths}"));
+                let error =
+                    error.help(format!("free disk space; the recording up to this point is in {paths}"));
                 self.failed = Some(Error::new(error.code(), error.cause()).file(&paths));
                 return Err(error);
             }
@@ -202,10 +204,10 @@ impl Recorder {
         self.skipped
     }
 
-    /// Recordings that an earlier program left cut off under the same name, and what they are called now.
+    /// Recordings that an earlier program left cut off under the same name, and what became of them.
     #[must_use]
-    pub fn rescued(&self) -> &[PathBuf] {
-        &self.rescued
+    pub fn recovered(&self) -> &[Recovered] {
+        &self.recovered
     }
 
     /// Ends the recording: every file gets its name, and `NAME.json` beside the first says how it was made. Also after an
@@ -240,10 +242,10 @@ impl Recorder {
         };
         match (trouble, paths.into_iter().next()) {
             (None, Some(first)) => Ok(first),
-            (Some(error), _) => {
-                Err(error
-                    .help(format!("{} until then in it; make room and go on", counted(self.rows, "row"))))
-            }
+            (Some(error), _) => Err(error.help(format!(
+                "it holds {} up to this point; free disk space and continue",
+                counted(self.rows, "row")
+            ))),
             (None, None) => {
                 Err(Error::new(DataCode::FileUnwritable, "the recording has no file").file(&self.side))
             }

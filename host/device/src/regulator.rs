@@ -20,8 +20,8 @@ use model_core::link::settings::{Regulator, Settings};
 use model_core::units::Length;
 
 use self::squares::Search;
-use super::course::{Course, Quantity};
 use super::run::{Ending, Plan, run, run_asking};
+use super::setpoint_profile::{Quantity, SetpointProfile};
 use super::{Client, tables};
 use crate::error::DeviceCode;
 use pam_data::error::{DataCode, Error, Result};
@@ -105,7 +105,7 @@ fn steps(client: &mut Client, low_pa: f64, high_pa: f64, stop: &dyn Fn() -> bool
     let plan = Plan {
         quantity: Quantity::Pressure,
         // The device makes them, so that each is as long as it should be however late this program is.
-        course: Course::Wave(Reference::Trapezoid {
+        profile: SetpointProfile::Wave(Reference::Trapezoid {
             low: low_pa as f32,
             high: high_pa as f32,
             ramp_s: 0.0,
@@ -130,9 +130,9 @@ fn steps(client: &mut Client, low_pa: f64, high_pa: f64, stop: &dyn Fn() -> bool
     let found = from_samples(&samples).ok_or_else(|| {
         Error::new(
             DeviceCode::DeviceVerify,
-            "the pressure does not follow its command, so no regulator can be found",
+            "the pressure does not follow its command, so the regulator cannot be identified",
         )
-        .help("is the supply air open, and is the pressure sensor where the muscle is?")
+        .help("check that the air supply is open and that the pressure sensor is connected to this muscle")
     })?;
     Ok(Found { line_s: found.line_s / fill(client, stroke_m)?, ..found })
 }
@@ -229,7 +229,7 @@ fn deadband(
     let search = RefCell::new(Search::new(middle_pa, found.gain));
     let plan = Plan {
         quantity: Quantity::Pressure,
-        course: Course::Constant(middle_pa as f32),
+        profile: SetpointProfile::Constant(middle_pa as f32),
         seconds: None,
         every_ticks: 4,
     };
@@ -326,7 +326,7 @@ impl Found {
         if client.call_once::<SetSettings>(&wanted)? != wanted {
             return Err(Error::new(
                 DeviceCode::DeviceVerify,
-                "the device keeps other settings than it was sent",
+                "the settings read back from the device differ from those sent",
             ));
         }
         Ok(())

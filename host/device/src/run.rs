@@ -1,4 +1,4 @@
-//! A run: start, follow a course, hand on every sample, and leave the muscle vented whatever happens.
+//! A run: start, follow a setpoint profile, pass on every sample, and leave the muscle vented whatever happens.
 
 use std::time::{Duration, Instant};
 
@@ -11,8 +11,8 @@ use model_core::link::messages::{
     TelemetryRate,
 };
 
-use super::course::{Course, Quantity};
-use super::{Client, Topic, words};
+use super::setpoint_profile::{Quantity, SetpointProfile};
+use super::{Client, Topic, messages};
 use crate::error::DeviceCode;
 use pam_data::error::{DataCode, Error, Result};
 
@@ -21,8 +21,8 @@ use pam_data::error::{DataCode, Error, Result};
 pub struct Plan {
     /// What is controlled.
     pub quantity: Quantity,
-    /// What is asked.
-    pub course: Course,
+    /// The setpoint over time.
+    pub profile: SetpointProfile,
     /// Device time from the start until the end, s; `None` until `stop` says so.
     pub seconds: Option<f64>,
     /// One sample every so many ticks.
@@ -32,7 +32,7 @@ pub struct Plan {
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
-    /// The time was over.
+    /// The time elapsed.
     Done,
     /// `stop` said so.
     Stopped,
@@ -54,7 +54,7 @@ pub fn vent(client: &mut Client) -> Result<Status> {
     match disarmed.and(stopped) {
         Ok(_) => client.call::<GetStatus>(&()),
         Err(e) => Err(Error::new(e.code(), format!("the device may not have vented: {}", e.cause()))
-            .help("take the supply air away from the muscle by hand")),
+            .help("shut off the air supply of the muscle by hand")),
     }
 }
 
@@ -90,7 +90,7 @@ pub fn run_asking(
     let vented = vent(client);
     let ending = outcome?;
     vented?;
-    quiet?.map_err(|refusal| words::refused("telemetry", refusal))?;
+    quiet?.map_err(|refusal| messages::refused("telemetry", refusal))?;
     Ok(ending)
 }
 
@@ -105,7 +105,7 @@ pub fn arm(client: &mut Client) -> Result<()> {
         let now = match client.try_call::<Arm>(&())? {
             Ok(status) => status.state,
             Err(refusal) if refusal == empty && Instant::now() < deadline => State::Disarmed,
-            Err(refusal) => return Err(words::refused(Arm::NAME, refusal)),
+            Err(refusal) => return Err(messages::refused(Arm::NAME, refusal)),
         };
         match now {
             State::Armed | State::Running => return Ok(()),
@@ -137,7 +137,7 @@ fn follow(
     if status.state == State::Disarmed {
         arm(client)?;
     }
-    if let Course::Points { values, .. } = &plan.course {
+    if let SetpointProfile::Points { values, .. } = &plan.profile {
         send_points(client, values)?;
     }
     client.call::<SetTelemetry>(&TelemetryRate { every_ticks: plan.every_ticks })?;
@@ -172,7 +172,7 @@ fn follow(
                     client.call::<SetTo>(&plan.quantity.set_point(value))?;
                 }
             }
-            Some(Topic::Event(Event::Fault(report))) => return Err(words::stopped(&report)),
+            Some(Topic::Event(Event::Fault(report))) => return Err(messages::stopped(&report)),
             Some(Topic::Event(_) | Topic::Log(_)) => {}
             None if heard.elapsed() > SILENCE => {
                 let status = client.call::<GetStatus>(&())?;
@@ -181,9 +181,9 @@ fn follow(
                 }
                 return Err(Error::new(
                     DeviceCode::DeviceSilent,
-                    format!("the device answers, but sends no telemetry; it is {}", words::state(status.state)),
+                    format!("the device answers, but sends no telemetry; it is {}", messages::state(status.state)),
                 )
-                .help("its control loop may be waiting for its sensors: `host device info` shows whether ticks are counted"));
+                .help("its control loop may be waiting for sensors: `host device info` shows whether ticks advance"));
             }
             None => {}
         }
@@ -194,9 +194,9 @@ fn follow(
 fn fault(client: &mut Client) -> Result<Error> {
     let faults = client.call::<GetFaults>(&())?;
     Ok(match faults.latched {
-        Some(report) => words::stopped(&report),
+        Some(report) => messages::stopped(&report),
         None => {
-            Error::new(DeviceCode::DeviceFault, "the device is stopped by a fault that it no longer names")
+            Error::new(DeviceCode::DeviceFault, "the device is stopped by a fault that it no longer reports")
                 .help("clear it with `host device faults --clear`")
         }
     })
@@ -212,18 +212,18 @@ fn send_points(client: &mut Client, values: &[f32]) -> Result<()> {
 }
 
 fn too_long() -> Error {
-    Error::new(DataCode::CallInvalid, "the course has more points than a device holds")
+    Error::new(DataCode::CallInvalid, "the setpoint profile has more points than the device holds")
         .help("use fewer points")
 }
 
-/// The first value of a course that the device makes.
-fn begins_at(course: &Course) -> f32 {
-    match course {
-        Course::Constant(value) => *value,
-        Course::Steps { values, .. } | Course::Points { values, .. } => {
+/// The first value of a profile.
+fn begins_at(profile: &SetpointProfile) -> f32 {
+    match profile {
+        SetpointProfile::Constant(value) => *value,
+        SetpointProfile::Steps { values, .. } | SetpointProfile::Points { values, .. } => {
             values.first().copied().unwrap_or(0.0)
         }
-        Course::Wave(wave) => match *wave {
+        SetpointProfile::Wave(wave) => match *wave {
             Reference::Sine { mean, .. } | Reference::Chirp { mean, .. } => mean,
             Reference::Trapezoid { low, .. } => low,
             Reference::SetPoint | Reference::Table { .. } => 0.0,
@@ -240,26 +240,26 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// Sends what the course needs at its beginning.
+    /// Sends what the profile needs at its start.
     ///
     /// # Errors
     /// What the device refuses, or silence.
     pub fn begin(client: &mut Client, plan: &Plan) -> Result<Self> {
-        if let (Quantity::Angle { .. }, Course::Wave(_) | Course::Points { .. }) =
-            (plan.quantity, &plan.course)
+        if let (Quantity::Angle { .. }, SetpointProfile::Wave(_) | SetpointProfile::Points { .. }) =
+            (plan.quantity, &plan.profile)
         {
             // A wave has one value; the stiffness is the last set-point's.
-            let angle = begins_at(&plan.course);
+            let angle = begins_at(&plan.profile);
             client.call::<SetTo>(&plan.quantity.set_point(angle))?;
         }
-        let (values, hold_s) = match &plan.course {
-            Course::Constant(value) => (vec![*value], f64::INFINITY),
-            Course::Steps { values, hold_s } => (values.clone(), *hold_s),
-            Course::Wave(reference) => {
+        let (values, hold_s) = match &plan.profile {
+            SetpointProfile::Constant(value) => (vec![*value], f64::INFINITY),
+            SetpointProfile::Steps { values, hold_s } => (values.clone(), *hold_s),
+            SetpointProfile::Wave(reference) => {
                 client.call::<SetReference>(reference)?;
                 (Vec::new(), f64::INFINITY)
             }
-            Course::Points { step_s, .. } => {
+            SetpointProfile::Points { step_s, .. } => {
                 client.call::<SetReference>(&Reference::Table { step_s: *step_s, repeat: true })?;
                 (Vec::new(), f64::INFINITY)
             }

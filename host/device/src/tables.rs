@@ -6,7 +6,7 @@ use model_core::link::messages::{
     PIECE, Refusal, Side, TableBegin, TableFault, TableInfo, TablePiece, TableRead,
 };
 
-use super::{Client, words};
+use super::{Client, messages};
 use crate::error::DeviceCode;
 use pam_data::error::{DataCode, Error, Result};
 
@@ -43,7 +43,7 @@ pub fn read(client: &mut Client, side: Side) -> Result<Option<Vec<u8>>> {
                 kept.crc
             ),
         )
-        .help("send the table again; if it comes back, the device's memory is failing"));
+        .help("send the table again; if the error returns, the memory of the device is failing"));
     }
     Ok(Some(image))
 }
@@ -56,7 +56,7 @@ fn commit(client: &mut Client, side: Side, crc: u32, before: Option<TableInfo>) 
         match client.try_once::<CommitTable>(&()) {
             Ok(Ok(kept)) => return Ok(kept),
             Ok(Err(Refusal::Table(TableFault::NotBegun))) if last.is_some() => {}
-            Ok(Err(refusal)) => return Err(words::refused("table_commit", refusal)),
+            Ok(Err(refusal)) => return Err(messages::refused("table_commit", refusal)),
             Err(silent) => last = Some(silent),
         }
         let mut info = client.call::<GetInfo>(&());
@@ -69,7 +69,7 @@ fn commit(client: &mut Client, side: Side, crc: u32, before: Option<TableInfo>) 
             _ => {}
         }
     }
-    Err(last.unwrap_or_else(|| words::refused("table_commit", Refusal::Table(TableFault::NotBegun))))
+    Err(last.unwrap_or_else(|| messages::refused("table_commit", Refusal::Table(TableFault::NotBegun))))
 }
 
 /// Sends an image, has it committed, reads it back and compares every byte. `progress` is told the bytes sent.
@@ -87,7 +87,7 @@ pub fn write(
     let capacity = client.call::<GetInfo>(&())?.table_capacity;
     let length = u32::try_from(image.len()).unwrap_or(u32::MAX);
     if length > capacity {
-        return Err(words::refused("table_begin", Refusal::Table(TableFault::TooLong(capacity))));
+        return Err(messages::refused("table_begin", Refusal::Table(TableFault::TooLong(capacity))));
     }
     let crc = check::of_image(image);
     let before = client.call::<GetInfo>(&())?.tables[side.index()];
@@ -101,7 +101,7 @@ pub fn write(
         })?;
         let there = match client.try_call::<SendTablePiece>(&TablePiece { offset: sent as u32, bytes }) {
             Ok(Ok(there) | Err(Refusal::Table(TableFault::Gap(there)))) => there as usize,
-            Ok(Err(refusal)) => return Err(words::refused("table_piece", refusal)),
+            Ok(Err(refusal)) => return Err(messages::refused("table_piece", refusal)),
             // A noisy line lets short frames pass where long ones break.
             Err(silent) if size > SMALLEST => {
                 size /= 2;
@@ -111,7 +111,7 @@ pub fn write(
             Err(silent) => return Err(silent),
         };
         if there <= sent || there > image.len() {
-            return Err(words::refused("table_piece", Refusal::Table(TableFault::Gap(there as u32))));
+            return Err(messages::refused("table_piece", Refusal::Table(TableFault::Gap(there as u32))));
         }
         sent = there;
         progress(sent);
@@ -124,7 +124,9 @@ pub fn write(
             DeviceCode::DeviceVerify,
             format!("the table read back differs from the one sent, first at byte {at} of {}", image.len()),
         )
-        .help("nothing was armed; send it again, and if it comes back the device's memory is failing"));
+        .help(
+            "nothing was armed; send it again; if the error returns, the memory of the device is failing",
+        ));
     }
     Ok(kept)
 }

@@ -15,6 +15,7 @@ use model_core::table::MuscleTable;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use pam_data::bounds;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::file_kind::FileKind;
 use pam_data::output::write_whole;
@@ -188,17 +189,11 @@ impl TableFile {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`DataCode::FileUnreadable`], or [`DataCode::TableInvalid`] with what is wrong.
+    /// [`DataCode::FileUnreadable`], also for a file that is longer than any table, or [`DataCode::TableInvalid`] with what is wrong.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let size = fs::metadata(path).map_err(|e| Error::unreadable(path, &e))?.len();
-        if size > (MAX_BODY + HEADER + CHECKSUM) as u64 {
-            let error =
-                Error::new(DataCode::TableInvalid, format!("{size} bytes are too many for a table file"))
-                    .help("tables end in .pam and are written by `host fit` or `host diagnose`");
-            return Err(FileKind::Table.wanted(path, error));
-        }
-        let bytes = fs::read(path).map_err(|e| Error::unreadable(path, &e))?;
+        let bytes = bounds::read(path, (MAX_BODY + HEADER + CHECKSUM) as u64)
+            .map_err(|e| e.help("tables end in .pam and are written by `host fit` or `host diagnose`"))?;
         Self::from_bytes(&bytes).map_err(|e| FileKind::Table.wanted(path, e))
     }
 
@@ -305,6 +300,12 @@ mod tests {
         for end in 0..bytes.len() {
             assert!(TableFile::from_bytes(&bytes[..end]).is_err(), "{end} bytes");
         }
+    }
+
+    #[test]
+    fn a_device_that_never_ends_is_no_table() {
+        let error = TableFile::read("/dev/zero").expect_err("it never ends");
+        assert_eq!(error.code(), DataCode::FileUnreadable);
     }
 
     #[test]

@@ -109,8 +109,7 @@ fn section(number: usize, section: &Section) -> Markup {
 }
 
 fn figure(figure: &Figure) -> Markup {
-    // Inside a script element only its own end tag has a meaning, and numbers have none; names could.
-    let numbers = figure.csv().replace("</", "<\\/");
+    let numbers = in_script(&figure.csv());
     html! {
         figure id=(figure.id) {
             h3 { (inline_markup::html(&figure.title)) }
@@ -126,6 +125,12 @@ fn figure(figure: &Figure) -> Markup {
             script type="text/csv" { (PreEscaped(numbers)) }
         }
     }
+}
+
+/// Text for a script element, in which a browser looks for `</script`, `<script` and `<!--` wherever they stand, and replaces no
+/// entities: the page's script does that when it saves the text.
+fn in_script(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;")
 }
 
 /// Whether a cell is a number, which is set to the right.
@@ -167,4 +172,18 @@ fn table(table: &Table) -> Markup {
 fn right(table: &Table, column: usize) -> Option<&'static str> {
     let mut cells = table.rows.iter().filter_map(|r| r.get(column)).filter(|c| !c.is_empty()).peekable();
     (cells.peek().is_some() && cells.all(|c| numeric(c))).then_some("number")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_script;
+
+    #[test]
+    fn no_name_in_the_numbers_reaches_the_browser_as_markup() {
+        let name = "a<!--<script>.csv,</SCRIPT >,&lt;,1<2\n";
+        let text = in_script(name);
+        assert!(!text.contains('<'), "{text}");
+        // As the page's script takes it back.
+        assert_eq!(text.replace("&lt;", "<").replace("&amp;", "&"), name);
+    }
 }

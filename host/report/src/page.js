@@ -5,7 +5,7 @@ document.addEventListener('click', (event) => {
   const figure = event.target.closest('figure');
   let text;
   if (kind === 'csv') {
-    text = figure.querySelector('script').textContent.replaceAll('<\\/', '</');
+    text = figure.querySelector('script').textContent.replaceAll('&lt;', '<').replaceAll('&amp;', '&');
   } else {
     const picture = figure.querySelector('svg').cloneNode(true);
     const style = document.createElementNS('http://www.w3.org/2000/svg', 'style');

@@ -14,7 +14,7 @@ use crate::console::Console;
 use pam_data::date;
 use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::output::{to_standard_output, write_whole};
+use pam_data::output::{Turn, to_standard_output, write_whole};
 use pam_data::progress::SharedProgress;
 use pam_diagnose::history::is_from_history;
 use pam_diagnose::remark::Remark;
@@ -81,7 +81,7 @@ impl Arguments {
         let muscle = MuscleDescription::read(&self.muscle)?;
         // Whoever asks for JSON is a program, or will look at that.
         let watched = if self.json.is_some() { Console::silent() } else { console.clone() };
-        let campaign = self.recordings.read_watched(Reader::of(&muscle), &watched)?;
+        let (campaign, hashes) = self.recordings.read_hashed(Reader::of(&muscle), &watched)?;
         for warning in &campaign.warnings {
             console.warning(warning);
         }
@@ -106,8 +106,15 @@ impl Arguments {
         // The line of progress goes before anything else is said.
         drop(options);
         console.detail(format!("diagnosed in {:.3} s", diagnosed.as_secs_f64()));
+        let _turn = Turn::of([
+            self.output.as_deref(),
+            self.json.as_deref(),
+            self.next.as_deref(),
+            self.reports.file(),
+            self.reports.figures.as_deref(),
+        ]);
         match refitted {
-            Some(Ok(refitted)) => self.with_model(console, &campaign, refitted, &mut answer)?,
+            Some(Ok(refitted)) => self.with_model(console, &campaign, hashes, refitted, &mut answer)?,
             // A table was asked for: then its absence is a failure. For advice alone it is not.
             Some(Err(e)) if self.output.is_some() => return Err(e),
             Some(Err(e)) => answer.remarks.push(Remark::NoAdvice(e.to_string())),
@@ -136,6 +143,7 @@ impl Arguments {
         &self,
         console: &Console,
         campaign: &pam_data::recording::Campaign,
+        hashes: Vec<String>,
         mut refitted: refitted_table::Refitted,
         answer: &mut pam_diagnose::Diagnosis,
     ) -> Result<()> {
@@ -152,7 +160,6 @@ impl Arguments {
             console.detail(warning);
         }
         let files = &self.recordings.files;
-        let hashes = files.iter().map(table_file::sha256).collect::<Result<Vec<_>>>()?;
         refitted.file.about.date = date::now_utc();
         refitted.file.about.sources = table_file::sources(campaign, files, hashes);
         refitted.file.write(path)?;

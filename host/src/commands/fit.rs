@@ -12,7 +12,7 @@ use pam_data::counted::counted;
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::output::{to_standard_output, write_whole};
+use pam_data::output::{Turn, to_standard_output, write_whole};
 use pam_fit::fit::{self, Options};
 
 use crate::progress::ProgressLine;
@@ -81,7 +81,7 @@ impl Arguments {
         let muscle = MuscleDescription::read(&self.muscle)?;
         // Whoever asks for JSON is a program, or will look at that.
         let watched = if self.json.is_some() { Console::silent() } else { console.clone() };
-        let campaign = self.recordings.read_watched(Reader::of(&muscle), &watched)?;
+        let (campaign, hashes) = self.recordings.read_hashed(Reader::of(&muscle), &watched)?;
         console.detail(format!(
             "read {} in {:.3} s",
             counted(campaign.samples(), "row"),
@@ -96,17 +96,10 @@ impl Arguments {
             fit_lengths: self.fit_lengths,
             physical: self.physical,
         };
-        // Files are hashed while the fit runs.
         let files = self.recordings.files.clone();
-        let (fitted, hashes) = std::thread::scope(|scope| {
-            let hashes = scope.spawn(|| files.iter().map(table_file::sha256).collect::<Result<Vec<_>>>());
-            let progress = ProgressLine::new(&watched, "fitting");
-            let fitted = fit::watched(&campaign, &muscle, &options, &progress);
-            (fitted, hashes.join())
-        });
-        let fitted = fitted?;
-        let hashes =
-            hashes.map_err(|_| Error::new(DataCode::FileUnreadable, "a file could not be hashed"))??;
+        let progress = ProgressLine::new(&watched, "fitting");
+        let fitted = fit::watched(&campaign, &muscle, &options, &progress)?;
+        drop(progress);
         console.detail(format!("fitted in {:.3} s", started.elapsed().as_secs_f64()));
         let about = table_file::About {
             muscle: muscle.name.clone(),
@@ -121,6 +114,12 @@ impl Arguments {
         let table = TableFile { table: fitted.table.clone(), about };
         let json = serde_json::to_string_pretty(&fitted.summary)
             .map_err(|e| Error::new(DataCode::FileUnwritable, e.to_string()))?;
+        let _turn = Turn::of([
+            self.output.as_deref(),
+            self.json.as_deref(),
+            self.reports.file(),
+            self.reports.figures.as_deref(),
+        ]);
         if let Some(path) = &self.output {
             table.write(path)?;
         }

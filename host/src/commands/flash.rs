@@ -16,7 +16,7 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::{printed, to_standard_output, write_whole};
 use pam_data::progress::Progress;
 use pam_device::error::DeviceCode;
-use pam_device::{Client, difference, recorder, tables};
+use pam_device::{Client, recorder, table_diff, tables};
 
 use crate::progress::ProgressLine;
 use pam_data::date::now_utc;
@@ -67,7 +67,7 @@ impl Arguments {
         match (&self.firmware, &self.chip, &self.table) {
             (Some(firmware), Some(chip), _) => program(firmware, chip, console),
             (_, _, Some(table)) => self.send(table, console),
-            _ => Err(Error::new(DataCode::CallInvalid, "neither a table nor a firmware is given")),
+            _ => Err(Error::new(DataCode::CallInvalid, "give a table or a firmware image")),
         }
     }
 
@@ -78,7 +78,8 @@ impl Arguments {
         let image = image::write(&file.table, &mut buffer)
             .map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()).file(path))?;
         if !file.about.corrections.is_empty() {
-            console.note("the table's corrections of the bench stay here; the controller is sent the muscle's part only");
+            console
+                .note("the corrections of the bench are not sent; the controller receives the muscle only");
         }
         let side = self.muscle.side();
         let mut client = self.port.connect(console)?;
@@ -132,7 +133,7 @@ impl Arguments {
         };
         match image::read(before) {
             Ok(table) => {
-                let difference = difference::between(&table, &file.table);
+                let difference = table_diff::between(&table, &file.table);
                 console.note(format!("device → {}:\n{}", file.about.muscle, difference.to_text()));
                 difference.to_json()
             }
@@ -168,7 +169,7 @@ impl Arguments {
             .clone()
             .unwrap_or_else(|| path.with_extension(format!("{:08x}.pam", check::of_image(before))));
         TableFile { table, about }.write(&to)?;
-        console.note(format!("the device's table is kept in {}", to.display()));
+        console.note(format!("the previous table of the device is saved in {}", to.display()));
         Ok(to.display().to_string())
     }
 
@@ -192,9 +193,9 @@ impl Arguments {
                     if crc != Some(check::of_image(image)) {
                         return Err(Error::new(
                             DeviceCode::DeviceVerify,
-                            "after its restart the device has another table",
+                            "the device has another table after its restart",
                         )
-                        .help("send it again; if it comes back, the device's memory is failing"));
+                        .help("send it again; if the error returns, the memory of the device is failing"));
                     }
                     console.note("confirmed after a restart");
                     return Ok(again);

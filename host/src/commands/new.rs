@@ -55,19 +55,19 @@ impl Arguments {
     /// Asks, checks each answer as it comes, writes.
     ///
     /// # Errors
-    /// [`DataCode::CallInvalid`] when the file is there already or the answers end early, [`DataCode::FileUnwritable`].
+    /// [`DataCode::CallInvalid`] when the file already exists or the answers end early, [`DataCode::FileUnwritable`].
     pub fn run(self, console: &Console) -> Result<()> {
         if !self.replace && self.output.as_os_str() != "-" && self.output.exists() {
-            return Err(Error::new(DataCode::CallInvalid, "the file is there already")
+            return Err(Error::new(DataCode::CallInvalid, "the file already exists")
                 .file(&self.output)
-                .help("name another one with -o, or replace it with --replace"));
+                .help("choose another name with -o, or replace it with --replace"));
         }
         // What cannot be written is better known before seven questions than after.
         let folder = self.output.parent().filter(|f| !f.as_os_str().is_empty());
         if let Some(folder) = folder
             && !folder.is_dir()
         {
-            return Err(Error::new(DataCode::FileUnwritable, "the folder is not there")
+            return Err(Error::new(DataCode::FileUnwritable, "the folder does not exist")
                 .file(folder)
                 .help("make it first"));
         }

@@ -53,9 +53,9 @@ fn chosen(plugged_in: &[String], is_controller: impl Fn(&str) -> bool) -> Result
     if plugged_in.is_empty() {
         return Err(Error::new(
             DataCode::CallInvalid,
-            "no port is given, and no USB serial device is plugged in",
+            "no port is given, and no USB serial device is connected",
         )
-        .help("name it: --port /dev/ttyACM0, or --port tcp:HOST:PORT for an emulated one"));
+        .help("give --port /dev/ttyACM0, or --port tcp:HOST:PORT for an emulated device"));
     }
     if let [only] = plugged_in {
         return Ok(only);

@@ -17,8 +17,8 @@ use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::progress::Progress;
 use pam_device::error::DeviceCode;
-use pam_device::recorder::{Recorder, about_losses, about_start, rescue};
-use pam_device::{Client, Topic, words};
+use pam_device::recorder::{Recorder, about_losses, about_start, recover};
+use pam_device::{Client, Topic, messages};
 
 use crate::progress::ProgressLine;
 use pam_data::date::now_utc;
@@ -116,10 +116,10 @@ impl Arguments {
         }
         watched?;
         kept?;
-        quiet?.map_err(|refusal| words::refused("telemetry", refusal))?;
+        quiet?.map_err(|refusal| messages::refused("telemetry", refusal))?;
         if losses.samples > 0 {
             console.warning(format!(
-                "{} lost on the way, in {}",
+                "{} lost on the line, in {}",
                 counted(losses.samples, "sample"),
                 counted(losses.gaps, "gap")
             ));
@@ -144,7 +144,7 @@ fn watch(
 ) -> Result<Ending> {
     client
         .try_call::<SetTelemetry>(&TelemetryRate { every_ticks })?
-        .map_err(|refusal| words::refused("telemetry", refusal))?;
+        .map_err(|refusal| messages::refused("telemetry", refusal))?;
     let (mut first, mut last) = (None, 0);
     let mut heard = Instant::now();
     while !stop() {
@@ -156,9 +156,9 @@ fn watch(
                 if sample.time_us < last {
                     return Err(Error::new(
                         DeviceCode::DeviceSilent,
-                        "the device restarted while it was recorded",
+                        "the device restarted during the recording",
                     )
-                    .help("`host device faults` says whether a fault did it; look at its supply"));
+                    .help("`host device faults` shows whether a fault caused it; check the power supply"));
                 }
                 last = sample.time_us;
                 let elapsed = last - *first.get_or_insert(last);
@@ -174,9 +174,9 @@ fn watch(
                 let status = client.call::<GetStatus>(&())?;
                 return Err(Error::new(
                     DeviceCode::DeviceSilent,
-                    format!("the device answers, but sends no telemetry; it is {}", words::state(status.state)),
+                    format!("the device answers, but sends no telemetry; it is {}", messages::state(status.state)),
                 )
-                .help("it may have restarted: `host device info` shows for how long it runs, and whether ticks are counted"));
+                .help("it may have restarted: `host device info` shows its time since start and whether ticks advance"));
             }
             None => {}
         }
@@ -189,11 +189,12 @@ fn watch(
 #[command(
     arg_required_else_help = true,
     after_help = "Example:\n  host recover run.csv.part run.mcap.part\n\n\
-    A recording is named NAME.part while it grows. This takes away the sample that was being written when the program was \
-    killed, ends the file and gives it its name. The next recording of the same name does so by itself."
+    A recording is named NAME.part while it grows. What is whole in it goes to a file of its own, also behind damage; what is \
+    missing is said in bytes and samples, and the original is then kept as NAME.part.original. The next recording of the same \
+    name does so by itself. A damaged recording of another name stays, and what is whole in it goes to NAME.rescued-N."
 )]
 pub struct RecoverArguments {
-    /// Recordings that were cut off.
+    /// Recordings that were cut off or damaged.
     #[arg(required = true, value_name = "NAME.part")]
     files: Vec<PathBuf>,
     /// Print JSON.
@@ -205,20 +206,29 @@ impl RecoverArguments {
     /// Makes whole recordings.
     ///
     /// # Errors
-    /// Files that are no `.part`, or cannot be read or written.
+    /// Files in which nothing is whole, or that cannot be read or written.
     pub fn run(self, console: &Console) -> Result<()> {
         let mut done = Vec::new();
         for file in &self.files {
-            let name = rescue(file)?;
+            let found = recover(file)?;
             if !self.json {
-                console.result(match &name {
+                console.result(match &found.recording {
                     Some(name) => format!("{} is now {}", file.display(), name.display()),
-                    None => format!("{} held nothing and is removed", file.display()),
+                    None => format!("{} was empty and is removed", file.display()),
                 });
             }
+            if let Some(loss) = found.loss() {
+                console.warning(loss);
+            }
+            let text = |path: &Option<PathBuf>| path.as_ref().map(|p| p.display().to_string());
             done.push(bench::Recovered {
                 part: file.display().to_string(),
-                recording: name.map(|n| n.display().to_string()),
+                recording: text(&found.recording),
+                original: text(&found.original),
+                samples: found.tally.samples,
+                samples_lost: found.tally.samples_lost,
+                bytes_lost: found.tally.bytes_lost,
+                gaps: found.tally.gaps,
             });
         }
         if self.json {

@@ -10,7 +10,7 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::progress::Progress;
 
 use crate::progress::ProgressLine;
-use pam_data::recording::{Campaign, Import, Reader};
+use pam_data::recording::{Campaign, Hashes, Import, Reader};
 
 /// Recordings on the command line.
 #[derive(Debug, Clone, Args)]
@@ -43,6 +43,17 @@ impl Recordings {
             reader.filters.push((column.trim().to_owned(), value.trim().to_owned()));
         }
         reader.campaign(&self.files)
+    }
+
+    /// As [`Recordings::read_watched`]; also gives the SHA-256 of each file, as it was read.
+    ///
+    /// # Errors
+    /// As [`Recordings::read`].
+    pub fn read_hashed(&self, mut reader: Reader<'_>, console: &Console) -> Result<(Campaign, Vec<String>)> {
+        let hashes = Arc::new(Hashes::default());
+        reader.hashes = Some(Arc::clone(&hashes));
+        let campaign = self.read_watched(reader, console)?;
+        Ok((campaign, hashes.of(&self.files)?))
     }
 
     /// As [`Recordings::read`], with a bar where somebody watches the console.

@@ -1,4 +1,4 @@
-//! `host run` and `host vent`: let a controller follow a course and record it; make it safe.
+//! `host run` and `host vent`: let a controller follow a setpoint profile and record it; make it safe.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,12 +15,12 @@ use crate::documents::{device, line};
 use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::progress::Progress;
-use pam_device::course::{Course, Quantity};
 use pam_device::error::DeviceCode;
-use pam_device::reach::Reached;
+use pam_device::reachability::Reachability;
 use pam_device::recorder::{Recorder, about_losses, about_start};
 use pam_device::run::{Ending, Plan, run, vent};
-use pam_device::{Client, words};
+use pam_device::setpoint_profile::{Quantity, SetpointProfile};
+use pam_device::{Client, messages};
 
 use crate::progress::ProgressLine;
 
@@ -32,9 +32,9 @@ use crate::progress::ProgressLine;
     host run --port /dev/ttyACM0 --seconds 10 -o run.csv \\\n      \
         --force 'sine mean=60 amplitude=20 frequency=0.5'\n  \
     host run --force 'steps 40 60 80 hold=2' --seconds 12 -o steps.mcap\n  \
-    host run --stroke @course.csv --seconds 30 -o stroke.csv\n  \
+    host run --stroke @profile.csv --seconds 30 -o stroke.csv\n  \
     host run --angle 'sine mean=0 amplitude=5 frequency=0.5' --stiffness 12\n\n\
-    Courses (frequencies in Hz, times in s):\n  \
+    Setpoint profiles (frequencies in Hz, times in s):\n  \
     VALUE\n  \
     sine mean= amplitude= frequency=\n  \
     steps V V … hold=\n  \
@@ -74,16 +74,16 @@ pub struct Arguments {
 #[group(required = true, multiple = false)]
 struct Asked {
     /// Force to follow, N.
-    #[arg(long, value_name = "COURSE", allow_hyphen_values = true)]
+    #[arg(long, value_name = "PROFILE", allow_hyphen_values = true)]
     force: Option<String>,
     /// Pressure to follow, kPa.
-    #[arg(long, value_name = "COURSE", allow_hyphen_values = true)]
+    #[arg(long, value_name = "PROFILE", allow_hyphen_values = true)]
     pressure: Option<String>,
     /// Stroke to follow, mm.
-    #[arg(long, value_name = "COURSE", allow_hyphen_values = true)]
+    #[arg(long, value_name = "PROFILE", allow_hyphen_values = true)]
     stroke: Option<String>,
     /// Angle of a joint to follow, degrees: two muscles on one pulley (the settings' `joint`).
-    #[arg(long, value_name = "COURSE", allow_hyphen_values = true, requires = "stiffness")]
+    #[arg(long, value_name = "PROFILE", allow_hyphen_values = true, requires = "stiffness")]
     angle: Option<String>,
 }
 
@@ -92,16 +92,16 @@ impl Asked {
         [&self.force, &self.pressure, &self.stroke, &self.angle].into_iter().find_map(|text| text.as_deref())
     }
 
-    fn parse(&self, stiffness: Option<f32>) -> Result<(Quantity, Course)> {
+    fn parse(&self, stiffness: Option<f32>) -> Result<(Quantity, SetpointProfile)> {
         let quantity = match (&self.force, &self.pressure, &self.stroke, stiffness) {
             (Some(_), ..) => Quantity::Force,
             (_, Some(_), ..) => Quantity::Pressure,
             (_, _, Some(_), _) => Quantity::Stroke,
             (.., Some(stiffness_nm_per_rad)) => Quantity::Angle { stiffness_nm_per_rad },
-            _ => return Err(Error::new(DataCode::CallInvalid, "nothing is asked for")),
+            _ => return Err(Error::new(DataCode::CallInvalid, "no setpoint profile is given")),
         };
         let text = self.text().unwrap_or_default();
-        Ok((quantity, Course::parse(text, quantity)?))
+        Ok((quantity, SetpointProfile::parse(text, quantity)?))
     }
 }
 
@@ -119,9 +119,9 @@ impl Arguments {
     /// Does what was asked.
     ///
     /// # Errors
-    /// A wrong course, a device that is silent or refuses, the fault that stopped it, a recording that cannot be written.
+    /// A wrong setpoint profile, a device that is silent or refuses, the fault that stopped it, a recording that cannot be written.
     pub fn run(self, console: &Console) -> Result<()> {
-        let (quantity, course) = self.quantity.parse(self.stiffness)?;
+        let (quantity, profile) = self.quantity.parse(self.stiffness)?;
         positive([("--seconds", self.seconds), ("--rate", self.rate)])?;
         if self.stiffness.is_some_and(|s| !(s >= 0.0 && s.is_finite())) {
             return Err(Error::new(DataCode::CallInvalid, "--stiffness must be zero or more"));
@@ -135,17 +135,17 @@ impl Arguments {
         let ticks = f64::from(client.call::<GetInfo>(&())?.ticks_per_s);
         let every_ticks = self.rate.map_or(1.0, |rate| (ticks / rate).round()).clamp(1.0, 60_000.0) as u16;
         let mut about = about_start("pam-run/1", &mut client)?;
-        about["mode"] = json!(words::mode(quantity.mode()));
-        about["course"] = json!(self.quantity.text());
+        about["mode"] = json!(messages::mode(quantity.mode()));
+        about["setpoint_profile"] = json!(self.quantity.text());
         about["stiffness_Nm_per_rad"] = json!(self.stiffness);
         about["unit"] = json!(quantity.unit());
         let mut recorder = begin(&self.output, &about, console)?;
-        let plan = Plan { quantity, course, seconds: self.seconds, every_ticks };
+        let plan = Plan { quantity, profile, seconds: self.seconds, every_ticks };
         let mut errors = Errors::new(client.call::<GetSettings>(&())?.joint);
         let saturated_before = client.call::<GetStatus>(&())?.saturated_ticks;
         let progress = ProgressLine::new(console, "run");
         progress.total(self.seconds.map_or(0, |s| (s * 1e3) as u64));
-        let mut reached = if quantity == Quantity::Pressure { None } else { Reached::of(&mut client)? };
+        let mut reached = if quantity == Quantity::Pressure { None } else { Reachability::of(&mut client)? };
         let mut start = None;
         let outcome = run(
             &mut client,
@@ -188,7 +188,7 @@ impl Arguments {
         let kept = kept?;
         if losses.samples > 0 {
             console.warning(format!(
-                "{} lost on the way, in {}",
+                "{} lost on the line, in {}",
                 counted(losses.samples, "sample"),
                 counted(losses.gaps, "gap")
             ));
@@ -196,11 +196,11 @@ impl Arguments {
         let lasted = errors.all.samples as f64 * f64::from(every_ticks);
         // A step asks for more than can be had for a moment, and is none the worse for it.
         if let Some(saturated) = saturated.map(f64::from).filter(|&saturated| saturated > 0.1 * lasted) {
-            let why = reached.as_ref().and_then(Reached::why).unwrap_or(
+            let why = reached.as_ref().and_then(Reachability::why).unwrap_or(
                 "more than the muscle can do there at the highest pressure allowed, or less than at none",
             );
             console.warning(format!(
-                "for {:.2} of {:.2} s what was asked was out of reach: {why}",
+                "for {:.2} of {:.2} s the setpoint could not be reached: {why}",
                 saturated.min(lasted) / ticks,
                 lasted / ticks
             ));
@@ -301,8 +301,11 @@ fn choose_feed_forward(client: &mut Client, source: Source) -> Result<()> {
     };
     let kept = client.call_once::<SetSettings>(&settings)?;
     if kept != settings {
-        return Err(Error::new(DeviceCode::DeviceVerify, "the device keeps other settings than it was sent")
-            .help("see `host device settings`"));
+        return Err(Error::new(
+            DeviceCode::DeviceVerify,
+            "the settings read back from the device differ from those sent",
+        )
+        .help("see `host device settings`"));
     }
     Ok(())
 }
@@ -315,7 +318,7 @@ pub(super) fn positive<const N: usize>(options: [(&str, Option<f64>); N]) -> Res
         {
             return Err(Error::new(DataCode::CallInvalid, format!("{option} must be above zero"))
                 .value(value.to_string())
-                .help("leave the option out to go on at the controller's own rate until Ctrl-C"));
+                .help("omit the option to record at the rate of the controller until Ctrl-C"));
         }
     }
     Ok(())
@@ -325,9 +328,9 @@ pub(super) fn positive<const N: usize>(options: [(&str, Option<f64>); N]) -> Res
 pub(super) fn not_there(files: &[PathBuf], replace: bool) -> Result<()> {
     // A device such as /dev/null takes any number of recordings.
     match files.iter().find(|f| f.is_file()) {
-        Some(there) if !replace => Err(Error::new(DataCode::CallInvalid, "the recording is there already")
+        Some(there) if !replace => Err(Error::new(DataCode::CallInvalid, "the recording already exists")
             .file(there)
-            .help("name another one with -o, or replace it with --replace")),
+            .help("choose another name with -o, or replace it with --replace")),
         _ => Ok(()),
     }
 }
@@ -338,8 +341,14 @@ pub(super) fn begin(files: &[PathBuf], about: &Value, console: &Console) -> Resu
         return Ok(None);
     }
     let recorder = Recorder::create(files, about)?;
-    for file in recorder.rescued() {
-        console.note(format!("a recording that was cut off under this name is now {}", file.display()));
+    for file in recorder.recovered() {
+        if let Some(recording) = &file.recording {
+            console
+                .note(format!("a recording that was cut off under this name is now {}", recording.display()));
+        }
+        if let Some(loss) = file.loss() {
+            console.warning(loss);
+        }
     }
     Ok(Some(recorder))
 }
@@ -347,7 +356,10 @@ pub(super) fn begin(files: &[PathBuf], about: &Value, console: &Console) -> Resu
 /// Ends it.
 pub(super) fn end(recorder: Recorder, about: &Value, console: &Console) -> Result<PathBuf> {
     if recorder.skipped() > 0 {
-        console.warning(format!("{} without numbers left out", counted(recorder.skipped(), "sample")));
+        console.warning(format!(
+            "{} left out: not finite, or not later than the one before",
+            counted(recorder.skipped(), "sample")
+        ));
     }
     recorder.finish(about)
 }
@@ -357,7 +369,7 @@ pub(super) fn interrupts() -> Result<Arc<AtomicBool>> {
     let flag = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&flag);
     ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))
-        .map_err(|e| Error::new(DataCode::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
+        .map_err(|e| Error::new(DataCode::CallInvalid, format!("Ctrl-C cannot be handled: {e}")))?;
     Ok(flag)
 }
 
@@ -379,7 +391,7 @@ impl VentArguments {
     /// A device that does not answer; then it must be vented by hand.
     pub fn run(self, console: &Console) -> Result<()> {
         let status = vent(&mut self.port.connect(console)?)?;
-        let state = words::state(status.state);
+        let state = messages::state(status.state);
         console.result(if self.json {
             line(&device::Vent { schema: "pam-vent/1", vented: true, state })?
         } else {

@@ -7,8 +7,7 @@ use clap::Args;
 
 use crate::console::Console;
 use crate::documents::{bench, line};
-use crate::studio::keeper::Order;
-use crate::studio::server::serve;
+use crate::studio::server::{First, serve};
 use pam_data::error::{DataCode, Error, Result};
 
 /// Arguments of `host studio`.
@@ -42,7 +41,7 @@ impl Arguments {
     /// # Errors
     /// A port that cannot be used, a device that cannot be reached.
     pub fn run(self, console: &Console) -> Result<()> {
-        let first = self.emulate.map(Order::Emulate).or(self.port.map(Order::Connect));
+        let first = self.emulate.map(First::Emulate).or(self.port.map(First::Connect));
         let (send, stop) = tokio::sync::oneshot::channel::<()>();
         let send = Arc::new(Mutex::new(Some(send)));
         ctrlc::set_handler(move || {
@@ -52,7 +51,7 @@ impl Arguments {
                 let _ = send.send(());
             }
         })
-        .map_err(|e| Error::new(DataCode::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
+        .map_err(|e| Error::new(DataCode::CallInvalid, format!("Ctrl-C cannot be handled: {e}")))?;
         let ready = |address: &str| {
             if self.json {
                 // A document of two strings can always be written.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand, ValueEnum};
 use model_core::muscle::Muscle;
 
-use crate::console::Console;
+use crate::console::{Console, name};
 use crate::documents::{table as document, text};
 use pam_data::counted::counted;
 use pam_data::error::Result;
@@ -254,10 +254,10 @@ fn to_text(file: &TableFile) -> String {
          L0 {:.2} mm, braid {:.2}° from the radial plane, bladder {:.2} mm, wall {:.2} mm{}\n\
          P0 {:.1} kPa, blocked force {:.1} N, at most {:.0} kPa\n\
          tested {:.0} to {:.0} kPa, contraction {:.4} to {:.4}\n",
-        a.muscle,
+        name(&a.muscle),
         t.kind,
-        a.date,
-        a.tool,
+        name(&a.date),
+        name(&a.tool),
         t.geometry.rest_length.millimetres(),
         t.geometry.braid_angle.degrees(),
         t.geometry.outer_diameter.millimetres(),
@@ -294,7 +294,7 @@ fn to_text(file: &TableFile) -> String {
         text += &format!("effect {}: {}\n", info.name, parameters.join(", "));
     }
     for c in &a.corrections {
-        text += &format!("correction of the bench {}: {:?}\n", c.effect, c.parameters);
+        text += &format!("correction of the bench {}: {:?}\n", name(&c.effect), c.parameters);
     }
     text += &format!(
         "\n{} samples, rms {:.3} N, error {:.3} % mean, {:.3} % at most, of blocked force",
@@ -306,13 +306,13 @@ fn to_text(file: &TableFile) -> String {
     for s in &a.sources {
         text += &format!(
             "\nfrom {} ({}, sha256 {})",
-            s.path,
+            name(&s.path),
             counted(s.samples, "row"),
             s.sha256.get(..16).unwrap_or("")
         );
     }
     for w in &a.fit.warnings {
-        text += &format!("\nwarning: {w}");
+        text += &format!("\nwarning: {}", name(w));
     }
     text
 }

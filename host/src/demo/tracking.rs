@@ -6,9 +6,9 @@ use model_core::link::settings::{FeedForward, ForceLoop, Settings};
 
 use pam_data::error::{Error, Result};
 use pam_device::Client;
-use pam_device::course::{Course, Quantity};
 use pam_device::error::DeviceCode;
 use pam_device::run::{Ending, Plan, run};
+use pam_device::setpoint_profile::{Quantity, SetpointProfile};
 
 /// Where a controller's pressure comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,16 +94,20 @@ impl Task {
     #[must_use]
     pub fn plan(self, mean: f64) -> Plan {
         let part = |share: f64| (share * mean) as f32;
-        let (course, seconds) = match self {
+        let (profile, seconds) = match self {
             Self::Sine => {
                 let reference = Reference::Sine { mean: part(1.0), amplitude: part(0.5), frequency_hz: 0.5 };
-                (Course::Wave(reference), 5.0)
+                (SetpointProfile::Wave(reference), 5.0)
             }
-            Self::Steps => {
-                (Course::Steps { values: vec![part(0.8), part(1.2), part(1.0), part(1.3)], hold_s: 1.0 }, 4.0)
-            }
+            Self::Steps => (
+                SetpointProfile::Steps {
+                    values: vec![part(0.8), part(1.2), part(1.0), part(1.3)],
+                    hold_s: 1.0,
+                },
+                4.0,
+            ),
         };
-        Plan { quantity: Quantity::Force, course, seconds: Some(seconds), every_ticks: 1 }
+        Plan { quantity: Quantity::Force, profile, seconds: Some(seconds), every_ticks: 1 }
     }
 }
 
@@ -132,7 +136,10 @@ pub struct Track {
 pub fn choose(client: &mut Client, law: Law, gain: f64) -> Result<()> {
     let wanted = law.settings(client.call::<GetSettings>(&())?, gain);
     if client.call_once::<SetSettings>(&wanted)? != wanted {
-        return Err(Error::new(DeviceCode::DeviceVerify, "the device keeps other settings than it was sent"));
+        return Err(Error::new(
+            DeviceCode::DeviceVerify,
+            "the settings read back from the device differ from those sent",
+        ));
     }
     Ok(())
 }

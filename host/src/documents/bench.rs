@@ -133,4 +133,12 @@ pub(crate) struct Recover {
 pub(crate) struct Recovered {
     pub part: String,
     pub recording: Option<String>,
+    /// The original where it is kept.
+    pub original: Option<String>,
+    /// Samples recovered.
+    pub samples: u64,
+    pub samples_lost: u64,
+    pub bytes_lost: u64,
+    /// Damaged places.
+    pub gaps: u64,
 }

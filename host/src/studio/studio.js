@@ -4,7 +4,7 @@ const $ = (id) => document.getElementById(id);
 // The token goes from the address into this page's memory, so that it stands in no history and no screenshot.
 const token = new URLSearchParams(location.search).get("token") || sessionStorage.getItem("token") || "";
 sessionStorage.setItem("token", token);
-history.replaceState(null, "", location.pathname + "?token=" + token);
+history.replaceState(null, "", location.pathname);
 
 let hideMessage = 0;
 function message(text) {
@@ -184,17 +184,32 @@ async function listen() {
 listen();
 
 // Controller.
-const vent = () => order("vent");
+// Vents have a port of their own, whose requests no other request of this page or of another one can hold up; where it cannot be
+// reached, as through a tunnel, or does not answer at once, they go with the others, too.
+let ventPath = null;
+order("vent-path").then((path) => { ventPath = path; });
+async function vent() {
+  if (!ventPath) return order("vent");
+  const pause = new AbortController(), timer = setTimeout(() => pause.abort(), 200);
+  try {
+    const response = await fetch(ventPath.address, { method: "POST", body: ventPath.token, signal: pause.signal });
+    if (response.ok) return true;
+    const value = await response.json();
+    message(value.error + (value.help ? "\n→ " + value.help : ""));
+    return null;
+  } catch { return order("vent"); } finally { clearTimeout(timer); }
+}
 const click = (id, act) => $(id).addEventListener("click", act);
 click("vent", vent);
 // The difference that was shown is that of another table, or to another device: what is sent must have been seen.
+let compared = "";
 const unseen = () => { $("flash").disabled = true; $("difference-text").hidden = true; };
 click("connect", () => { unseen(); return order("connect", { port: $("port").value }); });
 click("disconnect", () => order("disconnect"));
 click("emulate", async () => { unseen(); message("starting …"); const r = await order("emulate", { muscle: $("bench").value }); if (r) message("connected: " + r.controller); });
 $("mishap").addEventListener("change", () => order("mishap", { code: Number($("mishap").value) }));
 click("arm", () => order("arm"));
-click("follow", () => order("follow", { quantity: $("quantity").value, course: $("course").value }));
+click("follow", () => order("follow", { quantity: $("quantity").value, profile: $("profile").value }));
 click("record", async () => { if (typeof state.recording === "number") { const r = await order("end-record"); if (r) recordings(r); } else order("record"); });
 click("clear", () => order("clear"));
 click("hold", () => {
@@ -256,14 +271,14 @@ $("files").addEventListener("change", async () => {
 });
 click("example", async () => { message("recording on the virtual bench …"); const r = await order("example", { muscle: $("bench").value }); if (r) { recordings(r); message(counted(r.recordings.length, "recording") + " loaded"); } });
 const text = (id, value) => { $(id).hidden = false; $(id).textContent = value; };
-const report = (id, name) => { $(id).hidden = false; $(id).firstChild.href = `/report/${name}?token=${token}`; };
+const report = (id, address) => { $(id).hidden = false; $(id).firstChild.href = address; };
 click("compare", compare);
 click("fit", async () => {
   message("fitting …");
   unseen();
   const r = await order("fit", { muscle: $("muscle").value });
   if (!r) return;
-  $("message").hidden = true; text("fit-text", r.text); report("fit-report", "fit"); $("lines-figure").hidden = false;
+  $("message").hidden = true; text("fit-text", r.text); report("fit-report", r.report); $("lines-figure").hidden = false;
   // From blue over red to orange: yellow and green would be too pale on white.
   const n = r.lines.length, hue = (i) => (220 + 170 * i / Math.max(1, n - 1)) % 360, shade = (i) => `hsl(${hue(i)} 70% ${colour("--depth")})`;
   $("lines-key").replaceChildren(...r.lines.map((l, i) => { const k = key("", l.kPa.toFixed(0) + " kPa"); k.style.color = `hsl(${hue(i)} 70% var(--depth))`; return k; }));
@@ -273,8 +288,8 @@ click("fit", async () => {
     axes.end();
   });
 });
-click("diagnose", async () => { message("diagnosing …"); const r = await order("diagnose", { muscle: $("muscle").value }); if (r) { $("message").hidden = true; text("diagnosis", r.text); report("diagnosis-report", "diagnosis"); } });
-click("difference", async () => { const r = await order("difference"); if (r) { text("difference-text", r.text); $("flash").disabled = false; } });
-click("flash", async () => { const r = await order("flash"); if (r) { $("flash").disabled = true; message(`written and read back: ${r.bytes} bytes, check sum ${r.crc}`); } });
+click("diagnose", async () => { message("diagnosing …"); const r = await order("diagnose", { muscle: $("muscle").value }); if (r) { $("message").hidden = true; text("diagnosis", r.text); report("diagnosis-report", r.report); } });
+click("difference", async () => { const r = await order("difference"); if (r) { text("difference-text", r.text); compared = r.table; $("flash").disabled = false; } });
+click("flash", async () => { const r = await order("flash", { table: compared }); if (r) { $("flash").disabled = true; message(`written and read back: ${r.bytes} bytes, check sum ${r.crc}`); } });
 order("recordings").then((r) => { if (r) recordings(r); });
 order("ports").then((r) => { if (Array.isArray(r)) $("ports").replaceChildren(...r.map((p) => new Option(p))); });

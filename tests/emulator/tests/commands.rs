@@ -220,7 +220,7 @@ fn a_trace_is_armed_filled_inside_the_loop_and_read_out_over_a_serial_device() {
     let output = program::run(&stand.line, stand.folder.path(), &wave);
     assert_eq!(output.status.code(), Some(1));
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(said.contains("more force than allowed"), "{said}");
+    assert!(said.contains("the force exceeds its limit"), "{said}");
     let trace = json(&stand.host(&["device", "trace", "--read", "--json"]));
     // 256 records fit; a machine that is busy may have had time for fewer ticks.
     let records = trace["records"].as_u64().unwrap_or(0) as usize;

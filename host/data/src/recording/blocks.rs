@@ -8,6 +8,9 @@ use std::collections::BTreeMap;
 use std::io::{self, Read};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
+use crate::bounds::Budget;
+use crate::error::Error;
+
 use super::cells::{Dialect, LineError, LineMap, Parsed, Wanted, Words, parse};
 
 /// Small enough for a block and its columns to stay in the second-level cache.
@@ -104,6 +107,8 @@ pub(super) enum RowsError {
     Block(BlockError),
     /// Lines count as in [`Rows`].
     Line(Box<LineError>),
+    /// More values than fit into memory.
+    TooMany(Error),
 }
 
 struct Queue {
@@ -115,6 +120,7 @@ struct Queue {
 
 struct Joined {
     rows: Rows,
+    budget: Budget,
     next: usize,
     pending: BTreeMap<usize, Result<Parsed, Box<LineError>>>,
     failure: Option<RowsError>,
@@ -127,14 +133,20 @@ pub(super) fn read_rows(
     wanted: &[Wanted],
     width: usize,
     size: Option<u64>,
+    budget: Budget,
 ) -> Result<Rows, RowsError> {
     let workers = match size {
         Some(size) if size < 4 * BLOCK as u64 => 1,
         _ => std::thread::available_parallelism().map_or(1, usize::from).min(16),
     };
     let queue = Mutex::new(Queue { blocks, ticket: 0, stopped: false });
-    let joined =
-        Mutex::new(Joined { rows: Rows::default(), next: 0, pending: BTreeMap::new(), failure: None });
+    let joined = Mutex::new(Joined {
+        rows: Rows::default(),
+        budget,
+        next: 0,
+        pending: BTreeMap::new(),
+        failure: None,
+    });
     let advanced = Condvar::new();
     let work = || worker(&queue, &joined, &advanced, workers, dialect, wanted, width, size);
     if workers == 1 {
@@ -209,6 +221,13 @@ fn worker(
             joined.next += 1;
             match parsed {
                 Ok(parsed) => {
+                    if let Err(error) = joined.budget.take(parsed.values()) {
+                        joined.failure.get_or_insert(RowsError::TooMany(error));
+                        drop(joined);
+                        lock(queue).stopped = true;
+                        advanced.notify_all();
+                        return;
+                    }
                     let rows = parsed.rows as u64;
                     // Two per cent more than the file's size suggests, for lines that get shorter.
                     let expected = size.map_or(0, |s| s.saturating_mul(rows) / bytes.max(1) / 50 * 51);
@@ -235,10 +254,19 @@ mod tests {
 
     const DIALECT: Dialect = Dialect { delimiter: b',', comment: Some(b'#'), decimal_comma: false };
 
+    const VALUES: usize = 1 << 20;
+
     fn read(text: Vec<u8>, size: Option<u64>) -> Result<Rows, RowsError> {
         let number = Want::Number { scale: 1.0, offset: 0.0 };
         let wanted = [Wanted { index: 0, want: number }, Wanted { index: 2, want: number }];
-        read_rows(Blocks::new(Box::new(io::Cursor::new(text))), DIALECT, &wanted, 3, size)
+        read_rows(
+            Blocks::new(Box::new(io::Cursor::new(text))),
+            DIALECT,
+            &wanted,
+            3,
+            size,
+            Budget::new(VALUES),
+        )
     }
 
     #[test]
@@ -258,6 +286,29 @@ mod tests {
         assert_eq!(rows.map.line(1), 3);
         assert_eq!(rows.map.line(1001), 1005);
         assert_eq!(rows.map.line(199_999), 199_999 + 400);
+    }
+
+    #[test]
+    fn a_text_that_never_ends_is_given_up_at_the_budget() {
+        /// Compresses to almost nothing, as such files do.
+        struct Endless(usize);
+        impl Read for Endless {
+            fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+                assert!(self.0 < 256 << 20, "reads on without bound");
+                for byte in buffer.iter_mut() {
+                    *byte = b"1,2,3\n"[self.0 % 6];
+                    self.0 += 1;
+                }
+                Ok(buffer.len())
+            }
+        }
+        let number = Want::Number { scale: 1.0, offset: 0.0 };
+        let wanted = [Wanted { index: 0, want: number }];
+        for size in [None, Some(10)] {
+            let blocks = Blocks::new(Box::new(Endless(0)));
+            let found = read_rows(blocks, DIALECT, &wanted, 3, size, Budget::new(VALUES));
+            assert!(matches!(found, Err(RowsError::TooMany(_))));
+        }
     }
 
     #[test]

@@ -128,6 +128,18 @@ pub(super) struct Parsed {
     pub map: LineMap,
 }
 
+impl Parsed {
+    /// Memory that its content takes, in values of 8 bytes: numbers, the codes of texts, every word twice with its place in a table,
+    /// and the places where lines were skipped.
+    pub fn values(&self) -> usize {
+        let numbers: usize = self.numbers.iter().map(Vec::len).sum();
+        let texts = self.texts.iter().map(|t| {
+            t.codes.len().div_ceil(2) + t.words.iter().map(|w| 12 + w.len().div_ceil(4)).sum::<usize>()
+        });
+        numbers + texts.sum::<usize>() + 2 * self.map.0.len()
+    }
+}
+
 /// Parses a block of whole lines; `width` cells are expected in each.
 pub(super) fn parse(
     block: &[u8],

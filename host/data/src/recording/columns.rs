@@ -44,6 +44,14 @@ impl Recording {
         self.time.len()
     }
 
+    /// Values in all its columns.
+    pub(super) fn values(&self) -> usize {
+        let optional = [&self.force, &self.temperature, &self.pressure_command];
+        let columns = 3 + optional.iter().filter(|c| c.is_some()).count();
+        // Those of cycles, directions and rows take less than one column together.
+        (columns + 1) * self.len()
+    }
+
     /// Whether there are no rows.
     #[must_use]
     pub fn is_empty(&self) -> bool {

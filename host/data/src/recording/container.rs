@@ -1,12 +1,15 @@
 //! Files that hold named columns of numbers instead of text: MATLAB and Parquet.
 
+#[cfg(feature = "parquet")]
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::BufReader;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use super::sheet::{Column, Sheet, damaged};
+use super::source::Source;
 use super::{matlab, mcap};
+use crate::bounds::{self, Budget};
 use crate::error::{DataCode, Error, Result};
 
 /// The kinds of containers.
@@ -43,19 +46,23 @@ impl Container {
         }
     }
 
-    fn columns(self, path: &Path) -> Result<Sheet> {
-        let mut file = File::open(path).map_err(|e| Error::unreadable(path, &e))?;
+    fn columns(self, path: &Path, source: &mut Source) -> Result<Sheet> {
         match self {
-            Self::Matlab5 | Self::Mcap => {
-                let mut bytes = Vec::new();
-                file.seek(SeekFrom::Start(0)).map_err(|e| Error::unreadable(path, &e))?;
-                file.read_to_end(&mut bytes).map_err(|e| Error::unreadable(path, &e))?;
-                if self == Self::Mcap { mcap::columns(&bytes) } else { matlab::columns(&bytes) }
+            Self::Matlab5 => {
+                matlab::columns(&bounds::whole(path, &mut source.reader, bounds::WHOLE)?, Budget::whole())
             }
+            Self::Mcap => {
+                mcap::columns(BufReader::with_capacity(1 << 18, &mut source.reader), Budget::default())
+            }
+            Self::Hdf5 | Self::Parquet if !source.again => Err(Error::new(
+                DataCode::FileUnreadable,
+                format!("a {} file cannot be read from a pipe", self.name()),
+            )
+            .help("save it as a file first")),
             #[cfg(feature = "hdf5")]
             Self::Hdf5 => super::hdf5::columns(path),
             #[cfg(feature = "parquet")]
-            Self::Parquet => super::parquet::columns(file),
+            Self::Parquet => super::parquet::columns(File::open(path).map_err(|e| Error::unreadable(path, &e))?),
             #[cfg(not(all(feature = "hdf5", feature = "parquet")))]
             _ => Err(Error::new(
                 DataCode::RecordingContainer,
@@ -67,9 +74,9 @@ impl Container {
 }
 
 /// The columns of a container.
-pub(super) fn columns(path: &Path, container: Container) -> Result<Sheet> {
+pub(super) fn columns(path: &Path, container: Container, source: &mut Source) -> Result<Sheet> {
     // A damaged file must end in an error, also where the reader of a foreign format would rather panic.
-    let sheet = catch_unwind(AssertUnwindSafe(|| container.columns(path)))
+    let sheet = catch_unwind(AssertUnwindSafe(|| container.columns(path, source)))
         .unwrap_or_else(|_| Err(damaged("the file is damaged beyond what its reader expects")))
         .map_err(|e| {
             if e.code() == DataCode::RecordingContainer && !e.advised() {

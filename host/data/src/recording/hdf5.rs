@@ -10,10 +10,9 @@ use hdf5_reader::group::Group;
 use hdf5_reader::{CompoundField, Dataset, Datatype, Hdf5File, OpenOptions};
 
 use super::sheet::{Column, Sheet, damaged, matrix, without_common_prefix};
+use crate::bounds::{Budget, WHOLE};
 use crate::error::{Error, Result};
 
-/// More than any recording holds, bytes; a damaged file may claim any size.
-const LARGEST: usize = 4 << 30;
 /// A group in a group in a group is no recording any more.
 const DEEPEST: usize = 4;
 
@@ -22,9 +21,9 @@ pub(super) fn columns(path: &Path) -> Result<Sheet> {
     let mut first = Vec::new();
     let start = std::fs::File::open(path).and_then(|f| f.take(10).read_to_end(&mut first));
     start.map_err(|e| Error::unreadable(path, &e))?;
-    let options = OpenOptions::default().with_max_read_bytes(LARGEST);
+    let options = OpenOptions::default().with_max_read_bytes(WHOLE as usize);
     let file = Hdf5File::open_with_options(path, options).map_err(damaged)?;
-    let mut found = Found { sheet: Sheet::new(), matlab: first == *b"MATLAB 7.3" };
+    let mut found = Found { sheet: Sheet::new(), matlab: first == *b"MATLAB 7.3", budget: Budget::whole() };
     found.group(&file.root_group().map_err(damaged)?, "", 0)?;
     Ok(without_common_prefix(found.sheet))
 }
@@ -33,6 +32,7 @@ struct Found {
     sheet: Sheet,
     /// MATLAB stores column by column, so that its dimensions appear in reverse.
     matlab: bool,
+    budget: Budget,
 }
 
 impl Found {
@@ -53,6 +53,15 @@ impl Found {
         Ok(())
     }
 
+    /// The bytes of a data set, where there is room for all its values.
+    fn bytes(&mut self, dataset: &Dataset, values_per_element: usize) -> Result<Vec<u8>> {
+        let elements = dataset.shape().iter().try_fold(1_u64, |n, side| n.checked_mul(*side));
+        let elements = elements.and_then(|n| usize::try_from(n).ok());
+        let values = elements.and_then(|n| n.checked_mul(values_per_element.max(1)));
+        self.budget.take(values.unwrap_or(usize::MAX))?;
+        dataset.read_native_bytes().map_err(damaged)
+    }
+
     fn dataset(&mut self, dataset: &Dataset, name: &str) -> Result<()> {
         let class = text_of(dataset.attribute("MATLAB_class").ok());
         let numeric = |c: &str| {
@@ -69,7 +78,7 @@ impl Found {
         let shape = dataset.shape();
         let kind = dataset.dtype();
         if let Datatype::Compound { size, fields } = kind {
-            let bytes = dataset.read_native_bytes().map_err(damaged)?;
+            let bytes = self.bytes(dataset, (*size as usize).div_ceil(size_of::<f64>()))?;
             for field in fields {
                 self.field(&bytes, *size as usize, field, name);
             }
@@ -86,7 +95,7 @@ impl Found {
             // A single number, or a block of more dimensions.
             _ => return Ok(()),
         };
-        let bytes = dataset.read_native_bytes().map_err(damaged)?;
+        let bytes = self.bytes(dataset, 1)?;
         let values: Vec<f64> = bytes.chunks_exact(number.size()).map(|b| number.read(b)).collect();
         let (rows, wide) = (rows as usize, wide as usize);
         let values = if self.matlab { values } else { transposed(&values, rows, wide) };
@@ -130,7 +139,7 @@ impl Found {
                 }
                 continue;
             };
-            let bytes = values.read_native_bytes().map_err(damaged)?;
+            let bytes = self.bytes(&values, 1)?;
             let rows: Vec<f64> = bytes.chunks_exact(number.size()).map(|b| number.read(b)).collect();
             for (k, name) in names.iter().enumerate() {
                 let column = rows.chunks_exact(names.len()).map(|row| row[k]).collect();

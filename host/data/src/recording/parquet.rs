@@ -13,6 +13,7 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
 use super::sheet::{Column, Sheet, damaged};
+use crate::bounds::Budget;
 use crate::error::Result;
 
 /// Rows taken at a time.
@@ -24,11 +25,12 @@ pub(super) fn columns(file: File) -> Result<Sheet> {
     let about = reader.metadata().file_metadata();
     let durations = durations(about);
     let mut sheet = Sheet::new();
+    let mut budget = Budget::default();
     for (index, column) in about.schema_descr().columns().iter().enumerate() {
         let name = column.path().string();
         let meaning = if durations.contains(&name) { Err("durations") } else { meaning(column) };
         let content = match meaning {
-            Ok(scale) => values(&reader, index, column.max_def_level(), scale)?,
+            Ok(scale) => values(&reader, index, column.max_def_level(), scale, &mut budget)?,
             Err(what) => Column::Other(what.to_owned()),
         };
         sheet.push((name, content));
@@ -73,7 +75,13 @@ fn durations(about: &FileMetaData) -> Vec<String> {
 }
 
 /// All values of one column.
-fn values(reader: &SerializedFileReader<File>, index: usize, nullable: i16, scale: f64) -> Result<Column> {
+fn values(
+    reader: &SerializedFileReader<File>,
+    index: usize,
+    nullable: i16,
+    scale: f64,
+    budget: &mut Budget,
+) -> Result<Column> {
     let (mut numbers, mut texts) = (Vec::new(), Vec::new());
     let column = reader.metadata().file_metadata().schema_descr().column(index);
     let unsigned = matches!(column.logical_type_ref(), Some(LogicalType::Integer(i)) if !i.is_signed)
@@ -85,22 +93,26 @@ fn values(reader: &SerializedFileReader<File>, index: usize, nullable: i16, scal
         let group = reader.get_row_group(group).map_err(damaged)?;
         match group.get_column_reader(index).map_err(damaged)? {
             ColumnReader::DoubleColumnReader(mut r) => {
-                take(&mut r, nullable, &mut numbers, f64::NAN, |v| *v)?;
+                take(&mut r, nullable, budget, &mut numbers, f64::NAN, |v| *v)?;
             }
             ColumnReader::FloatColumnReader(mut r) => {
-                take(&mut r, nullable, &mut numbers, f64::NAN, |v| f64::from(*v))?;
+                take(&mut r, nullable, budget, &mut numbers, f64::NAN, |v| f64::from(*v))?;
             }
-            ColumnReader::Int32ColumnReader(mut r) => take(&mut r, nullable, &mut numbers, f64::NAN, |v| {
-                scale * if unsigned { f64::from(v.cast_unsigned()) } else { f64::from(*v) }
-            })?,
-            ColumnReader::Int64ColumnReader(mut r) => take(&mut r, nullable, &mut numbers, f64::NAN, |v| {
-                scale * if unsigned { v.cast_unsigned() as f64 } else { *v as f64 }
-            })?,
+            ColumnReader::Int32ColumnReader(mut r) => {
+                take(&mut r, nullable, budget, &mut numbers, f64::NAN, |v| {
+                    scale * if unsigned { f64::from(v.cast_unsigned()) } else { f64::from(*v) }
+                })?
+            }
+            ColumnReader::Int64ColumnReader(mut r) => {
+                take(&mut r, nullable, budget, &mut numbers, f64::NAN, |v| {
+                    scale * if unsigned { v.cast_unsigned() as f64 } else { *v as f64 }
+                })?
+            }
             ColumnReader::BoolColumnReader(mut r) => {
-                take(&mut r, nullable, &mut numbers, f64::NAN, |v| f64::from(u8::from(*v)))?;
+                take(&mut r, nullable, budget, &mut numbers, f64::NAN, |v| f64::from(u8::from(*v)))?;
             }
             ColumnReader::ByteArrayColumnReader(mut r) if scale == 1.0 => {
-                take(&mut r, nullable, &mut texts, String::new(), |v| {
+                take(&mut r, nullable, budget, &mut texts, String::new(), |v| {
                     String::from_utf8_lossy(v.data()).into_owned()
                 })?;
             }
@@ -113,6 +125,7 @@ fn values(reader: &SerializedFileReader<File>, index: usize, nullable: i16, scal
 fn take<D: DataType, T: Clone>(
     reader: &mut ColumnReaderImpl<D>,
     nullable: i16,
+    budget: &mut Budget,
     out: &mut Vec<T>,
     absent: T,
     convert: impl Fn(&D::T) -> T,
@@ -126,6 +139,8 @@ fn take<D: DataType, T: Clone>(
         if records == 0 {
             return Ok(());
         }
+        // A text takes three words at least; what it says comes on top, and is in the file.
+        budget.take(records * size_of::<T>().div_ceil(size_of::<f64>()))?;
         if nullable == 0 {
             out.extend(values.iter().map(&convert));
         } else {

@@ -1,8 +1,9 @@
 //! Files to recordings.
 
 use std::borrow::Cow;
-use std::path::Path;
-use std::sync::Arc;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::assemble::{Job, LookupTable, assemble};
 use super::blocks::{BlockError, Blocks, Rows, RowsError, read_rows};
@@ -17,6 +18,7 @@ use super::plan::{Context, Plan, plan};
 use super::quantity::{Named, named};
 use super::sheet::select;
 use super::source;
+use crate::bounds::{self, Budget};
 use crate::counted::counted;
 use crate::error::{DataCode, Error, Result};
 use crate::file_kind::FileKind;
@@ -38,6 +40,28 @@ pub struct Reader<'a> {
     pub min_rows: usize,
     /// Told of every byte that is read.
     pub progress: Option<Arc<dyn Progress>>,
+    /// Takes the SHA-256 of every file that is read.
+    pub hashes: Option<Arc<Hashes>>,
+}
+
+/// SHA-256 of files as they were read: of a pipe nothing is left to hash later, and a file may have changed.
+#[derive(Debug, Default)]
+pub struct Hashes(Mutex<HashMap<PathBuf, String>>);
+
+impl Hashes {
+    /// Of each of these files, in hexadecimal.
+    ///
+    /// # Errors
+    /// [`DataCode::FileUnreadable`] for one that was not read.
+    pub fn of(&self, files: &[PathBuf]) -> Result<Vec<String>> {
+        let known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let one = |file: &PathBuf| {
+            known.get(file).cloned().ok_or_else(|| {
+                Error::new(DataCode::FileUnreadable, "the file was not read to its end").file(file)
+            })
+        };
+        files.iter().map(one).collect()
+    }
 }
 
 /// Lines below what was taken for the header among which the header itself is looked for.
@@ -77,8 +101,14 @@ impl<'a> Reader<'a> {
     /// As [`Reader::file`], for the first file that is not right.
     pub fn campaign<P: AsRef<Path>>(&self, paths: impl IntoIterator<Item = P>) -> Result<Campaign> {
         let mut recordings = Vec::new();
+        let mut budget = Budget::default();
         for path in paths {
-            recordings.extend(self.file(path.as_ref())?);
+            let path = path.as_ref();
+            let read = self.file(path)?;
+            budget.take(read.iter().map(Recording::values).sum()).map_err(|e| {
+                e.file(path).help("the recordings together are too long: leave some out, or record fewer samples per second")
+            })?;
+            recordings.extend(read);
         }
         if recordings.is_empty() {
             return Err(Error::new(DataCode::CallInvalid, "no recording was given"));
@@ -112,14 +142,21 @@ impl<'a> Reader<'a> {
     }
 
     fn open(&self, path: &Path) -> Result<Vec<Recording>> {
-        let source = source::open(path, self.progress.as_ref())?;
+        let source = source::open(path, self.progress.as_ref(), self.hashes.is_some())?;
         if source.magic.is_empty() {
             return Err(Error::new(DataCode::RecordingEmpty, "the file is empty"));
         }
-        match Container::of(&source.magic) {
-            Some(container) => self.container(path, container),
-            None => self.text(path, source),
+        let bytes = source.bytes.clone();
+        let recordings = match Container::of(&source.magic) {
+            Some(container) => self.container(path, container, source)?,
+            None => self.text(path, source)?,
+        };
+        if let Some(hashes) = &self.hashes
+            && let Some(hash) = bytes.sha256().map_err(|e| Error::unreadable(path, &e))?
+        {
+            hashes.0.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_owned(), hash);
         }
+        Ok(recordings)
     }
 
     fn text(&self, path: &Path, source: source::Source) -> Result<Vec<Recording>> {
@@ -153,16 +190,27 @@ impl<'a> Reader<'a> {
                 _ => e,
             }
         })?;
-        let rows =
-            read_rows(blocks, head.dialect, &layout.plan.wanted, head.names.len(), source.size.or(average))
-                .map_err(|e| rows_error(e, &head, &description))?;
+        let rows = read_rows(
+            blocks,
+            head.dialect,
+            &layout.plan.wanted,
+            head.names.len(),
+            source.size.or(average),
+            Budget::default(),
+        )
+        .map_err(|e| rows_error(e, &head, &description))?;
         self.finish(path, &description, &head.names, &layout, head.lines + 1, rows)
     }
 
     /// A container gives recordings by the same rules as text.
-    fn container(&self, path: &Path, container: Container) -> Result<Vec<Recording>> {
+    fn container(
+        &self,
+        path: &Path,
+        container: Container,
+        mut source: source::Source,
+    ) -> Result<Vec<Recording>> {
         let description = self.description();
-        let sheet = container::columns(path, container)?;
+        let sheet = container::columns(path, container, &mut source)?;
         let names: Vec<String> = sheet.iter().map(|(n, _)| n.clone()).collect();
         let layout = self.layout(path, &names, &description, "")?;
         let rows = select(&sheet, &layout.plan.wanted)?;
@@ -268,6 +316,7 @@ fn block_error(error: BlockError) -> Error {
 fn rows_error(error: RowsError, head: &Head, import: &Import) -> Error {
     let LineError { line, cell, value, fault } = match error {
         RowsError::Block(e) => return block_error(e),
+        RowsError::TooMany(e) => return e,
         RowsError::Line(e) => *e,
     };
     let separator = match head.dialect.delimiter {
@@ -361,10 +410,8 @@ impl Constants {
 
 fn read_lookup(recording: &Path, file: &str) -> Result<LookupTable> {
     let path = recording.parent().unwrap_or(Path::new("")).join(file);
-    let text = std::fs::read(&path).map_err(|e| {
-        Error::unreadable(&path, &e)
-            .help("the import description's lookup table stands in the recording's folder")
-    })?;
+    let text = bounds::read(&path, bounds::WRITTEN)
+        .map_err(|e| e.help("the import description's lookup table stands in the recording's folder"))?;
     let text = &text[source::check_text(&text).map_err(|e| e.file(&path))?..];
     let mut lines = text.split(|b| *b == b'\n').enumerate().filter(|(_, l)| !l.trim_ascii().is_empty());
     let mut table = LookupTable::default();

@@ -1,9 +1,11 @@
 //! Bytes of a file, decompressed on the way when it is compressed.
 
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Read};
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use sha2::{Digest, Sha256};
 
 use crate::error::{DataCode, Error, Result};
 use crate::progress::Progress;
@@ -22,9 +24,12 @@ pub(super) struct Source {
     pub size: Option<u64>,
     /// The first bytes of the file itself, before any decompression.
     pub magic: Vec<u8>,
+    /// Whether it can be opened again: a pipe gives its bytes once.
+    pub again: bool,
+    pub bytes: Bytes,
 }
 
-pub(super) fn open(path: &Path, progress: Option<&Arc<dyn Progress>>) -> Result<Source> {
+pub(super) fn open(path: &Path, progress: Option<&Arc<dyn Progress>>, hashed: bool) -> Result<Source> {
     let unreadable = |e: io::Error| Error::unreadable(path, &e);
     let mut file = File::open(path).map_err(unreadable)?;
     let meta = file.metadata().map_err(unreadable)?;
@@ -33,48 +38,73 @@ pub(super) fn open(path: &Path, progress: Option<&Arc<dyn Progress>>) -> Result<
             .file(path)
             .help("name the files in it"));
     }
-    let counted = |file: File| Counted { file, progress: progress.cloned() };
     let mut magic = Vec::new();
     (&mut file).take(512).read_to_end(&mut magic).map_err(unreadable)?;
-    if magic.starts_with(&GZIP) || magic.starts_with(&ZSTD) {
-        // A pipe cannot be rewound, so the bytes already read go in front again.
-        let whole = io::Cursor::new(magic.clone()).chain(counted(file));
-        let reader: Box<dyn Read + Send> = if magic.starts_with(&GZIP) {
-            Box::new(flate2::read::MultiGzDecoder::new(whole))
-        } else {
-            let decoder = ruzstd::decoding::StreamingDecoder::new(whole).map_err(|e| {
-                Error::new(DataCode::RecordingContainer, format!("damaged zstd file: {e}")).file(path)
-            })?;
-            Box::new(decoder)
-        };
-        return Ok(Source { reader, size: None, magic });
-    }
-    let big_endian = magic.starts_with(&UTF_16_BIG);
-    if big_endian || magic.starts_with(&UTF_16_LITTLE) {
-        let whole = Box::new(io::Cursor::new(magic[2..].to_vec()).chain(counted(file)));
-        let reader = Box::new(Utf16::new(whole, big_endian));
-        return Ok(Source { reader, size: None, magic });
-    }
-    if meta.is_file() {
-        file.seek(SeekFrom::Start(0)).map_err(unreadable)?;
-        return Ok(Source { reader: Box::new(counted(file)), size: Some(meta.len()), magic });
-    }
-    Ok(Source { reader: Box::new(io::Cursor::new(magic.clone()).chain(counted(file))), size: None, magic })
+    // A pipe cannot be rewound, so the bytes already read go in front again.
+    let counted = Counted {
+        bytes: io::Cursor::new(magic.clone()).chain(file),
+        hash: hashed.then(Sha256::new),
+        progress: progress.cloned(),
+    };
+    let bytes = Bytes(Arc::new(Mutex::new(counted)));
+    let (whole, again) = (bytes.clone(), meta.is_file());
+    let mut size = None;
+    let reader: Box<dyn Read + Send> = if magic.starts_with(&GZIP) {
+        Box::new(flate2::read::MultiGzDecoder::new(whole))
+    } else if magic.starts_with(&ZSTD) {
+        Box::new(ruzstd::decoding::StreamingDecoder::new(whole).map_err(|e| {
+            Error::new(DataCode::RecordingContainer, format!("damaged zstd file: {e}")).file(path)
+        })?)
+    } else if magic.starts_with(&UTF_16_BIG) || magic.starts_with(&UTF_16_LITTLE) {
+        io::copy(&mut whole.clone().take(2), &mut io::sink()).map_err(unreadable)?;
+        Box::new(Utf16::new(Box::new(whole), magic.starts_with(&UTF_16_BIG)))
+    } else {
+        size = again.then_some(meta.len());
+        Box::new(whole)
+    };
+    Ok(Source { reader, size, magic, again, bytes })
 }
 
-/// A file that tells how far it is read.
+/// A file that tells how far it is read, and what its bytes were.
 struct Counted {
-    file: File,
+    bytes: io::Chain<io::Cursor<Vec<u8>>, File>,
+    hash: Option<Sha256>,
     progress: Option<Arc<dyn Progress>>,
 }
 
 impl Read for Counted {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let count = self.file.read(buffer)?;
+        let count = self.bytes.read(buffer)?;
+        if let Some(hash) = &mut self.hash {
+            hash.update(&buffer[..count]);
+        }
         if let Some(progress) = &self.progress {
             progress.add(count as u64);
         }
         Ok(count)
+    }
+}
+
+/// The file itself, which a decompressor reads and whose hash is asked for in the end.
+#[derive(Clone)]
+pub(super) struct Bytes(Arc<Mutex<Counted>>);
+
+impl Bytes {
+    /// SHA-256 of all bytes, those that nobody needed among them, in hexadecimal; `None` where it was not asked for.
+    pub fn sha256(&self) -> io::Result<Option<String>> {
+        let mut counted = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if counted.hash.is_none() {
+            return Ok(None);
+        }
+        io::copy(&mut *counted, &mut io::sink())?;
+        let hash = counted.hash.take();
+        Ok(hash.map(|hash| hash.finalize().iter().map(|b| format!("{b:02x}")).collect()))
+    }
+}
+
+impl Read for Bytes {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).read(buffer)
     }
 }
 

@@ -121,9 +121,8 @@ impl Qemu {
     pub(super) fn start(mut stand: Stand, speed: f64) -> Result<(Self, Address), String> {
         let image = image().ok_or("the firmware's image is not built (firmware/build)")?;
         let relay = Relay::listen().map_err(|e| format!("no port can be opened ({e})"))?;
-        let folder =
-            std::env::temp_dir().join(format!("pam-emulated-{}-{}", std::process::id(), relay.port()));
-        std::fs::create_dir_all(&folder).map_err(|e| format!("no temporary folder can be made ({e})"))?;
+        let made = tempfile::Builder::new().prefix("pam-emulated-").tempdir();
+        let folder = made.map_err(|e| format!("no temporary folder can be made ({e})"))?.keep();
         let no_wire = |e: io::Error| format!("no line to the board can be made ({e})");
         let link = Wire::new(&folder, "link").map_err(no_wire)?;
         let bench = Wire::new(&folder, "bench").map_err(no_wire)?;

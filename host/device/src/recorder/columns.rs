@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use model_core::link::messages::{Mode, SideSample, State, Telemetry};
 
-use crate::words;
+use crate::messages;
 
 /// One value of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,9 +27,14 @@ pub(super) struct Column {
 }
 
 impl Column {
+    /// A cell of this column, for its type.
+    pub fn sample_cell(&self) -> Cell {
+        (self.cell)(&blank())
+    }
+
     /// The type in JSON's words.
     pub fn kind(&self) -> &'static str {
-        match (self.cell)(&blank()) {
+        match self.sample_cell() {
             Cell::Time(_) | Cell::Number(_) => "number",
             Cell::Count(_) => "integer",
             Cell::Word(_) => "string",
@@ -54,6 +59,12 @@ pub(super) fn plain_header() -> String {
     header(&blank())
 }
 
+/// The header of a board with two muscles.
+pub(super) fn second_header() -> String {
+    let sides = [SideSample::default(), SideSample::default()].into_iter().collect();
+    header(&Telemetry { sides, ..blank() })
+}
+
 fn side(sample: &Telemetry, number: usize, pick: fn(&SideSample) -> f32) -> Cell {
     Cell::Number(sample.sides.get(number).map_or(f32::NAN, pick))
 }
@@ -75,8 +86,8 @@ pub(super) const COLUMNS: &[Column] = &[
     column!("table_N", "force by the table at the measured pressure and stroke, N", |s| side(s, 0, |x| x
         .model_n)),
     column!("asked", "what was asked for, in the SI unit of the mode", |s| Cell::Number(s.asked)),
-    column!("state", "disarmed, armed, running or fault", |s| Cell::Word(words::state(s.state))),
-    column!("mode", "what is controlled", |s| Cell::Word(words::mode(s.mode))),
+    column!("state", "disarmed, armed, running or fault", |s| Cell::Word(messages::state(s.state))),
+    column!("mode", "what is controlled", |s| Cell::Word(messages::mode(s.mode))),
     column!("tick", "number of the control loop's tick", |s| Cell::Count(s.tick)),
 ];
 

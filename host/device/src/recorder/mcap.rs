@@ -19,9 +19,7 @@ use ::mcap::{Attachment, WriteOptions, Writer};
 use serde_json::{Value, json};
 
 use super::columns::{COLUMNS, Column, SECOND};
-
-/// The first eight bytes, and the last.
-pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+use pam_data::mcap_records::MAGIC;
 
 /// The end of a file without an index: end of data (0x0F), footer (0x02), magic.
 pub(super) const END: [u8; 13 + 29 + 8] = {
@@ -35,21 +33,6 @@ pub(super) const END: [u8; 13 + 29 + 8] = {
     }
     end
 };
-
-/// Bytes from the start of a file that are whole records of data; 0 when there is not even a header.
-pub(super) fn whole(bytes: &[u8]) -> usize {
-    let mut at = MAGIC.len();
-    while let Some(head) = bytes.get(at..at + 9) {
-        let mut length = [0; 8];
-        length.copy_from_slice(&head[1..]);
-        let next = usize::try_from(u64::from_le_bytes(length)).ok().and_then(|l| (at + 9).checked_add(l));
-        match next {
-            Some(next) if next <= bytes.len() && head[0] != 0x0F => at = next,
-            _ => break,
-        }
-    }
-    if at == MAGIC.len() { 0 } else { at }
-}
 
 /// Bytes that the writer has finished and that are not in the file yet.
 #[derive(Clone, Default)]
@@ -184,44 +167,4 @@ fn event_schema() -> Value {
         },
         "required": ["event", "text"],
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn any_stump_of_a_file_can_be_ended() {
-        let mut encoder = Encoder::new(&json!({"host": "1", "device": {"board": "b"}}), 5).unwrap();
-        let mut bytes = encoder.take().unwrap();
-        for i in 0..20 {
-            encoder.sample(1000 * i, "{\"time_s\":1.0}").unwrap();
-            if i % 4 == 3 {
-                bytes.extend(encoder.take().unwrap());
-            }
-        }
-        let data = bytes.len();
-        bytes.extend(encoder.end(&json!({"ended_by": "time"})).unwrap());
-        let count = |bytes: &[u8]| {
-            ::mcap::MessageStream::new(bytes)
-                .unwrap()
-                .filter(|m| m.as_ref().is_ok_and(|m| !m.data.is_empty()))
-                .count()
-        };
-        assert_eq!(count(&bytes), 20);
-        let mut before = 0;
-        for length in 0..data {
-            let stump = &bytes[..length];
-            let mut ended = stump[..whole(stump)].to_vec();
-            if ended.is_empty() {
-                continue;
-            }
-            ended.extend(END);
-            let messages = count(&ended);
-            assert!(messages >= before && messages % 4 == 0, "{length}: {messages}");
-            before = messages;
-        }
-        // The last chunk is whole before its index is.
-        assert_eq!(before, 20);
-    }
 }

@@ -7,7 +7,7 @@ use crate::commands::port::PortOption;
 use crate::console::Console;
 use crate::documents::{device as document, text};
 use pam_data::error::Result;
-use pam_device::words;
+use pam_device::messages;
 
 pub(super) fn run(port: &PortOption, clear: bool, json: bool, console: &Console) -> Result<()> {
     let mut client = port.connect(console)?;
@@ -21,7 +21,7 @@ pub(super) fn run(port: &PortOption, clear: bool, json: bool, console: &Console)
     }
     if json {
         let one = |r: &FaultReport| {
-            let w = words::fault(r.fault);
+            let w = messages::fault(r.fault);
             document::Fault {
                 fault: w.name,
                 cause: w.cause,
@@ -29,8 +29,8 @@ pub(super) fn run(port: &PortOption, clear: bool, json: bool, console: &Console)
                 time_s: r.time_us as f64 * 1e-6,
                 value: r.value,
                 limit: r.limit,
-                muscle: words::side(r.side),
-                mode: words::mode(r.mode),
+                muscle: messages::side(r.side),
+                mode: messages::mode(r.mode),
                 last: document::Last {
                     pressure_Pa: r.last.pressure_pa,
                     stroke_m: r.last.stroke_m,
@@ -42,7 +42,7 @@ pub(super) fn run(port: &PortOption, clear: bool, json: bool, console: &Console)
             .iter()
             .zip(faults.counts)
             .filter(|(_, n)| *n > 0)
-            .map(|(f, n)| (words::fault(*f).name.to_owned(), n.into()))
+            .map(|(f, n)| (messages::fault(*f).name.to_owned(), n.into()))
             .collect();
         console.result(text(&document::Faults {
             schema: "pam-faults/1",
@@ -53,21 +53,21 @@ pub(super) fn run(port: &PortOption, clear: bool, json: bool, console: &Console)
     } else {
         match &faults.latched {
             Some(report) => {
-                console.result(format!("latched: {}", words::report(report)));
-                console.result(format!("what to do: {}", words::fault(report.fault).remedy));
+                console.result(format!("latched: {}", messages::report(report)));
+                console.result(format!("what to do: {}", messages::fault(report.fault).remedy));
             }
             None => console.result("no fault is latched"),
         }
         for (fault, count) in Fault::ALL.iter().zip(faults.counts).filter(|(_, n)| *n > 0) {
-            console.result(format!("since the start: {} × {}", count, words::fault(*fault).cause));
+            console.result(format!("since the start: {} × {}", count, messages::fault(*fault).cause));
         }
         for report in &past {
-            console.result(format!("past: {}", words::report(report)));
+            console.result(format!("past: {}", messages::report(report)));
         }
     }
     if clear {
         let status = client.call_once::<ClearFault>(&())?;
-        console.note(format!("cleared; the device is {}", words::state(status.state)));
+        console.note(format!("cleared; the device is {}", messages::state(status.state)));
     }
     Ok(())
 }

@@ -33,9 +33,9 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let (low, high) = (arguments.low, arguments.high);
     if !(low >= 20.0 && high - low >= 30.0 && high.is_finite()) {
-        return Err(Error::new(DataCode::CallInvalid, "these pressures show no regulator")
+        return Err(Error::new(DataCode::CallInvalid, "these pressures cannot identify a regulator")
             .value(format!("--low {low} --high {high}"))
-            .help("the lower one must be 20 kPa at least, and the upper one 30 kPa above it"));
+            .help("the lower must be at least 20 kPa, and the upper at least 30 kPa above it"));
     }
     let interrupted = interrupts()?;
     let mut client = arguments.port.connect(console)?;
@@ -44,7 +44,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let found = regulator::identify_whole(&mut client, low * 1e3, high * 1e3, &stop)?;
     if !arguments.dry_run {
         found.keep(&mut client)?;
-        console.note("kept in the settings; lag and line are inverted from here on");
+        console.note("saved in the settings; from now on, lag and line are compensated");
     }
     if arguments.json {
         console.result(text(&Regulator {

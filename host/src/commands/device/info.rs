@@ -9,7 +9,7 @@ use crate::console::Console;
 use crate::documents::{device as document, text};
 use pam_data::counted::counted;
 use pam_data::error::Result;
-use pam_device::{Client, Patience, Port, recorder, words};
+use pam_device::{Client, Patience, Port, messages, recorder};
 
 pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()> {
     // The versions are told even when they do not fit, and then the refusal.
@@ -47,11 +47,11 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
             table_capacity: info.table_capacity,
             trace_capacity: info.trace_capacity,
             reference_capacity: info.reference_capacity,
-            started_by: words::started_by(info.started_by),
+            started_by: messages::started_by(info.started_by),
             status: document::Status {
-                state: words::state(status.state),
-                mode: words::mode(status.mode),
-                fault: status.fault.map(|f| words::fault(f).name),
+                state: messages::state(status.state),
+                mode: messages::mode(status.mode),
+                fault: status.fault.map(|f| messages::fault(f).name),
                 time_s: status.time_us as f64 * 1e-6,
                 ticks: status.ticks,
                 overruns: status.overruns,
@@ -66,13 +66,13 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
     }
     console.result(format!(
         "{}{} in {} mode, {:.1} s and {} ticks at {} Hz since its start ({}), {}",
-        words::state(status.state),
-        status.fault.map(|f| format!(" ({})", words::fault(f).cause)).unwrap_or_default(),
-        words::mode(status.mode),
+        messages::state(status.state),
+        status.fault.map(|f| format!(" ({})", messages::fault(f).cause)).unwrap_or_default(),
+        messages::mode(status.mode),
         status.time_us as f64 * 1e-6,
         status.ticks,
         info.ticks_per_s,
-        words::started_by(info.started_by),
+        messages::started_by(info.started_by),
         counted(status.overruns, "overrun"),
     ));
     for (number, table) in info.tables.iter().take(usize::from(info.muscles)).enumerate() {

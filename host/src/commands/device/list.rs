@@ -38,7 +38,7 @@ pub(super) fn run(json: bool, console: &Console) -> Result<()> {
     if json {
         console.result(text(&document::Ports { schema: "pam-ports/1", ports: rows })?);
     } else if rows.is_empty() {
-        console.result("there is no serial device; an emulated one is named tcp:HOST:PORT");
+        console.result("no serial device is connected; the port of an emulated device is tcp:HOST:PORT");
     } else {
         for row in rows {
             console.result(match row {

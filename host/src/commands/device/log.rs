@@ -14,7 +14,7 @@ use crate::console::Console;
 use crate::documents::device::{LogLine, More};
 use crate::documents::line;
 use pam_data::error::{DataCode, Error, Result};
-use pam_device::{Topic, log_table::LogTable, words};
+use pam_device::{Topic, log_table::LogTable, messages};
 
 /// Arguments of `host device log`.
 #[derive(Debug, Args)]
@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let stop = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&stop);
     ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))
-        .map_err(|e| Error::new(DataCode::CallInvalid, format!("Ctrl-C cannot be watched: {e}")))?;
+        .map_err(|e| Error::new(DataCode::CallInvalid, format!("Ctrl-C cannot be handled: {e}")))?;
     let mut client = arguments.port.connect(console)?;
     let tell = |time_s, kind, text: &str, more| say(console, arguments.json, time_s, kind, text, more);
     let begin = Instant::now();
@@ -64,7 +64,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             asked = Some(Instant::now());
             if last != Some((status.state, status.mode)) {
                 last = Some((status.state, status.mode));
-                let (state, mode) = (words::state(status.state), words::mode(status.mode));
+                let (state, mode) = (messages::state(status.state), messages::mode(status.mode));
                 let text = format!("{state} in {mode} mode");
                 let more = More { state: Some(state), mode: Some(mode), ..More::default() };
                 tell(Some(status.time_us as f64 * 1e-6), "state", &text, more);
@@ -72,11 +72,11 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         }
         match client.topic(Duration::from_millis(100))? {
             Some(Topic::Event(Event::Fault(report))) => {
-                let fault = words::fault(report.fault);
+                let fault = messages::fault(report.fault);
                 let time = Some(report.time_us as f64 * 1e-6);
                 let more = More { fault: Some(fault.name), remedy: Some(fault.remedy), ..More::default() };
                 let mark = if arguments.json { "" } else { "FAULT " };
-                tell(time, "fault", &format!("{mark}{}", words::report(&report)), more);
+                tell(time, "fault", &format!("{mark}{}", messages::report(&report)), more);
                 if !arguments.json {
                     tell(None, "remedy", &format!("what to do: {}", fault.remedy), More::default());
                 }

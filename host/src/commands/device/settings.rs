@@ -9,6 +9,7 @@ use model_core::link::settings::Settings;
 use crate::commands::port::PortOption;
 use crate::console::Console;
 use crate::documents::{device as document, text};
+use pam_data::bounds;
 use pam_data::error::{DataCode, Error, Result, nearest};
 use pam_data::output::json_of;
 use pam_device::error::DeviceCode;
@@ -35,7 +36,11 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let mut wanted = match &arguments.from {
         Some(path) => {
-            let text = std::fs::read_to_string(path).map_err(|e| Error::unreadable(path, &e))?;
+            let text = bounds::read_text(path, bounds::WRITTEN)?.map_err(|()| {
+                Error::new(DataCode::FileUnreadable, "is binary, not text")
+                    .file(path)
+                    .help("settings of a device are TOML, as `host device settings` prints them")
+            })?;
             Some(toml::from_str::<Settings>(&text).map_err(|e| {
                 pam_data::toml_words::toml_error(DataCode::CallInvalid, &text, &e)
                     .file(path)
@@ -57,7 +62,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         if answered != wanted || now != wanted {
             return Err(Error::new(
                 DeviceCode::DeviceVerify,
-                "the device keeps other settings than it was sent",
+                "the settings read back from the device differ from those sent",
             )
             .help("look at them with `host device settings`"));
         }

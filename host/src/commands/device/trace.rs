@@ -83,7 +83,7 @@ fn variable(name: &str) -> Result<Variable> {
         let names: Vec<&str> = VARIABLES.iter().map(|(n, _, _)| *n).collect();
         let near =
             nearest(name, names.iter().copied()).map(|n| format!("did you mean {n}? ")).unwrap_or_default();
-        Error::new(DataCode::CallInvalid, "no variable of the loop has this name")
+        Error::new(DataCode::CallInvalid, "the control loop has no variable of this name")
             .value(name)
             .help(format!("{near}there are: {}", names.join(", ")))
     })
@@ -125,7 +125,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     };
     if trace.records == 0 {
         return Err(Error::new(DeviceCode::DeviceRefused, "the trace is empty")
-            .help("arm one first, without --read; a table that is put to use takes the trace's room"));
+            .help("arm one first, without --read; putting a table to use discards the trace"));
     }
     let ticks_per_s = client.call::<GetInfo>(&())?.ticks_per_s;
     let columns = read_columns(&mut client, &trace, ticks_per_s)?;

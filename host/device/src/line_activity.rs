@@ -1,4 +1,4 @@
-//! What a line lets one hear when there is no controller at its end, or another one than expected: errors in words.
+//! What arrives on a line before the first hello, and the error that it shows: no controller, or not the expected one.
 
 use model_core::link::hello::{Board, Hello};
 use model_core::link::{LINK_VERSION, SCHEMA_HASH};
@@ -10,7 +10,7 @@ use pam_data::error::Error;
 
 /// What came before any hello, to tell a silent line from a foreign peer.
 #[derive(Default)]
-pub(super) struct Heard {
+pub(super) struct LineActivity {
     /// Everything that arrived.
     pub bytes: usize,
     /// Whole frames.
@@ -20,7 +20,7 @@ pub(super) struct Heard {
     first: Vec<u8>,
 }
 
-impl Heard {
+impl LineActivity {
     /// Takes note of what arrived.
     pub fn take(&mut self, bytes: &[u8]) {
         self.bytes += bytes.len();
@@ -33,20 +33,20 @@ impl Heard {
         if self.bytes == 0 {
             return Error::new(DeviceCode::DeviceSilent, "nothing answers on this port")
                 .value(port.name())
-                .help("is the controller powered, flashed, and is this its port? `host device list` shows the ports here");
+                .help("check that the controller is powered and flashed, and that this is its port; `host device list` shows the ports");
         }
         if self.echoes > 0 {
-            return Error::new(DeviceCode::DeviceForeign, "the line only sends back what it is sent")
+            return Error::new(DeviceCode::DeviceForeign, "the line echoes what it is sent")
                 .value(port.name())
-                .help("are transmit and receive joined, or is a terminal program on the other end?");
+                .help("check whether transmit and receive are connected, or a terminal program is at the other end");
         }
         if self.frames > 0 {
             return Error::new(
                 DeviceCode::DeviceSilent,
-                "a controller is there, but it does not answer hello",
+                "a controller is connected, but it does not answer hello",
             )
             .value(port.name())
-            .help("is another program talking to it? close it, or restart the controller");
+            .help("close any other program that uses the port, or restart the controller");
         }
         let shown = String::from_utf8_lossy(&self.first);
         let printable = shown.chars().filter(|c| c.is_ascii_graphic() || c.is_ascii_whitespace()).count();
@@ -63,15 +63,15 @@ impl Heard {
             ),
         )
         .value(port.name())
-        .help("is it the right port? if it is the right board, flash it first: host flash --firmware ELF --chip CHIP")
+        .help("check the port; if it is the right board, flash it first: host flash --firmware ELF --chip CHIP")
     }
 }
 
 /// The line is gone in the middle of a conversation.
 pub(super) fn lost(port: &Port, reason: &std::io::Error) -> Error {
-    Error::new(DeviceCode::DeviceSilent, format!("the connection to the device is gone: {reason}"))
+    Error::new(DeviceCode::DeviceSilent, format!("the connection to the device is lost: {reason}"))
         .value(port.name())
-        .help("look at cable and supply, then try again; a running controller without its host stops itself within a second, unless it was set otherwise")
+        .help("check the cable and the supply, then try again; a running controller without its host stops within a second by default")
 }
 
 /// It is a controller, of another schema.

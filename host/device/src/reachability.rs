@@ -1,4 +1,4 @@
-//! Why what was asked of a muscle could not be had, and for how long its table went on beyond what it was tested at.
+//! Why a setpoint could not be reached, and how long a run was outside the tested range of its table.
 
 use model_core::inverse::Reach;
 use model_core::link::messages::{Side, State, Telemetry};
@@ -7,13 +7,13 @@ use model_core::table::MuscleTable;
 use model_core::units::{Force, Length, Pressure};
 use serde_json::{Value, json};
 
-use super::course::Quantity;
+use super::setpoint_profile::Quantity;
 use super::{Client, tables};
 use pam_data::error::Result;
 
-/// Samples of a run by what the first muscle's table has to say to them, friction and effects left out.
+/// Samples of a run, classified by the table of the first muscle without friction and effects.
 #[derive(Debug)]
-pub struct Reached {
+pub struct Reachability {
     table: MuscleTable,
     muscle: Muscle<f32>,
     guess: Pressure<f32>,
@@ -24,7 +24,7 @@ pub struct Reached {
     outside_tested: u64,
 }
 
-impl Reached {
+impl Reachability {
     /// For the table that a device has; none without one that this version can read.
     ///
     /// # Errors
@@ -87,7 +87,7 @@ impl Reached {
         })
     }
 
-    /// Why a force was out of reach, in words: the reason that held longest.
+    /// Why a force could not be reached: the reason that applied longest.
     #[must_use]
     pub fn why(&self) -> Option<&'static str> {
         let reasons = [
@@ -102,14 +102,14 @@ impl Reached {
         (samples > 0).then_some(words)
     }
 
-    /// What to tell of a run that was for more than a tenth of its time outside what the table was tested at.
+    /// The warning for a run that spent more than a tenth of its time outside the tested range of the table.
     #[must_use]
     pub fn extrapolated(&self, per_s: f64) -> Option<String> {
         let tested = &self.table.tested;
         (self.outside_tested * 10 > self.samples).then(|| {
             format!(
-                "for {:.2} of {:.2} s the muscle was beyond what its table was tested at (up to {:.0} kPa, contraction {:.3} to {:.3}): \
-                 the table goes on there as it ends, and its error is not known",
+                "for {:.2} of {:.2} s the muscle was outside the tested range of its table (up to {:.0} kPa, contraction {:.3} to {:.3}): \
+                 the table is extrapolated there, and its error is not known",
                 self.outside_tested as f64 / per_s,
                 self.samples as f64 / per_s,
                 tested.pressure_high.kilopascals(),

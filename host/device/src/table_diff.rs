@@ -1,4 +1,4 @@
-//! What changes when one table takes the place of another, in the terms of the muscle.
+//! The differences between two tables, in the terms of the muscle.
 
 use model_core::muscle::Muscle;
 use model_core::table::MuscleTable;
@@ -18,7 +18,7 @@ pub struct Change {
 
 /// The difference between two tables.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Difference {
+pub struct TableDiff {
     /// Quantities that differ; empty for equal tables.
     pub changes: Vec<Change>,
     /// Largest and root mean square difference of force over the new table's tested range, N, friction left out.
@@ -27,7 +27,7 @@ pub struct Difference {
 
 /// Compares the table on a device with the one that is to replace it.
 #[must_use]
-pub fn between(before: &MuscleTable, after: &MuscleTable) -> Difference {
+pub fn between(before: &MuscleTable, after: &MuscleTable) -> TableDiff {
     let mut changes = Vec::new();
     let mut add = |name: &str, a: String, b: String| {
         if a != b {
@@ -72,7 +72,7 @@ pub fn between(before: &MuscleTable, after: &MuscleTable) -> Difference {
         t.effects.iter().map(one).collect::<Vec<_>>().join("; ")
     };
     add("effects", effects(before), effects(after));
-    Difference { changes, force: force_difference(before, after) }
+    TableDiff { changes, force: force_difference(before, after) }
 }
 
 /// Largest and root mean square difference of `F_quasi` on a grid over the new table's tested range.
@@ -102,7 +102,7 @@ fn force_difference(before: &MuscleTable, after: &MuscleTable) -> Option<(f64, f
     (count > 0).then(|| (largest, (squares / f64::from(count)).sqrt()))
 }
 
-impl Difference {
+impl TableDiff {
     /// Whether the tables are the same to the digits that people read.
     #[must_use]
     pub fn is_empty(&self) -> bool {

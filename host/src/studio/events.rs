@@ -1,4 +1,4 @@
-//! What the page is told without asking: samples, faults, and between what its sensors can read.
+//! What the page receives by itself: samples, faults, and the ranges of the sensors.
 
 use model_core::link::messages::{Mode, SideSample, State, Telemetry};
 use model_core::link::settings::Settings;
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use tokio::sync::broadcast;
 
 use pam_data::error::Error;
-use pam_device::words;
+use pam_device::messages;
 
 /// Something went wrong.
 pub(super) fn tell(say: &broadcast::Sender<String>, level: &str, error: &Error) {
@@ -57,7 +57,7 @@ pub(super) fn batch(samples: &[Telemetry]) -> String {
         "c": side(&|s| f64::from(s.command_pa) * 1e-3, 1e2),
         "m": driven(&model),
         "a": driven(&|s| f64::from(s.asked) * scale),
-        "mode": samples.last().map(|s| words::mode(s.mode)),
+        "mode": samples.last().map(|s| messages::mode(s.mode)),
     })
     .to_string()
 }

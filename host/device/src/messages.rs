@@ -1,4 +1,4 @@
-//! What a device means, in words: its faults with their remedy, its refusals, its states.
+//! Messages for people about a device: its faults with their remedies, its refusals, its states.
 
 use model_core::link::endpoints::{ClearFault, Endpoint};
 use model_core::link::messages::{
@@ -9,9 +9,9 @@ use crate::error::DeviceCode;
 use pam_data::counted::counted;
 use pam_data::error::Error;
 
-/// A fault as a person reads it.
+/// The message about a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FaultWords {
+pub struct FaultMessage {
     /// The stable name, for logs and scripts.
     pub name: &'static str,
     /// What happened.
@@ -22,112 +22,117 @@ pub struct FaultWords {
     pub unit: &'static str,
 }
 
-/// The words for a fault.
+/// The message about a fault.
 #[must_use]
-pub fn fault(fault: Fault) -> FaultWords {
+pub fn fault(fault: Fault) -> FaultMessage {
     let (name, cause, remedy, unit) = match fault {
         Fault::SensorRange => (
             "sensor-range",
-            "a sensor reads what it cannot read",
-            "look for a broken wire or a short at the sensor; its limits are in the settings",
+            "a sensor reading is out of range",
+            "check the sensor for a broken wire or a short circuit; its range is in the settings",
             "",
         ),
         Fault::SensorStuck => (
             "sensor-stuck",
-            "a sensor's reading does not change although the command moves",
-            "look at the sensor's supply and plug; a held muscle needs a longer watch in the settings",
+            "a sensor reading does not change while the command changes",
+            "check the supply and the plug of the sensor; for a muscle held still, set a longer time in the settings",
             "ticks",
         ),
         Fault::SensorNoisy => (
             "sensor-noisy",
-            "a sensor's reading jumps about",
-            "look for a loose contact or missing shield",
+            "a sensor reading jumps",
+            "check for a loose contact or a missing cable shield",
             "jumps",
         ),
         Fault::SensorsDisagree => (
             "sensors-disagree",
-            "load cell and table contradict each other",
-            "is this the table of this muscle, and is the load cell zeroed?",
+            "the load cell and the table disagree",
+            "check that the table belongs to this muscle and that the load cell is zeroed",
             "N",
         ),
         Fault::SensorsSilent => (
             "sensors-silent",
-            "no readings arrive at all",
-            "look at the converter's supply and bus; on the virtual bench, is it still running?",
+            "no sensor readings arrive",
+            "check the supply and the bus of the converter; with the virtual bench, check that it is running",
             "ticks",
         ),
         Fault::PressureNotRising => (
             "pressure-not-rising",
-            "pressure stays below what is commanded",
-            "look for a burst bladder, a leak, or closed supply air",
+            "the pressure stays below the command",
+            "check for a burst bladder, a leak, or a closed air supply",
             "Pa",
         ),
         Fault::PressureNotFalling => (
             "pressure-not-falling",
-            "pressure stays above what is commanded",
-            "look for a jammed valve or a blocked exhaust; take the supply air away before touching the muscle",
+            "the pressure stays above the command",
+            "shut off the air supply before you touch the muscle, then check for a jammed valve or a blocked exhaust",
             "Pa",
         ),
         Fault::OverPressure => (
             "over-pressure",
-            "more pressure than allowed",
-            "lower the regulator's range, or ask for less force",
+            "the pressure exceeds its limit",
+            "reduce the range of the regulator, or the requested force",
             "Pa",
         ),
         Fault::OverStroke => (
             "over-stroke",
-            "the stroke has left its limits",
-            "look at load and end stops; the limits are in the settings",
+            "the stroke is outside its limits",
+            "check the load and the end stops; the limits are in the settings",
             "m",
         ),
-        Fault::OverSpeed => {
-            ("over-speed", "the muscle moves faster than allowed", "has the load come off?", "m/s")
-        }
+        Fault::OverSpeed => (
+            "over-speed",
+            "the speed of the muscle exceeds its limit",
+            "check that the load is still attached",
+            "m/s",
+        ),
         Fault::OverForce => {
-            ("over-force", "more force than allowed", "is the muscle caught on something?", "N")
+            ("over-force", "the force exceeds its limit", "check that the muscle can move freely", "N")
         }
         Fault::SetPointSilence => (
             "set-point-silence",
-            "no new set-point came in time",
-            "is the sending program still running, and quick enough?",
+            "no new setpoint arrived in time",
+            "check that the sending program is running and sends often enough",
             "ticks",
         ),
         Fault::LoopOverrun => (
             "loop-overrun",
             "the control loop missed ticks",
-            "stop other load on the device; an emulated one needs a faster computer",
+            "reduce the load on the device; an emulated device needs a faster computer",
             "ticks",
         ),
         Fault::TableMissing => (
             "table-missing",
-            "this mode needs a table and there is none",
+            "this mode needs a table, and the device has none",
             "send one: host flash TABLE.pam --port PORT",
             "",
         ),
         Fault::TableInvalid => (
             "table-invalid",
-            "the table in use is no longer what was checked",
-            "send it again: host flash TABLE.pam --port PORT; if it comes back, the memory is failing",
+            "the table in use has changed since it was checked",
+            "send it again: host flash TABLE.pam --port PORT; if the fault returns, the memory is failing",
             "",
         ),
-        Fault::BrownOut => ("brown-out", "the supply sagged", "look at the supply and its cable", "V"),
+        Fault::BrownOut => {
+            ("brown-out", "the supply voltage dropped", "check the power supply and its cable", "V")
+        }
         Fault::Watchdog => (
             "watchdog",
             "the watchdog restarted the device",
-            "a fault of the firmware: please report it with the log",
+            "this is a firmware fault: report it with the log",
             "",
         ),
         Fault::NotANumber => (
             "not-a-number",
-            "a calculation gave something that is no number",
-            "look at settings and table with `host device settings` and `host table check`; please report it",
+            "a calculation gave a value that is not finite",
+            "check the settings and the table with `host device settings` and `host table check`, and report the fault",
             "",
         ),
         Fault::HostSilence => (
             "host-silence",
-            "nothing was heard from the host while running",
-            "was the program ended, or the cable pulled? start it again; how long silence may last is watch.host_silence_ticks, \
-             and watch.autonomous=true lets a run go on without a host",
+            "the host was silent while the controller was running",
+            "check that the program is running and the cable is connected, then start again; watch.host_silence_ticks sets the \
+             time-out, and watch.autonomous=true lets a run continue without a host",
             "ticks",
         ),
         Fault::SettingsInvalid => (
@@ -161,20 +166,20 @@ pub fn fault(fault: Fault) -> FaultWords {
             "Pa",
         ),
     };
-    FaultWords { name, cause, remedy, unit }
+    FaultMessage { name, cause, remedy, unit }
 }
 
 /// One line about a fault as it happened: cause, sensor, value against limit.
 #[must_use]
 pub fn report(report: &FaultReport) -> String {
-    let words = fault(report.fault);
-    let unit = match (report.sensor, words.unit) {
+    let message = fault(report.fault);
+    let unit = match (report.sensor, message.unit) {
         (Some(sensor), "") => sensor_unit(sensor),
         (_, unit) => unit,
     };
     let sensor = report.sensor.map(|s| format!(" ({})", sensor_name(s))).unwrap_or_default();
     let side = if report.side == Side::Antagonist { " on the second muscle" } else { "" };
-    // A brown-out, or a table that is missing, is a matter of yes or no.
+    // A brown-out, or a table that is missing, has no value and no limit.
     let judged = if (report.value, report.limit) == (0.0, 0.0) {
         String::new()
     } else {
@@ -183,7 +188,7 @@ pub fn report(report: &FaultReport) -> String {
     let last = &report.last;
     format!(
         "{}{sensor}{side}{judged}, {:.3} s after the start, while {} in {} mode; last readings {}, {}, {}",
-        words.cause,
+        message.cause,
         report.time_us as f64 * 1e-6,
         state(report.from),
         mode(report.mode),
@@ -277,11 +282,11 @@ pub const fn started_by(started_by: StartedBy) -> &'static str {
 pub fn refused(request: &str, refusal: Refusal) -> Error {
     let (why, help) = match refusal {
         Refusal::UnknownEndpoint => {
-            ("it does not know this request".to_owned(), "flash the firmware of this release".to_owned())
+            ("it does not support this request".to_owned(), "flash the firmware of this release".to_owned())
         }
         Refusal::Malformed => (
-            "it could not read the request".to_owned(),
-            "device and program agree on the schema, so this is a fault in one of them: please report it"
+            "it could not decode the request".to_owned(),
+            "the device and the program use the same schema, so this is a defect in one of them: report it"
                 .to_owned(),
         ),
         Refusal::WrongState(now) => (
@@ -294,15 +299,15 @@ pub fn refused(request: &str, refusal: Refusal) -> Error {
             },
         ),
         Refusal::Latched(latched) => {
-            let words = fault(latched);
+            let message = fault(latched);
             (
-                format!("a fault is latched: {}", words.cause),
-                format!("{}; then `host device faults --clear`", words.remedy),
+                format!("a fault is latched: {}", message.cause),
+                format!("{}; then `host device faults --clear`", message.remedy),
             )
         }
         Refusal::StillFaulty(still) => {
-            let words = fault(still);
-            (format!("the fault is still there: {}", words.cause), words.remedy.to_owned())
+            let message = fault(still);
+            (format!("the fault is still present: {}", message.cause), message.remedy.to_owned())
         }
         Refusal::NoTable(which) => (
             format!("the {} has no table", side(which)),
@@ -310,10 +315,10 @@ pub fn refused(request: &str, refusal: Refusal) -> Error {
         ),
         Refusal::WrongMode(running) => (
             format!("it is in {} mode", mode(running)),
-            "set-points and references belong to the running mode".to_owned(),
+            "setpoints and references must match the running mode".to_owned(),
         ),
         Refusal::Value(field) => (
-            format!("{} is out of range or no number", field_name(field)),
+            format!("{} is out of range or not a number", field_name(field)),
             "`host device settings` shows the values in force".to_owned(),
         ),
         Refusal::Table(why) => return table_refused(why),
@@ -321,23 +326,23 @@ pub fn refused(request: &str, refusal: Refusal) -> Error {
             match why {
                 StoreFault::Medium => "its memory failed while reading or writing".to_owned(),
                 StoreFault::Full => "its memory is full".to_owned(),
-                StoreFault::NoPrevious => "there is no older table to go back to".to_owned(),
-                StoreFault::Verify => "its memory does not keep what is written".to_owned(),
+                StoreFault::NoPrevious => "there is no previous table".to_owned(),
+                StoreFault::Verify => "its memory does not retain what is written".to_owned(),
             },
             match why {
-                StoreFault::NoPrevious => "a roll-back goes back one table at most".to_owned(),
-                _ => "try again; if it comes back, the flash is worn out".to_owned(),
+                StoreFault::NoPrevious => "a rollback restores the previous table only".to_owned(),
+                _ => "try again; if the refusal returns, the flash memory is worn out".to_owned(),
             },
         ),
-        Refusal::Range => ("the request goes beyond the end".to_owned(), "ask for less".to_owned()),
+        Refusal::Range => ("the request reaches past the end of the data".to_owned(), "request less".to_owned()),
         Refusal::NotSupported => {
             ("this board cannot do that".to_owned(), "`host device info` shows what it can".to_owned())
         }
         Refusal::Stiffness { low_nm_per_rad: low, high_nm_per_rad: high } => (
             format!(
-                "with both muscles taut the joint has a stiffness of {low:.1} to {high:.1} N·m/rad at this angle"
+                "with both muscles taut the joint stiffness is {low:.1} to {high:.1} N·m/rad at this angle"
             ),
-            "ask for one of these; another radius or rest stroke of the joint moves them (the settings' `joint`)"
+            "choose a value in this range; another radius or rest stroke of the joint moves them (the settings' `joint`)"
                 .to_owned(),
         ),
         Refusal::Angle { low_rad, high_rad } => (
@@ -346,7 +351,7 @@ pub fn refused(request: &str, refusal: Refusal) -> Error {
                 low_rad.to_degrees(),
                 high_rad.to_degrees()
             ),
-            "ask for one of these; a smaller radius or another rest stroke of the joint moves them (the settings' `joint`)"
+            "choose an angle in this range; a smaller radius or another rest stroke of the joint moves them (the settings' `joint`)"
                 .to_owned(),
         ),
     };
@@ -355,46 +360,46 @@ pub fn refused(request: &str, refusal: Refusal) -> Error {
 
 fn table_refused(why: TableFault) -> Error {
     let cause = match why {
-        TableFault::NotBegun => "pieces came without a beginning".to_owned(),
-        TableFault::Gap(there) => format!("a piece is missing behind byte {there}"),
+        TableFault::NotBegun => "a piece arrived before the upload was started".to_owned(),
+        TableFault::Gap(there) => format!("a piece is missing after byte {there}"),
         TableFault::TooLong(fits) => format!("it is longer than the {fits} bytes that the device keeps"),
         TableFault::Incomplete(there) => format!("only {} arrived", counted(there, "byte")),
-        TableFault::Check => "its check sum is wrong".to_owned(),
+        TableFault::Check => "its checksum is wrong".to_owned(),
         TableFault::Version { found, known } => {
             format!("it has format version {found}, the device reads version {known}")
         }
-        TableFault::Malformed => "its bytes are no table".to_owned(),
+        TableFault::Malformed => "it cannot be decoded".to_owned(),
         TableFault::NotFinite => "a number in it is not finite".to_owned(),
         TableFault::NotOrdered => "its pressures are not in rising order".to_owned(),
         TableFault::OutOfRange => "a number in it is out of range".to_owned(),
-        TableFault::UnknownEffect => "it carries an effect that this firmware does not know".to_owned(),
+        TableFault::UnknownEffect => "it contains an effect that this firmware does not support".to_owned(),
     };
     let help = match why {
         TableFault::NotBegun | TableFault::Gap(_) | TableFault::Incomplete(_) | TableFault::Check => {
-            "the line lost bytes: try again, look at the cable"
+            "bytes were lost on the line: try again, and check the cable"
         }
         TableFault::Version { .. } | TableFault::UnknownEffect => {
             "flash the firmware of this release: host flash --firmware ELF --chip CHIP"
         }
-        _ => "judge it with `host table check`, and fit again",
+        _ => "check it with `host table check`, and fit again",
     };
     Error::new(
         DeviceCode::DeviceRefused,
-        format!("the device refuses the table: {cause}; the one before stays in use"),
+        format!("the device refuses the table: {cause}; the previous table stays in use"),
     )
     .help(help)
 }
 
 const fn field_name(field: Field) -> &'static str {
     match field {
-        Field::SetPoint => "a set-point",
+        Field::SetPoint => "a setpoint",
         Field::Reference => "a parameter of the reference",
         Field::ForceLoop => "the setting `force_loop`",
         Field::StrokeLoop => "the setting `stroke_loop`",
         Field::Joint => "the setting `joint`",
         Field::Regulator => "the setting `regulator`",
         Field::Limits => "the setting `limits`",
-        Field::SensorWatch => "a sensor's watch in the settings",
+        Field::SensorWatch => "a sensor monitor in the settings",
         Field::Watch => "the setting `watch`",
         Field::Bands => "a band of motion in the settings",
         Field::Rate => "the rate of telemetry or of a trace",
@@ -408,9 +413,9 @@ mod tests {
     #[test]
     fn every_fault_has_its_own_name_cause_and_remedy() {
         let all: Vec<_> = Fault::ALL.iter().map(|f| fault(*f)).collect();
-        for (at, words) in all.iter().enumerate() {
-            assert!(!words.remedy.is_empty());
-            assert!(all[..at].iter().all(|other| other.name != words.name && other.cause != words.cause));
+        for (at, message) in all.iter().enumerate() {
+            assert!(!message.remedy.is_empty());
+            assert!(all[..at].iter().all(|other| other.name != message.name && other.cause != message.cause));
         }
     }
 
@@ -422,7 +427,7 @@ mod tests {
         assert_eq!(error.exit_status(), 1);
         let error =
             refused("set_point", Refusal::Stiffness { low_nm_per_rad: 25.04, high_nm_per_rad: 29.96 });
-        assert!(error.to_string().ends_with("a stiffness of 25.0 to 30.0 N·m/rad at this angle"), "{error}");
+        assert!(error.to_string().ends_with("stiffness is 25.0 to 30.0 N·m/rad at this angle"), "{error}");
         let error = refused("set_point", Refusal::Angle { low_rad: -0.1, high_rad: 0.1 });
         assert!(error.to_string().ends_with("taut from -5.7° to 5.7° only"), "{error}");
     }

@@ -1,4 +1,4 @@
-//! What is asked of a controller over time, as a person writes it.
+//! Setpoint profiles: the setpoint of a controller over time, as a user writes it.
 //!
 //! ```text
 //! 60                                             this value, from now on
@@ -6,7 +6,7 @@
 //! steps 40 60 80 hold=2                          each value for 2 s, again and again
 //! trapezoid low=40 high=80 ramp=1 hold=1         times in s
 //! chirp mean=60 amplitude=10 from=0.1 to=5 duration=30
-//! @course.csv                                    time in s and value, joined by straight lines
+//! @profile.csv                                   time in s and value, joined by straight lines
 //! ```
 
 use std::path::Path;
@@ -78,21 +78,21 @@ impl Quantity {
     }
 }
 
-/// A course in SI units.
+/// A setpoint profile in SI units.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Course {
+pub enum SetpointProfile {
     /// One value.
     Constant(f32),
-    /// A wave that the device makes.
+    /// A waveform that the device generates.
     Wave(Reference),
-    /// Values that the host sends one after the other, again and again.
+    /// Values that the host sends in turn, repeatedly.
     Steps {
         /// The values.
         values: Vec<f32>,
         /// Time at each, s.
         hold_s: f64,
     },
-    /// Points at equal times, made by the device.
+    /// Points at equal intervals, played by the device.
     Points {
         /// Time between points, s.
         step_s: f32,
@@ -113,7 +113,7 @@ fn wrong(cause: impl Into<String>) -> Error {
     )
 }
 
-/// `name=value` words of a course.
+/// `name=value` parts of a profile.
 struct Words<'a> {
     kind: &'a str,
     named: Vec<(&'a str, f64)>,
@@ -160,7 +160,7 @@ impl<'a> Words<'a> {
     }
 }
 
-impl Course {
+impl SetpointProfile {
     /// Reads what a person wrote, in the quantity's unit.
     ///
     /// # Errors
@@ -232,7 +232,7 @@ impl Course {
             other => {
                 let known = ["sine", "steps", "trapezoid", "chirp", "constant"];
                 let near = nearest(other, known).map(|n| format!("; did you mean {n}?")).unwrap_or_default();
-                Err(wrong(format!("no course is called `{other}`{near}")))
+                Err(wrong(format!("there is no setpoint profile `{other}`{near}")))
             }
         }
     }
@@ -241,10 +241,10 @@ impl Course {
     fn from_file(path: &Path, quantity: Quantity) -> Result<Self> {
         let text = FileKind::Recording.read_text(path)?;
         let at = |line: usize, cause: &str| {
-            Error::new(DataCode::RecordingNotANumber, cause)
-                .file(path)
-                .line(line as u64 + 1)
-                .help(format!("a course is lines of `time_s,value`, the value in {}", quantity.unit()))
+            Error::new(DataCode::RecordingNotANumber, cause).file(path).line(line as u64 + 1).help(format!(
+                "a setpoint profile is lines of `time_s,value`, the value in {}",
+                quantity.unit()
+            ))
         };
         let mut points: Vec<(f64, f64)> = Vec::new();
         for (number, line) in text.lines().enumerate() {
@@ -255,7 +255,7 @@ impl Course {
             let cells: Vec<&str> = line.split([',', ';', '\t']).map(str::trim).collect();
             let parsed = match cells[..] {
                 [time, value] => time.parse::<f64>().ok().zip(value.parse::<f64>().ok()),
-                _ => return Err(at(number, "a line of a course has two cells").value(line)),
+                _ => return Err(at(number, "a line of a setpoint profile has two cells").value(line)),
             };
             match parsed.filter(|(t, v)| t.is_finite() && v.is_finite()) {
                 Some((time, _)) if points.last().is_some_and(|(t, _)| time <= *t) => {
@@ -267,7 +267,7 @@ impl Course {
             }
         }
         let [(begin, _), .., (end, _)] = points[..] else {
-            return Err(at(0, "a course needs two points at least"));
+            return Err(at(0, "a setpoint profile needs at least two points"));
         };
         // The device joins points at equal times, whole ticks apart: the shortest interval, or what the room allows.
         let shortest = points.windows(2).map(|w| w[1].0 - w[0].0).fold(f64::INFINITY, f64::min);
@@ -294,20 +294,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn courses_come_out_in_si_units() {
-        let p = |t| Course::parse(t, Quantity::Pressure).unwrap();
-        assert_eq!(p("60"), Course::Constant(60e3));
-        assert_eq!(p("constant 60"), Course::Constant(60e3));
-        assert_eq!(p("steps 1 2 hold=0.5"), Course::Steps { values: vec![1e3, 2e3], hold_s: 0.5 });
+    fn profiles_come_out_in_si_units() {
+        let p = |t| SetpointProfile::parse(t, Quantity::Pressure).unwrap();
+        assert_eq!(p("60"), SetpointProfile::Constant(60e3));
+        assert_eq!(p("constant 60"), SetpointProfile::Constant(60e3));
+        assert_eq!(p("steps 1 2 hold=0.5"), SetpointProfile::Steps { values: vec![1e3, 2e3], hold_s: 0.5 });
         assert_eq!(
             p("sine frequency=0.5 mean=60 amplitude=20"),
-            Course::Wave(Reference::Sine { mean: 60e3, amplitude: 20e3, frequency_hz: 0.5 })
+            SetpointProfile::Wave(Reference::Sine { mean: 60e3, amplitude: 20e3, frequency_hz: 0.5 })
         );
     }
 
     #[test]
     fn what_is_wrong_is_named() {
-        let told = |t| Course::parse(t, Quantity::Force).unwrap_err().to_string();
+        let told = |t| SetpointProfile::parse(t, Quantity::Force).unwrap_err().to_string();
         assert!(told("sinus mean=1").contains("did you mean sine?"));
         assert!(told("sine mean=1 amplitude=2").contains("needs frequency="));
         assert!(told("sine mean=1 amplitud=2 frequency=1").contains("did you mean amplitude=?"));
@@ -316,20 +316,20 @@ mod tests {
         assert!(told("steps hold=1").contains("at least one"));
         assert!(told("trapezoid low=1 high=2 ramp=0 hold=1").contains("above zero"));
         assert!(told("nan").contains("not a number"));
-        assert!(told("").contains("no course"));
+        assert!(told("").contains("no setpoint profile"));
     }
 
     #[test]
     fn a_file_becomes_points_at_equal_times() {
-        let path = std::env::temp_dir().join(format!("pam-course-{}.csv", std::process::id()));
+        let path = std::env::temp_dir().join(format!("pam-profile-{}.csv", std::process::id()));
         std::fs::write(&path, "time_s,force_N\n0,10\n1,20\n# rest\n3,0\n").unwrap();
-        let course = Course::parse(&format!("@{}", path.display()), Quantity::Force).unwrap();
-        assert_eq!(course, Course::Points { step_s: 1.0, values: vec![10.0, 20.0, 10.0, 0.0] });
+        let profile = SetpointProfile::parse(&format!("@{}", path.display()), Quantity::Force).unwrap();
+        assert_eq!(profile, SetpointProfile::Points { step_s: 1.0, values: vec![10.0, 20.0, 10.0, 0.0] });
         // Many points become fewer, whole ticks apart: else the device would play them too fast.
         let many: String = (0..1_200).map(|n| format!("{},{n}\n", 0.0025 * f64::from(n))).collect();
         std::fs::write(&path, many).unwrap();
-        let Course::Points { step_s, values } =
-            Course::parse(&format!("@{}", path.display()), Quantity::Force).unwrap()
+        let SetpointProfile::Points { step_s, values } =
+            SetpointProfile::parse(&format!("@{}", path.display()), Quantity::Force).unwrap()
         else {
             panic!("a file is points")
         };
@@ -341,7 +341,7 @@ mod tests {
             values[250]
         );
         std::fs::write(&path, "0,10\n1,20\n1,30\n").unwrap();
-        let error = Course::parse(&format!("@{}", path.display()), Quantity::Force).unwrap_err();
+        let error = SetpointProfile::parse(&format!("@{}", path.display()), Quantity::Force).unwrap_err();
         assert_eq!(error.place().line, Some(3));
         std::fs::remove_file(&path).unwrap();
     }

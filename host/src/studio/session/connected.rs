@@ -1,9 +1,8 @@
-//! The thread that owns the connection to the controller: orders in, telemetry and states out, and safety when nobody looks.
+//! One connected controller: its requests, its telemetry to the page and to a recording.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use model_core::check;
@@ -15,65 +14,29 @@ use model_core::link::hello::Board;
 use model_core::link::messages::{Event, Side, Start, State, Status, Telemetry, TelemetryRate};
 use model_core::link::settings::Settings;
 use serde_json::{Value, json};
-use tokio::sync::{broadcast, oneshot};
+use tokio::sync::broadcast;
 
+use super::super::events::{batch, credible, tell};
+use super::{Order, no_controller, report};
 use crate::demo::campaign::muscle;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::json_of;
-use pam_device::course::{Course, Quantity};
 use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::error::DeviceCode;
 use pam_device::recorder::{Recorder, about_losses, about_start, serial};
 use pam_device::run::{Plan, Steps, arm, vent};
-use pam_device::{Client, Topic, difference, tables, words};
+use pam_device::setpoint_profile::Quantity;
+use pam_device::{Address, Client, Topic, VentLine, messages, table_diff, tables};
 use pam_fit::table_file::TableFile;
 
-use super::told::{batch, credible, tell};
-
-/// What the page may ask of the controller.
-#[derive(Debug)]
-pub enum Order {
-    /// Connect to a port.
-    Connect(String),
-    /// Start an emulated controller with a muscle of the bench, and connect to it.
-    Emulate(String),
-    /// Vent and let go.
-    Disconnect,
-    /// Arm.
-    Arm,
-    /// Vent and disarm: always allowed.
-    Vent,
-    /// Follow a course.
-    Follow(Quantity, String),
-    /// Faults in words.
-    Faults,
-    /// Forget the latched fault.
-    Clear,
-    /// Change settings, each `KEY=VALUE`; the answer is all of them.
-    Settings(Vec<String>),
-    /// Let something go wrong on the emulated bench.
-    Mishap(u8),
-    /// What would change if this table were sent.
-    Difference(PathBuf),
-    /// Send this table.
-    Flash(PathBuf),
-    /// Begin a recording.
-    Record(PathBuf),
-    /// End it.
-    EndRecord,
-}
-
-/// An order and where its answer goes.
-pub type Asked = (Order, oneshot::Sender<Result<Value>>);
-
-/// How long nobody may look at an armed controller.
-const UNWATCHED: Duration = Duration::from_millis(1_500);
 /// Time between two batches of telemetry to the page.
 const BATCH: Duration = Duration::from_millis(16);
 /// Time between two reports of the state.
 const REPORT: Duration = Duration::from_millis(400);
 
-struct Connected {
+/// A controller that has said hello, and what the page does with it.
+pub struct Connected {
+    address: Address,
     client: Client,
     status: Status,
     settings: Settings,
@@ -86,104 +49,65 @@ struct Connected {
     reported: Instant,
 }
 
-/// Serves orders until the page's server ends; then vents.
-pub fn keep(orders: &Receiver<Asked>, say: &broadcast::Sender<String>) {
-    let mut connected: Option<Connected> = None;
-    let mut watched = Instant::now();
-    loop {
-        let wait = if connected.is_some() { Duration::from_millis(1) } else { Duration::from_millis(200) };
-        match orders.recv_timeout(wait) {
-            Ok((order, answer)) => {
-                let outcome = obey(order, &mut connected);
-                // A page that is gone does not wait for its answer.
-                let _ = answer.send(outcome);
-                report(connected.as_mut(), say);
-            }
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => break,
-        }
-        if say.receiver_count() > 0 {
-            watched = Instant::now();
-        }
-        let Some(now) = connected.as_mut() else {
-            continue;
-        };
-        if let Err(error) = now.listen(say) {
-            tell(say, "bad", &error);
-            // What was recorded until the cable was pulled is kept.
-            if let Err(error) = now.end_recording() {
-                tell(say, "bad", &error);
-            }
-            connected = None;
-            report(None, say);
-            continue;
-        }
-        if watched.elapsed() > UNWATCHED && matches!(now.status.state, State::Armed | State::Running) {
-            now.running = None;
-            // Nobody looks: what fails here is told by the next page through the state itself.
-            if let Ok(status) = vent(&mut now.client) {
-                now.status = status;
-            }
-        }
-    }
-    if let Some(mut now) = connected {
-        let _ = vent(&mut now.client);
-        let _ = now.end_recording();
-    }
-}
-
-fn report(connected: Option<&mut Connected>, say: &broadcast::Sender<String>) {
-    let text = match connected {
-        Some(now) => {
-            now.reported = Instant::now();
-            now.state().to_string()
-        }
-        None => json!({ "k": "s", "connected": false }).to_string(),
-    };
-    // Without a page nobody listens.
-    let _ = say.send(text);
-}
-
-fn none() -> Error {
-    Error::new(DataCode::CallInvalid, "no controller is connected")
-        .help("connect to a port, or start an emulated one")
-}
-
-fn obey(order: Order, connected: &mut Option<Connected>) -> Result<Value> {
-    match order {
-        Order::Connect(port) => {
-            let client = Client::open(&port.parse()?)?;
-            *connected = Some(Connected::new(client, None)?);
-            Ok(Value::Null)
-        }
-        Order::Emulate(name) => {
-            // The old one ends before a new one begins.
-            *connected = None;
-            let stand = Stand::swinging(muscle(&name)?);
-            let mishap = stand.mishap();
-            let emulated = Emulated::start(stand, None, 1.0)?;
-            let client = Client::open(emulated.address())?;
-            let words = emulated.words();
-            *connected = Some(Connected::new(client, Some((emulated, mishap)))?);
-            Ok(json!({ "controller": words }))
-        }
-        Order::Disconnect => {
-            if let Some(mut now) = connected.take() {
-                vent(&mut now.client)?;
-                now.end_recording()?;
-            }
-            Ok(Value::Null)
-        }
-        other => connected.as_mut().ok_or_else(none)?.obey(other),
+impl std::fmt::Debug for Connected {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Connected").field("client", &self.client).finish_non_exhaustive()
     }
 }
 
 impl Connected {
-    fn new(mut client: Client, emulated: Option<(Emulated, Arc<AtomicU8>)>) -> Result<Self> {
+    /// Opens a port and reads what the page shows first.
+    ///
+    /// # Errors
+    /// As [`Client::open`].
+    pub fn open(address: Address) -> Result<Self> {
+        Self::new(address.clone(), Client::open(&address)?, None)
+    }
+
+    /// Starts an emulated controller with a muscle of the bench, and connects to it. Also gives what it runs on, in words.
+    ///
+    /// # Errors
+    /// A muscle that the bench does not know, or as [`Emulated::start`] and [`Client::open`].
+    pub fn emulate(name: &str) -> Result<(Self, String)> {
+        let stand = Stand::swinging(muscle(name)?);
+        let mishap = stand.mishap();
+        let emulated = Emulated::start(stand, None, 1.0)?;
+        let address = emulated.address().clone();
+        let client = Client::open(&address)?;
+        let words = emulated.words();
+        Ok((Self::new(address, client, Some((emulated, mishap)))?, words))
+    }
+
+    /// Where it is connected.
+    pub(super) fn address(&self) -> &Address {
+        &self.address
+    }
+
+    pub(super) fn vent_line(&self) -> Result<VentLine> {
+        self.client.vent_line()
+    }
+
+    pub(super) fn state(&self) -> State {
+        self.status.state
+    }
+
+    /// Vents and disarms, confirmed by the controller.
+    pub(super) fn vent(&mut self) -> Result<()> {
+        self.running = None;
+        self.status = vent(&mut self.client)?;
+        Ok(())
+    }
+
+    pub(crate) fn new(
+        address: Address,
+        mut client: Client,
+        emulated: Option<(Emulated, Arc<AtomicU8>)>,
+    ) -> Result<Self> {
         client.call::<SetTelemetry>(&TelemetryRate { every_ticks: 1 })?;
         let status = client.call::<GetStatus>(&())?;
         let settings = client.call::<GetSettings>(&())?;
         let mut now = Self {
+            address,
             client,
             status,
             settings,
@@ -206,14 +130,16 @@ impl Connected {
         {
             self.fault = Some(format!(
                 "{}. What to do: {}.",
-                words::report(&latched),
-                words::fault(latched.fault).remedy
+                messages::report(&latched),
+                messages::fault(latched.fault).remedy
             ));
         }
         Ok(())
     }
 
-    fn state(&self) -> Value {
+    /// The state for the page.
+    pub(super) fn report(&mut self) -> Value {
+        self.reported = Instant::now();
         let hello = self.client.hello();
         let (major, minor, patch) = hello.release;
         let losses = self.client.losses();
@@ -224,8 +150,8 @@ impl Connected {
             "serial": serial(hello),
             "release": format!("{major}.{minor}.{patch}"),
             "emulated": self.emulated.as_ref().map(|e| if e.0.kind() == Kind::Qemu { "QEMU" } else { "in this process" }),
-            "state": words::state(self.status.state),
-            "mode": words::mode(self.status.mode),
+            "state": messages::state(self.status.state),
+            "mode": messages::mode(self.status.mode),
             "fault": self.fault,
             "lost": losses.samples, "bad_frames": losses.bad_frames,
             "recording": self.recorder.as_ref().map(|r| r.0.rows()),
@@ -233,7 +159,8 @@ impl Connected {
         })
     }
 
-    fn listen(&mut self, say: &broadcast::Sender<String>) -> Result<()> {
+    /// Takes what the controller sends for some milliseconds.
+    pub(super) fn listen(&mut self, say: &broadcast::Sender<String>) -> Result<()> {
         self.client.keep_alive()?;
         let until = Instant::now() + Duration::from_millis(8);
         while let Some(topic) = self.client.topic(until.saturating_duration_since(Instant::now()))? {
@@ -277,11 +204,18 @@ impl Connected {
         if sample.state == State::Running {
             if let Some((quantity, steps, start)) = &mut self.running {
                 let begin = *start.get_or_insert(sample.time_us);
-                steps.advance(
-                    &mut self.client,
-                    *quantity,
-                    sample.time_us.saturating_sub(begin) as f64 * 1e-6,
-                )?;
+                let elapsed = sample.time_us.saturating_sub(begin) as f64 * 1e-6;
+                match steps.advance(&mut self.client, *quantity, elapsed) {
+                    // A controller that was vented beside this conversation refuses setpoints; it is still connected.
+                    Err(error) if error.code() == DeviceCode::DeviceRefused => {
+                        self.running = None;
+                        self.status = self.client.call::<GetStatus>(&())?;
+                        if self.status.state == State::Running {
+                            tell(say, "bad", &error);
+                        }
+                    }
+                    other => other?,
+                }
             }
         } else if sample.state == State::Fault {
             self.running = None;
@@ -290,19 +224,15 @@ impl Connected {
         Ok(())
     }
 
-    fn obey(&mut self, order: Order) -> Result<Value> {
+    /// Carries out an order to a connected controller.
+    pub(super) fn obey(&mut self, order: Order) -> Result<Value> {
         match order {
-            Order::Connect(_) | Order::Emulate(_) | Order::Disconnect => return Err(none()),
+            Order::Replace(_) | Order::IsConnected(_) | Order::Disconnect => return Err(no_controller()),
             Order::Arm => {
                 arm(&mut self.client)?;
                 self.status = self.client.call::<GetStatus>(&())?;
             }
-            Order::Vent => {
-                self.running = None;
-                self.status = vent(&mut self.client)?;
-            }
-            Order::Follow(quantity, text) => {
-                let course = Course::parse(&text, quantity)?;
+            Order::Follow(quantity, profile) => {
                 if self.status.state == State::Disarmed {
                     return Err(Error::new(DeviceCode::DeviceRefused, "the controller is disarmed")
                         .help("arm it first"));
@@ -311,12 +241,12 @@ impl Connected {
                     self.client.call::<Stop>(&())?;
                 }
                 self.status = self.client.call::<StartMode>(&Start { mode: quantity.mode() })?;
-                let plan = Plan { quantity, course, seconds: None, every_ticks: 1 };
+                let plan = Plan { quantity, profile, seconds: None, every_ticks: 1 };
                 self.running = Some((quantity, Steps::begin(&mut self.client, &plan)?, None));
             }
             Order::Faults => {
                 let faults = self.client.call::<GetFaults>(&())?;
-                return Ok(json!({ "latched": faults.latched.as_ref().map(words::report) }));
+                return Ok(json!({ "latched": faults.latched.as_ref().map(messages::report) }));
             }
             Order::Clear => {
                 let cleared = self.client.call_once::<ClearFault>(&());
@@ -360,7 +290,7 @@ impl Connected {
             if kept != settings || read != settings {
                 return Err(Error::new(
                     DeviceCode::DeviceVerify,
-                    "the device keeps other settings than it was sent",
+                    "the settings read back from the device differ from those sent",
                 ));
             }
         }
@@ -373,7 +303,7 @@ impl Connected {
         let before = tables::read(&mut self.client, Side::Agonist)?;
         let Some(before) = before else { return Ok(json!({ "text": "the device has no table yet" })) };
         let old = image::read(&before).map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
-        Ok(json!({ "text": difference::between(&old, &new.table).to_text() }))
+        Ok(json!({ "text": table_diff::between(&old, &new.table).to_text() }))
     }
 
     fn flash(&mut self, path: &std::path::Path) -> Result<Value> {
@@ -393,7 +323,8 @@ impl Connected {
         Ok(json!({ "crc": format!("{:08x}", kept.crc), "bytes": kept.length, "generation": kept.generation }))
     }
 
-    fn end_recording(&mut self) -> Result<Option<PathBuf>> {
+    /// Ends the recording, if there is one.
+    pub(super) fn end_recording(&mut self) -> Result<Option<PathBuf>> {
         let Some((recorder, mut about)) = self.recorder.take() else { return Ok(None) };
         about["losses"] = about_losses(self.client.losses());
         about["ended_by"] = json!("the page");

@@ -1,0 +1,132 @@
+//! Connections of browsers, with bounds on their number, on the time that a request takes to arrive, and on its size.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::{Body, Bytes, to_bytes};
+use axum::extract::Request;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use tokio::net::TcpListener;
+use tokio::sync::Semaphore;
+
+/// Time for the head of a request, and for its body.
+pub(super) const ARRIVAL: Duration = Duration::from_secs(10);
+/// Pause after the system refused a connection, for instance for want of file handles.
+const REFUSED: Duration = Duration::from_millis(50);
+
+/// What is bounded.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits {
+    /// Connections at a time. A browser opens six to one origin; this is enough for ten.
+    pub connections: usize,
+    /// Time for the head of a request.
+    pub head: Duration,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { connections: 64, head: ARRIVAL }
+    }
+}
+
+/// Serves until the future is dropped. A connection beyond the limit is closed at once.
+pub(super) async fn serve(listener: TcpListener, app: Router, limits: Limits) {
+    let permits = Arc::new(Semaphore::new(limits.connections));
+    loop {
+        let Ok((stream, _)) = listener.accept().await else {
+            tokio::time::sleep(REFUSED).await;
+            continue;
+        };
+        let Ok(permit) = Arc::clone(&permits).try_acquire_owned() else { continue };
+        // Answers are short, and a vent's must not wait for more to send.
+        let _ = stream.set_nodelay(true);
+        let service = TowerToHyperService::new(app.clone());
+        tokio::spawn(async move {
+            let _permit = permit;
+            // A connection that breaks concerns its browser only.
+            let _ = hyper::server::conn::http1::Builder::new()
+                .timer(TokioTimer::new())
+                .header_read_timeout(limits.head)
+                .serve_connection(TokioIo::new(stream), service)
+                .await;
+        });
+    }
+}
+
+/// The body of a request, at most `limit` bytes of it.
+pub(super) async fn body(request: Request<Body>, limit: usize) -> Result<Bytes, Response> {
+    match tokio::time::timeout(ARRIVAL, to_bytes(request.into_body(), limit)).await {
+        Ok(Ok(bytes)) => Ok(bytes),
+        Ok(Err(_)) => {
+            let why = format!("the request is longer than {limit} bytes, or broke off");
+            Err((StatusCode::PAYLOAD_TOO_LARGE, why).into_response())
+        }
+        Err(_) => Err((StatusCode::REQUEST_TIMEOUT, "the request did not arrive in time").into_response()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Read, Write};
+    use std::net::TcpStream;
+
+    use axum::routing::get;
+
+    use super::*;
+
+    fn start(limits: Limits) -> std::net::SocketAddr {
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        listener.set_nonblocking(true).unwrap();
+        let address = listener.local_addr().unwrap();
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        let app = Router::new().route("/", get(|| async { "here" }));
+        std::thread::spawn(move || {
+            runtime.block_on(async { serve(TcpListener::from_std(listener).unwrap(), app, limits).await });
+        });
+        address
+    }
+
+    fn connect(address: std::net::SocketAddr) -> TcpStream {
+        let stream = TcpStream::connect(address).unwrap();
+        // A server that keeps the connection fails the test instead of holding it up for ever.
+        stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+        stream
+    }
+
+    #[test]
+    fn a_request_whose_head_does_not_end_is_given_up() {
+        let limits = Limits { head: Duration::from_millis(50), ..Limits::default() };
+        let mut stream = connect(start(limits));
+        stream.write_all(b"GET / HTTP/1.1\r\nHost: x\r\nSlow: ").unwrap();
+        let mut rest = Vec::new();
+        stream.read_to_end(&mut rest).unwrap();
+    }
+
+    #[test]
+    fn a_connection_beyond_the_limit_is_closed_and_the_others_go_on() {
+        let address = start(Limits { connections: 1, ..Limits::default() });
+        let mut first = connect(address);
+        let ask = |stream: &mut TcpStream| {
+            stream.write_all(b"GET / HTTP/1.1\r\nHost: x\r\n\r\n").unwrap();
+            let mut bytes = [0; 1024];
+            let count = stream.read(&mut bytes).unwrap();
+            assert!(String::from_utf8_lossy(&bytes[..count]).starts_with("HTTP/1.1 200"));
+        };
+        ask(&mut first);
+        assert_eq!(connect(address).read(&mut [0; 16]).unwrap(), 0);
+        ask(&mut first);
+    }
+
+    #[test]
+    fn a_body_is_taken_up_to_its_limit() {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        let taken =
+            |length: usize| runtime.block_on(body(Request::new(Body::from(vec![b'x'; length])), 64 << 10));
+        assert_eq!(taken(64 << 10).unwrap().len(), 64 << 10);
+        assert_eq!(taken((64 << 10) + 1).unwrap_err().status(), StatusCode::PAYLOAD_TOO_LARGE);
+    }
+}

@@ -1,0 +1,168 @@
+//! Orders of the page: to the controller, and about recordings.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+use tokio::sync::oneshot;
+
+use super::analysis::Analysis;
+use super::server::{Shared, ended_in_fault};
+use super::session::{Connected, Order, Request};
+use pam_data::error::{DataCode, Error, Result};
+use pam_device::error::DeviceCode;
+use pam_device::setpoint_profile::{Quantity, SetpointProfile};
+use pam_device::{Address, available};
+
+/// What the page may post.
+#[derive(Debug, Deserialize)]
+#[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
+pub(super) enum Posted {
+    Ports,
+    VentPath,
+    Connect { port: String },
+    Emulate { muscle: String },
+    Disconnect,
+    Arm,
+    Vent,
+    Follow { quantity: String, profile: String },
+    Faults,
+    Clear,
+    Settings { set: Vec<String> },
+    Mishap { code: u8 },
+    Record,
+    EndRecord,
+    Recordings,
+    Curves { number: usize },
+    Example { muscle: String },
+    Fit { muscle: String },
+    Diagnose { muscle: String },
+    Compare { a: usize, b: usize },
+    Difference,
+    Flash { table: String },
+}
+
+impl Shared {
+    pub(super) async fn order(&self, order: Order) -> Result<Value> {
+        self.order_since(order, self.vent.count()).await
+    }
+
+    /// An order that belongs to the time when there had been so many vents.
+    pub(super) async fn order_since(&self, order: Order, vents: u64) -> Result<Value> {
+        let gone = || {
+            Error::new(DeviceCode::DeviceSilent, "the thread of the controller has ended")
+                .help("start `host studio` again")
+        };
+        let (answer, answered) = oneshot::channel();
+        self.orders.send(Request { order, vents, answer }).map_err(|_| gone())?;
+        answered.await.map_err(|_| gone())?
+    }
+
+    /// Whatever may wait for a file or a line, off the server's thread.
+    async fn apart<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&Analysis) -> Result<T> + Send + 'static,
+    ) -> Result<T> {
+        let analysis = Arc::clone(&self.analysis);
+        let done = tokio::task::spawn_blocking(move || work(&analysis));
+        done.await.map_err(|e| ended_in_fault(&e))?
+    }
+
+    /// A computation that uses the whole machine, after those that were ordered before.
+    pub(super) async fn compute(
+        &self,
+        work: impl FnOnce(&Analysis) -> Result<Value> + Send + 'static,
+    ) -> Result<Value> {
+        let _turn = self.computing.acquire().await;
+        self.apart(work).await
+    }
+
+    /// The new connection is opened and checked before the present one is given up.
+    pub(super) async fn connect(&self, port: String) -> Result<Value> {
+        let address: Address = port.parse()?;
+        if self.order(Order::IsConnected(address.clone())).await? == json!(true) {
+            return Ok(Value::Null);
+        }
+        let fresh = self.apart(|_| Connected::open(address)).await?;
+        self.order(Order::Replace(Box::new(fresh))).await
+    }
+
+    pub(super) async fn emulate(&self, muscle: String) -> Result<Value> {
+        let (fresh, words) = self.apart(move |_| Connected::emulate(&muscle)).await?;
+        self.order(Order::Replace(Box::new(fresh))).await?;
+        Ok(json!({ "controller": words }))
+    }
+
+    /// Carries out what the page posted.
+    pub(super) async fn post(&self, posted: Posted) -> Result<Value> {
+        match posted {
+            Posted::Ports => self.apart(|_| Ok(json!(available()))).await,
+            Posted::VentPath => Ok(
+                json!({ "address": format!("{}/vent", self.vent_path.origin), "token": &*self.vent_path.token }),
+            ),
+            Posted::Connect { port } => self.connect(port).await,
+            Posted::Emulate { muscle } => self.emulate(muscle).await,
+            Posted::Disconnect => self.order(Order::Disconnect).await,
+            Posted::Arm => self.order(Order::Arm).await,
+            // The page uses the path of its own; this one serves where that cannot be reached, as through a tunnel.
+            Posted::Vent => {
+                let vent = Arc::clone(&self.vent);
+                self.apart(move |_| vent.now().map(|()| Value::Null)).await
+            }
+            Posted::Follow { quantity, profile } => self.follow(&quantity, profile).await,
+            Posted::Faults => self.order(Order::Faults).await,
+            Posted::Clear => self.order(Order::Clear).await,
+            Posted::Settings { set } => self.order(Order::Settings(set)).await,
+            Posted::Mishap { code } => self.order(Order::Mishap(code)).await,
+            Posted::Record => {
+                let path = self.apart(|a| Ok(a.next_run())).await?;
+                self.order(Order::Record(path)).await
+            }
+            Posted::EndRecord => {
+                let ended = self.order(Order::EndRecord).await?;
+                if let Some(path) = ended["path"].as_str() {
+                    self.analysis.add(PathBuf::from(path));
+                }
+                Ok(self.analysis.list())
+            }
+            Posted::Recordings => Ok(self.analysis.list()),
+            Posted::Curves { number } => self.apart(move |a| a.curves(number)).await,
+            Posted::Compare { a, b } => self.apart(move |w| w.compare(a, b)).await,
+            Posted::Example { muscle } => self.compute(move |a| a.example(&muscle)).await,
+            Posted::Fit { muscle } => self.compute(move |a| a.fit(&muscle)).await,
+            Posted::Diagnose { muscle } => self.compute(move |a| a.diagnose(&muscle)).await,
+            Posted::Difference => {
+                let table = self.analysis.table()?;
+                let mut found = self.order(Order::Difference(table.clone())).await?;
+                found["table"] = json!(table.display().to_string());
+                Ok(found)
+            }
+            Posted::Flash { table } => {
+                let table = self.analysis.table_named(&table)?;
+                self.order(Order::Flash(table)).await
+            }
+        }
+    }
+
+    async fn follow(&self, quantity: &str, profile: String) -> Result<Value> {
+        let quantity = match quantity {
+            "force" => Quantity::Force,
+            "pressure" => Quantity::Pressure,
+            "stroke" => Quantity::Stroke,
+            _ => {
+                return Err(Error::new(
+                    DataCode::CallInvalid,
+                    "a setpoint profile is of force, pressure or stroke",
+                ));
+            }
+        };
+        // A page may not read files of this machine by naming them as a profile.
+        if profile.trim_start().starts_with('@') {
+            return Err(Error::new(DataCode::CallInvalid, "the page takes no setpoint profile from a file")
+                .help("use host run"));
+        }
+        let profile = SetpointProfile::parse(&profile, quantity)?;
+        self.order(Order::Follow(quantity, profile)).await
+    }
+}

@@ -1,0 +1,286 @@
+//! What a vent, and a live controller, must survive: computations, silent lines, orders that are refused.
+
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Condvar, Mutex};
+use std::thread;
+use std::time::Duration;
+
+use model_core::link::endpoints::{Disarm, Endpoint};
+use model_core::link::frame::Accumulator;
+use pam_device::emulated::{Emulated, Kind, Stand};
+use pam_device::{Address, Client, Patience, Port};
+use serde_json::{Value, json};
+use tokio::sync::{Semaphore, broadcast, oneshot};
+
+use super::analysis::Analysis;
+use super::orders::Posted;
+use super::server::Shared;
+use super::session::{self, Connected, Order};
+use super::vent::{self, Vent};
+use crate::demo::campaign::muscle;
+
+/// A test that waits longer than this waits for something that never happens.
+const HOPELESS: Duration = Duration::from_secs(120);
+
+/// A door that is open until it is closed.
+#[derive(Default)]
+struct Gate(Mutex<bool>, Condvar);
+
+impl Gate {
+    fn set(&self, closed: bool) {
+        *self.0.lock().unwrap() = closed;
+        self.1.notify_all();
+    }
+
+    fn pass(&self) {
+        let _open = self.1.wait_while(self.0.lock().unwrap(), |closed| *closed).unwrap();
+    }
+}
+
+/// An emulated controller behind a line that notes the requests which pass, and can hold back the answers.
+struct Line {
+    address: Address,
+    answers: Arc<Gate>,
+    requests: Receiver<u8>,
+    _device: Emulated,
+}
+
+impl Line {
+    fn new() -> Self {
+        let stand = Stand::swinging(muscle("mini").unwrap());
+        let device = Emulated::start(stand, Some(Kind::Native), 1.0).unwrap();
+        let Address::Tcp { host, port } = device.address().clone() else { panic!("no TCP") };
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = Address::Tcp { host: "127.0.0.1".into(), port: listener.local_addr().unwrap().port() };
+        let answers = Arc::new(Gate::default());
+        let (note, requests) = channel();
+        let gate = Arc::clone(&answers);
+        thread::spawn(move || {
+            let (mut host_side, _) = listener.accept().unwrap();
+            let mut board_side = TcpStream::connect((host.as_str(), port)).unwrap();
+            let (mut from_board, mut to_host) =
+                (board_side.try_clone().unwrap(), host_side.try_clone().unwrap());
+            thread::spawn(move || {
+                let mut bytes = [0; 4096];
+                while let Ok(count @ 1..) = from_board.read(&mut bytes) {
+                    gate.pass();
+                    if to_host.write_all(&bytes[..count]).is_err() {
+                        return;
+                    }
+                }
+            });
+            let (mut frames, mut bytes) = (Accumulator::new(), [0; 4096]);
+            while let Ok(count @ 1..) = host_side.read(&mut bytes) {
+                for &byte in &bytes[..count] {
+                    if let Some(Ok(frame)) = frames.push(byte) {
+                        let _ = note.send(frame.header.id);
+                    }
+                }
+                if board_side.write_all(&bytes[..count]).is_err() {
+                    return;
+                }
+            }
+        });
+        Self { address, answers, requests, _device: device }
+    }
+
+    fn open(&self) -> Connected {
+        let patience = Patience { answer: HOPELESS, slow_answer: HOPELESS, ..Patience::default() };
+        let client = Client::connect(Port::open(&self.address).unwrap(), patience).unwrap();
+        Connected::new(self.address.clone(), client, None).unwrap()
+    }
+
+    fn await_request(&self, id: u8) {
+        while self.requests.recv_timeout(HOPELESS).expect("the request arrives") != id {}
+    }
+}
+
+/// The studio without its page; the folder goes with it.
+struct Studio {
+    shared: Shared,
+    says: broadcast::Receiver<String>,
+    folder: tempfile::TempDir,
+}
+
+impl Studio {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let (orders, requests) = channel();
+        let (say, says) = broadcast::channel(65_536);
+        let vent = Arc::new(Vent::default());
+        let vent_path = vent::start(Arc::clone(&vent), ["127.0.0.1:1".to_owned()].into()).unwrap();
+        {
+            let (say, vent) = (say.clone(), Arc::clone(&vent));
+            thread::spawn(move || session::serve(&requests, &say, &vent));
+        }
+        let shared = Shared {
+            token: "0".into(),
+            orders,
+            say,
+            analysis: Arc::new(Analysis::new(folder.path().to_owned()).unwrap()),
+            vent,
+            vent_path,
+            computing: Arc::new(Semaphore::new(1)),
+        };
+        Self { shared, says, folder }
+    }
+
+    /// Sends a vent as the page does, and waits for the answer.
+    fn press_vent(&self) -> String {
+        let path = &self.shared.vent_path;
+        let host = path.origin.strip_prefix("http://").unwrap();
+        let mut stream = TcpStream::connect(host).unwrap();
+        stream.set_read_timeout(Some(HOPELESS)).unwrap();
+        write!(
+            stream,
+            "POST /vent HTTP/1.1\r\nHost: {host}\r\nOrigin: http://127.0.0.1:1\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{}",
+            path.token.len(),
+            path.token
+        )
+        .unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        answer
+    }
+
+    /// The next report of the state that `wanted` accepts.
+    async fn state(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
+        loop {
+            let text = tokio::time::timeout(HOPELESS, self.says.recv()).await.unwrap();
+            // A batch that was missed is not a state that is waited for: one comes each 0.4 s.
+            let Ok(text) = text else { continue };
+            let value: Value = serde_json::from_str(&text).unwrap();
+            if value["k"] == "s" && wanted(&value) {
+                return value;
+            }
+        }
+    }
+}
+
+fn run(test: impl Future<Output = ()>) {
+    tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap().block_on(test);
+}
+
+#[test]
+fn a_vent_passes_a_computation_that_is_under_way() {
+    run(async {
+        let mut studio = Studio::new();
+        let line = Line::new();
+        studio.shared.order(Order::Replace(Box::new(line.open()))).await.unwrap();
+        let gate = Arc::new(Gate::default());
+        gate.set(true);
+        let (begun, begins) = oneshot::channel();
+        let computation = {
+            let (shared, gate) = (studio.shared.clone(), Arc::clone(&gate));
+            tokio::spawn(async move {
+                let held = move |_: &Analysis| {
+                    begun.send(()).unwrap();
+                    gate.pass();
+                    Ok(json!("computed"))
+                };
+                shared.compute(held).await
+            })
+        };
+        begins.await.unwrap();
+        // A second one waits for its turn, and the page's other requests are answered.
+        let second = tokio::spawn({
+            let shared = studio.shared.clone();
+            async move { shared.post(Posted::Fit { muscle: String::new() }).await }
+        });
+        studio.shared.post(Posted::Recordings).await.unwrap();
+        studio.shared.post(Posted::Arm).await.unwrap();
+        studio.state(|s| s["state"] == "armed").await;
+        assert!(studio.press_vent().starts_with("HTTP/1.1 204"));
+        studio.state(|s| s["state"] == "disarmed").await;
+        studio.shared.post(Posted::Arm).await.unwrap();
+        studio.state(|s| s["state"] == "armed").await;
+        studio.shared.post(Posted::Vent).await.unwrap();
+        studio.state(|s| s["state"] == "disarmed").await;
+        assert!(!computation.is_finished() && !second.is_finished());
+        gate.set(false);
+        assert_eq!(computation.await.unwrap().unwrap(), "computed");
+        assert!(second.await.unwrap().is_err());
+    });
+}
+
+#[test]
+fn a_vent_passes_a_conversation_that_waits_for_an_answer() {
+    run(async {
+        let mut studio = Studio::new();
+        let line = Line::new();
+        studio.shared.order(Order::Replace(Box::new(line.open()))).await.unwrap();
+        studio.shared.post(Posted::Arm).await.unwrap();
+        line.answers.set(true);
+        let faults = tokio::spawn({
+            let shared = studio.shared.clone();
+            async move { shared.post(Posted::Faults).await }
+        });
+        tokio::task::yield_now().await;
+        assert!(studio.press_vent().starts_with("HTTP/1.1 204"));
+        // The conversation cannot have sent this: before it disarms it waits for the answer to `stop`.
+        line.await_request(Disarm::ID);
+        assert!(!faults.is_finished(), "the conversation still waits");
+        // What was requested before the vent no longer moves the muscle.
+        let late = studio.shared.order_since(Order::Arm, studio.shared.vent.count() - 1);
+        line.answers.set(false);
+        assert!(late.await.unwrap_err().cause().contains("vented after"), "an order outlives a vent");
+        faults.await.unwrap().unwrap();
+        studio.state(|s| s["state"] == "disarmed").await;
+    });
+}
+
+#[test]
+fn a_live_controller_stays_until_its_successor_is_there_and_is_then_vented() {
+    run(async {
+        let mut studio = Studio::new();
+        let (line, next) = (Line::new(), Line::new());
+        studio.shared.order(Order::Replace(Box::new(line.open()))).await.unwrap();
+        studio.shared.post(Posted::Record).await.unwrap();
+        studio.shared.post(Posted::Arm).await.unwrap();
+        // Nothing listens there, there is no such muscle, no such port, and the last one is the present connection.
+        for refused in [
+            Posted::Connect { port: "tcp:127.0.0.1:1".into() },
+            Posted::Connect { port: "tcp:nonsense".into() },
+            Posted::Emulate { muscle: "no such muscle".into() },
+        ] {
+            assert!(studio.shared.post(refused).await.is_err());
+        }
+        studio.shared.post(Posted::Connect { port: line.address.to_string() }).await.unwrap();
+        let state = studio.state(|s| s["state"] == "armed").await;
+        assert_eq!(state["port"], line.address.to_string());
+        studio.state(|s| s["recording"].as_u64() > Some(3)).await;
+        while line.requests.try_recv().is_ok() {}
+        studio.shared.order(Order::Replace(Box::new(next.open()))).await.unwrap();
+        line.await_request(Disarm::ID);
+        studio.state(|s| s["port"] == next.address.to_string()).await;
+        let run = std::fs::read_to_string(studio.folder.path().join("run-1.csv")).unwrap();
+        assert!(run.lines().count() > 3, "the recording ended whole");
+    });
+}
+
+#[test]
+fn the_path_of_a_vent_only_vents_and_only_for_the_page() {
+    let studio = Studio::new();
+    assert!(studio.press_vent().contains("no controller is connected"));
+    let host = studio.shared.vent_path.origin.strip_prefix("http://").unwrap();
+    let right = &studio.shared.vent_path.token;
+    for (head, body, status) in [
+        (format!("POST /vent HTTP/1.1\r\nHost: {host}\r\nOrigin: http://evil.example"), &**right, "403"),
+        (format!("POST /vent HTTP/1.1\r\nHost: evil.example\r\nX: {host}"), right, "403"),
+        (format!("POST /vent HTTP/1.1\r\nHost: {host}"), "0000", "403"),
+        (format!("POST /api/order HTTP/1.1\r\nHost: {host}"), right, "404"),
+        (format!("POST /vent HTTP/1.1\r\nHost: {host}"), &"x".repeat(300), "413"),
+    ] {
+        let mut stream = TcpStream::connect(host).unwrap();
+        stream.set_read_timeout(Some(HOPELESS)).unwrap();
+        let count = studio.shared.vent.count();
+        write!(stream, "{head}\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{body}", body.len())
+            .unwrap();
+        let mut answer = String::new();
+        let _ = stream.read_to_string(&mut answer);
+        assert!(answer.starts_with(&format!("HTTP/1.1 {status}")), "{head}: {answer}");
+        assert_eq!(studio.shared.vent.count(), count);
+    }
+}
