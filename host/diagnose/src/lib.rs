@@ -47,6 +47,7 @@ mod moment;
 mod named;
 mod noise;
 pub mod planned;
+pub mod reference;
 mod rest;
 mod rows;
 mod search;
