@@ -60,4 +60,4 @@ mod unknown;
 pub mod words;
 
 pub use answer::{ChangeReport, Verdict};
-pub use report::{Against, Options, compare};
+pub use report::{Against, Mounted, Options, compare};

@@ -15,6 +15,7 @@ mod names;
 mod oracle;
 mod progress;
 mod queue;
+mod reference;
 mod report;
 mod residuals;
 mod score;
@@ -171,6 +172,8 @@ enum Command {
     Semi(Real),
     /// Ask about the real recordings of the 10 mm fluidic muscle as they are, and set the answers beside what is written about them.
     Festo(Real),
+    /// Ask what has changed: changes put into later runs of real recordings, untouched pairs, a cylinder whose seal was swapped.
+    Reference(reference::Reference),
     /// Generate, answer and score in one go; each goes on where an earlier run was broken off.
     Prove {
         /// dev or final.
@@ -217,6 +220,7 @@ fn main() -> ExitCode {
         Command::Festo(real) => {
             festo::run(&real.data, &real.output, &real.host).and_then(|()| real.copy_to_book("festo.md"))
         }
+        Command::Reference(what) => reference::run(&what),
         Command::Prove { set, what, tool, check } => prove(&set, &what, &tool, check),
     };
     match done {
