@@ -39,7 +39,7 @@ pub(super) struct Compared {
 pub(super) struct Weighed {
     /// Probability of every set.
     pub sets: Vec<(Vec<Change>, f64)>,
-    /// Size and standard deviation of every change beside the most probable set that holds the named ones.
+    /// Size and standard deviation of every named change beside the others.
     pub sizes: BTreeMap<Change, (f64, f64)>,
     /// Alone: size and standard deviation.
     pub alone: BTreeMap<Change, (f64, f64)>,
@@ -222,9 +222,11 @@ pub(super) fn weigh(c: &Compared, none: f64) -> Result<Weighed> {
     let mut weighed = Weighed { sets, sizes: BTreeMap::new(), alone };
     let named = named(&weighed);
     let holds = |i: &usize| named.iter().all(|n| weighed.sets[*i].0.contains(n));
+    // The set of the named ones alone, where it is one of those weighed: what is not named must not share out their sizes.
+    let alone = |i: &usize| holds(i) && weighed.sets[*i].0.len() == named.len();
     let best = (0..SETS.len())
         .filter(holds)
-        .max_by(|a, b| weighed.sets[*a].1.total_cmp(&weighed.sets[*b].1))
+        .max_by(|a, b| alone(a).cmp(&alone(b)).then(weighed.sets[*a].1.total_cmp(&weighed.sets[*b].1)))
         .unwrap_or(0);
     weighed.sizes = of(best);
     Ok(weighed)

@@ -60,8 +60,6 @@ impl Run {
 pub struct Muscle {
     /// Year and file.
     pub name: String,
-    /// Year.
-    pub year: String,
     /// Which half.
     pub half: Half,
     /// Runs of a mounting.
@@ -172,5 +170,5 @@ fn muscle(path: &Path, year: &str, list: &Sheet, rows: &[&Vec<String>]) -> Resul
     let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     let half = if DEVELOPMENT.iter().any(|d| stem.ends_with(d)) { Half::Development } else { Half::Final };
     let runs = all.iter().map(|r| r.run).max().unwrap_or(0);
-    Ok(Muscle { name: format!("{year} {}", stem.trim_start_matches("festo10_")), year: year.into(), half, runs, all })
+    Ok(Muscle { name: format!("{year} {}", stem.trim_start_matches("festo10_")), half, runs, all })
 }
