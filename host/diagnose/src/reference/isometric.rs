@@ -120,7 +120,8 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
         let round = weigh(&cells, &present, &surface, lag_open.then_some(&shift), prior_none);
         let leader = round.posterior.leader();
         let none = round.posterior.probability(Cause::None);
-        let more = leader.filter(|_| none < NAMED && accepted.len() < MOST_CHANGES);
+        // What a lag does to settled rows is not known well enough to look for more beneath it.
+        let more = leader.filter(|_| lag_open && none < NAMED && accepted.len() < MOST_CHANGES);
         let next = more.and_then(|(change, p)| accept(&cells, &round, change, p, &shift));
         let last = round.posterior.clone();
         first.get_or_insert(round);
