@@ -97,7 +97,15 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
     let lag = (shift.lag.abs() > LAG_FLOOR).then_some(&traced as &dyn Fn(&Run) -> Vec<f64>);
     let cells = cells(&runs, &surface, lag);
     if !cells.iter().any(|c| c.after) {
-        return Err(Error::new(DataCode::RecordingOutOfRange, "AFTER and the reference have no pressures in common"));
+        let values = || runs.side(true).flat_map(|r| r.pressure.iter().copied());
+        return Err(Error::new(DataCode::RecordingOutOfRange, "AFTER and the reference have no pressures in common")
+            .help(format!(
+                "AFTER has {:.0} to {:.0} kPa, the reference {:.0} to {:.0} kPa: check the units, or record the same pressures",
+                values().fold(f64::INFINITY, f64::min) / 1e3,
+                values().fold(f64::NEG_INFINITY, f64::max) / 1e3,
+                surface.low / 1e3,
+                surface.high / 1e3
+            )));
     }
     let setting = Setting {
         range: surface.high - surface.low,

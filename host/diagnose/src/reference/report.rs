@@ -11,7 +11,6 @@ use super::criteria::{
 };
 use super::held_out::{self, Unseen};
 use super::isometric::{self, Accepted, Analysis};
-use super::motion::range;
 use super::posterior::Cause;
 use super::runs::Runs;
 use super::shapes::{CHANGES, Change, Class};
@@ -57,8 +56,17 @@ enum Protocol {
 /// Share of the largest pressure within which a regulated one stays.
 const REGULATED: f64 = 0.3;
 
+/// The range of a column without its outermost hundredths, which a noisy sensor makes.
+fn usual_range(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let Some(last) = sorted.len().checked_sub(1) else { return 0.0 };
+    let at = |share: f64| sorted[(share * last as f64).round() as usize];
+    at(0.99) - at(0.01)
+}
+
 fn protocol(campaign: &Campaign, side: &str) -> Result<Protocol> {
-    let held = campaign.recordings.iter().filter(|r| range(&r.stroke) <= HELD).count();
+    let held = campaign.recordings.iter().filter(|r| usual_range(&r.stroke) <= HELD).count();
     if held == campaign.recordings.len() {
         return Ok(Protocol::Held);
     }
