@@ -21,7 +21,8 @@ fn sweep(file: &Path, seed: u64, length: Option<(&str, f64)>, change: impl Fn(f6
     }
     text.push('\n');
     for i in 0..600 {
-        let (p, d) = if i < 300 { (10.0 + 2.0 * f64::from(i), 1.0) } else { (610.0 - 2.0 * f64::from(i - 300), -1.0) };
+        let (p, d) =
+            if i < 300 { (10.0 + 2.0 * f64::from(i), 1.0) } else { (610.0 - 2.0 * f64::from(i - 300), -1.0) };
         let pull = (p - 60.0_f64).max(0.0);
         let f = 0.6 * pull - 2.0 * d * pull / 550.0 + 0.5 * noise();
         let (dp, df) = change(p, f);
@@ -42,7 +43,12 @@ impl Bench {
     }
 
     /// Three runs under one name.
-    fn runs(&self, name: &str, length: Option<(&str, f64)>, change: impl Fn(f64, f64) -> (f64, f64) + Copy) -> Vec<PathBuf> {
+    fn runs(
+        &self,
+        name: &str,
+        length: Option<(&str, f64)>,
+        change: impl Fn(f64, f64) -> (f64, f64) + Copy,
+    ) -> Vec<PathBuf> {
         let seed = name.bytes().map(u64::from).sum::<u64>();
         (0..3)
             .map(|i| {
@@ -82,14 +88,29 @@ fn pressure_and_force_alone_are_enough_and_the_json_has_the_promised_shape() {
     assert_eq!(status, 0, "{said}");
     assert_eq!(answer["schema"], "pam-diagnose/1");
     assert_eq!(answer["missing"][0]["effect"], "force-offset", "{answer:#}");
-    for key in ["verdict", "noise_N", "misfit_rms_N", "where", "unexplained", "held_out", "next_experiment", "considered"] {
+    for key in [
+        "verdict",
+        "noise_N",
+        "misfit_rms_N",
+        "where",
+        "unexplained",
+        "held_out",
+        "next_experiment",
+        "considered",
+    ] {
         assert!(answer.get(key).is_some(), "{key}");
     }
     let reference = &answer["reference"];
     assert_eq!(reference["files"].as_array().unwrap().len(), 3);
     assert!(reference["table"].is_null() && reference["samples"] == 1800);
     assert!(reference["repeatability_N"].as_f64().unwrap() > 0.0);
-    assert!(reference["not_comparable"].as_array().unwrap().iter().any(|n| n.as_str().unwrap().contains("end-slip")));
+    assert!(
+        reference["not_comparable"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|n| n.as_str().unwrap().contains("end-slip"))
+    );
     let page = std::fs::read_to_string(bench.0.path().join("page.html")).unwrap();
     assert!(page.contains("force-offset") && page.contains("<svg"));
 }
@@ -110,7 +131,10 @@ fn what_cannot_be_compared_is_said_with_a_remedy() {
     let before = bench.runs("before", Some(("displacement_mm", 0.0)), same);
     let elsewhere = bench.runs("elsewhere", Some(("displacement_mm", 9.0)), same);
     let (status, _, said) = bench.ask(&elsewhere, &before, &[]);
-    assert!(status == 1 && said.contains("none of the reference's lengths") && said.contains("9.0"), "{said}");
+    assert!(
+        status == 1 && said.contains("none of the reference's lengths") && said.contains("9.0"),
+        "{said}"
+    );
     let (status, _, said) = bench.ask(&before, &before, &[]);
     assert!(status == 2 && said.contains("both sides"), "{said}");
     let psi = bench.runs("psi", Some(("displacement_mm", 0.0)), |p, _| (p / 6.894_757 - p, 0.0));

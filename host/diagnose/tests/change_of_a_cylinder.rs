@@ -10,7 +10,9 @@ use pam_diagnose::reference::{Against, ChangeReport, Options, Verdict, compare};
 
 fn campaign(configuration: &str) -> Campaign {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/tudelft-printed-cylinder");
-    Reader::new().campaign([1, 3, 5, 7].map(|bar| folder.join(format!("{configuration}_{bar}bar.csv")))).unwrap()
+    Reader::new()
+        .campaign([1, 3, 5, 7].map(|bar| folder.join(format!("{configuration}_{bar}bar.csv"))))
+        .unwrap()
 }
 
 fn ask(before: &str, after: &str) -> ChangeReport {

@@ -54,7 +54,12 @@ fn head(page: &mut Page, r: &ChangeReport) {
         format!("{} % of the largest force, rms", figures(share, 2)),
         tone,
     );
-    page.fact("untouched recordings differ by", format!("{} N", figures(r.noise_N, 2)), "one cell, standard deviation", Tone::Plain);
+    page.fact(
+        "untouched recordings differ by",
+        format!("{} N", figures(r.noise_N, 2)),
+        "one cell, standard deviation",
+        Tone::Plain,
+    );
     if !r.missing.is_empty() {
         let h = &r.held_out;
         page.fact(
@@ -118,7 +123,11 @@ fn shown(r: &ChangeReport) -> &[Curve] {
 
 /// The ways of motion, in the order of the curves.
 fn ways(r: &ChangeReport) -> [&'static str; 2] {
-    if r.abscissa.1 == "kPa" { ["filling", "emptying"] } else { ["growing displacement", "shrinking displacement"] }
+    if r.abscissa.1 == "kPa" {
+        ["filling", "emptying"]
+    } else {
+        ["growing displacement", "shrinking displacement"]
+    }
 }
 
 fn forces(r: &ChangeReport) -> Section {
@@ -126,12 +135,16 @@ fn forces(r: &ChangeReport) -> Section {
     let panels: Vec<Panel> = shown(r)
         .iter()
         .map(|c| {
-            let mut panel = Panel::new(Axis::new(r.abscissa.0, r.abscissa.1), Axis::new("force F", "N")).titled(&c.title);
+            let mut panel =
+                Panel::new(Axis::new(r.abscissa.0, r.abscissa.1), Axis::new("force F", "N")).titled(&c.title);
             for (side, way) in ways(r).into_iter().enumerate() {
                 let colour = Colour::Series(side);
-                panel = panel
-                    .line(format!("before, {way}"), colour, &c.at, &c.before[side])
-                    .points(format!("after, {way}"), colour, &c.at, &c.after[side]);
+                panel = panel.line(format!("before, {way}"), colour, &c.at, &c.before[side]).points(
+                    format!("after, {way}"),
+                    colour,
+                    &c.at,
+                    &c.after[side],
+                );
             }
             panel
         })
@@ -152,8 +165,8 @@ fn differences(r: &ChangeReport) -> Section {
     let panels: Vec<Panel> = shown(r)
         .iter()
         .map(|c| {
-            let mut panel =
-                Panel::new(Axis::new(r.abscissa.0, r.abscissa.1), Axis::new("difference", "N")).titled(&c.title);
+            let mut panel = Panel::new(Axis::new(r.abscissa.0, r.abscissa.1), Axis::new("difference", "N"))
+                .titled(&c.title);
             for (side, way) in ways(r).into_iter().enumerate() {
                 let colour = Colour::Series(side);
                 panel = panel.points(way, colour, &c.at, &c.difference[side]);
@@ -177,7 +190,10 @@ fn differences(r: &ChangeReport) -> Section {
 
 fn located(r: &ChangeReport) -> Section {
     let mut section = Section::new("Where it sits");
-    let mut table = Table::new("Parts of the data that hold more of the difference than their share", &["where", "from", "to", "unit", "share of the difference", "share of the data"]);
+    let mut table = Table::new(
+        "Parts of the data that hold more of the difference than their share",
+        &["where", "from", "to", "unit", "share of the difference", "share of the data"],
+    );
     for p in &r.r#where {
         table.row([
             p.coordinate.clone(),
@@ -194,8 +210,10 @@ fn located(r: &ChangeReport) -> Section {
 
 fn unseen_sizes(r: &ChangeReport) -> Section {
     let mut section = Section::new("What else could be hidden");
-    let mut table =
-        Table::new("Changes that are not named", &["change", "probability", "would have been seen from", "why not"]);
+    let mut table = Table::new(
+        "Changes that are not named",
+        &["change", "probability", "would have been seen from", "why not"],
+    );
     for c in &r.considered {
         table.row([
             c.effect.clone(),

@@ -86,7 +86,8 @@ impl Arguments {
         let start = Instant::now();
         let given = self.with.iter().map(|name| effects::named(name.trim())).collect::<Result<Vec<_>>>()?;
         let Some(path) = &self.muscle else {
-            return Err(Error::new(DataCode::CallInvalid, "the muscle's description is missing").help("give --muscle M.toml"));
+            return Err(Error::new(DataCode::CallInvalid, "the muscle's description is missing")
+                .help("give --muscle M.toml"));
         };
         let muscle = MuscleDescription::read(path)?;
         // Whoever asks for JSON is a program, or will look at that.

@@ -146,7 +146,12 @@ fn injected(muscles: &[Muscle], short: bool) -> Vec<Job<'_>> {
             }
             for percent in SIZES.into_iter().filter(|p| !short || *p == 3.0) {
                 for effect in EFFECTS {
-                    jobs.push(Job { muscle, runs: (1, *b, muscle.runs), put_in: Some((effect, percent)), number });
+                    jobs.push(Job {
+                        muscle,
+                        runs: (1, *b, muscle.runs),
+                        put_in: Some((effect, percent)),
+                        number,
+                    });
                 }
             }
         }
@@ -165,7 +170,8 @@ fn ask(job: &Job<'_>, slopes: &Slopes) -> Result<Trial, String> {
         let moment = 0.35 + 0.3 * ((job.number * 37 % 10) as f64 / 10.0);
         (after, size) = inject(&after, effect, percent, slopes, &job.muscle.name, b, moment);
     }
-    let campaign = |runs: &[staircases::Run]| Campaign::new(runs.iter().map(staircases::Run::recording).collect());
+    let campaign =
+        |runs: &[staircases::Run]| Campaign::new(runs.iter().map(staircases::Run::recording).collect());
     let (before, after) = (campaign(&before), campaign(&after));
     let options = Options { mounted: Mounted::Same, ..Options::default() };
     let start = Instant::now();
@@ -204,7 +210,12 @@ pub fn run(what: &Reference) -> Result<(), Box<dyn Error>> {
     if let Some(page) = &what.page {
         std::fs::write(page, &text)?;
     }
-    println!("{} trials and {} pairs of the cylinder in {:.0} s", trials.len(), cylinder.len(), start.elapsed().as_secs_f64());
+    println!(
+        "{} trials and {} pairs of the cylinder in {:.0} s",
+        trials.len(),
+        cylinder.len(),
+        start.elapsed().as_secs_f64()
+    );
     Ok(())
 }
 

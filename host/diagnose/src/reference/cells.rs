@@ -112,7 +112,8 @@ pub(super) fn members(run: &Run, surface: &Surface) -> Vec<((f64, usize), Vec<(u
         // A bin of many rows is a hold: it must not outvote a ramp. Bins at the border of two cells count by their rows in each.
         let mut own = [0.0_f64; POINT_BINS];
         rows.iter().for_each(|i| own[bin(run.pressure[*i], surface.low, surface.high, POINT_BINS)] += 1.0);
-        let weight = |i: &usize| 1.0 / own[bin(run.pressure[*i], surface.low, surface.high, POINT_BINS)].sqrt();
+        let weight =
+            |i: &usize| 1.0 / own[bin(run.pressure[*i], surface.low, surface.high, POINT_BINS)].sqrt();
         let total: f64 = rows.iter().map(weight).sum();
         let weighted = rows.iter().map(|i| (*i, weight(i) / total)).collect();
         kept.push(((if side == 0 { 1.0 } else { -1.0 }, bin_), weighted));

@@ -104,7 +104,12 @@ impl Contrast {
                 projector -= &image * image.transpose() / a;
             }
         }
-        Self::from_projector(projector, self.residual.clone(), (self.free - shapes.len() as f64).max(1.0), self.taught)
+        Self::from_projector(
+            projector,
+            self.residual.clone(),
+            (self.free - shapes.len() as f64).max(1.0),
+            self.taught,
+        )
     }
 
     /// Without some cells: each gets a free level of its own, which is the same as leaving it out.

@@ -47,7 +47,11 @@ fn correction(changed: &Changed) -> Option<Correction> {
         // The catalogue counts the pressure that the reading lacks.
         Change::GaugeGain | Change::GaugeOffset => parameters[0] = -size,
         // A reading that is late by a first-order filter adds to the force expected of it.
-        Change::ForceOffset | Change::ForceGain | Change::CrossTalk | Change::DisplacementOffset | Change::SensorDelay
+        Change::ForceOffset
+        | Change::ForceGain
+        | Change::CrossTalk
+        | Change::DisplacementOffset
+        | Change::SensorDelay
         | Change::PressureSensorLag => parameters[0] = size,
         // A drift over one campaign says nothing of the next, and a frame's law has a part at turns that was not measured.
         _ => return None,
@@ -83,7 +87,10 @@ pub fn table(
     for m in &report.missing {
         let Some(correction) = correction(m) else {
             return refused(
-                format!("no table is written: `{}` is to be repaired at the bench, not corrected in a table", m.effect),
+                format!(
+                    "no table is written: `{}` is to be repaired at the bench, not corrected in a table",
+                    m.effect
+                ),
                 "leave -o out",
             );
         };

@@ -56,7 +56,8 @@ pub(super) fn unseen(cells: &[Cell], contrast: &Contrast, shapes: &[DVector<f64>
     let held = runs.len() > 1;
     let mut left = difference.clone();
     for side in 0..if held { 2 } else { 1 } {
-        let dropped: Vec<usize> = if held { after.iter().copied().filter(|i| fold(*i) == side).collect() } else { Vec::new() };
+        let dropped: Vec<usize> =
+            if held { after.iter().copied().filter(|i| fold(*i) == side).collect() } else { Vec::new() };
         let Some(found) = contrast.without_cells(&dropped).and_then(|c| sizes(&c, &shapes)) else { continue };
         for (k, i) in after.iter().enumerate().filter(|(_, i)| !held || fold(**i) == side) {
             left[k] -= (0..shapes.ncols()).map(|c| shapes[(*i, c)] * found[c]).sum::<f64>();

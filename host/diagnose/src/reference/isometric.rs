@@ -118,8 +118,9 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
     let used: std::collections::BTreeSet<usize> = runs.runs.iter().map(|r| r.mounting).collect();
     let taught = DIRECTIONS_PER_RUN * (runs.runs.len() as f64 - 2.0 * used.len() as f64).max(1.0);
     let levels = recorded.then(|| levels(&cells));
-    let contrast = Contrast::new(k, levels.as_deref(), y, taught)
-        .ok_or_else(|| Error::new(DataCode::RecordingNotFinite, "the recordings hold numbers that cannot be compared"))?;
+    let contrast = Contrast::new(k, levels.as_deref(), y, taught).ok_or_else(|| {
+        Error::new(DataCode::RecordingNotFinite, "the recordings hold numbers that cannot be compared")
+    })?;
     let mut accepted: Vec<Accepted> = Vec::new();
     let mut present = contrast.clone();
     let mut first: Option<Round> = None;
@@ -134,8 +135,11 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
         let last = round.posterior.clone();
         first.get_or_insert(round);
         // A second change of the same kind is what the first one's shape is inexact by.
-        let Some(next) = next.filter(|n| accepted.iter().all(|a| a.change.class() != n.change.class())) else {
-            let Some(first) = first else { break Err(Error::new(DataCode::RecordingEmpty, "nothing to weigh")) };
+        let Some(next) = next.filter(|n| accepted.iter().all(|a| a.change.class() != n.change.class()))
+        else {
+            let Some(first) = first else {
+                break Err(Error::new(DataCode::RecordingEmpty, "nothing to weigh"));
+            };
             refit(&contrast, &mut accepted, &cells);
             break Ok(Analysis { runs, surface, cells, contrast, first, accepted, last });
         };
@@ -154,7 +158,13 @@ fn is_lag(change: Change) -> bool {
 }
 
 /// Weighs every change that the cells can carry.
-fn weigh(cells: &[Cell], contrast: &Contrast, surface: &Surface, lag: Option<&Shift>, prior_none: f64) -> Round {
+fn weigh(
+    cells: &[Cell],
+    contrast: &Contrast,
+    surface: &Surface,
+    lag: Option<&Shift>,
+    prior_none: f64,
+) -> Round {
     let scale = contrast.scale();
     let sizes = SIZES.map(|s| s * surface.largest);
     let still = lag.map_or(0.0, |l| l.unchanged);
@@ -223,7 +233,13 @@ fn weigh_lag(cells: &[Cell], contrast: &Contrast, lag: &Shift) -> (Change, f64) 
     (change, gain + own.max(-5.0) + lag.changed)
 }
 
-fn accept(cells: &[Cell], round: &Round, change: Change, probability: f64, shift: &Shift) -> Option<Accepted> {
+fn accept(
+    cells: &[Cell],
+    round: &Round,
+    change: Change,
+    probability: f64,
+    shift: &Shift,
+) -> Option<Accepted> {
     let estimate = round.estimates.iter().find(|e| e.change == change)?;
     let shape = match change {
         Change::EndSlip => round.slip.as_ref()?.shape.clone(),
@@ -258,7 +274,8 @@ fn refit(contrast: &Contrast, accepted: &mut [Accepted], cells: &[Cell]) {
     }
     let shapes: Vec<DVector<f64>> = places.iter().map(|i| accepted[*i].shape.clone()).collect();
     let rms: Vec<f64> = shapes.iter().map(|s| rms_after(cells, s).max(f64::MIN_POSITIVE)).collect();
-    let x = nalgebra::DMatrix::from_columns(&shapes.iter().zip(&rms).map(|(s, r)| s / *r).collect::<Vec<_>>());
+    let x =
+        nalgebra::DMatrix::from_columns(&shapes.iter().zip(&rms).map(|(s, r)| s / *r).collect::<Vec<_>>());
     let inner = x.tr_mul(&(&freed.projector * &x));
     let Some(factor) = inner.cholesky() else { return };
     let sizes = factor.solve(&x.tr_mul(&freed.projected));

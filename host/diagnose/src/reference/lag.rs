@@ -69,7 +69,8 @@ impl<'a> Scorer<'a> {
     fn new(run: &'a Run, surface: &'a Surface) -> Self {
         let mut steps: Vec<f64> = run.time.windows(2).map(|w| w[1] - w[0]).collect();
         let middle = steps.len() / 2;
-        let usual = if steps.is_empty() { 0.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 };
+        let usual =
+            if steps.is_empty() { 0.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 };
         let rows = (1..run.time.len())
             .filter(|i| run.time[*i] - run.time[i - 1] < LAG_GAP * usual)
             .map(|i| {
@@ -156,7 +157,9 @@ pub(super) fn shift(runs: &Runs, scores: &[Score]) -> Shift {
     for mounting in 0..runs.strokes.len() {
         let side = |after: bool| -> Vec<(f64, f64)> {
             let both = runs.runs.iter().zip(scores);
-            both.filter(|(r, _)| r.mounting == mounting && r.after == after).map(|(_, s)| (s.lag, s.weight)).collect()
+            both.filter(|(r, _)| r.mounting == mounting && r.after == after)
+                .map(|(_, s)| (s.lag, s.weight))
+                .collect()
         };
         let (after, before) = (side(true), side(false));
         if after.is_empty() || (before.is_empty() && !alone) {
@@ -164,7 +167,8 @@ pub(super) fn shift(runs: &Runs, scores: &[Score]) -> Shift {
         }
         // A table knows no lag.
         let (a, b) = (weighted_median(&after), weighted_median(&before));
-        let total = |v: &[(f64, f64)]| if v.is_empty() { f64::INFINITY } else { v.iter().map(|s| s.1).sum::<f64>() };
+        let total =
+            |v: &[(f64, f64)]| if v.is_empty() { f64::INFINITY } else { v.iter().map(|s| s.1).sum::<f64>() };
         contrasts.push((a - b, 1.0 / (1.0 / total(&after) + 1.0 / total(&before))));
         deviations.extend(after.iter().map(|s| s.0 - a).chain(before.iter().map(|s| s.0 - b)));
     }
@@ -180,11 +184,11 @@ pub(super) fn shift(runs: &Runs, scores: &[Score]) -> Shift {
     let freedom = deviations.len().saturating_sub(2 * contrasts.len()) as f64;
     let square: f64 = deviations.iter().map(|d| d.clamp(-limit, limit).powi(2)).sum();
     let spread = (LAG_RUNS * LAG_FLOOR * LAG_FLOOR + square) / (LAG_RUNS + freedom);
-    let share = |after: bool| if alone && !after { 0.0 } else { 1.0 / (runs.side(after).count() as f64).max(1.0) };
+    let share =
+        |after: bool| if alone && !after { 0.0 } else { 1.0 / (runs.side(after).count() as f64).max(1.0) };
     let variance = MEDIAN_VARIANCE * spread * (share(true) + share(false)) + LAG_FLOOR * LAG_FLOOR;
     let degrees = LAG_RUNS + freedom;
-    let density =
-        |v: f64| -0.5 * v.ln() - 0.5 * (degrees + 1.0) * (lag * lag / (v * degrees)).ln_1p();
+    let density = |v: f64| -0.5 * v.ln() - 0.5 * (degrees + 1.0) * (lag * lag / (v * degrees)).ln_1p();
     let each: Vec<f64> = LAG_SIZES.iter().map(|s| density(variance + s * s)).collect();
     // The sign is known, hence twice the density.
     Shift { lag, variance, unchanged: density(variance), changed: log_mean(&each) + std::f64::consts::LN_2 }

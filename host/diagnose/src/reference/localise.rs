@@ -73,18 +73,17 @@ pub(super) fn since(analysis: &Analysis, accepted: &Accepted) -> Since {
         Change::ForceDrift => return Since::Gradual,
         Change::EndSlip => {
             let start = analysis.first.slip.as_ref().map_or(0.0, |s| s.start);
-            return Since::From { recording: recording_at(analysis, start), moment: start * analysis.runs.duration };
+            return Since::From {
+                recording: recording_at(analysis, start),
+                moment: start * analysis.runs.duration,
+            };
         }
         Change::SensorDelay | Change::PressureSensorLag => return Since::NotDetermined,
         _ => {}
     }
     let cells = &analysis.cells;
-    let others: Vec<DVector<f64>> = analysis
-        .accepted
-        .iter()
-        .filter(|a| a.change != accepted.change)
-        .map(|a| a.shape.clone())
-        .collect();
+    let others: Vec<DVector<f64>> =
+        analysis.accepted.iter().filter(|a| a.change != accepted.change).map(|a| a.shape.clone()).collect();
     let contrast: Contrast = analysis.contrast.without_shapes(&others);
     let scale = contrast.without_shapes(std::slice::from_ref(&accepted.shape)).scale();
     let sizes = SIZES.map(|s| s * analysis.surface.largest);

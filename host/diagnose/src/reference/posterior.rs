@@ -40,7 +40,8 @@ impl Posterior {
             Cause::Unknown => unknown,
             Cause::Named(_) => (1.0 - none - unknown) / names,
         };
-        let logs: Vec<f64> = evidence.iter().map(|(c, l)| prior(*c).max(f64::MIN_POSITIVE).ln() + l).collect();
+        let logs: Vec<f64> =
+            evidence.iter().map(|(c, l)| prior(*c).max(f64::MIN_POSITIVE).ln() + l).collect();
         let total = log_sum(&logs);
         let one = |(e, l): (&(Cause, f64), &f64)| {
             let p = (l - total).exp();
@@ -84,7 +85,9 @@ impl Posterior {
     pub fn leader(&self) -> Option<(Change, f64)> {
         let classes = self.classes();
         self.all.iter().find_map(|(cause, p)| match cause {
-            Cause::Named(change) if classes.get(&change.class()).is_some_and(|c| *c >= NAMED) => Some((*change, *p)),
+            Cause::Named(change) if classes.get(&change.class()).is_some_and(|c| *c >= NAMED) => {
+                Some((*change, *p))
+            }
             _ => None,
         })
     }
@@ -98,7 +101,12 @@ mod tests {
     fn a_class_leads_although_none_of_its_names_does() {
         let named = |c, l| (Cause::Named(c), l);
         let p = Posterior::of(
-            &[(Cause::None, 0.0), (Cause::Unknown, 0.0), named(Change::ForceGain, 9.0), named(Change::GaugeGain, 8.9)],
+            &[
+                (Cause::None, 0.0),
+                (Cause::Unknown, 0.0),
+                named(Change::ForceGain, 9.0),
+                named(Change::GaugeGain, 8.9),
+            ],
             0.8,
         );
         assert_eq!(p.leader().map(|l| l.0), Some(Change::ForceGain));

@@ -85,6 +85,7 @@ pub(super) fn covariance(cells: &[Cell], setting: &Setting) -> DMatrix<f64> {
 /// What repeats at a typical pulling cell of one run against the mean of others, N: run, zero and cell together.
 pub(super) fn spread(largest: f64, scale: f64) -> f64 {
     let r: &Repeats = &REPEATS;
-    let sum = [r.run, r.run_common, r.group, r.group_common, r.offset, r.cell].map(|v| v * v).iter().sum::<f64>();
+    let sum =
+        [r.run, r.run_common, r.group, r.group_common, r.offset, r.cell].map(|v| v * v).iter().sum::<f64>();
     largest / 100.0 * (scale * sum).sqrt()
 }

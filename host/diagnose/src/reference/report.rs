@@ -7,7 +7,8 @@ use super::answer::{
     Repeatability, Since, Verdict, not_comparable, size,
 };
 use super::criteria::{
-    CELLS, FEWEST_CELLS, HELD, NAMED, OTHER_ACTUATOR, PRIOR_NONE, SCALE_PRIOR, SIZES, SLOPE_ERROR, STROKE_PRIOR_NONE,
+    CELLS, FEWEST_CELLS, HELD, NAMED, OTHER_ACTUATOR, PRIOR_NONE, SCALE_PRIOR, SIZES, SLOPE_ERROR,
+    STROKE_PRIOR_NONE,
 };
 use super::held_out::{self, Unseen};
 use super::isometric::{self, Accepted, Analysis};
@@ -73,7 +74,10 @@ fn protocol(campaign: &Campaign, side: &str) -> Result<Protocol> {
     if held > 0 {
         return Err(Error::new(
             DataCode::RecordingOutOfRange,
-            format!("{side} mixes {held} recordings at a held length with {} strokes", campaign.recordings.len() - held),
+            format!(
+                "{side} mixes {held} recordings at a held length with {} strokes",
+                campaign.recordings.len() - held
+            ),
         )
         .help("give one kind at a time"));
     }
@@ -90,7 +94,9 @@ fn protocol(campaign: &Campaign, side: &str) -> Result<Protocol> {
                     format!("in `{}` length and pressure move together", r.name),
                 )
                 .file(&r.source)
-                .help("a comparison needs pressure sweeps at held lengths, or strokes at regulated pressures"));
+                .help(
+                    "a comparison needs pressure sweeps at held lengths, or strokes at regulated pressures",
+                ));
             }
         }
     }
@@ -167,16 +173,21 @@ fn prior(options: &Options, usual: f64) -> f64 {
 fn held(before: &Campaign, after: &Campaign, options: &Options) -> Result<ChangeReport> {
     let runs = Runs::of(before, after, options.mounted)?;
     if runs.side(true).next().is_none() {
-        let list = |of: &mut dyn Iterator<Item = f64>| of.map(|s| format!("{:.1}", s * 1e3)).collect::<Vec<_>>().join(", ");
-        return Err(Error::new(DataCode::RecordingOutOfRange, "AFTER was held at none of the reference's lengths")
-            .help(format!(
-                "strokes in mm: the reference has {}; AFTER has {}",
-                list(&mut runs.strokes.iter().copied()),
-                list(&mut runs.not_comparable.iter().filter_map(|n| match n {
-                    NotComparable::Stroke { stroke, .. } => Some(*stroke),
-                    _ => None,
-                }))
-            )));
+        let list = |of: &mut dyn Iterator<Item = f64>| {
+            of.map(|s| format!("{:.1}", s * 1e3)).collect::<Vec<_>>().join(", ")
+        };
+        return Err(Error::new(
+            DataCode::RecordingOutOfRange,
+            "AFTER was held at none of the reference's lengths",
+        )
+        .help(format!(
+            "strokes in mm: the reference has {}; AFTER has {}",
+            list(&mut runs.strokes.iter().copied()),
+            list(&mut runs.not_comparable.iter().filter_map(|n| match n {
+                NotComparable::Stroke { stroke, .. } => Some(*stroke),
+                _ => None,
+            }))
+        )));
     }
     let surface = Surface::of(&runs)?;
     let reference = isometric::Reference { surface, error: 0.0, recorded: true };
@@ -289,7 +300,9 @@ fn left(verdict: Verdict, unseen: &Unseen, places: &[Place]) -> Left {
         _ => (1.0 - unseen.share()).clamp(0.0, 1.0),
     };
     let pattern = match verdict {
-        Verdict::Unexplained | Verdict::PartlyExplained => places.first().map_or_else(|| "none".to_owned(), words::place),
+        Verdict::Unexplained | Verdict::PartlyExplained => {
+            places.first().map_or_else(|| "none".to_owned(), words::place)
+        }
         _ => "none".to_owned(),
     };
     Left { share, pattern }
@@ -357,7 +370,8 @@ fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
 fn considered(analysis: &Analysis, options: &Options) -> Vec<Considered> {
     let none = prior(options, PRIOR_NONE);
     let round = &analysis.first;
-    let names = round.posterior.all.iter().filter(|(c, _)| matches!(c, Cause::Named(_))).count().max(1) as f64;
+    let names =
+        round.posterior.all.iter().filter(|(c, _)| matches!(c, Cause::Named(_))).count().max(1) as f64;
     let prior_name = ((1.0 - none) / names).max(1e-6);
     let middle = SIZES[1] * analysis.surface.largest;
     let open = |change: Change| !analysis.accepted.iter().any(|a| a.change == change);

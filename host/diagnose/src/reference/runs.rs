@@ -95,9 +95,15 @@ fn mounted_anew(before: &Campaign, after: &Campaign, said: Mounted) -> bool {
         Mounted::Same => false,
         Mounted::Anew => true,
         Mounted::Found => {
-            let one_file = after.recordings.iter().all(|a| before.recordings.iter().any(|b| a.source == b.source));
-            let end = before.recordings.iter().filter_map(|r| r.time.last()).fold(f64::NEG_INFINITY, |a, b| a.max(*b));
-            let begin = after.recordings.iter().filter_map(|r| r.time.first()).fold(f64::INFINITY, |a, b| a.min(*b));
+            let one_file =
+                after.recordings.iter().all(|a| before.recordings.iter().any(|b| a.source == b.source));
+            let end = before
+                .recordings
+                .iter()
+                .filter_map(|r| r.time.last())
+                .fold(f64::NEG_INFINITY, |a, b| a.max(*b));
+            let begin =
+                after.recordings.iter().filter_map(|r| r.time.first()).fold(f64::INFINITY, |a, b| a.min(*b));
             // A clock that shows less than before, or about zero, was started anew and says nothing.
             let one_clock = before.clock == Clock::Shared && begin > end && begin - end < NEW_VISIT;
             !(one_file || one_clock)
@@ -136,7 +142,8 @@ impl Runs {
             let own = stroke(recording);
             let force = recording.require_force()?.to_vec();
             let Some(mounting) = nearest(&self.strokes, own) else {
-                self.not_comparable.push(NotComparable::Stroke { recording: recording.name.clone(), stroke: own });
+                self.not_comparable
+                    .push(NotComparable::Stroke { recording: recording.name.clone(), stroke: own });
                 continue;
             };
             let settled = motion::settled(&recording.time, &recording.pressure);

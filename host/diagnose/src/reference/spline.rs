@@ -99,10 +99,8 @@ impl Spline {
         let mut runs: Vec<usize> = points.iter().map(|p| p.run).collect();
         runs.sort_unstable();
         runs.dedup();
-        let points: Vec<Point> = points
-            .iter()
-            .map(|p| Point { run: runs.binary_search(&p.run).unwrap_or(0), ..*p })
-            .collect();
+        let points: Vec<Point> =
+            points.iter().map(|p| Point { run: runs.binary_search(&p.run).unwrap_or(0), ..*p }).collect();
         let n = points.len() as f64;
         let x = design(&points, runs.len(), low, high);
         let f = DVector::from_iterator(points.len(), points.iter().map(|p| p.force));
@@ -156,7 +154,8 @@ impl Spline {
             index[k] = (i + k, b[k]);
             index[4 + k] = (N + i + k, direction * b[k]);
         }
-        let inner = |(r, x): (usize, f64)| index.iter().map(|(c, y)| x * y * self.covariance[(r, *c)]).sum::<f64>();
+        let inner =
+            |(r, x): (usize, f64)| index.iter().map(|(c, y)| x * y * self.covariance[(r, *c)]).sum::<f64>();
         index.into_iter().map(inner).sum::<f64>().max(0.0)
     }
 }

@@ -109,14 +109,19 @@ pub(super) fn compare(before: &Campaign, after: &Campaign, reference_error: f64)
     let largest = before.iter().map(|b| b.middle.abs()).fold(0.0, f64::max);
     let by_pressure: Vec<f64> = (0..n)
         .map(|i| {
-            let points: Vec<(f64, f64)> =
-                (0..n).filter(|j| keys[*j].1 == keys[i].1).map(|j| (before[j].pressure, before[j].middle)).collect();
+            let points: Vec<(f64, f64)> = (0..n)
+                .filter(|j| keys[*j].1 == keys[i].1)
+                .map(|j| (before[j].pressure, before[j].middle))
+                .collect();
             if points.len() > 1 { slope(&points) } else { 0.0 }
         })
         .collect();
-    let middle = |i: usize| after[i].middle - before[i].middle - by_pressure[i] * (after[i].pressure - before[i].pressure);
-    let half =
-        |i: usize| after[i].half - before[i].half + by_pressure[i] * (after[i].pressure_half - before[i].pressure_half);
+    let middle = |i: usize| {
+        after[i].middle - before[i].middle - by_pressure[i] * (after[i].pressure - before[i].pressure)
+    };
+    let half = |i: usize| {
+        after[i].half - before[i].half + by_pressure[i] * (after[i].pressure_half - before[i].pressure_half)
+    };
     let y = DVector::from_iterator(2 * n, (0..n).map(middle).chain((0..n).map(half)));
     // More friction counts positive whichever way force and displacement count.
     let way = if before.iter().map(|b| b.half).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
@@ -136,10 +141,18 @@ pub(super) fn compare(before: &Campaign, after: &Campaign, reference_error: f64)
 }
 
 /// Covariance of the differences if nothing was changed, N².
-fn covariance(keys: &[Key], before: &[Band], after: &[Band], largest: f64, reference_error: f64) -> DMatrix<f64> {
+fn covariance(
+    keys: &[Key],
+    before: &[Band],
+    after: &[Band],
+    largest: f64,
+    reference_error: f64,
+) -> DMatrix<f64> {
     let r: &StrokeRepeats = &STROKE_REPEATS;
     let n = keys.len();
-    let (low, high) = before.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), b| (l.min(b.stroke), h.max(b.stroke)));
+    let (low, high) = before
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), b| (l.min(b.stroke), h.max(b.stroke)));
     let span = (high - low).max(f64::MIN_POSITIVE);
     let friction: Vec<f64> = (0..n)
         .map(|i| {
@@ -176,11 +189,11 @@ fn covariance(keys: &[Key], before: &[Band], after: &[Band], largest: f64, refer
 /// # Errors
 /// Numbers that cannot be used.
 pub(super) fn weigh(c: &Compared, none: f64) -> Result<Weighed> {
-    let unusable = || Error::new(DataCode::RecordingNotFinite, "the recordings hold numbers that cannot be compared");
+    let unusable =
+        || Error::new(DataCode::RecordingNotFinite, "the recordings hold numbers that cannot be compared");
     let factor = c.covariance.clone().cholesky().ok_or_else(unusable)?;
     let precision = factor.inverse();
-    let rms: Vec<f64> =
-        c.shapes.iter().map(|s| (2.0 * s.norm_squared() / s.len() as f64).sqrt()).collect();
+    let rms: Vec<f64> = c.shapes.iter().map(|s| (2.0 * s.norm_squared() / s.len() as f64).sqrt()).collect();
     let mut logs = Vec::new();
     let mut fits: Vec<Option<(DVector<f64>, DMatrix<f64>)>> = Vec::new();
     for set in SETS {
@@ -189,7 +202,8 @@ pub(super) fn weigh(c: &Compared, none: f64) -> Result<Weighed> {
             fits.push(None);
             continue;
         }
-        let columns: Vec<DVector<f64>> = set.iter().map(|k| &c.shapes[*k] / rms[*k].max(f64::MIN_POSITIVE)).collect();
+        let columns: Vec<DVector<f64>> =
+            set.iter().map(|k| &c.shapes[*k] / rms[*k].max(f64::MIN_POSITIVE)).collect();
         let v = DMatrix::from_columns(&columns);
         let (g, b) = (v.tr_mul(&(&precision * &v)), v.tr_mul(&(&precision * &c.y)));
         let each: Vec<f64> = SIZES

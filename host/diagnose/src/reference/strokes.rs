@@ -50,8 +50,10 @@ pub(super) type Key = (usize, usize);
 
 /// Levels of pressure, Pa, ascending, of recordings on both sides.
 pub(super) fn levels(campaigns: &[&Campaign]) -> Vec<f64> {
-    let mut means: Vec<f64> =
-        campaigns.iter().flat_map(|c| c.recordings.iter().flat_map(|r| strokes(r).into_iter().map(|s| s.1))).collect();
+    let mut means: Vec<f64> = campaigns
+        .iter()
+        .flat_map(|c| c.recordings.iter().flat_map(|r| strokes(r).into_iter().map(|s| s.1)))
+        .collect();
     means.sort_by(f64::total_cmp);
     let top = means.last().copied().unwrap_or(0.0).abs();
     let mut groups: Vec<Vec<f64>> = Vec::new();
@@ -110,7 +112,12 @@ pub(super) fn ends(campaign: &Campaign) -> (f64, f64) {
     (percentile(&all, ENDS.0), percentile(&all, ENDS.1))
 }
 
-fn parts(recording: &Recording, force: &[f64], (low, high): (f64, f64), number: &mut usize) -> Vec<(f64, Part)> {
+fn parts(
+    recording: &Recording,
+    force: &[f64],
+    (low, high): (f64, f64),
+    number: &mut usize,
+) -> Vec<(f64, Part)> {
     let speed = speed(&recording.time, &recording.stroke);
     let fast = STROKE_SPEED * percentile(&speed.iter().map(|v| v.abs()).collect::<Vec<_>>(), 0.7);
     let margin = STROKE_ENDS * (high - low);
@@ -127,8 +134,7 @@ fn parts(recording: &Recording, force: &[f64], (low, high): (f64, f64), number: 
         }
         for (bin, (p, x, f, n)) in sums.into_iter().enumerate().filter(|(_, s)| s.3 >= FEWEST_ROWS) {
             let n = n as f64;
-            let part =
-                Part { direction, pressure: p / n, stroke: x / n, force: f / n, bin, number: *number };
+            let part = Part { direction, pressure: p / n, stroke: x / n, force: f / n, bin, number: *number };
             all.push((level, part));
         }
         *number += 1;

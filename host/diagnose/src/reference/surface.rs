@@ -62,12 +62,17 @@ impl Surface {
     /// A pressure or a force that does not change, or too few rows.
     pub fn of(all: &Runs) -> Result<Self> {
         let values = || all.side(false).flat_map(|r| r.pressure.iter().copied());
-        let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-        let largest =
-            all.side(false).flat_map(|r| r.force.iter().copied()).fold(f64::NEG_INFINITY, f64::max);
+        let (low, high) =
+            (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+        let largest = all.side(false).flat_map(|r| r.force.iter().copied()).fold(f64::NEG_INFINITY, f64::max);
         if !(high > low) {
-            return Err(Error::new(DataCode::RecordingOutOfRange, "the pressure of the reference does not change")
-                .help("the length is held too, so nothing moves: give recordings in which the pressure is swept"));
+            return Err(Error::new(
+                DataCode::RecordingOutOfRange,
+                "the pressure of the reference does not change",
+            )
+            .help(
+                "the length is held too, so nothing moves: give recordings in which the pressure is swept",
+            ));
         }
         if !(largest > 0.0) {
             return Err(Error::new(DataCode::RecordingOutOfRange, "the force of the reference is never positive")
@@ -77,10 +82,12 @@ impl Surface {
         let mut curves = Vec::new();
         for mounting in 0..all.strokes.len() {
             let runs = all.side(false).filter(|r| r.mounting == mounting);
-            let points: Vec<Point> =
-                runs.enumerate().flat_map(|(i, r)| points(r, i, low, high)).collect();
+            let points: Vec<Point> = runs.enumerate().flat_map(|(i, r)| points(r, i, low, high)).collect();
             let spline = Spline::fit(&points, low, high).ok_or_else(|| {
-                Error::new(DataCode::RecordingTooShort, "the reference has too few rows for a curve of force over pressure")
+                Error::new(
+                    DataCode::RecordingTooShort,
+                    "the reference has too few rows for a curve of force over pressure",
+                )
             })?;
             let along = |of: &dyn Fn(f64) -> f64| grid.iter().map(|p| of(*p)).collect::<Vec<f64>>();
             curves.push(Curves {
@@ -125,7 +132,8 @@ impl Surface {
 
     /// A tabulated curve at a pressure.
     pub fn at(&self, curve: &[f64], pressure: f64) -> f64 {
-        let z = ((pressure - self.low) / (self.high - self.low) * (GRID - 1) as f64).clamp(0.0, (GRID - 1) as f64);
+        let z = ((pressure - self.low) / (self.high - self.low) * (GRID - 1) as f64)
+            .clamp(0.0, (GRID - 1) as f64);
         let i = (z as usize).min(GRID - 2);
         let v = z - i as f64;
         curve.get(i).copied().unwrap_or(0.0) * (1.0 - v) + curve.get(i + 1).copied().unwrap_or(0.0) * v

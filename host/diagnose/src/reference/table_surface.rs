@@ -22,7 +22,8 @@ pub(super) fn of(table: &TableFile, runs: &Runs) -> Result<Surface> {
     let tested = table.table.tested;
     let (least, most) = (f64::from(tested.pressure_low.pascals()), f64::from(tested.pressure_high.pascals()));
     let values = || runs.side(true).flat_map(|r| r.pressure.iter().copied());
-    let (seen_low, seen_high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+    let (seen_low, seen_high) =
+        (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
     let (low, high) = (least.max(seen_low), most.min(seen_high));
     if !(high > low) {
         return Err(Error::new(
@@ -37,7 +38,8 @@ pub(super) fn of(table: &TableFile, runs: &Runs) -> Result<Surface> {
         )
         .help("give a table or recordings of the same pressures"));
     }
-    let force = |p: f64, x: f64, d: f64| muscle.force(Pressure::from_pascals(p), Length::from_metres(x), d).newtons();
+    let force =
+        |p: f64, x: f64, d: f64| muscle.force(Pressure::from_pascals(p), Length::from_metres(x), d).newtons();
     let mean = |p: f64, x: f64| (force(p, x, 1.0) + force(p, x, -1.0)) / 2.0;
     let grid: Vec<f64> = (0..GRID).map(|i| low + (high - low) * i as f64 / (GRID - 1) as f64).collect();
     let step = (high - low) / (GRID - 1) as f64;
@@ -47,15 +49,24 @@ pub(super) fn of(table: &TableFile, runs: &Runs) -> Result<Surface> {
         .map(|&x| Curves {
             force: grid.iter().map(|p| mean(*p, x)).collect(),
             gap: grid.iter().map(|p| (force(*p, x, 1.0) - force(*p, x, -1.0)) / 2.0).collect(),
-            by_pressure: grid.iter().map(|p| (mean(p + step, x) - mean(p - step, x)) / (2.0 * step)).collect(),
-            by_stroke: grid.iter().map(|p| (mean(*p, x + STEP) - mean(*p, x - STEP)) / (2.0 * STEP)).collect(),
+            by_pressure: grid
+                .iter()
+                .map(|p| (mean(p + step, x) - mean(p - step, x)) / (2.0 * step))
+                .collect(),
+            by_stroke: grid
+                .iter()
+                .map(|p| (mean(*p, x + STEP) - mean(*p, x - STEP)) / (2.0 * STEP))
+                .collect(),
             variance: [vec![0.0; GRID], vec![0.0; GRID]],
         })
         .collect::<Vec<_>>();
     let largest = curves.iter().flat_map(|c| c.force.iter().copied()).fold(0.0, f64::max);
     if !(largest > 0.0) {
-        return Err(Error::new(DataCode::TableInvalid, "the table gives no force at these lengths and pressures")
-            .help("is it the table of this actuator?"));
+        return Err(Error::new(
+            DataCode::TableInvalid,
+            "the table gives no force at these lengths and pressures",
+        )
+        .help("is it the table of this actuator?"));
     }
     let mut surface = Surface { low, high, curves, usual_slope: 0.0, largest };
     surface.find_usual_slope();

@@ -24,11 +24,16 @@ fn run(mounting: usize, number: usize, change: &dyn Fn(f64, f64, f64, f64) -> (f
     };
     let own = 0.4 * uniform();
     let x = STROKES[mounting];
-    let mut r = Recording { name: format!("m{mounting} r{number}"), source: format!("r{number}.csv").into(), ..Recording::default() };
+    let mut r = Recording {
+        name: format!("m{mounting} r{number}"),
+        source: format!("r{number}.csv").into(),
+        ..Recording::default()
+    };
     let mut forces = Vec::new();
     for i in 0..600 {
         let t = 0.1 * f64::from(i);
-        let (p, d) = if i < 300 { (8e3 + 2e3 * f64::from(i), 1.0) } else { (608e3 - 2e3 * f64::from(i - 300), -1.0) };
+        let (p, d) =
+            if i < 300 { (8e3 + 2e3 * f64::from(i), 1.0) } else { (608e3 - 2e3 * f64::from(i - 300), -1.0) };
         let creep = 0.002 * (1.0 + t + 70.0 * number as f64).ln();
         let f = force(p, x, d) * (1.0 + creep) + own + 0.6 * uniform();
         let slope = (force(p, x + 1e-4, d) - force(p, x - 1e-4, d)) / 2e-4;
@@ -47,8 +52,14 @@ fn untouched(_: f64, _: f64, _: f64, _: f64) -> (f64, f64) {
 }
 
 /// Runs from one number to another at the first mountings, in the order of their times.
-fn campaign(mountings: usize, runs: std::ops::Range<usize>, change: &dyn Fn(f64, f64, f64, f64) -> (f64, f64)) -> Campaign {
-    Campaign::new(runs.flat_map(|n| (0..mountings).map(move |m| (m, n))).map(|(m, n)| run(m, n, change)).collect())
+fn campaign(
+    mountings: usize,
+    runs: std::ops::Range<usize>,
+    change: &dyn Fn(f64, f64, f64, f64) -> (f64, f64),
+) -> Campaign {
+    Campaign::new(
+        runs.flat_map(|n| (0..mountings).map(move |m| (m, n))).map(|(m, n)| run(m, n, change)).collect(),
+    )
 }
 
 fn ask(change: &dyn Fn(f64, f64, f64, f64) -> (f64, f64), mounted: Mounted) -> ChangeReport {
@@ -58,7 +69,12 @@ fn ask(change: &dyn Fn(f64, f64, f64, f64) -> (f64, f64), mounted: Mounted) -> C
 }
 
 fn size(report: &ChangeReport, name: &str) -> f64 {
-    assert_eq!(report.missing.iter().map(|m| m.effect.as_str()).collect::<Vec<_>>(), [name], "{:?}", report.probabilities);
+    assert_eq!(
+        report.missing.iter().map(|m| m.effect.as_str()).collect::<Vec<_>>(),
+        [name],
+        "{:?}",
+        report.probabilities
+    );
     report.missing[0].parameters[0].value
 }
 
@@ -112,8 +128,13 @@ fn the_same_recordings_on_both_sides_and_other_units_are_refused() {
 #[test]
 fn other_lengths_are_told_and_none_in_common_is_an_error_with_both_lists() {
     let before = campaign(2, 0..3, &untouched);
-    let report = compare(&campaign(3, 3..6, &untouched), Against::Recordings(&before), &Options::default()).unwrap();
-    assert!(report.reference.not_comparable.iter().any(|n| n.contains("18.0 mm")), "{:?}", report.reference.not_comparable);
+    let report =
+        compare(&campaign(3, 3..6, &untouched), Against::Recordings(&before), &Options::default()).unwrap();
+    assert!(
+        report.reference.not_comparable.iter().any(|n| n.contains("18.0 mm")),
+        "{:?}",
+        report.reference.not_comparable
+    );
     let elsewhere = Campaign::new((3..5).map(|n| run(2, n, &untouched)).collect());
     let error = compare(&elsewhere, Against::Recordings(&before), &Options::default()).unwrap_err();
     assert!(error.advice().is_some_and(|a| a.contains("0.0, 8.0") && a.contains("18.0")), "{error}");

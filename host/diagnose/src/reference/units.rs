@@ -40,7 +40,11 @@ fn largest(values: &[f64]) -> f64 {
 pub(super) fn check(before: &Campaign, after: &Campaign) -> Result<Vec<String>> {
     for a in &after.recordings {
         if let Some(b) = before.recordings.iter().find(|b| a.same_rows(b)) {
-            let whom = if a.name == b.name { format!("`{}` is", a.name) } else { format!("`{}` and `{}` hold the same rows:", a.name, b.name) };
+            let whom = if a.name == b.name {
+                format!("`{}` is", a.name)
+            } else {
+                format!("`{}` and `{}` hold the same rows:", a.name, b.name)
+            };
             return Err(Error::new(DataCode::CallInvalid, format!("{whom} on both sides of the comparison"))
                 .file(&a.source)
                 .help("give each recording once, before or after --reference; --where and --reference-where pick rows of one file"));
@@ -50,10 +54,14 @@ pub(super) fn check(before: &Campaign, after: &Campaign) -> Result<Vec<String>> 
     for (what, b, a) in [("pressure", &p0, &p1), ("force", &f0, &f1)] {
         if !(range(a) > 0.0) || !(range(b) > 0.0) {
             let side = if range(b) > 0.0 { "AFTER" } else { "the reference" };
-            return Err(Error::new(DataCode::RecordingOutOfRange, format!("the {what} of {side} does not change"))
-                .help("a sensor that stands still says nothing; look at its cable and at the column"));
+            return Err(Error::new(
+                DataCode::RecordingOutOfRange,
+                format!("the {what} of {side} does not change"),
+            )
+            .help("a sensor that stands still says nothing; look at its cable and at the column"));
         }
-        if let Some(words) = factor(range(a) / range(b)).filter(|_| factor(largest(a) / largest(b)).is_some()) {
+        if let Some(words) = factor(range(a) / range(b)).filter(|_| factor(largest(a) / largest(b)).is_some())
+        {
             return Err(Error::new(
                 DataCode::RecordingUnknownUnit,
                 format!("the {what} of AFTER and of the reference differ by a factor of about {words}"),

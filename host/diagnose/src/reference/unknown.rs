@@ -22,7 +22,8 @@ pub(super) struct Unknown {
 
 /// The free surfaces of one mounting as columns.
 fn columns(cells: &[Cell], mounting: usize, range: f64) -> Option<DMatrix<f64>> {
-    let own: Vec<usize> = (0..cells.len()).filter(|i| cells[*i].after && cells[*i].mounting == mounting).collect();
+    let own: Vec<usize> =
+        (0..cells.len()).filter(|i| cells[*i].after && cells[*i].mounting == mounting).collect();
     let covariance = |i: usize, j: usize| {
         let (a, b) = (&cells[own[i]], &cells[own[j]]);
         let apart = (a.means.pressure - b.means.pressure) / range / SMOOTH.0;
@@ -40,7 +41,13 @@ fn columns(cells: &[Cell], mounting: usize, range: f64) -> Option<DMatrix<f64>> 
     Some(all)
 }
 
-fn weigh(inner: &DMatrix<f64>, moment: &DVector<f64>, keep: &[usize], scale: f64, largest: f64) -> Option<f64> {
+fn weigh(
+    inner: &DMatrix<f64>,
+    moment: &DVector<f64>,
+    keep: &[usize],
+    scale: f64,
+    largest: f64,
+) -> Option<f64> {
     let m = inner.select_rows(keep).select_columns(keep);
     let eigen = m.try_symmetric_eigen(1e-12, 10_000)?;
     let b = eigen.eigenvectors.tr_mul(&moment.select_rows(keep));

@@ -5,16 +5,12 @@ use std::fmt::Write;
 use super::answer::{ChangeReport, Changed, NotComparable, Place, Repeatability, Since, Size, Verdict};
 use super::shapes::Owner;
 
-pub(super) const TABLE_REFERENCE: &str =
-    "the reference is a table: how far this actuator repeats is not known, and what is usual for its class was taken; small changes are missed";
-pub(super) const OTHER_ACTUATOR: &str =
-    "the difference is larger than a change of the bench makes: is it the same actuator, and are the signs and units the same?";
-pub(super) const ONE_LENGTH_REMOUNTED: &str =
-    "AFTER was mounted anew and has one length only: a shift of the clamp by a millimetre cannot be told from a change of gain; record at two lengths";
+pub(super) const TABLE_REFERENCE: &str = "the reference is a table: how far this actuator repeats is not known, and what is usual for its class was taken; small changes are missed";
+pub(super) const OTHER_ACTUATOR: &str = "the difference is larger than a change of the bench makes: is it the same actuator, and are the signs and units the same?";
+pub(super) const ONE_LENGTH_REMOUNTED: &str = "AFTER was mounted anew and has one length only: a shift of the clamp by a millimetre cannot be told from a change of gain; record at two lengths";
 pub(super) const ASSUMED: &str =
     "nothing in the reference was recorded twice: how far the actuator repeats is assumed, not measured";
-pub(super) const STROKES_ASSUMED: &str =
-    "how far campaigns of strokes repeat is assumed (zero and level to 0.2 % of the largest force, gain to 0.5 %, friction to 5 to 10 %), not measured";
+pub(super) const STROKES_ASSUMED: &str = "how far campaigns of strokes repeat is assumed (zero and level to 0.2 % of the largest force, gain to 0.5 %, friction to 5 to 10 %), not measured";
 pub(super) const STROKES_MARGINAL: &str =
     "probabilities are those that a change is there at all; several can be there at once";
 pub(super) const GAIN_OF_STROKES: &str =
@@ -101,7 +97,9 @@ pub fn owner(owner: Owner) -> &'static str {
 pub fn since(since: &Since) -> String {
     match since {
         Since::Beginning => "from the first recording on".into(),
-        Since::From { recording, moment } => format!("at once, from `{recording}` on ({moment:.0} s after the beginning)"),
+        Since::From { recording, moment } => {
+            format!("at once, from `{recording}` on ({moment:.0} s after the beginning)")
+        }
         Since::Gradual => "gradually".into(),
         Since::NotDetermined => "not determined".into(),
     }
@@ -109,7 +107,8 @@ pub fn since(since: &Since) -> String {
 
 /// A value with so many digits that the last ones mean something.
 fn rounded(value: f64, std: f64) -> String {
-    let digits = if std > 0.0 && std.is_finite() { (1.0 - std.log10().floor()).clamp(0.0, 9.0) as usize } else { 3 };
+    let digits =
+        if std > 0.0 && std.is_finite() { (1.0 - std.log10().floor()).clamp(0.0, 9.0) as usize } else { 3 };
     format!("{value:.digits$}")
 }
 
@@ -149,12 +148,18 @@ pub fn headline(r: &ChangeReport) -> String {
         Verdict::Consistent => "Nothing changed beyond what this actuator does anyway.".into(),
         Verdict::Explained => format!("What changed: {}.", names.join(", ")),
         Verdict::PartlyExplained => format!("What changed: {}; something else is left.", names.join(", ")),
-        Verdict::Unexplained => "Something changed, and no single known change describes it well enough to be named.".into(),
+        Verdict::Unexplained => {
+            "Something changed, and no single known change describes it well enough to be named.".into()
+        }
     }
 }
 
 fn one(text: &mut String, m: &Changed) {
-    let _ = writeln!(text, "\n{} (probability {:.2}; its class {:.2})", m.effect, m.probability, m.class_probability);
+    let _ = writeln!(
+        text,
+        "\n{} (probability {:.2}; its class {:.2})",
+        m.effect, m.probability, m.class_probability
+    );
     for s in &m.parameters {
         let _ = writeln!(text, "  how large   {} {} (95 %)", s.name, size(s));
     }
@@ -215,9 +220,7 @@ pub fn summary(r: &ChangeReport) -> String {
         let seen: Vec<String> = r
             .considered
             .iter()
-            .filter_map(|c| {
-                Some(format!("{} {}", c.effect, plain(c.detectable?, &c.unit)))
-            })
+            .filter_map(|c| Some(format!("{} {}", c.effect, plain(c.detectable?, &c.unit))))
             .collect();
         let _ = writeln!(text, "would have been seen (90 %): {}", seen.join(", "));
     }

@@ -119,19 +119,28 @@ fn before(arguments: &Arguments, muscle: Option<&MuscleDescription>, console: &C
 fn check(arguments: &Arguments) -> Result<()> {
     let foreign = [
         ("--table", arguments.table.is_some(), "give the table as --reference"),
-        ("--check", !arguments.check.is_empty(), "checks of the bench are for the diagnosis without --reference"),
+        (
+            "--check",
+            !arguments.check.is_empty(),
+            "checks of the bench are for the diagnosis without --reference",
+        ),
         ("--with", !arguments.with.is_empty(), "given effects are for the diagnosis without --reference"),
         ("--next", arguments.next.is_some(), "what to do stands with each change"),
     ];
     if let Some((option, _, help)) = foreign.iter().find(|f| f.1) {
-        return Err(Error::new(DataCode::CallInvalid, format!("{option} does not go with --reference")).help(*help));
+        return Err(
+            Error::new(DataCode::CallInvalid, format!("{option} does not go with --reference")).help(*help)
+        );
     }
     if arguments.changed.prior_changed.is_some_and(|p| !(p >= 0.01 && p <= 0.99)) {
         return Err(Error::new(DataCode::CallInvalid, "--prior-changed must lie between 0.01 and 0.99"));
     }
     if arguments.output.is_some() && arguments.muscle.is_none() {
-        return Err(Error::new(DataCode::CallInvalid, "-o writes a muscle's table, and no muscle is described")
-            .help("give --muscle M.toml, or leave -o out"));
+        return Err(Error::new(
+            DataCode::CallInvalid,
+            "-o writes a muscle's table, and no muscle is described",
+        )
+        .help("give --muscle M.toml, or leave -o out"));
     }
     Ok(())
 }
@@ -232,7 +241,9 @@ fn write_table(
 fn told(output: &Path, done: Done) -> String {
     let what = match done {
         Done::Unchanged => "the table of before: nothing changed",
-        Done::Corrected => "the table of before with a correction of the bench beside it; a controller gets the same table as before",
+        Done::Corrected => {
+            "the table of before with a correction of the bench beside it; a controller gets the same table as before"
+        }
         Done::Refitted => "the table fitted anew to the recordings after the change",
     };
     format!("{}: {what}", output.display())

@@ -11,8 +11,16 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 /// Configurations; the last three are reruns of the fourth.
-const CONFIGURATIONS: [&str; 8] =
-    ["kdn", "pk", "o-ring", "o-ring257", "x-ring257", "rerun_1_o-ring257", "rerun_2_o-ring257", "rerun_3_o-ring257"];
+const CONFIGURATIONS: [&str; 8] = [
+    "kdn",
+    "pk",
+    "o-ring",
+    "o-ring257",
+    "x-ring257",
+    "rerun_1_o-ring257",
+    "rerun_2_o-ring257",
+    "rerun_3_o-ring257",
+];
 const LEVELS: [&str; 4] = ["1bar", "3bar", "5bar", "7bar"];
 
 /// One pair with its answer.
@@ -34,7 +42,11 @@ impl Pair {
     /// Whether the main change is named and nothing false.
     pub fn right(&self) -> bool {
         let main = if self.known.contains(&Class::Gain) { Class::Gain } else { Class::Friction };
-        if self.known.is_empty() { self.named.is_empty() } else { self.named.contains(&main) && self.named.is_subset(&self.known) }
+        if self.known.is_empty() {
+            self.named.is_empty()
+        } else {
+            self.named.contains(&main) && self.named.is_subset(&self.known)
+        }
     }
 }
 
@@ -65,7 +77,10 @@ pub fn run(data: &Path, short: bool) -> Result<Vec<Pair>, Box<dyn Error>> {
     for name in CONFIGURATIONS.iter().take(if short { 5 } else { 8 }) {
         let files: Vec<_> = LEVELS.iter().map(|l| folder.join(format!("{name}_{l}.csv"))).collect();
         if files.iter().all(|f| f.exists()) {
-            campaigns.push((name, Reader::new().import(Some(&import)).campaign(&files).map_err(|e| e.to_string())?));
+            campaigns.push((
+                name,
+                Reader::new().import(Some(&import)).campaign(&files).map_err(|e| e.to_string())?,
+            ));
         } else {
             println!("no {name} in {}: left out", folder.display());
         }

@@ -43,7 +43,8 @@ impl Slopes {
         let mountings = runs.iter().map(|r| r.mounting).max().map_or(0, |m| m + 1);
         let mut strokes = vec![0.0; mountings];
         runs.iter().for_each(|r| strokes[r.mounting] = r.stroke);
-        let curves: Vec<Vec<f64>> = (0..mountings).map(|m| curve(runs.iter().filter(|r| r.mounting == m))).collect();
+        let curves: Vec<Vec<f64>> =
+            (0..mountings).map(|m| curve(runs.iter().filter(|r| r.mounting == m))).collect();
         let step = node(1) - node(0);
         let gradient = |c: &Vec<f64>| {
             (0..NODES)
@@ -168,7 +169,13 @@ fn interpolated(time: &[f64], values: &[f64], at: f64) -> f64 {
 }
 
 /// What a change of size `a` adds to pressure and force of a run that begins at `start` of `total` seconds.
-fn change(effect: &str, a: f64, run: &Run, slopes: &Slopes, (start, total, moment): (f64, f64, f64)) -> (Vec<f64>, Vec<f64>) {
+fn change(
+    effect: &str,
+    a: f64,
+    run: &Run,
+    slopes: &Slopes,
+    (start, total, moment): (f64, f64, f64),
+) -> (Vec<f64>, Vec<f64>) {
     let n = run.time.len();
     let by_stroke = |i: usize| Slopes::at(&slopes.by_stroke[run.mounting], run.pressure[i]);
     let clock = |i: usize| (start + run.time[i]) / total;
@@ -188,7 +195,9 @@ fn change(effect: &str, a: f64, run: &Run, slopes: &Slopes, (start, total, momen
         "force-drift" => (none, each(&|i| a * clock(i))),
         "rig-compliance" => (none, each(&|i| a * run.force[i] * by_stroke(i))),
         "end-slip" => (none, each(&|i| if clock(i) > moment { a * by_stroke(i) } else { 0.0 })),
-        "sensor-delay" => (none, each(&|i| interpolated(&run.time, &run.force, run.time[i] - a) - run.force[i])),
+        "sensor-delay" => {
+            (none, each(&|i| interpolated(&run.time, &run.force, run.time[i] - a) - run.force[i]))
+        }
         _ => {
             let slow = slowed(&run.time, &run.pressure, a.max(1e-6));
             (each(&|i| slow[i] - run.pressure[i]), none)

@@ -44,17 +44,28 @@ fn finer(run: &Run, factor: usize) -> Run {
     let between = |column: &[f64]| -> Vec<f64> {
         let mut out: Vec<f64> = column
             .windows(2)
-            .flat_map(|w| (0..factor).map(|k| w[0] + (w[1] - w[0]) * k as f64 / factor as f64).collect::<Vec<_>>())
+            .flat_map(|w| {
+                (0..factor).map(|k| w[0] + (w[1] - w[0]) * k as f64 / factor as f64).collect::<Vec<_>>()
+            })
             .collect();
         out.extend(column.last());
         out
     };
-    Run { time: between(&run.time), pressure: between(&run.pressure), force: between(&run.force), ..run.clone() }
+    Run {
+        time: between(&run.time),
+        pressure: between(&run.pressure),
+        force: between(&run.force),
+        ..run.clone()
+    }
 }
 
 fn rate(k: usize, n: usize) -> String {
     let (low, high) = interval(k, n);
-    if n == 0 { "–".into() } else { format!("{:.1} % ({:.0} to {:.0})", 100.0 * k as f64 / n as f64, 100.0 * low, 100.0 * high) }
+    if n == 0 {
+        "–".into()
+    } else {
+        format!("{:.1} % ({:.0} to {:.0})", 100.0 * k as f64 / n as f64, 100.0 * low, 100.0 * high)
+    }
 }
 
 fn right_class(t: &Trial) -> bool {
@@ -76,7 +87,8 @@ fn line(text: &mut String, label: &str, trials: &[&Trial]) {
     let in_set = count(&|t| t.effect.is_some_and(|e| t.answer.set.iter().any(|s| s == e)));
     let missed = count(&|t| t.answer.top == "none");
     let false_name = count(&|t| t.answer.named.iter().any(|m| class(&m.0) != t.effect.and_then(class)));
-    let sized: Vec<(f64, f64, f64)> = trials.iter().filter_map(|t| size_of(t).map(|(s, h)| (s, h, t.size))).collect();
+    let sized: Vec<(f64, f64, f64)> =
+        trials.iter().filter_map(|t| size_of(t).map(|(s, h)| (s, h, t.size))).collect();
     let within = sized.iter().filter(|(s, _, t)| (s.abs() / t.abs() - 1.0).abs() < 0.2).count();
     let covered = sized.iter().filter(|(s, h, t)| (s.abs() - t.abs()).abs() < *h).count();
     let set: usize = trials.iter().map(|t| t.answer.set.len()).sum();
@@ -114,7 +126,12 @@ fn injected(text: &mut String, trials: &[Trial]) {
             for percent in [1.0, 2.0, 3.0, 5.0] {
                 let some: Vec<&Trial> = trials
                     .iter()
-                    .filter(|t| t.effect.is_some() && t.half == half && t.percent == percent && t.muscle.starts_with(year))
+                    .filter(|t| {
+                        t.effect.is_some()
+                            && t.half == half
+                            && t.percent == percent
+                            && t.muscle.starts_with(year)
+                    })
                     .collect();
                 line(text, &format!("{year}, {percent} %"), &some);
             }
@@ -142,7 +159,12 @@ fn untouched(text: &mut String, trials: &[Trial]) {
         let named = own.iter().filter(|t| !t.answer.named.is_empty()).count();
         let alarmed = own.iter().filter(|t| t.answer.none < 0.5).count();
         let n = own.len();
-        let _ = writeln!(text, "| {label} | {n} | {named}: {} | {alarmed}: {} |", rate(named, n), rate(alarmed, n));
+        let _ = writeln!(
+            text,
+            "| {label} | {n} | {named}: {} | {alarmed}: {} |",
+            rate(named, n),
+            rate(alarmed, n)
+        );
     };
     let mut all = Vec::new();
     for ((half, year), own) in &groups {
@@ -151,7 +173,11 @@ fn untouched(text: &mut String, trials: &[Trial]) {
     }
     row("**all**", &all);
     for t in all.iter().filter(|t| t.answer.none < 0.5) {
-        let _ = writeln!(text, "\n{}, runs {:?}: {} with {:.2}.", t.muscle, t.runs, t.answer.top, t.answer.probability);
+        let _ = writeln!(
+            text,
+            "\n{}, runs {:?}: {} with {:.2}.",
+            t.muscle, t.runs, t.answer.top, t.answer.probability
+        );
     }
 }
 
@@ -181,7 +207,15 @@ fn cylinder(text: &mut String, pairs: &[Pair]) {
             if names.is_empty() { "–".to_owned() } else { names.join(", ") }
         };
         let mark = if p.right() { "" } else { " **wrong**" };
-        let _ = writeln!(text, "| {} | {} | {} | {}{mark} | {:.2} |", p.before, p.after, list(&p.known), list(&p.named), p.none);
+        let _ = writeln!(
+            text,
+            "| {} | {} | {} | {}{mark} | {:.2} |",
+            p.before,
+            p.after,
+            list(&p.known),
+            list(&p.named),
+            p.none
+        );
     }
 }
 
@@ -219,7 +253,10 @@ pub fn page(trials: &[Trial], pairs: &[Pair], speed: Option<(usize, f64)>, short
     }
     cylinder(&mut text, pairs);
     if let Some((rows, seconds)) = speed {
-        let _ = writeln!(text, "\n## Speed\n\n{rows} rows together: {seconds:.2} s, reading not included, on the machine that wrote this page.");
+        let _ = writeln!(
+            text,
+            "\n## Speed\n\n{rows} rows together: {seconds:.2} s, reading not included, on the machine that wrote this page."
+        );
     }
     text.push_str(UNTESTED);
     text

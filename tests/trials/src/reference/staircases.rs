@@ -123,7 +123,8 @@ pub fn read(data: &Path) -> Result<Vec<Muscle>, Box<dyn Error>> {
 }
 
 fn muscle(path: &Path, year: &str, list: &Sheet, rows: &[&Vec<String>]) -> Result<Muscle, Box<dyn Error>> {
-    let (key, first) = if year == "2021" { ("condition", 1) } else { ("nominal_relative_contraction_percent", 8) };
+    let (key, first) =
+        if year == "2021" { ("condition", 1) } else { ("nominal_relative_contraction_percent", 8) };
     let (key_here, run_here) = (list.column(key)?, list.column("run")?);
     let sheet = Sheet::read(path)?;
     let own_key = sheet.column(if year == "2021" { "condition" } else { "relative_contraction_percent" })?;
@@ -148,8 +149,10 @@ fn muscle(path: &Path, year: &str, list: &Sheet, rows: &[&Vec<String>]) -> Resul
             force: Vec::new(),
         };
         let mut before = f64::NEG_INFINITY;
-        for cells in sheet.rows.iter().filter(|c| c[own_key] == row[key_here] && c[own_run] == row[run_here]) {
-            let [t, p, f] = [cells[columns[0]].parse::<f64>()?, cells[columns[1]].parse()?, cells[columns[2]].parse()?];
+        for cells in sheet.rows.iter().filter(|c| c[own_key] == row[key_here] && c[own_run] == row[run_here])
+        {
+            let [t, p, f] =
+                [cells[columns[0]].parse::<f64>()?, cells[columns[1]].parse()?, cells[columns[2]].parse()?];
             if t > before {
                 one.time.push(t);
                 one.pressure.push(1e3 * p);
