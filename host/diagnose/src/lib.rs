@@ -58,6 +58,7 @@ mod options;
 pub mod outcome;
 mod preconditions;
 pub mod protocol_simulation;
+pub mod reference;
 pub mod refitted_table;
 pub mod remark;
 pub mod reserve;

@@ -16,6 +16,7 @@
 //! assert!(figure.svg().contains("friction factor k"));
 //! ```
 
+pub mod change_page;
 pub mod compare_page;
 pub mod diagnose_page;
 pub mod effect_page;

@@ -1,4 +1,6 @@
-//! `host diagnose`: what the model leaves out of recordings, where, and how sure that is.
+//! `host diagnose`: what the model leaves out of recordings, where, and how sure that is; with `--reference`, what has changed.
+
+mod reference;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,7 +14,7 @@ use super::recordings::Recordings;
 use super::reports::Reports;
 use crate::console::Console;
 use pam_data::date;
-use pam_data::error::Result;
+use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::{Turn, to_standard_output, write_whole};
 use pam_data::progress::SharedProgress;
@@ -33,11 +35,15 @@ use pam_report::{diagnose_page, document, history_text, wording};
     host diagnose --muscle mini.toml loops/*.csv\n  \
     host diagnose --muscle mini.toml loops/*.csv -o corrected.pam \\\n      \
         --report answer.html --json answer.json\n  \
-    host diagnose --muscle mini.toml loops/*.csv --with backlash,force-offset")]
+    host diagnose --muscle mini.toml loops/*.csv --with backlash,force-offset\n  \
+    host diagnose today/*.csv --reference march/*.csv --report changed.html\n  \
+    host diagnose --muscle mini.toml today/*.csv --reference mini.pam")]
 pub struct Arguments {
-    /// The muscle's description.
-    #[arg(long, value_name = "M.toml")]
-    muscle: PathBuf,
+    /// The muscle's description. With --reference it may be left out: any pneumatic actuator can be compared with itself.
+    #[arg(long, value_name = "M.toml", required_unless_present = "reference")]
+    muscle: Option<PathBuf>,
+    #[command(flatten)]
+    changed: reference::Options,
     #[command(flatten)]
     recordings: Recordings,
     /// The table whose misfit is asked about; without it one is fitted to the recordings.
@@ -76,9 +82,16 @@ impl Arguments {
             ("--report", self.reports.file()),
             ("--next", self.next.as_deref()),
         ])?;
+        if !self.changed.reference.is_empty() {
+            return reference::run(&self, console, taken);
+        }
         let start = Instant::now();
         let given = self.with.iter().map(|name| effects::named(name.trim())).collect::<Result<Vec<_>>>()?;
-        let muscle = MuscleDescription::read(&self.muscle)?;
+        let Some(path) = &self.muscle else {
+            return Err(Error::new(DataCode::CallInvalid, "the muscle's description is missing")
+                .help("give --muscle M.toml"));
+        };
+        let muscle = MuscleDescription::read(path)?;
         // Whoever asks for JSON is a program, or will look at that.
         let watched = if self.json.is_some() { Console::silent() } else { console.clone() };
         let (campaign, hashes) = self.recordings.read_hashed(Reader::of(&muscle), &watched)?;

@@ -16,6 +16,7 @@ mod names;
 mod oracle;
 mod progress;
 mod queue;
+mod reference;
 mod report;
 mod residuals;
 mod score;
@@ -174,6 +175,8 @@ enum Command {
     Festo(Real),
     /// The same for settled points only: writes the section of the page on what the muscles remember.
     FestoHistory(Real),
+    /// Ask what has changed: changes put into later runs of real recordings, untouched pairs, a cylinder whose seal was swapped.
+    Reference(reference::Reference),
     /// Generate, answer and score in one go; each goes on where an earlier run was broken off.
     Prove {
         /// dev or final.
@@ -223,6 +226,7 @@ fn main() -> ExitCode {
         Command::FestoHistory(real) => {
             festo::run_history(&real.data, &real.output, &real.host, real.page.as_deref())
         }
+        Command::Reference(what) => reference::run(&what),
         Command::Prove { set, what, tool, check } => prove(&set, &what, &tool, check),
     };
     match done {

@@ -1,0 +1,63 @@
+//! Diagnosis against a reference: what has changed since earlier recordings of the same actuator.
+//!
+//! ```text
+//! rows → settled rows with direction → reference surface (BEFORE only) → residual cells, shapes of change, lag scores
+//!      → what repeats (covariance) → generalised least squares → evidence of each change → gate → posterior → answer
+//! ```
+//! | file | what |
+//! | --- | --- |
+//! | [`criteria`] | every constant with its meaning and source |
+//! | `runs` | recordings as runs: mountings, run numbers, what cannot be compared |
+//! | `motion` | settled rows; which way the pressure or the stroke moves |
+//! | `spline`, `surface` | the force before, over pressure and direction, by mounting; its slopes |
+//! | `table_surface` | the same from a table file |
+//! | `cells` | residuals and shapes as means over cells of pressure |
+//! | [`shapes`] | the changes that can be named: shape, class, owner, remedy |
+//! | `repeatability` | how far untouched recordings differ: a Gaussian covariance |
+//! | `contrast` | generalised least squares and Bayes factors |
+//! | `lag` | delays between the channels, by rows in motion |
+//! | `slip` | a step within AFTER |
+//! | `unknown` | a smooth change that no name describes |
+//! | `gate` | a change must show without any single mounting |
+//! | `posterior` | probabilities, set, verdict |
+//! | `isometric` | all of this for pressure staircases at held lengths |
+//! | `strokes`, `stroked` | the same question for strokes at regulated pressures |
+//! | `localise` | which cells, since which file, at once or gradually |
+//! | `held_out` | how much of the difference is gone on recordings that the fit had not seen |
+//! | `units` | columns in other units, another actuator |
+//! | [`answer`] | the answer as values and JSON |
+//! | [`words`] | the answer in words |
+//! | [`correction`] | what the answer means for a table |
+//!
+//! The same recordings give the same answer on any number of threads.
+
+pub mod answer;
+mod cells;
+mod contrast;
+pub mod correction;
+pub mod criteria;
+mod gate;
+mod held_out;
+mod isometric;
+mod lag;
+mod localise;
+mod motion;
+mod posterior;
+mod repeatability;
+mod report;
+mod runs;
+pub mod shapes;
+mod slip;
+mod spline;
+mod stroked;
+mod strokes;
+mod surface;
+mod table_surface;
+#[cfg(test)]
+mod tests;
+mod units;
+mod unknown;
+pub mod words;
+
+pub use answer::{ChangeReport, Verdict};
+pub use report::{Against, Mounted, Options, compare};

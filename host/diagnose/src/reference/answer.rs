@@ -1,0 +1,318 @@
+//! The answer as values and JSON, in the schema of every diagnosis.
+
+#![allow(non_snake_case, reason = "units are spelled as in the JSON")]
+
+use serde::Serialize;
+
+use super::shapes::{Class, Owner};
+use super::words;
+
+/// The judgement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Nothing changed beyond what this actuator does anyway.
+    Consistent,
+    /// What changed is named, and nothing else stands out.
+    Explained,
+    /// Something is named, and something else is left.
+    PartlyExplained,
+    /// Something changed that no name describes well enough.
+    Unexplained,
+}
+
+/// What of AFTER has no counterpart in the reference.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NotComparable {
+    /// A recording at a length that the reference does not have.
+    Stroke {
+        /// Its name.
+        recording: String,
+        /// m.
+        stroke: f64,
+    },
+    /// Rows at pressures that the reference does not have.
+    Pressure {
+        /// Its name.
+        recording: String,
+        /// Their share of the settled rows.
+        share: f64,
+    },
+    /// Too few common cells.
+    FewCells {
+        /// m.
+        stroke: f64,
+    },
+    /// Changes that need several lengths, and the reference has one.
+    OneLength,
+    /// A level of pressure of strokes that only one side has, Pa.
+    Level {
+        /// Pa.
+        pressure: f64,
+    },
+    /// Changes that strokes at regulated pressures are not asked about.
+    Strokes,
+}
+
+/// A part of the cells in which the difference sits.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Place {
+    /// Its name, one of those of every diagnosis.
+    pub coordinate: String,
+    /// From this value, in `unit`.
+    pub from: f64,
+    /// To this value.
+    pub to: f64,
+    /// Share of the difference's energy that lies there.
+    pub share: f64,
+    /// Share of the cells that lie there.
+    pub rows: f64,
+    /// Unit of `from` and `to`.
+    pub unit: String,
+}
+
+/// Since when a change is there.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "course", rename_all = "kebab-case")]
+pub enum Since {
+    /// From the first recording of AFTER on.
+    Beginning,
+    /// From one recording on, at once.
+    From {
+        /// Its name.
+        recording: String,
+        /// s since AFTER began.
+        moment: f64,
+    },
+    /// Gradually through AFTER.
+    Gradual,
+    /// The recordings do not say.
+    NotDetermined,
+}
+
+/// The size of a change, SI.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Size {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+    /// Standard deviation, the slopes' error included.
+    pub std: f64,
+    /// Lower end of the 95 % interval.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// SI unit.
+    pub unit: String,
+}
+
+/// What changed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Changed {
+    /// Its name.
+    pub effect: String,
+    /// How probable this very name is.
+    pub probability: f64,
+    /// How probable its class is.
+    pub class_probability: f64,
+    /// Its class.
+    pub class: Class,
+    /// Share of the difference's energy that is gone on recordings held out, this change alone.
+    pub share_explained: f64,
+    /// Its size.
+    pub parameters: Vec<Size>,
+    /// Names that these recordings cannot tell from it.
+    pub confusable_with: Vec<String>,
+    /// Since when.
+    pub since: Since,
+    /// Whose it is.
+    pub owner: Owner,
+    /// Whether it is the bench's: it corrects the data and never goes to a controller.
+    pub correction: bool,
+    /// Its law.
+    pub law: String,
+    /// What to do.
+    pub remedy: String,
+    /// rms of the force that it adds in AFTER, N.
+    pub rms_N: f64,
+}
+
+/// What no name explains.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Left {
+    /// Share of the difference's energy.
+    pub share: f64,
+    /// Its pattern in words.
+    pub pattern: String,
+}
+
+/// The difference on recordings that the sizes were not fitted to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HeldOut {
+    /// How recordings were held out.
+    pub split: String,
+    /// rms without the named changes, N.
+    pub rms_before_N: f64,
+    /// rms with them, N.
+    pub rms_after_N: f64,
+    /// What repeats, N.
+    pub noise_N: f64,
+}
+
+/// A change that was looked at.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Considered {
+    /// Its name.
+    pub effect: String,
+    /// Its probability.
+    pub gain: f64,
+    /// Why it is not named.
+    pub why_not: String,
+    /// The size that would have been seen with 90 %, SI; absent where these recordings cannot show it.
+    pub detectable: Option<f64>,
+    /// Unit of `detectable`.
+    pub unit: String,
+}
+
+/// What the reference is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Reference {
+    /// Its files.
+    pub files: Vec<String>,
+    /// The table file, where it is one.
+    pub table: Option<String>,
+    /// Its rows.
+    pub samples: usize,
+    /// How far untouched recordings of this actuator differ, rms of a cell, N.
+    pub repeatability_N: f64,
+    /// Where that is from.
+    pub repeatability_from: Repeatability,
+    /// Whether AFTER counts as mounted anew.
+    pub mounted_anew: bool,
+    /// What of AFTER could not be compared, and changes that could not be asked about.
+    pub not_comparable: Vec<String>,
+}
+
+/// Where the repeatability is from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Repeatability {
+    /// From runs under the same conditions, beside what is usual.
+    Measured,
+    /// What is usual for such actuators: nothing was recorded twice.
+    Assumed,
+}
+
+/// A name, none or unknown, with its probability.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Probability {
+    /// `none`, `unknown` or a name.
+    pub cause: String,
+    /// Its probability.
+    pub probability: f64,
+}
+
+/// A curve for a picture: force over pressure, or over stroke.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Curve {
+    /// What it is of: a mounting or a level.
+    pub title: String,
+    /// Abscissae: kPa, or mm.
+    pub at: Vec<f64>,
+    /// N; the first of each pair filling or shortening, the second the other way.
+    pub before: [Vec<f64>; 2],
+    /// The same after.
+    pub after: [Vec<f64>; 2],
+    /// AFTER minus what was to be expected, N.
+    pub difference: [Vec<f64>; 2],
+    /// What the named changes add, N.
+    pub explained: [Vec<f64>; 2],
+}
+
+/// The whole answer.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChangeReport {
+    /// `pam-diagnose/1`.
+    pub schema: &'static str,
+    /// The actuator's name, where it is described.
+    pub muscle: Option<String>,
+    /// Rows of AFTER.
+    pub samples: usize,
+    /// The judgement.
+    pub verdict: Verdict,
+    /// How far untouched recordings differ, N.
+    pub noise_N: f64,
+    /// rms of AFTER minus what was to be expected, N.
+    pub misfit_rms_N: f64,
+    /// Largest force of the reference, N.
+    pub largest_force_N: f64,
+    /// Where the difference sits; empty where nothing changed.
+    pub r#where: Vec<Place>,
+    /// What changed.
+    pub missing: Vec<Changed>,
+    /// What no name explains.
+    pub unexplained: Left,
+    /// How much of the difference is gone.
+    pub held_out: HeldOut,
+    /// Always absent: what to do is with each change.
+    pub next_experiment: Option<()>,
+    /// Every change that could be asked about.
+    pub considered: Vec<Considered>,
+    /// All probabilities of the first weighing, in falling order.
+    pub probabilities: Vec<Probability>,
+    /// Causes that hold 95 % of the probability.
+    pub set: Vec<String>,
+    /// What a reader should know, in sentences.
+    pub remarks: Vec<String>,
+    /// What it was compared with.
+    pub reference: Reference,
+    /// For pictures.
+    #[serde(skip)]
+    pub curves: Vec<Curve>,
+    /// Label and unit of the curves' abscissa.
+    #[serde(skip)]
+    pub abscissa: (&'static str, &'static str),
+}
+
+impl ChangeReport {
+    /// As JSON text.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        // Strings, finite numbers and options of them: this cannot fail.
+        serde_json::to_string_pretty(self).unwrap_or_default()
+    }
+
+    /// Probability of a cause in the first weighing.
+    #[must_use]
+    pub fn probability(&self, cause: &str) -> f64 {
+        self.probabilities.iter().find(|p| p.cause == cause).map_or(0.0, |p| p.probability)
+    }
+
+    /// The most probable cause.
+    #[must_use]
+    pub fn top(&self) -> &str {
+        self.probabilities.first().map_or("none", |p| p.cause.as_str())
+    }
+}
+
+/// A size with its 95 % interval. `freedom` widens it as Student's t does; `slopes` is the share by which the slopes may be wrong.
+pub(super) fn size(parameter: (&str, &str), value: f64, std: f64, freedom: f64, slopes: f64) -> Size {
+    let z = 1.959_964;
+    // Expansion of Student's quantile for not too few degrees of freedom.
+    let t = z + (z * z * z + z) / (4.0 * freedom.max(1.0));
+    let half = (t * std).hypot(slopes * value);
+    Size {
+        name: parameter.0.into(),
+        value,
+        std: half / z,
+        low: value - half,
+        high: value + half,
+        unit: parameter.1.into(),
+    }
+}
+
+/// In words, for the JSON's list.
+pub(super) fn not_comparable(all: &[NotComparable]) -> Vec<String> {
+    all.iter().map(words::not_comparable).collect()
+}

@@ -1,0 +1,100 @@
+//! What the answer means for a table: a correction of the bench beside it, or a refit on AFTER.
+
+use super::answer::{ChangeReport, Changed, Verdict};
+use super::shapes::Change;
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::Campaign;
+use pam_fit::bench::Candidate;
+use pam_fit::fit::{Options as FitOptions, fit};
+use pam_fit::table_file::{About, Correction, TableFile};
+
+/// What was done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Done {
+    /// Nothing changed: the table of before stands.
+    Unchanged,
+    /// The bench's correction is beside the table of before.
+    Corrected,
+    /// The table is fitted anew to AFTER.
+    Refitted,
+}
+
+/// A table fitted to recordings.
+///
+/// # Errors
+/// Recordings that cannot be fitted.
+pub fn fitted(campaign: &Campaign, muscle: &MuscleDescription) -> Result<TableFile> {
+    let fitted = fit(campaign, muscle, &FitOptions::default())?;
+    let about = About {
+        muscle: muscle.name.clone(),
+        tool: format!("host {}", env!("CARGO_PKG_VERSION")),
+        fit: fitted.summary.quality(),
+        uncertainty: Some(fitted.stored_uncertainty()),
+        ..About::default()
+    };
+    Ok(TableFile { table: fitted.table, about })
+}
+
+/// The correction of a change of the bench, in the catalogue's parameters; `None` where the catalogue has no such law.
+fn correction(changed: &Changed) -> Option<Correction> {
+    let change = Change::from_name(&changed.effect)?;
+    let size = changed.parameters.first()?.value;
+    let Some(Candidate::Bench(_)) = Candidate::from_name(&changed.effect) else { return None };
+    let info = Candidate::from_name(&changed.effect)?.info();
+    let mut parameters = vec![0.0; info.parameters.len()];
+    match change {
+        // The catalogue counts the pressure that the reading lacks.
+        Change::GaugeGain | Change::GaugeOffset => parameters[0] = -size,
+        // A reading that is late by a first-order filter adds to the force expected of it.
+        Change::ForceOffset
+        | Change::ForceGain
+        | Change::CrossTalk
+        | Change::DisplacementOffset
+        | Change::SensorDelay
+        | Change::PressureSensorLag => parameters[0] = size,
+        // A drift over one campaign says nothing of the next, and a frame's law has a part at turns that was not measured.
+        _ => return None,
+    }
+    Some(Correction { effect: changed.effect.clone(), parameters })
+}
+
+/// The table that follows from the answer. `before`: the table of before, or the recordings of before, to be fitted.
+///
+/// # Errors
+/// An answer that names nothing although something changed, changes that no correction can express, recordings that cannot be fitted.
+pub fn table(
+    report: &ChangeReport,
+    before: impl FnOnce() -> Result<TableFile>,
+    after: &Campaign,
+    muscle: &MuscleDescription,
+) -> Result<(TableFile, Done)> {
+    let refused = |why: String, help: &str| Err(Error::new(DataCode::CallInvalid, why).help(help));
+    match report.verdict {
+        Verdict::Consistent => return Ok((before()?, Done::Unchanged)),
+        Verdict::Unexplained => {
+            return refused(
+                "no table is written: something changed that has no name".into(),
+                "leave -o out, look at the report, and fit anew with `host fit` once the bench is in order",
+            );
+        }
+        Verdict::Explained | Verdict::PartlyExplained => {}
+    }
+    if report.missing.iter().any(|m| !m.correction) {
+        return Ok((fitted(after, muscle)?, Done::Refitted));
+    }
+    let mut file = before()?;
+    for m in &report.missing {
+        let Some(correction) = correction(m) else {
+            return refused(
+                format!(
+                    "no table is written: `{}` is to be repaired at the bench, not corrected in a table",
+                    m.effect
+                ),
+                "leave -o out",
+            );
+        };
+        file.about.corrections.push(correction);
+    }
+    Ok((file, Done::Corrected))
+}

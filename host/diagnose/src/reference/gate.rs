@@ -1,0 +1,55 @@
+//! A change of bench or actuator shows in every mounting: what would not stand without one of them counts only what the others say.
+
+use nalgebra::DVector;
+
+use super::cells::Cell;
+use super::contrast::{Contrast, evidence};
+use super::criteria::{GATE, GATE_MOUNTINGS};
+use super::shapes::Change;
+
+/// Log evidence that lies this much below none needs no gate.
+const WORTH_ASKING: f64 = -1.0;
+
+/// A named change with its evidence over none.
+pub(super) struct Asked<'a> {
+    pub change: Change,
+    /// Normalised to unit rms over AFTER.
+    pub shape: &'a DVector<f64>,
+    /// Log evidence over no change.
+    pub log: f64,
+}
+
+/// Limits the log evidences. Within three mountings nothing can be asked.
+pub(super) fn limit(cells: &[Cell], contrast: &Contrast, asked: &mut [Asked<'_>], sizes: &[f64]) {
+    let mut mountings: Vec<usize> = cells.iter().filter(|c| c.after).map(|c| c.mounting).collect();
+    mountings.sort_unstable();
+    mountings.dedup();
+    let candidates: Vec<usize> = (0..asked.len()).filter(|i| asked[*i].log > WORTH_ASKING).collect();
+    if mountings.len() < GATE_MOUNTINGS || candidates.is_empty() {
+        return;
+    }
+    let mut worst = vec![f64::INFINITY; asked.len()];
+    for m in mountings {
+        let dropped: Vec<usize> =
+            (0..cells.len()).filter(|i| cells[*i].after && cells[*i].mounting == m).collect();
+        let Some(without) = contrast.without_cells(&dropped) else { continue };
+        let scale = without.scale();
+        for &i in &candidates {
+            let mut shape = asked[i].shape.clone();
+            dropped.iter().for_each(|d| shape[*d] = 0.0);
+            let (a, b) = without.products(&shape);
+            let log = evidence(a, b, scale, sizes);
+            worst[i] = worst[i].min(if log.is_finite() { log } else { 0.0 });
+        }
+    }
+    let strong = GATE.ln();
+    let best = candidates.iter().map(|i| worst[*i]).fold(f64::NEG_INFINITY, f64::max);
+    for &i in &candidates {
+        // The gate asks whether there is a change of this kind at all: it closes for every name or for none. Only a step may sit at the
+        // end of AFTER, where one mounting shows it.
+        let closed = best < strong || (asked[i].change == Change::EndSlip && worst[i] < strong);
+        if closed {
+            asked[i].log = asked[i].log.min(worst[i]);
+        }
+    }
+}

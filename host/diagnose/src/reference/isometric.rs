@@ -1,0 +1,287 @@
+//! The whole chain for recordings at held lengths: from runs to weighed changes.
+
+use nalgebra::DVector;
+
+use super::cells::{Cell, cells};
+use super::contrast::{Contrast, evidence};
+use super::criteria::{DIRECTIONS_PER_RUN, LAG_FLOOR, MOST_CHANGES, NAMED, SIZES};
+use super::gate::{self, Asked};
+use super::lag::{self, Shift};
+use super::posterior::{Cause, Posterior};
+use super::repeatability::{Setting, covariance};
+use super::runs::{Run, Runs};
+use super::shapes::{CHANGES, Change};
+use super::slip::{self, Slip, rms_after};
+use super::surface::Surface;
+use super::unknown;
+use pam_data::error::{DataCode, Error, Result};
+
+/// The size of a change if it is the only one left, SI.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Estimate {
+    pub change: Change,
+    pub size: f64,
+    pub std: f64,
+    /// rms of the shape over AFTER per unit of size, N.
+    pub rms: f64,
+}
+
+/// A change that is named, with the shape that it has in the cells.
+#[derive(Debug, Clone)]
+pub(super) struct Accepted {
+    pub change: Change,
+    pub probability: f64,
+    /// Other names that the set of this round holds.
+    pub rivals: Vec<Change>,
+    /// Per unit of size, N; zero on BEFORE.
+    pub shape: DVector<f64>,
+    pub size: f64,
+    pub std: f64,
+}
+
+/// One weighing of all changes.
+pub(super) struct Round {
+    pub posterior: Posterior,
+    pub estimates: Vec<Estimate>,
+    pub slip: Option<Slip>,
+    pub local: Option<(usize, f64)>,
+}
+
+/// Everything that was found.
+pub(super) struct Analysis {
+    pub runs: Runs,
+    pub surface: Surface,
+    pub cells: Vec<Cell>,
+    /// Of the first round, without changes.
+    pub contrast: Contrast,
+    pub first: Round,
+    pub accepted: Vec<Accepted>,
+    /// The weighing after the last name.
+    pub last: Posterior,
+}
+
+/// Which level each cell belongs to, without gaps.
+fn levels(cells: &[Cell]) -> Vec<usize> {
+    let key = |c: &Cell| (c.mounting, c.direction < 0.0, c.bin);
+    let mut all: Vec<_> = cells.iter().map(key).collect();
+    all.sort_unstable();
+    all.dedup();
+    cells.iter().map(|c| all.binary_search(&key(c)).unwrap_or(0)).collect()
+}
+
+fn shape(cells: &[Cell], change: Change) -> Option<DVector<f64>> {
+    let of = |c: &Cell| change.shape(&c.means, c.direction).map(|s| if c.after { s } else { 0.0 });
+    let values: Option<Vec<f64>> = cells.iter().map(of).collect();
+    values.map(DVector::from_vec)
+}
+
+/// The reference and how good it is.
+pub(super) struct Reference {
+    pub surface: Surface,
+    /// N; zero where the reference is recordings, whose levels are estimated with the rest.
+    pub error: f64,
+    /// Whether BEFORE has cells of its own.
+    pub recorded: bool,
+}
+
+/// Weighs everything.
+///
+/// # Errors
+/// Recordings that leave no common cells, or numbers that cannot be used.
+pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Result<Analysis> {
+    let Reference { surface, error, recorded } = reference;
+    use rayon::prelude::*;
+    let scores: Vec<_> = runs.runs.par_iter().map(|r| lag::score(r, &surface)).collect();
+    let shift = lag::shift(&runs, &scores);
+    let traced = |run: &Run| lag::effect(run, &surface, shift.lag);
+    let lag = (shift.lag.abs() > LAG_FLOOR).then_some(&traced as &dyn Fn(&Run) -> Vec<f64>);
+    let cells = cells(&runs, &surface, lag);
+    if !cells.iter().any(|c| c.after) {
+        let values = || runs.side(true).flat_map(|r| r.pressure.iter().copied());
+        return Err(Error::new(DataCode::RecordingOutOfRange, "AFTER and the reference have no pressures in common")
+            .help(format!(
+                "AFTER has {:.0} to {:.0} kPa, the reference {:.0} to {:.0} kPa: check the units, or record the same pressures",
+                values().fold(f64::INFINITY, f64::min) / 1e3,
+                values().fold(f64::NEG_INFINITY, f64::max) / 1e3,
+                surface.low / 1e3,
+                surface.high / 1e3
+            )));
+    }
+    let setting = Setting {
+        range: surface.high - surface.low,
+        largest: surface.largest,
+        remounted: runs.remounted,
+        reference_error: error,
+    };
+    let k = covariance(&cells, &setting);
+    let y = DVector::from_iterator(cells.len(), cells.iter().map(|c| c.means.residual));
+    let used: std::collections::BTreeSet<usize> = runs.runs.iter().map(|r| r.mounting).collect();
+    let taught = DIRECTIONS_PER_RUN * (runs.runs.len() as f64 - 2.0 * used.len() as f64).max(1.0);
+    let levels = recorded.then(|| levels(&cells));
+    let contrast = Contrast::new(k, levels.as_deref(), y, taught).ok_or_else(|| {
+        Error::new(DataCode::RecordingNotFinite, "the recordings hold numbers that cannot be compared")
+    })?;
+    let mut accepted: Vec<Accepted> = Vec::new();
+    let mut present = contrast.clone();
+    let mut first: Option<Round> = None;
+    loop {
+        let lag_open = !accepted.iter().any(|a| is_lag(a.change));
+        let round = weigh(&cells, &present, &surface, lag_open.then_some(&shift), prior_none);
+        let leader = round.posterior.leader();
+        let none = round.posterior.probability(Cause::None);
+        // What a lag does to settled rows is not known well enough to look for more beneath it.
+        let more = leader.filter(|_| lag_open && none < NAMED && accepted.len() < MOST_CHANGES);
+        let next = more.and_then(|(change, p)| accept(&cells, &round, change, p, &shift));
+        let last = round.posterior.clone();
+        first.get_or_insert(round);
+        // A second change of the same kind is what the first one's shape is inexact by.
+        let Some(next) = next.filter(|n| accepted.iter().all(|a| a.change.class() != n.change.class()))
+        else {
+            let Some(first) = first else {
+                break Err(Error::new(DataCode::RecordingEmpty, "nothing to weigh"));
+            };
+            refit(&contrast, &mut accepted, &cells);
+            break Ok(Analysis { runs, surface, cells, contrast, first, accepted, last });
+        };
+        if is_lag(next.change) {
+            let residual = &present.residual - lag::trace(&cells);
+            present = present.with_residual(residual);
+        } else {
+            present = present.without_shapes(std::slice::from_ref(&next.shape));
+        }
+        accepted.push(next);
+    }
+}
+
+fn is_lag(change: Change) -> bool {
+    matches!(change, Change::SensorDelay | Change::PressureSensorLag)
+}
+
+/// Weighs every change that the cells can carry.
+fn weigh(
+    cells: &[Cell],
+    contrast: &Contrast,
+    surface: &Surface,
+    lag: Option<&Shift>,
+    prior_none: f64,
+) -> Round {
+    let scale = contrast.scale();
+    let sizes = SIZES.map(|s| s * surface.largest);
+    let still = lag.map_or(0.0, |l| l.unchanged);
+    let mut estimates = Vec::new();
+    let mut shapes: Vec<(Change, DVector<f64>, f64)> = Vec::new();
+    let mut enter = |change: Change, shape: DVector<f64>, log: Option<f64>| {
+        let rms = rms_after(cells, &shape);
+        if !(rms > 0.0 && rms.is_finite()) {
+            return;
+        }
+        let unit = shape / rms;
+        let (a, b) = contrast.products(&unit);
+        let log = log.unwrap_or_else(|| evidence(a, b, scale, &sizes));
+        if log.is_finite() {
+            estimates.push(Estimate { change, size: b / a / rms, std: (scale / a).sqrt() / rms, rms });
+            shapes.push((change, unit, log));
+        }
+    };
+    for about in CHANGES {
+        if let Some(shape) = shape(cells, about.change) {
+            enter(about.change, shape, None);
+        }
+    }
+    let slip = slip::search(cells, contrast, scale, &sizes);
+    if let Some(slip) = &slip {
+        enter(Change::EndSlip, slip.shape.clone(), Some(slip.log));
+    }
+    let mut asked: Vec<Asked<'_>> =
+        shapes.iter().map(|(change, shape, log)| Asked { change: *change, shape, log: *log }).collect();
+    gate::limit(cells, contrast, &mut asked, &sizes);
+    let mut all: Vec<(Cause, f64)> = asked.iter().map(|a| (Cause::Named(a.change), a.log + still)).collect();
+    all.push((Cause::None, still));
+    let range = surface.high - surface.low;
+    let unknown = unknown::weighed(cells, contrast, range, surface.largest);
+    if let Some(unknown) = unknown {
+        all.push((Cause::Unknown, unknown.log + still));
+    }
+    if let Some(lag) = lag {
+        let (change, log) = weigh_lag(cells, contrast, lag);
+        all.push((Cause::Named(change), log));
+        let rms = rms_after(cells, &lag::trace(cells)) / lag.lag.abs().max(1e-9);
+        estimates.push(Estimate { change, size: lag.lag.abs(), std: lag.variance.sqrt(), rms });
+    }
+    Round {
+        posterior: Posterior::of(&all, prior_none),
+        estimates,
+        slip,
+        local: unknown.and_then(|u| u.local),
+    }
+}
+
+/// The lag with its trace in the settled cells, which it must not contradict.
+fn weigh_lag(cells: &[Cell], contrast: &Contrast, lag: &Shift) -> (Change, f64) {
+    let trace = lag::trace(cells);
+    let scale = contrast.scale();
+    let change = if lag.lag > 0.0 { Change::SensorDelay } else { Change::PressureSensorLag };
+    if trace.iter().all(|v| *v == 0.0) {
+        return (change, lag.changed);
+    }
+    let freed = &contrast.residual - &trace;
+    let image = &contrast.projector * &freed;
+    let gain = 0.5 * (contrast.energy - freed.dot(&image)) / scale;
+    let (a, b) = (trace.dot(&(&contrast.projector * &trace)), trace.dot(&image));
+    // The size is known from the rows in motion; the cells may put it right by a third.
+    let own = evidence(a, b, scale, &[0.3]);
+    (change, gain + own.max(-5.0) + lag.changed)
+}
+
+fn accept(
+    cells: &[Cell],
+    round: &Round,
+    change: Change,
+    probability: f64,
+    shift: &Shift,
+) -> Option<Accepted> {
+    let estimate = round.estimates.iter().find(|e| e.change == change)?;
+    let shape = match change {
+        Change::EndSlip => round.slip.as_ref()?.shape.clone(),
+        c if is_lag(c) => lag::trace(cells) / shift.lag.abs().max(1e-9),
+        c => shape(cells, c)?,
+    };
+    let rivals = round.posterior.set().into_iter().filter_map(|c| match c {
+        Cause::Named(other) if other != change => Some(other),
+        _ => None,
+    });
+    Some(Accepted {
+        change,
+        probability,
+        rivals: rivals.collect(),
+        shape,
+        size: estimate.size,
+        std: estimate.std,
+    })
+}
+
+/// Sizes of several changes beside each other.
+fn refit(contrast: &Contrast, accepted: &mut [Accepted], cells: &[Cell]) {
+    let lagged = accepted.iter().any(|a| is_lag(a.change));
+    let freed = if lagged {
+        contrast.with_residual(&contrast.residual - lag::trace(cells))
+    } else {
+        contrast.clone()
+    };
+    let places: Vec<usize> = (0..accepted.len()).filter(|i| !is_lag(accepted[*i].change)).collect();
+    if places.is_empty() || accepted.len() < 2 {
+        return;
+    }
+    let shapes: Vec<DVector<f64>> = places.iter().map(|i| accepted[*i].shape.clone()).collect();
+    let rms: Vec<f64> = shapes.iter().map(|s| rms_after(cells, s).max(f64::MIN_POSITIVE)).collect();
+    let x =
+        nalgebra::DMatrix::from_columns(&shapes.iter().zip(&rms).map(|(s, r)| s / *r).collect::<Vec<_>>());
+    let inner = x.tr_mul(&(&freed.projector * &x));
+    let Some(factor) = inner.cholesky() else { return };
+    let sizes = factor.solve(&x.tr_mul(&freed.projected));
+    let covariance = factor.inverse() * freed.without_shapes(&shapes).scale();
+    for (k, i) in places.into_iter().enumerate() {
+        accepted[i].size = sizes[k] / rms[k];
+        accepted[i].std = covariance[(k, k)].max(0.0).sqrt() / rms[k];
+    }
+}

@@ -1,0 +1,91 @@
+//! How far the cells of untouched recordings differ: a Gaussian covariance.
+
+use nalgebra::DMatrix;
+
+use super::cells::Cell;
+use super::criteria::{REMOUNT, REPEATS, Repeats};
+
+/// Below this share of the usual slope the elastic part is not told from slack.
+const PULLS: f64 = 0.05;
+
+fn centred(values: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
+    let n = values.clone().count().max(1) as f64;
+    let mean = values.clone().sum::<f64>() / n;
+    values.map(|v| v - mean).collect()
+}
+
+/// The elastic part of every cell, scaled to unit rms where the actuator pulls; zero elsewhere.
+fn elastic(cells: &[Cell]) -> Vec<f64> {
+    let pulls = |c: &&Cell| c.means.active > PULLS;
+    let count = cells.iter().filter(pulls).count();
+    let square: f64 = cells.iter().filter(pulls).map(|c| c.means.elastic * c.means.elastic).sum();
+    let rms = if count > 0 { (square / count as f64).sqrt().max(1e-9) } else { 1.0 };
+    cells.iter().map(|c| if c.means.active > PULLS { c.means.elastic / rms } else { 0.0 }).collect()
+}
+
+/// What the covariance depends on beside the cells.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Setting {
+    /// Range of the pressure, Pa.
+    pub range: f64,
+    /// Largest force, N.
+    pub largest: f64,
+    /// Whether AFTER was mounted anew.
+    pub remounted: bool,
+    /// What the reference itself is wrong by in every mounting, N: a table's stated error; zero for recordings.
+    pub reference_error: f64,
+}
+
+/// Covariance of the cells if nothing was changed, N².
+pub(super) fn covariance(cells: &[Cell], setting: &Setting) -> DMatrix<f64> {
+    let Setting { range, largest, remounted, reference_error } = *setting;
+    let r: &Repeats = &REPEATS;
+    let unit = largest / 100.0;
+    let mounted = centred(cells.iter().map(|c| c.means.mounted));
+    let begun = centred(cells.iter().map(|c| c.means.begun));
+    let elastic = elastic(cells);
+    let square = |v: f64| v * v;
+    let mut k = DMatrix::zeros(cells.len(), cells.len());
+    for (i, a) in cells.iter().enumerate() {
+        for (j, b) in cells.iter().enumerate().take(i + 1) {
+            let one = |same: bool| f64::from(u8::from(same));
+            let (mounting, run) = (one(a.mounting == b.mounting), one(a.run == b.run));
+            let (number, side) = (one(a.number == b.number), one(a.after == b.after));
+            let apart = (a.means.pressure - b.means.pressure) / range / r.length;
+            let way = if a.direction * b.direction > 0.0 { 1.0 } else { r.directions };
+            let base = a.means.active * b.means.active * (-0.5 * apart * apart).exp() * way;
+            let (clocks, within) = (mounted[i] * mounted[j], begun[i] * begun[j]);
+            let mut v = base
+                * (clocks * (square(r.creep) * mounting + square(r.creep_common))
+                    + within * (square(r.within) * mounting + square(r.within_common))
+                    + square(r.run) * run
+                    + square(r.run_common) * number
+                    + square(r.group) * mounting * side
+                    + square(r.group_common) * side);
+            // The elastic part is what creeps: it does so as a whole, too.
+            v += elastic[i]
+                * elastic[j]
+                * (clocks * square(r.creep_common) + square(r.run_common) * number + square(r.group) * side);
+            if remounted {
+                v += square(REMOUNT / unit) * mounting * side * a.means.by_stroke * b.means.by_stroke;
+            }
+            v += square(reference_error / unit) * mounting * base;
+            v += square(r.offset) * run;
+            if i == j {
+                v += square(r.cell) * (0.2 + a.means.active) * (1.0 + 2.0 / a.rows)
+                    + a.means.variance / square(unit);
+            }
+            k[(i, j)] = v * square(unit);
+            k[(j, i)] = k[(i, j)];
+        }
+    }
+    k
+}
+
+/// What repeats at a typical pulling cell of one run against the mean of others, N: run, zero and cell together.
+pub(super) fn spread(largest: f64, scale: f64) -> f64 {
+    let r: &Repeats = &REPEATS;
+    let sum =
+        [r.run, r.run_common, r.group, r.group_common, r.offset, r.cell].map(|v| v * v).iter().sum::<f64>();
+    largest / 100.0 * (scale * sum).sqrt()
+}

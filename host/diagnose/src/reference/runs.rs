@@ -1,0 +1,196 @@
+//! Recordings as runs: which mounting, which run of it, when, and what cannot be compared.
+
+use super::answer::NotComparable;
+use super::criteria::{NEW_VISIT, PAUSE, SAME_STROKE};
+use super::motion;
+use pam_data::error::Result;
+use pam_data::recording::{Campaign, Clock, Recording};
+
+/// Whether AFTER was mounted anew since BEFORE.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Mounted {
+    /// Found from files and clocks: one file, or one clock without a long pause, is one visit.
+    #[default]
+    Found,
+    /// AFTER goes on where BEFORE ended: nothing was taken off the bench.
+    Same,
+    /// Taken off and put on again.
+    Anew,
+}
+
+/// One recording at a held length, SI.
+#[derive(Debug, Clone)]
+pub(super) struct Run {
+    pub name: String,
+    pub after: bool,
+    /// Index of the mounting, by ascending stroke.
+    pub mounting: usize,
+    /// Number of the run within its mounting, counted from 0 at each visit.
+    pub number: usize,
+    /// Own stroke minus the mounting's, m.
+    pub shift: f64,
+    pub time: Vec<f64>,
+    pub pressure: Vec<f64>,
+    pub force: Vec<f64>,
+    pub settled: Vec<bool>,
+    pub direction: Vec<f64>,
+    /// s since the mounting's first row.
+    pub since_mounted: f64,
+    /// s since AFTER began; zero for BEFORE.
+    pub since_after: f64,
+}
+
+impl Run {
+    pub fn duration(&self) -> f64 {
+        self.time.last().zip(self.time.first()).map_or(0.0, |(l, f)| l - f)
+    }
+}
+
+/// All runs, BEFORE first, each side in the order given.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Runs {
+    pub runs: Vec<Run>,
+    /// Strokes of the mountings, m, ascending.
+    pub strokes: Vec<f64>,
+    /// Whether the AFTER runs of a mounting were mounted anew.
+    pub remounted: bool,
+    /// Duration of AFTER, s.
+    pub duration: f64,
+    pub not_comparable: Vec<NotComparable>,
+}
+
+/// The middle of a recording's strokes, m.
+fn stroke(recording: &Recording) -> f64 {
+    let mut values = recording.stroke.clone();
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Strokes that are further apart than a mounting's tolerance.
+fn mountings(recordings: &[Recording]) -> Vec<f64> {
+    let mut all: Vec<f64> = recordings.iter().map(stroke).collect();
+    all.sort_by(f64::total_cmp);
+    let mut groups: Vec<Vec<f64>> = Vec::new();
+    for s in all {
+        match groups.last_mut() {
+            Some(group) if s - group[0] <= SAME_STROKE => group.push(s),
+            _ => groups.push(vec![s]),
+        }
+    }
+    groups.iter().map(|g| g.iter().sum::<f64>() / g.len() as f64).collect()
+}
+
+fn nearest(strokes: &[f64], stroke: f64) -> Option<usize> {
+    let best = (0..strokes.len())
+        .min_by(|a, b| (strokes[*a] - stroke).abs().total_cmp(&(strokes[*b] - stroke).abs()))?;
+    ((strokes[best] - stroke).abs() <= SAME_STROKE * 1.000_001).then_some(best)
+}
+
+/// Whether AFTER is another visit to the bench than BEFORE.
+fn mounted_anew(before: &Campaign, after: &Campaign, said: Mounted) -> bool {
+    match said {
+        Mounted::Same => false,
+        Mounted::Anew => true,
+        Mounted::Found => {
+            let one_file =
+                after.recordings.iter().all(|a| before.recordings.iter().any(|b| a.source == b.source));
+            let end = before
+                .recordings
+                .iter()
+                .filter_map(|r| r.time.last())
+                .fold(f64::NEG_INFINITY, |a, b| a.max(*b));
+            let begin =
+                after.recordings.iter().filter_map(|r| r.time.first()).fold(f64::INFINITY, |a, b| a.min(*b));
+            // A clock that shows less than before, or about zero, was started anew and says nothing.
+            let one_clock = before.clock == Clock::Shared && begin > end && begin - end < NEW_VISIT;
+            !(one_file || one_clock)
+        }
+    }
+}
+
+impl Runs {
+    /// Runs of AFTER against the mountings of BEFORE.
+    ///
+    /// # Errors
+    /// A recording without force.
+    pub fn of(before: &Campaign, after: &Campaign, said: Mounted) -> Result<Self> {
+        let strokes = mountings(&before.recordings);
+        let remounted = mounted_anew(before, after, said);
+        let mut all = Self { strokes, remounted, ..Self::default() };
+        all.add(before, false)?;
+        all.add(after, true)?;
+        all.count();
+        Ok(all)
+    }
+
+    /// Runs of AFTER alone, for a reference that is a table.
+    ///
+    /// # Errors
+    /// A recording without force.
+    pub fn alone(after: &Campaign) -> Result<Self> {
+        let mut all = Self { strokes: mountings(&after.recordings), remounted: true, ..Self::default() };
+        all.add(after, true)?;
+        all.count();
+        Ok(all)
+    }
+
+    fn add(&mut self, campaign: &Campaign, after: bool) -> Result<()> {
+        for recording in &campaign.recordings {
+            let own = stroke(recording);
+            let force = recording.require_force()?.to_vec();
+            let Some(mounting) = nearest(&self.strokes, own) else {
+                self.not_comparable
+                    .push(NotComparable::Stroke { recording: recording.name.clone(), stroke: own });
+                continue;
+            };
+            let settled = motion::settled(&recording.time, &recording.pressure);
+            let direction = motion::direction(&recording.pressure, &settled);
+            self.runs.push(Run {
+                name: recording.name.clone(),
+                after,
+                mounting,
+                number: 0,
+                shift: own - self.strokes[mounting],
+                time: recording.time.clone(),
+                pressure: recording.pressure.clone(),
+                force,
+                settled,
+                direction,
+                since_mounted: 0.0,
+                since_after: 0.0,
+            });
+        }
+        Ok(())
+    }
+
+    /// Numbers the runs of each mounting and starts their clocks.
+    fn count(&mut self) {
+        let mut clocks = vec![(0, 0.0); self.strokes.len()];
+        let (mut side, mut elapsed) = (false, 0.0);
+        for run in &mut self.runs {
+            if run.after && !side {
+                side = true;
+                if self.remounted {
+                    clocks.fill((0, 0.0));
+                }
+            }
+            let duration = run.duration();
+            let (number, clock) = &mut clocks[run.mounting];
+            (run.number, run.since_mounted) = (*number, *clock);
+            (*number, *clock) = (*number + 1, *clock + duration + PAUSE);
+            if run.after {
+                run.since_after = elapsed;
+                elapsed += duration;
+            }
+        }
+        self.duration = elapsed;
+    }
+
+    /// Runs of one side.
+    pub fn side(&self, after: bool) -> impl Iterator<Item = &Run> {
+        self.runs.iter().filter(move |r| r.after == after)
+    }
+}

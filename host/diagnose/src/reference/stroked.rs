@@ -1,0 +1,307 @@
+//! Strokes at regulated pressures: what the middle of the loop and its half width changed by.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::answer::NotComparable;
+use super::contrast::{log_mean, log_sum};
+use super::criteria::{SIZES, STROKE_BINS, STROKE_LENGTH, STROKE_REPEATS, StrokeRepeats};
+use super::shapes::{Change, Class};
+use super::strokes::{Band, Key, bands, ends, levels};
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::recording::Campaign;
+
+/// The changes that strokes at regulated pressures are asked about.
+pub(super) const ASKED: [Change; 4] =
+    [Change::ForceOffset, Change::ForceGain, Change::CoulombFriction, Change::PressureFriction];
+/// Sets of them that are weighed against each other, by index.
+const SETS: [&[usize]; 9] = [&[], &[0], &[1], &[2], &[3], &[2, 3], &[1, 2], &[1, 3], &[1, 2, 3]];
+/// Numerical floor of the diagonal, share of the largest force.
+const FLOOR: f64 = 1e-4;
+
+/// The differences of both campaigns.
+pub(super) struct Compared {
+    pub keys: Vec<Key>,
+    pub levels: Vec<f64>,
+    pub before: Vec<Band>,
+    pub after: Vec<Band>,
+    /// Middles first, then halves, N.
+    pub y: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+    /// Columns of [`ASKED`], N per unit.
+    pub shapes: Vec<DVector<f64>>,
+    pub largest: f64,
+    pub not_comparable: Vec<NotComparable>,
+}
+
+/// What is weighed, with its log evidence, prior included.
+pub(super) struct Weighed {
+    /// Probability of every set.
+    pub sets: Vec<(Vec<Change>, f64)>,
+    /// Size and standard deviation of every named change beside the others.
+    pub sizes: BTreeMap<Change, (f64, f64)>,
+    /// Alone: size and standard deviation.
+    pub alone: BTreeMap<Change, (f64, f64)>,
+}
+
+impl Weighed {
+    /// Probability that a change is there.
+    pub fn marginal(&self, change: Change) -> f64 {
+        self.sets.iter().filter(|(s, _)| s.contains(&change)).map(|(_, p)| p).sum()
+    }
+
+    /// Probability that one of a class is there.
+    pub fn class(&self, class: Class) -> f64 {
+        self.sets.iter().filter(|(s, _)| s.iter().any(|c| c.class() == class)).map(|(_, p)| p).sum()
+    }
+
+    /// Probability that nothing changed.
+    pub fn none(&self) -> f64 {
+        self.sets.iter().filter(|(s, _)| s.is_empty()).map(|(_, p)| p).sum()
+    }
+}
+
+/// Slopes of a line through points.
+fn slope(points: &[(f64, f64)]) -> f64 {
+    let n = points.len() as f64;
+    let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
+    let xx: f64 = points.iter().map(|p| (p.0 - mx).powi(2)).sum();
+    let xy: f64 = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
+    if xx > 0.0 { xy / xx } else { 0.0 }
+}
+
+/// Compares two campaigns. `reference_error`: what the reference itself is wrong by, N; zero for recordings.
+///
+/// # Errors
+/// No common level, or a recording without force.
+pub(super) fn compare(before: &Campaign, after: &Campaign, reference_error: f64) -> Result<Compared> {
+    let levels = levels(&[before, after]);
+    let ends = ends(before);
+    let (old, new) = (bands(before, &levels, ends)?, bands(after, &levels, ends)?);
+    let keys: Vec<Key> = old.keys().filter(|k| new.contains_key(k)).copied().collect();
+    let mut not_comparable = vec![NotComparable::Strokes];
+    for (i, pressure) in levels.iter().enumerate() {
+        if !keys.iter().any(|k| k.0 == i) {
+            not_comparable.push(NotComparable::Level { pressure: *pressure });
+        }
+    }
+    if keys.len() < 3 {
+        let list = |bands: &BTreeMap<Key, Band>| {
+            let mut of: Vec<usize> = bands.keys().map(|k| k.0).collect();
+            of.dedup();
+            let names: Vec<String> = of.iter().map(|i| format!("{:.0}", levels[*i] / 1e3)).collect();
+            if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+        };
+        return Err(Error::new(
+            DataCode::RecordingOutOfRange,
+            format!(
+                "strokes of AFTER and of the reference have too little in common: levels of {} kPa and of {} kPa, two strokes each way needed",
+                list(&new),
+                list(&old)
+            ),
+        )
+        .help("record the same pressures over the same stroke, three cycles or more"));
+    }
+    let pick = |bands: &BTreeMap<Key, Band>| keys.iter().map(|k| bands[k]).collect::<Vec<Band>>();
+    let (before, after) = (pick(&old), pick(&new));
+    let n = keys.len();
+    let largest = before.iter().map(|b| b.middle.abs()).fold(0.0, f64::max);
+    let by_pressure: Vec<f64> = (0..n)
+        .map(|i| {
+            let points: Vec<(f64, f64)> = (0..n)
+                .filter(|j| keys[*j].1 == keys[i].1)
+                .map(|j| (before[j].pressure, before[j].middle))
+                .collect();
+            if points.len() > 1 { slope(&points) } else { 0.0 }
+        })
+        .collect();
+    let middle = |i: usize| {
+        after[i].middle - before[i].middle - by_pressure[i] * (after[i].pressure - before[i].pressure)
+    };
+    let half = |i: usize| {
+        after[i].half - before[i].half + by_pressure[i] * (after[i].pressure_half - before[i].pressure_half)
+    };
+    let y = DVector::from_iterator(2 * n, (0..n).map(middle).chain((0..n).map(half)));
+    // More friction counts positive whichever way force and displacement count.
+    let way = if before.iter().map(|b| b.half).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
+    let column = |change: Change| {
+        let of = |i: usize| match (change, i < n) {
+            (Change::ForceOffset, true) => 1.0,
+            (Change::ForceGain, true) => before[i].middle,
+            (Change::CoulombFriction, false) => way,
+            (Change::PressureFriction, false) => way * before[i - n].pressure,
+            _ => 0.0,
+        };
+        DVector::from_fn(2 * n, |i, _| of(i))
+    };
+    let shapes = ASKED.iter().map(|c| column(*c)).collect();
+    let covariance = covariance(&keys, &before, &after, largest, reference_error);
+    Ok(Compared { keys, levels, before, after, y, covariance, shapes, largest, not_comparable })
+}
+
+/// Covariance of the differences if nothing was changed, N².
+fn covariance(
+    keys: &[Key],
+    before: &[Band],
+    after: &[Band],
+    largest: f64,
+    reference_error: f64,
+) -> DMatrix<f64> {
+    let r: &StrokeRepeats = &STROKE_REPEATS;
+    let n = keys.len();
+    let (low, high) = before
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), b| (l.min(b.stroke), h.max(b.stroke)));
+    let span = (high - low).max(f64::MIN_POSITIVE);
+    let friction: Vec<f64> = (0..n)
+        .map(|i| {
+            let own = (0..n).filter(|j| keys[*j].0 == keys[i].0);
+            let count = own.clone().count().max(1) as f64;
+            own.map(|j| before[j].half.abs()).sum::<f64>() / count
+        })
+        .collect();
+    let f2 = largest * largest;
+    let mut s = DMatrix::zeros(2 * n, 2 * n);
+    for i in 0..n {
+        for j in 0..n {
+            let same = f64::from(u8::from(keys[i].0 == keys[j].0));
+            let apart = (before[i].stroke - before[j].stroke) / span / STROKE_LENGTH;
+            let along = (-0.5 * apart * apart).exp() * same;
+            s[(i, j)] = (r.zero * r.zero + r.level * r.level * same + r.along * r.along * along) * f2
+                + r.gain * r.gain * before[i].middle * before[j].middle
+                + reference_error * reference_error * along;
+            let share = r.friction * r.friction
+                + r.friction_level * r.friction_level * same
+                + r.friction_along * r.friction_along * along;
+            s[(n + i, n + j)] = share * friction[i] * friction[j] + reference_error * reference_error * along;
+        }
+        let error = before[i].error.hypot(after[i].error);
+        let floor = (FLOOR * largest).powi(2) + error * error;
+        s[(i, i)] += floor + (r.along * largest).powi(2);
+        s[(n + i, n + i)] += floor + (r.friction_along * friction[i]).powi(2);
+    }
+    s
+}
+
+/// Weighs every set of changes. `none` is the prior probability of no change.
+///
+/// # Errors
+/// Numbers that cannot be used.
+pub(super) fn weigh(c: &Compared, none: f64) -> Result<Weighed> {
+    let unusable =
+        || Error::new(DataCode::RecordingNotFinite, "the recordings hold numbers that cannot be compared");
+    let factor = c.covariance.clone().cholesky().ok_or_else(unusable)?;
+    let precision = factor.inverse();
+    let rms: Vec<f64> = c.shapes.iter().map(|s| (2.0 * s.norm_squared() / s.len() as f64).sqrt()).collect();
+    let mut logs = Vec::new();
+    let mut fits: Vec<Option<(DVector<f64>, DMatrix<f64>)>> = Vec::new();
+    for set in SETS {
+        if set.is_empty() {
+            logs.push(none.ln());
+            fits.push(None);
+            continue;
+        }
+        let columns: Vec<DVector<f64>> =
+            set.iter().map(|k| &c.shapes[*k] / rms[*k].max(f64::MIN_POSITIVE)).collect();
+        let v = DMatrix::from_columns(&columns);
+        let (g, b) = (v.tr_mul(&(&precision * &v)), v.tr_mul(&(&precision * &c.y)));
+        let each: Vec<f64> = SIZES
+            .iter()
+            .filter_map(|size| {
+                let t = (size * c.largest).powi(2);
+                let grown = DMatrix::identity(set.len(), set.len()) + &g * t;
+                let solved = grown.clone().lu().solve(&b)?;
+                Some(-0.5 * grown.determinant().ln() + 0.5 * t * b.dot(&solved))
+            })
+            .collect();
+        logs.push(log_mean(&each) + ((1.0 - none) / (SETS.len() - 1) as f64).ln());
+        fits.push(g.cholesky().map(|f| (f.solve(&b), f.inverse())));
+    }
+    let total = log_sum(&logs);
+    let sets: Vec<(Vec<Change>, f64)> = SETS
+        .iter()
+        .zip(&logs)
+        .map(|(s, l)| (s.iter().map(|k| ASKED[*k]).collect(), (l - total).exp()))
+        .collect();
+    let of = |index: usize| -> BTreeMap<Change, (f64, f64)> {
+        let Some((sizes, inverse)) = &fits[index] else { return BTreeMap::new() };
+        let one = |(i, k): (usize, &usize)| {
+            let unit = rms[*k].max(f64::MIN_POSITIVE);
+            (ASKED[*k], (sizes[i] / unit, inverse[(i, i)].max(0.0).sqrt() / unit))
+        };
+        SETS[index].iter().enumerate().map(one).collect()
+    };
+    let alone = (1..=ASKED.len()).flat_map(of).collect();
+    let mut weighed = Weighed { sets, sizes: BTreeMap::new(), alone };
+    let named = named(&weighed);
+    let holds = |i: &usize| named.iter().all(|n| weighed.sets[*i].0.contains(n));
+    // The set of the named ones alone, where it is one of those weighed: what is not named must not share out their sizes.
+    let alone = |i: &usize| holds(i) && weighed.sets[*i].0.len() == named.len();
+    let best = (0..SETS.len())
+        .filter(holds)
+        .max_by(|a, b| alone(a).cmp(&alone(b)).then(weighed.sets[*a].1.total_cmp(&weighed.sets[*b].1)))
+        .unwrap_or(0);
+    weighed.sizes = of(best);
+    Ok(weighed)
+}
+
+/// The best name of every class that is more probable than not.
+pub(super) fn named(weighed: &Weighed) -> Vec<Change> {
+    let mut all = Vec::new();
+    for class in [Class::Gain, Class::Friction, Class::Zero] {
+        if weighed.class(class) >= super::criteria::NAMED {
+            let mut own = ASKED.iter().copied().filter(|c| c.class() == class);
+            let first = own.next();
+            let best = own.fold(first, |best, c| match best {
+                Some(b) if weighed.marginal(b) >= weighed.marginal(c) => Some(b),
+                _ => Some(c),
+            });
+            all.extend(best);
+        }
+    }
+    all
+}
+
+/// rms of the difference without and with the changes, fitted to every other level (or part of the stroke) and judged on the rest, N.
+pub(super) fn unseen(c: &Compared, changes: &[Change]) -> (f64, f64) {
+    let rms = |v: &DVector<f64>| (v.norm_squared() / v.len().max(1) as f64).sqrt();
+    let columns: Vec<DVector<f64>> = ASKED
+        .iter()
+        .zip(&c.shapes)
+        .filter(|(a, _)| changes.contains(a))
+        .map(|(_, s)| s / s.amax().max(f64::MIN_POSITIVE))
+        .collect();
+    if columns.is_empty() {
+        return (rms(&c.y), rms(&c.y));
+    }
+    let n = c.keys.len();
+    let mut present: Vec<usize> = c.keys.iter().map(|k| k.0).collect();
+    present.dedup();
+    let fold = |i: usize| {
+        let key = c.keys[i % n];
+        if present.len() > 1 { present.iter().position(|l| *l == key.0).unwrap_or(0) % 2 } else { key.1 % 2 }
+    };
+    let v = DMatrix::from_columns(&columns);
+    let mut left = c.y.clone();
+    for side in 0..2 {
+        let kept: Vec<usize> = (0..2 * n).filter(|i| fold(*i) != side).collect();
+        let k = c.covariance.select_rows(&kept).select_columns(&kept);
+        let x = v.select_rows(&kept);
+        let Some(factor) = k.cholesky() else { continue };
+        let inner = x.tr_mul(&factor.solve(&x));
+        let Some(inner) = inner.cholesky() else { continue };
+        let sizes = inner.solve(&x.tr_mul(&factor.solve(&c.y.select_rows(&kept))));
+        for i in (0..2 * n).filter(|i| fold(*i) == side) {
+            left[i] -= (0..columns.len()).map(|k| v[(i, k)] * sizes[k]).sum::<f64>();
+        }
+    }
+    (rms(&c.y), rms(&left))
+}
+
+/// Parts of the stroke of a level, for pictures.
+pub(super) fn of_level(c: &Compared, level: usize) -> Vec<usize> {
+    let mut own: Vec<usize> = (0..c.keys.len()).filter(|i| c.keys[*i].0 == level).collect();
+    own.truncate(STROKE_BINS);
+    own
+}

@@ -1,0 +1,74 @@
+//! The force that a table gives, tabulated as recordings would be.
+
+use model_core::muscle::Muscle;
+use model_core::units::{Length, Pressure};
+
+use super::criteria::GRID;
+use super::runs::Runs;
+use super::surface::{Curves, Surface};
+use pam_data::error::{DataCode, Error, Result};
+use pam_fit::table_file::TableFile;
+
+/// Step of the slope over the length, m.
+const STEP: f64 = 1e-4;
+
+/// A table's surface at the mountings of AFTER, over the pressures that AFTER has and the table was made for.
+///
+/// # Errors
+/// A table that cannot be evaluated, or no common pressures.
+pub(super) fn of(table: &TableFile, runs: &Runs) -> Result<Surface> {
+    let muscle =
+        Muscle::<f64>::build(&table.table).map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
+    let tested = table.table.tested;
+    let (least, most) = (f64::from(tested.pressure_low.pascals()), f64::from(tested.pressure_high.pascals()));
+    let values = || runs.side(true).flat_map(|r| r.pressure.iter().copied());
+    let (seen_low, seen_high) =
+        (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+    let (low, high) = (least.max(seen_low), most.min(seen_high));
+    if !(high > low) {
+        return Err(Error::new(
+            DataCode::RecordingOutOfRange,
+            format!(
+                "the table was made for {:.0} to {:.0} kPa, the recordings have {:.0} to {:.0} kPa",
+                least / 1e3,
+                most / 1e3,
+                seen_low / 1e3,
+                seen_high / 1e3
+            ),
+        )
+        .help("give a table or recordings of the same pressures"));
+    }
+    let force =
+        |p: f64, x: f64, d: f64| muscle.force(Pressure::from_pascals(p), Length::from_metres(x), d).newtons();
+    let mean = |p: f64, x: f64| (force(p, x, 1.0) + force(p, x, -1.0)) / 2.0;
+    let grid: Vec<f64> = (0..GRID).map(|i| low + (high - low) * i as f64 / (GRID - 1) as f64).collect();
+    let step = (high - low) / (GRID - 1) as f64;
+    let curves = runs
+        .strokes
+        .iter()
+        .map(|&x| Curves {
+            force: grid.iter().map(|p| mean(*p, x)).collect(),
+            gap: grid.iter().map(|p| (force(*p, x, 1.0) - force(*p, x, -1.0)) / 2.0).collect(),
+            by_pressure: grid
+                .iter()
+                .map(|p| (mean(p + step, x) - mean(p - step, x)) / (2.0 * step))
+                .collect(),
+            by_stroke: grid
+                .iter()
+                .map(|p| (mean(*p, x + STEP) - mean(*p, x - STEP)) / (2.0 * STEP))
+                .collect(),
+            variance: [vec![0.0; GRID], vec![0.0; GRID]],
+        })
+        .collect::<Vec<_>>();
+    let largest = curves.iter().flat_map(|c| c.force.iter().copied()).fold(0.0, f64::max);
+    if !(largest > 0.0) {
+        return Err(Error::new(
+            DataCode::TableInvalid,
+            "the table gives no force at these lengths and pressures",
+        )
+        .help("is it the table of this actuator?"));
+    }
+    let mut surface = Surface { low, high, curves, usual_slope: 0.0, largest };
+    surface.find_usual_slope();
+    Ok(surface)
+}

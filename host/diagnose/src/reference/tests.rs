@@ -1,0 +1,165 @@
+//! Known answers on synthetic staircases, which share no code with what is tested.
+
+#![allow(clippy::unwrap_used, reason = "what fails here fails the test")]
+
+use super::{Against, ChangeReport, Mounted, Options, Verdict, compare};
+use pam_data::recording::{Campaign, Recording};
+
+/// Strokes of the mountings, m.
+const STROKES: [f64; 3] = [0.0, 0.008, 0.018];
+
+/// A force that is slack below a threshold which grows with the stroke, N.
+fn force(pressure: f64, stroke: f64, direction: f64) -> f64 {
+    let above = (pressure - 40e3 - 6e6 * stroke) / 30e3;
+    let pull = 30e3 * (above.min(30.0).exp().ln_1p() + (above - 30.0).max(0.0));
+    7.5e-4 * pull * (1.0 - 9.0 * stroke) - 3.0 * direction * pull / 600e3
+}
+
+/// A run of filling and emptying with creep, a little of its own, and noise.
+fn run(mounting: usize, number: usize, change: &dyn Fn(f64, f64, f64, f64) -> (f64, f64)) -> Recording {
+    let mut state = (17 + 31 * mounting + 101 * number) as u64;
+    let mut uniform = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let own = 0.4 * uniform();
+    let x = STROKES[mounting];
+    let mut r = Recording {
+        name: format!("m{mounting} r{number}"),
+        source: format!("r{number}.csv").into(),
+        ..Recording::default()
+    };
+    let mut forces = Vec::new();
+    for i in 0..600 {
+        let t = 0.1 * f64::from(i);
+        let (p, d) =
+            if i < 300 { (8e3 + 2e3 * f64::from(i), 1.0) } else { (608e3 - 2e3 * f64::from(i - 300), -1.0) };
+        let creep = 0.002 * (1.0 + t + 70.0 * number as f64).ln();
+        let f = force(p, x, d) * (1.0 + creep) + own + 0.6 * uniform();
+        let slope = (force(p, x + 1e-4, d) - force(p, x - 1e-4, d)) / 2e-4;
+        let (dp, df) = change(p, f, d, slope);
+        r.time.push(t);
+        r.pressure.push(p + dp);
+        r.stroke.push(x);
+        forces.push(f + df);
+    }
+    r.force = Some(forces);
+    r
+}
+
+fn untouched(_: f64, _: f64, _: f64, _: f64) -> (f64, f64) {
+    (0.0, 0.0)
+}
+
+/// Runs from one number to another at the first mountings, in the order of their times.
+fn campaign(
+    mountings: usize,
+    runs: std::ops::Range<usize>,
+    change: &dyn Fn(f64, f64, f64, f64) -> (f64, f64),
+) -> Campaign {
+    Campaign::new(
+        runs.flat_map(|n| (0..mountings).map(move |m| (m, n))).map(|(m, n)| run(m, n, change)).collect(),
+    )
+}
+
+fn ask(change: &dyn Fn(f64, f64, f64, f64) -> (f64, f64), mounted: Mounted) -> ChangeReport {
+    let before = campaign(3, 0..3, &untouched);
+    let after = campaign(3, 3..6, change);
+    compare(&after, Against::Recordings(&before), &Options { mounted, ..Options::default() }).unwrap()
+}
+
+fn size(report: &ChangeReport, name: &str) -> f64 {
+    assert_eq!(
+        report.missing.iter().map(|m| m.effect.as_str()).collect::<Vec<_>>(),
+        [name],
+        "{:?}",
+        report.probabilities
+    );
+    report.missing[0].parameters[0].value
+}
+
+#[test]
+fn nothing_changed_is_an_answer_with_sizes_that_would_have_been_seen() {
+    let report = ask(&untouched, Mounted::Same);
+    assert_eq!(report.verdict, Verdict::Consistent, "{:?}", report.probabilities);
+    assert!(report.missing.is_empty() && report.r#where.is_empty());
+    let offset = report.considered.iter().find(|c| c.effect == "force-offset").unwrap();
+    assert!(offset.detectable.is_some_and(|d| d > 0.5 && d < 12.0), "{offset:?}");
+}
+
+#[test]
+fn changes_of_three_per_cent_are_named_with_their_size() {
+    let offset = size(&ask(&|_, _, _, _| (0.0, 13.0), Mounted::Same), "force-offset");
+    assert!((offset - 13.0).abs() < 2.0, "{offset}");
+    let rubbing = size(&ask(&|_, _, d, _| (0.0, -11.0 * d), Mounted::Same), "coulomb-friction");
+    assert!((rubbing - 11.0).abs() < 2.0, "{rubbing}");
+    let gauge = size(&ask(&|_, _, _, _| (-22e3, 0.0), Mounted::Same), "gauge-offset");
+    assert!((gauge + 22e3).abs() < 4e3, "{gauge}");
+    let moved = size(&ask(&|_, _, _, s| (0.0, 2.5e-3 * s), Mounted::Same), "displacement-offset");
+    assert!((moved - 2.5e-3).abs() < 0.6e-3, "{moved}");
+}
+
+#[test]
+fn a_named_change_is_gone_on_recordings_held_out_and_its_interval_holds_it() {
+    let report = ask(&|_, _, _, _| (0.0, 13.0), Mounted::Same);
+    let h = &report.held_out;
+    assert!(h.rms_after_N < 0.4 * h.rms_before_N, "{h:?}");
+    let s = &report.missing[0].parameters[0];
+    assert!(s.low < 13.0 && s.high > 13.0, "{s:?}");
+}
+
+#[test]
+fn a_shift_of_the_clamp_is_no_change_where_the_actuator_was_mounted_anew() {
+    let anew = ask(&|_, _, _, s| (0.0, 0.7e-3 * s), Mounted::Anew);
+    assert!(anew.missing.is_empty(), "{:?}", anew.probabilities);
+    assert!(anew.reference.mounted_anew);
+}
+
+#[test]
+fn the_same_recordings_on_both_sides_and_other_units_are_refused() {
+    let before = campaign(3, 0..3, &untouched);
+    let error = compare(&before, Against::Recordings(&before), &Options::default()).unwrap_err();
+    assert!(error.cause().contains("both sides"), "{error}");
+    let pounds = campaign(3, 3..6, &|_, f, _, _| (0.0, f / 4.448_222 - f));
+    let error = compare(&pounds, Against::Recordings(&before), &Options::default()).unwrap_err();
+    assert!(error.cause().contains("lbf"), "{error}");
+}
+
+#[test]
+fn other_lengths_are_told_and_none_in_common_is_an_error_with_both_lists() {
+    let before = campaign(2, 0..3, &untouched);
+    let report =
+        compare(&campaign(3, 3..6, &untouched), Against::Recordings(&before), &Options::default()).unwrap();
+    assert!(
+        report.reference.not_comparable.iter().any(|n| n.contains("18.0 mm")),
+        "{:?}",
+        report.reference.not_comparable
+    );
+    let elsewhere = Campaign::new((3..5).map(|n| run(2, n, &untouched)).collect());
+    let error = compare(&elsewhere, Against::Recordings(&before), &Options::default()).unwrap_err();
+    assert!(error.advice().is_some_and(|a| a.contains("0.0, 8.0") && a.contains("18.0")), "{error}");
+}
+
+#[test]
+fn one_run_on_each_side_is_answered_with_a_note_and_the_json_is_finite() {
+    let (before, after) = (campaign(1, 0..1, &untouched), campaign(1, 1..2, &untouched));
+    let report = compare(&after, Against::Recordings(&before), &Options::default()).unwrap();
+    assert!(report.missing.is_empty(), "{:?}", report.probabilities);
+    assert!(report.remarks.iter().any(|r| r.contains("assumed, not measured")), "{:?}", report.remarks);
+    assert!(report.reference.not_comparable.iter().any(|n| n.contains("end-slip")));
+    let json = report.to_json();
+    assert!(json.contains("\"pam-diagnose/1\"") && json.contains("repeatability_N"));
+    assert!(!json.contains("\"misfit_rms_N\": null"), "{json}");
+}
+
+#[test]
+fn a_sensor_that_stands_still_and_a_lost_force_are_errors() {
+    let before = campaign(1, 0..2, &untouched);
+    let mut dead = campaign(1, 2..4, &untouched);
+    for r in &mut dead.recordings {
+        r.force = Some(vec![5.0; r.time.len()]);
+    }
+    assert!(compare(&dead, Against::Recordings(&before), &Options::default()).is_err());
+    dead.recordings.iter_mut().for_each(|r| r.force = None);
+    assert!(compare(&dead, Against::Recordings(&before), &Options::default()).is_err());
+}

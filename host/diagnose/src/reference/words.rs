@@ -1,0 +1,234 @@
+//! The answer in words. Everything that reads as a sentence stands here.
+
+use std::fmt::Write;
+
+use super::answer::{ChangeReport, Changed, NotComparable, Place, Repeatability, Since, Size, Verdict};
+use super::shapes::Owner;
+
+pub(super) const TABLE_REFERENCE: &str = "the reference is a table: how far this actuator repeats is not known, and what is usual for its class was taken; small changes are missed";
+pub(super) const OTHER_ACTUATOR: &str = "the difference is larger than a change of the bench makes: is it the same actuator, and are the signs and units the same?";
+pub(super) const ONE_LENGTH_REMOUNTED: &str = "AFTER was mounted anew and has one length only: a shift of the clamp by a millimetre cannot be told from a change of gain; record at two lengths";
+pub(super) const ASSUMED: &str =
+    "nothing in the reference was recorded twice: how far the actuator repeats is assumed, not measured";
+pub(super) const STROKES_ASSUMED: &str = "how far campaigns of strokes repeat is assumed (zero and level to 0.2 % of the largest force, gain to 0.5 %, friction to 5 to 10 %), not measured";
+pub(super) const STROKES_MARGINAL: &str =
+    "probabilities are those that a change is there at all; several can be there at once";
+pub(super) const GAIN_OF_STROKES: &str =
+    "at regulated pressures a gain of the load cell, a gain of the gauge and another piston area look alike";
+pub(super) const STROKE_SPLIT: &str = "every other level of pressure";
+
+pub(super) fn split(held: bool) -> &'static str {
+    if held { "every other recording of AFTER" } else { "none: AFTER is one recording" }
+}
+
+pub(super) fn not_acquitted(none: f64) -> String {
+    format!("no change is named, but that nothing changed has a probability of {none:.2} only")
+}
+
+pub(super) fn one_mounting(stroke: f64, log: f64) -> String {
+    format!(
+        "the mounting at {:.1} mm differs by itself (Bayes factor e^{log:.0}), and the others do not: clamped again, or slipped?",
+        stroke * 1e3
+    )
+}
+
+pub(super) fn why_not(comparable: bool, probability: f64) -> &'static str {
+    if !comparable {
+        "these recordings cannot show it"
+    } else if probability >= 0.05 {
+        "possible, but another cause is more probable"
+    } else {
+        "the difference does not have its shape, or is too small"
+    }
+}
+
+pub(super) fn place(p: &Place) -> String {
+    let range = if p.from == p.to {
+        format!("{:.4} {}", p.from, p.unit)
+    } else {
+        format!("{:.0} to {:.0} {}", p.from, p.to, p.unit)
+    };
+    let what = match (p.coordinate.as_str(), p.from) {
+        ("direction", d) if d > 0.0 => "filling or shortening".to_owned(),
+        ("direction", _) => "emptying or lengthening".to_owned(),
+        ("recording", n) => format!("recording {n:.0} of AFTER"),
+        (name, _) => format!("{name} {}", range.trim_end()),
+    };
+    format!("{:.0} % of the difference lies in {what} ({:.0} % of the data)", 100.0 * p.share, 100.0 * p.rows)
+}
+
+pub(super) fn not_comparable(n: &NotComparable) -> String {
+    match n {
+        NotComparable::Stroke { recording, stroke } => {
+            format!("`{recording}`: the reference has no recording at a stroke of {:.1} mm", stroke * 1e3)
+        }
+        NotComparable::Pressure { recording, share } => {
+            format!("`{recording}`: {:.0} % of the rows at pressures that the reference does not have", 100.0 * share)
+        }
+        NotComparable::FewCells { stroke } => {
+            format!("stroke {:.1} mm: too few pressures and directions in common", stroke * 1e3)
+        }
+        NotComparable::OneLength => {
+            "displacement-offset, rig-compliance, end-slip: the reference has one length, the slope over the length is not known".into()
+        }
+        NotComparable::Level { pressure } => {
+            format!("strokes at {:.0} kPa: on one side only, or fewer than two each way", pressure / 1e3)
+        }
+        NotComparable::Strokes => {
+            "gauge-offset, displacement-offset, rig-compliance, end-slip, drift and lags: not asked of strokes at regulated pressures".into()
+        }
+    }
+}
+
+/// Whose a change is.
+#[must_use]
+pub fn owner(owner: Owner) -> &'static str {
+    match owner {
+        Owner::Sensor => "a sensor's",
+        Owner::Rig => "the rig's",
+        Owner::Muscle => "the actuator's",
+        Owner::SensorOrMuscle => "a sensor's or the actuator's",
+        Owner::RigOrMuscle => "the rig's or the actuator's",
+    }
+}
+
+/// Since when a change is there.
+#[must_use]
+pub fn since(since: &Since) -> String {
+    match since {
+        Since::Beginning => "from the first recording on".into(),
+        Since::From { recording, moment } => {
+            format!("at once, from `{recording}` on ({moment:.0} s after the beginning)")
+        }
+        Since::Gradual => "gradually".into(),
+        Since::NotDetermined => "not determined".into(),
+    }
+}
+
+/// A value with so many digits that the last ones mean something.
+fn rounded(value: f64, std: f64) -> String {
+    let digits =
+        if std > 0.0 && std.is_finite() { (1.0 - std.log10().floor()).clamp(0.0, 9.0) as usize } else { 3 };
+    format!("{value:.digits$}")
+}
+
+/// Factor and name of the unit that people use instead of an SI unit.
+fn usual_unit(unit: &str) -> (f64, &'static str) {
+    match unit {
+        "Pa" => (1e-3, " kPa"),
+        "m" => (1e3, " mm"),
+        "s" => (1e3, " ms"),
+        "m²" => (1e5, " N per 100 kPa"),
+        "m/N" => (1e6, " µm/N"),
+        "N" => (1.0, " N"),
+        _ => (100.0, " %"),
+    }
+}
+
+/// A size with its interval in a unit that people use.
+#[must_use]
+pub fn size(s: &Size) -> String {
+    let (scale, unit) = usual_unit(&s.unit);
+    let half = scale * (s.high - s.low) / 2.0;
+    format!("{} ± {}{unit}", rounded(scale * s.value, half), rounded(half, half))
+}
+
+/// A size in a unit that people use, without an interval.
+#[must_use]
+pub fn plain(value: f64, unit: &str) -> String {
+    let (scale, unit) = usual_unit(unit);
+    format!("{}{unit}", rounded(scale * value, scale * value.abs()))
+}
+
+/// The sentence that stands first.
+#[must_use]
+pub fn headline(r: &ChangeReport) -> String {
+    let names: Vec<&str> = r.missing.iter().map(|m| m.effect.as_str()).collect();
+    match r.verdict {
+        Verdict::Consistent => "Nothing changed beyond what this actuator does anyway.".into(),
+        Verdict::Explained => format!("What changed: {}.", names.join(", ")),
+        Verdict::PartlyExplained => format!("What changed: {}; something else is left.", names.join(", ")),
+        Verdict::Unexplained => {
+            "Something changed, and no single known change describes it well enough to be named.".into()
+        }
+    }
+}
+
+fn one(text: &mut String, m: &Changed) {
+    let _ = writeln!(
+        text,
+        "\n{} (probability {:.2}; its class {:.2})",
+        m.effect, m.probability, m.class_probability
+    );
+    for s in &m.parameters {
+        let _ = writeln!(text, "  how large   {} {} (95 %)", s.name, size(s));
+    }
+    let _ = writeln!(text, "  law         {}", m.law);
+    let _ = writeln!(text, "  since when  {}", since(&m.since));
+    let _ = writeln!(text, "  whose       {}", owner(m.owner));
+    let _ = writeln!(text, "  what to do  {}", m.remedy);
+    if !m.confusable_with.is_empty() {
+        let _ = writeln!(text, "  or          {}", m.confusable_with.join(", "));
+    }
+}
+
+/// The answer for a terminal.
+#[must_use]
+pub fn summary(r: &ChangeReport) -> String {
+    let mut text = headline(r);
+    text.push('\n');
+    let _ = writeln!(
+        text,
+        "Difference {:.2} N rms ({:.2} % of the largest force); untouched recordings differ by {:.2} N ({}).",
+        r.misfit_rms_N,
+        100.0 * r.misfit_rms_N / r.largest_force_N.max(f64::MIN_POSITIVE),
+        r.noise_N,
+        match r.reference.repeatability_from {
+            Repeatability::Measured => "from repeats and what is usual",
+            Repeatability::Assumed => "assumed",
+        }
+    );
+    for m in &r.missing {
+        one(&mut text, m);
+    }
+    if !r.missing.is_empty() {
+        let h = &r.held_out;
+        let share = if h.rms_before_N > 0.0 { 1.0 - (h.rms_after_N / h.rms_before_N).powi(2) } else { 0.0 };
+        let _ = writeln!(
+            text,
+            "\nOn recordings held out ({}): {:.2} N without, {:.2} N with; {:.0} % of the difference's energy is gone.",
+            h.split,
+            h.rms_before_N,
+            h.rms_after_N,
+            100.0 * share
+        );
+    }
+    if r.verdict != Verdict::Consistent {
+        for p in r.r#where.iter().take(3) {
+            let _ = writeln!(text, "where: {}", place(p));
+        }
+    }
+    let shown: Vec<String> = r
+        .probabilities
+        .iter()
+        .filter(|p| p.probability >= 0.01)
+        .take(6)
+        .map(|p| format!("{} {:.2}", p.cause, p.probability))
+        .collect();
+    let _ = writeln!(text, "\nprobabilities: {}", shown.join(", "));
+    if r.verdict == Verdict::Consistent {
+        let seen: Vec<String> = r
+            .considered
+            .iter()
+            .filter_map(|c| Some(format!("{} {}", c.effect, plain(c.detectable?, &c.unit))))
+            .collect();
+        let _ = writeln!(text, "would have been seen (90 %): {}", seen.join(", "));
+    }
+    for n in &r.reference.not_comparable {
+        let _ = writeln!(text, "not comparable: {n}");
+    }
+    for remark in &r.remarks {
+        let _ = writeln!(text, "note: {remark}");
+    }
+    text
+}

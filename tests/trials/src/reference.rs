@@ -1,0 +1,225 @@
+//! `trials reference`: changes put into later runs of real recordings, untouched pairs, and a cylinder whose seal was swapped; each asked of
+//! the diagnosis against a reference.
+
+mod cylinder;
+mod injection;
+mod page;
+mod staircases;
+
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::Args;
+use pam_data::recording::Campaign;
+use pam_diagnose::reference::shapes::{Change, Class};
+use pam_diagnose::reference::{Against, ChangeReport, Mounted, Options, Verdict, compare};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use injection::{EFFECTS, Slopes, inject};
+use staircases::{Half, Muscle};
+
+/// What is tried.
+#[derive(Args)]
+pub struct Reference {
+    /// Directory that holds aarl-festo-10mm-2021, -2022 and tudelft-printed-cylinder; what is absent is left out, and the page says so.
+    #[arg(long, default_value = "../shared/data")]
+    data: PathBuf,
+    /// Where to.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Write the tables as this page of the book, too.
+    #[arg(long)]
+    page: Option<PathBuf>,
+    /// A stratified share: one split a muscle at 3 %, every seventh untouched pair, the cylinder's five configurations.
+    #[arg(long)]
+    short: bool,
+}
+
+/// Sizes put in, % of the largest force rms.
+const SIZES: [f64; 4] = [1.0, 2.0, 3.0, 5.0];
+/// Untouched pairs that the short version leaves out between two.
+const SHORT_STEP: usize = 7;
+
+/// One trial of a staircase.
+#[derive(Debug, Clone, Serialize)]
+pub struct Trial {
+    /// Muscle.
+    pub muscle: String,
+    /// Which half it belongs to.
+    pub half: Half,
+    /// First and last run before, last run after.
+    pub runs: (usize, usize, usize),
+    /// What was put in; absent for untouched pairs.
+    pub effect: Option<&'static str>,
+    /// % of the largest force rms.
+    pub percent: f64,
+    /// Its size, SI.
+    pub size: f64,
+    /// The answer.
+    pub answer: Answer,
+}
+
+/// What is kept of an answer.
+#[derive(Debug, Clone, Serialize)]
+pub struct Answer {
+    /// The most probable cause.
+    pub top: String,
+    /// Its probability.
+    pub probability: f64,
+    /// Probability that nothing changed.
+    pub none: f64,
+    /// Causes that hold 95 %.
+    pub set: Vec<String>,
+    /// Names, with size and half the 95 % interval.
+    pub named: Vec<(String, f64, f64)>,
+    /// Share of the difference gone on recordings held out.
+    pub held_out: f64,
+    /// Verdict.
+    pub verdict: Verdict,
+    /// s.
+    pub seconds: f64,
+}
+
+impl Answer {
+    fn of(report: &ChangeReport, seconds: f64) -> Self {
+        let size = |m: &pam_diagnose::reference::answer::Changed| {
+            m.parameters.first().map_or((0.0, 0.0), |s| (s.value, (s.high - s.low) / 2.0))
+        };
+        let h = &report.held_out;
+        Self {
+            top: report.top().to_owned(),
+            probability: report.probability(report.top()),
+            none: report.probability("none"),
+            set: report.set.clone(),
+            named: report.missing.iter().map(|m| (m.effect.clone(), size(m).0, size(m).1)).collect(),
+            held_out: 1.0 - (h.rms_after_N / h.rms_before_N.max(f64::MIN_POSITIVE)).powi(2),
+            verdict: report.verdict,
+            seconds,
+        }
+    }
+}
+
+/// Class of a name; names without a class are their own.
+pub fn class(name: &str) -> Option<Class> {
+    Change::from_name(name).map(Change::class)
+}
+
+/// What a job puts in.
+struct Job<'a> {
+    muscle: &'a Muscle,
+    runs: (usize, usize, usize),
+    put_in: Option<(&'static str, f64)>,
+    number: usize,
+}
+
+/// Every contiguous window of runs, parted so that enough are left on either side.
+fn untouched(muscles: &[Muscle], step: usize) -> Vec<Job<'_>> {
+    let mut jobs = Vec::new();
+    let mut number = 0;
+    for muscle in muscles {
+        let side = muscle.least_runs();
+        for a in 1..=muscle.runs {
+            for b in a + side - 1..muscle.runs {
+                for c in b + side..=muscle.runs {
+                    number += 1;
+                    if number % step == 0 {
+                        jobs.push(Job { muscle, runs: (a, b, c), put_in: None, number });
+                    }
+                }
+            }
+        }
+    }
+    jobs
+}
+
+fn injected(muscles: &[Muscle], short: bool) -> Vec<Job<'_>> {
+    let mut jobs = Vec::new();
+    for muscle in muscles {
+        let side = muscle.least_runs();
+        let splits: Vec<usize> = (side..=muscle.runs - side).collect();
+        for (number, b) in splits.iter().enumerate() {
+            if short && number != splits.len() / 2 {
+                continue;
+            }
+            for percent in SIZES.into_iter().filter(|p| !short || *p == 3.0) {
+                for effect in EFFECTS {
+                    jobs.push(Job {
+                        muscle,
+                        runs: (1, *b, muscle.runs),
+                        put_in: Some((effect, percent)),
+                        number,
+                    });
+                }
+            }
+        }
+    }
+    jobs
+}
+
+fn ask(job: &Job<'_>, slopes: &Slopes) -> Result<Trial, String> {
+    let (a, b, c) = job.runs;
+    let before = job.muscle.between(a, b);
+    let mut after = job.muscle.between(b + 1, c);
+    after.sort_by_key(|r| (r.run, r.mounting));
+    let mut size = 0.0;
+    if let Some((effect, percent)) = job.put_in {
+        // A slip happens between a third and two thirds of AFTER, by the number of the trial.
+        let moment = 0.35 + 0.3 * ((job.number * 37 % 10) as f64 / 10.0);
+        (after, size) = inject(&after, effect, percent, slopes, &job.muscle.name, b, moment);
+    }
+    let campaign =
+        |runs: &[staircases::Run]| Campaign::new(runs.iter().map(staircases::Run::recording).collect());
+    let (before, after) = (campaign(&before), campaign(&after));
+    let options = Options { mounted: Mounted::Same, ..Options::default() };
+    let start = Instant::now();
+    let report = compare(&after, Against::Recordings(&before), &options)
+        .map_err(|e| format!("{} {:?} {:?}: {e}", job.muscle.name, job.runs, job.put_in))?;
+    Ok(Trial {
+        muscle: job.muscle.name.clone(),
+        half: job.muscle.half,
+        runs: job.runs,
+        effect: job.put_in.map(|p| p.0),
+        percent: job.put_in.map_or(0.0, |p| p.1),
+        size,
+        answer: Answer::of(&report, start.elapsed().as_secs_f64()),
+    })
+}
+
+/// Runs all trials and writes `reference.json`, `reference.md` and, where asked for, the page.
+///
+/// # Errors
+/// Files that cannot be read or written, a trial without an answer.
+pub fn run(what: &Reference) -> Result<(), Box<dyn Error>> {
+    let start = Instant::now();
+    std::fs::create_dir_all(&what.output)?;
+    let muscles = staircases::read(&what.data)?;
+    let slopes: BTreeMap<&str, Slopes> =
+        muscles.iter().map(|m| (m.name.as_str(), Slopes::of(&m.between(1, m.runs)))).collect();
+    let mut jobs = untouched(&muscles, if what.short { SHORT_STEP } else { 1 });
+    jobs.extend(injected(&muscles, what.short));
+    let trials: Vec<Trial> =
+        jobs.par_iter().map(|j| ask(j, &slopes[j.muscle.name.as_str()])).collect::<Result<_, _>>()?;
+    let cylinder = cylinder::run(&what.data, what.short)?;
+    let speed = page::speed(&muscles)?;
+    let text = page::page(&trials, &cylinder, speed, what.short);
+    write(&what.output, "reference.json", &serde_json::to_string_pretty(&(&trials, &cylinder))?)?;
+    write(&what.output, "reference.md", &text)?;
+    if let Some(page) = &what.page {
+        std::fs::write(page, &text)?;
+    }
+    println!(
+        "{} trials and {} pairs of the cylinder in {:.0} s",
+        trials.len(),
+        cylinder.len(),
+        start.elapsed().as_secs_f64()
+    );
+    Ok(())
+}
+
+fn write(directory: &Path, name: &str, text: &str) -> Result<(), Box<dyn Error>> {
+    std::fs::write(directory.join(name), text)?;
+    Ok(())
+}

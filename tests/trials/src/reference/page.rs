@@ -1,0 +1,263 @@
+//! The page: what was tried, what came out, what is not tested.
+
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::fmt::Write;
+use std::time::Instant;
+
+use pam_data::recording::Campaign;
+use pam_diagnose::reference::{Against, Mounted, Options, compare};
+
+use super::cylinder::Pair;
+use super::injection::EFFECTS;
+use super::staircases::{Half, Muscle, Run};
+use super::{Trial, class};
+use crate::clopper::interval;
+
+/// Rows of either side in the measurement of speed.
+const SPEED_ROWS: usize = 30_000;
+
+/// s for so many rows on each side, of the muscle with the most rows; `None` without recordings.
+///
+/// # Errors
+/// A comparison without an answer.
+pub fn speed(muscles: &[Muscle]) -> Result<Option<(usize, f64)>, Box<dyn Error>> {
+    let rows = |m: &Muscle| m.between(1, m.runs).iter().map(|r| r.time.len()).sum::<usize>();
+    let Some(muscle) = muscles.iter().max_by_key(|m| rows(m)) else { return Ok(None) };
+    let runs = muscle.between(1, muscle.runs);
+    let split = muscle.runs.div_ceil(2);
+    // Rows are put between the recorded ones until there are enough.
+    let side = |from: usize, to: usize| -> Campaign {
+        let own: Vec<&Run> = runs.iter().filter(|r| r.run >= from && r.run <= to).collect();
+        let have: usize = own.iter().map(|r| r.time.len()).sum();
+        let factor = SPEED_ROWS.div_ceil(have.max(1));
+        Campaign::new(own.iter().map(|r| finer(r, factor).recording()).collect())
+    };
+    let (before, after) = (side(1, split), side(split + 1, muscle.runs));
+    let options = Options { mounted: Mounted::Same, ..Options::default() };
+    let start = Instant::now();
+    compare(&after, Against::Recordings(&before), &options).map_err(|e| e.to_string())?;
+    Ok(Some((before.samples() + after.samples(), start.elapsed().as_secs_f64())))
+}
+
+fn finer(run: &Run, factor: usize) -> Run {
+    let between = |column: &[f64]| -> Vec<f64> {
+        let mut out: Vec<f64> = column
+            .windows(2)
+            .flat_map(|w| {
+                (0..factor).map(|k| w[0] + (w[1] - w[0]) * k as f64 / factor as f64).collect::<Vec<_>>()
+            })
+            .collect();
+        out.extend(column.last());
+        out
+    };
+    Run {
+        time: between(&run.time),
+        pressure: between(&run.pressure),
+        force: between(&run.force),
+        ..run.clone()
+    }
+}
+
+fn rate(k: usize, n: usize) -> String {
+    let (low, high) = interval(k, n);
+    if n == 0 {
+        "–".into()
+    } else {
+        format!("{:.1} % ({:.0} to {:.0})", 100.0 * k as f64 / n as f64, 100.0 * low, 100.0 * high)
+    }
+}
+
+fn right_class(t: &Trial) -> bool {
+    t.effect.is_some_and(|e| class(&t.answer.top) == class(e))
+}
+
+fn size_of(t: &Trial) -> Option<(f64, f64)> {
+    t.answer.named.iter().find(|n| Some(n.0.as_str()) == t.effect).map(|n| (n.1, n.2))
+}
+
+/// One line of the table over a selection of injected trials.
+fn line(text: &mut String, label: &str, trials: &[&Trial]) {
+    let n = trials.len();
+    if n == 0 {
+        return;
+    }
+    let count = |of: &dyn Fn(&&&Trial) -> bool| trials.iter().filter(of).count();
+    let exact = count(&|t| t.effect == Some(t.answer.top.as_str()));
+    let in_set = count(&|t| t.effect.is_some_and(|e| t.answer.set.iter().any(|s| s == e)));
+    let missed = count(&|t| t.answer.top == "none");
+    let false_name = count(&|t| t.answer.named.iter().any(|m| class(&m.0) != t.effect.and_then(class)));
+    let sized: Vec<(f64, f64, f64)> =
+        trials.iter().filter_map(|t| size_of(t).map(|(s, h)| (s, h, t.size))).collect();
+    let within = sized.iter().filter(|(s, _, t)| (s.abs() / t.abs() - 1.0).abs() < 0.2).count();
+    let covered = sized.iter().filter(|(s, h, t)| (s.abs() - t.abs()).abs() < *h).count();
+    let set: usize = trials.iter().map(|t| t.answer.set.len()).sum();
+    let _ = writeln!(
+        text,
+        "| {label} | {n} | {} | {} | {} | {:.2} | {} | {} | {} | {} |",
+        rate(count(&|t| right_class(t)), n),
+        rate(exact, n),
+        rate(in_set, n),
+        set as f64 / n as f64,
+        rate(within, sized.len()),
+        rate(covered, sized.len()),
+        rate(missed, n),
+        rate(false_name, n)
+    );
+}
+
+const HEAD: &str = "| | n | class right | exact | in the set | names in the set | size within 20 % | in the stated 95 % | missed (\"none\") | a name of a false class |\n\
+                    | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
+
+fn injected(text: &mut String, trials: &[Trial]) {
+    let _ = write!(
+        text,
+        "## Changes put into later runs\n\nOf each muscle the runs from some number on get one change, with a sign by hash; the runs before stay as they \
+         are. Every split that leaves two runs a side (2021), and both splits of three runs (2022, one run on one side). \"Class\", \"exact\": \
+         the most probable cause. Sizes: of those named exactly. Rates with exact 95 % intervals.\n"
+    );
+    for half in [Half::Final, Half::Development] {
+        let title = match half {
+            Half::Final => "Muscles that no constant was chosen on",
+            Half::Development => "Muscles on which constants were chosen",
+        };
+        let _ = write!(text, "\n### {title}\n\n{HEAD}");
+        for year in ["2021", "2022"] {
+            for percent in [1.0, 2.0, 3.0, 5.0] {
+                let some: Vec<&Trial> = trials
+                    .iter()
+                    .filter(|t| {
+                        t.effect.is_some()
+                            && t.half == half
+                            && t.percent == percent
+                            && t.muscle.starts_with(year)
+                    })
+                    .collect();
+                line(text, &format!("{year}, {percent} %"), &some);
+            }
+        }
+    }
+    let _ = write!(text, "\n### By effect, final half, 3 %\n\n{HEAD}");
+    for effect in EFFECTS {
+        let own = |t: &&Trial| t.effect == Some(effect) && t.half == Half::Final && t.percent == 3.0;
+        line(text, effect, &trials.iter().filter(own).collect::<Vec<_>>());
+    }
+}
+
+fn untouched(text: &mut String, trials: &[Trial]) {
+    let _ = write!(
+        text,
+        "\n## Untouched pairs\n\nEvery contiguous window of runs, parted once. Windows of one muscle share runs: errors come in clusters, so the intervals \
+         are narrower than they should be. \"Not none\": probability of no change below one half.\n\n\
+         | | pairs | named | not none |\n| --- | --- | --- | --- |\n"
+    );
+    let mut groups: BTreeMap<(Half, &str), Vec<&Trial>> = BTreeMap::new();
+    for t in trials.iter().filter(|t| t.effect.is_none()) {
+        groups.entry((t.half, &t.muscle[..4])).or_default().push(t);
+    }
+    let mut row = |label: &str, own: &[&Trial]| {
+        let named = own.iter().filter(|t| !t.answer.named.is_empty()).count();
+        let alarmed = own.iter().filter(|t| t.answer.none < 0.5).count();
+        let n = own.len();
+        let _ = writeln!(
+            text,
+            "| {label} | {n} | {named}: {} | {alarmed}: {} |",
+            rate(named, n),
+            rate(alarmed, n)
+        );
+    };
+    let mut all = Vec::new();
+    for ((half, year), own) in &groups {
+        row(&format!("{year}, {half:?}").to_lowercase(), own);
+        all.extend(own.iter().copied());
+    }
+    row("**all**", &all);
+    for t in all.iter().filter(|t| t.answer.none < 0.5) {
+        let _ = writeln!(
+            text,
+            "\n{}, runs {:?}: {} with {:.2}.",
+            t.muscle, t.runs, t.answer.top, t.answer.probability
+        );
+    }
+}
+
+fn cylinder(text: &mut String, pairs: &[Pair]) {
+    if pairs.is_empty() {
+        return;
+    }
+    let (changed, same): (Vec<&Pair>, Vec<&Pair>) = pairs.iter().partition(|p| !p.known.is_empty());
+    let right = changed.iter().filter(|p| p.right()).count();
+    let all = changed.iter().filter(|p| p.named == p.known).count();
+    let named = same.iter().filter(|p| !p.named.is_empty()).count();
+    let (nc, ns) = (changed.len(), same.len());
+    let _ = write!(
+        text,
+        "\n## A cylinder with its seal swapped\n\nOne rig, another seal or bore: another seal is other friction, the larger bore a larger gain. Main class: gain \
+         where the bore differs, else friction.\n\n| | pairs | |\n| --- | --- | --- |\n\
+         | main class named, nothing false | {nc} | {right}: {} |\n| all known classes named | {nc} | {all}: {} |\n\
+         | reruns in which nothing changed, named | {ns} | {named}: {} |\n\n\
+         | before | after | known | named | p(none) |\n| --- | --- | --- | --- | --- |\n",
+        rate(right, nc),
+        rate(all, nc),
+        rate(named, ns)
+    );
+    for p in pairs {
+        let list = |s: &std::collections::BTreeSet<_>| {
+            let names: Vec<String> = s.iter().map(|c| format!("{c:?}").to_lowercase()).collect();
+            if names.is_empty() { "–".to_owned() } else { names.join(", ") }
+        };
+        let mark = if p.right() { "" } else { " **wrong**" };
+        let _ = writeln!(
+            text,
+            "| {} | {} | {} | {}{mark} | {:.2} |",
+            p.before,
+            p.after,
+            list(&p.known),
+            list(&p.named),
+            p.none
+        );
+    }
+}
+
+const UNTESTED: &str = "\n## What is not tested\n\n\
+    - Two changes at once in staircases, tables (.pam) as the reference, several campaigns in the reference of strokes, \"since when\" and leaks: computed or \
+    specified, not measured here. A leak has no shape yet and is never named.\n\
+    - Lengths between those of the reference are not interpolated; they are reported as not comparable.\n\
+    - Stroked *muscles*: the same route as the cylinder, not measured; gauge offset, stroke offset, compliance, slip and lags are not asked of strokes.\n\
+    - All staircases are of one laboratory and one type of muscle, and the constants of what repeats come from six of the eleven. There is no second rig.\n\
+    - Injected drift and slip run through AFTER by run, then mounting. Lags of the 12 Hz recordings are put in by the same interpolation that the analysis \
+    assumes.\n\
+    - Mounting anew (± 1 mm) is modelled but not tried here; it hides stroke offsets and compliance of that size.\n\
+    - The prior of the cylinder was reshaped once after a first look at these pairs (friction repeats to a share of friction): they are no clean test.\n\
+    - Other methods were not run on these pairs.\n";
+
+/// The page as Markdown.
+pub fn page(trials: &[Trial], pairs: &[Pair], speed: Option<(usize, f64)>, short: bool) -> String {
+    let mut text = String::from(
+        "# The proof: what changed\n\n`host diagnose AFTER… --reference BEFORE…` asked about real recordings: changes that were put into them, pairs in which \
+         nothing changed, and a cylinder whose seal was swapped. Nothing on this page is typed by hand:\n\n\
+         ```text\ncargo run --release -p trials -- reference -o DIR --page docs/src/proof-reference.md\n```\n\n",
+    );
+    if short {
+        text.push_str("**This is the short version: a stratified share of the trials.**\n\n");
+    }
+    text.push_str(
+        "Bounds set beforehand, at 3 %: class 85 %, exact 75 %, truth in the set 95 %, size within 20 % in 90 %; untouched pairs named in 2 % at most; \
+         pairs of seals: main class in 80 %, no rerun named; 60,000 rows in 5 s on two cores.\n\n",
+    );
+    if trials.is_empty() {
+        text.push_str("The staircases were not there.\n");
+    } else {
+        injected(&mut text, trials);
+        untouched(&mut text, trials);
+    }
+    cylinder(&mut text, pairs);
+    if let Some((rows, seconds)) = speed {
+        let _ = writeln!(
+            text,
+            "\n## Speed\n\n{rows} rows together: {seconds:.2} s, reading not included, on the machine that wrote this page."
+        );
+    }
+    text.push_str(UNTESTED);
+    text
+}
