@@ -5,7 +5,7 @@ use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 
 use super::Port;
 use crate::error::DeviceCode;
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_data::error::Error;
 
 /// What came before any hello, to tell a silent line from a foreign peer.
@@ -59,7 +59,7 @@ impl Heard {
             DeviceCode::DeviceForeign,
             format!(
                 "something answers here, but it is not a controller of this project: it sent {}, beginning {begins}",
-                counted(self.bytes, "byte")
+                pluralise(self.bytes, "byte")
             ),
         )
         .value(port.name())

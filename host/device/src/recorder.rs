@@ -23,7 +23,7 @@ pub use part::rescue;
 use self::mcap::Encoder;
 use self::part::{Part, part_of};
 use super::words;
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::write_whole;
 
@@ -242,7 +242,7 @@ impl Recorder {
             (None, Some(first)) => Ok(first),
             (Some(error), _) => {
                 Err(error
-                    .help(format!("{} until then in it; make room and go on", counted(self.rows, "row"))))
+                    .help(format!("{} until then in it; make room and go on", pluralise(self.rows, "row"))))
             }
             (None, None) => {
                 Err(Error::new(DataCode::FileUnwritable, "the recording has no file").file(&self.side))

@@ -6,7 +6,7 @@ use model_core::link::messages::{
 };
 
 use crate::error::DeviceCode;
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_data::error::Error;
 
 /// A fault as a person reads it.
@@ -328,7 +328,7 @@ fn table_refused(why: TableFault) -> Error {
         TableFault::NotBegun => "pieces came without a beginning".to_owned(),
         TableFault::Gap(there) => format!("a piece is missing behind byte {there}"),
         TableFault::TooLong(fits) => format!("it is longer than the {fits} bytes that the device keeps"),
-        TableFault::Incomplete(there) => format!("only {} arrived", counted(there, "byte")),
+        TableFault::Incomplete(there) => format!("only {} arrived", pluralise(there, "byte")),
         TableFault::Check => "its check sum is wrong".to_owned(),
         TableFault::Version { found, known } => {
             format!("it has format version {found}, the device reads version {known}")

@@ -4,7 +4,7 @@ use super::answer::Options;
 use super::candidates::library;
 use super::rows::Rows;
 use super::verdict::{Considered, Diagnosis, HeldOut, Trace, Unexplained, Verdict};
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 
 /// Fewest rows and half-strokes from which anything is judged.
 const FEWEST_ROWS: usize = 60;
@@ -26,7 +26,7 @@ pub(super) fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<String> {
     let effective = rows.effective();
     if effective < FEWEST_ROWS {
         let usable =
-            if effective == 0 { "no row".to_owned() } else { format!("only {}", counted(effective, "row")) };
+            if effective == 0 { "no row".to_owned() } else { format!("only {}", pluralise(effective, "row")) };
         return Some(format!(
             "{usable} can be used (direction known, muscle not slack); {FEWEST_ROWS} is the least"
         ));
@@ -34,7 +34,7 @@ pub(super) fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<String> {
     if rows.blocks < FEWEST_BLOCKS {
         return Some(format!(
             "only {}: with fewer than {FEWEST_BLOCKS} chance and physics cannot be told apart",
-            counted(rows.blocks, "half-stroke")
+            pluralise(rows.blocks, "half-stroke")
         ));
     }
     let judged = || rows.root_weight.iter().zip(&rows.contexts).filter(|(w, _)| **w > 0.0);

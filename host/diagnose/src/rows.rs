@@ -15,7 +15,7 @@ use self::gather::Gathering;
 pub(crate) use self::sleeve::{ORDERS, Shape, YEOH};
 use super::kinematics::{Thresholds, white_noise};
 use super::linear::quantile;
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_data::error::Result;
 use pam_data::progress::SharedProgress;
 use pam_data::recording::dropouts::Screened;
@@ -118,7 +118,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<Rows> {
     rows.remarks.extend(ends.iter().map(|end| {
         format!(
             "left out: {} of exactly {:.2} N, where the force sensor stands at the end of its range",
-            counted(end.rows, "reading"),
+            pluralise(end.rows, "reading"),
             end.force
         )
     }));

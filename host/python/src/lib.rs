@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use pam_fit::band::{ForceBand, HALF_95};
 use pam_data::date;
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_diagnose as diagnosis;
 use pam_data::error::{DataCode, Error};
 use pam_fit::fit::Options;
@@ -233,7 +233,7 @@ impl Recording {
     }
 
     fn __repr__(&self) -> String {
-        format!("Recording({:?}, {}, {:.1} s)", self.0.name, counted(self.0.len(), "row"), self.0.duration())
+        format!("Recording({:?}, {}, {:.1} s)", self.0.name, pluralise(self.0.len(), "row"), self.0.duration())
     }
 }
 
@@ -277,7 +277,7 @@ impl Campaign {
     }
 
     fn __repr__(&self) -> String {
-        format!("Campaign({}, {})", counted(self.0.recordings.len(), "recording"), counted(self.0.samples(), "row"))
+        format!("Campaign({}, {})", pluralise(self.0.recordings.len(), "recording"), pluralise(self.0.samples(), "row"))
     }
 }
 
@@ -352,7 +352,7 @@ impl Prediction {
     fn __repr__(&self) -> String {
         let rms = self.0.rms.map_or(String::new(), |r| format!(", rms {r:.3} N"));
         let band = self.0.bands.as_ref().map_or(String::new(), |b| format!(", ± {:.3} N", b.mean));
-        format!("Prediction({}{rms}{band})", counted(self.0.force.len(), "row"))
+        format!("Prediction({}{rms}{band})", pluralise(self.0.force.len(), "row"))
     }
 }
 

@@ -8,7 +8,7 @@ use clap::Args;
 use super::recordings::Recordings;
 use super::reports::Reports;
 use crate::console::Console;
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
@@ -84,7 +84,7 @@ impl Arguments {
         let campaign = self.recordings.read_watched(Reader::of(&muscle), &watched)?;
         console.detail(format!(
             "read {} in {:.3} s",
-            counted(campaign.samples(), "row"),
+            pluralise(campaign.samples(), "row"),
             start.elapsed().as_secs_f64()
         ));
         let started = Instant::now();

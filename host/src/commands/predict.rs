@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::recordings::Recordings;
 use crate::console::Console;
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::{to_standard_output, write_whole};
 use pam_data::recording::Reader;
@@ -100,7 +100,7 @@ impl Arguments {
                 });
                 format!(", force ± {:.3} N{inside}", bands.mean)
             });
-            console.note(format!("{}: {}, {rms}{band}", recording.name, counted(recording.len(), "row")));
+            console.note(format!("{}: {}, {rms}{band}", recording.name, pluralise(recording.len(), "row")));
         }
         if self.output.is_none() && self.json.is_none() {
             console.detail("nothing is written: give -o or --json");

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::port::PortOption;
 use crate::console::Console;
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::progress::Progress;
 use pam_device::course::{Course, Quantity};
@@ -188,8 +188,8 @@ impl Arguments {
         if losses.samples > 0 {
             console.warning(format!(
                 "{} lost on the way, in {}",
-                counted(losses.samples, "sample"),
-                counted(losses.gaps, "gap")
+                pluralise(losses.samples, "sample"),
+                pluralise(losses.gaps, "gap")
             ));
         }
         let lasted = errors.all.samples as f64 * f64::from(every_ticks);
@@ -215,7 +215,7 @@ impl Arguments {
         } else {
             let name = kept.map(|p| format!(" in {}", p.display())).unwrap_or_default();
             let rms = errors.to_text(quantity);
-            console.result(format!("{}{name}{rms}; vented", counted(errors.all.samples, "sample")));
+            console.result(format!("{}{name}{rms}; vented", pluralise(errors.all.samples, "sample")));
         }
         Ok(())
     }
@@ -346,7 +346,7 @@ pub(super) fn begin(files: &[PathBuf], about: &Value, console: &Console) -> Resu
 /// Ends it.
 pub(super) fn end(recorder: Recorder, about: &Value, console: &Console) -> Result<PathBuf> {
     if recorder.skipped() > 0 {
-        console.warning(format!("{} without numbers left out", counted(recorder.skipped(), "sample")));
+        console.warning(format!("{} without numbers left out", pluralise(recorder.skipped(), "sample")));
     }
     recorder.finish(about)
 }

@@ -7,7 +7,7 @@ use model_core::muscle::Muscle;
 use serde_json::{Value, json};
 
 use crate::console::Console;
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_data::error::Result;
 use pam_data::output::{json_of, printed, to_standard_output, write_whole};
 use pam_fit::table_export::{self, Format};
@@ -312,7 +312,7 @@ fn to_text(file: &TableFile) -> String {
         text += &format!(
             "\nfrom {} ({}, sha256 {})",
             s.path,
-            counted(s.samples, "row"),
+            pluralise(s.samples, "row"),
             s.sha256.get(..16).unwrap_or("")
         );
     }

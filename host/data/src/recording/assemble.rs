@@ -12,7 +12,7 @@ use super::import::{FoundZero, Import, Value, Zero};
 use super::plan::{Plan, Role};
 use super::quantity::Quantity;
 use super::zero::{at_largest, first_level, smallest};
-use crate::counted::counted;
+use crate::pluralise::pluralise;
 use crate::error::{DataCode, Error, Result};
 
 /// A lookup table as text.
@@ -55,7 +55,7 @@ pub(super) fn assemble(job: &Job<'_>, mut rows: Rows) -> Result<Vec<Recording>> 
             n => format!("there are {n} rows only"),
         };
         return Err(Error::new(DataCode::RecordingTooShort, cause)
-            .help(format!("a recording has at least {}", counted(job.min_rows, "row"))));
+            .help(format!("a recording has at least {}", pluralise(job.min_rows, "row"))));
     }
     let mut table = sort_columns(job, &mut rows)?;
     let map = |row: usize| job.first_line + rows.map.line(row);

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::counted::counted;
+use crate::pluralise::pluralise;
 use crate::error::{DataCode, Error, Result};
 
 /// One file, or one group of a file's rows, in time order. All columns are equally long and hold finite numbers only.
@@ -103,7 +103,7 @@ impl Recording {
         columns.extend(names.iter().zip(optional).filter_map(|(n, c)| Some((*n, c.as_ref()?))));
         for (name, column) in columns {
             if column.len() != n {
-                let cause = format!("{} of {name} beside {n} of time", counted(column.len(), "row"));
+                let cause = format!("{} of {name} beside {n} of time", pluralise(column.len(), "row"));
                 return Err(Error::new(DataCode::RecordingWrongWidth, cause).file(&self.source));
             }
             if let Some(row) = column.iter().position(|v| !v.is_finite()) {

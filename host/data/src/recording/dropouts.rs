@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use super::other_unit::{Apart, standing_apart};
 use super::{Campaign, Recording};
-use crate::counted::counted;
+use crate::pluralise::pluralise;
 use pull::Pull;
 use steps::{Scale, Stretch, edges, masked, stretches};
 
@@ -114,7 +114,7 @@ impl<'a> Screened<'a> {
         format!(
             "`{}` stands apart from the other recordings, and its {} left out: {}",
             r.name,
-            if r.len() == 1 { "row is".to_owned() } else { format!("{} are", counted(r.len(), "row")) },
+            if r.len() == 1 { "row is".to_owned() } else { format!("{} are", pluralise(r.len(), "row")) },
             a.told()
         )
     }
@@ -136,7 +136,7 @@ impl<'a> Screened<'a> {
         };
         Some(format!(
             "the pressure alone steps away and back, each within one reading, while the force goes on; {} left out: {}; {cause}",
-            counted(self.rows(), "row"),
+            pluralise(self.rows(), "row"),
             places.join("; ")
         ))
     }

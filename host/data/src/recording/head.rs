@@ -4,7 +4,7 @@ use super::cells::Dialect;
 use super::import::{Decimal, Import};
 use super::line::Cells;
 use super::quantity::{Named, named};
-use crate::counted::counted;
+use crate::pluralise::pluralise;
 use crate::error::{DataCode, Error, Result};
 
 /// The beginning of a text file: how it is cut, and what its columns are called.
@@ -29,7 +29,7 @@ impl Head {
         loop {
             let rest = &text[bytes..];
             if rest.is_empty() {
-                let cause = format!("the file ends within its first {}", counted(lines, "line"));
+                let cause = format!("the file ends within its first {}", pluralise(lines, "line"));
                 return Err(Error::new(DataCode::RecordingTooShort, cause)
                     .help("see skip_lines in the import description"));
             }

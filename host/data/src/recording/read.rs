@@ -17,7 +17,7 @@ use super::plan::{Context, Plan, plan};
 use super::quantity::{Named, named};
 use super::sheet::select;
 use super::source;
-use crate::counted::counted;
+use crate::pluralise::pluralise;
 use crate::error::{DataCode, Error, Result};
 use crate::file_kind::FileKind;
 use crate::muscle_description::MuscleDescription;
@@ -302,7 +302,7 @@ fn rows_error(error: RowsError, head: &Head, import: &Import) -> Error {
             Error::new(DataCode::RecordingNotANumber, "not a number").help(help)
         }
         Fault::Width { found, expected } => {
-            let cells = counted(found, "cell");
+            let cells = pluralise(found, "cell");
             let help = if *found == 2 * expected && separator == "commas" {
                 "this looks like decimal commas; write decimals with a point, or use an import description"
                     .to_owned()

@@ -2,7 +2,7 @@
 
 use super::blocks::Rows;
 use super::cells::{Want, Wanted, Words};
-use crate::counted::counted;
+use crate::pluralise::pluralise;
 use crate::error::{DataCode, Error, Result};
 
 /// The columns of one file, in its order.
@@ -81,7 +81,7 @@ pub(super) fn select(sheet: &Sheet, wanted: &[Wanted]) -> Result<Rows> {
             Some((n, first)) if n != count => {
                 return Err(Error::new(
                     DataCode::RecordingWrongWidth,
-                    format!("`{name}` has {} and `{first}` has {n}", counted(count, "row")),
+                    format!("`{name}` has {} and `{first}` has {n}", pluralise(count, "row")),
                 )
                 .help("all columns of a recording are equally long"));
             }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::file_kind::FileKind;
 use pam_data::recording::{Named, Quantity, named};
@@ -71,7 +71,7 @@ impl Table {
         let table = Self { file: file.to_owned(), columns };
         let rows = table.columns.first().map_or(0, |c| c.2.len());
         if rows < FEWEST {
-            return Err(table.poor(format!("{}, and at least {FEWEST} are needed", counted(rows, "row"))));
+            return Err(table.poor(format!("{}, and at least {FEWEST} are needed", pluralise(rows, "row"))));
         }
         Ok(table)
     }

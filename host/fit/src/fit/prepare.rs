@@ -4,7 +4,7 @@ use model_core::braid::Geometry;
 use model_core::table::MAX_ORDER;
 
 use crate::error::FitCode;
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::possible::Contractions;
@@ -52,7 +52,7 @@ impl Prepared {
         if points.rows < 3 || distinct < 3 {
             return Err(Error::new(
                 FitCode::FitUnderdetermined,
-                format!("{} cannot determine a muscle's table", counted(points.rows, "row")),
+                format!("{} cannot determine a muscle's table", pluralise(points.rows, "row")),
             )
             .help("record at least one slow stroke there and back at one pressure"));
         }

@@ -3,7 +3,7 @@
 use super::prepared::Prepared;
 use super::screen::Use;
 
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 
 /// A mean error beyond this, percent, is no misfit of a muscle: something else is wrong.
 const NO_MUSCLE: f64 = 10.0;
@@ -182,7 +182,7 @@ fn set_aside(prepared: &Prepared, out: &mut Vec<String>) {
     let side = |name: &str, clip: &super::screen::Clip| {
         format!(
             "left out of the fit: {} of exactly {:.2} N, where the force sensor stands at the {name} end of its range",
-            counted(clip.rows, "row"),
+            pluralise(clip.rows, "row"),
             clip.force
         )
     };
@@ -193,13 +193,13 @@ fn set_aside(prepared: &Prepared, out: &mut Vec<String>) {
         out.push(format!(
             "the muscle is slack in {}: the force stays near zero where the model would push; this is not fitted, and the \
              table stops at zero force",
-            counted(slack, "row")
+            pluralise(slack, "row")
         ));
     }
     if !prepared.outliers.is_empty() {
         out.push(format!(
             "{} of the force out of line with the rest and not fitted, listed under `outliers`",
-            counted(prepared.outliers.len(), "reading")
+            pluralise(prepared.outliers.len(), "reading")
         ));
     }
 }

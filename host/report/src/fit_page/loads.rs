@@ -2,7 +2,7 @@
 
 use super::super::{Axis, Colour, Figure, Mark, Panel, Section, fixed};
 use super::view::{Banded, View};
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_fit::fit::basis::columns;
 
 /// At most this many small panels: more cannot be compared by eye.
@@ -104,7 +104,7 @@ fn loops(view: &View<'_>) -> Figure {
     let more = view.levels.len().saturating_sub(PANELS);
     let left = match more {
         0 => String::new(),
-        n => format!(" Left out here: {} between them.", counted(n, "pressure")),
+        n => format!(" Left out here: {} between them.", pluralise(n, "pressure")),
     };
     Figure::multiples(
         "loops",

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use crate::commands::port::PortOption;
 use crate::console::Console;
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_data::error::Result;
 use pam_device::{Client, Patience, Port, recorder, words};
 
@@ -24,7 +24,7 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
              link version {} (this program {LINK_VERSION}), schema {:016x} (this program {SCHEMA_HASH:016x})\n\
              table format {}, store format {}, {} muscle{}",
             recorder::serial(&hello),
-            counted(hello.starts, "start"),
+            pluralise(hello.starts, "start"),
             hello.link_version,
             hello.schema_hash,
             hello.table_format,
@@ -70,7 +70,7 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
         status.ticks,
         info.ticks_per_s,
         words::started_by(info.started_by),
-        counted(status.overruns, "overrun"),
+        pluralise(status.overruns, "overrun"),
     ));
     for (number, table) in info.tables.iter().take(usize::from(info.muscles)).enumerate() {
         console.result(match table {

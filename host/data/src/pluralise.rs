@@ -5,12 +5,12 @@ use std::fmt::Display;
 /// One thing, or several: the word is that for one, in a language that adds an s.
 ///
 /// ```
-/// use pam_data::counted::counted;
-/// assert_eq!([counted(0, "row"), counted(1, "row"), counted(2, "row")], ["0 rows", "1 row", "2 rows"]);
-/// assert_eq!(counted("17 880", "row"), "17 880 rows");
+/// use pam_data::pluralise::pluralise;
+/// assert_eq!([pluralise(0, "row"), pluralise(1, "row"), pluralise(2, "row")], ["0 rows", "1 row", "2 rows"]);
+/// assert_eq!(pluralise("17 880", "row"), "17 880 rows");
 /// ```
 #[must_use]
-pub fn counted(number: impl Display, one: &str) -> String {
+pub fn pluralise(number: impl Display, one: &str) -> String {
     let number = number.to_string();
     let plural = if number == "1" { "" } else { "s" };
     format!("{number} {one}{plural}")
