@@ -8,7 +8,7 @@ pub mod file_kind;
 pub mod muscle_description;
 pub mod output;
 pub mod pluralise;
-pub mod possible;
+pub mod physical_limits;
 pub mod progress;
 pub mod recording;
 pub mod toml_words;

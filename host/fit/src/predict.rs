@@ -17,7 +17,7 @@ use crate::band::{ForceBand, HALF_95};
 use crate::bench::Candidate;
 use crate::table_file::TableFile;
 use pam_data::error::{DataCode, Error, Result};
-use pam_data::possible::Contractions;
+use pam_data::physical_limits::Contractions;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::segment::Motion;
 use pam_data::recording::{Campaign, Follower, Recording, has_decimal_commas};

@@ -13,7 +13,7 @@ use pam_data::error::{DataCode, Error};
 use pam_fit::fit::Options;
 use pam_fit::fit::result::Fit as HostFit;
 use pam_data::muscle_description::{Kind, MuscleDescription};
-use pam_data::possible::{self, Contractions};
+use pam_data::physical_limits::{self, Contractions};
 use pam_fit::predict::{Predicted, beyond, predict as host_predict, predict_with_bands};
 use pam_data::recording::{Campaign as HostCampaign, Import, Reader, Recording as HostRecording};
 use pam_report::{Page, diagnose_page, fit_page};
@@ -500,7 +500,7 @@ fn over<'py>(
     let places: Vec<(f64, f64)> = p.as_array().iter().copied().zip(x.as_array().iter().copied()).collect();
     let contractions = Contractions::of(model.braid());
     for (p, x) in &places {
-        possible::pressure(*p).map_err(raised)?;
+        physical_limits::pressure(*p).map_err(raised)?;
         contractions.check(x / model.braid().rest_length()).map_err(raised)?;
     }
     warn(py, &beyond(&table.table, &places))?;

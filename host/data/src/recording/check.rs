@@ -2,7 +2,7 @@
 
 use super::columns::Recording;
 use crate::error::{DataCode, Error, Result};
-use crate::possible;
+use crate::physical_limits;
 
 /// Metres as millimetres to the micrometre: what arithmetic leaves beyond that nobody measured.
 fn millimetres(metres: f64) -> f64 {
@@ -38,10 +38,10 @@ pub(super) fn check(recording: &Recording, line_of_row: &dyn Fn(usize) -> u64) -
             .help(help));
     }
     for (i, p) in recording.pressure.iter().enumerate() {
-        possible::pressure(*p).map_err(|e| e.line(line(i)))?;
+        physical_limits::pressure(*p).map_err(|e| e.line(line(i)))?;
     }
     for (i, f) in recording.force.iter().flatten().enumerate() {
-        possible::force(*f).map_err(|e| e.line(line(i)))?;
+        physical_limits::force(*f).map_err(|e| e.line(line(i)))?;
     }
     if let Some(rest) = recording.rest_length
         && let Some(i) = recording.stroke.iter().position(|s| *s >= rest || *s <= -rest)

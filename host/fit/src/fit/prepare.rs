@@ -7,7 +7,7 @@ use crate::error::FitCode;
 use pam_data::pluralise::pluralise;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::possible::Contractions;
+use pam_data::physical_limits::Contractions;
 use pam_data::progress::Progress;
 use pam_data::recording::Campaign;
 use pam_data::recording::dropouts::Screened;

@@ -47,7 +47,7 @@ pub fn force(newtons: f64) -> Result<()> {
 /// The contractions that a braid can make: from its fibres pulled straight to more than any braid contracts.
 ///
 /// ```
-/// use pam_data::possible::Contractions;
+/// use pam_data::physical_limits::Contractions;
 /// use model_core::braid::miniature;
 ///
 /// // Fibres of 1.0247 L0: it stretches by 2.5 % at most.
