@@ -11,4 +11,4 @@ pub mod pluralise;
 pub mod physical_limits;
 pub mod progress;
 pub mod recording;
-pub mod toml_words;
+pub mod toml_errors;

@@ -45,7 +45,7 @@ use serde::Deserialize;
 use super::quantity::{Quantity, Unit};
 use crate::error::{DataCode, Error, Result, nearest};
 use crate::file_kind::FileKind;
-use crate::toml_words::toml_error;
+use crate::toml_errors::toml_error;
 
 /// A column by name or by number, counted from 1.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]

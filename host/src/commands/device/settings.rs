@@ -37,7 +37,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         Some(path) => {
             let text = std::fs::read_to_string(path).map_err(|e| Error::unreadable(path, &e))?;
             Some(toml::from_str::<Settings>(&text).map_err(|e| {
-                pam_data::toml_words::toml_error(DataCode::CallInvalid, &text, &e)
+                pam_data::toml_errors::toml_error(DataCode::CallInvalid, &text, &e)
                     .file(path)
                     .help("the file must hold all settings, as `host device settings` prints them")
             })?)
