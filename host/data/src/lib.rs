@@ -1,7 +1,6 @@
 //! What the other libraries of the host stand on: recordings in SI units, campaigns, muscle descriptions, failures, whole files.
 
 pub mod compare;
-
 pub mod date;
 pub mod error;
 pub mod file_kind;
