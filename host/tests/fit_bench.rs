@@ -1,7 +1,7 @@
 //! The fit on muscles of other physics than its own: the virtual bench's, which store energy in a hyperelastic tube.
 
 use pam_evaluate::other_length::unseen_length;
-use pam_fit::band::ForceBand;
+use pam_fit::confidence_band::ConfidenceBand;
 use pam_fit::fit::{Options, fit, result::Fit};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::Muscle;
@@ -189,7 +189,7 @@ fn stated_intervals_cover() {
             let p = fitted.prepared.pressures.levels[i];
             let mut with_band = pam_evaluate::hold_out::as_file(&fitted);
             with_band.about.uncertainty = Some(fitted.stored_uncertainty());
-            let band = ForceBand::of(&with_band).expect("a band").std(p, x, 0.0);
+            let band = ConfidenceBand::of(&with_band).expect("a band").std(p, x, 0.0);
             for (off, std) in [
                 (f.k_F - t.k_F, f.k_F_std),
                 (fitted.prepared.quasi(p, x) - truth.prepared.quasi(p, x), band),

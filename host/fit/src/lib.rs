@@ -1,8 +1,8 @@
 //! From recordings to a muscle's table, and from a table to forces.
 
-pub mod band;
 pub mod bench;
 pub mod checks;
+pub mod confidence_band;
 pub mod error;
 pub mod fit;
 pub mod predict;

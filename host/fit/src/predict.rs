@@ -13,7 +13,7 @@ use model_core::table::MuscleTable;
 use model_core::units::{Length, Pressure};
 use rayon::prelude::*;
 
-use crate::band::{ForceBand, HALF_95};
+use crate::confidence_band::{ConfidenceBand, HALF_95};
 use crate::bench::Candidate;
 use crate::table_file::TableFile;
 use pam_data::error::{DataCode, Error, Result};
@@ -71,10 +71,10 @@ pub fn predict(file: &TableFile, campaign: &Campaign) -> Result<Prediction> {
 /// # Errors
 /// As [`predict`].
 pub fn predict_with_bands(file: &TableFile, campaign: &Campaign) -> Result<Prediction> {
-    run(file, campaign, ForceBand::of(file).as_ref())
+    run(file, campaign, ConfidenceBand::of(file).as_ref())
 }
 
-fn bands(band: &ForceBand, recording: &Recording, motion: &Motion, force: &[f64]) -> Bands {
+fn bands(band: &ConfidenceBand, recording: &Recording, motion: &Motion, force: &[f64]) -> Bands {
     let at = |i: usize| (recording.pressure[i], recording.stroke[i], f64::from(motion.direction[i]));
     let stds = (0..recording.len()).into_par_iter().map(|i| {
         let (pressure, stroke, direction) = at(i);
@@ -90,7 +90,7 @@ fn bands(band: &ForceBand, recording: &Recording, motion: &Motion, force: &[f64]
     Bands { half, mean, inside }
 }
 
-fn run(file: &TableFile, campaign: &Campaign, band: Option<&ForceBand>) -> Result<Prediction> {
+fn run(file: &TableFile, campaign: &Campaign, band: Option<&ConfidenceBand>) -> Result<Prediction> {
     let screened = Screened::of(campaign);
     let campaign = screened.campaign.as_ref();
     let muscle =

@@ -5,7 +5,7 @@
 use std::ffi::CString;
 use std::path::PathBuf;
 
-use pam_fit::band::{ForceBand, HALF_95};
+use pam_fit::confidence_band::{ConfidenceBand, HALF_95};
 use pam_data::date;
 use pam_data::pluralise::pluralise;
 use pam_diagnose as diagnosis;
@@ -424,7 +424,7 @@ impl Table {
         stroke: &Bound<'py, PyAny>,
         direction: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Option<Bound<'py, PyAny>>> {
-        let Some(band) = ForceBand::of(&self.0) else { return Ok(None) };
+        let Some(band) = ConfidenceBand::of(&self.0) else { return Ok(None) };
         let model = Model::<f64>::build(&self.0.table).map_err(|e| wrong(e.to_string()))?;
         over(&self.0, &model, pressure, stroke, direction, |p, x, s| HALF_95 * band.std(p, x, s)).map(Some)
     }

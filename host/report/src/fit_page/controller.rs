@@ -19,7 +19,7 @@ pub(super) fn section(view: &View<'_>) -> Section {
          95 %), and by what the model does not describe, ± {} N for a single moment. The valve's own error comes on top.",
         figures(worst, 2),
         figures(100.0 * worst / blocked.max(f64::MIN_POSITIVE), 2),
-        figures(pam_fit::band::HALF_95 * view.fit.summary.rms_N, 2)
+        figures(pam_fit::confidence_band::HALF_95 * view.fit.summary.rms_N, 2)
     ));
     section.figure(pressure_for_force(view, &places));
     section.figure(error_of_force(view, &places));

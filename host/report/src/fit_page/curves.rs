@@ -2,7 +2,7 @@
 
 use super::super::{Axis, Colour, Figure, Panel, Section, figures, fixed};
 use super::view::{Banded, View};
-use pam_fit::band::HALF_95;
+use pam_fit::confidence_band::HALF_95;
 use pam_fit::fit::uncertainty;
 
 /// Places along the pressure axis.

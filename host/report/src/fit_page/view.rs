@@ -4,7 +4,7 @@ use model_core::units::{Length, Pressure};
 
 use super::super::{Colour, figures, fixed};
 use pam_data::recording::Campaign;
-use pam_fit::band::{ForceBand, HALF_95};
+use pam_fit::confidence_band::{ConfidenceBand, HALF_95};
 use pam_fit::fit::points::Point;
 use pam_fit::fit::result::Fit;
 use pam_fit::fit::screen::Use;
@@ -21,7 +21,7 @@ pub(super) struct View<'a> {
     /// `F − F_model` of every point by the table itself, N.
     pub residual: Vec<f64>,
     muscle: Option<model_core::muscle::Muscle<f64>>,
-    band: Option<ForceBand>,
+    band: Option<ConfidenceBand>,
 }
 
 /// A curve with the edges of its interval.
@@ -50,7 +50,7 @@ impl<'a> View<'a> {
         let levels = fit.prepared.pressures.levels.as_slice();
         let uncertainty = Some(fit.stored_uncertainty());
         let about = About { uncertainty, ..About::default() };
-        let band = ForceBand::of(&TableFile { table: fit.table.clone(), about });
+        let band = ConfidenceBand::of(&TableFile { table: fit.table.clone(), about });
         let mut view = Self { fit, campaign, levels, l0, residual: Vec::new(), muscle, band };
         view.residual = view
             .points()

@@ -18,7 +18,7 @@ pub const HALF_95: f64 = 1.96;
 /// the deviations, which is exact but for `k_F` times elasticity.
 ///
 /// ```
-/// use pam_fit::band::ForceBand;
+/// use pam_fit::confidence_band::ConfidenceBand;
 /// use pam_fit::table_file::{About, TableFile, Uncertainty};
 ///
 /// // A table whose only uncertain number is P0, by 1 kPa.
@@ -28,14 +28,14 @@ pub const HALF_95: f64 = 1.96;
 /// root[0] = 1e3;
 /// let uncertainty = Uncertainty { rows: rows as u32, columns: 1, root, residual_newtons: 0.3 };
 /// let about = About { uncertainty: Some(uncertainty), ..About::default() };
-/// let band = ForceBand::of(&TableFile { table, about }).expect("an uncertainty");
+/// let band = ConfidenceBand::of(&TableFile { table, about }).expect("an uncertainty");
 /// // At rest length the blocked force is (P − P0) g(L0), whatever the pressure.
 /// let std = band.std(300e3, 0.0, 0.0);
 /// assert!((std - band.std(500e3, 0.0, 0.0)).abs() < 1e-9 && std > 0.0);
 /// assert!((band.reading_std(300e3, 0.0, 0.0) - std.hypot(0.3)).abs() < 1e-12);
 /// ```
 #[derive(Debug, Clone)]
-pub struct ForceBand {
+pub struct ConfidenceBand {
     muscle: Muscle<f64>,
     basis: PressureBasis,
     order: usize,
@@ -44,7 +44,7 @@ pub struct ForceBand {
     residual: f64,
 }
 
-impl ForceBand {
+impl ConfidenceBand {
     /// Of a table file; `None` where it holds no uncertainty, or one of another table.
     #[must_use]
     pub fn of(file: &TableFile) -> Option<Self> {
@@ -83,7 +83,7 @@ impl ForceBand {
         sum.iter().map(|s| s * s).sum::<f64>().sqrt()
     }
 
-    /// As [`ForceBand::std`], of a single reading: with what the table does not describe, as seen in its own residuals.
+    /// As [`ConfidenceBand::std`], of a single reading: with what the table does not describe, as seen in its own residuals.
     #[must_use]
     pub fn reading_std(&self, pressure: f64, stroke: f64, direction: f64) -> f64 {
         self.with_scatter(self.std(pressure, stroke, direction))
