@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::pluralise::pluralise;
 use crate::error::{DataCode, Error, Result};
+use crate::pluralise::pluralise;
 use crate::recording::Recording;
 
 /// One quantity of both recordings.

@@ -39,7 +39,7 @@ pub struct Predicted {
     /// The force that the load cell would read, N, per row.
     pub force: Vec<f64>,
     /// Root mean square of `F − F_model` where it was read rightly, N; `None` without a force column, and where the
-    /// whole recording is in another unit than the rest ([`pam_data::recording::other_unit`]).
+    /// whole recording is in another unit than the rest ([`pam_data::recording::unit_check`]).
     pub rms: Option<f64>,
     /// How uncertain it is, where that was asked for and the table knows.
     pub bands: Option<Bands>,

@@ -5,15 +5,15 @@ use std::path::Path;
 
 use super::blocks::Rows;
 use super::cells::{Want, Words};
-use super::check::check;
+use super::column_plan::{ColumnPlan, Role};
 use super::columns::Recording;
 use super::decimal;
 use super::import::{FoundZero, Import, Value, Zero};
-use super::plan::{Plan, Role};
+use super::plausibility::check;
 use super::quantity::Quantity;
-use super::zero::{at_largest, first_level, smallest};
-use crate::pluralise::pluralise;
+use super::stroke_zero::{at_largest, first_level, smallest};
 use crate::error::{DataCode, Error, Result};
+use crate::pluralise::pluralise;
 
 /// A lookup table as text.
 #[derive(Debug, Default)]
@@ -38,7 +38,7 @@ pub(super) struct Job<'a> {
     pub muscle_name: Option<&'a str>,
     pub import: &'a Import,
     pub filters: &'a [(String, Value)],
-    pub plan: &'a Plan,
+    pub plan: &'a ColumnPlan,
     pub names: &'a [String],
     pub lookup: Option<&'a LookupTable>,
     /// Line of the file that holds line 0 of the rows, counted from 1.

@@ -1,6 +1,7 @@
 //! Several recordings of one muscle, in the order in which they happened.
 
 use super::Recording;
+use crate::statistics::median;
 
 /// A clock that shows more at the first reading was not started for the campaign, s (a day and some).
 const LONGEST_CLOCK: f64 = 1.0e5;
@@ -110,7 +111,7 @@ fn other_clock(recordings: &[Recording]) -> Option<String> {
         (r.duration() / steps, way / steps)
     };
     let rows: Vec<(f64, f64)> = recordings.iter().map(a_row).collect();
-    let middle = |of: &dyn Fn(&(f64, f64)) -> f64| median(rows.iter().map(of).collect());
+    let middle = |of: &dyn Fn(&(f64, f64)) -> f64| median(&mut rows.iter().map(of).collect::<Vec<_>>());
     let (interval, way) = (middle(&|r| r.0), middle(&|r| r.1));
     let odd = |(time, moved): &(f64, f64)| {
         let thousand = [1e3, 1e-3].iter().any(|f| (time / interval / f - 1.0).abs() < 0.02);
@@ -122,11 +123,6 @@ fn other_clock(recordings: &[Recording]) -> Option<String> {
          another unit; put the one that was logged into the column's name",
         recordings[i].name, rows[i].0, interval
     ))
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

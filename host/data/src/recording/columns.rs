@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::pluralise::pluralise;
 use crate::error::{DataCode, Error, Result};
+use crate::pluralise::pluralise;
 
 /// One file, or one group of a file's rows, in time order. All columns are equally long and hold finite numbers only.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -5,7 +5,7 @@ use std::io::{Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use super::sheet::{Column, Sheet, damaged};
+use super::column_table::{Column, ColumnTable, damaged};
 use super::{matlab, mcap};
 use crate::error::{DataCode, Error, Result};
 
@@ -43,7 +43,7 @@ impl Container {
         }
     }
 
-    fn columns(self, path: &Path) -> Result<Sheet> {
+    fn columns(self, path: &Path) -> Result<ColumnTable> {
         let mut file = File::open(path).map_err(|e| Error::unreadable(path, &e))?;
         match self {
             Self::Matlab5 | Self::Mcap => {
@@ -67,9 +67,9 @@ impl Container {
 }
 
 /// The columns of a container.
-pub(super) fn columns(path: &Path, container: Container) -> Result<Sheet> {
+pub(super) fn columns(path: &Path, container: Container) -> Result<ColumnTable> {
     // A damaged file must end in an error, also where the reader of a foreign format would rather panic.
-    let sheet = catch_unwind(AssertUnwindSafe(|| container.columns(path)))
+    let table = catch_unwind(AssertUnwindSafe(|| container.columns(path)))
         .unwrap_or_else(|_| Err(damaged("the file is damaged beyond what its reader expects")))
         .map_err(|e| {
             if e.code() == DataCode::RecordingContainer && !e.advised() {
@@ -81,9 +81,9 @@ pub(super) fn columns(path: &Path, container: Container) -> Result<Sheet> {
             }
         })?;
     let useless = |column: &Column| matches!(column, Column::Other(_));
-    if sheet.iter().all(|(_, c)| useless(c)) {
+    if table.iter().all(|(_, c)| useless(c)) {
         let mut cause = "there is no column of numbers in the file".to_owned();
-        if let Some((name, Column::Other(what))) = sheet.first() {
+        if let Some((name, Column::Other(what))) = table.first() {
             cause += &format!(": `{name}` holds {what}");
         }
         return Err(damaged(cause).help(
@@ -91,7 +91,7 @@ pub(super) fn columns(path: &Path, container: Container) -> Result<Sheet> {
              of vectors by `table2struct(T, 'ToScalar', true)`",
         ));
     }
-    Ok(sheet)
+    Ok(table)
 }
 
 #[cfg(test)]

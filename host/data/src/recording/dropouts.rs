@@ -6,16 +6,16 @@
 //! Where the muscle is slack, the force stands at the end of its cell's range, or the campaign says too little of what pressure
 //! makes, nothing is marked.
 
-mod pull;
+mod expected_force;
 mod steps;
 
 use std::borrow::Cow;
 use std::ops::Range;
 
-use super::other_unit::{Apart, standing_apart};
+use super::unit_check::{InconsistentRecording, inconsistent_recordings};
 use super::{Campaign, Recording};
 use crate::pluralise::pluralise;
-use pull::Pull;
+use expected_force::ExpectedForce;
 use steps::{Scale, Stretch, edges, masked, stretches};
 
 /// A stretch of readings of the pressure that are not the muscle's.
@@ -36,11 +36,11 @@ pub struct Dropout {
 /// A campaign with what was read wrongly made good as well as can be: good enough to follow the motion; no evidence.
 #[derive(Debug, Clone)]
 pub struct Screened<'a> {
-    /// As it was read, but for the mistake in recordings that stand apart, and for the pressure of the dropouts: the reading times
+    /// As it was read, but for the mistake in recordings that stand inconsistent, and for the pressure of the dropouts: the reading times
     /// their factor, or the line from the reading before to the reading after.
     pub campaign: Cow<'a, Campaign>,
     /// Whole recordings in another unit than the rest, in order.
-    pub apart: Vec<Apart>,
+    pub inconsistent: Vec<InconsistentRecording>,
     /// In order.
     pub dropouts: Vec<Dropout>,
 }
@@ -54,10 +54,10 @@ impl<'a> Screened<'a> {
     /// Looks a campaign over. Recordings without a force are passed over: nothing tells a dropout from a real step there.
     #[must_use]
     pub fn of(campaign: &'a Campaign) -> Self {
-        let apart = standing_apart(campaign);
+        let inconsistent = inconsistent_recordings(campaign);
         let mut campaign = Cow::Borrowed(campaign);
-        for a in &apart {
-            a.mistake.mend(&mut campaign.to_mut().recordings[a.recording]);
+        for a in &inconsistent {
+            a.mistake.correct(&mut campaign.to_mut().recordings[a.recording]);
         }
         let dropouts = find(&campaign);
         if !dropouts.is_empty() {
@@ -69,13 +69,13 @@ impl<'a> Screened<'a> {
                 recording.pressure[d.rows.clone()].copy_from_slice(&bridge);
             }
         }
-        Self { campaign, apart, dropouts }
+        Self { campaign, inconsistent, dropouts }
     }
 
     /// Whether a whole recording is in another unit than the rest.
     #[must_use]
-    pub fn stands_apart(&self, index: usize) -> bool {
-        self.apart.iter().any(|a| a.recording == index)
+    pub fn is_inconsistent(&self, index: usize) -> bool {
+        self.inconsistent.iter().any(|a| a.recording == index)
     }
 
     /// The stretches of one recording in which the gauge fell out, in order.
@@ -86,7 +86,7 @@ impl<'a> Screened<'a> {
     /// Row by row of a recording, whether it was read rightly.
     #[must_use]
     pub fn read(&self, index: usize) -> Vec<bool> {
-        let right = !self.stands_apart(index);
+        let right = !self.is_inconsistent(index);
         let mut read = vec![right; self.campaign.recordings.get(index).map_or(0, Recording::len)];
         for rows in self.of_recording(index) {
             read[rows].fill(false);
@@ -103,19 +103,19 @@ impl<'a> Screened<'a> {
     /// What there is to say: where, from what to what, the likely cause, and what to do; `None` where all was read rightly.
     #[must_use]
     pub fn remark(&self) -> Option<String> {
-        let apart = self.apart.iter().take(TOLD).map(|a| self.told_apart(a));
-        let more = self.apart.len().checked_sub(TOLD + 1).map(|n| format!("so do {} more", n + 1));
-        let parts: Vec<String> = apart.chain(more).chain(self.remark_on_dropouts()).collect();
+        let inconsistent = self.inconsistent.iter().take(TOLD).map(|a| self.told_apart(a));
+        let more = self.inconsistent.len().checked_sub(TOLD + 1).map(|n| format!("so do {} more", n + 1));
+        let parts: Vec<String> = inconsistent.chain(more).chain(self.remark_on_dropouts()).collect();
         (!parts.is_empty()).then(|| parts.join(". "))
     }
 
-    fn told_apart(&self, a: &Apart) -> String {
+    fn told_apart(&self, a: &InconsistentRecording) -> String {
         let r = &self.campaign.recordings[a.recording];
         format!(
-            "`{}` stands apart from the other recordings, and its {} left out: {}",
+            "`{}` stands inconsistent from the other recordings, and its {} left out: {}",
             r.name,
             if r.len() == 1 { "row is".to_owned() } else { format!("{} are", pluralise(r.len(), "row")) },
-            a.told()
+            a.describe()
         )
     }
 
@@ -184,7 +184,7 @@ fn find(campaign: &Campaign) -> Vec<Dropout> {
     let Some(scale) = Scale::of(campaign) else { return Vec::new() };
     let edges = edges(campaign, &scale);
     let mask = masked(campaign, &edges);
-    let Some(pull) = mask.and_then(|mask| Pull::of(campaign, &mask)) else { return Vec::new() };
+    let Some(expected) = mask.and_then(|mask| ExpectedForce::of(campaign, &mask)) else { return Vec::new() };
     let mut found = Vec::new();
     for (recording, edges) in edges.iter().enumerate() {
         let r = &campaign.recordings[recording];
@@ -195,7 +195,7 @@ fn find(campaign: &Campaign) -> Vec<Dropout> {
             if stretch.rows.start < free {
                 continue;
             }
-            if pull.goes_on(&stretch, r, force) {
+            if expected.goes_on(&stretch, r, force) {
                 free = stretch.rows.end + 1;
                 found.push(Dropout {
                     recording,

@@ -5,7 +5,7 @@
 
 use std::io::Read;
 
-use super::sheet::{Sheet, damaged, matrix, without_common_prefix};
+use super::column_table::{ColumnTable, damaged, matrix, without_common_prefix};
 use crate::error::Result;
 
 const COMPRESSED: u32 = 15;
@@ -17,7 +17,7 @@ const DEEPEST: usize = 4;
 
 /// The vectors of a file. A matrix gives its columns as `name(:,k)`, a struct its fields as `name.field`, or as `field` alone
 /// when the file holds nothing else.
-pub(super) fn columns(bytes: &[u8]) -> Result<Sheet> {
+pub(super) fn columns(bytes: &[u8]) -> Result<ColumnTable> {
     let header = bytes.get(..128).ok_or_else(|| damaged("it ends within its header"))?;
     let big = match &header[126..128] {
         b"IM" => false,
@@ -92,7 +92,7 @@ impl<'a> Elements<'a> {
     }
 }
 
-fn array(bytes: &[u8], big: bool, name: Option<&str>, depth: usize, columns: &mut Sheet) -> Result<()> {
+fn array(bytes: &[u8], big: bool, name: Option<&str>, depth: usize, columns: &mut ColumnTable) -> Result<()> {
     if bytes.is_empty() {
         return Ok(());
     }

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::sheet::{Column, Sheet};
+use super::column_table::{Column, ColumnTable};
 use crate::error::{DataCode, Error, Result};
 
 /// The first eight bytes of such a file.
@@ -12,7 +12,7 @@ pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 const TOPIC: &str = "/telemetry";
 
 /// Every field of the samples that is a number in all of them.
-pub(super) fn columns(bytes: &[u8]) -> Result<Sheet> {
+pub(super) fn columns(bytes: &[u8]) -> Result<ColumnTable> {
     let damaged = |e: mcap::McapError| {
         Error::new(DataCode::RecordingContainer, format!("the MCAP file cannot be read: {e}"))
             .help("a file that was cut off (NAME.part) is mended by `host recover`; else copy it again")

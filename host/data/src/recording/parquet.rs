@@ -12,18 +12,18 @@ use parquet::file::metadata::FileMetaData;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
-use super::sheet::{Column, Sheet, damaged};
+use super::column_table::{Column, ColumnTable, damaged};
 use crate::error::Result;
 
 /// Rows taken at a time.
 const BATCH: usize = 1 << 16;
 
 /// The columns of a file. A missing value becomes NaN, or an empty text, so that it is told where it is needed.
-pub(super) fn columns(file: File) -> Result<Sheet> {
+pub(super) fn columns(file: File) -> Result<ColumnTable> {
     let reader = SerializedFileReader::new(file).map_err(damaged)?;
     let about = reader.metadata().file_metadata();
     let durations = durations(about);
-    let mut sheet = Sheet::new();
+    let mut table = ColumnTable::new();
     for (index, column) in about.schema_descr().columns().iter().enumerate() {
         let name = column.path().string();
         let meaning = if durations.contains(&name) { Err("durations") } else { meaning(column) };
@@ -31,9 +31,9 @@ pub(super) fn columns(file: File) -> Result<Sheet> {
             Ok(scale) => values(&reader, index, column.max_def_level(), scale)?,
             Err(what) => Column::Other(what.to_owned()),
         };
-        sheet.push((name, content));
+        table.push((name, content));
     }
-    Ok(sheet)
+    Ok(table)
 }
 
 /// By what a column's stored numbers are to be multiplied, or what it is instead of a column of numbers.

@@ -8,19 +8,19 @@ use super::assemble::{Job, LookupTable, assemble};
 use super::blocks::{BlockError, Blocks, Rows, RowsError, read_rows};
 use super::campaign::Campaign;
 use super::cells::{Dialect, Fault, LineError};
+use super::column_plan::{ColumnPlan, Context, plan};
+use super::column_table::select;
 use super::columns::Recording;
 use super::container::{self, Container};
-use super::head::Head;
+use super::header::Header;
 use super::import::{Decimal, Import, Value, pattern as pattern_of};
 use super::line::Cells;
-use super::plan::{Context, Plan, plan};
 use super::quantity::{Named, named};
-use super::sheet::select;
 use super::source;
-use crate::pluralise::pluralise;
 use crate::error::{DataCode, Error, Result};
 use crate::file_kind::FileKind;
 use crate::muscle_description::MuscleDescription;
+use crate::pluralise::pluralise;
 use crate::progress::Progress;
 
 /// How to read recordings, and what is known of the muscle that made them.
@@ -138,13 +138,13 @@ impl<'a> Reader<'a> {
         if text.iter().all(u8::is_ascii_whitespace) {
             return Err(Error::new(DataCode::RecordingEmpty, "the file holds nothing but blanks"));
         }
-        let head = Head::read(text, &description)?;
-        let rest = &text[head.bytes..];
-        let average = head.average_line(rest);
+        let header = Header::read(text, &description)?;
+        let rest = &text[header.bytes..];
+        let average = header.average_line(rest);
         blocks.put_back(rest);
-        let preamble = String::from_utf8_lossy(&text[..head.preamble]);
-        let layout = self.layout(path, &head.names, &description, &preamble).map_err(|e| {
-            let below = if self.import.is_none() { header_below(text, &head) } else { None };
+        let preamble = String::from_utf8_lossy(&text[..header.preamble]);
+        let layout = self.layout(path, &header.names, &description, &preamble).map_err(|e| {
+            let below = if self.import.is_none() { header_below(text, &header) } else { None };
             match below {
                 Some(line) if e.code() == DataCode::RecordingMissingColumn => e.help(format!(
                     "line {line} looks like the header: give skip_lines = {} in an import description (--import)",
@@ -153,20 +153,25 @@ impl<'a> Reader<'a> {
                 _ => e,
             }
         })?;
-        let rows =
-            read_rows(blocks, head.dialect, &layout.plan.wanted, head.names.len(), source.size.or(average))
-                .map_err(|e| rows_error(e, &head, &description))?;
-        self.finish(path, &description, &head.names, &layout, head.lines + 1, rows)
+        let rows = read_rows(
+            blocks,
+            header.dialect,
+            &layout.plan.wanted,
+            header.names.len(),
+            source.size.or(average),
+        )
+        .map_err(|e| rows_error(e, &header, &description))?;
+        self.finish(path, &description, &header.names, &layout, header.lines + 1, rows)
     }
 
     /// A container gives recordings by the same rules as text.
     fn container(&self, path: &Path, container: Container) -> Result<Vec<Recording>> {
         let description = self.description();
-        let sheet = container::columns(path, container)?;
-        let names: Vec<String> = sheet.iter().map(|(n, _)| n.clone()).collect();
+        let table = container::columns(path, container)?;
+        let names: Vec<String> = table.iter().map(|(n, _)| n.clone()).collect();
         let layout = self.layout(path, &names, &description, "")?;
-        let rows = select(&sheet, &layout.plan.wanted)?;
-        drop(sheet);
+        let rows = select(&table, &layout.plan.wanted)?;
+        drop(table);
         self.finish(path, &description, &names, &layout, 1, rows)
     }
 
@@ -227,19 +232,19 @@ impl<'a> Reader<'a> {
 }
 
 /// The first of the next lines, counted from 1, that names columns as a header does: above it a program may have told other things.
-fn header_below(text: &[u8], head: &Head) -> Option<u64> {
+fn header_below(text: &[u8], header: &Header) -> Option<u64> {
     let names = |line: &[u8]| {
         let line = String::from_utf8_lossy(line);
         let known = |n: &str| matches!(named(n.trim().trim_matches('"')), Named::Known(..));
         line.split([',', ';', '\t']).filter(|n| known(n)).count()
     };
-    let below = text[head.bytes..].split(|b| *b == b'\n').take(LOOKED_BELOW);
-    below.zip(head.lines + 1..).find_map(|(line, number)| (names(line) >= 2).then_some(number))
+    let below = text[header.bytes..].split(|b| *b == b'\n').take(LOOKED_BELOW);
+    below.zip(header.lines + 1..).find_map(|(line, number)| (names(line) >= 2).then_some(number))
 }
 
 /// What is read of one file.
 struct Layout {
-    plan: Plan,
+    plan: ColumnPlan,
     filters: Vec<(String, Value)>,
     lookup: Option<LookupTable>,
     labels: Vec<(String, String)>,
@@ -265,12 +270,12 @@ fn block_error(error: BlockError) -> Error {
     }
 }
 
-fn rows_error(error: RowsError, head: &Head, import: &Import) -> Error {
+fn rows_error(error: RowsError, header: &Header, import: &Import) -> Error {
     let LineError { line, cell, value, fault } = match error {
         RowsError::Block(e) => return block_error(e),
         RowsError::Line(e) => *e,
     };
-    let separator = match head.dialect.delimiter {
+    let separator = match header.dialect.delimiter {
         b'\t' => "tabs",
         b';' => "semicolons",
         b' ' => "blanks",
@@ -290,11 +295,12 @@ fn rows_error(error: RowsError, head: &Head, import: &Import) -> Error {
                  =(A2-A$2)*86400), or give sample_interval_s in an import description"
             } else if value.contains(',') && value.contains('.') {
                 "write numbers without signs between thousands"
-            } else if comma && !head.dialect.decimal_comma {
+            } else if comma && !header.dialect.decimal_comma {
                 "decimals are written with a point; for decimal commas use an import description with decimal = \"comma\""
-            } else if head.dialect.decimal_comma && value.contains('.') && import.decimal == Decimal::Comma {
+            } else if header.dialect.decimal_comma && value.contains('.') && import.decimal == Decimal::Comma
+            {
                 "the import description says that decimals are written with a comma"
-            } else if head.dialect.decimal_comma && value.contains('.') {
+            } else if header.dialect.decimal_comma && value.contains('.') {
                 "decimals are written with a comma in this file's first row; write numbers without points between thousands"
             } else {
                 "every cell of a column that is used must be a number"
@@ -317,8 +323,8 @@ fn rows_error(error: RowsError, head: &Head, import: &Import) -> Error {
                 .help("cells that hold line breaks are not supported")
         }
     };
-    let error = error.line(head.lines + line + 1).value(value);
-    match cell.and_then(|c| head.names.get(c)) {
+    let error = error.line(header.lines + line + 1).value(value);
+    match cell.and_then(|c| header.names.get(c)) {
         Some(name) => error.column(name.clone()),
         None => error,
     }

@@ -120,7 +120,7 @@ const NOISE_STEP: f64 = 6.0;
 #[must_use]
 pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
     let campaign = screened.campaign.as_ref();
-    let taken = |index: usize| campaign.recordings[index].force.is_some() && !screened.stands_apart(index);
+    let taken = |index: usize| campaign.recordings[index].force.is_some() && !screened.is_inconsistent(index);
     let with_force = || (0..campaign.recordings.len()).filter(|i| taken(*i)).map(|i| &campaign.recordings[i]);
     let rows: usize = with_force().map(Recording::len).sum();
     let pressure = Range::of(with_force().flat_map(|r| r.pressure.iter().copied()));

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::unit;
 use crate::recording::{Campaign, Recording, white_noise};
+use crate::statistics::ranked;
 
 /// The longest stretch that is looked at, s: what lasts longer is how the bench was driven.
 const LONGEST: f64 = 10.0;
@@ -44,8 +45,8 @@ impl Scale {
             return None;
         }
         // Few readings at full scale must not set it.
-        let at = ((0.99 * sizes.len() as f64) as usize).min(sizes.len() - 1);
-        let highest = *sizes.select_nth_unstable_by(at, f64::total_cmp).1;
+        let rank = (0.99 * sizes.len() as f64) as usize;
+        let highest = ranked(&mut sizes, rank);
         let noise = with_force().map(|r| white_noise(&r.pressure)).fold(0.0, f64::max);
         let step = (LEAST_STEP * highest).max(ABOVE_NOISE * noise);
         (step > 0.0).then_some(Self { step })

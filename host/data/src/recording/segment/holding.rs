@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use super::scale::Scale;
 use super::turning::Leg;
+use crate::statistics::median;
 
 /// A stretch of samples at held length, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +27,7 @@ pub(super) fn holds(time: &[f64], smooth: &[f64], scale: &Scale, legs: &[Leg]) -
         return Vec::new();
     }
     if legs.is_empty() {
-        return vec![Hold { start: 0, end: n - 1, stroke: median(smooth) }];
+        return vec![Hold { start: 0, end: n - 1, stroke: sampled_median(smooth) }];
     }
     let mut holds: Vec<Hold> = Vec::new();
     let speeds: Vec<f64> = legs.iter().map(|l| speed(time, smooth, l, scale.threshold)).collect();
@@ -130,7 +131,7 @@ fn longest(
         return Found::Short;
     }
     // The stretch includes what of the motion before and after stays within the threshold; that is no rest.
-    let level = median(&smooth[start..end]);
+    let level = sampled_median(&smooth[start..end]);
     let tolerance = (3.0 * scale.smoothed_noise).max(0.1 * scale.threshold);
     let still = |i: &usize| (smooth[*i] - level).abs() <= tolerance;
     let (Some(first), Some(last)) = ((start..end).find(still), (start..end).rev().find(still)) else {
@@ -213,12 +214,8 @@ fn joined(holds: Vec<Hold>, smooth: &[f64], scale: &Scale) -> Vec<Hold> {
     joined
 }
 
-pub(super) fn median(column: &[f64]) -> f64 {
-    // Some thousands of samples tell a level as well as millions.
+/// The median of a column, from at most 4096 samples spread evenly over it: they determine a level as well as millions.
+pub(super) fn sampled_median(column: &[f64]) -> f64 {
     let mut some: Vec<f64> = column.iter().step_by(column.len() / 4096 + 1).copied().collect();
-    if some.is_empty() {
-        return 0.0;
-    }
-    let middle = some.len() / 2;
-    *some.select_nth_unstable_by(middle, f64::total_cmp).1
+    median(&mut some)
 }

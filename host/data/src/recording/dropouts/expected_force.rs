@@ -2,13 +2,11 @@
 
 use std::ops::Range;
 
-use nalgebra::{SMatrix, SVector};
-
 use super::steps::Stretch;
+use crate::recording::force_surface::{ForceSurface, TERMS};
 use crate::recording::{Campaign, Recording, white_noise};
+use crate::statistics::median;
 
-/// `F ≈ p (a0 + a1 u + a2 u² + a3 u³) + b0 + b1 u + b2 u² + b3 u³`, with pressure and stroke as shares of their ranges.
-const TERMS: usize = 8;
 /// Rows that are taken for it.
 const ROWS: usize = 20_000;
 /// Rounds in which rows are left out that lie further off than so many times the median.
@@ -35,8 +33,8 @@ const CLIPPED: f64 = 1.0 / 300.0;
 
 /// The force that pressure makes at each stroke, from the rows of a campaign that no step is near.
 #[derive(Debug, Clone)]
-pub(super) struct Pull {
-    terms: SVector<f64, TERMS>,
+pub(super) struct ExpectedForce {
+    surface: ForceSurface,
     pressure: f64,
     stroke: (f64, f64),
     /// The lowest force, and the range above it, N.
@@ -46,7 +44,7 @@ pub(super) struct Pull {
     ceiling: f64,
 }
 
-impl Pull {
+impl ExpectedForce {
     /// `None` where too few rows are left that pull, or the force hardly changes.
     pub(super) fn of(campaign: &Campaign, masks: &[Vec<Range<usize>>]) -> Option<Self> {
         let total = campaign.samples();
@@ -79,48 +77,39 @@ impl Pull {
             rows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), r| (l.min(r[k]), h.max(r[k])))
         };
         let ((lowest, highest), stroke) = (bounds(0), bounds(1));
-        let mut pull = Self {
-            terms: SVector::zeros(),
+        let mut expected = Self {
+            surface: ForceSurface::default(),
             pressure: highest.abs().max(lowest.abs()).max(f64::MIN_POSITIVE),
             stroke: (stroke.0, (stroke.1 - stroke.0).max(1e-9)),
             floor,
             span,
             ceiling: if clipped { largest } else { f64::INFINITY },
         };
-        pull.terms = pull.solved(&rows)?;
+        expected.surface = expected.fitted(&rows)?;
         // What no step gave away, such as a wrong unit from the first row on, must not bend the surface.
         for _ in 0..ROUNDS {
-            let off = |r: &[f64; 3]| (r[2] - pull.force(r[0], r[1])).abs();
+            let off = |r: &[f64; 3]| (r[2] - expected.force(r[0], r[1])).abs();
             let mut sizes: Vec<f64> = rows.iter().map(off).collect();
-            let middle = sizes.len() / 2;
-            let far = FAR * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+            let far = FAR * median(&mut sizes);
             let near: Vec<[f64; 3]> = rows.iter().copied().filter(|r| off(r) <= far).collect();
-            pull.terms = pull.solved(&near)?;
+            expected.surface = expected.fitted(&near)?;
         }
-        Some(pull)
+        Some(expected)
     }
 
-    /// The terms by least squares.
-    fn solved(&self, rows: &[[f64; 3]]) -> Option<SVector<f64, TERMS>> {
-        let (mut normal, mut moment) =
-            (SMatrix::<f64, TERMS, TERMS>::zeros(), SVector::<f64, TERMS>::zeros());
-        for [p, x, f] in rows {
-            let row = self.row(*p, *x);
-            normal += row * row.transpose();
-            moment += row * *f;
-        }
-        normal += SMatrix::from_diagonal(&(SVector::from(HELD) * rows.len() as f64));
-        Some(normal.cholesky()?.solve(&moment))
+    fn fitted(&self, rows: &[[f64; 3]]) -> Option<ForceSurface> {
+        let scaled = rows.iter().map(|[p, x, f]| (self.scaled(*p, *x), *f));
+        ForceSurface::fit(scaled, &HELD)
     }
 
-    fn row(&self, pressure: f64, stroke: f64) -> SVector<f64, TERMS> {
-        let (p, u) = (pressure / self.pressure, (stroke - self.stroke.0) / self.stroke.1);
-        SVector::from([p, p * u, p * u * u, p * u.powi(3), 1.0, u, u * u, u.powi(3)])
+    /// Pressure and stroke as shares of their ranges.
+    fn scaled(&self, pressure: f64, stroke: f64) -> [f64; 2] {
+        [pressure / self.pressure, (stroke - self.stroke.0) / self.stroke.1]
     }
 
-    /// N.
+    /// The force of the surface, N, at a pressure in Pa and a stroke in m.
     fn force(&self, pressure: f64, stroke: f64) -> f64 {
-        self.row(pressure, stroke).dot(&self.terms)
+        self.surface.force(self.scaled(pressure, stroke))
     }
 
     /// Whether the force goes on through a stretch, and for a while after, as if its steps of pressure had not been.

@@ -28,7 +28,7 @@ impl Column {
 
 /// How a column came to read what it reads.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Wrong {
+pub enum MistakeKind {
     /// A unit: the true reading is this many times the one that was read, and the ratio is that of the units named.
     Unit(f64, &'static str),
     /// Its sign.
@@ -45,18 +45,18 @@ pub struct Mistake {
     /// Which.
     pub column: Column,
     /// What.
-    pub wrong: Wrong,
+    pub wrong: MistakeKind,
 }
 
 impl Mistake {
     /// The true reading of its column.
     #[must_use]
-    pub fn made_good(&self, read: f64) -> f64 {
+    pub fn corrected(&self, read: f64) -> f64 {
         match self.wrong {
-            Wrong::Unit(factor, _) => read * factor,
-            Wrong::Sign => -read,
-            Wrong::OtherEnd(sum) => sum - read,
-            Wrong::Absolute(atmosphere) => read - atmosphere,
+            MistakeKind::Unit(factor, _) => read * factor,
+            MistakeKind::Sign => -read,
+            MistakeKind::OtherEnd(sum) => sum - read,
+            MistakeKind::Absolute(atmosphere) => read - atmosphere,
         }
     }
 
@@ -66,24 +66,24 @@ impl Mistake {
             Column::Stroke => 1,
             Column::Force => 2,
         };
-        row[k] = self.made_good(row[k]);
+        row[k] = self.corrected(row[k]);
         row
     }
 
     /// Makes it good in a whole recording.
-    pub(in crate::recording) fn mend(&self, recording: &mut Recording) {
+    pub(in crate::recording) fn correct(&self, recording: &mut Recording) {
         let column = match self.column {
             Column::Pressure => Some(&mut recording.pressure),
             Column::Stroke => Some(&mut recording.stroke),
             Column::Force => recording.force.as_mut(),
         };
-        column.into_iter().flatten().for_each(|v| *v = self.made_good(*v));
+        column.into_iter().flatten().for_each(|v| *v = self.corrected(*v));
     }
 
-    pub(super) fn told(&self) -> String {
+    pub(super) fn describe(&self) -> String {
         let column = self.column.name();
         match self.wrong {
-            Wrong::Unit(factor, units) => {
+            MistakeKind::Unit(factor, units) => {
                 let ratio = |r: f64| format!("{r:.2}").trim_end_matches('0').trim_end_matches('.').to_owned();
                 let times = if factor > 1.0 {
                     format!("{} times", ratio(factor))
@@ -95,18 +95,18 @@ impl Mistake {
                      column's name"
                 )
             }
-            Wrong::Sign => format!(
+            MistakeKind::Sign => format!(
                 "its {column} would fit theirs with the other sign: mend the sign, or give scale = -1 in an import description"
             ),
-            Wrong::OtherEnd(_) => format!(
+            MistakeKind::OtherEnd(_) => format!(
                 "its {column} would fit theirs counted from the other end: positive is a muscle that shortens; mend it, or give \
                  positive = \"extension\" in an import description"
             ),
-            Wrong::Absolute(atmosphere) if atmosphere > 0.0 => format!(
+            MistakeKind::Absolute(atmosphere) if atmosphere > 0.0 => format!(
                 "its {column} would fit theirs less one atmosphere: gauge pressure is wanted, not absolute; take 101.3 kPa off, or give \
                  an offset in an import description"
             ),
-            Wrong::Absolute(_) => format!(
+            MistakeKind::Absolute(_) => format!(
                 "its {column} would fit theirs with one atmosphere more: theirs seems to be absolute; gauge pressure is wanted, take \
                  101.3 kPa off there, or give an offset in an import description"
             ),
@@ -142,16 +142,16 @@ const FORCES: [(f64, &str); 4] = [
 pub(super) fn mistakes(rows: &[Row]) -> impl Iterator<Item = Mistake> {
     let scaled = |column: Column, ratios: &'static [(f64, &'static str)]| {
         ratios.iter().flat_map(move |(ratio, units)| {
-            [*ratio, 1.0 / ratio].map(|factor| Mistake { column, wrong: Wrong::Unit(factor, units) })
+            [*ratio, 1.0 / ratio].map(|factor| Mistake { column, wrong: MistakeKind::Unit(factor, units) })
         })
     };
     let (low, high) =
         rows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), r| (l.min(r[1]), h.max(r[1])));
     let shifted = [
-        Mistake { column: Column::Force, wrong: Wrong::Sign },
-        Mistake { column: Column::Stroke, wrong: Wrong::OtherEnd(low + high) },
-        Mistake { column: Column::Pressure, wrong: Wrong::Absolute(ATMOSPHERE) },
-        Mistake { column: Column::Pressure, wrong: Wrong::Absolute(-ATMOSPHERE) },
+        Mistake { column: Column::Force, wrong: MistakeKind::Sign },
+        Mistake { column: Column::Stroke, wrong: MistakeKind::OtherEnd(low + high) },
+        Mistake { column: Column::Pressure, wrong: MistakeKind::Absolute(ATMOSPHERE) },
+        Mistake { column: Column::Pressure, wrong: MistakeKind::Absolute(-ATMOSPHERE) },
     ];
     scaled(Column::Pressure, &PRESSURES)
         .chain(scaled(Column::Stroke, &STROKES))

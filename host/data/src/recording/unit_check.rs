@@ -1,21 +1,22 @@
 //! Whole recordings in another unit, or with another sign or zero, than the rest of their campaign: bar under a heading in kPa, a
 //! load cell wired the other way round, an absolute gauge among those that read above the atmosphere.
 //!
-//! What force the other recordings make of pressure and stroke is held against what this one reads. It stands apart only where it is
+//! What force the other recordings make of pressure and stroke is held against what this one reads. It stands error_of only where it is
 //! far off as it was read, and one known mistake made good brings it among the others. Two recordings cannot tell which of them is
 //! wrong, and nothing is said where the others were never at the strokes of this one.
 
 use super::{Campaign, Recording};
+use crate::statistics::ranked;
 
-mod agreed;
+mod consensus_surface;
 mod mistake;
 
-use agreed::{Agreed, FAR_OFF, Row};
-pub use mistake::{Column, Mistake, Wrong};
+use consensus_surface::{ConsensusSurface, FAR_OFF, Row};
+pub use mistake::{Column, Mistake, MistakeKind};
 
-/// A recording that stands apart, and by what.
+/// A recording that stands error_of, and by what.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Apart {
+pub struct InconsistentRecording {
     /// The recording, counted as in the campaign.
     pub recording: usize,
     /// What would bring it among the others.
@@ -24,12 +25,12 @@ pub struct Apart {
     pub or: Option<Mistake>,
 }
 
-impl Apart {
+impl InconsistentRecording {
     /// What would bring it among the others, and what to do, in words.
     #[must_use]
-    pub fn told(&self) -> String {
-        let or = self.or.map_or(String::new(), |m| format!("; or {}", m.told()));
-        self.mistake.told() + &or
+    pub fn describe(&self) -> String {
+        let or = self.or.map_or(String::new(), |m| format!("; or {}", m.describe()));
+        self.mistake.describe() + &or
     }
 }
 
@@ -38,7 +39,7 @@ const ROWS: usize = 6000;
 const ROWS_OF_ONE: usize = 400;
 /// Fewer rows of a recording tell nothing.
 const LEAST_ROWS: usize = 8;
-/// With fewer recordings than this none stands apart from the others.
+/// With fewer recordings than this none stands error_of from the others.
 const LEAST_RECORDINGS: usize = 3;
 /// From this share on it is looked at whether one without which the rest agree better is far off them: it bends what all say together.
 const LOOKED_AT: f64 = 0.06;
@@ -53,9 +54,9 @@ struct Sample {
     rows: Vec<Row>,
 }
 
-/// The recordings of a campaign that stand apart from all others, in order.
+/// The recordings of a campaign that stand error_of from all others, in order.
 #[must_use]
-pub fn standing_apart(campaign: &Campaign) -> Vec<Apart> {
+pub fn inconsistent_recordings(campaign: &Campaign) -> Vec<InconsistentRecording> {
     let long_enough = |r: &Recording| r.force.is_some() && r.len() >= LEAST_ROWS;
     let count = campaign.recordings.iter().filter(|r| long_enough(r)).count();
     if count < LEAST_RECORDINGS {
@@ -66,7 +67,7 @@ pub fn standing_apart(campaign: &Campaign) -> Vec<Apart> {
     let samples: Vec<Sample> =
         campaign.recordings.iter().enumerate().filter(|(_, r)| long_enough(r)).map(of).collect();
     let Some(largest) = usual_largest(&samples) else { return Vec::new() };
-    let Some((others, odd)) = agreed(&samples, largest) else { return Vec::new() };
+    let Some((others, odd)) = consensus(&samples, largest) else { return Vec::new() };
     odd.into_iter().filter_map(|i| others.judge(&samples[i])).collect()
 }
 
@@ -74,37 +75,38 @@ pub fn standing_apart(campaign: &Campaign) -> Vec<Apart> {
 ///
 /// One in a wrong unit bends what all of them say together, and can make another look odd. So the one is left out without which the
 /// rest agree best, then the next, until they agree.
-fn agreed(samples: &[Sample], largest: f64) -> Option<(Agreed, Vec<usize>)> {
+fn consensus(samples: &[Sample], largest: f64) -> Option<(ConsensusSurface, Vec<usize>)> {
     let mut kept: Vec<usize> = (0..samples.len()).collect();
     let mut odd = Vec::new();
     let without = |kept: &[usize], i: Option<usize>| {
         let rest = kept.iter().copied().filter(|k| Some(*k) != i).map(|k| &samples[k]);
-        Agreed::on(rest, largest)
+        ConsensusSurface::on(rest, largest)
     };
-    let mut agreed = without(&kept, None)?;
-    let apart = |agreed: &Agreed, i: usize| agreed.off(&samples[i].rows, None).unwrap_or(0.0);
+    let mut consensus = without(&kept, None)?;
+    let error_of =
+        |consensus: &ConsensusSurface, i: usize| consensus.off(&samples[i].rows, None).unwrap_or(0.0);
     let most = MOST_ODD.min((samples.len() - 1) / 2);
     while odd.len() < most {
         let far = if odd.is_empty() { LOOKED_AT } else { FAR_OFF };
-        if kept.iter().all(|i| apart(&agreed, *i) < far) {
+        if kept.iter().all(|i| error_of(&consensus, *i) < far) {
             break;
         }
         let mut tried: Vec<usize> = kept.clone();
-        tried.sort_by(|a, b| apart(&agreed, *b).total_cmp(&apart(&agreed, *a)));
+        tried.sort_by(|a, b| error_of(&consensus, *b).total_cmp(&error_of(&consensus, *a)));
         tried.truncate(TRIED);
         let disagreement = |i: usize| {
             let rest = without(&kept, Some(i))?;
-            let sum: f64 = kept.iter().filter(|k| **k != i).map(|k| apart(&rest, *k)).sum();
+            let sum: f64 = kept.iter().filter(|k| **k != i).map(|k| error_of(&rest, *k)).sum();
             Some((sum, i, rest))
         };
         let best = tried.into_iter().filter_map(disagreement).min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, i, rest)) = best else { break };
         kept.retain(|k| *k != i);
         odd.push(i);
-        agreed = rest;
+        consensus = rest;
     }
     odd.sort_unstable();
-    (!odd.is_empty()).then_some((agreed, odd))
+    (!odd.is_empty()).then_some((consensus, odd))
 }
 
 /// Rows of a recording, evenly spread.
@@ -119,12 +121,12 @@ fn sampled(r: &Recording, most: usize) -> Vec<Row> {
 fn usual_largest(samples: &[Sample]) -> Option<f64> {
     let top = |s: &Sample| {
         let mut forces: Vec<f64> = s.rows.iter().map(|r| r[2].abs()).collect();
-        let at = forces.len() - 1 - forces.len() / 50;
-        *forces.select_nth_unstable_by(at, f64::total_cmp).1
+        let rank = forces.len() - 1 - forces.len() / 50;
+        ranked(&mut forces, rank)
     };
     let mut tops: Vec<f64> = samples.iter().map(top).collect();
-    let at = tops.len() * 3 / 4;
-    let usual = *tops.select_nth_unstable_by(at, f64::total_cmp).1;
+    let rank = tops.len() * 3 / 4;
+    let usual = ranked(&mut tops, rank);
     (usual > 0.0).then_some(usual)
 }
 

@@ -4,21 +4,21 @@ use super::cells::Dialect;
 use super::import::{Decimal, Import};
 use super::line::Cells;
 use super::quantity::{Named, named};
-use crate::pluralise::pluralise;
 use crate::error::{DataCode, Error, Result};
+use crate::pluralise::pluralise;
 
 /// The beginning of a text file: how it is cut, and what its columns are called.
-pub(super) struct Head {
+pub(super) struct Header {
     pub dialect: Dialect,
     pub names: Vec<String>,
     /// Bytes above the header or the first row.
     pub preamble: usize,
-    /// Bytes and lines that the head takes.
+    /// Bytes and lines that the header takes.
     pub bytes: usize,
     pub lines: u64,
 }
 
-impl Head {
+impl Header {
     pub fn read(text: &[u8], import: &Import) -> Result<Self> {
         let comment = import.comment.and_then(|c| u8::try_from(c).ok());
         let mut bytes = 0;

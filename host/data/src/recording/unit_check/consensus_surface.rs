@@ -1,9 +1,9 @@
 //! What force most recordings of a campaign make of pressure and stroke, and how far one of them is off.
 
-use nalgebra::{SMatrix, SVector};
-
 use super::mistake::{Mistake, mistakes};
-use super::{Apart, Sample};
+use super::{InconsistentRecording, Sample};
+use crate::recording::force_surface::{ForceSurface, TERMS};
+use crate::statistics::{median, ranked};
 
 /// A muscle pulls from this share of the campaign's usual largest force.
 const PULLS: f64 = 0.05;
@@ -27,8 +27,6 @@ const BEYOND: f64 = 1.6;
 /// A row: pressure in Pa, stroke in m, force in N.
 pub(super) type Row = [f64; 3];
 
-/// `F ≈ p (a0 + a1 u + a2 u² + a3 u³) + b0 + b1 u + b2 u² + b3 u³`, with pressure and stroke as shares of their ranges.
-const TERMS: usize = 8;
 /// What the rows leave open is taken for nothing.
 const HELD: f64 = 1e-6;
 /// Rounds in which rows are left out that lie further off than so many times the median.
@@ -36,8 +34,8 @@ const ROUNDS: usize = 4;
 const FAR: f64 = 5.0;
 
 /// What force pressure and stroke make in the recordings that agree.
-pub(super) struct Agreed {
-    terms: SVector<f64, TERMS>,
+pub(super) struct ConsensusSurface {
+    surface: ForceSurface,
     /// Lowest and highest, Pa.
     pressure: (f64, f64),
     /// Lowest, and the range above it, m.
@@ -50,7 +48,7 @@ pub(super) struct Agreed {
     scatter: f64,
 }
 
-impl Agreed {
+impl ConsensusSurface {
     /// Of some recordings, where they pull; `None` where that is too little.
     pub(super) fn on<'a>(samples: impl Iterator<Item = &'a Sample>, largest: f64) -> Option<Self> {
         let pulls = |r: &Row| r[2].abs() > PULLS * largest;
@@ -68,8 +66,8 @@ impl Agreed {
         if high <= 0.0 {
             return None;
         }
-        let mut agreed = Self {
-            terms: SVector::zeros(),
+        let mut surface = Self {
+            surface: ForceSurface::default(),
             pressure: (low, high),
             stroke: (short, (long - short).max(1e-9)),
             strokes,
@@ -78,39 +76,29 @@ impl Agreed {
         };
         let mut kept = rows.clone();
         for _ in 0..ROUNDS {
-            agreed.terms = agreed.solved(&kept)?;
-            let off = |r: &Row| (r[2] - agreed.force(r[0], r[1])).abs();
+            surface.surface = surface.fitted(&kept)?;
+            let off = |r: &Row| (r[2] - surface.force(r[0], r[1])).abs();
             let mut sizes: Vec<f64> = rows.iter().map(off).collect();
-            let middle = sizes.len() / 2;
-            let far = FAR * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+            let far = FAR * median(&mut sizes);
             kept = rows.iter().copied().filter(|r| off(r) <= far).collect();
         }
-        agreed.scatter = agreed.off(&rows, None)?;
-        Some(agreed)
+        surface.scatter = surface.off(&rows, None)?;
+        Some(surface)
     }
 
-    fn solved(&self, rows: &[Row]) -> Option<SVector<f64, TERMS>> {
-        let (mut normal, mut moment) =
-            (SMatrix::<f64, TERMS, TERMS>::zeros(), SVector::<f64, TERMS>::zeros());
-        for [p, x, f] in rows {
-            let row = self.row(*p, *x);
-            normal += row * row.transpose();
-            moment += row * *f;
-        }
-        normal += SMatrix::identity() * (HELD * rows.len() as f64);
-        Some(normal.cholesky()?.solve(&moment))
+    fn fitted(&self, rows: &[Row]) -> Option<ForceSurface> {
+        let scaled = rows.iter().map(|[p, x, f]| (self.scaled(*p, *x), *f));
+        ForceSurface::fit(scaled, &[HELD; TERMS])
     }
 
-    /// Beyond the strokes that there are it goes on as at their end.
-    fn row(&self, pressure: f64, stroke: f64) -> SVector<f64, TERMS> {
-        let p = pressure / self.pressure.1;
-        let u = ((stroke - self.stroke.0) / self.stroke.1).clamp(0.0, 1.0);
-        SVector::from([p, p * u, p * u * u, p * u.powi(3), 1.0, u, u * u, u.powi(3)])
+    /// Pressure and stroke as shares of their ranges; a stroke outside its range counts as the nearer end of it.
+    fn scaled(&self, pressure: f64, stroke: f64) -> [f64; 2] {
+        [pressure / self.pressure.1, ((stroke - self.stroke.0) / self.stroke.1).clamp(0.0, 1.0)]
     }
 
-    /// N.
+    /// The force of the surface, N, at a pressure in Pa and a stroke in m.
     fn force(&self, pressure: f64, stroke: f64) -> f64 {
-        self.row(pressure, stroke).dot(&self.terms)
+        self.surface.force(self.scaled(pressure, stroke))
     }
 
     /// Whether there are rows about such a stroke and pressure.
@@ -122,7 +110,7 @@ impl Agreed {
     }
 
     /// Whether a recording that does not agree would with one mistake made good.
-    pub(super) fn judge(&self, sample: &Sample) -> Option<Apart> {
+    pub(super) fn judge(&self, sample: &Sample) -> Option<InconsistentRecording> {
         let as_read = self.off(&sample.rows, None).filter(|off| *off >= FAR_OFF)?;
         let tried = mistakes(&sample.rows).filter_map(|m| Some((self.off(&sample.rows, Some(&m))?, m)));
         let mut tried: Vec<(f64, Mistake)> = tried.collect();
@@ -130,7 +118,7 @@ impl Agreed {
         let (left, mistake) = tried.first().copied()?;
         let among = AMONG.0.max(AMONG.1 * self.scatter);
         let next = tried.get(1).filter(|(next, _)| *next < AS_GOOD * left);
-        (left <= among.min(AMONG_AT_MOST) && as_read >= BETTER * left).then(|| Apart {
+        (left <= among.min(AMONG_AT_MOST) && as_read >= BETTER * left).then(|| InconsistentRecording {
             recording: sample.recording,
             mistake,
             or: next.map(|(_, m)| *m),
@@ -146,8 +134,8 @@ impl Agreed {
             return None;
         }
         let quantile = |values: &mut Vec<f64>, fifths: usize| {
-            let at = values.len() * fifths / 5;
-            *values.select_nth_unstable_by(at, f64::total_cmp).1 / self.largest
+            let rank = values.len() * fifths / 5;
+            ranked(values, rank) / self.largest
         };
         let four_fifths = |values: &mut Vec<f64>| quantile(values, 4);
         let fifth = |values: &mut Vec<f64>| quantile(values, 1);
