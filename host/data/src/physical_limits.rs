@@ -1,27 +1,27 @@
-//! What a pneumatic muscle can do at all: beyond it a reading is a wrong unit, sign or zero, and the model's equations go on giving
-//! numbers that mean nothing.
+//! Limits beyond which no pneumatic muscle works. A reading outside them has a wrong unit, sign or zero; the model would still return
+//! numbers for it, without meaning.
 
 use model_core::braid::Braid;
 
 use crate::error::{DataCode, Error, Result};
 
-/// Gauge pressures, Pa: not below vacuum, with a margin for a sensor's zero.
+/// Lowest and highest gauge pressure, Pa: vacuum (−101 kPa) with a margin for a sensor's zero, and 1000 bar.
 const PRESSURE: (f64, f64) = (-120e3, 1e8);
 
-/// The largest force, N: a thousand times what the strongest muscles on the market pull.
+/// The largest force, N: a thousand times that of the strongest muscles on the market.
 const FORCE: f64 = 1e7;
 
-/// Contraction that no braid reaches: pressure stops pulling at 0.42 at the latest, where the fibres lie at 54.7°.
+/// A contraction that no braid reaches: its force ends at a contraction of 0.42 at the latest, where the fibres are at 54.7°.
 const CONTRACTION: f64 = 0.5;
 
-/// A gauge pressure in Pa.
+/// Checks a gauge pressure in Pa.
 ///
 /// # Errors
-/// [`DataCode::RecordingOutOfRange`] for one that no pneumatic muscle has.
+/// [`DataCode::RecordingOutOfRange`] outside the limits.
 #[inline]
 pub fn pressure(pascals: f64) -> Result<()> {
     if pascals < PRESSURE.0 || pascals > PRESSURE.1 {
-        return Err(Error::new(DataCode::RecordingOutOfRange, "no pressure of a pneumatic muscle")
+        return Err(Error::new(DataCode::RecordingOutOfRange, "pressure outside the range of pneumatic muscles")
             .column("pressure")
             .value(format!("{} kPa", pascals / 1e3))
             .help("check the unit in the column's name; gauge pressure is never below -101 kPa"));
@@ -29,22 +29,22 @@ pub fn pressure(pascals: f64) -> Result<()> {
     Ok(())
 }
 
-/// A force in N.
+/// Checks a force in N.
 ///
 /// # Errors
-/// [`DataCode::RecordingOutOfRange`] for one that no pneumatic muscle has.
+/// [`DataCode::RecordingOutOfRange`] outside the limits.
 #[inline]
 pub fn force(newtons: f64) -> Result<()> {
     if newtons.abs() > FORCE {
-        return Err(Error::new(DataCode::RecordingOutOfRange, "no force of a pneumatic muscle")
+        return Err(Error::new(DataCode::RecordingOutOfRange, "force outside the range of pneumatic muscles")
             .column("force")
             .value(format!("{newtons:e} N"))
-            .help("check the unit in the column's name; counts of a converter come in by a scale in the import description"));
+            .help("check the unit in the column's name; convert counts of an analog-to-digital converter with scale in an import description"));
     }
     Ok(())
 }
 
-/// The contractions that a braid can make: from its fibres pulled straight to more than any braid contracts.
+/// The range of contractions of a braid, from straight fibres to beyond what any braid reaches.
 ///
 /// ```
 /// use pam_data::physical_limits::Contractions;
@@ -54,7 +54,7 @@ pub fn force(newtons: f64) -> Result<()> {
 /// let can = Contractions::of(&miniature().build()?);
 /// assert!(can.check(0.08).is_ok() && can.check(-0.02).is_ok());
 /// let error = can.check(-0.03).unwrap_err();
-/// assert!(error.to_string().contains("a contraction of -0.030, which this braid cannot have"));
+/// assert!(error.to_string().contains("a contraction of -0.030 is outside the range of this braid"));
 /// assert!(can.check(0.9).is_err());
 /// # Ok::<(), model_core::braid::GeometryError>(())
 /// ```
@@ -64,26 +64,26 @@ pub struct Contractions {
 }
 
 impl Contractions {
-    /// Of a braid.
+    /// The range of this braid.
     #[must_use]
     pub fn of(braid: &Braid<f64>) -> Self {
         Self { taut: braid.fibre_length() / braid.rest_length() - 1.0 }
     }
 
-    /// A contraction `(L0 − L)/L0`.
+    /// Checks a contraction `(L0 − L)/L0`.
     ///
     /// # Errors
-    /// [`DataCode::RecordingOutOfRange`] for one that this braid cannot have.
+    /// [`DataCode::RecordingOutOfRange`] for one outside the range.
     #[inline]
     pub fn check(&self, contraction: f64) -> Result<()> {
         if contraction > CONTRACTION || contraction < -self.taut {
             return Err(Error::new(
                 DataCode::RecordingOutOfRange,
-                format!("a contraction of {contraction:.3}, which this braid cannot have"),
+                format!("a contraction of {contraction:.3} is outside the range of this braid"),
             )
             .help(format!(
-                "contraction is (L0 − L)/L0 and lies between {:.3} (braid pulled straight) and about 0.4: check the rest length, \
-                 the sign of the displacement (positive = \"extension\" in an import description turns it round) and its zero",
+                "contraction is (L0 − L)/L0, from {:.3} (fibres straight) to about 0.4: check the rest length, the sign of the displacement \
+                 (positive = \"extension\" in an import description inverts it) and its zero",
                 -self.taut
             )));
         }

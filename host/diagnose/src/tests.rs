@@ -14,7 +14,7 @@ use super::verdict::Verdict;
 use super::{Diagnosis, Options, diagnose, model};
 use pam_data::muscle_description::{Kind, MuscleDescription};
 use pam_data::recording::{Campaign, Recording};
-use pam_fit::fit::{Options as FitOptions, fit};
+use pam_fit::{Options as FitOptions, fit};
 use pam_fit::predict::predict;
 use pam_fit::table_file::TableFile;
 

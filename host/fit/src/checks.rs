@@ -19,7 +19,6 @@
 
 mod dead_weights;
 mod gauge;
-mod regression;
 mod rigid_bar;
 mod table;
 
@@ -31,18 +30,18 @@ use pam_data::recording::{Campaign, Quantity};
 
 use table::Table;
 
-/// A fault of the bench as a check measured it.
+/// A fault of the bench as measured by a check.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
-    /// Which law of the bench.
+    /// The law of the fault.
     pub fault: BenchName,
     /// Its parameters in the law's order, SI.
     pub parameters: Vec<f64>,
-    /// Their standard deviations, by whole stays or stretches; `None` for what the check does not vary.
+    /// Their standard deviations (1 σ), by whole stays or stretches; `None` for what the check does not vary.
     pub deviations: Vec<Option<f64>>,
-    /// The first parameter with its interval, in words and handy units.
+    /// The first parameter with its 95 % interval, as text with practical units.
     pub words: String,
-    /// Which check, in words.
+    /// Which check measured it, as text.
     pub check: &'static str,
 }
 
@@ -56,7 +55,7 @@ impl Measured {
     }
 }
 
-/// A fault is taken for real from so many standard deviations on.
+/// Significance: a fault counts as real from this many standard deviations on (p < 10⁻⁴ for normal errors, in any of the few checks).
 const SURE: f64 = 4.0;
 
 /// Checks of one bench.
@@ -92,13 +91,13 @@ impl Checks {
         Ok(checks)
     }
 
-    /// Everything that was measured.
+    /// All measured faults.
     #[must_use]
     pub fn measured(&self) -> &[Measured] {
         &self.measured
     }
 
-    /// Whether nothing was checked.
+    /// Whether there are no checks.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.measured.is_empty()
@@ -131,4 +130,10 @@ pub fn freed(campaign: &Campaign, faults: &[Measured]) -> Campaign {
         }
     }
     freed
+}
+
+/// The standard deviation of a measurement whose reference may be off by up to `limit`, every error within it being equally likely
+/// (JCGM 100:2008, 4.3.7).
+fn with_reference(deviation: f64, limit: f64) -> f64 {
+    deviation.hypot(limit / 3.0_f64.sqrt())
 }

@@ -1,21 +1,21 @@
-//! How uncertain a table's force is: the band about every curve.
+//! The confidence band of a table's force.
 
 use model_core::muscle::Muscle;
 use model_core::units::{Length, Pressure};
 
-use crate::fit::basis::PressureBasis;
+use crate::numerics::spline_basis::SplineBasis;
 use crate::table_file::TableFile;
 
 /// Half the width of a normal distribution's 95 % interval, in standard deviations.
 pub const HALF_95: f64 = 1.96;
 
-/// The uncertainty of a table's force, ready to be asked at many places.
+/// The uncertainty of a table's force, prepared for evaluation at many places.
 ///
 /// ```text
 /// var F = gᵀ C g,   g = ∂F/∂(P0, E_kj, k_F,j) = (−G g(L), G c_k φ_j, −s q φ_j),   G = 1 − s k_F
 /// ```
-/// with `C` the covariance that the table file holds. It is that of the base model; what effects add is not in it. To first order in
-/// the deviations, which is exact but for `k_F` times elasticity.
+/// with `C` the covariance that the table file holds. It covers the base model; effects add uncertainty that it does not contain. First
+/// order in the deviations, which is exact except for `k_F` times elasticity.
 ///
 /// ```
 /// use pam_fit::confidence_band::ConfidenceBand;
@@ -37,7 +37,7 @@ pub const HALF_95: f64 = 1.96;
 #[derive(Debug, Clone)]
 pub struct ConfidenceBand {
     muscle: Muscle<f64>,
-    basis: PressureBasis,
+    basis: SplineBasis,
     order: usize,
     columns: usize,
     root: Vec<f64>,
@@ -45,7 +45,7 @@ pub struct ConfidenceBand {
 }
 
 impl ConfidenceBand {
-    /// Of a table file; `None` where it holds no uncertainty, or one of another table.
+    /// The band of a table file; `None` where the file holds no uncertainty, or that of another table.
     #[must_use]
     pub fn of(file: &TableFile) -> Option<Self> {
         let u = file.about.uncertainty.as_ref()?;
@@ -56,12 +56,12 @@ impl ConfidenceBand {
         }
         let muscle = Muscle::<f64>::build(&file.table).ok()?;
         let nodes: Vec<f64> = file.table.nodes.iter().map(|p| f64::from(*p)).collect();
-        let basis = PressureBasis::new(&nodes);
+        let basis = SplineBasis::new(&nodes);
         Some(Self { muscle, basis, order, columns, root: u.root.clone(), residual: u.residual_newtons })
     }
 
     /// Standard deviation of the force at a pressure (Pa), a stroke (m) and a direction (+1 shortening, −1 lengthening, 0 for the
-    /// friction-free force), N: what the table's numbers leave open.
+    /// friction-free force), N, from the uncertainty of the table's parameters.
     #[must_use]
     pub fn std(&self, pressure: f64, stroke: f64, direction: f64) -> f64 {
         let held = self.muscle.held(Length::from_metres(stroke));
@@ -83,13 +83,13 @@ impl ConfidenceBand {
         sum.iter().map(|s| s * s).sum::<f64>().sqrt()
     }
 
-    /// As [`ConfidenceBand::std`], of a single reading: with what the table does not describe, as seen in its own residuals.
+    /// The standard deviation of a single reading, N: [`ConfidenceBand::std`] and the root mean square of the fit's residuals.
     #[must_use]
     pub fn reading_std(&self, pressure: f64, stroke: f64, direction: f64) -> f64 {
         self.with_scatter(self.std(pressure, stroke, direction))
     }
 
-    /// The standard deviation of a single reading where that of the force is `std`, N.
+    /// The standard deviation of a single reading where that of the force is `std`, both in N.
     #[must_use]
     pub fn with_scatter(&self, std: f64) -> f64 {
         std.hypot(self.residual)

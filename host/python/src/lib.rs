@@ -10,8 +10,8 @@ use pam_data::date;
 use pam_data::pluralise::pluralise;
 use pam_diagnose as diagnosis;
 use pam_data::error::{DataCode, Error};
-use pam_fit::fit::Options;
-use pam_fit::fit::result::Fit as HostFit;
+use pam_fit::Options;
+use pam_fit::Fit as HostFit;
 use pam_data::muscle_description::{Kind, MuscleDescription};
 use pam_data::physical_limits::{self, Contractions};
 use pam_fit::predict::{Predicted, beyond, predict as host_predict, predict_with_bands};
@@ -537,7 +537,7 @@ impl Fit {
             tool: format!("pamtools {}", env!("CARGO_PKG_VERSION")),
             fit: self.fit.summary.quality(),
             uncertainty: Some(self.fit.stored_uncertainty()),
-            mountings: self.fit.prepared.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
+            mountings: self.fit.solution.problem.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
             ..About::default()
         };
         Table(TableFile { table: self.fit.table.clone(), about })
@@ -587,7 +587,7 @@ fn fit(
         ..Options::default()
     };
     let (campaign, muscle) = (campaign.0.clone(), muscle.0.clone());
-    let fit = py.detach(|| pam_fit::fit::fit(&campaign, &muscle, &options)).map_err(raised)?;
+    let fit = py.detach(|| pam_fit::fit(&campaign, &muscle, &options)).map_err(raised)?;
     Ok(Fit { fit, campaign, options })
 }
 

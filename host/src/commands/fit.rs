@@ -13,7 +13,7 @@ use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::{to_standard_output, write_whole};
-use pam_fit::fit::{self, Options};
+use pam_fit::{Options, fit_with_progress};
 
 use crate::progress::ProgressLine;
 use pam_data::recording::Reader;
@@ -101,7 +101,7 @@ impl Arguments {
         let (fitted, hashes) = std::thread::scope(|scope| {
             let hashes = scope.spawn(|| files.iter().map(table_file::sha256).collect::<Result<Vec<_>>>());
             let progress = ProgressLine::new(&watched, "fitting");
-            let fitted = fit::watched(&campaign, &muscle, &options, &progress);
+            let fitted = fit_with_progress(&campaign, &muscle, &options, &progress);
             (fitted, hashes.join())
         });
         let fitted = fitted?;
@@ -116,7 +116,7 @@ impl Arguments {
             fit: fitted.summary.quality(),
             uncertainty: Some(fitted.stored_uncertainty()),
             corrections: Vec::new(),
-            mountings: fitted.prepared.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
+            mountings: fitted.solution.problem.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
         };
         let table = TableFile { table: fitted.table.clone(), about };
         let json = serde_json::to_string_pretty(&fitted.summary)

@@ -14,7 +14,7 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::write_whole;
 use pam_data::recording::{Campaign, Reader, Recording};
-use pam_fit::fit::{Options, fit};
+use pam_fit::{Options, fit};
 use pam_fit::table_file::{self, About, TableFile};
 use pam_report::{diagnose_page, fit_page};
 
@@ -182,7 +182,7 @@ impl Workshop {
             fit: fitted.summary.quality(),
             uncertainty: Some(fitted.stored_uncertainty()),
             corrections: Vec::new(),
-            mountings: fitted.prepared.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
+            mountings: fitted.solution.problem.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
         };
         let path = self.folder.join("fitted.pam");
         TableFile { table: fitted.table.clone(), about }.write(&path)?;

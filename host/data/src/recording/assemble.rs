@@ -253,7 +253,10 @@ fn set_zero(job: &Job<'_>, table: &mut Table) {
     }
 }
 
-/// Which rows the filters leave; `None` when all.
+/// At most this many values of a column are listed in an error.
+const LISTED_VALUES: usize = 20;
+
+/// Which rows the filters keep; `None` when all.
 fn keep(job: &Job<'_>, table: &Table, rows: usize) -> Result<Option<Vec<bool>>> {
     if job.filters.is_empty() {
         return Ok(None);
@@ -286,8 +289,11 @@ fn keep(job: &Job<'_>, table: &Table, rows: usize) -> Result<Option<Vec<bool>>> 
         return Ok(Some(keep));
     }
     let list = |(words, (name, _)): (&Words, &(String, Value))| {
-        let some: Vec<_> = words.words.iter().take(8).map(String::as_str).collect();
-        format!("{name} is one of {}", some.join(", "))
+        let mut values: Vec<String> = words.words.iter().take(LISTED_VALUES).cloned().collect();
+        if words.words.len() > LISTED_VALUES {
+            values.push(format!("and {} more", words.words.len() - LISTED_VALUES));
+        }
+        format!("{name} is one of {}", values.join(", "))
     };
     let has: Vec<String> = table.filters.iter().zip(job.filters).map(list).collect();
     let muscle = match (rest_length, job.rest_length) {

@@ -99,8 +99,8 @@ impl Campaign {
     }
 }
 
-/// A recording whose time is in another unit than that of the others, told: its rows are a thousand times as far apart, or as close, and
-/// the muscle moves as far from row to row as theirs does.
+/// A warning about a recording whose time has another unit than that of the others: its sample interval is a thousand times theirs, or a
+/// thousandth, and the stroke per row is the same.
 fn other_clock(recordings: &[Recording]) -> Option<String> {
     if recordings.len() < 3 {
         return None;
@@ -119,8 +119,8 @@ fn other_clock(recordings: &[Recording]) -> Option<String> {
     };
     let i = rows.iter().position(odd)?;
     Some(format!(
-        "the rows of `{}` are {:.4} s apart, those of the others {:.4} s, and the muscle moves as far from row to row: its time seems to be in \
-         another unit; put the one that was logged into the column's name",
+        "the sample interval of `{}` is {:.4} s, that of the others {:.4} s, with the same stroke per row: its time seems to have another \
+         unit; put the logged unit into the column's name",
         recordings[i].name, rows[i].0, interval
     ))
 }
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn milliseconds_under_a_heading_in_seconds_are_told() {
+    fn milliseconds_under_a_heading_in_seconds_are_reported() {
         let loops = |name: &str, start: f64, interval: f64, way: f64| Recording {
             name: name.into(),
             time: (0..100).map(|i| start + interval * f64::from(i)).collect(),
@@ -174,7 +174,7 @@ mod tests {
             Campaign::new(files.map(|(n, s, i, w)| loops(n, s, i, w)).to_vec()).warnings.join("; ")
         };
         let said = told(100.0, 1e-4);
-        assert!(said.contains("`b` are 100.0000 s apart, those of the others 0.1000 s"), "{said}");
+        assert!(said.contains("`b` is 100.0000 s, that of the others 0.1000 s"), "{said}");
         assert!(told(1e-4, 1e-4).contains("another unit"));
         // A logger that was set to another rate sees the same motion.
         assert_eq!(told(1e-4, 1e-7), "");

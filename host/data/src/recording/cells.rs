@@ -318,7 +318,7 @@ fn explain(mut cells: Cells<'_>, width: usize, index: usize) -> CellError {
     let Ok(text) = cells.text() else { return open_quote(line) };
     let bare = text.trim().trim_start_matches(['-', '+']).to_lowercase();
     let fault = match bare.as_str() {
-        "" => Fault::Empty,
+        "" if text.trim().is_empty() => Fault::Empty,
         "nan" | "inf" | "infinity" | "na" | "n/a" | "null" | "none" | "1.#inf" | "1.#qnan" | "#n/a" => {
             Fault::NotFinite
         }

@@ -136,7 +136,7 @@ impl<'a> Reader<'a> {
         };
         let text = &first[start..];
         if text.iter().all(u8::is_ascii_whitespace) {
-            return Err(Error::new(DataCode::RecordingEmpty, "the file holds nothing but blanks"));
+            return Err(Error::new(DataCode::RecordingEmpty, "the file contains only blanks"));
         }
         let header = Header::read(text, &description)?;
         let rest = &text[header.bytes..];
@@ -254,7 +254,7 @@ fn block_error(error: BlockError) -> Error {
     match error {
         BlockError::LongLine => {
             Error::new(DataCode::RecordingNotText, "the file has a line of more than 4 MiB")
-                .help("this is no table of text; give a CSV or tab-separated file with one header line")
+                .help("this is not a table of text: give a CSV or tab-separated file with one header line")
         }
         BlockError::Io(e) if e.kind() == std::io::ErrorKind::NotFound => Error::unreadable("", &e),
         BlockError::Io(e) if matches!(e.kind(), std::io::ErrorKind::PermissionDenied) => {
@@ -265,7 +265,7 @@ fn block_error(error: BlockError) -> Error {
             let reason = e.to_string();
             let reason = reason.split(':').next().unwrap_or_default();
             Error::new(DataCode::RecordingContainer, format!("cannot be read to its end: {reason}"))
-                .help("the file may be damaged or cut short; get it again from where it was recorded")
+                .help("the file may be damaged or incomplete: copy it again")
         }
     }
 }
@@ -282,10 +282,10 @@ fn rows_error(error: RowsError, header: &Header, import: &Import) -> Error {
         _ => "commas",
     };
     let error = match &fault {
-        Fault::Empty => Error::new(DataCode::RecordingNotANumber, "an empty cell")
+        Fault::Empty => Error::new(DataCode::RecordingNotANumber, "empty cell")
             .help("every row needs a number in every column that is used; leave incomplete rows out"),
         Fault::NotFinite => Error::new(DataCode::RecordingNotFinite, "not a finite number")
-            .help("leave such rows out, or repair the sensor's channel; nothing is filled in silently"),
+            .help("leave such rows out, or repair the sensor's channel; missing values are never filled in"),
         Fault::NotANumber => {
             let comma =
                 value.contains(',') && value.chars().all(|c| c.is_ascii_digit() || ",.-+ ".contains(c));
@@ -294,14 +294,16 @@ fn rows_error(error: RowsError, header: &Header, import: &Import) -> Error {
                 "dates and times of day are not read: write seconds or milliseconds from some beginning (in a spreadsheet \
                  =(A2-A$2)*86400), or give sample_interval_s in an import description"
             } else if value.contains(',') && value.contains('.') {
-                "write numbers without signs between thousands"
+                "write numbers without thousands separators"
             } else if comma && !header.dialect.decimal_comma {
-                "decimals are written with a point; for decimal commas use an import description with decimal = \"comma\""
+                "use a decimal point, or an import description with decimal = \"comma\""
             } else if header.dialect.decimal_comma && value.contains('.') && import.decimal == Decimal::Comma
             {
-                "the import description says that decimals are written with a comma"
+                "the import description specifies decimal commas"
             } else if header.dialect.decimal_comma && value.contains('.') {
-                "decimals are written with a comma in this file's first row; write numbers without points between thousands"
+                "this file's first row has decimal commas: write numbers without thousands separators"
+            } else if value.chars().all(|c| "-+ ".contains(c)) {
+                "signs without digits usually mark a missing value: leave such rows out"
             } else {
                 "every cell of a column that is used must be a number"
             };
@@ -310,10 +312,10 @@ fn rows_error(error: RowsError, header: &Header, import: &Import) -> Error {
         Fault::Width { found, expected } => {
             let cells = pluralise(found, "cell");
             let help = if *found == 2 * expected && separator == "commas" {
-                "this looks like decimal commas; write decimals with a point, or use an import description"
+                "these look like decimal commas: use a decimal point, or an import description with decimal = \"comma\""
                     .to_owned()
             } else {
-                format!("cells are separated by {separator}; the line may be cut short or damaged")
+                format!("cells are separated by {separator}; the line may be incomplete or damaged")
             };
             Error::new(DataCode::RecordingWrongWidth, format!("{cells} where {expected} are expected"))
                 .help(help)
@@ -344,7 +346,7 @@ impl Constants {
         let Some(captures) = pattern.captures(text) else {
             return Err(Error::new(
                 DataCode::ImportInvalid,
-                format!("{what} not as the import description says"),
+                format!("{what} not of the form in the import description"),
             )
             .value(text)
             .help(format!("{key} must match {}", pattern.as_str())));
@@ -356,7 +358,7 @@ impl Constants {
                 continue;
             }
             let value = caught.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
-                Error::new(DataCode::ImportInvalid, format!("{key} catches no number for {group}"))
+                Error::new(DataCode::ImportInvalid, format!("{key} matches no number for {group}"))
                     .value(caught)
             })?;
             self.quantities.push((group.to_owned(), value));
@@ -369,7 +371,7 @@ fn read_lookup(recording: &Path, file: &str) -> Result<LookupTable> {
     let path = recording.parent().unwrap_or(Path::new("")).join(file);
     let text = std::fs::read(&path).map_err(|e| {
         Error::unreadable(&path, &e)
-            .help("the import description's lookup table stands in the recording's folder")
+            .help("the lookup table of an import description belongs in the folder of the recording")
     })?;
     let text = &text[source::check_text(&text).map_err(|e| e.file(&path))?..];
     let mut lines = text.split(|b| *b == b'\n').enumerate().filter(|(_, l)| !l.trim_ascii().is_empty());

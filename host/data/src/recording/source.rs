@@ -136,10 +136,16 @@ pub(super) fn check_text(first: &[u8]) -> Result<usize> {
     if first.starts_with(&UTF_16_LITTLE) || first.starts_with(&UTF_16_BIG) {
         return not_text("the file is UTF-16 text", "save it as UTF-8, or as plain text");
     }
-    if first.starts_with(b"\x89HDF") || first.starts_with(b"PAR1") || first.starts_with(b"PK\x03\x04") {
+    if first.starts_with(b"PK\x03\x04") || first.starts_with(b"\xd0\xcf\x11\xe0") {
         return not_text(
-            "the file is a container, not text",
-            "see the manual for the formats that are read directly",
+            "the file is an Excel workbook or another archive, not text",
+            "in the spreadsheet program, save the sheet as CSV (UTF-8)",
+        );
+    }
+    if first.starts_with(b"\x89HDF") || first.starts_with(b"PAR1") {
+        return not_text(
+            "the file is a damaged HDF5 or Parquet file, not text",
+            "copy the file again, or export its columns as CSV",
         );
     }
     let head = &first[..first.len().min(1 << 16)];

@@ -1,9 +1,9 @@
-//! Whole recordings in another unit, or with another sign or zero, than the rest of their campaign: bar under a heading in kPa, a
-//! load cell wired the other way round, an absolute gauge among those that read above the atmosphere.
+//! Whole recordings with another unit, sign or zero than the others of their campaign: bar under a heading in kPa, a load cell with
+//! inverted sign, an absolute pressure sensor among gauge pressure sensors.
 //!
-//! What force the other recordings make of pressure and stroke is held against what this one reads. It stands error_of only where it is
-//! far off as it was read, and one known mistake made good brings it among the others. Two recordings cannot tell which of them is
-//! wrong, and nothing is said where the others were never at the strokes of this one.
+//! A surface of force over pressure and stroke is fitted to the other recordings. A recording is inconsistent only where its residuals
+//! are large as read, and small with one known mistake corrected. At least three recordings are needed to decide which one is wrong,
+//! and the others must cover the strokes of this one.
 
 use super::{Campaign, Recording};
 use crate::statistics::ranked;
@@ -14,19 +14,19 @@ mod mistake;
 use consensus_surface::{ConsensusSurface, FAR_OFF, Row};
 pub use mistake::{Column, Mistake, MistakeKind};
 
-/// A recording that stands error_of, and by what.
+/// A recording that is inconsistent with the others, and its mistake.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InconsistentRecording {
-    /// The recording, counted as in the campaign.
+    /// Index of the recording in the campaign.
     pub recording: usize,
-    /// What would bring it among the others.
+    /// The mistake whose correction makes it agree.
     pub mistake: Mistake,
-    /// What would do so about as well.
+    /// Another mistake that explains it about as well.
     pub or: Option<Mistake>,
 }
 
 impl InconsistentRecording {
-    /// What would bring it among the others, and what to do, in words.
+    /// The mistake and the remedy, in words.
     #[must_use]
     pub fn describe(&self) -> String {
         let or = self.or.map_or(String::new(), |m| format!("; or {}", m.describe()));
@@ -34,27 +34,28 @@ impl InconsistentRecording {
     }
 }
 
-/// Rows of a campaign that are looked at, and of one recording at most.
+/// Sampled rows of a campaign, and of one recording at most.
 const ROWS: usize = 6000;
 const ROWS_OF_ONE: usize = 400;
-/// Fewer rows of a recording tell nothing.
+/// Recordings with fewer rows are skipped.
 const LEAST_ROWS: usize = 8;
-/// With fewer recordings than this none stands error_of from the others.
+/// With fewer recordings it cannot be decided which one is wrong.
 const LEAST_RECORDINGS: usize = 3;
-/// From this share on it is looked at whether one without which the rest agree better is far off them: it bends what all say together.
-const LOOKED_AT: f64 = 0.06;
-/// So many recordings are left out at most until the rest agree, each one of so many that are furthest off.
+/// From this residual on, as a share of the usual largest force, the search without one recording starts: a wrong recording also bends
+/// the surface that includes it.
+const SEARCH_FROM: f64 = 0.06;
+/// At most this many recordings are excluded until the others agree, each chosen among this many with the largest residuals.
 const MOST_ODD: usize = 6;
 const TRIED: usize = 24;
 
-/// Some rows of a recording.
+/// Sampled rows of a recording.
 struct Sample {
-    /// The recording, counted as in the campaign.
+    /// Index of the recording in the campaign.
     recording: usize,
     rows: Vec<Row>,
 }
 
-/// The recordings of a campaign that stand error_of from all others, in order.
+/// The recordings of a campaign that are inconsistent with the others, in order.
 #[must_use]
 pub fn inconsistent_recordings(campaign: &Campaign) -> Vec<InconsistentRecording> {
     let long_enough = |r: &Recording| r.force.is_some() && r.len() >= LEAST_ROWS;
@@ -71,10 +72,10 @@ pub fn inconsistent_recordings(campaign: &Campaign) -> Vec<InconsistentRecording
     odd.into_iter().filter_map(|i| others.judge(&samples[i])).collect()
 }
 
-/// What most recordings agree on, and those that do not, in order; `None` where all agree.
+/// The surface on which most recordings agree, and those that do not, in order; `None` where all agree.
 ///
-/// One in a wrong unit bends what all of them say together, and can make another look odd. So the one is left out without which the
-/// rest agree best, then the next, until they agree.
+/// A recording in a wrong unit bends the common surface and can make another one look inconsistent. So the recording is excluded
+/// without which the others agree best, then the next, until they agree.
 fn consensus(samples: &[Sample], largest: f64) -> Option<(ConsensusSurface, Vec<usize>)> {
     let mut kept: Vec<usize> = (0..samples.len()).collect();
     let mut odd = Vec::new();
@@ -84,10 +85,10 @@ fn consensus(samples: &[Sample], largest: f64) -> Option<(ConsensusSurface, Vec<
     };
     let mut consensus = without(&kept, None)?;
     let error_of =
-        |consensus: &ConsensusSurface, i: usize| consensus.off(&samples[i].rows, None).unwrap_or(0.0);
+        |consensus: &ConsensusSurface, i: usize| consensus.residual(&samples[i].rows, None).unwrap_or(0.0);
     let most = MOST_ODD.min((samples.len() - 1) / 2);
     while odd.len() < most {
-        let far = if odd.is_empty() { LOOKED_AT } else { FAR_OFF };
+        let far = if odd.is_empty() { SEARCH_FROM } else { FAR_OFF };
         if kept.iter().all(|i| error_of(&consensus, *i) < far) {
             break;
         }
@@ -116,8 +117,8 @@ fn sampled(r: &Recording, most: usize) -> Vec<Row> {
     (0..r.len()).step_by(stride).map(|i| [r.pressure[i], r.stroke[i], force[i]]).collect()
 }
 
-/// What recordings reach with their largest force, whatever its sign, N: a quarter of them reach more. A campaign may hold as many
-/// recordings of a vented muscle as of one that pulls.
+/// The upper quartile of the recordings' largest absolute force (each its 98 % quantile), N. A campaign may contain as many recordings of
+/// a vented muscle as of one that pulls.
 fn usual_largest(samples: &[Sample]) -> Option<f64> {
     let top = |s: &Sample| {
         let mut forces: Vec<f64> = s.rows.iter().map(|r| r[2].abs()).collect();

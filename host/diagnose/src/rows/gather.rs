@@ -8,7 +8,7 @@ use super::{Rows, TARGET_ROWS, readings, sleeve};
 use crate::kinematics::{Kinematics, Recorded, Thresholds, kinematics};
 use pam_data::error::Result;
 use pam_data::recording::{Recording, UNKNOWN_PAUSE};
-use pam_fit::fit::screen::Clip;
+use pam_fit::Clip;
 
 /// A campaign's recordings on their way into rows.
 pub(super) struct Gathering<'a> {

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use pam_data::pluralise::pluralise;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::file_kind::FileKind;
+use pam_data::pluralise::pluralise;
 use pam_data::recording::{Named, Quantity, named};
 
 /// What a column's name begins with when it holds what is known.
@@ -45,7 +45,7 @@ impl Table {
                 Named::UnknownUnit(quantity) => {
                     return Err(Error::new(
                         DataCode::CheckInvalid,
-                        format!("the column `{}` is in no unit that is known", &header[at]),
+                        format!("unknown unit of the column `{}`", &header[at]),
                     )
                     .file(file)
                     .help(format!("{} is in {}", quantity.name(), quantity.unit_list())));
@@ -71,7 +71,7 @@ impl Table {
         let table = Self { file: file.to_owned(), columns };
         let rows = table.columns.first().map_or(0, |c| c.2.len());
         if rows < FEWEST {
-            return Err(table.poor(format!("{}, and at least {FEWEST} are needed", pluralise(rows, "row"))));
+            return Err(table.poor(format!("{}; a check needs at least {FEWEST}", pluralise(rows, "row"))));
         }
         Ok(table)
     }
@@ -106,7 +106,7 @@ impl Table {
 
     /// The file is no check.
     pub(super) fn without_reference(&self) -> Error {
-        Error::new(DataCode::CheckInvalid, "there is no column of what is known")
+        Error::new(DataCode::CheckInvalid, "there is no column of the reference")
             .file(&self.file)
             .help("a check has `reference_force_N`, `reference_displacement_mm` or `reference_pressure_kPa` beside the reading")
     }

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use super::points::median;
+use crate::numerics::median;
 
 /// Chunks per unit of contraction.
 pub const PER_CONTRACTION: f64 = 500.0;
@@ -18,15 +18,15 @@ const LEAST_ROWS: f64 = 0.1;
 /// Where a sample lies: its chunk, and its branch.
 #[derive(Debug, Clone, Copy)]
 pub struct Place {
-    /// The tested level, or the interval of a continuous range.
+    /// Index of the tested level, or of the interval of a continuous range.
     pub group: u32,
     /// A finer cut of pressure, where it moves; 0 for levels.
     pub fine: u32,
-    /// ΔL/L0.
+    /// Contraction ΔL/L0.
     pub contraction: f64,
-    /// +1, −1, 0.
+    /// +1 shortening, −1 lengthening, 0 unknown.
     pub direction: f64,
-    /// How many rows the sample stands for.
+    /// How many rows the sample represents.
     pub rows: f64,
 }
 

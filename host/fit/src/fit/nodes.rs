@@ -15,6 +15,16 @@ pub struct Pressures {
     pub nodes: Vec<f64>,
 }
 
+impl Pressures {
+    /// The tested level, or the interval, that a pressure in Pa belongs to.
+    pub(super) fn nearest(&self, pressure: f64) -> u32 {
+        let levels = &self.levels;
+        let nearest = (0..levels.len())
+            .min_by(|a, b| (levels[*a] - pressure).abs().total_cmp(&(levels[*b] - pressure).abs()));
+        nearest.unwrap_or(0) as u32
+    }
+}
+
 /// Intervals that a continuous range is cut into.
 const INTERVALS: usize = 8;
 const BINS: usize = 1024;

@@ -3,7 +3,7 @@
 use super::super::{Axis, Colour, Figure, Mark, Panel, Section, fixed};
 use super::view::{Banded, View};
 use pam_data::pluralise::pluralise;
-use pam_fit::fit::basis::columns;
+use pam_fit::columns;
 
 /// At most this many small panels: more cannot be compared by eye.
 pub(super) const PANELS: usize = 9;
@@ -28,13 +28,13 @@ fn load_lines(view: &View<'_>) -> Figure {
         let (x, y): (Vec<f64>, Vec<f64>) = broken(points.iter().enumerate().map(|(i, p)| {
             (view.group(i) == group).then(|| (view.contraction(p.stroke), p.force, p.recording))
         }));
-        panel = if view.fit.prepared.pressures.held {
+        panel = if view.fit.solution.problem.pressures.held {
             panel.hair(view.name(group), view.colour(group), &x, &y)
         } else {
             panel.points(view.name(group), view.colour(group), &x, &y)
         };
     }
-    for group in (0..view.levels.len()).filter(|_| view.fit.prepared.pressures.held) {
+    for group in (0..view.levels.len()).filter(|_| view.fit.solution.problem.pressures.held) {
         let mid = view.fit.midline.iter().filter(|m| m.group as usize == group);
         let (x, y): (Vec<f64>, Vec<f64>) = mid.map(|m| (100.0 * m.contraction, m.force)).unzip();
         panel = panel.dashes(if group == 0 { "mid-line F_{AVG}" } else { "" }, Colour::Ink, &x, &y);
@@ -70,7 +70,7 @@ fn broken(points: impl Iterator<Item = Option<(f64, f64, u32)>>) -> (Vec<f64>, V
 }
 
 fn loops(view: &View<'_>) -> Figure {
-    let friction = view.fit.prepared.design.friction;
+    let friction = view.fit.solution.problem.design.friction;
     let panels = view.some(PANELS).into_iter().map(|group| {
         let mut of: Vec<usize> = (0..view.points().len()).filter(|i| view.group(*i) == group).collect();
         // Few enough to stay dots, so that one sees them on both sides of the line.
@@ -238,7 +238,7 @@ fn ends(view: &View<'_>) -> Figure {
 
 fn deadband(view: &View<'_>) -> Figure {
     let s = &view.fit.summary;
-    let area = columns(&view.fit.prepared.braid, 0.0).area;
+    let area = columns(&view.fit.solution.problem.braid, 0.0).area;
     let (p0, half) = (s.deadband_kPa, 1.96 * s.deadband_std_kPa);
     let top = view.levels.last().map_or(1.0, |p| p / 1e3);
     let all = repeats(view);

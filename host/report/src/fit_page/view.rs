@@ -5,9 +5,9 @@ use model_core::units::{Length, Pressure};
 use super::super::{Colour, figures, fixed};
 use pam_data::recording::Campaign;
 use pam_fit::confidence_band::{ConfidenceBand, HALF_95};
-use pam_fit::fit::points::Point;
-use pam_fit::fit::result::Fit;
-use pam_fit::fit::screen::Use;
+use pam_fit::Point;
+use pam_fit::Fit;
+use pam_fit::PointUse;
 use pam_fit::table_file::{About, TableFile};
 
 /// A fit, ready to be drawn.
@@ -46,8 +46,8 @@ impl FromIterator<[f64; 3]> for Banded {
 impl<'a> View<'a> {
     pub fn new(fit: &'a Fit, campaign: &'a Campaign) -> Self {
         let muscle = model_core::muscle::Muscle::<f64>::build(&fit.table).ok();
-        let l0 = fit.prepared.braid.rest_length();
-        let levels = fit.prepared.pressures.levels.as_slice();
+        let l0 = fit.solution.problem.braid.rest_length();
+        let levels = fit.solution.problem.pressures.levels.as_slice();
         let uncertainty = Some(fit.stored_uncertainty());
         let about = About { uncertainty, ..About::default() };
         let band = ConfidenceBand::of(&TableFile { table: fit.table.clone(), about });
@@ -61,11 +61,11 @@ impl<'a> View<'a> {
     }
 
     pub fn points(&self) -> &'a [Point] {
-        &self.fit.prepared.points.list
+        &self.fit.solution.problem.points.list
     }
 
     fn direction(&self, p: &Point) -> f64 {
-        if self.fit.prepared.design.friction { p.direction } else { 0.0 }
+        if self.fit.solution.problem.design.friction { p.direction } else { 0.0 }
     }
 
     /// The table's force, N.
@@ -84,12 +84,12 @@ impl<'a> View<'a> {
 
     /// The tested pressure that a point belongs to.
     pub fn group(&self, i: usize) -> usize {
-        let design = &self.fit.prepared.design;
+        let design = &self.fit.solution.problem.design;
         design.bins[design.rows[i].bin as usize].group as usize
     }
 
     pub fn fitted(&self, i: usize) -> bool {
-        self.fit.prepared.used[i] == Use::Fitted
+        self.fit.solution.screen.used[i] == PointUse::Fitted
     }
 
     /// Contraction in percent.
@@ -99,7 +99,7 @@ impl<'a> View<'a> {
 
     pub fn name(&self, group: usize) -> String {
         let Some(p) = self.levels.get(group) else { return String::new() };
-        if self.fit.prepared.pressures.held {
+        if self.fit.solution.problem.pressures.held {
             format!("{} kPa", fixed(p / 1e3, 0))
         } else {
             format!("about {} kPa", fixed(p / 1e3, 0))

@@ -1,4 +1,4 @@
-//! What force the pressure makes in a campaign, and whether a force goes on while the pressure steps away.
+//! The force expected at a pressure and stroke in a campaign, and whether a force continues while the pressure reading steps away.
 
 use std::ops::Range;
 
@@ -7,31 +7,31 @@ use crate::recording::force_surface::{ForceSurface, TERMS};
 use crate::recording::{Campaign, Recording, white_noise};
 use crate::statistics::median;
 
-/// Rows that are taken for it.
+/// Rows that the surface is fitted to.
 const ROWS: usize = 20_000;
-/// Rounds in which rows are left out that lie further off than so many times the median.
+/// Rounds that exclude rows whose residual exceeds [`FAR`] times the median.
 const ROUNDS: usize = 3;
 const FAR: f64 = 5.0;
-/// What the campaign leaves open is taken for nothing. Where only one pressure was tested the force is as good as proportional to it,
-/// which is the least that pressure can make: deadband and elasticity only take from it.
+/// Ridge towards zero, per row, for what the campaign does not determine. With one tested pressure the force comes out proportional to
+/// pressure, which is the smallest possible effect of pressure: deadband and elasticity reduce the force.
 const HELD: [f64; TERMS] = [1e-6, 1e-5, 1e-5, 1e-5, 1e-3, 1e-5, 1e-5, 1e-5];
-/// A muscle pulls from this share of the range of forces above the lowest.
+/// A muscle counts as pulling above this share of the range of forces.
 const PULLS: f64 = 0.05;
-/// The step must make this share of the range of forces, and so many standard deviations of a reading.
+/// The step must change the expected force by this share of the range of forces, and this many standard deviations of a reading.
 const NOTICEABLE: (f64, f64) = (0.03, 25.0);
-/// The force goes on if it follows by less than this share.
+/// The force continues if it follows less than this share of the expected change.
 const FOLLOWS: f64 = 0.15;
-/// Before and after, the campaign's other readings make the force that is read up to this share of what the step would make: of two
-/// levels between which a gauge changes, the muscle's is the one that the force fits.
+/// Before and after, the residual of the force stays below this share of the expected change: of two levels between which the reading
+/// changes, the true one is the one that the force agrees with.
 const SUPPORTED: f64 = 0.3;
-/// How long after a stretch the force is watched: what follows late follows too. s, and rows at least.
+/// How long after a stretch the force is checked for a late reaction: s, and rows at least.
 const LATE: (f64, usize) = (0.3, 2);
-/// Rows on either side from which the level is taken.
+/// Rows on either side that determine the level.
 const BESIDE: usize = 5;
-/// A force sensor that stands at the end of its range repeats one value in this share of the rows.
+/// A saturated force sensor repeats one value in at least this share of the rows.
 const CLIPPED: f64 = 1.0 / 300.0;
 
-/// The force that pressure makes at each stroke, from the rows of a campaign that no step is near.
+/// Force over pressure and stroke, from the rows of a campaign away from pressure steps.
 #[derive(Debug, Clone)]
 pub(super) struct ExpectedForce {
     surface: ForceSurface,
@@ -40,12 +40,12 @@ pub(super) struct ExpectedForce {
     /// The lowest force, and the range above it, N.
     floor: f64,
     span: f64,
-    /// Where the force sensor ends, N.
+    /// Where the force sensor saturates, N.
     ceiling: f64,
 }
 
 impl ExpectedForce {
-    /// `None` where too few rows are left that pull, or the force hardly changes.
+    /// `None` where too few rows pull, or the force hardly changes.
     pub(super) fn of(campaign: &Campaign, masks: &[Vec<Range<usize>>]) -> Option<Self> {
         let total = campaign.samples();
         let stride = (total / ROWS).max(1);
@@ -65,7 +65,7 @@ impl ExpectedForce {
         let largest = forces.last().copied()?;
         let at = |share: f64| forces[(share * (forces.len() - 1) as f64) as usize];
         let (floor, top) = (at(0.002), at(0.998));
-        // Where the force hardly changes, as on a dead weight, no row lies above the lowest by a share of the largest.
+        // Where the force hardly changes, as on a dead weight, no row exceeds the lowest by a share of the largest.
         let span = (top - floor).max(top.abs());
         let at_largest = forces.iter().rev().take_while(|f| **f == largest).count();
         let clipped = at_largest >= 5 && at_largest as f64 >= CLIPPED * forces.len() as f64;
@@ -86,7 +86,7 @@ impl ExpectedForce {
             ceiling: if clipped { largest } else { f64::INFINITY },
         };
         expected.surface = expected.fitted(&rows)?;
-        // What no step gave away, such as a wrong unit from the first row on, must not bend the surface.
+        // A wrong unit from the first row on shows no step; it must not bend the surface.
         for _ in 0..ROUNDS {
             let off = |r: &[f64; 3]| (r[2] - expected.force(r[0], r[1])).abs();
             let mut sizes: Vec<f64> = rows.iter().map(off).collect();
@@ -112,8 +112,8 @@ impl ExpectedForce {
         self.surface.force(self.scaled(pressure, stroke))
     }
 
-    /// Whether the force goes on through a stretch, and for a while after, as if its steps of pressure had not been.
-    pub(super) fn goes_on(&self, stretch: &Stretch, r: &Recording, force: &[f64]) -> bool {
+    /// Whether the force continues through a stretch, and for a while after, as if its pressure steps had not happened.
+    pub(super) fn continues(&self, stretch: &Stretch, r: &Recording, force: &[f64]) -> bool {
         let Range { start, end } = stretch.rows;
         let bridge = stretch.bridged(&r.time, &r.pressure);
         let inside = if start > 0 { start } else { end - 1 };

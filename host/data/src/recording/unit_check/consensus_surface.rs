@@ -1,55 +1,55 @@
-//! What force most recordings of a campaign make of pressure and stroke, and how far one of them is off.
+//! The surface of force over pressure and stroke on which most recordings of a campaign agree, and the distance of a recording from it.
 
 use super::mistake::{Mistake, mistakes};
 use super::{InconsistentRecording, Sample};
 use crate::recording::force_surface::{ForceSurface, TERMS};
 use crate::statistics::{median, ranked};
 
-/// A muscle pulls from this share of the campaign's usual largest force.
+/// A muscle counts as pulling above this share of the campaign's usual largest force.
 const PULLS: f64 = 0.05;
-/// A recording is far off if a fifth of its rows are further off than this share of that force…
+/// A recording is inconsistent if a fifth of its rows have a residual above this share of that force…
 pub(super) const FAR_OFF: f64 = 0.12;
-/// …and so many times further than with the mistake made good.
+/// …and this many times the residual with the mistake corrected.
 const BETTER: f64 = 3.0;
-/// Another mistake that leaves less than so many times as much may be the one as well.
+/// Another mistake whose residual is below this multiple of the best one is reported as an alternative.
 const AS_GOOD: f64 = 1.5;
-/// It is among the others then: within this share of the usual largest force, or so many times as far off as they are among themselves.
+/// Corrected, it agrees with the others: within this share of the usual largest force, or this multiple of their own scatter.
 const AMONG: (f64, f64) = (0.02, 2.0);
-/// But never further than this share.
+/// Upper limit of that residual, as a share of the usual largest force.
 const AMONG_AT_MOST: f64 = 0.15;
-/// The force that the others make of it changes by this share from the lowest fifth of its rows to the highest.
+/// The expected force changes by at least this share between the lowest and the highest fifth of its rows.
 const CHANGES: f64 = 0.1;
-/// The others were at a stroke if one of their rows is nearer than this share of their range.
+/// The others cover a stroke if one of their rows is nearer than this share of their range.
 const NEAR: f64 = 0.03;
-/// And at a pressure if it is no further than this factor beyond theirs.
+/// They cover a pressure up to this factor beyond their own range.
 const BEYOND: f64 = 1.6;
 
 /// A row: pressure in Pa, stroke in m, force in N.
 pub(super) type Row = [f64; 3];
 
-/// What the rows leave open is taken for nothing.
+/// Ridge towards zero, per row, for what the rows do not determine.
 const HELD: f64 = 1e-6;
-/// Rounds in which rows are left out that lie further off than so many times the median.
+/// Rounds that exclude rows whose residual exceeds [`FAR`] times the median.
 const ROUNDS: usize = 4;
 const FAR: f64 = 5.0;
 
-/// What force pressure and stroke make in the recordings that agree.
+/// Force over pressure and stroke in the recordings that agree.
 pub(super) struct ConsensusSurface {
     surface: ForceSurface,
     /// Lowest and highest, Pa.
     pressure: (f64, f64),
     /// Lowest, and the range above it, m.
     stroke: (f64, f64),
-    /// The strokes that there are, sorted, m.
+    /// The recorded strokes, sorted, m.
     strokes: Vec<f64>,
     /// The usual largest force, N.
     largest: f64,
-    /// How far four fifths of their own rows are off at most, a share of that.
+    /// The 80 % quantile of their own residuals, as a share of that.
     scatter: f64,
 }
 
 impl ConsensusSurface {
-    /// Of some recordings, where they pull; `None` where that is too little.
+    /// Fits the rows of some recordings that pull; `None` of too few.
     pub(super) fn on<'a>(samples: impl Iterator<Item = &'a Sample>, largest: f64) -> Option<Self> {
         let pulls = |r: &Row| r[2].abs() > PULLS * largest;
         let rows: Vec<Row> = samples.flat_map(|s| &s.rows).copied().filter(pulls).collect();
@@ -59,7 +59,7 @@ impl ConsensusSurface {
         let bounds = |k: usize| {
             let mut all: Vec<f64> = rows.iter().map(|r| r[k]).collect();
             all.sort_unstable_by(f64::total_cmp);
-            // Rows that few share must not set the scale.
+            // A few extreme rows must not set the scale.
             (all[all.len() / 100], all[all.len() - 1 - all.len() / 100], all)
         };
         let ((low, high, _), (short, long, strokes)) = (bounds(0), bounds(1));
@@ -82,7 +82,7 @@ impl ConsensusSurface {
             let far = FAR * median(&mut sizes);
             kept = rows.iter().copied().filter(|r| off(r) <= far).collect();
         }
-        surface.scatter = surface.off(&rows, None)?;
+        surface.scatter = surface.residual(&rows, None)?;
         Some(surface)
     }
 
@@ -101,18 +101,18 @@ impl ConsensusSurface {
         self.surface.force(self.scaled(pressure, stroke))
     }
 
-    /// Whether there are rows about such a stroke and pressure.
-    fn know(&self, pressure: f64, stroke: f64) -> bool {
+    /// Whether there are rows near this stroke and pressure.
+    fn covers(&self, pressure: f64, stroke: f64) -> bool {
         let next = self.strokes.partition_point(|x| *x < stroke);
         let near = |i: usize| self.strokes.get(i).is_some_and(|x| (x - stroke).abs() <= NEAR * self.stroke.1);
         let within = pressure <= BEYOND * self.pressure.1 && pressure >= self.pressure.0 / BEYOND;
         within && (near(next) || next > 0 && near(next - 1))
     }
 
-    /// Whether a recording that does not agree would with one mistake made good.
+    /// Whether an inconsistent recording agrees once one mistake is corrected.
     pub(super) fn judge(&self, sample: &Sample) -> Option<InconsistentRecording> {
-        let as_read = self.off(&sample.rows, None).filter(|off| *off >= FAR_OFF)?;
-        let tried = mistakes(&sample.rows).filter_map(|m| Some((self.off(&sample.rows, Some(&m))?, m)));
+        let as_read = self.residual(&sample.rows, None).filter(|off| *off >= FAR_OFF)?;
+        let tried = mistakes(&sample.rows).filter_map(|m| Some((self.residual(&sample.rows, Some(&m))?, m)));
         let mut tried: Vec<(f64, Mistake)> = tried.collect();
         tried.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let (left, mistake) = tried.first().copied()?;
@@ -125,11 +125,11 @@ impl ConsensusSurface {
         })
     }
 
-    /// How far four fifths of a recording's rows are off at most, a share of the usual largest force; a slack muscle pulls nothing.
-    /// With a mistake made good `None` where the others do not know most of the rows, or the force that they make of it hardly changes.
-    pub(super) fn off(&self, rows: &[Row], mistake: Option<&Mistake>) -> Option<f64> {
+    /// The 80 % quantile of a recording's residuals, as a share of the usual largest force; a slack muscle has no force. With a mistake
+    /// corrected `None` where the others do not cover most of the rows, or where the expected force hardly changes.
+    pub(super) fn residual(&self, rows: &[Row], mistake: Option<&Mistake>) -> Option<f64> {
         let rows: Vec<Row> = rows.iter().map(|r| mistake.map_or(*r, |m| m.of_row(*r))).collect();
-        let known = rows.iter().filter(|r| self.know(r[0], r[1])).count();
+        let known = rows.iter().filter(|r| self.covers(r[0], r[1])).count();
         if mistake.is_some() && 4 * known < 3 * rows.len() {
             return None;
         }
@@ -145,7 +145,7 @@ impl ConsensusSurface {
             made.push(force);
             sizes.push((f - force).abs());
         }
-        // A dead load cell reads what any muscle makes of no pressure, and one level fits many units: the force must change.
+        // A dead load cell agrees with any muscle without pressure, and one level agrees with many units: the force must change.
         let telling = mistake.is_none() || four_fifths(&mut made) - fifth(&mut made) >= CHANGES;
         telling.then(|| four_fifths(&mut sizes))
     }

@@ -1,21 +1,21 @@
-//! Known mistakes in a column of a recording, and what makes them good.
+//! Common mistakes in a column of a recording, and their corrections.
 
 use super::Row;
 use crate::recording::Recording;
 
-/// The column that a mistake is in.
+/// The column with a mistake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Column {
-    /// The gauge's.
+    /// Pressure.
     Pressure,
-    /// The stroke's.
+    /// Stroke.
     Stroke,
-    /// The load cell's.
+    /// Force.
     Force,
 }
 
 impl Column {
-    /// As it is called.
+    /// Its name.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -26,30 +26,30 @@ impl Column {
     }
 }
 
-/// How a column came to read what it reads.
+/// The kind of a mistake.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum MistakeKind {
-    /// A unit: the true reading is this many times the one that was read, and the ratio is that of the units named.
+    /// A wrong unit: the true value is this factor times the reading; the text names the pair of units with this ratio.
     Unit(f64, &'static str),
-    /// Its sign.
+    /// The wrong sign.
     Sign,
-    /// It is counted from the other end of the stroke, which comes to the sum of its smallest and its largest reading, m.
+    /// Counted from the other end of the stroke; the sum of the smallest and the largest reading, m.
     OtherEnd(f64),
-    /// It counts from vacuum and is so many Pa too much; negative where the others do.
+    /// Absolute pressure, too high by this many Pa; negative where the others are absolute.
     Absolute(f64),
 }
 
 /// A mistake in one column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mistake {
-    /// Which.
+    /// The column.
     pub column: Column,
-    /// What.
+    /// The kind of mistake.
     pub wrong: MistakeKind,
 }
 
 impl Mistake {
-    /// The true reading of its column.
+    /// The true value for a reading.
     #[must_use]
     pub fn corrected(&self, read: f64) -> f64 {
         match self.wrong {
@@ -70,7 +70,7 @@ impl Mistake {
         row
     }
 
-    /// Makes it good in a whole recording.
+    /// Corrects a whole recording.
     pub(in crate::recording) fn correct(&self, recording: &mut Recording) {
         let column = match self.column {
             Column::Pressure => Some(&mut recording.pressure),
@@ -91,24 +91,24 @@ impl Mistake {
                     format!("1/{} of", ratio(1.0 / factor))
                 };
                 format!(
-                    "its {column} would fit theirs at {times} what was read, the ratio of {units}: put the unit that was logged into the \
-                     column's name"
+                    "its {column} agrees with theirs at {times} the reading, the ratio of {units}: put the logged unit into the column's \
+                     name"
                 )
             }
             MistakeKind::Sign => format!(
-                "its {column} would fit theirs with the other sign: mend the sign, or give scale = -1 in an import description"
+                "its {column} agrees with theirs with the opposite sign: correct the sign, or give scale = -1 in an import description"
             ),
             MistakeKind::OtherEnd(_) => format!(
-                "its {column} would fit theirs counted from the other end: positive is a muscle that shortens; mend it, or give \
+                "its {column} agrees with theirs when counted from the other end: contraction is positive; correct it, or give \
                  positive = \"extension\" in an import description"
             ),
             MistakeKind::Absolute(atmosphere) if atmosphere > 0.0 => format!(
-                "its {column} would fit theirs less one atmosphere: gauge pressure is wanted, not absolute; take 101.3 kPa off, or give \
-                 an offset in an import description"
+                "its {column} agrees with theirs minus one atmosphere: it seems to be absolute; subtract 101.3 kPa for gauge pressure, or \
+                 give an offset in an import description"
             ),
             MistakeKind::Absolute(_) => format!(
-                "its {column} would fit theirs with one atmosphere more: theirs seems to be absolute; gauge pressure is wanted, take \
-                 101.3 kPa off there, or give an offset in an import description"
+                "its {column} agrees with theirs plus one atmosphere: theirs seem to be absolute; subtract 101.3 kPa there for gauge \
+                 pressure, or give an offset in an import description"
             ),
         }
     }
@@ -116,7 +116,7 @@ impl Mistake {
 
 /// One standard atmosphere, Pa.
 pub(super) const ATMOSPHERE: f64 = 101_325.0;
-/// Ratios of units that laboratories mix up: the unit read as another, and by what its readings are too small then.
+/// Ratios of units that are easily confused: the factor, and the pair of units.
 const PRESSURES: [(f64, &str); 6] = [
     (6.894_757, "psi to kPa"),
     (10.0, "MPa to bar, or kPa to mbar"),
@@ -138,7 +138,7 @@ const FORCES: [(f64, &str); 4] = [
     (1000.0, "kN to N, or N to mN"),
 ];
 
-/// All that is tried of a recording.
+/// All mistakes to try on a recording.
 pub(super) fn mistakes(rows: &[Row]) -> impl Iterator<Item = Mistake> {
     let scaled = |column: Column, ratios: &'static [(f64, &'static str)]| {
         ratios.iter().flat_map(move |(ratio, units)| {

@@ -110,14 +110,14 @@ fn what_is_no_known_mistake_is_not_called_one() {
 }
 
 #[test]
-fn what_stands_apart_is_told_with_what_to_do() {
+fn an_inconsistent_recording_is_reported_with_the_remedy() {
     let campaign = Campaign::new(spoiled(3, Column::Pressure, |p| p / PSI));
     let screened = crate::recording::dropouts::Screened::of(&campaign);
     let said = screened.remark().expect("a remark");
     for part in [
-        "`d` stands apart",
-        "its 240 rows are left out",
-        "6.89 times what was read",
+        "`d` is inconsistent",
+        "its 240 rows are excluded",
+        "6.89 times the reading",
         "psi to kPa",
         "column's name",
     ] {
