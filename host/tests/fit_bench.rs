@@ -291,7 +291,8 @@ fn a_length_that_was_not_recorded_comes_from_the_others() {
             lengths.iter().enumerate().filter(|(i, _)| *i != left_out).map(|(_, l)| &l.2).collect();
         let clip = own.solution.problem.clips.0.map(|c| c.force);
         let percent = |from: &[&Fit]| {
-            let carried = predict_unseen_length(from, campaign, &description(spec), clip).expect("a prediction");
+            let carried =
+                predict_unseen_length(from, campaign, &description(spec), clip).expect("a prediction");
             (100.0 * carried.score.mean() / own.summary.blocked_force_N, carried.end_effect)
         };
         let (all, end_effect) = percent(&others);

@@ -142,8 +142,13 @@ fn the_raw_files_of_the_thesis_give_the_same_table() {
     assert_eq!(known.summary.samples, own.summary.samples);
     let (a, b) = (known.summary.deadband_kPa, own.summary.deadband_kPa);
     assert!((a - b).abs() < 0.02, "P0 {a} and {b} kPa");
-    for (level, (p, q)) in
-        own.solution.problem.pressures.levels.iter().zip(known.summary.pressures.iter().zip(&own.summary.pressures))
+    for (level, (p, q)) in own
+        .solution
+        .problem
+        .pressures
+        .levels
+        .iter()
+        .zip(known.summary.pressures.iter().zip(&own.summary.pressures))
     {
         assert!((p.k_F - q.k_F).abs() < 1e-4, "k_F {} and {}", p.k_F, q.k_F);
         for i in 0..=20 {

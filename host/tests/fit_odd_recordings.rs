@@ -9,9 +9,9 @@ use std::f64::consts::PI;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Reader, Recording};
 use pam_diagnose::diagnose;
-use pam_fit::{Fit, Options, fit};
 use pam_fit::predict::{predict, to_csv};
 use pam_fit::table_file::{About, TableFile};
+use pam_fit::{Fit, Options, fit};
 
 const REST: f64 = 39.16e-3;
 const DEADBAND: f64 = 76.5e3;

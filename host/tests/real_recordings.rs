@@ -10,8 +10,8 @@ use pam_data::recording::dropouts::Screened;
 use pam_data::recording::segment::Motion;
 use pam_data::recording::{Campaign, Clock, Import, Reader};
 use pam_evaluate::length_transfer::predict_unseen_length;
-use pam_fit::pressures;
 use pam_fit::points;
+use pam_fit::pressures;
 use pam_fit::{Options, fit};
 
 fn project() -> PathBuf {

@@ -21,10 +21,13 @@ const CONTRACTION: f64 = 0.5;
 #[inline]
 pub fn pressure(pascals: f64) -> Result<()> {
     if pascals < PRESSURE.0 || pascals > PRESSURE.1 {
-        return Err(Error::new(DataCode::RecordingOutOfRange, "pressure outside the range of pneumatic muscles")
-            .column("pressure")
-            .value(format!("{} kPa", pascals / 1e3))
-            .help("check the unit in the column's name; gauge pressure is never below -101 kPa"));
+        return Err(Error::new(
+            DataCode::RecordingOutOfRange,
+            "pressure outside the range of pneumatic muscles",
+        )
+        .column("pressure")
+        .value(format!("{} kPa", pascals / 1e3))
+        .help("check the unit in the column's name; gauge pressure is never below -101 kPa"));
     }
     Ok(())
 }

@@ -1,8 +1,8 @@
-//! Numbers of things in words.
+//! Counts with the singular or plural of a noun.
 
 use std::fmt::Display;
 
-/// One thing, or several: the word is that for one, in a language that adds an s.
+/// A count with its noun, given in the singular; the plural adds an s.
 ///
 /// ```
 /// use pam_data::pluralise::pluralise;

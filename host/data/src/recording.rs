@@ -31,7 +31,7 @@ mod read;
 pub mod segment;
 mod source;
 mod stroke_zero;
-pub mod unit_check;
+mod unit_check;
 
 pub use campaign::{Campaign, Clock};
 pub use columns::Recording;

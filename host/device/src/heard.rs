@@ -5,8 +5,8 @@ use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 
 use super::Port;
 use crate::error::DeviceCode;
-use pam_data::pluralise::pluralise;
 use pam_data::error::Error;
+use pam_data::pluralise::pluralise;
 
 /// What came before any hello, to tell a silent line from a foreign peer.
 #[derive(Default)]

@@ -23,9 +23,9 @@ pub use part::rescue;
 use self::mcap::Encoder;
 use self::part::{Part, part_of};
 use super::words;
-use pam_data::pluralise::pluralise;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::write_whole;
+use pam_data::pluralise::pluralise;
 
 /// Time between two pieces: what a killed program may lose.
 const PIECE: Duration = Duration::from_millis(100);

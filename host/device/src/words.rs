@@ -6,8 +6,8 @@ use model_core::link::messages::{
 };
 
 use crate::error::DeviceCode;
-use pam_data::pluralise::pluralise;
 use pam_data::error::Error;
+use pam_data::pluralise::pluralise;
 
 /// A fault as a person reads it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

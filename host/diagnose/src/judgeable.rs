@@ -25,8 +25,11 @@ pub(super) fn blocked_force(rows: &Rows) -> f64 {
 pub(super) fn cannot_be_judged(rows: &Rows, blocked: f64) -> Option<String> {
     let effective = rows.effective();
     if effective < FEWEST_ROWS {
-        let usable =
-            if effective == 0 { "no row".to_owned() } else { format!("only {}", pluralise(effective, "row")) };
+        let usable = if effective == 0 {
+            "no row".to_owned()
+        } else {
+            format!("only {}", pluralise(effective, "row"))
+        };
         return Some(format!(
             "{usable} can be used (direction known, muscle not slack); {FEWEST_ROWS} is the least"
         ));

@@ -10,9 +10,9 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Campaign;
 use pam_data::recording::dropouts::Screened;
 use pam_fit::bench::Candidate;
-use pam_fit::{Options as FitOptions, fit};
 use pam_fit::predict::predict;
 use pam_fit::table_file::{About, Correction, TableFile};
+use pam_fit::{Options as FitOptions, fit};
 
 /// A refitted table file and how well it does on the recordings.
 #[derive(Clone, Debug)]

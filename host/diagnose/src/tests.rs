@@ -14,9 +14,9 @@ use super::verdict::Verdict;
 use super::{Diagnosis, Options, diagnose, model};
 use pam_data::muscle_description::{Kind, MuscleDescription};
 use pam_data::recording::{Campaign, Recording};
-use pam_fit::{Options as FitOptions, fit};
 use pam_fit::predict::predict;
 use pam_fit::table_file::TableFile;
+use pam_fit::{Options as FitOptions, fit};
 
 fn one_bladder() -> MuscleTable {
     let mut one_bladder = table::example();

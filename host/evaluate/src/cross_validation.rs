@@ -159,7 +159,8 @@ pub fn cross_validate(
     let whole = fit(campaign, muscle, options)?;
     let clip = whole.solution.problem.clips.0.map(|c| c.force);
     let blocked = f64::from(whole.table.blocked_force.newtons());
-    let mut out = CrossValidation { table: Score::default(), published: None, spots: Vec::new(), blocked, whole };
+    let mut out =
+        CrossValidation { table: Score::default(), published: None, spots: Vec::new(), blocked, whole };
     let mut reference = Score::default();
     let mut tally = Tally::default();
     for value in &values {

@@ -79,7 +79,8 @@ pub fn predict_unseen_length(
     muscle: &MuscleDescription,
     clip: Option<f64>,
 ) -> Result<LengthTransfer> {
-    let pressure = others.iter().map(|f| f.solution.problem.points.pressure.high).fold(f64::INFINITY, f64::min);
+    let pressure =
+        others.iter().map(|f| f.solution.problem.points.pressure.high).fold(f64::INFINITY, f64::min);
     let of = |f: &&Fit| {
         let geometry = &f.solution.problem.geometry;
         (geometry.rest_length.metres(), f.solution.blocked(pressure), geometry.outer_diameter.metres())

@@ -20,6 +20,8 @@
 //! # Ok::<(), pam_data::error::Error>(())
 //! ```
 
+#![warn(unreachable_pub)]
+
 pub mod cross_validation;
 pub mod length_transfer;
 pub mod published;

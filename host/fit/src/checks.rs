@@ -1,13 +1,13 @@
-//! Checks of the bench without its muscle: each instrument against something known.
+//! Checks of the bench without its muscle: each instrument against a reference.
 //!
 //! ```text
 //! dead weights      F_read = (1 + γ) (W + c P) + o        known weights W on the cell, line vented and under pressure P
 //! rigid bar         x_read = x_bar − δ − F/K − b/2·sign F a bar in the muscle's place, pulled and pushed
 //! reference gauge   P_read = (1 + ν) P + q                a better gauge beside the bench's own
 //! ```
-//! Loops of a muscle hardly tell a wrong scale of the cell from a wrong scale of the gauge, a frame that gives from a braid that
-//! stretches: more than nine tenths of such a trace lie in the tables. A minute with a weight tells. What a check measures is known
-//! before anything is fitted: readings are freed of it, and no other recording has to explain it.
+//! Loops of a muscle hardly separate a gain error of the load cell from one of the pressure sensor, or the compliance of the frame from
+//! that of the braid: the table absorbs more than nine tenths of such an error. A check of one minute with a weight measures it. The
+//! recordings are corrected for measured faults before the fit.
 //!
 //! A check is a table like a recording, with the known quantity in a column whose name begins with `reference_`:
 //!
@@ -104,8 +104,8 @@ impl Checks {
     }
 }
 
-/// The recordings as a bench without these faults would have read them: the inverse of the readings above, exactly. A play is left
-/// in: how it shows in a loop depends on when the joint unloads.
+/// The recordings as a bench without these faults would have read them: the exact inverse of the equations above. Backlash is not
+/// corrected: its effect depends on when the joint unloads.
 #[must_use]
 pub fn freed(campaign: &Campaign, faults: &[Measured]) -> Campaign {
     let of = |name: BenchName, at: usize| -> f64 {

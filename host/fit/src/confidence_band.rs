@@ -91,7 +91,7 @@ impl ConfidenceBand {
 
     /// The standard deviation of a single reading where that of the force is `std`, both in N.
     #[must_use]
-    pub fn with_scatter(&self, std: f64) -> f64 {
+    pub(crate) fn with_scatter(&self, std: f64) -> f64 {
         std.hypot(self.residual)
     }
 }

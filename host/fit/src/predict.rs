@@ -40,7 +40,7 @@ pub struct Predicted {
     /// The force that the load cell would read, N, per row.
     pub force: Vec<f64>,
     /// Root mean square of `F − F_model` over rows without sensor failures, N; `None` without a force column, and where the whole
-    /// recording is in another unit than the others ([`pam_data::recording::unit_check`]).
+    /// recording is in another unit than the others ([`pam_data::recording::dropouts`]).
     pub rms: Option<f64>,
     /// The uncertainty, where it was requested and the table holds it.
     pub bands: Option<Bands>,

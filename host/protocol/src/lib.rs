@@ -195,7 +195,9 @@ impl Protocol {
                         || !not_negative(*settle_s)
                         || rate_kpa_s.is_some_and(|r| !positive(r))
                     {
-                        return bad("pressure and settling time must not be negative, and the rate must be above zero");
+                        return bad(
+                            "pressure and settling time must not be negative, and the rate must be above zero",
+                        );
                     }
                 }
                 Step::Move { to, speed_mm_s } | Step::Cycles { to, speed_mm_s, .. } => {

@@ -11,8 +11,8 @@ mod view;
 use super::{Page, Section, Tone, figures, fixed};
 use pam_data::pluralise::pluralise;
 use pam_data::recording::Campaign;
-use pam_fit::Options;
 use pam_fit::Fit;
+use pam_fit::Options;
 use view::View;
 
 /// Error below which a table is called good, percent of blocked force; the thesis reaches a fifth of it.

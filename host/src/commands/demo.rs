@@ -23,8 +23,8 @@ use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::recorder::{Recorder, about_losses, about_start};
 use pam_device::{Client, regulator, tables};
 use pam_fit::Fit;
-use pam_fit::{Options, fit};
 use pam_fit::predict::predict;
+use pam_fit::{Options, fit};
 
 use crate::progress::ProgressLine;
 use pam_data::recording::{Campaign, Reader};

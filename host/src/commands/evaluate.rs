@@ -14,8 +14,8 @@ use pam_data::progress::Progress;
 use pam_evaluate::cross_validation::{CrossValidation, Score, Split, Spot, cross_validate};
 use pam_evaluate::length_transfer::{LengthTransfer, predict_unseen_length};
 use pam_evaluate::published::Published;
-use pam_fit::Options;
 use pam_fit::Fit;
+use pam_fit::Options;
 
 use crate::progress::ProgressLine;
 use pam_data::recording::{Campaign, Reader};

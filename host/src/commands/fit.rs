@@ -8,11 +8,11 @@ use clap::Args;
 use super::recordings::Recordings;
 use super::reports::Reports;
 use crate::console::Console;
-use pam_data::pluralise::pluralise;
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::{to_standard_output, write_whole};
+use pam_data::pluralise::pluralise;
 use pam_fit::{Options, fit_with_progress};
 
 use crate::progress::ProgressLine;

@@ -7,9 +7,9 @@ use serde_json::json;
 
 use super::recordings::Recordings;
 use crate::console::Console;
-use pam_data::pluralise::pluralise;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::{to_standard_output, write_whole};
+use pam_data::pluralise::pluralise;
 use pam_data::recording::Reader;
 use pam_fit::predict::{predict_with_bands, to_csv};
 use pam_fit::table_file::TableFile;

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::console::Console;
-use pam_data::pluralise::pluralise;
 use pam_data::error::Result;
 use pam_data::output::write_whole;
+use pam_data::pluralise::pluralise;
 use pam_report::Page;
 
 /// What to write of a report.

@@ -11,8 +11,8 @@ use serde_json::{Value, json};
 
 use super::port::PortOption;
 use crate::console::Console;
-use pam_data::pluralise::pluralise;
 use pam_data::error::{DataCode, Error, Result};
+use pam_data::pluralise::pluralise;
 use pam_data::progress::Progress;
 use pam_device::course::{Course, Quantity};
 use pam_device::error::DeviceCode;

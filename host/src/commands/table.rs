@@ -7,9 +7,9 @@ use model_core::muscle::Muscle;
 use serde_json::{Value, json};
 
 use crate::console::Console;
-use pam_data::pluralise::pluralise;
 use pam_data::error::Result;
 use pam_data::output::{json_of, printed, to_standard_output, write_whole};
+use pam_data::pluralise::pluralise;
 use pam_fit::table_export::{self, Format};
 use pam_fit::table_file::TableFile;
 

@@ -14,8 +14,8 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::write_whole;
 use pam_data::recording::{Campaign, Reader, Recording};
-use pam_fit::{Options, fit};
 use pam_fit::table_file::{self, About, TableFile};
+use pam_fit::{Options, fit};
 use pam_report::{diagnose_page, fit_page};
 
 /// Points of a curve that are sent to the page.

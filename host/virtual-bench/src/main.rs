@@ -117,8 +117,9 @@ fn main() -> ExitCode {
 }
 
 fn muscle(name: &str) -> Result<virtual_bench::muscle::MuscleSpec, Box<dyn Error>> {
-    presets::by_name(name)
-        .ok_or_else(|| format!("unknown muscle \"{name}\": choose mini, contractile, push or random:SEED").into())
+    presets::by_name(name).ok_or_else(|| {
+        format!("unknown muscle \"{name}\": choose mini, contractile, push or random:SEED").into()
+    })
 }
 
 fn write(dir: &Path, name: &str, text: &str) -> Result<(), Box<dyn Error>> {

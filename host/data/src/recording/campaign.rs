@@ -30,7 +30,7 @@ impl Campaign {
     /// Decides from the times whether the clock is shared, and puts recordings with a shared clock into order.
     ///
     /// With one clock no two recordings overlap. They are sorted by time then, because a shell lists `run10` before `run2`.
-    /// Recordings that overlap cannot share a clock; their given order stands.
+    /// Recordings that overlap cannot share a clock; they keep the given order.
     #[must_use]
     pub fn new(mut recordings: Vec<Recording>) -> Self {
         let mut warnings = Vec::new();

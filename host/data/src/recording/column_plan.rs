@@ -12,7 +12,7 @@ use crate::error::{DataCode, Error, Result, nearest};
 pub(super) enum Role {
     /// A quantity in SI.
     Quantity(Quantity),
-    /// A quantity given in words, with what each word stands for (in SI).
+    /// A quantity given as words, with the value of each word in SI units.
     Coded(Quantity, BTreeMap<String, f64>),
     /// The n-th column that sets recordings apart.
     Split(usize),

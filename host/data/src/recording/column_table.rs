@@ -21,7 +21,7 @@ pub(super) enum Column {
     Other(String),
 }
 
-/// A failure inside a container, in the words of whoever read it.
+/// An error inside a binary file, with the reader's message.
 pub(super) fn damaged(what: impl std::fmt::Display) -> Error {
     Error::new(DataCode::RecordingContainer, what.to_string())
 }

@@ -32,7 +32,7 @@ pub struct Recording {
     pub pressure_command: Option<Vec<f64>>,
     /// Number of the cycle, as the file counts them.
     pub cycle: Option<Vec<u32>>,
-    /// Which way the bench drove the muscle, where the file says so: 1 shortening or filling, −1 lengthening or emptying,
+    /// The direction of the bench, where the file has that column: 1 shortening or filling, −1 lengthening or emptying,
     /// 0 unknown.
     pub direction: Option<Vec<i8>>,
 }
@@ -52,7 +52,7 @@ impl Recording {
 
     /// Whether two recordings were measured as one: the same numbers in every row, whatever they are called.
     #[must_use]
-    pub fn same_rows(&self, other: &Self) -> bool {
+    pub(crate) fn same_rows(&self, other: &Self) -> bool {
         !self.is_empty()
             && self.time == other.time
             && self.stroke == other.stroke

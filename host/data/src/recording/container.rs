@@ -20,7 +20,7 @@ pub(super) enum Container {
 
 impl Container {
     /// Recognises a container by its first bytes. An HDF5 file may begin with 512 bytes of the user's own; MATLAB's says so.
-    pub fn of(magic: &[u8]) -> Option<Self> {
+    pub(super) fn of(magic: &[u8]) -> Option<Self> {
         if magic.starts_with(b"MATLAB 5.0 MAT-file") {
             Some(Self::Matlab5)
         } else if magic.starts_with(b"MATLAB 7.3 MAT-file") || magic.starts_with(b"\x89HDF\r\n\x1a\n") {

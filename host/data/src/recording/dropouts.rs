@@ -40,7 +40,7 @@ pub struct Screened<'a> {
     /// factor, or the line from the reading before to the reading after).
     pub campaign: Cow<'a, Campaign>,
     /// Whole recordings with another unit, sign or zero than the others, in order.
-    pub inconsistent: Vec<InconsistentRecording>,
+    inconsistent: Vec<InconsistentRecording>,
     /// The drop-outs, in order.
     pub dropouts: Vec<Dropout>,
 }
@@ -104,7 +104,11 @@ impl<'a> Screened<'a> {
     #[must_use]
     pub fn remark(&self) -> Option<String> {
         let inconsistent = self.inconsistent.iter().take(LISTED).map(|a| self.describe_inconsistent(a));
-        let more = self.inconsistent.len().checked_sub(LISTED + 1).map(|n| format!("{} more recordings are inconsistent", n + 1));
+        let more = self
+            .inconsistent
+            .len()
+            .checked_sub(LISTED + 1)
+            .map(|n| format!("{} more recordings are inconsistent", n + 1));
         let parts: Vec<String> = inconsistent.chain(more).chain(self.remark_on_dropouts()).collect();
         (!parts.is_empty()).then(|| parts.join(". "))
     }

@@ -19,7 +19,7 @@ pub(super) struct Header {
 }
 
 impl Header {
-    pub fn read(text: &[u8], import: &Import) -> Result<Self> {
+    pub(super) fn read(text: &[u8], import: &Import) -> Result<Self> {
         let comment = import.comment.and_then(|c| u8::try_from(c).ok());
         let mut bytes = 0;
         let mut lines = 0;
@@ -96,7 +96,7 @@ impl Header {
     }
 
     /// For streams of unknown size: none; the estimate is only for reserving memory.
-    pub fn average_line(&self, rest: &[u8]) -> Option<u64> {
+    pub(super) fn average_line(&self, rest: &[u8]) -> Option<u64> {
         (rest.len() < 65_536).then_some(rest.len() as u64)
     }
 }

@@ -104,7 +104,7 @@ pub enum FoundZero {
 pub struct Column {
     /// The column of the file or of the lookup table.
     pub column: ColumnRef,
-    /// The unit after scale and offset; by default what the column's name says, or SI.
+    /// The unit after scale and offset; by default that of the column's name, or SI.
     pub unit: Option<String>,
     /// Value in `unit` = cell · scale + offset.
     #[serde(default = "one")]

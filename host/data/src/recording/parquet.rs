@@ -1,7 +1,7 @@
 //! Parquet files: flat columns of numbers and of text.
 //!
 //! A column's physical type says how its values are stored, its logical type what they mean: a time of day is stored as an
-//! integer, and must not be taken for seconds. What is no plain number is told where it is asked for.
+//! integer, and must not be taken for seconds. A column that is not numeric is an error only where it is needed.
 
 use std::fs::File;
 
@@ -18,7 +18,7 @@ use crate::error::Result;
 /// Rows taken at a time.
 const BATCH: usize = 1 << 16;
 
-/// The columns of a file. A missing value becomes NaN, or an empty text, so that it is told where it is needed.
+/// The columns of a file. A missing value becomes NaN, or an empty text, and is an error only where it is needed.
 pub(super) fn columns(file: File) -> Result<ColumnTable> {
     let reader = SerializedFileReader::new(file).map_err(damaged)?;
     let about = reader.metadata().file_metadata();

@@ -4,13 +4,13 @@ use super::columns::Recording;
 use crate::error::{DataCode, Error, Result};
 use crate::physical_limits;
 
-/// Metres as millimetres to the micrometre: what arithmetic leaves beyond that nobody measured.
+/// Metres as millimetres, rounded to a micrometre: further digits are rounding errors.
 fn millimetres(metres: f64) -> f64 {
     let micrometres = (metres * 1e6).round();
     if micrometres.is_finite() { micrometres / 1e3 } else { metres * 1e3 }
 }
 
-/// Where more than one row in so many repeats the time of the one before, it is the clock's way.
+/// Where more than one row in this many repeats the time of the row before, the clock is too coarse.
 const COARSE: usize = 20;
 
 /// The checks that a single cell does not show.

@@ -332,7 +332,7 @@ fn rows_error(error: RowsError, header: &Header, import: &Import) -> Error {
     }
 }
 
-/// What is constant over a file and stands in its name or above its table.
+/// Values that are constant over a file, from its name or the lines above its table.
 #[derive(Default)]
 struct Constants {
     quantities: Vec<(String, f64)>,

@@ -62,7 +62,7 @@ pub(super) fn open(path: &Path, progress: Option<&Arc<dyn Progress>>) -> Result<
     Ok(Source { reader: Box::new(io::Cursor::new(magic.clone()).chain(counted(file))), size: None, magic })
 }
 
-/// A file that tells how far it is read.
+/// A file that reports the progress of reading.
 struct Counted {
     file: File,
     progress: Option<Arc<dyn Progress>>,
@@ -169,7 +169,7 @@ pub(super) fn check_text(first: &[u8]) -> Result<usize> {
 mod tests {
     use super::*;
 
-    /// Gives so many bytes at a time.
+    /// Returns at most a given number of bytes per call.
     struct Slowly(Vec<u8>, usize);
 
     impl Read for Slowly {

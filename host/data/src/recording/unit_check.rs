@@ -12,23 +12,23 @@ mod consensus_surface;
 mod mistake;
 
 use consensus_surface::{ConsensusSurface, FAR_OFF, Row};
-pub use mistake::{Column, Mistake, MistakeKind};
+use mistake::Mistake;
 
 /// A recording that is inconsistent with the others, and its mistake.
 #[derive(Debug, Clone, PartialEq)]
-pub struct InconsistentRecording {
+pub(crate) struct InconsistentRecording {
     /// Index of the recording in the campaign.
-    pub recording: usize,
+    pub(crate) recording: usize,
     /// The mistake whose correction makes it agree.
-    pub mistake: Mistake,
+    pub(crate) mistake: Mistake,
     /// Another mistake that explains it about as well.
-    pub or: Option<Mistake>,
+    pub(crate) or: Option<Mistake>,
 }
 
 impl InconsistentRecording {
     /// The mistake and the remedy, in words.
     #[must_use]
-    pub fn describe(&self) -> String {
+    pub(crate) fn describe(&self) -> String {
         let or = self.or.map_or(String::new(), |m| format!("; or {}", m.describe()));
         self.mistake.describe() + &or
     }
@@ -57,7 +57,7 @@ struct Sample {
 
 /// The recordings of a campaign that are inconsistent with the others, in order.
 #[must_use]
-pub fn inconsistent_recordings(campaign: &Campaign) -> Vec<InconsistentRecording> {
+pub(crate) fn inconsistent_recordings(campaign: &Campaign) -> Vec<InconsistentRecording> {
     let long_enough = |r: &Recording| r.force.is_some() && r.len() >= LEAST_ROWS;
     let count = campaign.recordings.iter().filter(|r| long_enough(r)).count();
     if count < LEAST_RECORDINGS {

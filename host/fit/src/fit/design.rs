@@ -267,7 +267,7 @@ impl Design {
 
     /// `ẽ_1 … ẽ_M` at a bin.
     #[must_use]
-    pub fn reduced_at<'a>(&self, bin: u32, curves: &'a Curves) -> &'a [f64] {
+    pub(crate) fn reduced_at<'a>(&self, bin: u32, curves: &'a Curves) -> &'a [f64] {
         &curves.values[bin as usize * (curves.order + 1)..][..curves.order]
     }
 

@@ -1,4 +1,4 @@
-//! What a tape measure and a data sheet leave open about a muscle: the unknowns, how well each is known beforehand, its bounds.
+//! The dimensions of a muscle that can be fitted together with the table: the unknowns, their priors, their bounds.
 //!
 //! | unknown | prior (one standard deviation) | bounds |
 //! | --- | --- | --- |
@@ -8,7 +8,7 @@
 //! | length of a mounting (a stroke held through whole recordings) | 0.5 mm | ± 1 mm |
 //!
 //! The diameter scales the force and the angle bends it over contraction, so blocked forces at several lengths determine
-//! both. The wall only scales the elastic part, which the `E_k` scale too: it stays where its prior has it, and says so.
+//! both. The wall only scales the elastic part, which the `E_k` scale too: it stays near its prior, and is reported as undetermined.
 
 use model_core::braid::Geometry;
 use model_core::units::{Angle, Length};

@@ -17,7 +17,7 @@ use super::solution::Solution;
 
 /// A residual, of one row or of the mean of several.
 #[derive(Debug, Clone, Copy)]
-pub struct Sample {
+pub(crate) struct Sample {
     /// Chunk and branch of the sample.
     pub place: Place,
     /// The residual `F − F_model`, N.
@@ -28,7 +28,7 @@ pub struct Sample {
 
 /// Errors of one group of chunks.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Errors {
+pub(crate) struct Errors {
     /// Mean absolute error over chunks, percent of blocked force.
     pub mean: f64,
     /// Largest absolute error of a chunk, percent of blocked force.
@@ -50,7 +50,7 @@ pub struct ChunkError {
 
 /// The error of every chunk.
 #[must_use]
-pub fn by_chunk(samples: impl IntoIterator<Item = Sample>) -> Vec<ChunkError> {
+pub(crate) fn by_chunk(samples: impl IntoIterator<Item = Sample>) -> Vec<ChunkError> {
     cut(samples.into_iter().map(|s| (s.place, [s.residual, s.blocked])))
         .into_iter()
         .filter_map(|chunk| {
@@ -65,7 +65,7 @@ pub fn by_chunk(samples: impl IntoIterator<Item = Sample>) -> Vec<ChunkError> {
 }
 
 /// Errors by eq. 24 of points that took part and that `take` accepts.
-pub fn chunks(solution: &Solution, residuals: &[f64], take: impl Fn(u32) -> bool) -> Vec<ChunkError> {
+pub(crate) fn chunks(solution: &Solution, residuals: &[f64], take: impl Fn(u32) -> bool) -> Vec<ChunkError> {
     let samples = solution.counted_points().filter(|(_, place)| take(place.group)).map(|(i, place)| Sample {
         place,
         residual: residuals[i],
@@ -76,7 +76,7 @@ pub fn chunks(solution: &Solution, residuals: &[f64], take: impl Fn(u32) -> bool
 
 /// Mean and largest error of chunks that `take` accepts.
 #[must_use]
-pub fn errors(chunks: &[ChunkError], take: impl Fn(&ChunkError) -> bool) -> Errors {
+pub(crate) fn errors(chunks: &[ChunkError], take: impl Fn(&ChunkError) -> bool) -> Errors {
     let mut e = Errors::default();
     for c in chunks.iter().filter(|c| take(c)) {
         e.mean += c.percent.abs();

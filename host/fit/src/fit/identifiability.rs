@@ -77,7 +77,7 @@ const CORRELATED: f64 = 0.9;
 
 /// Every `E_k` and `k_F` whose 95 % interval contains zero, with the reason.
 #[must_use]
-pub fn not_determined(solution: &Solution, root: &CovarianceRoot) -> Vec<NotDetermined> {
+pub(crate) fn not_determined(solution: &Solution, root: &CovarianceRoot) -> Vec<NotDetermined> {
     let levels = &solution.problem.pressures.levels;
     let table = table_root(solution, root, levels);
     let at: Vec<Correlations> = levels.iter().map(|p| Correlations::at(solution, root, *p)).collect();

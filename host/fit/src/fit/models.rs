@@ -33,10 +33,10 @@ use super::solution::Solution;
 use crate::numerics::least_squares::least_squares;
 
 /// Young's modulus of the thesis's silicone, Pa; the default where the description gives none.
-pub const THESIS_MODULUS: f64 = 1.75e6;
+pub(crate) const THESIS_MODULUS: f64 = 1.75e6;
 
 /// A fitted constant: its name, the index of its pressure (`None` for all pressures), its value in SI units.
-pub type Constant = (String, Option<u32>, f64);
+pub(crate) type Constant = (String, Option<u32>, f64);
 
 /// A model evaluated on the mid-lines.
 #[derive(Debug, Clone, PartialEq)]
@@ -241,7 +241,7 @@ fn with_friction(solution: &Solution, mid: &[MidPoint], m4: Model) -> Model {
 
 /// `V_B d⟨(I_1 − 3)^i⟩/dΔL` for i = 1, 2, 3, m²: what a hyperelastic constant of 1 Pa pushes with, N.
 #[must_use]
-pub fn wall_columns(geometry: &Geometry, braid: &Braid<f64>, stroke: f64) -> [f64; 3] {
+pub(crate) fn wall_columns(geometry: &Geometry, braid: &Braid<f64>, stroke: f64) -> [f64; 3] {
     // Central differences of a smooth function at 10⁻⁵ of its scale: nine digits.
     let h = 1e-5 * braid.rest_length();
     let (after, before) = (invariants(geometry, braid, stroke + h), invariants(geometry, braid, stroke - h));

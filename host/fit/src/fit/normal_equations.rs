@@ -146,7 +146,7 @@ impl Design {
 
     /// The normal equations of a stretch of points. `curves` are those of `parameters`.
     #[must_use]
-    pub fn normal_of(
+    pub(crate) fn normal_of(
         &self,
         rows: Range<usize>,
         parameters: &[f64],
@@ -162,7 +162,7 @@ impl Design {
 
     /// The normal equations of each group by itself.
     #[must_use]
-    pub fn normal_by_group(&self, parameters: &[f64], weights: &[f64]) -> Vec<NormalEquations> {
+    pub(crate) fn normal_by_group(&self, parameters: &[f64], weights: &[f64]) -> Vec<NormalEquations> {
         let mut normals = vec![NormalEquations::zeros(self.layout().len()); self.groups];
         for (bin, s) in self.sums(0..self.rows.len(), parameters, &self.curves(parameters), weights) {
             let bin = &self.bins[bin as usize];

@@ -12,7 +12,7 @@ use crate::numerics::median;
 ///
 /// Only points whose range is far above that of the others are examined row by row. Such rows beside a reversal belong to the other
 /// branch, as noise of the stroke hides a reversal by a row or two: they leave the mean too, but are not reported as outliers.
-pub fn despike(campaign: &Campaign, points: &mut Points) -> Vec<Outlier> {
+pub(super) fn despike(campaign: &Campaign, points: &mut Points) -> Vec<Outlier> {
     let mut spreads: Vec<f64> =
         points.list.iter().filter(|p| p.rows >= 3).map(|p| p.force_range.1 - p.force_range.0).collect();
     let typical = median(&mut spreads).max(4.0 * points.row_noise);

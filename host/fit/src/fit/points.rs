@@ -90,7 +90,7 @@ impl Points {
     /// How far single rows scatter about their point's mean, N, by the median: noise that is correlated over some rows shows here
     /// and not in `row_noise`. 0 where points hold too few rows to tell.
     #[must_use]
-    pub fn scatter_within(&self) -> f64 {
+    pub(crate) fn scatter_within(&self) -> f64 {
         // The range of n normal values is about 2 √(2 ln n) standard deviations.
         let deviation =
             |p: &Point| (p.force_range.1 - p.force_range.0) / (2.0 * (2.0 * f64::from(p.rows).ln()).sqrt());
@@ -99,7 +99,7 @@ impl Points {
 
     /// Whether a turn of the motion lies just before and just after a point.
     #[must_use]
-    pub fn beside_turn(&self, i: usize) -> (bool, bool) {
+    pub(crate) fn beside_turn(&self, i: usize) -> (bool, bool) {
         let here = &self.list[i];
         let turns = |there: Option<&Point>| there.is_some_and(|p| p.block != here.block);
         (turns(i.checked_sub(1).and_then(|k| self.list.get(k))), turns(self.list.get(i + 1)))
@@ -112,8 +112,7 @@ const AIM: usize = 16_000;
 const STROKE_STEP: f64 = 1.0 / 500.0;
 /// A piece ends after this share of the range of pressure.
 const PRESSURE_STEP: f64 = 1.0 / 100.0;
-/// Or after so many standard deviations of a single reading, where these are more: noise must not cut pieces short, or there would be
-/// as many points as rows.
+/// Or after this many standard deviations of a single reading, where that is more: otherwise noise would end a piece after every row.
 const NOISE_STEP: f64 = 6.0;
 
 /// Cuts a campaign into points; a dropout of the gauge shares none with what is beside it. `motions` are those of its recordings;

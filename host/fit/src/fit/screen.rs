@@ -15,7 +15,7 @@ pub enum PointUse {
     NearReversal,
     /// Excluded: the muscle is slack; the force stays at zero where the model would push.
     Slack,
-    /// Excluded: the force reading stands at the end of the sensor's range.
+    /// Excluded: the force reading is at the end of the sensor's range.
     Clipped,
     /// Excluded: the reading is far outside the scatter of the others.
     Outlier,

@@ -5,7 +5,7 @@ use super::screen::{PointUse, Screen};
 use super::smoothing::Smoothing;
 use super::weights::Weights;
 
-/// Finds where the muscle is slack: the force stands near zero where straight curves, fitted to the points that pull, would push.
+/// Finds where the muscle is slack: the force is near zero where straight curves, fitted to the points that pull, would push.
 /// Flexible curves would bend until they described slackness as elasticity.
 ///
 /// Returns the screen and the parameters of the straight curves; where too few points have a force near zero, both as they were.

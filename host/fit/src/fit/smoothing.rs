@@ -21,14 +21,14 @@ pub struct Smoothing {
 
 impl Smoothing {
     /// So stiff that the curves are straight lines.
-    pub const STRAIGHT: Self = Self { elastic: 1e4, friction: 1e4 };
+    pub(crate) const STRAIGHT: Self = Self { elastic: 1e4, friction: 1e4 };
     /// A start: flexible, yet bridges gaps between pressures.
     pub const START: Self = Self { elastic: 1e-3, friction: 1e-2 };
 }
 
 /// One tried pair of weights with its score.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Trial {
+pub(crate) struct Trial {
     /// The weights.
     pub smoothing: Smoothing,
     /// Mean weighted square error of left-out groups.
@@ -41,7 +41,7 @@ pub struct Trial {
 /// The first and the last pressure are predicted by continuation, which is another matter than prediction between pressures:
 /// they count only where there are too few others.
 #[must_use]
-pub fn choose(design: &Design, parameters: &[f64], weights: &[f64]) -> (Smoothing, Vec<Trial>) {
+pub(crate) fn choose(design: &Design, parameters: &[f64], weights: &[f64]) -> (Smoothing, Vec<Trial>) {
     let groups = design.normal_by_group(parameters, weights);
     let used: Vec<usize> = (0..groups.len()).filter(|g| groups[*g].weight > 0.0).collect();
     if used.len() < 3 {
@@ -86,7 +86,7 @@ pub fn choose(design: &Design, parameters: &[f64], weights: &[f64]) -> (Smoothin
 /// Chooses how strongly `E_k` are held constant over pressure, where pressure moved through a range and the muscle was slack
 /// at part of it: there a curve without data would run away.
 #[must_use]
-pub fn choose_level(design: &Design, parameters: &[f64], weights: &[f64]) -> f64 {
+pub(crate) fn choose_level(design: &Design, parameters: &[f64], weights: &[f64]) -> f64 {
     let candidates = [1e-4, 1e-3, 1e-2, 1e-1, 1.0];
     let groups = design.normal_by_group(parameters, weights);
     let used: Vec<usize> = (0..groups.len()).filter(|g| groups[*g].weight > 0.0).collect();

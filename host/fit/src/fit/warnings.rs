@@ -17,7 +17,7 @@ const ATMOSPHERE: f64 = 101_325.0;
 /// All warnings. `mean_error` is that of all mid-lines by eq. 24, `left_out` the error of each pressure predicted from the others; both
 /// in percent of blocked force.
 #[must_use]
-pub fn warnings(solution: &Solution, mean_error: f64, left_out: &[Option<f64>]) -> Vec<String> {
+pub(super) fn warnings(solution: &Solution, mean_error: f64, left_out: &[Option<f64>]) -> Vec<String> {
     let mut out = solution.warnings.clone();
     agreement(solution, mean_error, &mut out);
     amount(solution, &mut out);

@@ -4,10 +4,10 @@ use model_core::units::{Length, Pressure};
 
 use super::super::{Colour, figures, fixed};
 use pam_data::recording::Campaign;
-use pam_fit::confidence_band::{ConfidenceBand, HALF_95};
-use pam_fit::Point;
 use pam_fit::Fit;
+use pam_fit::Point;
 use pam_fit::PointUse;
+use pam_fit::confidence_band::{ConfidenceBand, HALF_95};
 use pam_fit::table_file::{About, TableFile};
 
 /// A fit, ready to be drawn.

@@ -7,8 +7,8 @@ use serde_json::json;
 
 use crate::commands::port::PortOption;
 use crate::console::Console;
-use pam_data::pluralise::pluralise;
 use pam_data::error::Result;
+use pam_data::pluralise::pluralise;
 use pam_device::{Client, Patience, Port, recorder, words};
 
 pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()> {

@@ -10,9 +10,9 @@ use serde_json::json;
 
 use crate::commands::port::PortOption;
 use crate::console::Console;
-use pam_data::pluralise::pluralise;
 use pam_data::error::{DataCode, Error, Result, nearest};
 use pam_data::output::write_whole;
+use pam_data::pluralise::pluralise;
 use pam_device::Client;
 use pam_device::error::DeviceCode;
 

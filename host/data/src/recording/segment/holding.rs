@@ -121,7 +121,7 @@ fn longest(
     while legs[*leg].end < start && *leg + 1 < legs.len() {
         *leg += 1;
     }
-    // The slower of the legs around it says how long the motion would take for this distance.
+    // The slower of the adjacent strokes determines how long the motion would take for this distance.
     let around = || legs[*leg..].iter().zip(&speeds[*leg..]).take_while(|(l, _)| l.start <= end).take(3);
     let slowest = around().map(|(_, speed)| *speed).fold(f64::INFINITY, f64::min);
     let shortest = around().map(|(l, _)| time[l.end] - time[l.start]).fold(f64::INFINITY, f64::min);
@@ -161,7 +161,7 @@ fn flat(smooth: &[f64], scale: &Scale) -> bool {
     let cut = smooth.len() / 20;
     let inner = &smooth[cut..smooth.len() - cut];
     let n = inner.len() as f64;
-    // Orthogonal polynomials on -1..1: the coefficient of each alone tells rise and bend.
+    // Orthogonal polynomials on -1..1: their coefficients are slope and curvature.
     let place = |i: usize| 2.0 * i as f64 / (n - 1.0) - 1.0;
     let mean_square = (0..inner.len()).map(|i| place(i).powi(2)).sum::<f64>() / n;
     let (mut pp, mut px, mut qq, mut qx) = (0.0, 0.0, 0.0, 0.0);

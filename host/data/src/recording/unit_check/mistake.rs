@@ -5,7 +5,7 @@ use crate::recording::Recording;
 
 /// The column with a mistake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Column {
+pub(crate) enum Column {
     /// Pressure.
     Pressure,
     /// Stroke.
@@ -17,7 +17,7 @@ pub enum Column {
 impl Column {
     /// Its name.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Pressure => "pressure",
             Self::Stroke => "stroke",
@@ -28,7 +28,7 @@ impl Column {
 
 /// The kind of a mistake.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum MistakeKind {
+pub(crate) enum MistakeKind {
     /// A wrong unit: the true value is this factor times the reading; the text names the pair of units with this ratio.
     Unit(f64, &'static str),
     /// The wrong sign.
@@ -41,17 +41,17 @@ pub enum MistakeKind {
 
 /// A mistake in one column.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mistake {
+pub(crate) struct Mistake {
     /// The column.
-    pub column: Column,
+    pub(crate) column: Column,
     /// The kind of mistake.
-    pub wrong: MistakeKind,
+    pub(crate) wrong: MistakeKind,
 }
 
 impl Mistake {
     /// The true value for a reading.
     #[must_use]
-    pub fn corrected(&self, read: f64) -> f64 {
+    pub(crate) fn corrected(&self, read: f64) -> f64 {
         match self.wrong {
             MistakeKind::Unit(factor, _) => read * factor,
             MistakeKind::Sign => -read,

@@ -1,4 +1,4 @@
-use super::mistake::ATMOSPHERE;
+use super::mistake::{ATMOSPHERE, Column, MistakeKind};
 use super::*;
 
 const PSI: f64 = 6.894_757;
