@@ -5,22 +5,22 @@
 use std::ffi::CString;
 use std::path::PathBuf;
 
-use pam_fit::confidence_band::{ConfidenceBand, HALF_95};
-use pam_data::date;
-use pam_data::pluralise::pluralise;
-use pam_diagnose as diagnosis;
-use pam_data::error::{DataCode, Error};
-use pam_fit::Options;
-use pam_fit::Fit as HostFit;
-use pam_data::muscle_description::{Kind, MuscleDescription};
-use pam_data::physical_limits::{self, Contractions};
-use pam_fit::predict::{Predicted, beyond, predict as host_predict, predict_with_bands};
-use pam_data::recording::{Campaign as HostCampaign, Import, Reader, Recording as HostRecording};
-use pam_report::{Page, diagnose_page, fit_page};
-use pam_fit::table_file::{self, About, TableFile};
 use model_core::muscle::Muscle as Model;
 use model_core::units::{Length, Pressure};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
+use pam_data::date;
+use pam_data::error::{DataCode, Error};
+use pam_data::muscle_description::{Kind, MuscleDescription};
+use pam_data::physical_limits::{self, Contractions};
+use pam_data::pluralise::pluralise;
+use pam_data::recording::{Campaign as HostCampaign, Import, Reader, Recording as HostRecording};
+use pam_diagnose as diagnosis;
+use pam_fit::Fit as HostFit;
+use pam_fit::Options;
+use pam_fit::confidence_band::{ConfidenceBand, HALF_95};
+use pam_fit::predict::{Predicted, beyond, predict as host_predict, predict_with_bands};
+use pam_fit::table_file::{self, About, TableFile};
+use pam_report::{Page, diagnose_page, fit_page};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyIndexError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
@@ -76,7 +76,8 @@ fn numbers<'py>(name: &str, values: &Bound<'py, PyAny>) -> PyResult<Bound<'py, P
     // numpy would drop the imaginary parts with no more than a warning.
     if numpy.call_method1("iscomplexobj", (values,))?.is_truthy()? {
         return Err(raised(
-            Error::new(DataCode::CallInvalid, format!("`{name}` holds complex numbers")).help("give its real part"),
+            Error::new(DataCode::CallInvalid, format!("`{name}` holds complex numbers"))
+                .help("give its real part"),
         ));
     }
     numpy.call_method1("asarray", (values, "float64")).map_err(|e| {
@@ -233,7 +234,12 @@ impl Recording {
     }
 
     fn __repr__(&self) -> String {
-        format!("Recording({:?}, {}, {:.1} s)", self.0.name, pluralise(self.0.len(), "row"), self.0.duration())
+        format!(
+            "Recording({:?}, {}, {:.1} s)",
+            self.0.name,
+            pluralise(self.0.len(), "row"),
+            self.0.duration()
+        )
     }
 }
 
@@ -277,7 +283,11 @@ impl Campaign {
     }
 
     fn __repr__(&self) -> String {
-        format!("Campaign({}, {})", pluralise(self.0.recordings.len(), "recording"), pluralise(self.0.samples(), "row"))
+        format!(
+            "Campaign({}, {})",
+            pluralise(self.0.recordings.len(), "recording"),
+            pluralise(self.0.samples(), "row")
+        )
     }
 }
 
@@ -495,7 +505,9 @@ fn over<'py>(
     let part = |i: usize| -> PyResult<PyReadonlyArrayDyn<'py, f64>> { Ok(same.get_item(i)?.extract()?) };
     let (p, x, s) = (part(0)?, part(1)?, part(2)?);
     if let Some(wrong_way) = s.as_array().iter().find(|s| !(-1.0..=1.0).contains(*s)) {
-        return Err(wrong(format!("`direction` is {wrong_way}; it is 1 shortening, -1 lengthening, 0 the mid-line")));
+        return Err(wrong(format!(
+            "`direction` is {wrong_way}; it is 1 shortening, -1 lengthening, 0 the mid-line"
+        )));
     }
     let places: Vec<(f64, f64)> = p.as_array().iter().copied().zip(x.as_array().iter().copied()).collect();
     let contractions = Contractions::of(model.braid());
