@@ -22,7 +22,7 @@ use toml::de::{DeTable, DeValue};
 use crate::error::HostCode;
 use pam_data::bounds;
 use pam_data::error::{DataCode, Error, Result, nearest};
-use pam_data::toml_words::toml_error;
+use pam_data::toml_errors::toml_error;
 
 /// The name of the file.
 pub const NAME: &str = "pam.toml";

@@ -83,13 +83,13 @@ fn every_fault_is_measured_within_its_interval_and_none_where_there_is_none() {
 fn bad_checks_are_refused_with_the_place_and_what_to_do() {
     let rows = |row: &str| row.repeat(30);
     for (text, says) in [
-        (format!("time_s,force_N\n{}", rows("0,1\n")), "no column of what is known"),
+        (format!("time_s,force_N\n{}", rows("0,1\n")), "no column of the reference"),
         ("time_s,force_N,reference_force_N\n0,1,1\n".to_owned(), "1 row,"),
         (
             format!("time_s,force_N,reference_force_N\n{}0,x,1\n", rows("0,1,1\n")),
             "line 32: `x` is no number for `force_N`",
         ),
-        (format!("time_s,force_N,reference_force_stone\n{}", rows("0,1,1\n")), "in no unit that is known"),
+        (format!("time_s,force_N,reference_force_stone\n{}", rows("0,1,1\n")), "unknown unit of the column"),
         (format!("time_s,force_N,reference_force_N\n{}0,1\n", rows("0,1,1\n")), "line 32"),
         (format!("time_s,force_N,reference_force_N\n{}", rows("0,1,1\n")), "at least three different"),
         (format!("time_s,pressure_kPa,reference_force_N\n{}", rows("0,1,1\n")), "no column `force_`"),

@@ -14,7 +14,7 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::segment::Motion;
 use pam_data::recording::{Campaign, Follower, Recording};
 use pam_fit::bench::{Candidate, Span};
-use pam_fit::fit;
+use pam_fit::{Options, fit};
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::Muscle;
@@ -226,7 +226,7 @@ fn each_law_describes_the_bench_s_own_version_of_its_effect() {
     let without = run(&quiet, &protocol);
     let pulling: Vec<Recording> = run(&spec, &protocol).into_iter().filter(|r| pressed(r)).collect();
     let description = MuscleDescription::parse(&spec.muscle.description()).expect("a description");
-    let fit = fit::fit(&Campaign::new(pulling), &description, &fit::Options::default()).expect("a fit");
+    let fit = fit(&Campaign::new(pulling), &description, &Options::default()).expect("a fit");
     let model = Model::<f64>::build(&fit.table).expect("a valid table");
 
     let mut short = BTreeMap::new();

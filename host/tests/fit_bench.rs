@@ -1,8 +1,8 @@
 //! The fit on muscles of other physics than its own: the virtual bench's, which store energy in a hyperelastic tube.
 
-use pam_evaluate::other_length::unseen_length;
-use pam_fit::band::ForceBand;
-use pam_fit::fit::{Options, fit, result::Fit};
+use pam_evaluate::length_transfer::predict_unseen_length;
+use pam_fit::confidence_band::ConfidenceBand;
+use pam_fit::{Fit, Options, fit};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::Muscle;
 use virtual_bench::presets;
@@ -103,10 +103,10 @@ fn without_blocked_force_the_interval_of_the_deadband_holds_the_truth() {
 /// A curve through separate fits, as the thesis joins them: M = 4 at each pressure by itself, natural splines between.
 fn joined(fitted: &Fit, pressure: f64, stroke: f64) -> f64 {
     let m4 = fitted.models.iter().find(|m| m.name == "m4").expect("a model");
-    let levels = &fitted.prepared.pressures.levels;
-    let phi = pam_fit::fit::basis::PressureBasis::new(levels).at(pressure);
-    let columns = pam_fit::fit::basis::columns(&fitted.prepared.braid, stroke);
-    let mut force = (pressure - fitted.prepared.deadband()) * columns.area;
+    let levels = &fitted.solution.problem.pressures.levels;
+    let phi = pam_fit::numerics::spline_basis::SplineBasis::new(levels).at(pressure);
+    let columns = pam_fit::columns(&fitted.solution.problem.braid, stroke);
+    let mut force = (pressure - fitted.solution.deadband()) * columns.area;
     for (name, group, value) in &m4.constants {
         let Some(g) = group else { continue };
         let k: usize = name[2..].parse().expect("E_k");
@@ -128,7 +128,7 @@ fn between_pressures_it_is_twice_as_good_as_separate_fits() {
         let fitted =
             fit(&thesis(&spec, &levels, seed, 8.0), &description(&spec), &Options::default()).expect("a fit");
         let (mut a, mut b, mut n) = (0.0, 0.0, 0.0);
-        for pair in fitted.prepared.pressures.levels.windows(2) {
+        for pair in fitted.solution.problem.pressures.levels.windows(2) {
             let p = 0.5 * (pair[0] + pair[1]);
             let blocked = muscle.quasi_static(p, 0.0);
             // What both levels covered.
@@ -136,7 +136,7 @@ fn between_pressures_it_is_twice_as_good_as_separate_fits() {
             for i in 0..=40 {
                 let x = end * f64::from(i) / 40.0;
                 let truth = muscle.quasi_static(p, x);
-                a += (fitted.prepared.quasi(p, x) - truth).abs() / blocked;
+                a += (fitted.solution.quasi(p, x) - truth).abs() / blocked;
                 b += (joined(&fitted, p, x) - truth).abs() / blocked;
                 n += 1.0;
             }
@@ -160,7 +160,7 @@ fn stated_intervals_cover() {
     let options = Options { order: 2, ..Options::default() };
     let truth = fit(&base, &muscle, &options).expect("a fit");
     // The truth is the model itself on the recording's motion; what is left after a turn is the model's too.
-    let table = pam_evaluate::hold_out::as_file(&truth);
+    let table = pam_evaluate::cross_validation::as_file(&truth);
     let clean = pam_fit::predict::predict(&table, &base).expect("a prediction");
     let (mut inside, mut all) = (0, 0);
     let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
@@ -186,13 +186,13 @@ fn stated_intervals_cover() {
             let (f, t) = (&fitted.summary.pressures[i], &truth.summary.pressures[i]);
             // The force at half the free stroke stands for the curve: single E_k trade with each other.
             let x = 0.5 * t.free_contraction.expect("a free contraction") * muscle.rest_length();
-            let p = fitted.prepared.pressures.levels[i];
-            let mut with_band = pam_evaluate::hold_out::as_file(&fitted);
+            let p = fitted.solution.problem.pressures.levels[i];
+            let mut with_band = pam_evaluate::cross_validation::as_file(&fitted);
             with_band.about.uncertainty = Some(fitted.stored_uncertainty());
-            let band = ForceBand::of(&with_band).expect("a band").std(p, x, 0.0);
+            let band = ConfidenceBand::of(&with_band).expect("a band").std(p, x, 0.0);
             for (off, std) in [
                 (f.k_F - t.k_F, f.k_F_std),
-                (fitted.prepared.quasi(p, x) - truth.prepared.quasi(p, x), band),
+                (fitted.solution.quasi(p, x) - truth.solution.quasi(p, x), band),
                 (f.E_MPa[0] - t.E_MPa[0], f.E_std_MPa[0]),
             ] {
                 inside += usize::from(off.abs() <= 1.96 * std);
@@ -257,12 +257,12 @@ fn stress_rises_with_strain_where_it_is_asked_for() {
     let campaign = thesis(&spec, &presets::large_pressures(), 4, 8.0);
     let options = Options { physical: true, ..Options::default() };
     let fitted = fit(&campaign, &description(&spec), &options).expect("a fit");
-    let braid = &fitted.prepared.braid;
+    let braid = &fitted.solution.problem.braid;
     let largest = braid
-        .posture(model_core::units::Length::from_metres(fitted.prepared.points.stroke.high))
+        .posture(model_core::units::Length::from_metres(fitted.solution.problem.points.stroke.high))
         .radial_strain;
-    for p in &fitted.prepared.pressures.levels {
-        let (e, _) = fitted.prepared.curves_at(*p);
+    for p in &fitted.solution.problem.pressures.levels {
+        let (e, _) = fitted.solution.curves_at(*p);
         for i in 0..=40 {
             let x = largest * f64::from(i) / 40.0;
             let slope: f64 = e.iter().enumerate().map(|(k, e)| (k + 1) as f64 * e * x.powi(k as i32)).sum();
@@ -289,9 +289,10 @@ fn a_length_that_was_not_recorded_comes_from_the_others() {
         let (spec, campaign, own) = &lengths[left_out];
         let others: Vec<&Fit> =
             lengths.iter().enumerate().filter(|(i, _)| *i != left_out).map(|(_, l)| &l.2).collect();
-        let clip = own.prepared.clips.0.map(|c| c.force);
+        let clip = own.solution.problem.clips.0.map(|c| c.force);
         let percent = |from: &[&Fit]| {
-            let carried = unseen_length(from, campaign, &description(spec), clip).expect("a prediction");
+            let carried =
+                predict_unseen_length(from, campaign, &description(spec), clip).expect("a prediction");
             (100.0 * carried.score.mean() / own.summary.blocked_force_N, carried.end_effect)
         };
         let (all, end_effect) = percent(&others);

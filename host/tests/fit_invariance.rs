@@ -7,7 +7,7 @@ use std::fs;
 
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Import, Reader, Recording};
-use pam_fit::fit::{Options, fit, result::Fit};
+use pam_fit::{Fit, Options, fit};
 use proptest::prelude::*;
 use virtual_bench::presets;
 
@@ -142,13 +142,18 @@ fn the_raw_files_of_the_thesis_give_the_same_table() {
     assert_eq!(known.summary.samples, own.summary.samples);
     let (a, b) = (known.summary.deadband_kPa, own.summary.deadband_kPa);
     assert!((a - b).abs() < 0.02, "P0 {a} and {b} kPa");
-    for (level, (p, q)) in
-        own.prepared.pressures.levels.iter().zip(known.summary.pressures.iter().zip(&own.summary.pressures))
+    for (level, (p, q)) in own
+        .solution
+        .problem
+        .pressures
+        .levels
+        .iter()
+        .zip(known.summary.pressures.iter().zip(&own.summary.pressures))
     {
         assert!((p.k_F - q.k_F).abs() < 1e-4, "k_F {} and {}", p.k_F, q.k_F);
         for i in 0..=20 {
-            let x = own.prepared.points.stroke.high * f64::from(i) / 20.0;
-            let off = (known.prepared.quasi(*level, x) - own.prepared.quasi(*level, x)).abs();
+            let x = own.solution.problem.points.stroke.high * f64::from(i) / 20.0;
+            let off = (known.solution.quasi(*level, x) - own.solution.quasi(*level, x)).abs();
             assert!(off < 3e-4 * own.summary.blocked_force_N, "{off} N at {level} Pa and {x} m");
         }
     }
@@ -227,7 +232,7 @@ proptest! {
             Ok(fitted) => {
                 prop_assert!(fitted.table.check().is_ok());
                 prop_assert!(fitted.summary.rms_N.is_finite() && fitted.summary.mean_error_pct.is_finite());
-                let bytes = pam_evaluate::hold_out::as_file(&fitted).to_bytes().expect("a file");
+                let bytes = pam_evaluate::cross_validation::as_file(&fitted).to_bytes().expect("a file");
                 prop_assert!(pam_fit::table_file::TableFile::from_bytes(&bytes).is_ok());
             }
             Err(e) => prop_assert!(e.advised() && !e.cause().is_empty(), "{e}"),

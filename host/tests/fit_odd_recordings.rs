@@ -9,9 +9,9 @@ use std::f64::consts::PI;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Reader, Recording};
 use pam_diagnose::diagnose;
-use pam_fit::fit::{Options, fit, result::Fit};
 use pam_fit::predict::{predict, to_csv};
 use pam_fit::table_file::{About, TableFile};
+use pam_fit::{Fit, Options, fit};
 
 const REST: f64 = 39.16e-3;
 const DEADBAND: f64 = 76.5e3;
@@ -196,7 +196,7 @@ fn a_gauge_that_falls_out_does_no_harm() {
     assert_truth(&found, 400.0, 0.003);
     assert_eq!(found.summary.rows.dropouts, 49);
     assert_eq!(found.summary.pressures.len(), SIX.len(), "no level at which nobody tested");
-    let remark = |all: &[String]| all.iter().find(|w| w.contains("49 rows left out")).cloned();
+    let remark = |all: &[String]| all.iter().find(|w| w.contains("49 rows excluded")).cloned();
     let said = remark(&found.summary.warnings).unwrap();
     assert!(said.contains("276 rows 221 to 260 (2.20 to 2.59 s) from 27"), "{said}");
     assert!(said.contains("483 rows 301 to 303 (3.00 to 3.02 s) from 48"), "{said}");

@@ -9,10 +9,10 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::segment::Motion;
 use pam_data::recording::{Campaign, Clock, Import, Reader};
-use pam_evaluate::other_length::unseen_length;
-use pam_fit::fit::nodes::pressures;
-use pam_fit::fit::points::points;
-use pam_fit::fit::{Options, fit};
+use pam_evaluate::length_transfer::predict_unseen_length;
+use pam_fit::points;
+use pam_fit::pressures;
+use pam_fit::{Options, fit};
 
 fn project() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()
@@ -209,8 +209,8 @@ fn a_length_that_was_not_recorded_is_predicted_from_the_others() {
             let (muscle, campaign, own) = &cases[i];
             let others: Vec<_> =
                 cases.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, c)| &c.2).collect();
-            let clip = own.prepared.clips.0.map(|c| c.force);
-            let carried = unseen_length(&others, campaign, muscle, clip).unwrap();
+            let clip = own.solution.problem.clips.0.map(|c| c.force);
+            let carried = predict_unseen_length(&others, campaign, muscle, clip).unwrap();
             println!("{}: end effect {:.1} mm by the others", muscle.name, carried.end_effect * 1e3);
             100.0 * carried.score.mean() / own.summary.blocked_force_N
         };

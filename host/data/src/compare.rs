@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::counted::counted;
 use crate::error::{DataCode, Error, Result};
+use crate::pluralise::pluralise;
 use crate::recording::Recording;
 
 /// One quantity of both recordings.
@@ -94,7 +94,7 @@ impl Comparison {
     /// Lines for a terminal.
     #[must_use]
     pub fn to_text(&self) -> String {
-        let mut text = format!("{} over {:.3} s, B − A\n", counted(self.rows, "row"), self.overlap);
+        let mut text = format!("{} over {:.3} s, B − A\n", pluralise(self.rows, "row"), self.overlap);
         text += &format!("{:<18}{:>12}{:>12}{:>12}{:>10}\n", "", "rms", "mean", "largest", "at s");
         for c in &self.columns {
             let name = format!("{}, {}", c.name, c.unit);

@@ -1,6 +1,6 @@
 //! Calendar dates of results.
 
-/// The present time as ISO 8601 in UTC; `SOURCE_DATE_EPOCH` stands in for the clock where it is set, so that builds can be
+/// The present time as ISO 8601 in UTC; `SOURCE_DATE_EPOCH` replaces the clock where it is set, so that builds can be
 /// repeated to the byte.
 #[must_use]
 pub fn now_utc() -> String {

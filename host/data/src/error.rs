@@ -1,4 +1,4 @@
-//! What went wrong, said once for a person: the cause, where it is, what to do.
+//! Errors with cause, place and remedy.
 //!
 //! Every failure of the libraries is an [`Error`]. Its [`Code`] is stable, so that scripts can test for it, and decides the exit
 //! status: 1 when the input or the device is at fault, 2 when the call is. Each crate declares its own codes.
@@ -148,7 +148,7 @@ error_codes! {
         /// A line has too few or too many cells.
         RecordingWrongWidth = "recording::wrong-width", Input,
             "every line has as many cells as the header";
-        /// Time stands still or goes backwards.
+        /// Time does not increase.
         RecordingTimeOrder = "recording::time-order", Input,
             "put the rows into the order in which they were measured";
         /// A number is outside what is physically possible.
@@ -169,7 +169,7 @@ error_codes! {
         /// A muscle description is not valid.
         MuscleInvalid = "muscle::invalid", Input,
             "compare with the descriptions in examples/muscles, or make one with `host new`";
-        /// A check of the bench is not valid, or tells nothing.
+        /// A check of the bench is invalid or determines nothing.
         CheckInvalid = "check::invalid", Input,
             "compare with the tables in the book's chapter on checking the bench";
         /// A table file is damaged or from another version.
@@ -360,7 +360,7 @@ impl Error {
     }
 }
 
-/// The operating system's reason without its number, which says nothing that the words do not.
+/// The operating system's reason without its number, which repeats the text.
 fn in_words(reason: &std::io::Error) -> String {
     let text = reason.to_string();
     match text.rfind(" (os error ") {

@@ -1,4 +1,4 @@
-//! Which of the program's kinds of files one is, by its content, so that an error about a wrong file can say what the file is.
+//! Recognises the kind of a file by its content, so that an error about a wrong file can name its kind.
 
 use std::io::Read;
 use std::path::Path;
@@ -33,7 +33,7 @@ pub enum FileKind {
 impl FileKind {
     /// What a file is by its first bytes; `None` where they are those of no kind of ours.
     #[must_use]
-    pub fn of_bytes(bytes: &[u8]) -> Option<Self> {
+    pub(crate) fn of_bytes(bytes: &[u8]) -> Option<Self> {
         if bytes.starts_with(b"PAMF") {
             return Some(Self::Table);
         }

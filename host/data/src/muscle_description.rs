@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{DataCode, Error, Result};
 use crate::file_kind::FileKind;
-use crate::toml_words::toml_error;
+use crate::toml_errors::toml_error;
 
 /// Whether the muscle pulls, or pushes by a rod fixed to one end fitting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -13,7 +13,7 @@ use crate::file_kind::FileKind;
 /// one and nothing else. A new file that takes an old one's place has its permissions. A path of `-` is standard output.
 ///
 /// # Errors
-/// [`DataCode::FileUnwritable`], or [`DataCode::CallInvalid`] where a file of another kind stands there that no command makes again, such as a
+/// [`DataCode::FileUnwritable`], or [`DataCode::CallInvalid`] where the path holds a file of another kind that no command can recreate, such as a
 /// recording that was given behind `--json`; what stood at `path` is untouched then.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     if path == Path::new("-") {
@@ -135,7 +135,7 @@ impl Turn {
     }
 }
 
-/// Whether one of a call's results, each with the option that says where it goes, goes to standard output: words for people must not
+/// Whether one of a call's results, each with the option that names its destination, goes to standard output: text for people must not
 /// then.
 ///
 /// ```
@@ -150,19 +150,16 @@ impl Turn {
 /// ```
 ///
 /// # Errors
-/// [`DataCode::CallInvalid`] where more than one would: nobody could take them apart.
+/// [`DataCode::CallInvalid`] for more than one: they could not be separated.
 pub fn to_standard_output(results: &[(&str, Option<&Path>)]) -> Result<bool> {
     let there: Vec<&str> =
         results.iter().filter(|(_, path)| *path == Some(Path::new("-"))).map(|(option, _)| *option).collect();
     if there.len() > 1 {
         return Err(Error::new(
             DataCode::CallInvalid,
-            format!(
-                "the results of {} would all go to standard output, one behind the other",
-                there.join(" and ")
-            ),
+            format!("the results of {} would all go to standard output", there.join(" and ")),
         )
-        .help("let one of them be `-`, and name files for the others"));
+        .help("use `-` for one of them, and files for the others"));
     }
     Ok(!there.is_empty())
 }
@@ -184,7 +181,7 @@ pub fn json_of(value: &impl serde::Serialize) -> serde_json::Value {
     serde_json::to_string(value).ok().and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default()
 }
 
-/// Refuses to put a result where a recording, a table or a description stands: an option that takes a file was given another's.
+/// Refuses to overwrite a recording, a table or a description: the path was probably meant for another option.
 fn keeps_its_kind(path: &Path, bytes: &[u8]) -> Result<()> {
     let (Some(there), fresh) = (FileKind::of_file(path), FileKind::of_bytes(bytes)) else { return Ok(()) };
     if matches!(there, FileKind::Json | FileKind::Report) || fresh == Some(there) {
@@ -196,7 +193,7 @@ fn keeps_its_kind(path: &Path, bytes: &[u8]) -> Result<()> {
         format!("{} stands here, and {fresh} would take its place", there.words()),
     )
     .file(path)
-    .help("name another file to write; `host COMMAND --help` says which options take one"))
+    .help("name another output file; `host COMMAND --help` lists the options that write files"))
 }
 
 #[cfg(test)]

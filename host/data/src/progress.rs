@@ -1,4 +1,4 @@
-//! How far a piece of work has come. Libraries report it; whoever called them decides whether and where to show it.
+//! Progress of long computations. Libraries report it; the caller decides whether and where to show it.
 
 use std::fmt::Debug;
 use std::ops::Deref;

@@ -60,6 +60,7 @@ fn every_bad_input_is_told_with_place_and_remedy() {
         ("text", line_12("1.0,300,oops,50")),
         ("control-characters", line_12("1.0,\u{1b}[31m,0.1,50")),
         ("empty-cell", line_12("1.0,,0.1,50")),
+        ("dashes", line_12("1.0,---,0.1,50")),
         ("nan", line_12("1.0,300,NaN,50")),
         ("infinite", line_12("1.0,300,0.1,-inf")),
         ("overflow", line_12("1.0,300,0.1,1e999")),
@@ -92,7 +93,9 @@ fn every_bad_input_is_told_with_place_and_remedy() {
         ("coarse-clock", clock_of_whole_seconds.into_bytes()),
         ("header-below", [b"Bench 5\nOperator: Jo\n\n", &table(20, |_| None)[..]].concat()),
         ("binary", (0..20_000u32).flat_map(|i| (i.wrapping_mul(2_654_435_761)).to_le_bytes()).collect()),
-        ("zip", b"PK\x03\x04rest of a spreadsheet".to_vec()),
+        ("excel", b"PK\x03\x04rest of a spreadsheet".to_vec()),
+        ("excel-97", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1rest of a spreadsheet".to_vec()),
+        ("hdf5-cut", b"\x89HDF".to_vec()),
         ("one-line", vec![b'7'; 9 << 20]),
         (
             "carriage-returns",
@@ -151,4 +154,19 @@ fn every_bad_import_description_is_told() {
             .unwrap();
     }
     insta::assert_snapshot!(told);
+}
+
+#[test]
+fn every_value_of_a_filtered_column_is_listed_or_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let advice = |runs: usize| {
+        let mut text = HEADER.trim_end().to_owned() + ",run\n";
+        for i in 0..40 * runs {
+            writeln!(text, "{},300,{},50,{}", i as f64 * 0.1, i as f64 * 0.01, i / 40 + 1).unwrap();
+        }
+        let error = read(folder.path(), "runs.csv", text.as_bytes(), Some("[where]\nrun = 99")).unwrap_err();
+        error.advice().unwrap_or_default().to_owned()
+    };
+    assert!(advice(10).ends_with("run is one of 1, 2, 3, 4, 5, 6, 7, 8, 9, 10"), "{}", advice(10));
+    assert!(advice(23).ends_with("19, 20, and 3 more"), "{}", advice(23));
 }

@@ -5,8 +5,8 @@ use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 
 use super::Port;
 use crate::error::DeviceCode;
-use pam_data::counted::counted;
 use pam_data::error::Error;
+use pam_data::pluralise::pluralise;
 
 /// What came before any hello, to tell a silent line from a foreign peer.
 #[derive(Default)]
@@ -59,7 +59,7 @@ impl LineActivity {
             DeviceCode::DeviceForeign,
             format!(
                 "something answers here, but it is not a controller of this project: it sent {}, beginning {begins}",
-                counted(self.bytes, "byte")
+                pluralise(self.bytes, "byte")
             ),
         )
         .value(port.name())

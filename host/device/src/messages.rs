@@ -6,8 +6,8 @@ use model_core::link::messages::{
 };
 
 use crate::error::DeviceCode;
-use pam_data::counted::counted;
 use pam_data::error::Error;
+use pam_data::pluralise::pluralise;
 
 /// The message about a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -363,7 +363,7 @@ fn table_refused(why: TableFault) -> Error {
         TableFault::NotBegun => "a piece arrived before the upload was started".to_owned(),
         TableFault::Gap(there) => format!("a piece is missing after byte {there}"),
         TableFault::TooLong(fits) => format!("it is longer than the {fits} bytes that the device keeps"),
-        TableFault::Incomplete(there) => format!("only {} arrived", counted(there, "byte")),
+        TableFault::Incomplete(there) => format!("only {} arrived", pluralise(there, "byte")),
         TableFault::Check => "its checksum is wrong".to_owned(),
         TableFault::Version { found, known } => {
             format!("it has format version {found}, the device reads version {known}")

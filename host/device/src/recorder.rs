@@ -24,9 +24,9 @@ pub use recover::{Recovered, Tally, recover};
 use self::mcap::Encoder;
 use self::part::{Part, part_of};
 use super::messages;
-use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::write_whole;
+use pam_data::pluralise::pluralise;
 
 /// Time between two pieces: what a killed program may lose.
 const PIECE: Duration = Duration::from_millis(100);
@@ -244,7 +244,7 @@ impl Recorder {
             (None, Some(first)) => Ok(first),
             (Some(error), _) => Err(error.help(format!(
                 "it holds {} up to this point; free disk space and continue",
-                counted(self.rows, "row")
+                pluralise(self.rows, "row")
             ))),
             (None, None) => {
                 Err(Error::new(DataCode::FileUnwritable, "the recording has no file").file(&self.side))

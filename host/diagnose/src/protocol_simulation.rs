@@ -15,7 +15,7 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::file_kind::FileKind;
 use pam_data::recording::segment::Motion;
 use pam_data::recording::{Campaign, Follower, Recording};
-use pam_data::toml_words::toml_error;
+use pam_data::toml_errors::toml_error;
 
 /// Reads a protocol file.
 ///

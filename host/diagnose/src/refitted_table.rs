@@ -13,9 +13,9 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Campaign;
 use pam_data::recording::dropouts::Screened;
 use pam_fit::bench::Candidate;
-use pam_fit::fit::{Options as FitOptions, fit};
 use pam_fit::predict::predict;
 use pam_fit::table_file::{About, Correction, TableFile};
+use pam_fit::{Options as FitOptions, fit};
 
 /// A refitted table file and how well it does on the recordings.
 #[derive(Clone, Debug)]
@@ -41,7 +41,7 @@ pub struct Refitted {
 /// Recordings that cannot be fitted.
 pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagnosis) -> Result<Refitted> {
     let plain = fit(campaign, muscle, &FitOptions::default())?;
-    let about = |fitted: &pam_fit::fit::result::Fit, corrections: Vec<Correction>| About {
+    let about = |fitted: &pam_fit::Fit, corrections: Vec<Correction>| About {
         muscle: muscle.name.clone(),
         tool: format!("host {}", env!("CARGO_PKG_VERSION")),
         fit: fitted.summary.quality(),

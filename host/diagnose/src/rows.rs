@@ -28,7 +28,7 @@ use pam_data::error::Result;
 use pam_data::progress::SharedProgress;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::{Campaign, Recording};
-use pam_fit::fit::screen::Clip;
+use pam_fit::Clip;
 
 /// What was recorded, row by row. Nothing changes it.
 #[derive(Clone, Debug, Default)]

@@ -17,9 +17,9 @@ use super::why::Why;
 use super::{Diagnosis, Options, diagnose, refitted_table};
 use pam_data::muscle_description::{Kind, MuscleDescription};
 use pam_data::recording::{Campaign, Recording};
-use pam_fit::fit::{Options as FitOptions, fit};
 use pam_fit::predict::predict;
 use pam_fit::table_file::TableFile;
+use pam_fit::{Options as FitOptions, fit};
 
 fn one_bladder() -> MuscleTable {
     let mut one_bladder = table::example();

@@ -1,4 +1,4 @@
-//! Published formulas for muscles on the market, to compare with.
+//! Published force formulas of commercial muscles, for comparison.
 
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
@@ -11,7 +11,7 @@ use pam_data::muscle_description::MuscleDescription;
 /// F620     = a atan(b (L0 − l))                          L0 in m
 /// ```
 ///
-/// It knows no direction of motion and no hysteresis. `e620` is the muscle's own largest contraction at 620 kPa.
+/// It has no hysteresis. `e620` is the muscle's own largest contraction at 620 kPa.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Published {
     name: &'static str,
@@ -19,23 +19,23 @@ pub struct Published {
     blocked: [f64; 3],
 }
 
-/// The formulas that are known.
+/// All formulas.
 const ALL: [Published; 2] = [
     Published { name: "bolen-10mm", c: [0.5682, 4.254, 0.5597], blocked: [303.5, 19.03, 0.0075] },
     Published { name: "bolen-20mm", c: [0.2579, 6.477, 1.321], blocked: [922.4, 15.37, 0.013] },
 ];
 
 impl Published {
-    /// By name.
+    /// The formula of this name.
     ///
     /// # Errors
-    /// [`DataCode::CallInvalid`] with the names that are known.
+    /// [`DataCode::CallInvalid`], listing the names.
     pub fn named(name: &str) -> Result<Self> {
         ALL.into_iter().find(|p| p.name == name).ok_or_else(|| {
             let known: Vec<&str> = ALL.iter().map(|p| p.name).collect();
-            Error::new(DataCode::CallInvalid, "no published formula of this name")
+            Error::new(DataCode::CallInvalid, "unknown published formula")
                 .value(name)
-                .help(format!("known are {}", known.join(", ")))
+                .help(format!("choose one of {}", known.join(", ")))
         })
     }
 

@@ -8,9 +8,9 @@
 use std::time::Instant;
 
 use model_core::braid::miniature;
-use pam_fit::fit::design::{Design, Measured};
-use pam_fit::fit::models::moduli_at_one_pressure;
-use pam_fit::fit::smoothing::Smoothing;
+use pam_fit::Smoothing;
+use pam_fit::moduli_at_one_pressure;
+use pam_fit::{Design, Measured};
 use serde_json::json;
 
 /// `P0` of the benchmark's muscle, Pa.

@@ -23,7 +23,7 @@ mod pressure_sensor_lag;
 mod rig_compliance;
 mod sensor_delay;
 
-pub use candidate::{Candidate, Fitted, Span, columns_of, read_when_vented};
+pub use candidate::{Candidate, Span, columns_of, read_when_vented};
 
 model_core::effect_list! {
     /// A correction of the bench, by name. In files it is its place in this list: the order stays, new ones go to the end.

@@ -1,13 +1,13 @@
-//! Checks of the bench without its muscle: each instrument against something known.
+//! Checks of the bench without its muscle: each instrument against a reference.
 //!
 //! ```text
 //! dead weights      F_read = (1 + γ) (W + c P) + o        known weights W on the cell, line vented and under pressure P
 //! rigid bar         x_read = x_bar − δ − F/K − b/2·sign F a bar in the muscle's place, pulled and pushed
 //! reference gauge   P_read = (1 + ν) P + q                a better gauge beside the bench's own
 //! ```
-//! Loops of a muscle hardly tell a wrong scale of the cell from a wrong scale of the gauge, a frame that gives from a braid that
-//! stretches: more than nine tenths of such a trace lie in the tables. A minute with a weight tells. What a check measures is known
-//! before anything is fitted: readings are freed of it, and no other recording has to explain it.
+//! Loops of a muscle hardly separate a gain error of the load cell from one of the pressure sensor, or the compliance of the frame from
+//! that of the braid: the table absorbs more than nine tenths of such an error. A check of one minute with a weight measures it. The
+//! recordings are corrected for measured faults before the fit.
 //!
 //! A check is a table like a recording, with the known quantity in a column whose name begins with `reference_`:
 //!
@@ -19,7 +19,6 @@
 
 mod dead_weights;
 mod gauge;
-mod regression;
 mod rigid_bar;
 mod table;
 
@@ -31,18 +30,18 @@ use pam_data::recording::{Campaign, Quantity};
 
 use table::Table;
 
-/// A fault of the bench as a check measured it.
+/// A fault of the bench as measured by a check.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
-    /// Which law of the bench.
+    /// The law of the fault.
     pub fault: BenchName,
     /// Its parameters in the law's order, SI.
     pub parameters: Vec<f64>,
-    /// Their standard deviations, by whole stays or stretches; `None` for what the check does not vary.
+    /// Their standard deviations (1 σ), by whole stays or stretches; `None` for what the check does not vary.
     pub deviations: Vec<Option<f64>>,
-    /// The first parameter with its interval, in words and handy units.
+    /// The first parameter with its 95 % interval, as text with practical units.
     pub words: String,
-    /// Which check, in words.
+    /// Which check measured it, as text.
     pub check: &'static str,
 }
 
@@ -56,7 +55,7 @@ impl Measured {
     }
 }
 
-/// A fault is taken for real from so many standard deviations on.
+/// Significance: a fault counts as real from this many standard deviations on (p < 10⁻⁴ for normal errors, in any of the few checks).
 const SURE: f64 = 4.0;
 
 /// Checks of one bench.
@@ -92,21 +91,21 @@ impl Checks {
         Ok(checks)
     }
 
-    /// Everything that was measured.
+    /// All measured faults.
     #[must_use]
     pub fn measured(&self) -> &[Measured] {
         &self.measured
     }
 
-    /// Whether nothing was checked.
+    /// Whether there are no checks.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.measured.is_empty()
     }
 }
 
-/// The recordings as a bench without these faults would have read them: the inverse of the readings above, exactly. A play is left
-/// in: how it shows in a loop depends on when the joint unloads.
+/// The recordings as a bench without these faults would have read them: the exact inverse of the equations above. Backlash is not
+/// corrected: its effect depends on when the joint unloads.
 #[must_use]
 pub fn freed(campaign: &Campaign, faults: &[Measured]) -> Campaign {
     let of = |name: BenchName, at: usize| -> f64 {
@@ -131,4 +130,10 @@ pub fn freed(campaign: &Campaign, faults: &[Measured]) -> Campaign {
         }
     }
     freed
+}
+
+/// The standard deviation of a measurement whose reference may be off by up to `limit`, every error within it being equally likely
+/// (JCGM 100:2008, 4.3.7).
+fn with_reference(deviation: f64, limit: f64) -> f64 {
+    deviation.hypot(limit / 3.0_f64.sqrt())
 }

@@ -1,4 +1,4 @@
-//! A table's force on recordings: the base model, the effects it carries, and the corrections of the bench.
+//! Force predicted by a table on recordings: the base model, the table's effects, and corrections of the bench.
 //!
 //! Effects have a memory, which runs through the recordings in their order: earlier files are the muscle's history. Over a pause
 //! of known length the memories fade as they do in time; an unknown pause counts as a minute.
@@ -8,56 +8,57 @@ use std::fmt::Write;
 use std::fs;
 
 use model_core::effects::{Chain, Memory};
+use model_core::motion::Motion as MotionSample;
 use model_core::muscle::Muscle;
 use model_core::table::MuscleTable;
 use model_core::units::{Length, Pressure};
 use rayon::prelude::*;
 
-use crate::band::{ForceBand, HALF_95};
 use crate::bench::Candidate;
-use crate::table_file::TableFile;
+use crate::confidence_band::{ConfidenceBand, HALF_95};
+use crate::table_file::{Correction, TableFile};
 use pam_data::error::{DataCode, Error, Result};
-use pam_data::possible::Contractions;
+use pam_data::physical_limits::Contractions;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::segment::Motion;
 use pam_data::recording::{Campaign, Follower, Recording, has_decimal_commas};
 
-/// What a table says of a campaign.
+/// The predicted force of a campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prediction {
-    /// Per recording, in the campaign's order.
+    /// The recordings in the campaign's order.
     pub recordings: Vec<Predicted>,
     /// Root mean square of `F − F_model` over all rows that have a force, N; `None` where none has.
     pub rms: Option<f64>,
-    /// What the user should know.
+    /// Warnings: excluded readings, extrapolation.
     pub warnings: Vec<String>,
 }
 
-/// What a table says of one recording.
+/// The predicted force of one recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Predicted {
     /// The force that the load cell would read, N, per row.
     pub force: Vec<f64>,
-    /// Root mean square of `F − F_model` where it was read rightly, N; `None` without a force column, and where the
-    /// whole recording is in another unit than the rest ([`pam_data::recording::other_unit`]).
+    /// Root mean square of `F − F_model` over rows without sensor failures, N; `None` without a force column, and where the whole
+    /// recording is in another unit than the others ([`pam_data::recording::dropouts`]).
     pub rms: Option<f64>,
-    /// How uncertain it is, where that was asked for and the table knows.
+    /// The uncertainty, where it was requested and the table holds it.
     pub bands: Option<Bands>,
 }
 
 /// The uncertainty of a predicted recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bands {
-    /// Half the width of the 95 % interval of the base model's force, N, per row: what the table's numbers leave open.
+    /// Half the width of the 95 % interval of the base model's force, N, per row: from the uncertainty of the table's parameters.
     pub half: Vec<f64>,
     /// Its mean, N.
     pub mean: f64,
-    /// The share of measured forces within the 95 % interval of single readings, which adds what the table does not describe;
+    /// The share of measured forces within the 95 % interval of single readings, which include the residuals of the fit;
     /// `None` without a force column.
     pub inside: Option<f64>,
 }
 
-/// Runs a table over a campaign. What was read wrongly ([`pam_data::recording::dropouts`]) is bridged.
+/// Predicts the force of a campaign. Readings of a failed sensor are interpolated ([`pam_data::recording::dropouts`]).
 ///
 /// # Errors
 /// [`DataCode::TableInvalid`] where the table cannot be evaluated, or names a correction that this program does not know;
@@ -66,15 +67,15 @@ pub fn predict(file: &TableFile, campaign: &Campaign) -> Result<Prediction> {
     run(file, campaign, None)
 }
 
-/// As [`predict`], with the bands of the forces.
+/// [`predict`] with confidence bands.
 ///
 /// # Errors
 /// As [`predict`].
 pub fn predict_with_bands(file: &TableFile, campaign: &Campaign) -> Result<Prediction> {
-    run(file, campaign, ForceBand::of(file).as_ref())
+    run(file, campaign, ConfidenceBand::of(file).as_ref())
 }
 
-fn bands(band: &ForceBand, recording: &Recording, motion: &Motion, force: &[f64]) -> Bands {
+fn bands(band: &ConfidenceBand, recording: &Recording, motion: &Motion, force: &[f64]) -> Bands {
     let at = |i: usize| (recording.pressure[i], recording.stroke[i], f64::from(motion.direction[i]));
     let stds = (0..recording.len()).into_par_iter().map(|i| {
         let (pressure, stroke, direction) = at(i);
@@ -90,64 +91,26 @@ fn bands(band: &ForceBand, recording: &Recording, motion: &Motion, force: &[f64]
     Bands { half, mean, inside }
 }
 
-fn run(file: &TableFile, campaign: &Campaign, band: Option<&ForceBand>) -> Result<Prediction> {
+fn run(file: &TableFile, campaign: &Campaign, band: Option<&ConfidenceBand>) -> Result<Prediction> {
     let screened = Screened::of(campaign);
     let campaign = screened.campaign.as_ref();
     let muscle =
         Muscle::<f64>::build(&file.table).map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
-    let mut chain = Chain::<f64>::new(&file.table.effects);
-    let mut corrections: Vec<(Candidate, &[f64], Memory<f64>)> = Vec::new();
-    for c in &file.about.corrections {
-        let candidate = Candidate::from_name(&c.effect)
-            .filter(|k| k.info().parameters.len() == c.parameters.len())
-            .ok_or_else(|| {
-                Error::new(DataCode::TableInvalid, format!("unknown correction `{}`", c.effect))
-                    .help("the table was written by a newer version of this program")
-            })?;
-        corrections.push((candidate, &c.parameters, Memory::<f64>::default()));
-    }
-    let mut follower = Follower::of(campaign);
-    let plain = chain.is_empty() && corrections.is_empty();
-    let mut recordings = Vec::with_capacity(campaign.recordings.len());
-    let (mut square, mut rows) = (0.0, 0.0);
+    let chain = Chain::<f64>::new(&file.table.effects);
+    let mut model = Model { muscle, chain, corrections: corrections(file)? };
     let corrected: Vec<Cow<'_, Recording>> =
         campaign.recordings.iter().map(|r| with_true_length(file, r)).collect();
-    let rest_length = muscle.braid().rest_length();
-    let contractions = Contractions::of(muscle.braid());
-    for recording in &corrected {
-        for (i, stroke) in recording.stroke.iter().enumerate() {
-            contractions
-                .check(stroke / rest_length)
-                .map_err(|e| e.file(&recording.source).value(format!("row {}", i + 1)))?;
-        }
-    }
+    check_contractions(&model.muscle, &corrected)?;
+    let mut follower = Follower::of(campaign);
+    let mut recordings = Vec::with_capacity(campaign.recordings.len());
+    let (mut square, mut rows) = (0.0, 0.0);
     for (index, (recording, motion)) in
         corrected.iter().map(Cow::as_ref).zip(Motion::of_campaign(campaign)).enumerate()
     {
-        let force: Vec<f64> = if plain {
-            (0..recording.len())
-                .map(|i| {
-                    let p = Pressure::from_pascals(recording.pressure[i]);
-                    let x = Length::from_metres(recording.stroke[i]);
-                    muscle.force(p, x, f64::from(motion.direction[i])).newtons()
-                })
-                .collect()
+        let force = if model.is_plain() {
+            model.plain(recording, &motion)
         } else {
-            let motions = follower.follow(recording, &motion, campaign.pause_before(index));
-            let mut forces = Vec::with_capacity(recording.len());
-            for (i, motion) in motions.iter().enumerate() {
-                let context = muscle.context(motion, Pressure::from_pascals(recording.pressure[i]));
-                chain.step(&context);
-                // What the muscle itself makes ends at slackness; what the bench adds to the reading does not.
-                let (mut pull, mut read) = (context.force() + chain.force(&context), 0.0);
-                for (candidate, parameters, memory) in &mut corrections {
-                    candidate.step(parameters, &context, memory);
-                    let part = candidate.force(parameters, &context, memory);
-                    *if candidate.acts_on_a_slack_muscle(0) { &mut read } else { &mut pull } += part;
-                }
-                forces.push(muscle.pull(pull).newtons() + read);
-            }
-            forces
+            model.with_effects(recording, &follower.follow(recording, &motion, campaign.pause_before(index)))
         };
         let read = screened.read(index);
         let measured = recording.force.as_ref().filter(|_| read.contains(&true));
@@ -170,6 +133,85 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ForceBand>) -> Resul
         .collect();
     let warnings = screened.remark().into_iter().chain(beyond(&file.table, &places)).collect();
     Ok(Prediction { recordings, rms, warnings })
+}
+
+/// A correction of the bench with its parameters and its memory.
+type StoredCorrection<'a> = (Candidate, &'a [f64], Memory<f64>);
+
+/// # Errors
+/// A correction that this program does not know.
+fn corrections(file: &TableFile) -> Result<Vec<StoredCorrection<'_>>> {
+    let known = |c: &Correction| {
+        Candidate::from_name(&c.effect).filter(|k| k.info().parameters.len() == c.parameters.len())
+    };
+    file.about
+        .corrections
+        .iter()
+        .map(|c| {
+            let candidate = known(c).ok_or_else(|| {
+                Error::new(DataCode::TableInvalid, format!("unknown correction `{}`", c.effect))
+                    .help("a newer version of this program wrote the table: update this program")
+            })?;
+            Ok((candidate, c.parameters.as_slice(), Memory::<f64>::default()))
+        })
+        .collect()
+}
+
+/// # Errors
+/// A row whose length the table's braid cannot have.
+fn check_contractions(muscle: &Muscle<f64>, recordings: &[Cow<'_, Recording>]) -> Result<()> {
+    let rest_length = muscle.braid().rest_length();
+    let contractions = Contractions::of(muscle.braid());
+    for recording in recordings {
+        for (i, stroke) in recording.stroke.iter().enumerate() {
+            contractions
+                .check(stroke / rest_length)
+                .map_err(|e| e.file(&recording.source).value(format!("row {}", i + 1)))?;
+        }
+    }
+    Ok(())
+}
+
+/// A table's muscle with the memory of its effects and corrections.
+struct Model<'a> {
+    muscle: Muscle<f64>,
+    chain: Chain<f64>,
+    corrections: Vec<StoredCorrection<'a>>,
+}
+
+impl Model<'_> {
+    /// Whether the force depends on the present only.
+    fn is_plain(&self) -> bool {
+        self.chain.is_empty() && self.corrections.is_empty()
+    }
+
+    /// The force of the base model in every row, N.
+    fn plain(&self, recording: &Recording, motion: &Motion) -> Vec<f64> {
+        let force = |i: usize| {
+            let p = Pressure::from_pascals(recording.pressure[i]);
+            let x = Length::from_metres(recording.stroke[i]);
+            self.muscle.force(p, x, f64::from(motion.direction[i])).newtons()
+        };
+        (0..recording.len()).map(force).collect()
+    }
+
+    /// The force with effects and corrections in every row, N.
+    fn with_effects(&mut self, recording: &Recording, motions: &[MotionSample<f64>]) -> Vec<f64> {
+        let mut forces = Vec::with_capacity(recording.len());
+        for (i, motion) in motions.iter().enumerate() {
+            let context = self.muscle.context(motion, Pressure::from_pascals(recording.pressure[i]));
+            self.chain.step(&context);
+            // A slack muscle transmits no force; what the bench adds to the reading acts all the same.
+            let (mut pull, mut read) = (context.force() + self.chain.force(&context), 0.0);
+            for (candidate, parameters, memory) in &mut self.corrections {
+                candidate.step(parameters, &context, memory);
+                let part = candidate.force(parameters, &context, memory);
+                *if candidate.acts_on_a_slack_muscle(0) { &mut read } else { &mut pull } += part;
+            }
+            forces.push(self.muscle.pull(pull).newtons() + read);
+        }
+        forces
+    }
 }
 
 /// The recording with the correction of its mounting, where the table knows the stroke that it was held at.
@@ -197,7 +239,7 @@ pub fn beyond(table: &MuscleTable, places: &[(f64, f64)]) -> Vec<String> {
         let out = places.iter().map(of).filter(|v| *v < low - slack || *v > high + slack).count();
         if out * 100 > places.len() {
             warnings.push(format!(
-                "{} % of the rows lie outside the {what} that the table was fitted to ({:.4} to {:.4}{name}): an extrapolation there",
+                "{} % of the rows are outside the {what} of the fit ({:.4} to {:.4}{name}): the force there is an extrapolation",
                 out * 100 / places.len(),
                 low / unit,
                 high / unit

@@ -25,16 +25,19 @@ impl Format {
     /// What a file's name ends in.
     ///
     /// # Errors
-    /// [`DataCode::CallInvalid`] for an ending that says nothing.
+    /// [`DataCode::CallInvalid`] for an unknown file name extension.
     pub fn of(path: &Path) -> Result<Self> {
         match path.extension().and_then(|e| e.to_str()) {
             Some("json") => Ok(Self::Json),
             Some("csv") => Ok(Self::Csv),
             Some("h" | "hpp") => Ok(Self::C),
             Some("mat") => Ok(Self::Matlab),
-            _ => Err(Error::new(DataCode::CallInvalid, "the output's name does not say which form it has")
-                .file(path)
-                .help("end it in .json, .csv, .h or .mat, or give --format")),
+            _ => Err(Error::new(
+                DataCode::CallInvalid,
+                "the extension of the output's name is not a known format",
+            )
+            .file(path)
+            .help("use .json, .csv, .h or .mat, or give --format")),
         }
     }
 }
@@ -87,7 +90,7 @@ pub fn c_header(file: &TableFile) -> String {
         text += "/* With the tip correction L' = L - 2 (pi/2 - 1)(R - R0) stands for L in the forces. */\n";
     }
     if t.goes_slack {
-        text += "/* A muscle that hangs slack pushes nothing: where F comes out below zero it is zero (GOES_SLACK). */\n";
+        text += "/* A slack muscle exerts no force: replace F below zero by zero (GOES_SLACK). */\n";
     }
     if !t.effects.is_empty() {
         text += "/* The table also carries effects, which are not in this header. */\n";

@@ -32,7 +32,7 @@ const MAX_BODY: usize = 16 << 20;
 /// A table with its history.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableFile {
-    /// What the controller gets.
+    /// The table as the controller gets it.
     pub table: MuscleTable,
     /// What stays with the host.
     pub about: About,
@@ -41,13 +41,13 @@ pub struct TableFile {
 /// Where a table comes from and how good it is.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct About {
-    /// The muscle's name.
+    /// The name of the muscle description.
     pub muscle: String,
     /// When the table was made, ISO 8601 in UTC.
     pub date: String,
     /// The program that made it, with its version.
     pub tool: String,
-    /// The recordings behind it.
+    /// The recordings of the fit.
     pub sources: Vec<Source>,
     /// How well it fits them.
     pub fit: FitQuality,
@@ -63,7 +63,7 @@ pub struct About {
 /// One file that a table was fitted to.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Source {
-    /// Its path as given.
+    /// The path as given on the command line.
     pub path: String,
     /// SHA-256 of its bytes, in hexadecimal.
     pub sha256: String,

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Recording};
-use pam_fit::fit::design::{Design, Measured};
-use pam_fit::fit::{Options, fit, midline::midline, models};
+use pam_fit::{Design, Measured};
+use pam_fit::{Options, fit, midline, side_by_side};
 
 fn table(name: &str) -> Vec<Vec<f64>> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/references").join(name);
@@ -57,16 +57,16 @@ fn separate_fits_are_those_of_numpy() {
     let mut fitted = fit(&campaign, &muscle, &Options::default()).expect("a fit");
     assert!((fitted.summary.deadband_kPa - 76.5).abs() < 1.0, "P0 {}", fitted.summary.deadband_kPa);
     // The reference takes P0 as given.
-    fitted.prepared.design.origin = 76.5e3;
-    fitted.prepared.parameters[0] = 0.0;
-    let mid = midline(&fitted.prepared);
-    let all = models::side_by_side(&fitted.prepared, &mid, None);
+    fitted.solution.problem.design.origin = 76.5e3;
+    fitted.solution.parameters[0] = 0.0;
+    let mid = midline(&fitted.solution);
+    let all = side_by_side(&fitted.solution, &mid, None);
     let m4 = all.iter().find(|m| m.name == "m4").expect("a model");
     let expected = table("separate_fits.csv");
     // The reference has every chunk; here the ones right at the turns are set aside, so the comparison is of forces.
     for (g, row) in expected.iter().enumerate() {
         let at = |i: usize| {
-            let c = pam_fit::fit::basis::columns(&fitted.prepared.braid, mid[i].stroke);
+            let c = pam_fit::columns(&fitted.solution.problem.braid, mid[i].stroke);
             let reference: f64 = (0..4).map(|k| row[1 + k] * 1e6 * c.elastic[k]).sum();
             (row[0] - 76.5e3) * c.area + reference
         };

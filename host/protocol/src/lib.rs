@@ -1,4 +1,4 @@
-//! What is done to a muscle: a protocol is plain data, readable from a small TOML file.
+//! Test protocols: what a bench does to a muscle, step by step, as plain data in a small TOML file.
 //!
 //! ```
 //! let text = r#"
@@ -20,40 +20,40 @@
 //! assert_eq!(protocol.step.len(), 3);
 //! ```
 //!
-//! A position is given as `to_mm` (contraction stroke), `to_contraction` (of rest length) or `to_free` (part of the free
-//! stroke at the pressure of that moment: 0 blocked, 1 unloaded); one of the three.
+//! A position is one of `to_mm` (stroke), `to_contraction` (share of the rest length) and `to_free` (share of the free stroke at the
+//! present pressure: 0 blocked, 1 unloaded).
 
 use serde::{Deserialize, Serialize};
 
-/// A list of steps at a sampling rate.
+/// A list of steps and a sampling rate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Protocol {
-    /// What it is called.
+    /// The name of the protocol.
     pub name: String,
     /// Samples per second.
     #[serde(rename = "sample_Hz")]
     pub sample_hz: f64,
-    /// What is done, in order.
+    /// The steps, in order.
     pub step: Vec<Step>,
 }
 
-/// A contraction stroke, said in one of three ways.
+/// A stroke, in one of three forms.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Place {
-    /// In mm.
+    /// Stroke, mm.
     #[serde(rename = "to_mm", skip_serializing_if = "Option::is_none")]
     pub mm: Option<f64>,
-    /// Of the rest length.
+    /// Share of the rest length.
     #[serde(rename = "to_contraction", skip_serializing_if = "Option::is_none")]
     pub contraction: Option<f64>,
-    /// Of the free stroke at the present pressure.
+    /// Share of the free stroke at the present pressure.
     #[serde(rename = "to_free", skip_serializing_if = "Option::is_none")]
     pub free: Option<f64>,
 }
 
 impl Place {
-    /// Part of the free stroke.
+    /// A share of the free stroke.
     pub fn free(part: f64) -> Self {
         Self { free: Some(part), ..Self::default() }
     }
@@ -65,19 +65,19 @@ impl Place {
 pub enum Step {
     /// Start a new recording file. Without any such step everything is recorded into one file named as the protocol.
     File {
-        /// Its name, without extension.
+        /// Name of the file, without extension.
         name: String,
     },
     /// Stop recording: what follows is not written until the next `file`.
     EndFile,
     /// Vented at rest length: the instruments' zeros.
     Tare {
-        /// For how long, s.
+        /// Duration, s.
         seconds: f64,
     },
     /// Change the pressure at held length, then wait.
     Pressure {
-        /// Where to, kPa.
+        /// Target pressure, kPa.
         #[serde(rename = "to_kPa")]
         to_kpa: f64,
         /// How fast, kPa/s; a step when absent.
@@ -89,30 +89,30 @@ pub enum Step {
     },
     /// Move at the present pressure.
     Move {
-        /// Where to.
+        /// Target stroke.
         #[serde(flatten)]
         to: Place,
-        /// How fast, mm/s.
+        /// Speed, mm/s.
         speed_mm_s: f64,
     },
     /// Triangular loops from the present position to another and back.
     Cycles {
-        /// Where to.
+        /// Target stroke.
         #[serde(flatten)]
         to: Place,
-        /// How fast, mm/s.
+        /// Speed, mm/s.
         speed_mm_s: f64,
-        /// How often.
+        /// Number of cycles.
         count: u32,
     },
     /// Keep everything as it is.
     Hold {
-        /// For how long, s.
+        /// Duration, s.
         seconds: f64,
     },
     /// Vented and let alone, not recorded.
     Rest {
-        /// For how long, s.
+        /// Duration, s.
         seconds: f64,
     },
     /// Sinusoidal motion about the present position.
@@ -122,17 +122,17 @@ pub enum Step {
         /// Frequency, Hz.
         #[serde(rename = "frequency_Hz")]
         frequency_hz: f64,
-        /// For how long, s.
+        /// Duration, s.
         seconds: f64,
     },
 }
 
-/// Why a protocol cannot be used.
+/// Why a protocol is invalid.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ProtocolError {
-    /// Not a TOML file of this form; the parser's words.
+    /// Not a TOML file of this form, with the message of the parser.
     Text(String),
-    /// A number that cannot be: which step (from 1; 0 for the head) and what is wrong.
+    /// A number out of range: the step (from 1; 0 for the header) and the reason.
     Number(usize, &'static str),
 }
 
@@ -149,24 +149,33 @@ impl std::fmt::Display for ProtocolError {
 impl std::error::Error for ProtocolError {}
 
 impl Protocol {
-    /// Read a protocol file and check its numbers.
+    /// Parses a protocol file and checks its numbers.
+    ///
+    /// # Errors
+    /// Text that is no protocol, or a number out of range.
     pub fn from_toml(text: &str) -> Result<Self, ProtocolError> {
         let p: Self = toml::from_str(text).map_err(|e| ProtocolError::Text(e.to_string()))?;
         p.check()?;
         Ok(p)
     }
 
-    /// The protocol as a file.
+    /// The protocol as TOML text.
+    ///
+    /// # Errors
+    /// Numbers that TOML cannot represent.
     pub fn to_toml(&self) -> Result<String, ProtocolError> {
         toml::to_string(self).map_err(|e| ProtocolError::Text(e.to_string()))
     }
 
-    /// Refuse numbers that cannot be.
+    /// Checks that all numbers are in range.
+    ///
+    /// # Errors
+    /// The first step with a number out of range.
     pub fn check(&self) -> Result<(), ProtocolError> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         let not_negative = |x: f64| x.is_finite() && x >= 0.0;
         if !positive(self.sample_hz) || self.sample_hz > 20_000.0 {
-            return Err(ProtocolError::Number(0, "the sampling rate must lie between 0 and 20 000 Hz"));
+            return Err(ProtocolError::Number(0, "the sampling rate must be above 0 and at most 20 000 Hz"));
         }
         for (i, step) in self.step.iter().enumerate() {
             let bad = |what| Err(ProtocolError::Number(i + 1, what));
@@ -186,7 +195,9 @@ impl Protocol {
                         || !not_negative(*settle_s)
                         || rate_kpa_s.is_some_and(|r| !positive(r))
                     {
-                        return bad("pressure and waiting time must not be negative, the rate above zero");
+                        return bad(
+                            "pressure and settling time must not be negative, and the rate must be above zero",
+                        );
                     }
                 }
                 Step::Move { to, speed_mm_s } | Step::Cycles { to, speed_mm_s, .. } => {

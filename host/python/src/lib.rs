@@ -5,22 +5,22 @@
 use std::ffi::CString;
 use std::path::PathBuf;
 
-use pam_fit::band::{ForceBand, HALF_95};
-use pam_data::date;
-use pam_data::counted::counted;
-use pam_diagnose as diagnosis;
-use pam_data::error::{DataCode, Error};
-use pam_fit::fit::Options;
-use pam_fit::fit::result::Fit as HostFit;
-use pam_data::muscle_description::{Kind, MuscleDescription};
-use pam_data::possible::{self, Contractions};
-use pam_fit::predict::{Predicted, beyond, predict as host_predict, predict_with_bands};
-use pam_data::recording::{Campaign as HostCampaign, Import, Reader, Recording as HostRecording};
-use pam_report::{Page, diagnose_page, fit_page};
-use pam_fit::table_file::{self, About, TableFile};
 use model_core::muscle::Muscle as Model;
 use model_core::units::{Length, Pressure};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
+use pam_data::date;
+use pam_data::error::{DataCode, Error};
+use pam_data::muscle_description::{Kind, MuscleDescription};
+use pam_data::physical_limits::{self, Contractions};
+use pam_data::pluralise::pluralise;
+use pam_data::recording::{Campaign as HostCampaign, Import, Reader, Recording as HostRecording};
+use pam_diagnose as diagnosis;
+use pam_fit::Fit as HostFit;
+use pam_fit::Options;
+use pam_fit::confidence_band::{ConfidenceBand, HALF_95};
+use pam_fit::predict::{Predicted, beyond, predict as host_predict, predict_with_bands};
+use pam_fit::table_file::{self, About, TableFile};
+use pam_report::{Page, diagnose_page, fit_page};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyIndexError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
@@ -76,7 +76,8 @@ fn numbers<'py>(name: &str, values: &Bound<'py, PyAny>) -> PyResult<Bound<'py, P
     // numpy would drop the imaginary parts with no more than a warning.
     if numpy.call_method1("iscomplexobj", (values,))?.is_truthy()? {
         return Err(raised(
-            Error::new(DataCode::CallInvalid, format!("`{name}` holds complex numbers")).help("give its real part"),
+            Error::new(DataCode::CallInvalid, format!("`{name}` holds complex numbers"))
+                .help("give its real part"),
         ));
     }
     numpy.call_method1("asarray", (values, "float64")).map_err(|e| {
@@ -233,7 +234,12 @@ impl Recording {
     }
 
     fn __repr__(&self) -> String {
-        format!("Recording({:?}, {}, {:.1} s)", self.0.name, counted(self.0.len(), "row"), self.0.duration())
+        format!(
+            "Recording({:?}, {}, {:.1} s)",
+            self.0.name,
+            pluralise(self.0.len(), "row"),
+            self.0.duration()
+        )
     }
 }
 
@@ -277,7 +283,11 @@ impl Campaign {
     }
 
     fn __repr__(&self) -> String {
-        format!("Campaign({}, {})", counted(self.0.recordings.len(), "recording"), counted(self.0.samples(), "row"))
+        format!(
+            "Campaign({}, {})",
+            pluralise(self.0.recordings.len(), "recording"),
+            pluralise(self.0.samples(), "row")
+        )
     }
 }
 
@@ -352,7 +362,7 @@ impl Prediction {
     fn __repr__(&self) -> String {
         let rms = self.0.rms.map_or(String::new(), |r| format!(", rms {r:.3} N"));
         let band = self.0.bands.as_ref().map_or(String::new(), |b| format!(", ± {:.3} N", b.mean));
-        format!("Prediction({}{rms}{band})", counted(self.0.force.len(), "row"))
+        format!("Prediction({}{rms}{band})", pluralise(self.0.force.len(), "row"))
     }
 }
 
@@ -424,7 +434,7 @@ impl Table {
         stroke: &Bound<'py, PyAny>,
         direction: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Option<Bound<'py, PyAny>>> {
-        let Some(band) = ForceBand::of(&self.0) else { return Ok(None) };
+        let Some(band) = ConfidenceBand::of(&self.0) else { return Ok(None) };
         let model = Model::<f64>::build(&self.0.table).map_err(|e| wrong(e.to_string()))?;
         over(&self.0, &model, pressure, stroke, direction, |p, x, s| HALF_95 * band.std(p, x, s)).map(Some)
     }
@@ -495,12 +505,14 @@ fn over<'py>(
     let part = |i: usize| -> PyResult<PyReadonlyArrayDyn<'py, f64>> { Ok(same.get_item(i)?.extract()?) };
     let (p, x, s) = (part(0)?, part(1)?, part(2)?);
     if let Some(wrong_way) = s.as_array().iter().find(|s| !(-1.0..=1.0).contains(*s)) {
-        return Err(wrong(format!("`direction` is {wrong_way}; it is 1 shortening, -1 lengthening, 0 the mid-line")));
+        return Err(wrong(format!(
+            "`direction` is {wrong_way}; it is 1 shortening, -1 lengthening, 0 the mid-line"
+        )));
     }
     let places: Vec<(f64, f64)> = p.as_array().iter().copied().zip(x.as_array().iter().copied()).collect();
     let contractions = Contractions::of(model.braid());
     for (p, x) in &places {
-        possible::pressure(*p).map_err(raised)?;
+        physical_limits::pressure(*p).map_err(raised)?;
         contractions.check(x / model.braid().rest_length()).map_err(raised)?;
     }
     warn(py, &beyond(&table.table, &places))?;
@@ -537,7 +549,7 @@ impl Fit {
             tool: format!("pamtools {}", env!("CARGO_PKG_VERSION")),
             fit: self.fit.summary.quality(),
             uncertainty: Some(self.fit.stored_uncertainty()),
-            mountings: self.fit.prepared.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
+            mountings: self.fit.solution.problem.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
             ..About::default()
         };
         Table(TableFile { table: self.fit.table.clone(), about })
@@ -587,7 +599,7 @@ fn fit(
         ..Options::default()
     };
     let (campaign, muscle) = (campaign.0.clone(), muscle.0.clone());
-    let fit = py.detach(|| pam_fit::fit::fit(&campaign, &muscle, &options)).map_err(raised)?;
+    let fit = py.detach(|| pam_fit::fit(&campaign, &muscle, &options)).map_err(raised)?;
     Ok(Fit { fit, campaign, options })
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
 use pam_data::compare::{Column, Comparison};
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_data::recording::Recording;
 
 /// The page of a comparison of `b` with `a`.
@@ -35,7 +35,7 @@ pub fn page(a: &Recording, b: &Recording, found: &Comparison) -> Page {
     for (letter, r) in [("A", a), ("B", b)] {
         page.origin(
             format!("recording {letter}"),
-            format!("{}, {}, {} s", r.source.display(), counted(r.len(), "row"), fixed(r.duration(), 1)),
+            format!("{}, {}, {} s", r.source.display(), pluralise(r.len(), "row"), fixed(r.duration(), 1)),
         );
     }
     page.origin("made by", format!("host {}", env!("CARGO_PKG_VERSION")));
@@ -89,7 +89,7 @@ fn numbers(found: &Comparison) -> Section {
     let mut section = Section::new("Differences").summarised();
     let caption = format!(
         "B − A over {} in {} s",
-        counted(fixed(found.rows as f64, 0), "row"),
+        pluralise(fixed(found.rows as f64, 0), "row"),
         fixed(found.overlap, 1)
     );
     let mut table = Table::new(caption, &["quantity", "rms", "mean", "largest", "at s"]);

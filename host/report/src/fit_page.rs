@@ -10,10 +10,10 @@ mod residuals;
 mod view;
 
 use super::{Page, Section, Tone, figures, fixed};
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_data::recording::Campaign;
-use pam_fit::fit::Options;
-use pam_fit::fit::result::Fit;
+use pam_fit::Fit;
+use pam_fit::Options;
 use view::View;
 
 /// Error below which a table is called good, percent of blocked force; the thesis reaches a fifth of it.
@@ -31,7 +31,7 @@ pub fn page(fit: &Fit, campaign: &Campaign, options: &Options) -> Page {
         format!(
             "{} rows of {}, order M = {}{}",
             fixed(s.samples as f64, 0),
-            counted(campaign.recordings.len(), "recording"),
+            pluralise(campaign.recordings.len(), "recording"),
             options.order,
             if options.tip_correction { ", tip correction" } else { "" }
         ),

@@ -1,7 +1,7 @@
 //! A report as plain values: what it says, in which order. [`Page::html`] and [`Page::markdown`] give it a form.
 
 use super::figure::Figure;
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_data::recording::Campaign;
 
 /// How a fact or a notice is meant.
@@ -220,7 +220,7 @@ impl Page {
     /// Adds a line for every recording that the report is made from.
     pub fn recordings(&mut self, campaign: &Campaign) {
         for recording in &campaign.recordings {
-            self.origin(&recording.name, counted(recording.len(), "row"));
+            self.origin(&recording.name, pluralise(recording.len(), "row"));
         }
     }
 

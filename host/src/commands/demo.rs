@@ -22,9 +22,9 @@ use pam_data::progress::Progress;
 use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::recorder::{Recorder, about_losses, about_start};
 use pam_device::{Client, regulator, tables};
-use pam_fit::fit::result::Fit;
-use pam_fit::fit::{Options, fit};
+use pam_fit::Fit;
 use pam_fit::predict::predict;
+use pam_fit::{Options, fit};
 
 use crate::progress::ProgressLine;
 use pam_data::recording::{Campaign, Reader};

@@ -10,11 +10,11 @@ use pam_data::error::{Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::{json_of, write_whole};
 use pam_data::progress::Progress;
-use pam_evaluate::hold_out::{HeldOut, Score, Split, Spot, hold_out};
-use pam_evaluate::other_length::{Carried, unseen_length};
+use pam_evaluate::cross_validation::{CrossValidation, Score, Split, Spot, cross_validate};
+use pam_evaluate::length_transfer::{LengthTransfer, predict_unseen_length};
 use pam_evaluate::published::Published;
-use pam_fit::fit::Options;
-use pam_fit::fit::result::Fit;
+use pam_fit::Fit;
+use pam_fit::Options;
 
 use crate::progress::ProgressLine;
 use pam_data::recording::{Campaign, Reader};
@@ -67,8 +67,8 @@ enum LeaveOut {
 struct Case {
     muscle: MuscleDescription,
     campaign: Campaign,
-    runs: Option<HeldOut>,
-    contractions: Option<HeldOut>,
+    runs: Option<CrossValidation>,
+    contractions: Option<CrossValidation>,
 }
 
 impl Arguments {
@@ -94,7 +94,7 @@ impl Arguments {
             let muscle = MuscleDescription::read(path)?;
             let campaign = self.recordings.read(Reader::of(&muscle))?;
             let mut over = |split, wanted: bool| {
-                let score = || hold_out(&campaign, &muscle, &options, split, published.as_ref());
+                let score = || cross_validate(&campaign, &muscle, &options, split, published.as_ref());
                 // One split that cannot be fitted does not take the other figures away.
                 let scored = wanted.then(score)?;
                 progress.step();
@@ -143,22 +143,22 @@ impl Case {
 }
 
 /// The muscle predicted from the tables of all others.
-fn by_others(cases: &[Case], index: usize) -> Result<Option<Carried>> {
+fn by_others(cases: &[Case], index: usize) -> Result<Option<LengthTransfer>> {
     let Some(own) = cases[index].whole() else { return Ok(None) };
     let others: Vec<_> =
         cases.iter().enumerate().filter(|(i, _)| *i != index).filter_map(|(_, c)| c.whole()).collect();
     if others.is_empty() {
         return Ok(None);
     }
-    let clip = own.prepared.clips.0.map(|c| c.force);
-    unseen_length(&others, &cases[index].campaign, &cases[index].muscle, clip).map(Some)
+    let clip = own.solution.problem.clips.0.map(|c| c.force);
+    predict_unseen_length(&others, &cases[index].campaign, &cases[index].muscle, clip).map(Some)
 }
 
 fn percent(score: &Score, blocked: f64) -> (f64, f64) {
     (100.0 * score.mean() / blocked, 100.0 * score.rms() / blocked)
 }
 
-fn to_text(cases: &[Case], lengths: &[Option<Carried>], published: Option<&str>) -> String {
+fn to_text(cases: &[Case], lengths: &[Option<LengthTransfer>], published: Option<&str>) -> String {
     let mut text = format!(
         "Errors on held-out data: mean |F − F_model| in N, and in percent of the blocked force at the highest pressure.\n\
          {:<22} {:>8} {:>17} {:>17} {:>17} {:>17}\n",
@@ -259,7 +259,7 @@ fn places(what: &str, spots: &[Spot]) -> String {
     text
 }
 
-fn to_document(case: &Case, length: Option<&Carried>) -> document::Muscle {
+fn to_document(case: &Case, length: Option<&LengthTransfer>) -> document::Muscle {
     let blocked = case.runs.as_ref().or(case.contractions.as_ref()).map_or(f64::NAN, |h| h.blocked);
     let score = |s: &Score| {
         let (mean_pct, rms_pct) = percent(s, blocked);
@@ -279,7 +279,7 @@ fn to_document(case: &Case, length: Option<&Carried>) -> document::Muscle {
             })
             .collect()
     };
-    let held = |h: &Option<HeldOut>| {
+    let held = |h: &Option<CrossValidation>| {
         h.as_ref().map(|h| document::HeldOut {
             table: score(&h.table),
             published: h.published.as_ref().map(score),

@@ -8,12 +8,12 @@ use clap::Args;
 use super::recordings::Recordings;
 use super::reports::Reports;
 use crate::console::Console;
-use pam_data::counted::counted;
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::{Turn, to_standard_output, write_whole};
-use pam_fit::fit::{self, Options};
+use pam_data::pluralise::pluralise;
+use pam_fit::{Options, fit_with_progress};
 
 use crate::progress::ProgressLine;
 use pam_data::recording::Reader;
@@ -84,7 +84,7 @@ impl Arguments {
         let (campaign, hashes) = self.recordings.read_hashed(Reader::of(&muscle), &watched)?;
         console.detail(format!(
             "read {} in {:.3} s",
-            counted(campaign.samples(), "row"),
+            pluralise(campaign.samples(), "row"),
             start.elapsed().as_secs_f64()
         ));
         let started = Instant::now();
@@ -98,7 +98,7 @@ impl Arguments {
         };
         let files = self.recordings.files.clone();
         let progress = ProgressLine::new(&watched, "fitting");
-        let fitted = fit::watched(&campaign, &muscle, &options, &progress)?;
+        let fitted = fit_with_progress(&campaign, &muscle, &options, &progress)?;
         drop(progress);
         console.detail(format!("fitted in {:.3} s", started.elapsed().as_secs_f64()));
         let about = table_file::About {
@@ -109,7 +109,7 @@ impl Arguments {
             fit: fitted.summary.quality(),
             uncertainty: Some(fitted.stored_uncertainty()),
             corrections: Vec::new(),
-            mountings: fitted.prepared.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
+            mountings: fitted.solution.problem.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
         };
         let table = TableFile { table: fitted.table.clone(), about };
         let json = serde_json::to_string_pretty(&fitted.summary)

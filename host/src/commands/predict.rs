@@ -6,9 +6,9 @@ use super::recordings::Recordings;
 use crate::console::Console;
 use crate::documents::{predict as document, text};
 use clap::Args;
-use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::{to_standard_output, write_whole};
+use pam_data::pluralise::pluralise;
 use pam_data::recording::Reader;
 use pam_fit::predict::{predict_with_bands, to_csv};
 use pam_fit::table_file::TableFile;
@@ -95,7 +95,7 @@ impl Arguments {
                 });
                 format!(", force ± {:.3} N (95 %){inside}", bands.mean)
             });
-            console.note(format!("{}: {}, {rms}{band}", recording.name, counted(recording.len(), "row")));
+            console.note(format!("{}: {}, {rms}{band}", recording.name, pluralise(recording.len(), "row")));
         }
         if self.output.is_none() && self.json.is_none() {
             console.detail("nothing is written: give -o or --json");

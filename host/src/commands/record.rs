@@ -13,8 +13,8 @@ use super::port::PortOption;
 use super::run::{begin, end, interrupts, not_there, positive};
 use crate::console::Console;
 use crate::documents::{bench, text};
-use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result};
+use pam_data::pluralise::pluralise;
 use pam_data::progress::Progress;
 use pam_device::error::DeviceCode;
 use pam_device::recorder::{Recorder, about_losses, about_start, recover};
@@ -111,7 +111,7 @@ impl Arguments {
         if let Err(error) = &watched
             && kept.is_ok()
         {
-            console.note(format!("{} until then in {names}", counted(rows, "sample")));
+            console.note(format!("{} until then in {names}", pluralise(rows, "sample")));
             console.detail(error.to_string());
         }
         watched?;
@@ -120,14 +120,14 @@ impl Arguments {
         if losses.samples > 0 {
             console.warning(format!(
                 "{} lost on the line, in {}",
-                counted(losses.samples, "sample"),
-                counted(losses.gaps, "gap")
+                pluralise(losses.samples, "sample"),
+                pluralise(losses.gaps, "gap")
             ));
         }
         console.result(if self.json {
             format!("{about:#}")
         } else {
-            format!("{} in {names}, {} lost", counted(rows, "sample"), losses.samples)
+            format!("{} in {names}, {} lost", pluralise(rows, "sample"), losses.samples)
         });
         Ok(())
     }

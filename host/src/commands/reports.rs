@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::console::Console;
-use pam_data::counted::counted;
 use pam_data::error::Result;
 use pam_data::output::write_whole;
+use pam_data::pluralise::pluralise;
 use pam_report::Page;
 
 /// What to write of a report.
@@ -49,7 +49,7 @@ impl Reports {
         }
         if let Some(folder) = &self.figures {
             let files = page.write_parts(folder)?;
-            console.detail(format!("{} in {}", counted(files.len(), "file"), folder.display()));
+            console.detail(format!("{} in {}", pluralise(files.len(), "file"), folder.display()));
         }
         Ok(())
     }

@@ -12,8 +12,8 @@ use serde_json::{Value, json};
 use super::port::PortOption;
 use crate::console::Console;
 use crate::documents::{device, line};
-use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result};
+use pam_data::pluralise::pluralise;
 use pam_data::progress::Progress;
 use pam_device::error::DeviceCode;
 use pam_device::reachability::Reachability;
@@ -189,8 +189,8 @@ impl Arguments {
         if losses.samples > 0 {
             console.warning(format!(
                 "{} lost on the line, in {}",
-                counted(losses.samples, "sample"),
-                counted(losses.gaps, "gap")
+                pluralise(losses.samples, "sample"),
+                pluralise(losses.gaps, "gap")
             ));
         }
         let lasted = errors.all.samples as f64 * f64::from(every_ticks);
@@ -216,7 +216,7 @@ impl Arguments {
         } else {
             let name = kept.map(|p| format!(" in {}", p.display())).unwrap_or_default();
             let rms = errors.to_text(quantity);
-            console.result(format!("{}{name}{rms}; vented", counted(errors.all.samples, "sample")));
+            console.result(format!("{}{name}{rms}; vented", pluralise(errors.all.samples, "sample")));
         }
         Ok(())
     }
@@ -358,7 +358,7 @@ pub(super) fn end(recorder: Recorder, about: &Value, console: &Console) -> Resul
     if recorder.skipped() > 0 {
         console.warning(format!(
             "{} left out: not finite, or not later than the one before",
-            counted(recorder.skipped(), "sample")
+            pluralise(recorder.skipped(), "sample")
         ));
     }
     recorder.finish(about)

@@ -7,9 +7,9 @@ use model_core::muscle::Muscle;
 
 use crate::console::{Console, name};
 use crate::documents::{table as document, text};
-use pam_data::counted::counted;
 use pam_data::error::Result;
 use pam_data::output::{printed, to_standard_output, write_whole};
+use pam_data::pluralise::pluralise;
 use pam_fit::table_export::{self, Format};
 use pam_fit::table_file::TableFile;
 
@@ -307,7 +307,7 @@ fn to_text(file: &TableFile) -> String {
         text += &format!(
             "\nfrom {} ({}, sha256 {})",
             name(&s.path),
-            counted(s.samples, "row"),
+            pluralise(s.samples, "row"),
             s.sha256.get(..16).unwrap_or("")
         );
     }

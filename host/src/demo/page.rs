@@ -6,7 +6,7 @@ use model_core::units::{Length, Pressure};
 use super::tracking::{SETTLE, Task, Track};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
-use pam_fit::fit::result::Fit;
+use pam_fit::Fit;
 use pam_report::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, fixed};
 
 /// What the page tells.

@@ -16,8 +16,8 @@ use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Hashes, Reader, Recording};
-use pam_fit::fit::{Options, fit};
 use pam_fit::table_file::{self, About, TableFile};
+use pam_fit::{Options, fit};
 use pam_report::{diagnose_page, fit_page};
 
 /// Points of a curve that are sent to the page.
@@ -262,7 +262,7 @@ impl Analysis {
             fit: fitted.summary.quality(),
             uncertainty: Some(fitted.stored_uncertainty()),
             corrections: Vec::new(),
-            mountings: fitted.prepared.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
+            mountings: fitted.solution.problem.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
         };
         let path = self.free("fitted", "pam");
         TableFile { table: fitted.table.clone(), about }.write(&path)?;

@@ -7,7 +7,7 @@ use model_core::table::MuscleTable;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Reader};
 use pam_diagnose::refitted_table;
-use pam_fit::fit::{self, Options};
+use pam_fit::{Options, fit};
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::{Muscle, MuscleSpec};
@@ -163,7 +163,7 @@ fn record(spec: &MuscleSpec) -> (MuscleDescription, Campaign) {
 /// When a step of the way fails.
 pub fn tables(case: &Case) -> Tables {
     let (muscle, campaign) = record(&case.spec);
-    let plain = fit::fit(&campaign, &muscle, &Options::default()).expect("a fit").table;
+    let plain = fit(&campaign, &muscle, &Options::default()).expect("a fit").table;
     let geometry = muscle.geometry();
     let options = pam_diagnose::Options { muscle: muscle.name.clone(), ..Default::default() };
     let answer = pam_diagnose::diagnose(&campaign, &geometry, &options).expect("a diagnosis");
@@ -183,7 +183,7 @@ pub fn tables(case: &Case) -> Tables {
 /// When a step of the way fails.
 pub fn table_without(case: &Case) -> MuscleTable {
     let (muscle, campaign) = record(&case.plain);
-    fit::fit(&campaign, &muscle, &Options::default()).expect("a fit").table
+    fit(&campaign, &muscle, &Options::default()).expect("a fit").table
 }
 
 /// A slow sine of force about a third of blocked force `b`, N, then two steps; the first part of the sine fills the muscle.

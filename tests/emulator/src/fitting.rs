@@ -5,7 +5,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use model_core::table::MuscleTable;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Reader;
-use pam_fit::fit::{self, Options};
+use pam_fit::{Options, fit};
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::MuscleSpec;
@@ -48,7 +48,7 @@ pub fn fitted(spec: &MuscleSpec) -> MuscleTable {
         .collect();
     let muscle = MuscleDescription::parse(&spec.description()).expect("a description");
     let campaign = Reader::of(&muscle).campaign(&files).expect("recordings");
-    let table = fit::fit(&campaign, &muscle, &Options::default()).expect("a fit").table;
+    let table = fit(&campaign, &muscle, &Options::default()).expect("a fit").table;
     known.push((spec.clone(), table.clone()));
     table
 }

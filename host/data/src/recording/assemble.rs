@@ -5,15 +5,15 @@ use std::path::Path;
 
 use super::blocks::Rows;
 use super::cells::{Want, Words};
-use super::check::check;
+use super::column_plan::{ColumnPlan, Role};
 use super::columns::Recording;
 use super::decimal;
 use super::import::{FoundZero, Import, Value, Zero};
-use super::plan::{Plan, Role};
+use super::plausibility::check;
 use super::quantity::Quantity;
-use super::zero::{at_largest, first_level, smallest};
-use crate::counted::counted;
+use super::stroke_zero::{at_largest, first_level, smallest};
 use crate::error::{DataCode, Error, Result};
+use crate::pluralise::pluralise;
 
 /// A lookup table as text.
 #[derive(Debug, Default)]
@@ -38,7 +38,7 @@ pub(super) struct Job<'a> {
     pub muscle_name: Option<&'a str>,
     pub import: &'a Import,
     pub filters: &'a [(String, Value)],
-    pub plan: &'a Plan,
+    pub plan: &'a ColumnPlan,
     pub names: &'a [String],
     pub lookup: Option<&'a LookupTable>,
     /// Line of the file that holds line 0 of the rows, counted from 1.
@@ -55,7 +55,7 @@ pub(super) fn assemble(job: &Job<'_>, mut rows: Rows) -> Result<Vec<Recording>> 
             n => format!("there are {n} rows only"),
         };
         return Err(Error::new(DataCode::RecordingTooShort, cause)
-            .help(format!("a recording has at least {}", counted(job.min_rows, "row"))));
+            .help(format!("a recording has at least {}", pluralise(job.min_rows, "row"))));
     }
     let mut table = sort_columns(job, &mut rows)?;
     let map = |row: usize| job.first_line + rows.map.line(row);
@@ -253,7 +253,10 @@ fn set_zero(job: &Job<'_>, table: &mut Table) {
     }
 }
 
-/// Which rows the filters leave; `None` when all.
+/// At most this many values of a column are listed in an error.
+const LISTED_VALUES: usize = 20;
+
+/// Which rows the filters keep; `None` when all.
 fn keep(job: &Job<'_>, table: &Table, rows: usize) -> Result<Option<Vec<bool>>> {
     if job.filters.is_empty() {
         return Ok(None);
@@ -286,8 +289,11 @@ fn keep(job: &Job<'_>, table: &Table, rows: usize) -> Result<Option<Vec<bool>>> 
         return Ok(Some(keep));
     }
     let list = |(words, (name, _)): (&Words, &(String, Value))| {
-        let some: Vec<_> = words.words.iter().take(8).map(String::as_str).collect();
-        format!("{name} is one of {}", some.join(", "))
+        let mut values: Vec<String> = words.words.iter().take(LISTED_VALUES).cloned().collect();
+        if words.words.len() > LISTED_VALUES {
+            values.push(format!("and {} more", words.words.len() - LISTED_VALUES));
+        }
+        format!("{name} is one of {}", values.join(", "))
     };
     let has: Vec<String> = table.filters.iter().zip(job.filters).map(list).collect();
     let muscle = match (rest_length, job.rest_length) {

@@ -1,6 +1,6 @@
 //! A text file in blocks of whole lines, parsed on all cores, put together in order.
 //!
-//! One worker at a time reads; all parse; whoever finishes the next block in line appends it to the columns. So a block
+//! One worker at a time reads; all parse; the worker with the next block in order appends it to the columns. So a block
 //! is parsed while it is still in the cache, memory holds the columns and a few blocks only, and a compressed stream goes
 //! the same way as a plain file. The first error in the order of the file is the one reported.
 
@@ -33,17 +33,17 @@ pub(super) enum BlockError {
 }
 
 impl Blocks {
-    pub fn new(reader: Box<dyn Read + Send>) -> Self {
+    pub(super) fn new(reader: Box<dyn Read + Send>) -> Self {
         Self { reader, carry: Vec::new(), ended: false }
     }
 
     /// Puts bytes back in front of what is still to come.
-    pub fn put_back(&mut self, bytes: &[u8]) {
+    pub(super) fn put_back(&mut self, bytes: &[u8]) {
         self.carry.splice(0..0, bytes.iter().copied());
     }
 
     /// Fills `block` with the next lines; `false` at the end. The last line may lack its line end.
-    pub fn next(&mut self, block: &mut Vec<u8>) -> Result<bool, BlockError> {
+    pub(super) fn next(&mut self, block: &mut Vec<u8>) -> Result<bool, BlockError> {
         block.clear();
         block.append(&mut self.carry);
         let mut searched = 0;

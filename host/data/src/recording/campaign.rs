@@ -1,6 +1,7 @@
 //! Several recordings of one muscle, in the order in which they happened.
 
 use super::Recording;
+use crate::statistics::median;
 
 /// A clock that shows more at the first reading was not started for the campaign, s (a day and some).
 const LONGEST_CLOCK: f64 = 1.0e5;
@@ -29,7 +30,7 @@ impl Campaign {
     /// Decides from the times whether the clock is shared, and puts recordings with a shared clock into order.
     ///
     /// With one clock no two recordings overlap. They are sorted by time then, because a shell lists `run10` before `run2`.
-    /// Recordings that overlap cannot share a clock; their given order stands.
+    /// Recordings that overlap cannot share a clock; they keep the given order.
     #[must_use]
     pub fn new(mut recordings: Vec<Recording>) -> Self {
         let mut warnings = Vec::new();
@@ -98,8 +99,8 @@ impl Campaign {
     }
 }
 
-/// A recording whose time is in another unit than that of the others, told: its rows are a thousand times as far apart, or as close, and
-/// the muscle moves as far from row to row as theirs does.
+/// A warning about a recording whose time has another unit than that of the others: its sample interval is a thousand times theirs, or a
+/// thousandth, and the stroke per row is the same.
 fn other_clock(recordings: &[Recording]) -> Option<String> {
     if recordings.len() < 3 {
         return None;
@@ -110,7 +111,7 @@ fn other_clock(recordings: &[Recording]) -> Option<String> {
         (r.duration() / steps, way / steps)
     };
     let rows: Vec<(f64, f64)> = recordings.iter().map(a_row).collect();
-    let middle = |of: &dyn Fn(&(f64, f64)) -> f64| median(rows.iter().map(of).collect());
+    let middle = |of: &dyn Fn(&(f64, f64)) -> f64| median(&mut rows.iter().map(of).collect::<Vec<_>>());
     let (interval, way) = (middle(&|r| r.0), middle(&|r| r.1));
     let odd = |(time, moved): &(f64, f64)| {
         let thousand = [1e3, 1e-3].iter().any(|f| (time / interval / f - 1.0).abs() < 0.02);
@@ -118,15 +119,10 @@ fn other_clock(recordings: &[Recording]) -> Option<String> {
     };
     let i = rows.iter().position(odd)?;
     Some(format!(
-        "the rows of `{}` are {:.4} s apart, those of the others {:.4} s, and the muscle moves as far from row to row: its time seems to be in \
-         another unit; put the one that was logged into the column's name",
+        "the sample interval of `{}` is {:.4} s, that of the others {:.4} s, with the same stroke per row: its time seems to have another \
+         unit; put the logged unit into the column's name",
         recordings[i].name, rows[i].0, interval
     ))
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]
@@ -166,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn milliseconds_under_a_heading_in_seconds_are_told() {
+    fn milliseconds_under_a_heading_in_seconds_are_reported() {
         let loops = |name: &str, start: f64, interval: f64, way: f64| Recording {
             name: name.into(),
             time: (0..100).map(|i| start + interval * f64::from(i)).collect(),
@@ -178,7 +174,7 @@ mod tests {
             Campaign::new(files.map(|(n, s, i, w)| loops(n, s, i, w)).to_vec()).warnings.join("; ")
         };
         let said = told(100.0, 1e-4);
-        assert!(said.contains("`b` are 100.0000 s apart, those of the others 0.1000 s"), "{said}");
+        assert!(said.contains("`b` is 100.0000 s, that of the others 0.1000 s"), "{said}");
         assert!(told(1e-4, 1e-4).contains("another unit"));
         // A logger that was set to another rate sees the same motion.
         assert_eq!(told(1e-4, 1e-7), "");

@@ -8,7 +8,7 @@ use super::line::{Cells, is_blank, trim_end};
 /// How a text file is cut into cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Dialect {
-    /// What stands between cells; a space means any run of blanks.
+    /// The separator of cells; a space means any run of blanks.
     pub delimiter: u8,
     /// Lines that begin with this are skipped.
     pub comment: Option<u8>,
@@ -62,7 +62,7 @@ pub(super) struct Words {
 }
 
 impl Words {
-    pub fn push(&mut self, word: &str) {
+    pub(super) fn push(&mut self, word: &str) {
         let code = self.code(word);
         self.codes.push(code);
     }
@@ -83,12 +83,12 @@ impl Words {
         code
     }
 
-    pub fn append(&mut self, other: &Self) {
+    pub(super) fn append(&mut self, other: &Self) {
         let map: Vec<u32> = other.words.iter().map(|w| self.code(w)).collect();
         self.codes.extend(other.codes.iter().map(|c| map[*c as usize]));
     }
 
-    pub fn get(&self, row: usize) -> &str {
+    pub(super) fn get(&self, row: usize) -> &str {
         self.codes.get(row).and_then(|c| self.words.get(*c as usize)).map_or("", String::as_str)
     }
 }
@@ -98,19 +98,19 @@ impl Words {
 pub(super) struct LineMap(Vec<(usize, u64)>);
 
 impl LineMap {
-    pub fn note(&mut self, row: usize, line: u64) {
+    pub(super) fn note(&mut self, row: usize, line: u64) {
         if self.0.last().is_none_or(|(r, l)| l + (row - r) as u64 != line) {
             self.0.push((row, line));
         }
     }
 
-    pub fn append(&mut self, other: &Self, rows: usize, lines: u64) {
+    pub(super) fn append(&mut self, other: &Self, rows: usize, lines: u64) {
         for (row, line) in &other.0 {
             self.note(rows + row, lines + line);
         }
     }
 
-    pub fn line(&self, row: usize) -> u64 {
+    pub(super) fn line(&self, row: usize) -> u64 {
         let at = self.0.partition_point(|(r, _)| *r <= row);
         at.checked_sub(1).map_or(row as u64, |i| self.0[i].1 + (row - self.0[i].0) as u64)
     }
@@ -131,7 +131,7 @@ pub(super) struct Parsed {
 impl Parsed {
     /// Memory that its content takes, in values of 8 bytes: numbers, the codes of texts, every word twice with its place in a table,
     /// and the places where lines were skipped.
-    pub fn values(&self) -> usize {
+    pub(super) fn values(&self) -> usize {
         let numbers: usize = self.numbers.iter().map(Vec::len).sum();
         let texts = self.texts.iter().map(|t| {
             t.codes.len().div_ceil(2) + t.words.iter().map(|w| 12 + w.len().div_ceil(4)).sum::<usize>()
@@ -330,7 +330,7 @@ fn explain(mut cells: Cells<'_>, width: usize, index: usize) -> CellError {
     let Ok(text) = cells.text() else { return open_quote(line) };
     let bare = text.trim().trim_start_matches(['-', '+']).to_lowercase();
     let fault = match bare.as_str() {
-        "" => Fault::Empty,
+        "" if text.trim().is_empty() => Fault::Empty,
         "nan" | "inf" | "infinity" | "na" | "n/a" | "null" | "none" | "1.#inf" | "1.#qnan" | "#n/a" => {
             Fault::NotFinite
         }

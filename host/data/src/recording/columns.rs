@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::counted::counted;
 use crate::error::{DataCode, Error, Result};
+use crate::pluralise::pluralise;
 
 /// One file, or one group of a file's rows, in time order. All columns are equally long and hold finite numbers only.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -32,7 +32,7 @@ pub struct Recording {
     pub pressure_command: Option<Vec<f64>>,
     /// Number of the cycle, as the file counts them.
     pub cycle: Option<Vec<u32>>,
-    /// Which way the bench drove the muscle, where the file says so: 1 shortening or filling, −1 lengthening or emptying,
+    /// The direction of the bench, where the file has that column: 1 shortening or filling, −1 lengthening or emptying,
     /// 0 unknown.
     pub direction: Option<Vec<i8>>,
 }
@@ -111,7 +111,7 @@ impl Recording {
         columns.extend(names.iter().zip(optional).filter_map(|(n, c)| Some((*n, c.as_ref()?))));
         for (name, column) in columns {
             if column.len() != n {
-                let cause = format!("{} of {name} beside {n} of time", counted(column.len(), "row"));
+                let cause = format!("{} of {name} beside {n} of time", pluralise(column.len(), "row"));
                 return Err(Error::new(DataCode::RecordingWrongWidth, cause).file(&self.source));
             }
             if let Some(row) = column.iter().position(|v| !v.is_finite()) {

@@ -6,7 +6,7 @@ use std::io::BufReader;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use super::sheet::{Column, Sheet, damaged};
+use super::column_table::{Column, ColumnTable, damaged};
 use super::source::Source;
 use super::{matlab, mcap};
 use crate::bounds::{self, Budget};
@@ -23,7 +23,7 @@ pub(super) enum Container {
 
 impl Container {
     /// Recognises a container by its first bytes. An HDF5 file may begin with 512 bytes of the user's own; MATLAB's says so.
-    pub fn of(magic: &[u8]) -> Option<Self> {
+    pub(super) fn of(magic: &[u8]) -> Option<Self> {
         if magic.starts_with(b"MATLAB 5.0 MAT-file") {
             Some(Self::Matlab5)
         } else if magic.starts_with(b"MATLAB 7.3 MAT-file") || magic.starts_with(b"\x89HDF\r\n\x1a\n") {
@@ -46,7 +46,7 @@ impl Container {
         }
     }
 
-    fn columns(self, path: &Path, source: &mut Source) -> Result<Sheet> {
+    fn columns(self, path: &Path, source: &mut Source) -> Result<ColumnTable> {
         match self {
             Self::Matlab5 => {
                 matlab::columns(&bounds::whole(path, &mut source.reader, bounds::WHOLE)?, Budget::whole())
@@ -74,9 +74,9 @@ impl Container {
 }
 
 /// The columns of a container.
-pub(super) fn columns(path: &Path, container: Container, source: &mut Source) -> Result<Sheet> {
+pub(super) fn columns(path: &Path, container: Container, source: &mut Source) -> Result<ColumnTable> {
     // A damaged file must end in an error, also where the reader of a foreign format would rather panic.
-    let sheet = catch_unwind(AssertUnwindSafe(|| container.columns(path, source)))
+    let table = catch_unwind(AssertUnwindSafe(|| container.columns(path, source)))
         .unwrap_or_else(|_| Err(damaged("the file is damaged beyond what its reader expects")))
         .map_err(|e| {
             if e.code() == DataCode::RecordingContainer && !e.advised() {
@@ -88,9 +88,9 @@ pub(super) fn columns(path: &Path, container: Container, source: &mut Source) ->
             }
         })?;
     let useless = |column: &Column| matches!(column, Column::Other(_));
-    if sheet.iter().all(|(_, c)| useless(c)) {
+    if table.iter().all(|(_, c)| useless(c)) {
         let mut cause = "there is no column of numbers in the file".to_owned();
-        if let Some((name, Column::Other(what))) = sheet.first() {
+        if let Some((name, Column::Other(what))) = table.first() {
             cause += &format!(": `{name}` holds {what}");
         }
         return Err(damaged(cause).help(
@@ -98,7 +98,7 @@ pub(super) fn columns(path: &Path, container: Container, source: &mut Source) ->
              of vectors by `table2struct(T, 'ToScalar', true)`",
         ));
     }
-    Ok(sheet)
+    Ok(table)
 }
 
 #[cfg(test)]

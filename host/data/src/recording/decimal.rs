@@ -6,7 +6,7 @@ const POWERS: [f64; 23] = [
     1e19, 1e20, 1e21, 1e22,
 ];
 
-/// Reads a number at the start of `bytes` and says how many bytes it took; `None` when there is none.
+/// Parses a number at the start of `bytes`; returns it with its length in bytes, or `None`.
 ///
 /// Up to 2⁵³ and 10^±22 one multiplication or division of two exact doubles is correctly rounded (Clinger 1990); any other
 /// number goes through the standard library, which is correctly rounded too.

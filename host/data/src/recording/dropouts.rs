@@ -1,63 +1,63 @@
-//! Stretches in which the gauge alone falls out: its reading steps away between two readings and back between two readings, while
-//! the force goes on as if nothing had happened. Somebody's psi among kilopascals, or a loose plug.
+//! Drop-outs of the pressure sensor: its reading steps away within one sample and back within one sample, while the force does not
+//! react. The cause is a wrong unit in part of a file, or a loose connector.
 //!
-//! A real step of pressure moves the force of a muscle that pulls. So a stretch counts as fallen out only where the force is what the
-//! campaign's other readings make at the pressure of before and after, and far from what they make at the pressure that was read.
-//! Where the muscle is slack, the force stands at the end of its cell's range, or the campaign says too little of what pressure
-//! makes, nothing is marked.
+//! A real step of pressure changes the force of a muscle that pulls. So a stretch counts as a drop-out only where the force agrees with
+//! the campaign's other readings at the pressure before and after, and disagrees at the pressure that was read. Nothing is marked
+//! where the muscle is slack, where the force sensor saturates, or where the campaign does not determine how force depends on pressure.
 
-mod pull;
+mod expected_force;
 mod steps;
 
 use std::borrow::Cow;
 use std::ops::Range;
 
-use super::other_unit::{Apart, standing_apart};
+use super::unit_check::{InconsistentRecording, inconsistent_recordings};
 use super::{Campaign, Recording};
-use crate::counted::counted;
-use pull::Pull;
+use crate::pluralise::pluralise;
+use expected_force::ExpectedForce;
 use steps::{Scale, Stretch, edges, masked, stretches};
 
-/// A stretch of readings of the pressure that are not the muscle's.
+/// A drop-out: consecutive readings that are not the muscle's pressure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dropout {
-    /// The recording, counted as in the campaign.
+    /// Index of the recording in the campaign.
     pub recording: usize,
-    /// Its rows there, from 0.
+    /// The rows in that recording, from 0.
     pub rows: Range<usize>,
-    /// The last reading before, or the first one behind where it begins the recording, Pa.
+    /// The last reading before it, or the first one after where it begins the recording, Pa.
     pub beside: f64,
-    /// The first reading of the stretch, Pa.
+    /// The first reading of the drop-out, Pa.
     pub read: f64,
-    /// By what every reading of the stretch is too small, where it is one factor: that of before and of after agree.
+    /// The factor by which every reading is too small, where the factors before and after agree.
     pub factor: Option<f64>,
 }
 
-/// A campaign with what was read wrongly made good as well as can be: good enough to follow the motion; no evidence.
+/// A campaign with drop-outs interpolated and inconsistent recordings corrected: good enough to follow the motion, but no evidence for
+/// a fit.
 #[derive(Debug, Clone)]
 pub struct Screened<'a> {
-    /// As it was read, but for the mistake in recordings that stand apart, and for the pressure of the dropouts: the reading times
-    /// their factor, or the line from the reading before to the reading after.
+    /// The campaign with its corrections: mistakes of inconsistent recordings, and the pressure of drop-outs (the reading times the
+    /// factor, or the line from the reading before to the reading after).
     pub campaign: Cow<'a, Campaign>,
-    /// Whole recordings in another unit than the rest, in order.
-    pub apart: Vec<Apart>,
-    /// In order.
+    /// Whole recordings with another unit, sign or zero than the others, in order.
+    inconsistent: Vec<InconsistentRecording>,
+    /// The drop-outs, in order.
     pub dropouts: Vec<Dropout>,
 }
 
-/// At most this many stretches are told one by one.
-const TOLD: usize = 4;
-/// A reading of this share of the one before is zero.
+/// At most this many drop-outs or recordings are listed one by one.
+const LISTED: usize = 4;
+/// A reading below this share of the one before counts as zero.
 const NOTHING: f64 = 0.01;
 
 impl<'a> Screened<'a> {
-    /// Looks a campaign over. Recordings without a force are passed over: nothing tells a dropout from a real step there.
+    /// Screens a campaign. Recordings without a force are skipped: a drop-out and a real step look the same there.
     #[must_use]
     pub fn of(campaign: &'a Campaign) -> Self {
-        let apart = standing_apart(campaign);
+        let inconsistent = inconsistent_recordings(campaign);
         let mut campaign = Cow::Borrowed(campaign);
-        for a in &apart {
-            a.mistake.mend(&mut campaign.to_mut().recordings[a.recording]);
+        for a in &inconsistent {
+            a.mistake.correct(&mut campaign.to_mut().recordings[a.recording]);
         }
         let dropouts = find(&campaign);
         if !dropouts.is_empty() {
@@ -69,24 +69,24 @@ impl<'a> Screened<'a> {
                 recording.pressure[d.rows.clone()].copy_from_slice(&bridge);
             }
         }
-        Self { campaign, apart, dropouts }
+        Self { campaign, inconsistent, dropouts }
     }
 
-    /// Whether a whole recording is in another unit than the rest.
+    /// Whether a whole recording has another unit, sign or zero than the others.
     #[must_use]
-    pub fn stands_apart(&self, index: usize) -> bool {
-        self.apart.iter().any(|a| a.recording == index)
+    pub fn is_inconsistent(&self, index: usize) -> bool {
+        self.inconsistent.iter().any(|a| a.recording == index)
     }
 
-    /// The stretches of one recording in which the gauge fell out, in order.
+    /// The drop-outs of one recording, in order.
     pub fn of_recording(&self, index: usize) -> impl Iterator<Item = Range<usize>> + '_ {
         self.dropouts.iter().filter(move |d| d.recording == index).map(|d| d.rows.clone())
     }
 
-    /// Row by row of a recording, whether it was read rightly.
+    /// For each row of a recording, whether it is free of drop-outs and consistent.
     #[must_use]
     pub fn read(&self, index: usize) -> Vec<bool> {
-        let right = !self.stands_apart(index);
+        let right = !self.is_inconsistent(index);
         let mut read = vec![right; self.campaign.recordings.get(index).map_or(0, Recording::len)];
         for rows in self.of_recording(index) {
             read[rows].fill(false);
@@ -94,49 +94,54 @@ impl<'a> Screened<'a> {
         read
     }
 
-    /// Rows in which the gauge fell out.
+    /// The number of rows in drop-outs.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.dropouts.iter().map(|d| d.rows.len()).sum()
     }
 
-    /// What there is to say: where, from what to what, the likely cause, and what to do; `None` where all was read rightly.
+    /// A warning with places, readings, the likely cause and the remedy; `None` without drop-outs and inconsistent recordings.
     #[must_use]
     pub fn remark(&self) -> Option<String> {
-        let apart = self.apart.iter().take(TOLD).map(|a| self.told_apart(a));
-        let more = self.apart.len().checked_sub(TOLD + 1).map(|n| format!("so do {} more", n + 1));
-        let parts: Vec<String> = apart.chain(more).chain(self.remark_on_dropouts()).collect();
+        let inconsistent = self.inconsistent.iter().take(LISTED).map(|a| self.describe_inconsistent(a));
+        let more = self
+            .inconsistent
+            .len()
+            .checked_sub(LISTED + 1)
+            .map(|n| format!("{} more recordings are inconsistent", n + 1));
+        let parts: Vec<String> = inconsistent.chain(more).chain(self.remark_on_dropouts()).collect();
         (!parts.is_empty()).then(|| parts.join(". "))
     }
 
-    fn told_apart(&self, a: &Apart) -> String {
+    fn describe_inconsistent(&self, a: &InconsistentRecording) -> String {
         let r = &self.campaign.recordings[a.recording];
         format!(
-            "`{}` stands apart from the other recordings, and its {} left out: {}",
+            "`{}` is inconsistent with the other recordings, and its {} excluded: {}",
             r.name,
-            if r.len() == 1 { "row is".to_owned() } else { format!("{} are", counted(r.len(), "row")) },
-            a.told()
+            if r.len() == 1 { "row is".to_owned() } else { format!("{} are", pluralise(r.len(), "row")) },
+            a.describe()
         )
     }
 
     fn remark_on_dropouts(&self) -> Option<String> {
         let first = self.dropouts.first()?;
-        let mut places: Vec<String> = self.dropouts.iter().take(TOLD).map(|d| self.place(d)).collect();
-        if self.dropouts.len() > TOLD {
-            places.push(format!("and so on, {} times in all", self.dropouts.len()));
+        let mut places: Vec<String> = self.dropouts.iter().take(LISTED).map(|d| self.place(d)).collect();
+        if self.dropouts.len() > LISTED {
+            places.push(format!("and others, {} drop-outs in all", self.dropouts.len()));
         }
         let units: Vec<_> = self.dropouts.iter().map(|d| d.factor.and_then(unit)).collect();
         let ratio = units[0].filter(|first| units.iter().all(|u| *u == Some(*first)));
         let cause = match ratio {
-            Some(unit) => format!("the ratio is that of {unit}: mend the unit where the readings are logged"),
+            Some(unit) => format!("the ratio is that of {unit}: correct the unit in the logging program"),
             None if first.read.abs() <= NOTHING * first.beside.abs() => {
-                "look at the gauge's plug and cable".to_owned()
+                "check connector and cable of the pressure sensor".to_owned()
             }
-            None => "look at the gauge, its plug and its cable".to_owned(),
+            None => "check the pressure sensor, its connector and cable".to_owned(),
         };
         Some(format!(
-            "the pressure alone steps away and back, each within one reading, while the force goes on; {} left out: {}; {cause}",
-            counted(self.rows(), "row"),
+            "drop-out of the pressure sensor (a step away and back, each within one reading, without a reaction of the force); {} \
+             excluded: {}; {cause}",
+            pluralise(self.rows(), "row"),
             places.join("; ")
         ))
     }
@@ -158,7 +163,7 @@ impl<'a> Screened<'a> {
     }
 }
 
-/// Pairs of units whose ratio a wrong unit shows, the larger one first.
+/// Ratios of pairs of pressure units.
 const RATIOS: [(f64, &str); 8] = [
     (6.894_757, "psi to kPa"),
     (7.500_617, "kPa to mmHg"),
@@ -169,10 +174,10 @@ const RATIOS: [(f64, &str); 8] = [
     (101.325, "atm to kPa"),
     (1000.0, "MPa to kPa"),
 ];
-/// How near a ratio must come to that of two units: nearer than atm is to bar.
+/// Largest relative difference from the ratio of two units: below the difference of atm and bar, 1.3 %.
 const SAME_RATIO: f64 = 0.01;
 
-/// The units whose ratio a factor is, either way round.
+/// The pair of units with this ratio, or its inverse.
 fn unit(factor: f64) -> Option<&'static str> {
     let off = |ratio: f64| (factor.ln().abs() - ratio.ln()).abs();
     let nearest = RATIOS.iter().min_by(|a, b| off(a.0).total_cmp(&off(b.0)))?;
@@ -184,18 +189,18 @@ fn find(campaign: &Campaign) -> Vec<Dropout> {
     let Some(scale) = Scale::of(campaign) else { return Vec::new() };
     let edges = edges(campaign, &scale);
     let mask = masked(campaign, &edges);
-    let Some(pull) = mask.and_then(|mask| Pull::of(campaign, &mask)) else { return Vec::new() };
+    let Some(expected) = mask.and_then(|mask| ExpectedForce::of(campaign, &mask)) else { return Vec::new() };
     let mut found = Vec::new();
     for (recording, edges) in edges.iter().enumerate() {
         let r = &campaign.recordings[recording];
         let Some(force) = r.force.as_deref() else { continue };
         let mut free = 0;
         for stretch in stretches(edges, &r.time, &r.pressure) {
-            // The way back of one is not the way out of the next.
+            // The return edge of one drop-out is not the first edge of the next.
             if stretch.rows.start < free {
                 continue;
             }
-            if pull.goes_on(&stretch, r, force) {
+            if expected.continues(&stretch, r, force) {
                 free = stretch.rows.end + 1;
                 found.push(Dropout {
                     recording,

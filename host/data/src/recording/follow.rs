@@ -5,7 +5,7 @@ use model_core::motion::Motion;
 use super::segment::{self, Rates};
 use super::{Campaign, Recording};
 
-/// A pause that nobody recorded counts as this long, s.
+/// An unknown pause between recordings counts as this long, s.
 pub const UNKNOWN_PAUSE: f64 = 60.0;
 
 /// Follows the motion through a campaign's recordings, one after another.
@@ -45,7 +45,7 @@ impl Follower {
                 part.fill(1.0);
             }
         }
-        // Between two recordings the muscle stands, and its first motion is one after a rest.
+        // Between two recordings the muscle rests, so its first motion follows a rest.
         if let Some(first) = resting.first_mut() {
             *first = 1.0;
         }

@@ -9,7 +9,7 @@ use std::path::Path;
 use hdf5_reader::group::Group;
 use hdf5_reader::{CompoundField, Dataset, Datatype, Hdf5File, OpenOptions};
 
-use super::sheet::{Column, Sheet, damaged, matrix, without_common_prefix};
+use super::column_table::{Column, ColumnTable, damaged, matrix, without_common_prefix};
 use crate::bounds::{Budget, WHOLE};
 use crate::error::{Error, Result};
 
@@ -17,19 +17,20 @@ use crate::error::{Error, Result};
 const DEEPEST: usize = 4;
 
 /// The columns of a file.
-pub(super) fn columns(path: &Path) -> Result<Sheet> {
+pub(super) fn columns(path: &Path) -> Result<ColumnTable> {
     let mut first = Vec::new();
     let start = std::fs::File::open(path).and_then(|f| f.take(10).read_to_end(&mut first));
     start.map_err(|e| Error::unreadable(path, &e))?;
     let options = OpenOptions::default().with_max_read_bytes(WHOLE as usize);
     let file = Hdf5File::open_with_options(path, options).map_err(damaged)?;
-    let mut found = Found { sheet: Sheet::new(), matlab: first == *b"MATLAB 7.3", budget: Budget::whole() };
+    let mut found =
+        Found { table: ColumnTable::new(), matlab: first == *b"MATLAB 7.3", budget: Budget::whole() };
     found.group(&file.root_group().map_err(damaged)?, "", 0)?;
-    Ok(without_common_prefix(found.sheet))
+    Ok(without_common_prefix(found.table))
 }
 
 struct Found {
-    sheet: Sheet,
+    table: ColumnTable,
     /// MATLAB stores column by column, so that its dimensions appear in reverse.
     matlab: bool,
     budget: Budget,
@@ -99,7 +100,7 @@ impl Found {
         let values: Vec<f64> = bytes.chunks_exact(number.size()).map(|b| number.read(b)).collect();
         let (rows, wide) = (rows as usize, wide as usize);
         let values = if self.matlab { values } else { transposed(&values, rows, wide) };
-        matrix(name, rows, wide, values, &mut self.sheet);
+        matrix(name, rows, wide, values, &mut self.table);
         Ok(())
     }
 
@@ -124,7 +125,7 @@ impl Found {
             );
         }
         let rows = values.len() / wide.max(1);
-        matrix(&name, rows, wide, values, &mut self.sheet);
+        matrix(&name, rows, wide, values, &mut self.table);
     }
 
     /// A pandas frame in its fixed form: blocks of columns of one type, their names beside each.
@@ -143,14 +144,14 @@ impl Found {
             let rows: Vec<f64> = bytes.chunks_exact(number.size()).map(|b| number.read(b)).collect();
             for (k, name) in names.iter().enumerate() {
                 let column = rows.chunks_exact(names.len()).map(|row| row[k]).collect();
-                self.sheet.push((format!("{prefix}{name}"), Column::Numbers(column)));
+                self.table.push((format!("{prefix}{name}"), Column::Numbers(column)));
             }
         }
         Ok(())
     }
 
     fn other(&mut self, name: &str, what: String) {
-        self.sheet.push((name.to_owned(), Column::Other(what)));
+        self.table.push((name.to_owned(), Column::Other(what)));
     }
 }
 

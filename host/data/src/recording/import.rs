@@ -45,7 +45,7 @@ use serde::Deserialize;
 use super::quantity::{Quantity, Unit};
 use crate::error::{DataCode, Error, Result, nearest};
 use crate::file_kind::FileKind;
-use crate::toml_words::toml_error;
+use crate::toml_errors::toml_error;
 
 /// A column by name or by number, counted from 1.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
@@ -104,7 +104,7 @@ pub enum FoundZero {
 pub struct Column {
     /// The column of the file or of the lookup table.
     pub column: ColumnRef,
-    /// The unit after scale and offset; by default what the column's name says, or SI.
+    /// The unit after scale and offset; by default that of the column's name, or SI.
     pub unit: Option<String>,
     /// Value in `unit` = cell · scale + offset.
     #[serde(default = "one")]

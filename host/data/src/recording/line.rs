@@ -25,12 +25,12 @@ pub(super) struct Cells<'a> {
 
 impl<'a> Cells<'a> {
     /// Before the first cell.
-    pub fn of(line: &'a [u8], dialect: Dialect) -> Self {
+    pub(super) fn of(line: &'a [u8], dialect: Dialect) -> Self {
         Self { line, at: Some(0), dialect }
     }
 
     /// All cells of a line as text; used for headers.
-    pub fn split(line: &'a [u8], dialect: Dialect) -> Result<Vec<String>, ()> {
+    pub(super) fn split(line: &'a [u8], dialect: Dialect) -> Result<Vec<String>, ()> {
         let mut cells = Self::of(trim_end(line), dialect);
         let mut all = Vec::new();
         while cells.at.is_some() {
@@ -50,7 +50,7 @@ impl<'a> Cells<'a> {
         at
     }
 
-    /// Behind a cell that ends at `at`: the start of the next one, or `None` if something else stands there.
+    /// The start of the cell after one that ends at `at`, or `None` if no separator follows.
     #[inline]
     fn after(&self, at: usize) -> Option<Option<usize>> {
         match self.line.get(at) {
@@ -70,7 +70,7 @@ impl<'a> Cells<'a> {
 
     /// The next cell as a number; `None` where it is none.
     #[inline]
-    pub fn number(&mut self) -> Option<f64> {
+    pub(super) fn number(&mut self) -> Option<f64> {
         let start = self.blanks(self.at?);
         if self.dialect.decimal_comma || self.line.get(start) == Some(&b'"') {
             let text = self.text().ok()?;
@@ -101,7 +101,7 @@ impl<'a> Cells<'a> {
     }
 
     /// The next cell as text; an error where a quote does not end.
-    pub fn text(&mut self) -> Result<std::borrow::Cow<'a, str>, ()> {
+    pub(super) fn text(&mut self) -> Result<std::borrow::Cow<'a, str>, ()> {
         let Some(at) = self.at else { return Ok("".into()) };
         let start = self.blanks(at);
         if self.line.get(start) == Some(&b'"') {
@@ -136,7 +136,7 @@ impl<'a> Cells<'a> {
 
     /// Passes over the next cell.
     #[inline]
-    pub fn skip(&mut self) -> Result<(), ()> {
+    pub(super) fn skip(&mut self) -> Result<(), ()> {
         let Some(at) = self.at else { return Ok(()) };
         if self.dialect.delimiter == b' ' || self.line.get(self.blanks(at)) == Some(&b'"') {
             return self.text().map(|_| ());

@@ -5,7 +5,7 @@
 
 use std::io::Read;
 
-use super::sheet::{Sheet, damaged, matrix, without_common_prefix};
+use super::column_table::{ColumnTable, damaged, matrix, without_common_prefix};
 use crate::bounds::{Budget, WHOLE};
 use crate::error::Result;
 
@@ -16,7 +16,7 @@ const DEEPEST: usize = 4;
 
 /// The vectors of a file. A matrix gives its columns as `name(:,k)`, a struct its fields as `name.field`, or as `field` alone
 /// when the file holds nothing else.
-pub(super) fn columns(bytes: &[u8], mut budget: Budget) -> Result<Sheet> {
+pub(super) fn columns(bytes: &[u8], mut budget: Budget) -> Result<ColumnTable> {
     let header = bytes.get(..128).ok_or_else(|| damaged("it ends within its header"))?;
     let big = match &header[126..128] {
         b"IM" => false,
@@ -97,7 +97,7 @@ fn array(
     name: Option<&str>,
     depth: usize,
     budget: &mut Budget,
-    columns: &mut Sheet,
+    columns: &mut ColumnTable,
 ) -> Result<()> {
     if bytes.is_empty() {
         return Ok(());

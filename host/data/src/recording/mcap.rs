@@ -5,7 +5,7 @@ use std::io::Read;
 
 use serde_json::Value;
 
-use super::sheet::{Column, Sheet};
+use super::column_table::{Column, ColumnTable};
 use crate::bounds::Budget;
 use crate::error::{DataCode, Error, Result};
 use crate::mcap_records::{Chunk, Records, Trouble, channel, kind, message};
@@ -16,8 +16,8 @@ pub(super) use crate::mcap_records::MAGIC;
 const TOPIC: &str = "/telemetry";
 
 /// Every field of the samples that is a number in all of them.
-pub(super) fn columns(reader: impl Read, budget: Budget) -> Result<Sheet> {
-    let mut samples = Samples { topics: HashMap::new(), sheet: Vec::new(), rows: 0, budget };
+pub(super) fn columns(reader: impl Read, budget: Budget) -> Result<ColumnTable> {
+    let mut samples = Samples { topics: HashMap::new(), table: Vec::new(), rows: 0, budget };
     let mut records = Records::new(reader);
     while let Some((kind, body)) = records.next().map_err(trouble)? {
         match kind {
@@ -60,7 +60,7 @@ fn trouble(trouble: Trouble) -> Error {
 
 struct Samples {
     topics: HashMap<u16, bool>,
-    sheet: Vec<(String, Vec<f64>)>,
+    table: Vec<(String, Vec<f64>)>,
     rows: usize,
     budget: Budget,
 }
@@ -97,26 +97,26 @@ impl Samples {
         let fields = value.as_object().ok_or_else(foreign)?;
         if self.rows == 0 {
             let numbers = fields.iter().filter(|(_, v)| v.is_number());
-            self.sheet = numbers.map(|(k, _)| (k.clone(), Vec::new())).collect();
+            self.table = numbers.map(|(k, _)| (k.clone(), Vec::new())).collect();
         }
         self.rows += 1;
         // A message takes memory for every column, whatever little it says.
-        self.budget.take(self.sheet.len())?;
-        for (name, column) in &mut self.sheet {
+        self.budget.take(self.table.len())?;
+        for (name, column) in &mut self.table {
             // A number that was none is `null` there; the reader of columns judges it as such.
             column.push(fields.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN));
         }
         Ok(())
     }
 
-    fn finish(self) -> Result<Sheet> {
+    fn finish(self) -> Result<ColumnTable> {
         if self.rows == 0 {
             let cause = format!("the MCAP file has no message of {TOPIC}");
             return Err(Error::new(DataCode::RecordingEmpty, cause)
                 .help("record again; `host record` writes at least a sample each tick"));
         }
         // A column that is null throughout was not measured.
-        let kept = self.sheet.into_iter().filter(|(_, v)| v.iter().any(|x| x.is_finite()));
+        let kept = self.table.into_iter().filter(|(_, v)| v.iter().any(|x| x.is_finite()));
         Ok(kept.map(|(name, v)| (name, Column::Numbers(v))).collect())
     }
 }

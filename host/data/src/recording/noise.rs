@@ -1,5 +1,7 @@
 //! How noisy a column is, robustly, beside whatever motion it shows.
 
+use crate::statistics::{deviation_from_median, median};
+
 /// Standard deviation of the white noise in a column: from second differences, whose variance is 6 σ² for white noise and
 /// which smooth motion hardly enters; their median is deaf to turning points and jumps. Where the motion is sampled so
 /// coarsely that it bends between samples, fourth differences (70 σ²) see less of it, so the smaller of both counts. 0 for
@@ -34,13 +36,7 @@ fn spread_of(n: usize, value: impl Fn(usize) -> f64) -> f64 {
         .flat_map(|run| run * 256..((run + 1) * 256).min(n))
         .map(|i| value(i).abs())
         .collect();
-    if sizes.is_empty() {
-        return 0.0;
-    }
-    let middle = sizes.len() / 2;
-    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-    // The median of |x| of a normal variable is 0.6745 σ.
-    *median / 0.674_489_75
+    deviation_from_median(median(&mut sizes))
 }
 
 /// The smallest step between neighbours that differ: the quantum of a converter or of printed digits, 0 if there is none.

@@ -1,7 +1,7 @@
 //! Parquet files: flat columns of numbers and of text.
 //!
 //! A column's physical type says how its values are stored, its logical type what they mean: a time of day is stored as an
-//! integer, and must not be taken for seconds. What is no plain number is told where it is asked for.
+//! integer, and must not be taken for seconds. A column that is not numeric is an error only where it is needed.
 
 use std::fs::File;
 
@@ -12,19 +12,19 @@ use parquet::file::metadata::FileMetaData;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
-use super::sheet::{Column, Sheet, damaged};
+use super::column_table::{Column, ColumnTable, damaged};
 use crate::bounds::Budget;
 use crate::error::Result;
 
 /// Rows taken at a time.
 const BATCH: usize = 1 << 16;
 
-/// The columns of a file. A missing value becomes NaN, or an empty text, so that it is told where it is needed.
-pub(super) fn columns(file: File) -> Result<Sheet> {
+/// The columns of a file. A missing value becomes NaN, or an empty text, and is an error only where it is needed.
+pub(super) fn columns(file: File) -> Result<ColumnTable> {
     let reader = SerializedFileReader::new(file).map_err(damaged)?;
     let about = reader.metadata().file_metadata();
     let durations = durations(about);
-    let mut sheet = Sheet::new();
+    let mut table = ColumnTable::new();
     let mut budget = Budget::default();
     for (index, column) in about.schema_descr().columns().iter().enumerate() {
         let name = column.path().string();
@@ -33,9 +33,9 @@ pub(super) fn columns(file: File) -> Result<Sheet> {
             Ok(scale) => values(&reader, index, column.max_def_level(), scale, &mut budget)?,
             Err(what) => Column::Other(what.to_owned()),
         };
-        sheet.push((name, content));
+        table.push((name, content));
     }
-    Ok(sheet)
+    Ok(table)
 }
 
 /// By what a column's stored numbers are to be multiplied, or what it is instead of a column of numbers.

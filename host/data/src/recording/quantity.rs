@@ -1,4 +1,4 @@
-//! What a column can hold, and in which units. The unit stands behind the last underscore of a column's name.
+//! The quantities and units of columns. The unit follows the last underscore of a column's name.
 
 /// A quantity that a column of a recording can hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -61,7 +61,7 @@ const NONE: &[Unit] = &[unit("", 1.0)];
 
 impl Quantity {
     /// The quantities that a recording's header can name. Rest length and direction come in by import description only.
-    pub const IN_HEADERS: [Self; 9] = [
+    pub(crate) const IN_HEADERS: [Self; 9] = [
         Self::Time,
         Self::Pressure,
         Self::Displacement,

@@ -9,20 +9,20 @@ use super::assemble::{Job, LookupTable, assemble};
 use super::blocks::{BlockError, Blocks, Rows, RowsError, read_rows};
 use super::campaign::Campaign;
 use super::cells::{Dialect, Fault, LineError};
+use super::column_plan::{ColumnPlan, Context, plan};
+use super::column_table::select;
 use super::columns::Recording;
 use super::container::{self, Container};
-use super::head::Head;
+use super::header::Header;
 use super::import::{Decimal, Import, Value, pattern as pattern_of};
 use super::line::Cells;
-use super::plan::{Context, Plan, plan};
 use super::quantity::{Named, named};
-use super::sheet::select;
 use super::source;
 use crate::bounds::{self, Budget};
-use crate::counted::counted;
 use crate::error::{DataCode, Error, Result};
 use crate::file_kind::FileKind;
 use crate::muscle_description::MuscleDescription;
+use crate::pluralise::pluralise;
 use crate::progress::Progress;
 
 /// How to read recordings, and what is known of the muscle that made them.
@@ -173,15 +173,15 @@ impl<'a> Reader<'a> {
         };
         let text = &first[start..];
         if text.iter().all(u8::is_ascii_whitespace) {
-            return Err(Error::new(DataCode::RecordingEmpty, "the file holds nothing but blanks"));
+            return Err(Error::new(DataCode::RecordingEmpty, "the file contains only blanks"));
         }
-        let head = Head::read(text, &description)?;
-        let rest = &text[head.bytes..];
-        let average = head.average_line(rest);
+        let header = Header::read(text, &description)?;
+        let rest = &text[header.bytes..];
+        let average = header.average_line(rest);
         blocks.put_back(rest);
-        let preamble = String::from_utf8_lossy(&text[..head.preamble]);
-        let layout = self.layout(path, &head.names, &description, &preamble).map_err(|e| {
-            let below = if self.import.is_none() { header_below(text, &head) } else { None };
+        let preamble = String::from_utf8_lossy(&text[..header.preamble]);
+        let layout = self.layout(path, &header.names, &description, &preamble).map_err(|e| {
+            let below = if self.import.is_none() { header_below(text, &header) } else { None };
             match below {
                 Some(line) if e.code() == DataCode::RecordingMissingColumn => e.help(format!(
                     "line {line} looks like the header: give skip_lines = {} in an import description (--import)",
@@ -192,14 +192,14 @@ impl<'a> Reader<'a> {
         })?;
         let rows = read_rows(
             blocks,
-            head.dialect,
+            header.dialect,
             &layout.plan.wanted,
-            head.names.len(),
+            header.names.len(),
             source.size.or(average),
             Budget::default(),
         )
-        .map_err(|e| rows_error(e, &head, &description))?;
-        self.finish(path, &description, &head.names, &layout, head.lines + 1, rows)
+        .map_err(|e| rows_error(e, &header, &description))?;
+        self.finish(path, &description, &header.names, &layout, header.lines + 1, rows)
     }
 
     /// A container gives recordings by the same rules as text.
@@ -210,11 +210,11 @@ impl<'a> Reader<'a> {
         mut source: source::Source,
     ) -> Result<Vec<Recording>> {
         let description = self.description();
-        let sheet = container::columns(path, container, &mut source)?;
-        let names: Vec<String> = sheet.iter().map(|(n, _)| n.clone()).collect();
+        let table = container::columns(path, container, &mut source)?;
+        let names: Vec<String> = table.iter().map(|(n, _)| n.clone()).collect();
         let layout = self.layout(path, &names, &description, "")?;
-        let rows = select(&sheet, &layout.plan.wanted)?;
-        drop(sheet);
+        let rows = select(&table, &layout.plan.wanted)?;
+        drop(table);
         self.finish(path, &description, &names, &layout, 1, rows)
     }
 
@@ -275,19 +275,19 @@ impl<'a> Reader<'a> {
 }
 
 /// The first of the next lines, counted from 1, that names columns as a header does: above it a program may have told other things.
-fn header_below(text: &[u8], head: &Head) -> Option<u64> {
+fn header_below(text: &[u8], header: &Header) -> Option<u64> {
     let names = |line: &[u8]| {
         let line = String::from_utf8_lossy(line);
         let known = |n: &str| matches!(named(n.trim().trim_matches('"')), Named::Known(..));
         line.split([',', ';', '\t']).filter(|n| known(n)).count()
     };
-    let below = text[head.bytes..].split(|b| *b == b'\n').take(LOOKED_BELOW);
-    below.zip(head.lines + 1..).find_map(|(line, number)| (names(line) >= 2).then_some(number))
+    let below = text[header.bytes..].split(|b| *b == b'\n').take(LOOKED_BELOW);
+    below.zip(header.lines + 1..).find_map(|(line, number)| (names(line) >= 2).then_some(number))
 }
 
 /// What is read of one file.
 struct Layout {
-    plan: Plan,
+    plan: ColumnPlan,
     filters: Vec<(String, Value)>,
     lookup: Option<LookupTable>,
     labels: Vec<(String, String)>,
@@ -297,7 +297,7 @@ fn block_error(error: BlockError) -> Error {
     match error {
         BlockError::LongLine => {
             Error::new(DataCode::RecordingNotText, "the file has a line of more than 4 MiB")
-                .help("this is no table of text; give a CSV or tab-separated file with one header line")
+                .help("this is not a table of text: give a CSV or tab-separated file with one header line")
         }
         BlockError::Io(e) if e.kind() == std::io::ErrorKind::NotFound => Error::unreadable("", &e),
         BlockError::Io(e) if matches!(e.kind(), std::io::ErrorKind::PermissionDenied) => {
@@ -308,28 +308,28 @@ fn block_error(error: BlockError) -> Error {
             let reason = e.to_string();
             let reason = reason.split(':').next().unwrap_or_default();
             Error::new(DataCode::RecordingContainer, format!("cannot be read to its end: {reason}"))
-                .help("the file may be damaged or cut short; get it again from where it was recorded")
+                .help("the file may be damaged or incomplete: copy it again")
         }
     }
 }
 
-fn rows_error(error: RowsError, head: &Head, import: &Import) -> Error {
+fn rows_error(error: RowsError, header: &Header, import: &Import) -> Error {
     let LineError { line, cell, value, fault } = match error {
         RowsError::Block(e) => return block_error(e),
         RowsError::TooMany(e) => return e,
         RowsError::Line(e) => *e,
     };
-    let separator = match head.dialect.delimiter {
+    let separator = match header.dialect.delimiter {
         b'\t' => "tabs",
         b';' => "semicolons",
         b' ' => "blanks",
         _ => "commas",
     };
     let error = match &fault {
-        Fault::Empty => Error::new(DataCode::RecordingNotANumber, "an empty cell")
+        Fault::Empty => Error::new(DataCode::RecordingNotANumber, "empty cell")
             .help("every row needs a number in every column that is used; leave incomplete rows out"),
         Fault::NotFinite => Error::new(DataCode::RecordingNotFinite, "not a finite number")
-            .help("leave such rows out, or repair the sensor's channel; nothing is filled in silently"),
+            .help("leave such rows out, or repair the sensor's channel; missing values are never filled in"),
         Fault::NotANumber => {
             let comma =
                 value.contains(',') && value.chars().all(|c| c.is_ascii_digit() || ",.-+ ".contains(c));
@@ -338,25 +338,28 @@ fn rows_error(error: RowsError, head: &Head, import: &Import) -> Error {
                 "dates and times of day are not read: write seconds or milliseconds from some beginning (in a spreadsheet \
                  =(A2-A$2)*86400), or give sample_interval_s in an import description"
             } else if value.contains(',') && value.contains('.') {
-                "write numbers without signs between thousands"
-            } else if comma && !head.dialect.decimal_comma {
-                "decimals are written with a point; for decimal commas use an import description with decimal = \"comma\""
-            } else if head.dialect.decimal_comma && value.contains('.') && import.decimal == Decimal::Comma {
-                "the import description says that decimals are written with a comma"
-            } else if head.dialect.decimal_comma && value.contains('.') {
-                "decimals are written with a comma in this file's first row; write numbers without points between thousands"
+                "write numbers without thousands separators"
+            } else if comma && !header.dialect.decimal_comma {
+                "use a decimal point, or an import description with decimal = \"comma\""
+            } else if header.dialect.decimal_comma && value.contains('.') && import.decimal == Decimal::Comma
+            {
+                "the import description specifies decimal commas"
+            } else if header.dialect.decimal_comma && value.contains('.') {
+                "this file's first row has decimal commas: write numbers without thousands separators"
+            } else if value.chars().all(|c| "-+ ".contains(c)) {
+                "signs without digits usually mark a missing value: leave such rows out"
             } else {
                 "every cell of a column that is used must be a number"
             };
             Error::new(DataCode::RecordingNotANumber, "not a number").help(help)
         }
         Fault::Width { found, expected } => {
-            let cells = counted(found, "cell");
+            let cells = pluralise(found, "cell");
             let help = if *found == 2 * expected && separator == "commas" {
-                "this looks like decimal commas; write decimals with a point, or use an import description"
+                "these look like decimal commas: use a decimal point, or an import description with decimal = \"comma\""
                     .to_owned()
             } else {
-                format!("cells are separated by {separator}; the line may be cut short or damaged")
+                format!("cells are separated by {separator}; the line may be incomplete or damaged")
             };
             Error::new(DataCode::RecordingWrongWidth, format!("{cells} where {expected} are expected"))
                 .help(help)
@@ -366,14 +369,14 @@ fn rows_error(error: RowsError, head: &Head, import: &Import) -> Error {
                 .help("cells that hold line breaks are not supported")
         }
     };
-    let error = error.line(head.lines + line + 1).value(value);
-    match cell.and_then(|c| head.names.get(c)) {
+    let error = error.line(header.lines + line + 1).value(value);
+    match cell.and_then(|c| header.names.get(c)) {
         Some(name) => error.column(name.clone()),
         None => error,
     }
 }
 
-/// What is constant over a file and stands in its name or above its table.
+/// Values that are constant over a file, from its name or the lines above its table.
 #[derive(Default)]
 struct Constants {
     quantities: Vec<(String, f64)>,
@@ -387,7 +390,7 @@ impl Constants {
         let Some(captures) = pattern.captures(text) else {
             return Err(Error::new(
                 DataCode::ImportInvalid,
-                format!("{what} not as the import description says"),
+                format!("{what} not of the form in the import description"),
             )
             .value(text)
             .help(format!("{key} must match {}", pattern.as_str())));
@@ -399,7 +402,7 @@ impl Constants {
                 continue;
             }
             let value = caught.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
-                Error::new(DataCode::ImportInvalid, format!("{key} catches no number for {group}"))
+                Error::new(DataCode::ImportInvalid, format!("{key} matches no number for {group}"))
                     .value(caught)
             })?;
             self.quantities.push((group.to_owned(), value));

@@ -15,7 +15,7 @@ pub use rates::Rates;
 
 use super::campaign::{Campaign, Clock};
 use super::columns::Recording;
-use holding::median;
+use holding::sampled_median;
 use turning::{Leg, Track, legs};
 
 #[cfg(test)]
@@ -286,7 +286,7 @@ fn stroke_turns(track: &Track<'_>, legs: &[Leg], holds: &[Hold]) -> Vec<Turn> {
         let index = match (rest, before) {
             (Some(hold), _) => {
                 let tolerance = (3.0 * track.noise).min(track.threshold / 2.0);
-                let level = median(&track.raw[hold.start..=hold.end]);
+                let level = sampled_median(&track.raw[hold.start..=hold.end]);
                 track.departure(leg, hold.start, level, tolerance)
             }
             (None, Some(before)) => track.turn(before, leg),

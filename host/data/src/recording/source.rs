@@ -91,7 +91,7 @@ pub(super) struct Bytes(Arc<Mutex<Counted>>);
 
 impl Bytes {
     /// SHA-256 of all bytes, those that nobody needed among them, in hexadecimal; `None` where it was not asked for.
-    pub fn sha256(&self) -> io::Result<Option<String>> {
+    pub(super) fn sha256(&self) -> io::Result<Option<String>> {
         let mut counted = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if counted.hash.is_none() {
             return Ok(None);
@@ -166,10 +166,16 @@ pub(super) fn check_text(first: &[u8]) -> Result<usize> {
     if first.starts_with(&UTF_16_LITTLE) || first.starts_with(&UTF_16_BIG) {
         return not_text("the file is UTF-16 text", "save it as UTF-8, or as plain text");
     }
-    if first.starts_with(b"\x89HDF") || first.starts_with(b"PAR1") || first.starts_with(b"PK\x03\x04") {
+    if first.starts_with(b"PK\x03\x04") || first.starts_with(b"\xd0\xcf\x11\xe0") {
         return not_text(
-            "the file is a container, not text",
-            "see the manual for the formats that are read directly",
+            "the file is an Excel workbook or another archive, not text",
+            "in the spreadsheet program, save the sheet as CSV (UTF-8)",
+        );
+    }
+    if first.starts_with(b"\x89HDF") || first.starts_with(b"PAR1") {
+        return not_text(
+            "the file is a damaged HDF5 or Parquet file, not text",
+            "copy the file again, or export its columns as CSV",
         );
     }
     let head = &first[..first.len().min(1 << 16)];
@@ -193,7 +199,7 @@ pub(super) fn check_text(first: &[u8]) -> Result<usize> {
 mod tests {
     use super::*;
 
-    /// Gives so many bytes at a time.
+    /// Returns at most a given number of bytes per call.
     struct Slowly(Vec<u8>, usize);
 
     impl Read for Slowly {

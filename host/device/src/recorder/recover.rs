@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::side_file;
-use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::mcap_records::MAGIC;
+use pam_data::pluralise::pluralise;
 
 use self::window::Window;
 
@@ -48,9 +48,9 @@ impl Recovered {
         let original = self.original.as_ref()?;
         Some(format!(
             "{} lost in {}, with them at least {}; the original stays as {}",
-            counted(self.tally.bytes_lost, "byte"),
-            counted(self.tally.gaps, "place"),
-            counted(self.tally.samples_lost, "sample"),
+            pluralise(self.tally.bytes_lost, "byte"),
+            pluralise(self.tally.gaps, "place"),
+            pluralise(self.tally.samples_lost, "sample"),
             original.display()
         ))
     }

@@ -6,8 +6,8 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Campaign;
 use pam_fit::bench::Candidate;
-use pam_fit::fit::{Options as FitOptions, fit};
 use pam_fit::table_file::{About, Correction, TableFile};
+use pam_fit::{Options as FitOptions, fit};
 
 /// What was done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

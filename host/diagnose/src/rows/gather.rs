@@ -12,7 +12,7 @@ use crate::kinematics::{Kinematics, Recorded, Thresholds, kinematics};
 use pam_data::error::Result;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::{Campaign, Recording, UNKNOWN_PAUSE};
-use pam_fit::fit::screen::Clip;
+use pam_fit::Clip;
 
 /// The rows of a campaign before levels, blocks and weights are known.
 #[derive(Default)]

@@ -4,7 +4,7 @@ use crate::criteria::rows::{FLANK_STEP, NEGLIGIBLE_ERROR, NO_LOAD, SIMULTANEITY,
 use crate::kinematics::white_noise;
 use crate::linear::median;
 use pam_data::recording::Campaign;
-use pam_fit::fit::screen::{self, Clip};
+use pam_fit::{Clip, clip};
 
 /// Isolated spikes of a series: rows that stand out from the middle of their five neighbours by more than noise can.
 pub(super) fn spikes(series: &[f64]) -> Vec<bool> {
@@ -26,7 +26,7 @@ pub(super) fn spikes(series: &[f64]) -> Vec<bool> {
 
 /// The ends of the force sensor's range that were met under load. A vented muscle may well read exactly nothing.
 pub(super) fn ends(campaign: &Campaign) -> Vec<Clip> {
-    let (low, high) = screen::clip(campaign);
+    let (low, high) = clip(campaign);
     let force = campaign.recordings.iter().filter_map(|r| r.force.as_deref()).flatten();
     let strongest = force.fold(0.0, |s: f64, f| s.max(f.abs()));
     [low, high].into_iter().flatten().filter(|c| c.force.abs() > NO_LOAD * strongest).collect()

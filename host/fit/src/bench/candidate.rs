@@ -1,6 +1,6 @@
 //! One kind of value for every effect that a diagnosis may weigh, of the muscle or of the bench.
 
-use model_core::effects::{Axis, Context, EffectName, Info, MEMORY, Memory, Parameter, Role, Traits, Vented};
+use model_core::effects::{Axis, Context, EffectName, Info, MEMORY, Memory, Parameter, Traits, Vented};
 use serde::{Deserialize, Serialize};
 
 use super::BenchName;
@@ -12,15 +12,6 @@ pub enum Candidate {
     Muscle(EffectName),
     /// An error of the bench: corrects the data and stays on the host.
     Bench(BenchName),
-}
-
-/// An effect with its parameters, in SI units and in the order of [`Info::parameters`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Fitted {
-    /// Which one.
-    pub candidate: Candidate,
-    /// Its parameters.
-    pub parameters: Vec<f64>,
 }
 
 /// What the recordings can show of shapes that live on their own axes: a slip within their time, a wall within their
@@ -272,18 +263,6 @@ fn spaced(low: f64, high: f64, count: usize) -> Vec<f64> {
         .collect()
 }
 
-impl Fitted {
-    /// Whether any parameter lies outside its plausible range, and which.
-    pub fn implausible(&self) -> impl Iterator<Item = (&'static Parameter, f64)> + '_ {
-        let known = self.candidate.info().parameters.iter();
-        known.zip(self.parameters.iter().copied()).filter(|(p, v)| {
-            // An amplitude that was not used is not out of range.
-            let unused = p.role == Role::Amplitude && *v == 0.0;
-            !(unused || *v >= p.low && *v <= p.high)
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -302,12 +281,5 @@ mod tests {
         assert_eq!(seal.grid(3, &span).len(), 9);
         let offset = Candidate::from_name("force-offset").expect("in the catalogue");
         assert_eq!(offset.grid(3, &span), vec![Vec::<f64>::new()]);
-    }
-
-    #[test]
-    fn what_is_outside_the_known_range_is_named() {
-        let fitted = Fitted { candidate: Candidate::Bench(BenchName::RigCompliance), parameters: vec![1.0] };
-        let found: Vec<_> = fitted.implausible().map(|(p, v)| (p.name, v)).collect();
-        assert_eq!(found, [("compliance", 1.0)]);
     }
 }

@@ -1,9 +1,9 @@
 //! Known weights on the load cell: its scale, and what the line's pressure adds to it.
 
-use super::Measured;
-use super::regression::{by_blocks, with_reference};
 use super::table::{Table, stays};
+use super::{Measured, with_reference};
 use crate::bench::BenchName;
+use crate::numerics::least_squares::by_blocks;
 use pam_data::error::Result;
 use pam_data::recording::Quantity;
 
@@ -37,8 +37,8 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
     }
     let Some(found) = by_blocks(&columns, &off, &block) else {
         return Err(table.poor(
-            "the weights do not tell a scale from a zero, and how surely: hang at least three different ones, each for some seconds, all \
-             of them with the line under pressure too if the line was",
+            "the weights do not determine gain and offset: use at least three different ones, each for some seconds; where the line was \
+             under pressure, use all of them with and without pressure",
         ));
     };
     let gain = found.values[0];

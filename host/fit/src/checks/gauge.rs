@@ -1,9 +1,9 @@
 //! A reference gauge beside the bench's own: its scale. Its zero is a part of the dead band in every model, and stays there.
 
-use super::Measured;
-use super::regression::{by_blocks, with_reference};
 use super::table::{Table, stays};
+use super::{Measured, with_reference};
 use crate::bench::BenchName;
+use crate::numerics::least_squares::by_blocks;
 use pam_data::error::Result;
 use pam_data::recording::Quantity;
 
@@ -17,7 +17,7 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
     let found = by_blocks(&[known.to_vec(), vec![1.0; read.len()]], &off, &stays(&[known]));
     let Some(found) = found else {
         return Err(table.poor(
-            "the pressures do not tell a scale from a zero: take at least three different ones, each for some seconds",
+            "the pressures do not separate gain from offset: use at least three different ones, each for some seconds",
         ));
     };
     // The law counts what is missing: the muscle has (1 + γ) of what is read.

@@ -1,9 +1,9 @@
 //! A bar that does not give, in the muscle's place: what is read as stroke is what frame and joints give.
 
 use super::Measured;
-use super::regression::by_blocks;
 use super::table::Table;
 use crate::bench::BenchName;
+use crate::numerics::least_squares::by_blocks;
 use pam_data::error::Result;
 use pam_data::recording::Quantity;
 
@@ -31,7 +31,7 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
     }
     let Some(found) = by_blocks(&columns, &off, &block) else {
         return Err(table.poor(
-            "the force on the bar hardly changes: pull and push at it, slowly, up to the muscle's force",
+            "the force on the bar changes too little: pull and push it slowly, up to the muscle's force",
         ));
     };
     let (give, give_std) = (found.values[0].max(0.0), found.deviations[0]);

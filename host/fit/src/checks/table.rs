@@ -2,17 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
-use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::file_kind::FileKind;
+use pam_data::pluralise::pluralise;
 use pam_data::recording::{Named, Quantity, named};
 
-/// What a column's name begins with when it holds what is known.
+/// The prefix of the column that holds the reference.
 const REFERENCE: &str = "reference_";
-/// Fewest rows from which anything is measured.
+/// The smallest number of rows of a check.
 const FEWEST: usize = 20;
 
-/// A check, read.
+/// The columns of a check.
 pub(super) struct Table {
     file: PathBuf,
     /// Quantity, whether it is the reference, values in SI.
@@ -45,7 +45,7 @@ impl Table {
                 Named::UnknownUnit(quantity) => {
                     return Err(Error::new(
                         DataCode::CheckInvalid,
-                        format!("the column `{}` is in no unit that is known", &header[at]),
+                        format!("unknown unit of the column `{}`", &header[at]),
                     )
                     .file(file)
                     .help(format!("{} is in {}", quantity.name(), quantity.unit_list())));
@@ -71,7 +71,7 @@ impl Table {
         let table = Self { file: file.to_owned(), columns };
         let rows = table.columns.first().map_or(0, |c| c.2.len());
         if rows < FEWEST {
-            return Err(table.poor(format!("{}, and at least {FEWEST} are needed", counted(rows, "row"))));
+            return Err(table.poor(format!("{}; a check needs at least {FEWEST}", pluralise(rows, "row"))));
         }
         Ok(table)
     }
@@ -86,7 +86,7 @@ impl Table {
         self.find(quantity).ok_or_else(|| self.missing("", quantity))
     }
 
-    /// The known quantity.
+    /// The column of the reference.
     pub(super) fn reference(&self, quantity: Quantity) -> Result<&[f64]> {
         let found = self.columns.iter().find(|c| c.0 == quantity && c.1);
         found.map(|c| c.2.as_slice()).ok_or_else(|| self.missing(REFERENCE, quantity))
@@ -104,14 +104,14 @@ impl Table {
             .help(format!("name it with its unit: {}", quantity.unit_list()))
     }
 
-    /// The file is no check.
+    /// The error of a file without a reference column.
     pub(super) fn without_reference(&self) -> Error {
-        Error::new(DataCode::CheckInvalid, "there is no column of what is known")
+        Error::new(DataCode::CheckInvalid, "there is no column of the reference")
             .file(&self.file)
             .help("a check has `reference_force_N`, `reference_displacement_mm` or `reference_pressure_kPa` beside the reading")
     }
 
-    /// The check tells nothing.
+    /// The error of a check that determines nothing.
     pub(super) fn poor(&self, why: impl Into<String>) -> Error {
         Error::new(DataCode::CheckInvalid, why.into()).file(&self.file)
     }

@@ -11,17 +11,18 @@
 //! `c̃ = c T` that are orthonormal over the strokes of the recordings, with `T` upper triangular: `E = T ẽ` at every node.
 
 use model_core::braid::Braid;
-use model_core::spline::{self, Cubic, MAX_NODES, MAX_PIECES, Nodes};
 use model_core::table::MAX_ORDER;
 use model_core::units::Length;
 use nalgebra::DMatrix;
 
-/// What the muscle's shape at one stroke contributes.
+use crate::numerics::symmetric::dot;
+
+/// The columns of the linear model at one stroke.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Columns {
-    /// `g`, m².
+    /// The area `g` by which pressure acts on the length, m².
     pub area: f64,
-    /// `c_1 … c_M`, m².
+    /// The elastic columns `c_1 … c_M`, m².
     pub elastic: [f64; MAX_ORDER],
 }
 
@@ -32,49 +33,10 @@ pub fn columns(braid: &Braid<f64>, stroke: f64) -> Columns {
     Columns { area: posture.area, elastic: posture.elastic_columns() }
 }
 
-/// Values of every `φ_j` at pressures.
-#[derive(Debug, Clone)]
-pub struct PressureBasis {
-    nodes: Vec<f64>,
-    places: Nodes<f64>,
-    /// Per function, its cubics.
-    cubics: Vec<[Cubic<f64>; MAX_PIECES]>,
-}
-
-impl PressureBasis {
-    /// On increasing nodes, Pa; at most [`MAX_NODES`] of them count.
-    #[must_use]
-    pub fn new(nodes: &[f64]) -> Self {
-        let nodes = &nodes[..nodes.len().min(MAX_NODES)];
-        let cubics = (0..nodes.len())
-            .map(|j| {
-                let mut unit = [0.0; MAX_NODES];
-                unit[j] = 1.0;
-                Nodes::<f64>::pieces(nodes, &unit[..nodes.len()])
-            })
-            .collect();
-        Self { nodes: nodes.to_vec(), places: Nodes::new(nodes), cubics }
-    }
-
-    /// The nodes, Pa.
-    #[must_use]
-    pub fn nodes(&self) -> &[f64] {
-        &self.nodes
-    }
-
-    /// `φ_1(P) … φ_J(P)`.
-    #[must_use]
-    pub fn at(&self, pressure: f64) -> Vec<f64> {
-        let piece = self.places.place(pressure);
-        let above = pressure - self.places.origin(piece);
-        self.cubics.iter().map(|c| spline::value(&c[piece], above)).collect()
-    }
-}
-
-/// The combinations of columns that are orthonormal over given strokes.
+/// Combinations of the elastic columns that are orthonormal over given strokes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Orthonormal {
-    /// `M`.
+    /// The order `M` of the elastic polynomial.
     pub order: usize,
     /// `T`, upper triangular, `M × M`, row after row: `c̃_k = Σ_i c_i T_ik`.
     pub t: Vec<f64>,
@@ -118,7 +80,7 @@ impl Orthonormal {
             combination[k] = 1.0;
             for _ in 0..2 {
                 for (j, u) in q.iter().enumerate() {
-                    let projection = super::linear::dot(&v, u) / rows as f64;
+                    let projection = dot(&v, u) / rows as f64;
                     for (x, y) in v.iter_mut().zip(u) {
                         *x -= projection * y;
                     }
@@ -226,19 +188,5 @@ mod tests {
         let basis = Orthonormal::over(&all, 4);
         assert_eq!(basis.rank, 0);
         assert_eq!(basis.to_moduli(&[1.0; 4]), [0.0; 4]);
-    }
-
-    #[test]
-    fn pressure_functions_are_one_at_their_own_node_and_sum_to_one() {
-        let basis = PressureBasis::new(&[1e5, 2e5, 4e5, 5e5]);
-        for (j, p) in [1e5, 2e5, 4e5, 5e5].into_iter().enumerate() {
-            for (i, v) in basis.at(p).iter().enumerate() {
-                assert!((v - f64::from(u8::from(i == j))).abs() < 1e-12);
-            }
-        }
-        for p in [0.0, 1.3e5, 3.0e5, 9e5] {
-            assert!((basis.at(p).iter().sum::<f64>() - 1.0).abs() < 1e-12);
-        }
-        assert_eq!(PressureBasis::new(&[3e5]).at(1e5), [1.0]);
     }
 }

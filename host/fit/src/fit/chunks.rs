@@ -7,32 +7,32 @@
 
 use std::collections::BTreeMap;
 
-use super::points::median;
+use crate::numerics::median;
 
 /// Chunks per unit of contraction.
-pub const PER_CONTRACTION: f64 = 500.0;
+pub(crate) const PER_CONTRACTION: f64 = 500.0;
 
 /// A chunk with fewer rows than this share of the median chunk's is no mid-line.
 const LEAST_ROWS: f64 = 0.1;
 
 /// Where a sample lies: its chunk, and its branch.
 #[derive(Debug, Clone, Copy)]
-pub struct Place {
-    /// The tested level, or the interval of a continuous range.
+pub(crate) struct Place {
+    /// Index of the tested level, or of the interval of a continuous range.
     pub group: u32,
     /// A finer cut of pressure, where it moves; 0 for levels.
     pub fine: u32,
-    /// ΔL/L0.
+    /// Contraction ΔL/L0.
     pub contraction: f64,
-    /// +1, −1, 0.
+    /// +1 shortening, −1 lengthening, 0 unknown.
     pub direction: f64,
-    /// How many rows the sample stands for.
+    /// How many rows the sample represents.
     pub rows: f64,
 }
 
 /// One chunk: the means of `N` quantities on each of its branches.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Chunk<const N: usize> {
+pub(crate) struct Chunk<const N: usize> {
     /// The tested level, or the interval of a continuous range.
     pub group: u32,
     /// ΔL/L0 of its middle.
@@ -44,7 +44,7 @@ pub struct Chunk<const N: usize> {
 impl<const N: usize> Chunk<N> {
     /// The means of all branches that are there, each counting alike.
     #[must_use]
-    pub fn mean(&self) -> [f64; N] {
+    pub(crate) fn mean(&self) -> [f64; N] {
         let present = self.branches.iter().flatten();
         let n = present.clone().count() as f64;
         std::array::from_fn(|i| present.clone().map(|b| b[i]).sum::<f64>() / n)
@@ -56,7 +56,7 @@ type Sums<const N: usize> = [(f64, [f64; N]); 3];
 
 /// Cuts samples of `N` quantities into chunks, in order of group, finer pressure and contraction.
 #[must_use]
-pub fn cut<const N: usize>(samples: impl IntoIterator<Item = (Place, [f64; N])>) -> Vec<Chunk<N>> {
+pub(crate) fn cut<const N: usize>(samples: impl IntoIterator<Item = (Place, [f64; N])>) -> Vec<Chunk<N>> {
     let mut sums: BTreeMap<(u32, u32, i64), Sums<N>> = BTreeMap::new();
     for (at, values) in samples {
         let number = (at.contraction * PER_CONTRACTION).floor() as i64;

@@ -9,36 +9,37 @@
 use model_core::braid::Braid;
 use model_core::table::MAX_ORDER;
 
-use super::basis::{Columns, Orthonormal, PressureBasis};
-use super::linear::{Symmetric, dot};
+use super::basis::{Columns, Orthonormal};
+use crate::numerics::spline_basis::SplineBasis;
+use crate::numerics::symmetric::{Symmetric, dot};
 
 /// A force measured at a pressure and a stroke.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
-    /// Pa.
+    /// Gauge pressure, Pa.
     pub pressure: f64,
-    /// m.
+    /// Stroke (displacement from rest length, positive when shorter), m.
     pub stroke: f64,
     /// +1 shortening, −1 lengthening, 0 for a mid-line.
     pub direction: f64,
-    /// N.
+    /// Force, N.
     pub force: f64,
 }
 
 /// One point as the linear problem sees it.
 #[derive(Debug, Clone, Copy)]
 pub struct Row {
-    /// Pa.
+    /// Gauge pressure, Pa.
     pub pressure: f64,
-    /// `g`, m².
+    /// The area `g`, m².
     pub area: f64,
-    /// `c̃_k`, of unit size.
+    /// The orthonormal elastic columns `c̃_k`, dimensionless.
     pub elastic: [f64; MAX_ORDER],
-    /// `s`.
+    /// The direction `s`: +1 shortening, −1 lengthening, 0 where friction is not fitted.
     pub direction: f64,
-    /// N.
+    /// The measured force, N.
     pub force: f64,
-    /// Its pressure bin.
+    /// Index of its pressure bin.
     pub bin: u32,
 }
 
@@ -57,7 +58,7 @@ impl Row {
     }
 }
 
-/// Points of nearly one pressure.
+/// Points at nearly one pressure.
 #[derive(Debug, Clone)]
 pub struct Bin {
     /// `φ_j` at their mean pressure.
@@ -66,73 +67,73 @@ pub struct Bin {
     pub group: u32,
 }
 
-/// The problem.
+/// The linear problem of all pressures: points, unknowns, and the model at each point.
 #[derive(Debug, Clone)]
 pub struct Design {
-    /// `φ_j`.
-    pub basis: PressureBasis,
-    /// `c̃ = c T`.
+    /// The basis functions `φ_j` over pressure.
+    pub basis: SplineBasis,
+    /// The transformation `c̃ = c T` of the elastic columns.
     pub orthonormal: Orthonormal,
-    /// One per point.
+    /// The points, one row each.
     pub rows: Vec<Row>,
-    /// Pressure bins.
+    /// The pressure bins.
     pub bins: Vec<Bin>,
-    /// Number of groups.
+    /// The number of groups that cross-validation leaves out in turn.
     pub groups: usize,
     /// `z_m`, N per unit of `a_m`: `extras` numbers for each row.
     pub extra: Vec<f64>,
-    /// Number of extra columns.
+    /// The number of extra columns.
     pub extras: usize,
     /// Precision (1/σ²) of a prior about zero for each `a_m`; zero for none.
     pub extra_prior: Vec<f64>,
     /// Whether both directions of motion are there, so that `k_F` can be found.
     pub friction: bool,
-    /// What `P0` counts from, Pa: the first unknown is `P0 − origin`.
+    /// The origin of `P0`, Pa: the first unknown is `P0 − origin`.
     pub origin: f64,
-    /// How strongly `P0` is held at its origin, N² per Pa² of the data's weight; zero where the points alone decide.
+    /// The precision of a prior of `P0` about its origin, in units of the weighted sum of squares per Pa²; zero for no prior.
     pub hold_deadband: f64,
-    /// A further penalty, where the user asks for more than the points say.
+    /// A further penalty, for a constraint that the user requested.
     pub held: Option<Symmetric>,
-    /// Weight of a penalty on `E_k` that change with pressure at all; zero but where dimensions are fitted too.
+    /// Weight of a penalty on the slope of `E_k` over pressure; zero unless pressure moves or dimensions are fitted.
     pub level: f64,
 }
 
-/// Where each unknown stands in the vector of all.
+/// The index of each unknown in the vector of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
-    /// `M`.
+    /// The order `M` of the elastic polynomial.
     pub order: usize,
-    /// `J`.
+    /// The number `J` of nodes.
     pub nodes: usize,
-    /// Number of `a_m`.
+    /// The number of extra unknowns `a_m`.
     pub extras: usize,
 }
 
 impl Layout {
-    /// Of `P0`.
+    /// Index of `P0`.
     pub const DEADBAND: usize = 0;
 
-    /// Of `ẽ_kj`, `k` and `j` from 0.
+    /// Index of `ẽ_kj`, with `k` and `j` from 0.
     #[must_use]
     pub fn elastic(&self, k: usize, j: usize) -> usize {
         1 + k * self.nodes + j
     }
-    /// Of `k_F,j`.
+    /// Index of `k_F,j`, with `j` from 0.
     #[must_use]
     pub fn friction(&self, j: usize) -> usize {
         1 + self.order * self.nodes + j
     }
-    /// Of `a_m`.
+    /// Index of `a_m`, with `m` from 0.
     #[must_use]
     pub fn extra(&self, m: usize) -> usize {
         1 + (self.order + 1) * self.nodes + m
     }
-    /// Unknowns in all.
+    /// The number of unknowns.
     #[must_use]
     pub fn len(&self) -> usize {
         1 + (self.order + 1) * self.nodes + self.extras
     }
-    /// Never: there is always `P0`.
+    /// Always false: there is always `P0`.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         false
@@ -142,11 +143,11 @@ impl Layout {
 /// The parts of the model's force at one row.
 #[derive(Debug, Clone, Copy)]
 pub struct Evaluated {
-    /// `q`, N.
+    /// The friction-free force `q`, N.
     pub quasi: f64,
-    /// `G`.
+    /// The friction factor `G = 1 − s k_F`.
     pub grip: f64,
-    /// The whole force, extra columns included, N.
+    /// The force including extra columns, N.
     pub force: f64,
 }
 
@@ -158,10 +159,10 @@ pub struct Curves {
 }
 
 impl Design {
-    /// The problem of these points, with nothing asked beside it.
+    /// The problem of these points, without extra columns, priors and constraints.
     #[must_use]
     pub fn new(
-        basis: PressureBasis,
+        basis: SplineBasis,
         orthonormal: Orthonormal,
         rows: Vec<Row>,
         bins: Vec<Bin>,
@@ -189,12 +190,12 @@ impl Design {
     /// whether the directions of the points count.
     ///
     /// ```
-    /// use pam_fit::fit::design::{Design, Measured};
+    /// use pam_fit::{Design, Measured};
     /// use model_core::braid::miniature;
     ///
     /// // Blocked forces of a braid that begins to pull at 50 kPa: F = (P − P0) g(L0).
     /// let braid = miniature().build()?;
-    /// let area = pam_fit::fit::basis::columns(&braid, 0.0).area;
+    /// let area = pam_fit::columns(&braid, 0.0).area;
     /// let points: Vec<Measured> = [200e3, 300e3, 400e3]
     ///     .map(|p| Measured { pressure: p, stroke: 0.0, direction: 0.0, force: (p - 50e3) * area })
     ///     .into();
@@ -211,7 +212,7 @@ impl Design {
         let mut levels: Vec<f64> = points.iter().map(|p| p.pressure).collect();
         levels.sort_by(f64::total_cmp);
         levels.dedup();
-        let basis = PressureBasis::new(&levels);
+        let basis = SplineBasis::new(&levels);
         let columns: Vec<Columns> = points.iter().map(|p| super::basis::columns(braid, p.stroke)).collect();
         let orthonormal = Orthonormal::over(&columns, order);
         let rows = points.iter().zip(&columns).map(|(p, c)| {
@@ -224,7 +225,7 @@ impl Design {
         Self::new(basis, orthonormal, rows, bins, levels.len(), friction)
     }
 
-    /// Where each unknown stands.
+    /// The index of each unknown.
     #[must_use]
     pub fn layout(&self) -> Layout {
         Layout { order: self.orthonormal.order, nodes: self.basis.nodes().len(), extras: self.extras }
@@ -266,7 +267,7 @@ impl Design {
 
     /// `ẽ_1 … ẽ_M` at a bin.
     #[must_use]
-    pub fn reduced_at<'a>(&self, bin: u32, curves: &'a Curves) -> &'a [f64] {
+    pub(crate) fn reduced_at<'a>(&self, bin: u32, curves: &'a Curves) -> &'a [f64] {
         &curves.values[bin as usize * (curves.order + 1)..][..curves.order]
     }
 

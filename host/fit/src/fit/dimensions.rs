@@ -1,4 +1,4 @@
-//! What a tape measure and a data sheet leave open about a muscle: the unknowns, how well each is known beforehand, its bounds.
+//! The dimensions of a muscle that can be fitted together with the table: the unknowns, their priors, their bounds.
 //!
 //! | unknown | prior (one standard deviation) | bounds |
 //! | --- | --- | --- |
@@ -8,45 +8,45 @@
 //! | length of a mounting (a stroke held through whole recordings) | 0.5 mm | ± 1 mm |
 //!
 //! The diameter scales the force and the angle bends it over contraction, so blocked forces at several lengths determine
-//! both. The wall only scales the elastic part, which the `E_k` scale too: it stays where its prior has it, and says so.
+//! both. The wall only scales the elastic part, which the `E_k` scale too: it stays near its prior, and is reported as undetermined.
 
 use model_core::braid::Geometry;
 use model_core::units::{Angle, Length};
 use serde::Serialize;
 
-/// A dimension or a length that was found together with the table.
+/// A dimension or a mounting length that was fitted together with the table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Adjusted {
-    /// What it is.
+    /// The name of the dimension, as in the muscle description.
     pub name: String,
-    /// Its unit.
+    /// The unit of the values.
     pub unit: &'static str,
-    /// As described.
+    /// The value in the muscle description.
     pub nominal: f64,
-    /// As found.
+    /// The fitted value.
     pub value: f64,
-    /// Standard deviation of what was found.
+    /// Standard deviation (1 σ) of the fitted value.
     pub std: f64,
-    /// It was kept at or above this …
+    /// Lower bound of the search.
     pub low: f64,
-    /// … and at or below this.
+    /// Upper bound of the search.
     pub high: f64,
-    /// Share of the prior's variance that the recordings removed: near 1 they determine it, near 0 they say nothing.
+    /// Share of the prior's variance that the recordings removed: near 1 they determine the value, near 0 they do not.
     pub determined: f64,
-    /// Whether it stopped at a bound.
+    /// Whether the value is at a bound.
     pub at_bound: bool,
 }
 
-/// A stroke that whole recordings were held at, and by how much it was off.
+/// A stroke at which whole recordings were held, with its correction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mounting {
     /// The stroke as recorded, m.
     pub stroke: f64,
-    /// What is to be added to it, m.
+    /// The correction to add to it, m.
     pub offset: f64,
 }
 
-/// What may be found together with the table.
+/// A dimension that can be fitted together with the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Unknown {
     Angle,

@@ -4,66 +4,53 @@
 //! e = |F_model − F_AVG| / F_B(P)                                     thesis, eq. 24
 //! ```
 //! `F_B(P)` counts as at least a twentieth of that of the highest pressure
-//! ([`blocked_for_errors`](super::prepared::Prepared::blocked_for_errors)): at the deadband it is zero.
+//! ([`blocked_for_errors`](super::solution::Solution::blocked_for_errors)): at the deadband it is zero.
 //!
 //! Chunks are those of the mid-line ([`super::chunks`]); in each the residual `F − F_model` (each sample with its own pressure and
 //! direction) is averaged per branch, and the branches are averaged. Where both branches are there, the friction of either cancels in
 //! the model as in the measurement, so that this is eq. 24 on loops at constant pressure. It also holds where pressure moves and where
 //! only one branch was recorded (then the model's friction stands in for the missing branch). Samples just after a turn lie between
 //! the branches and belong to neither: they count in no mid-line.
-//!
-//! ```
-//! use pam_fit::fit::chunks::Place;
-//! use pam_fit::fit::errors::{Sample, by_chunk, errors};
-//!
-//! // One chunk: 2 N too much while shortening, 1 N too little while lengthening; F_B is 200 N.
-//! let at = |direction, residual| Sample {
-//!     place: Place { group: 0, fine: 0, contraction: 0.0011, direction, rows: 1.0 }, residual, blocked: 200.0,
-//! };
-//! let chunks = by_chunk([at(1.0, 2.0), at(-1.0, -1.0)]);
-//! // The mid-line is off by half a newton: a quarter of a percent.
-//! assert!((errors(&chunks, |_| true).mean - 0.25).abs() < 1e-12);
-//! ```
 
 use super::chunks::{Place, cut};
-use super::prepared::Prepared;
+use super::solution::Solution;
 
-/// One sample, or a mean over some.
+/// A residual, of one row or of the mean of several.
 #[derive(Debug, Clone, Copy)]
-pub struct Sample {
-    /// Its chunk and branch.
+pub(crate) struct Sample {
+    /// Chunk and branch of the sample.
     pub place: Place,
-    /// `F − F_model`, N.
+    /// The residual `F − F_model`, N.
     pub residual: f64,
-    /// `F_B` at its pressure, N.
+    /// The blocked force `F_B` at the pressure of the sample, N.
     pub blocked: f64,
 }
 
-/// Errors of one group, or of all.
+/// Errors of one group of chunks.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Errors {
-    /// Mean over chunks, percent.
+pub(crate) struct Errors {
+    /// Mean absolute error over chunks, percent of blocked force.
     pub mean: f64,
-    /// Largest of a chunk, percent.
+    /// Largest absolute error of a chunk, percent of blocked force.
     pub max: f64,
-    /// Chunks.
+    /// The number of chunks.
     pub chunks: usize,
 }
 
-/// One chunk's error, for pictures.
+/// The error of one chunk.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChunkError {
-    /// The group.
+    /// Index of the tested level, or of the interval of a continuous range.
     pub group: u32,
-    /// ΔL/L0 of the chunk's middle.
+    /// Contraction ΔL/L0 of the middle of the chunk.
     pub contraction: f64,
-    /// `(F_AVG − F_model) / F_B`, percent, with its sign.
+    /// The signed error `(F_AVG − F_model) / F_B`, percent.
     pub percent: f64,
 }
 
 /// The error of every chunk.
 #[must_use]
-pub fn by_chunk(samples: impl IntoIterator<Item = Sample>) -> Vec<ChunkError> {
+pub(crate) fn by_chunk(samples: impl IntoIterator<Item = Sample>) -> Vec<ChunkError> {
     cut(samples.into_iter().map(|s| (s.place, [s.residual, s.blocked])))
         .into_iter()
         .filter_map(|chunk| {
@@ -78,18 +65,18 @@ pub fn by_chunk(samples: impl IntoIterator<Item = Sample>) -> Vec<ChunkError> {
 }
 
 /// Errors by eq. 24 of points that took part and that `take` accepts.
-pub fn chunks(prepared: &Prepared, residuals: &[f64], take: impl Fn(u32) -> bool) -> Vec<ChunkError> {
-    let samples = prepared.counted().filter(|(_, place)| take(place.group)).map(|(i, place)| Sample {
+pub(crate) fn chunks(solution: &Solution, residuals: &[f64], take: impl Fn(u32) -> bool) -> Vec<ChunkError> {
+    let samples = solution.counted_points().filter(|(_, place)| take(place.group)).map(|(i, place)| Sample {
         place,
         residual: residuals[i],
-        blocked: prepared.blocked_for_errors(prepared.points.list[i].pressure),
+        blocked: solution.blocked_for_errors(solution.problem.points.list[i].pressure),
     });
     by_chunk(samples)
 }
 
 /// Mean and largest error of chunks that `take` accepts.
 #[must_use]
-pub fn errors(chunks: &[ChunkError], take: impl Fn(&ChunkError) -> bool) -> Errors {
+pub(crate) fn errors(chunks: &[ChunkError], take: impl Fn(&ChunkError) -> bool) -> Errors {
     let mut e = Errors::default();
     for c in chunks.iter().filter(|c| take(c)) {
         e.mean += c.percent.abs();

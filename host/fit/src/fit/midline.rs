@@ -4,43 +4,44 @@
 //! chunk with one branch only has that branch's force with the fitted friction taken off.
 
 use super::chunks::cut;
-use super::prepared::Prepared;
+use super::solution::Solution;
 
 /// One chunk of a mid-line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MidPoint {
-    /// The tested level, or the interval of a continuous range.
+    /// Index of the tested level, or of the interval of a continuous range.
     pub group: u32,
     /// Mean pressure, Pa.
     pub pressure: f64,
     /// Mean stroke, m.
     pub stroke: f64,
-    /// ΔL/L0.
+    /// Contraction ΔL/L0.
     pub contraction: f64,
-    /// `F_AVG`, N.
+    /// The mid-line force `F_AVG`, N.
     pub force: f64,
-    /// Mean force while shortening, N, where there is that branch.
+    /// Mean force while shortening, N; `None` without that branch.
     pub shortening: Option<f64>,
-    /// Mean force while lengthening, N, where there is that branch.
+    /// Mean force while lengthening, N; `None` without that branch.
     pub lengthening: Option<f64>,
-    /// `F_B` at this pressure, N.
+    /// The blocked force `F_B` at this pressure, N.
     pub blocked: f64,
 }
 
 /// The mid-lines of all pressures, in order of group, finer pressure and contraction.
 #[must_use]
-pub fn midline(prepared: &Prepared) -> Vec<MidPoint> {
-    let l0 = prepared.braid.rest_length();
-    let samples = prepared.counted().map(|(i, place)| {
-        let p = &prepared.points.list[i];
-        (place, [p.pressure, p.stroke + prepared.shift[i], p.force])
+pub fn midline(solution: &Solution) -> Vec<MidPoint> {
+    let l0 = solution.problem.braid.rest_length();
+    let samples = solution.counted_points().map(|(i, place)| {
+        let p = &solution.problem.points.list[i];
+        (place, [p.pressure, p.stroke + solution.problem.shift[i], p.force])
     });
     cut(samples)
         .into_iter()
         .map(|chunk| {
             let [pressure, stroke, mean] = chunk.mean();
             let [lengthening, _, shortening] = chunk.branches.map(|b| b.map(|[.., force]| force));
-            let friction = if prepared.design.friction { prepared.curves_at(pressure).1 } else { 0.0 };
+            let friction =
+                if solution.problem.design.friction { solution.curves_at(pressure).1 } else { 0.0 };
             let force = match (shortening, lengthening) {
                 (Some(up), None) => up / (1.0 - friction),
                 (None, Some(down)) => down / (1.0 + friction),
@@ -54,7 +55,7 @@ pub fn midline(prepared: &Prepared) -> Vec<MidPoint> {
                 force,
                 shortening,
                 lengthening,
-                blocked: prepared.blocked_for_errors(pressure),
+                blocked: solution.blocked_for_errors(pressure),
             }
         })
         .collect()

@@ -25,27 +25,27 @@
 use model_core::braid::{Braid, Geometry};
 use model_core::table::MAX_ORDER;
 use model_core::units::Length;
-use nalgebra::DMatrix;
 
 use super::basis::columns;
 use super::design::Measured;
 use super::midline::MidPoint;
-use super::prepared::Prepared;
+use super::solution::Solution;
+use crate::numerics::least_squares::least_squares;
 
-/// Young's modulus of the thesis's silicone, Pa: stands in where the description names none.
-pub const THESIS_MODULUS: f64 = 1.75e6;
+/// Young's modulus of the thesis's silicone, Pa; the default where the description gives none.
+pub(crate) const THESIS_MODULUS: f64 = 1.75e6;
 
-/// A fitted constant: its name, the group of rows that it belongs to (none for all), its value in SI units.
-pub type Constant = (String, Option<u32>, f64);
+/// A fitted constant: its name, the index of its pressure (`None` for all pressures), its value in SI units.
+pub(crate) type Constant = (String, Option<u32>, f64);
 
-/// One model on the mid-lines.
+/// A model evaluated on the mid-lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
-    /// Its name.
+    /// The name of the model.
     pub name: &'static str,
-    /// Its force at every mid-point, N; friction-free.
+    /// Its friction-free force at every mid-point, N.
     pub force: Vec<f64>,
-    /// What was fitted.
+    /// The fitted constants.
     pub constants: Vec<Constant>,
     /// Mean error by eq. 24, percent.
     pub mean_error: f64,
@@ -55,11 +55,11 @@ pub struct Model {
 
 /// All models. `modulus` is Young's modulus of the bladder, Pa.
 #[must_use]
-pub fn side_by_side(prepared: &Prepared, mid: &[MidPoint], modulus: Option<f64>) -> Vec<Model> {
-    let plain = with_tip(prepared.geometry, false);
-    let tip = with_tip(prepared.geometry, true);
+pub fn side_by_side(solution: &Solution, mid: &[MidPoint], modulus: Option<f64>) -> Vec<Model> {
+    let plain = with_tip(solution.problem.geometry, false);
+    let tip = with_tip(solution.problem.geometry, true);
     let (Some(plain), Some(tip)) = (plain, tip) else { return Vec::new() };
-    let p0 = prepared.deadband();
+    let p0 = solution.deadband();
     let e = modulus.unwrap_or(THESIS_MODULUS);
     let at = |name, force: Vec<f64>, constants| judge(name, mid, force, constants);
     let all = |braid: &Braid<f64>, f: &dyn Fn(&MidPoint, &super::basis::Columns) -> f64| -> Vec<f64> {
@@ -68,7 +68,7 @@ pub fn side_by_side(prepared: &Prepared, mid: &[MidPoint], modulus: Option<f64>)
     let whole = |_: &[usize]| None;
     let straight = |of: &[usize]| Some(straight_part(mid, of));
     let per_pressure = |name, braid: &Braid<f64>, order, part: &dyn Fn(&[usize]) -> Option<Vec<usize>>| {
-        let (force, constants) = separate(prepared, mid, braid, order, part);
+        let (force, constants) = separate(solution, mid, braid, order, part);
         judge(name, mid, force, constants)
     };
     let deadband = || ("P0".to_owned(), None, p0);
@@ -87,13 +87,13 @@ pub fn side_by_side(prepared: &Prepared, mid: &[MidPoint], modulus: Option<f64>)
         per_pressure("m4", &plain, 4, &whole),
         per_pressure("m4-tip", &tip, 4, &whole),
     ];
-    if prepared.design.friction
+    if solution.problem.design.friction
         && let Some(m4) = models.iter().find(|m| m.name == "m4").cloned()
     {
-        models.push(with_friction(prepared, mid, m4));
+        models.push(with_friction(solution, mid, m4));
     }
     let wall: Vec<[f64; 3]> =
-        mid.iter().map(|m| wall_columns(&prepared.geometry, &plain, m.stroke)).collect();
+        mid.iter().map(|m| wall_columns(&solution.problem.geometry, &plain, m.stroke)).collect();
     models.push(yeoh(mid, &plain, &wall));
     let c1 = e / 6.0;
     let force = mid
@@ -118,16 +118,16 @@ fn judge(name: &'static str, mid: &[MidPoint], force: Vec<f64>, constants: Vec<C
 
 /// M moduli at each pressure by itself, least squares on the mid-points that `part` picks of each group (all where `None`).
 fn separate(
-    prepared: &Prepared,
+    solution: &Solution,
     mid: &[MidPoint],
     braid: &Braid<f64>,
     order: usize,
     part: &dyn Fn(&[usize]) -> Option<Vec<usize>>,
 ) -> (Vec<f64>, Vec<Constant>) {
-    let p0 = prepared.deadband();
+    let p0 = solution.deadband();
     let mut force = vec![0.0; mid.len()];
     let mut constants = Vec::new();
-    for group in 0..prepared.design.groups as u32 {
+    for group in 0..solution.problem.design.groups as u32 {
         let of: Vec<usize> = (0..mid.len()).filter(|i| mid[*i].group == group).collect();
         if of.is_empty() {
             continue;
@@ -157,9 +157,7 @@ fn separate(
 /// With `w_i = F_i⁻²` it is the objective of the thesis (eq. 23), which is linear in the `E_k`.
 ///
 /// ```
-/// use pam_fit::fit::basis::columns;
-/// use pam_fit::fit::design::Measured;
-/// use pam_fit::fit::models::moduli_at_one_pressure;
+/// use pam_fit::{Measured, columns, moduli_at_one_pressure};
 /// use model_core::braid::miniature;
 ///
 /// let braid = miniature().build()?;
@@ -189,38 +187,6 @@ pub fn moduli_at_one_pressure(
         (c.elastic.map(|c| root * c), root * (p.force - (p.pressure - deadband) * c.area))
     });
     least_squares(&rows.collect::<Vec<_>>(), order.min(MAX_ORDER))
-}
-
-/// Least squares: columns scaled, made orthonormal by Householder's reflections, and the small triangle that is left solved by
-/// its singular values, so that directions which the rows do not determine stay at zero. A row is its columns and its target.
-fn least_squares(rows: &[([f64; MAX_ORDER], f64)], order: usize) -> Vec<f64> {
-    if rows.is_empty() || order == 0 {
-        return vec![0.0; order];
-    }
-    let size = |k: usize| rows.iter().map(|(c, _)| c[k] * c[k]).sum::<f64>().sqrt();
-    let scale: Vec<f64> = (0..order).map(|k| Some(size(k)).filter(|s| *s > 0.0).unwrap_or(1.0)).collect();
-    // The target is one more column: what is left of it above the triangle's last row is Qᵀ b.
-    let height = rows.len().max(order + 1);
-    let all = DMatrix::from_fn(height, order + 1, |i, k| match rows.get(i) {
-        Some((c, target)) => {
-            if k < order {
-                c[k] / scale[k]
-            } else {
-                *target
-            }
-        }
-        None => 0.0,
-    });
-    let triangle = all.qr().unpack_r();
-    let solution = triangle
-        .view((0, 0), (order, order))
-        .into_owned()
-        .svd(true, true)
-        .solve(&triangle.view((0, order), (order, 1)).into_owned(), 1e-9);
-    match solution {
-        Ok(x) => x.iter().zip(&scale).map(|(x, s)| x / s).collect(),
-        Err(_) => vec![0.0; order],
-    }
 }
 
 /// The longest stretch of a load line (mid-points `of` one group, by contraction) that stays within one percent of the blocked
@@ -259,10 +225,10 @@ fn straight_part(mid: &[MidPoint], of: &[usize]) -> Vec<usize> {
 }
 
 /// The model with friction on both branches: one error for each branch of each chunk.
-fn with_friction(prepared: &Prepared, mid: &[MidPoint], m4: Model) -> Model {
+fn with_friction(solution: &Solution, mid: &[MidPoint], m4: Model) -> Model {
     let mut sum = (0.0, 0.0, 0.0_f64);
     for (m, f) in mid.iter().zip(&m4.force) {
-        let k = prepared.curves_at(m.pressure).1;
+        let k = solution.curves_at(m.pressure).1;
         for (measured, model) in [(m.shortening, f * (1.0 - k)), (m.lengthening, f * (1.0 + k))] {
             if let Some(measured) = measured {
                 let e = 100.0 * (measured - model).abs() / m.blocked;
@@ -275,7 +241,7 @@ fn with_friction(prepared: &Prepared, mid: &[MidPoint], m4: Model) -> Model {
 
 /// `V_B d⟨(I_1 − 3)^i⟩/dΔL` for i = 1, 2, 3, m²: what a hyperelastic constant of 1 Pa pushes with, N.
 #[must_use]
-pub fn wall_columns(geometry: &Geometry, braid: &Braid<f64>, stroke: f64) -> [f64; 3] {
+pub(crate) fn wall_columns(geometry: &Geometry, braid: &Braid<f64>, stroke: f64) -> [f64; 3] {
     // Central differences of a smooth function at 10⁻⁵ of its scale: nine digits.
     let h = 1e-5 * braid.rest_length();
     let (after, before) = (invariants(geometry, braid, stroke + h), invariants(geometry, braid, stroke - h));

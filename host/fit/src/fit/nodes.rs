@@ -15,11 +15,21 @@ pub struct Pressures {
     pub nodes: Vec<f64>,
 }
 
-/// Intervals that a continuous range is cut into.
+impl Pressures {
+    /// The tested level, or the interval, that a pressure in Pa belongs to.
+    pub(super) fn nearest(&self, pressure: f64) -> u32 {
+        let levels = &self.levels;
+        let nearest = (0..levels.len())
+            .min_by(|a, b| (levels[*a] - pressure).abs().total_cmp(&(levels[*b] - pressure).abs()));
+        nearest.unwrap_or(0) as u32
+    }
+}
+
+/// Intervals of a continuous range.
 const INTERVALS: usize = 8;
 const BINS: usize = 1024;
 
-/// Looks at how the rows are spread over pressure. `max_pressure` is the highest that a controller may command.
+/// Finds the tested pressures from the distribution of rows. `max_pressure` is the highest that a controller may command, Pa.
 #[must_use]
 pub fn pressures(points: &Points, max_pressure: f64) -> Pressures {
     let range = points.pressure;
@@ -80,7 +90,7 @@ fn peaks(rows: &[f64], half: usize) -> Option<Vec<usize>> {
     let within = |i: usize| rows[i.saturating_sub(half)..(i + half + 1).min(BINS)].iter().sum::<f64>();
     let near: Vec<f64> = (0..BINS).map(within).collect();
     let width = 2 * half + 1;
-    // A level stands out of its surroundings, however few of all rows it holds: short strokes at low pressure are a level too.
+    // A level exceeds its surroundings, however few rows it has: short strokes at low pressure are a level too.
     let stands_out = |i: usize| {
         let around = [i.checked_sub(2 * width), i.checked_sub(width), Some(i + width), Some(i + 2 * width)];
         let beside: f64 = around.into_iter().flatten().filter_map(|k| near.get(k)).sum::<f64>() / 4.0;
@@ -94,7 +104,7 @@ fn peaks(rows: &[f64], half: usize) -> Option<Vec<usize>> {
             peaks.push(i);
         }
     }
-    // Ramps between levels are welcome data, but do not make the levels disappear.
+    // Ramps between levels are used as data, but do not hide the levels.
     let held: f64 = peaks.iter().map(|i| near[*i]).sum();
     (!peaks.is_empty() && peaks.len() <= MAX_NODES - 2 && held >= 0.8 * total).then_some(peaks)
 }

@@ -1,16 +1,18 @@
-//! Readings that do not belong to the rest: found, taken out, and listed.
+//! Force readings outside the scatter of the others: found, excluded, and listed.
 
 use pam_data::recording::Campaign;
 
-use super::points::{Points, median};
-use super::prepared::Prepared;
-use super::screen::{Outlier, Use};
+use super::points::Points;
+use super::problem::Problem;
+use super::screen::{Outlier, PointUse, Screen};
+use super::weights::scatter;
+use crate::numerics::median;
 
-/// Finds single rows that jump out of their piece and takes them out of its mean.
+/// Finds single rows far from the others of their point and takes them out of its mean.
 ///
-/// Only pieces whose own spread is far above that of the others are looked at row by row. Strays beside a turn of the motion are
-/// rows of the other branch, whose turn the stroke's noise hides by a row or two: they leave the mean too, but are no odd readings.
-pub fn despike(campaign: &Campaign, points: &mut Points) -> Vec<Outlier> {
+/// Only points whose range is far above that of the others are examined row by row. Such rows beside a reversal belong to the other
+/// branch, as noise of the stroke hides a reversal by a row or two: they leave the mean too, but are not reported as outliers.
+pub(super) fn despike(campaign: &Campaign, points: &mut Points) -> Vec<Outlier> {
     let mut spreads: Vec<f64> =
         points.list.iter().filter(|p| p.rows >= 3).map(|p| p.force_range.1 - p.force_range.0).collect();
     let typical = median(&mut spreads).max(4.0 * points.row_noise);
@@ -19,7 +21,7 @@ pub fn despike(campaign: &Campaign, points: &mut Points) -> Vec<Outlier> {
         return found;
     }
     for index in 0..points.list.len() {
-        let turns = points.beside_turn(index);
+        let reversals = points.beside_turn(index);
         let p = &mut points.list[index];
         if p.dropout || p.rows < 3 || p.force_range.1 - p.force_range.0 < 6.0 * typical {
             continue;
@@ -39,9 +41,9 @@ pub fn despike(campaign: &Campaign, points: &mut Points) -> Vec<Outlier> {
         let kept = rows.iter().enumerate().filter(|(i, _)| !stray.contains(i)).map(|(_, f)| *f);
         p.force = kept.sum::<f64>() / (rows.len() - stray.len()) as f64;
         let others_before =
-            if turns.0 { stray.iter().zip(0..).take_while(|(s, k)| **s == *k).count() } else { 0 };
+            if reversals.0 { stray.iter().zip(0..).take_while(|(s, k)| **s == *k).count() } else { 0 };
         let to_the_end = stray.iter().rev().zip((0..rows.len()).rev());
-        let others_after = if turns.1 { to_the_end.take_while(|(s, k)| **s == *k).count() } else { 0 };
+        let others_after = if reversals.1 { to_the_end.take_while(|(s, k)| **s == *k).count() } else { 0 };
         for &i in &stray[others_before..stray.len() - others_after] {
             found.push(Outlier {
                 recording: p.recording,
@@ -55,52 +57,53 @@ pub fn despike(campaign: &Campaign, points: &mut Points) -> Vec<Outlier> {
     found
 }
 
-impl Prepared {
-    /// Points far off the model for a moment only: spikes. A long stretch off the model is a misfit, and stays.
-    pub(super) fn find_outliers(&mut self) {
-        let residuals = self.design.residuals(&self.parameters);
-        // A point of few rows scatters as rows do, also where most points are means over many; of a million rows of normal noise none
-        // lies beyond eight standard deviations.
-        let within = self.points.scatter_within();
-        let scatter: Vec<f64> = self.scatter(&residuals).iter().map(|s| s.hypot(within)).collect();
-        let group = |i: usize| self.design.bins[self.design.rows[i].bin as usize].group as usize;
-        let force = self.points.force.span();
-        let far = |i: usize| {
-            residuals[i].abs() > (8.0 * scatter[group(i)]).max(0.01 * force) && self.used[i] == Use::Fitted
-        };
-        let n = self.used.len();
-        let mut i = 0;
-        let mut marked = Vec::new();
-        while i < n {
-            if !far(i) {
-                i += 1;
-                continue;
-            }
-            let start = i;
-            while i < n && far(i) {
-                i += 1;
-            }
-            // The neighbours on both sides must be well: then it is a spike of the reading.
-            let calm = |k: usize| residuals[k].abs() < 4.0 * scatter[group(k)];
-            if i - start <= 3 && start > 0 && i < n && calm(start - 1) && calm(i) {
-                // Beside a turn they are rows of the other branch, not odd readings.
-                let turn = self.points.beside_turn(start).0 || self.points.beside_turn(i - 1).1;
-                marked.extend((start..i).map(|k| (k, if turn { Use::NearTurn } else { Use::Outlier })));
-            }
+/// Excludes points far from the model for a moment only: spikes of the reading. A long stretch far from the model is a misfit, and
+/// stays.
+pub(super) fn find(problem: &Problem, screen: &Screen, parameters: &[f64]) -> Screen {
+    let points = &problem.points;
+    let residuals = problem.design.residuals(parameters);
+    // A point of few rows scatters as rows do, also where most points are means over many. Of a million rows of normal noise none
+    // lies beyond eight standard deviations.
+    let within = points.scatter_within();
+    let scatter: Vec<f64> = scatter(problem, screen, &residuals).iter().map(|s| s.hypot(within)).collect();
+    let group = |i: usize| problem.group_of(i);
+    let force = points.force.span();
+    let far = |i: usize| {
+        residuals[i].abs() > (8.0 * scatter[group(i)]).max(0.01 * force) && screen.used[i] == PointUse::Fitted
+    };
+    let n = screen.used.len();
+    let mut found = screen.clone();
+    let mut i = 0;
+    while i < n {
+        if !far(i) {
+            i += 1;
+            continue;
         }
-        for (i, what) in marked {
-            self.used[i] = what;
-            if what == Use::NearTurn {
-                continue;
-            }
-            let p = &self.points.list[i];
-            self.outliers.push(Outlier {
+        let start = i;
+        while i < n && far(i) {
+            i += 1;
+        }
+        // The neighbours on both sides must agree with the model: then it is a spike of the reading.
+        let calm = |k: usize| residuals[k].abs() < 4.0 * scatter[group(k)];
+        if !(i - start <= 3 && start > 0 && i < n && calm(start - 1) && calm(i)) {
+            continue;
+        }
+        // Beside a reversal they are rows of the other branch, not spikes.
+        if points.beside_turn(start).0 || points.beside_turn(i - 1).1 {
+            found.used[start..i].fill(PointUse::NearReversal);
+            continue;
+        }
+        found.used[start..i].fill(PointUse::Outlier);
+        found.outliers.extend((start..i).map(|k| {
+            let p = &points.list[k];
+            Outlier {
                 recording: p.recording,
                 row: p.first_row,
                 time: p.time,
                 force: p.force,
-                off: residuals[i],
-            });
-        }
+                off: residuals[k],
+            }
+        }));
     }
+    found
 }

@@ -1,9 +1,9 @@
 //! What is asked of the curves beside describing the points: that they bend no more than the points say.
 
 use super::design::{Design, Layout};
-use super::linear::Symmetric;
-use super::normal::Normal;
+use super::normal_equations::NormalEquations;
 use super::smoothing::Smoothing;
+use crate::numerics::symmetric::Symmetric;
 
 impl Design {
     /// The penalty on curves that bend, and on unknowns that nothing else holds.
@@ -11,7 +11,7 @@ impl Design {
     /// `bend_elastic` and `bend_friction` weigh the squared second differences of `ẽ_k` (N) and of `k_F` (times the
     /// typical force, N) between neighbouring nodes against the data's mean weight.
     #[must_use]
-    pub fn penalty(&self, data: &Normal, bend_elastic: f64, bend_friction: f64) -> Symmetric {
+    pub fn penalty(&self, data: &NormalEquations, bend_elastic: f64, bend_friction: f64) -> Symmetric {
         let layout = self.layout();
         let nodes = self.basis.nodes();
         let mut penalty = Symmetric::zeros(layout.len());
@@ -81,7 +81,7 @@ impl Design {
 
 #[cfg(test)]
 mod tests {
-    use crate::fit::joint::tests::known;
+    use crate::fit::gauss_newton::tests::known;
 
     #[test]
     fn a_steep_straight_friction_stays_steep_however_stiff_the_curve() {

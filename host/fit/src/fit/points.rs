@@ -4,6 +4,7 @@
 //! pressure and stroke hardly change within. A piece ends where the direction turns, where stroke or pressure has moved on
 //! by a small share of their ranges, or where it holds enough rows. One pass, linear in rows; memory is that of the points.
 
+use crate::numerics::median;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::segment::Motion;
 use pam_data::recording::{Campaign, Recording, white_noise};
@@ -11,38 +12,38 @@ use pam_data::recording::{Campaign, Recording, white_noise};
 /// A mean over consecutive rows of one recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// The recording it comes from, counted as in the campaign.
+    /// Index of the recording in the campaign.
     pub recording: u32,
-    /// Its first row in that recording.
+    /// Index of its first row in that recording.
     pub first_row: u32,
-    /// How many rows it holds.
+    /// The number of rows.
     pub rows: u32,
-    /// The half-stroke it belongs to, counted through the campaign: rows between two turns.
+    /// The half-stroke that it belongs to, numbered through the campaign: the rows between two reversals.
     pub block: u32,
     /// +1 shortening or filling, −1 lengthening or emptying, 0 unknown.
     pub direction: f64,
-    /// s.
+    /// Mean time, s.
     pub time: f64,
-    /// Pa.
+    /// Mean gauge pressure, Pa.
     pub pressure: f64,
-    /// m.
+    /// Mean stroke, m.
     pub stroke: f64,
-    /// N.
+    /// Mean force, N.
     pub force: f64,
-    /// The lowest and the highest force among its rows, N: spikes show here.
+    /// Lowest and highest force among its rows, N; spikes show here.
     pub force_range: (f64, f64),
-    /// Distance from the last turn, or from the recording's beginning, in shares of the ranges of stroke and pressure.
+    /// Distance from the last reversal, or from the start of the recording, as a share of the ranges of stroke and pressure.
     pub since_turn: f64,
-    /// Whether the gauge fell out there: the pressure is bridged.
+    /// Whether the pressure sensor failed: the pressure is interpolated.
     pub dropout: bool,
 }
 
 /// The smallest and the largest value of a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
-    /// Smallest.
+    /// Smallest value.
     pub low: f64,
-    /// Largest.
+    /// Largest value.
     pub high: f64,
 }
 
@@ -67,19 +68,19 @@ impl Range {
 /// All points of a campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Points {
-    /// In time order.
+    /// The points, in time order.
     pub list: Vec<Point>,
-    /// Rows behind them.
+    /// The number of rows.
     pub rows: usize,
-    /// Half-strokes.
+    /// The number of half-strokes.
     pub blocks: u32,
-    /// Of pressure, Pa.
+    /// Range of the gauge pressure, Pa.
     pub pressure: Range,
-    /// Of stroke, m.
+    /// Range of the stroke, m.
     pub stroke: Range,
-    /// Of force, N.
+    /// Range of the force, N.
     pub force: Range,
-    /// Standard deviation of the force from row to row beside its trend, N.
+    /// Standard deviation of the force from row to row, without its trend, N.
     pub row_noise: f64,
     /// Standard deviation of a single reading of the stroke, m.
     pub stroke_noise: f64,
@@ -89,7 +90,7 @@ impl Points {
     /// How far single rows scatter about their point's mean, N, by the median: noise that is correlated over some rows shows here
     /// and not in `row_noise`. 0 where points hold too few rows to tell.
     #[must_use]
-    pub fn scatter_within(&self) -> f64 {
+    pub(crate) fn scatter_within(&self) -> f64 {
         // The range of n normal values is about 2 √(2 ln n) standard deviations.
         let deviation =
             |p: &Point| (p.force_range.1 - p.force_range.0) / (2.0 * (2.0 * f64::from(p.rows).ln()).sqrt());
@@ -98,7 +99,7 @@ impl Points {
 
     /// Whether a turn of the motion lies just before and just after a point.
     #[must_use]
-    pub fn beside_turn(&self, i: usize) -> (bool, bool) {
+    pub(crate) fn beside_turn(&self, i: usize) -> (bool, bool) {
         let here = &self.list[i];
         let turns = |there: Option<&Point>| there.is_some_and(|p| p.block != here.block);
         (turns(i.checked_sub(1).and_then(|k| self.list.get(k))), turns(self.list.get(i + 1)))
@@ -111,8 +112,7 @@ const AIM: usize = 16_000;
 const STROKE_STEP: f64 = 1.0 / 500.0;
 /// A piece ends after this share of the range of pressure.
 const PRESSURE_STEP: f64 = 1.0 / 100.0;
-/// Or after so many standard deviations of a single reading, where these are more: noise must not cut pieces short, or there would be
-/// as many points as rows.
+/// Or after this many standard deviations of a single reading, where that is more: otherwise noise would end a piece after every row.
 const NOISE_STEP: f64 = 6.0;
 
 /// Cuts a campaign into points; a dropout of the gauge shares none with what is beside it. `motions` are those of its recordings;
@@ -120,7 +120,7 @@ const NOISE_STEP: f64 = 6.0;
 #[must_use]
 pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
     let campaign = screened.campaign.as_ref();
-    let taken = |index: usize| campaign.recordings[index].force.is_some() && !screened.stands_apart(index);
+    let taken = |index: usize| campaign.recordings[index].force.is_some() && !screened.is_inconsistent(index);
     let with_force = || (0..campaign.recordings.len()).filter(|i| taken(*i)).map(|i| &campaign.recordings[i]);
     let rows: usize = with_force().map(Recording::len).sum();
     let pressure = Range::of(with_force().flat_map(|r| r.pressure.iter().copied()));
@@ -206,15 +206,6 @@ fn row_noise(campaign: &Campaign, rows: usize) -> f64 {
         .flat_map(|f| f.windows(3).step_by(stride).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()))
         .collect();
     median(&mut seconds) / (0.6745 * 6.0_f64.sqrt())
-}
-
-/// The median, by partial sorting; 0 of none.
-pub fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! What a fit gives: the table, its errors, and what is said about it.
+//! The result of a fit: the table, its errors and its summary.
 
 use model_core::muscle::Muscle;
 use model_core::table::{Kind as TableKind, MuscleTable, Tested};
@@ -12,62 +12,69 @@ use pam_data::progress::Progress;
 use pam_data::recording::Campaign;
 
 use super::Options;
+use super::cross_validation::predict_left_out;
 use super::errors::{ChunkError, chunks};
-use super::left_out::left_out;
 use super::midline::{MidPoint, midline};
 use super::models::{self, Model};
-use super::prepared::Prepared;
-use super::summary::{ModelError, Summary, summarise};
-use super::uncertainty::{self, Root, Uncertain};
+use super::solution::Solution;
+use super::summary::{ModelError, Results, Summary, summarise};
+use super::uncertainty::{Uncertain, jackknife, table_root};
+use crate::numerics::covariance_root::CovarianceRoot;
 
 /// A finished fit.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// What the controller gets.
+    /// The table as the controller gets it.
     pub table: MuscleTable,
     /// The solved problem behind it.
-    pub prepared: Prepared,
-    /// How uncertain the parameters are.
+    pub solution: Solution,
+    /// The uncertainty of the parameters.
     pub uncertain: Uncertain,
     /// Root of the covariance of the table's numbers: `P0`, `E_k` at the nodes, `k_F` at the nodes.
-    pub table_root: Root,
-    /// Every chunk's error by eq. 24.
+    pub table_root: CovarianceRoot,
+    /// The error of every chunk by eq. 24, percent of blocked force.
     pub chunks: Vec<ChunkError>,
-    /// F_AVG, chunk by chunk.
+    /// The mid-line of the hysteresis loop (F_AVG), chunk by chunk.
     pub midline: Vec<MidPoint>,
-    /// Every model on the mid-lines.
+    /// The models to compare with, on the mid-lines.
     pub models: Vec<Model>,
     /// The figures, as they are written to JSON.
     pub summary: Summary,
 }
 
 impl Fit {
-    /// Draws everything from a solved problem.
+    /// Derives table, uncertainty, errors and summary from a solution.
     ///
     /// # Errors
     /// [`FitCode::FitUnderdetermined`] where no usable table comes out.
     pub fn of(
-        prepared: Prepared,
+        solution: Solution,
         campaign: &Campaign,
         muscle: &MuscleDescription,
         options: &Options,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        progress.stage("leaving out stretches, for the intervals", 0);
-        let table = table(&prepared, muscle)?;
-        let data = prepared.design.normal(&prepared.parameters, &prepared.weights);
-        let penalty = prepared.design.penalty(&data, prepared.smoothing.elastic, prepared.smoothing.friction);
-        let uncertain = uncertainty::jackknife(&prepared, &penalty);
-        let table_root = uncertainty::of_table(&prepared, &uncertain.root, &prepared.pressures.nodes);
-        let residuals = table_residuals(&prepared, &table)?;
-        let chunks = chunks(&prepared, &residuals, |_| true);
-        let left_out = left_out(&prepared, options, progress);
+        progress.stage("jackknife of the confidence intervals", 0);
+        let table = table(&solution, muscle)?;
+        let Solution { problem, screen, weights, parameters, .. } = &solution;
+        let penalty = problem.penalty(parameters, weights, solution.smoothing);
+        let uncertain = jackknife(problem, screen, weights, parameters, &penalty, solution.deadband_std);
+        let table_root = table_root(&solution, &uncertain.root, &solution.problem.pressures.nodes);
+        let residuals = table_residuals(&solution, &table)?;
+        let chunks = chunks(&solution, &residuals, |_| true);
+        let left_out = predict_left_out(&solution, options, progress);
         progress.stage("comparing the models", 0);
-        let midline = midline(&prepared);
+        let midline = midline(&solution);
         let modulus = muscle.young_modulus();
-        let models = models::side_by_side(&prepared, &midline, modulus);
-        let mut summary =
-            summarise(&prepared, &table, campaign, muscle, &uncertain, &residuals, &chunks, &left_out);
+        let models = models::side_by_side(&solution, &midline, modulus);
+        let results = Results {
+            table: &table,
+            uncertain: &uncertain,
+            residuals: &residuals,
+            chunks: &chunks,
+            left_out: &left_out,
+        };
+        let mut summary = summarise(&solution, campaign, muscle, &results);
         summary.models.splice(
             0..0,
             models.iter().map(|m| ModelError {
@@ -76,7 +83,7 @@ impl Fit {
                 max_error_pct: m.max_error,
             }),
         );
-        Ok(Self { table, prepared, uncertain, table_root, chunks, midline, models, summary })
+        Ok(Self { table, solution, uncertain, table_root, chunks, midline, models, summary })
     }
 }
 
@@ -94,39 +101,39 @@ impl Fit {
     }
 }
 
-/// What a muscle pulls where it pulls most, as a share of what its braid alone makes of the pressure; deadband and elasticity take from it.
-const POSSIBLE: (f64, f64) = (0.2, 2.0);
+/// The largest force of a muscle as a share of what its braid alone would make of the pressure; deadband and elasticity reduce it.
+const SHARE_OF_BRAID: (f64, f64) = (0.2, 2.0);
 
 /// The table's numbers from the solution, checked.
-fn table(prepared: &Prepared, muscle: &MuscleDescription) -> Result<MuscleTable> {
+fn table(solution: &Solution, muscle: &MuscleDescription) -> Result<MuscleTable> {
     let unusable = |what: &str| {
-        let share = prepared.share_of_braid();
-        let units = share.filter(|s| !(POSSIBLE.0..POSSIBLE.1).contains(s)).map(|s| {
+        let share = solution.problem.share_of_braid();
+        let units = share.filter(|s| !(SHARE_OF_BRAID.0..SHARE_OF_BRAID.1).contains(s)).map(|s| {
             let times = if s > 0.1 { format!("{s:.1} times") } else { format!("{s:.1e} times") };
-            format!("the force is {times} what this braid makes of the pressure that was read: ")
+            format!("the force is {times} what this braid makes of the recorded pressure: ")
         });
-        Error::new(FitCode::FitUnderdetermined, format!("the recordings lead to no usable table: {what}")).help(format!(
-            "{}check the muscle's dimensions and the recording's units; a longer stroke or more pressures determine more",
+        Error::new(FitCode::FitUnderdetermined, format!("the recordings give no usable table: {what}")).help(format!(
+            "{}check the muscle's dimensions and the units of the recordings, or record longer strokes and more pressures",
             units.unwrap_or_default()
         ))
     };
-    let nodes = &prepared.pressures.nodes;
-    let at: Vec<(Vec<f64>, f64)> = nodes.iter().map(|p| prepared.curves_at(*p)).collect();
-    let order = prepared.design.layout().order;
+    let nodes = &solution.problem.pressures.nodes;
+    let at: Vec<(Vec<f64>, f64)> = nodes.iter().map(|p| solution.curves_at(*p)).collect();
+    let order = solution.problem.design.layout().order;
     let elastic = (0..order).map(|k| at.iter().map(|(e, _)| e[k] as f32).collect()).collect();
-    let max_pressure = muscle.max_pressure_kPa.map_or(prepared.points.pressure.high, |kpa| kpa * 1e3);
-    let last = prepared.pressures.levels.last().copied().filter(|_| prepared.pressures.held);
-    let highest = last.unwrap_or(prepared.points.pressure.high);
-    let l0 = prepared.braid.rest_length();
-    let (range, stroke) = (prepared.points.pressure, prepared.points.stroke);
+    let max_pressure = muscle.max_pressure_kPa.map_or(solution.problem.points.pressure.high, |kpa| kpa * 1e3);
+    let last = solution.problem.pressures.levels.last().copied().filter(|_| solution.problem.pressures.held);
+    let highest = last.unwrap_or(solution.problem.points.pressure.high);
+    let l0 = solution.problem.braid.rest_length();
+    let (range, stroke) = (solution.problem.points.pressure, solution.problem.points.stroke);
     let table = MuscleTable {
         kind: match muscle.kind {
             Kind::Contractile => TableKind::Contractile,
             Kind::Push => TableKind::Push,
         },
-        geometry: prepared.geometry.cast(),
-        deadband: Pressure::from_pascals(prepared.deadband() as f32),
-        goes_slack: prepared.goes_slack,
+        geometry: solution.problem.geometry.cast(),
+        deadband: Pressure::from_pascals(solution.deadband() as f32),
+        goes_slack: solution.screen.goes_slack,
         nodes: nodes.iter().map(|p| *p as f32).collect(),
         elastic,
         friction: at.iter().map(|(_, k)| k.clamp(-0.5, 0.95) as f32).collect(),
@@ -137,7 +144,7 @@ fn table(prepared: &Prepared, muscle: &MuscleDescription) -> Result<MuscleTable>
             contraction_high: (stroke.high / l0) as f32,
         },
         max_pressure: Pressure::from_pascals(max_pressure as f32),
-        blocked_force: Force::from_newtons(prepared.blocked(highest) as f32),
+        blocked_force: Force::from_newtons(solution.blocked(highest) as f32),
         effects: heapless::Vec::new(),
     };
     table.check().map_err(|e| unusable(&e.to_string()))?;
@@ -145,15 +152,16 @@ fn table(prepared: &Prepared, muscle: &MuscleDescription) -> Result<MuscleTable>
 }
 
 /// `F − F_model` of every point by the table itself, as the controller would have it, N.
-fn table_residuals(prepared: &Prepared, table: &MuscleTable) -> Result<Vec<f64>> {
+fn table_residuals(solution: &Solution, table: &MuscleTable) -> Result<Vec<f64>> {
     let muscle =
         Muscle::<f64>::build(table).map_err(|e| Error::new(FitCode::FitUnderdetermined, e.to_string()))?;
-    let directed = prepared.design.friction;
-    Ok(prepared
+    let directed = solution.problem.design.friction;
+    Ok(solution
+        .problem
         .points
         .list
         .iter()
-        .zip(&prepared.shift)
+        .zip(&solution.problem.shift)
         .map(|(p, shift)| {
             let direction = if directed { p.direction } else { 0.0 };
             let stroke = Length::from_metres(p.stroke + shift);

@@ -1,52 +1,101 @@
-//! Which points a fit may use, and why others are set aside: nothing is dropped without being counted and said.
+//! Which points a fit may use, and why it excludes others. Every excluded point is counted and reported.
 
 use pam_data::recording::Campaign;
 
+use super::points::Points;
+
 /// Whether a point takes part in the fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Use {
-    /// It does.
+pub enum PointUse {
+    /// It takes part.
     Fitted,
-    /// The direction of its motion is not known, so friction's sign is not either.
+    /// Excluded: the direction of motion is unknown, and with it the sign of friction.
     UnknownDirection,
-    /// Just after a turn: friction has not yet turned round.
-    NearTurn,
-    /// The muscle is slack: the force stays at zero while the model would push.
+    /// Excluded: just after a reversal, where friction has not changed sign completely.
+    NearReversal,
+    /// Excluded: the muscle is slack; the force stays at zero where the model would push.
     Slack,
-    /// The force sensor's reading stands at the end of its range.
+    /// Excluded: the force reading is at the end of the sensor's range.
     Clipped,
-    /// A reading far beyond what the rest scatters.
+    /// Excluded: the reading is far outside the scatter of the others.
     Outlier,
-    /// The gauge alone fell out: the pressure of these rows is bridged.
+    /// Excluded: the pressure sensor failed for these rows, and their pressure is interpolated.
     Dropout,
 }
 
-/// A reading that does not belong to the rest.
+/// A force reading outside the scatter of the others.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outlier {
-    /// The recording, counted as in the campaign.
+    /// Index of the recording in the campaign.
     pub recording: u32,
-    /// Row in that recording, from 0.
+    /// Index of the row in that recording.
     pub row: u32,
-    /// s.
+    /// Time, s.
     pub time: f64,
-    /// What was read, N.
+    /// The reading, N.
     pub force: f64,
-    /// How far it lies off, N.
+    /// Its distance from what the other readings give, N.
     pub off: f64,
 }
 
-/// A force at which the sensor's readings end: many rows stand at exactly the smallest (or largest) value.
+/// An end of the force sensor's range: many rows stand at exactly the smallest, or the largest, value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clip {
-    /// N.
+    /// The reading at that end, N.
     pub force: f64,
-    /// Rows at it.
+    /// How many rows stand at it.
     pub rows: usize,
 }
 
-/// Looks for the end of the force sensor's range. A converter that clips repeats one exact value; readings of a free sensor
-/// near its smallest value scatter over several.
+/// The use of every point, and what was found on the way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Screen {
+    /// The use of each point, in the order of the points.
+    pub used: Vec<PointUse>,
+    /// The distance from a reversal within which points are excluded, as a share of the ranges of stroke and pressure.
+    pub turn_zone: f64,
+    /// Whether the recordings show the muscle slack.
+    pub goes_slack: bool,
+    /// Readings outside the scatter of the others.
+    pub outliers: Vec<Outlier>,
+    /// Points of a slack muscle that take part so that the model does not pull there; empty where there are none.
+    pub held_down: Vec<bool>,
+}
+
+impl Screen {
+    /// Excludes what can be judged without a model: sensor failures, ends of the sensor's range, unknown directions.
+    pub(super) fn without_model(
+        points: &Points,
+        clips: (Option<Clip>, Option<Clip>),
+        outliers: Vec<Outlier>,
+    ) -> Self {
+        let known: f64 = points.list.iter().filter(|p| p.direction != 0.0).map(|p| f64::from(p.rows)).sum();
+        // Where the direction is rarely known there is no friction to find, and every point takes part.
+        let drop_unknown = known > 0.5 * points.rows as f64;
+        let tolerance = 1e-9 * points.force.span();
+        let at = |clip: &Option<Clip>, value: f64| clip.is_some_and(|c| (value - c.force).abs() <= tolerance);
+        let used = points.list.iter().map(|p| {
+            if p.dropout {
+                PointUse::Dropout
+            } else if at(&clips.0, p.force_range.0) || at(&clips.1, p.force_range.1) {
+                PointUse::Clipped
+            } else if p.direction == 0.0 && drop_unknown {
+                PointUse::UnknownDirection
+            } else {
+                PointUse::Fitted
+            }
+        });
+        Self { used: used.collect(), turn_zone: 0.05, goes_slack: false, outliers, held_down: Vec::new() }
+    }
+
+    /// The same with another use of the points.
+    pub(super) fn with_use(&self, used: Vec<PointUse>) -> Self {
+        Self { used, ..self.clone() }
+    }
+}
+
+/// Finds the ends of the force sensor's range. A converter that clips repeats one exact value; the readings of a free sensor near its
+/// smallest value scatter over several.
 #[must_use]
 pub fn clip(campaign: &Campaign) -> (Option<Clip>, Option<Clip>) {
     let readings = || campaign.recordings.iter().filter_map(|r| r.force.as_deref()).flatten().copied();

@@ -1,88 +1,103 @@
-//! Where the muscle is slack: the force stays at zero, and the model must not pull there.
+//! Where the muscle is slack: its force stays at zero, and the model must not pull there.
 
-use super::prepared::Prepared;
-use super::screen::Use;
+use super::problem::Problem;
+use super::screen::{PointUse, Screen};
 use super::smoothing::Smoothing;
+use super::weights::Weights;
 
-impl Prepared {
-    /// Finds where the muscle is slack: the force stands near zero where straight curves, fitted to points that pull,
-    /// would push. Flexible curves would bend until they described slackness as elasticity.
-    pub(super) fn find_slack(&mut self) {
-        let force = self.points.force.high.max(-self.points.force.low);
-        let floor = self.clips.0.map_or(0.0, |c| c.force).max(self.points.force.low).min(0.0);
-        let near_zero = floor + (0.02 * force).max(4.0 * self.points.row_noise);
-        let candidates: Vec<bool> = self.points.list.iter().map(|p| p.force <= near_zero).collect();
-        let rows: f64 = self
-            .points
-            .list
-            .iter()
-            .zip(&candidates)
-            .filter(|(_, c)| **c)
-            .map(|(p, _)| f64::from(p.rows))
-            .sum();
-        if rows < 0.002 * self.points.rows as f64 {
-            return;
-        }
-        let fitted = self.used.clone();
-        for (used, candidate) in self.used.iter_mut().zip(&candidates) {
-            if *candidate && *used == Use::Fitted {
-                *used = Use::Slack;
+/// Finds where the muscle is slack: the force is near zero where straight curves, fitted to the points that pull, would push.
+/// Flexible curves would bend until they described slackness as elasticity.
+///
+/// Returns the screen and the parameters of the straight curves; where too few points have a force near zero, both as they were.
+pub(super) fn find(problem: &Problem, screen: &Screen, parameters: Vec<f64>) -> (Screen, Vec<f64>) {
+    let points = &problem.points;
+    let force = points.force.high.max(-points.force.low);
+    let floor = problem.clips.0.map_or(0.0, |c| c.force).max(points.force.low).min(0.0);
+    let near_zero = floor + (0.02 * force).max(4.0 * points.row_noise);
+    let candidates: Vec<bool> = points.list.iter().map(|p| p.force <= near_zero).collect();
+    let rows: f64 =
+        points.list.iter().zip(&candidates).filter(|(_, c)| **c).map(|(p, _)| f64::from(p.rows)).sum();
+    if rows < 0.002 * points.rows as f64 {
+        return (screen.clone(), parameters);
+    }
+    let exclude = |(used, candidate): (&PointUse, &bool)| {
+        if *candidate && *used == PointUse::Fitted { PointUse::Slack } else { *used }
+    };
+    let pulling = screen.with_use(screen.used.iter().zip(&candidates).map(exclude).collect());
+    let weights = Weights::of(problem, &pulling, &parameters);
+    // No trend with pressure at all: the trend of other points would be continued to where the muscle is slack.
+    let mut straight = problem.clone();
+    straight.design.level = 10.0;
+    let parameters = straight.solve(&parameters, &weights.values, Smoothing::STRAIGHT, 10);
+    let curves = problem.design.curves(&parameters);
+    let mut used = screen.used.clone();
+    let mut slack = 0.0;
+    for i in 0..used.len() {
+        let e = problem.design.evaluate(i, &parameters, &curves);
+        if candidates[i] && e.force < floor - 0.03 * force {
+            if !matches!(used[i], PointUse::Clipped | PointUse::Dropout) {
+                used[i] = PointUse::Slack;
             }
-        }
-        self.weigh();
-        // No trend with pressure at all: what slack points would say about it must not be said by others' continuation.
-        let level = std::mem::replace(&mut self.design.level, 10.0);
-        self.solve(Smoothing::STRAIGHT, 10);
-        self.design.level = level;
-        self.used = fitted;
-        let curves = self.design.curves(&self.parameters);
-        let mut slack = 0.0;
-        for i in 0..self.used.len() {
-            let e = self.design.evaluate(i, &self.parameters, &curves);
-            if candidates[i] && e.force < floor - 0.03 * force {
-                if !matches!(self.used[i], Use::Clipped | Use::Dropout) {
-                    self.used[i] = Use::Slack;
-                }
-                slack += f64::from(self.points.list[i].rows);
-            }
-        }
-        self.goes_slack = slack > 0.005 * self.points.rows as f64;
-        if !self.goes_slack {
-            self.used = self.used.iter().map(|u| if *u == Use::Slack { Use::Fitted } else { *u }).collect();
+            slack += f64::from(points.list[i].rows);
         }
     }
-
-    /// A slack muscle says that the model must not pull there: points set aside as slack come back where it would.
-    pub(super) fn hold_slack_down(&mut self) {
-        let before: Vec<Use> = self.used.clone();
-        let set_aside = |u: Use| matches!(u, Use::Slack | Use::Clipped);
-        if !before.iter().any(|u| set_aside(*u)) {
-            return;
+    let goes_slack = slack > 0.005 * points.rows as f64;
+    if !goes_slack {
+        for u in used.iter_mut().filter(|u| **u == PointUse::Slack) {
+            *u = PointUse::Fitted;
         }
-        let tolerance = (0.005 * self.points.force.span()).max(2.0 * self.points.row_noise);
-        let upper = self.clips.1.map_or(f64::INFINITY, |c| c.force);
-        for round in 0..16 {
-            let curves = self.design.curves(&self.parameters);
-            let mut changed = 0;
-            for i in 0..self.used.len() {
-                if !set_aside(before[i]) || self.points.list[i].force >= upper {
-                    continue;
-                }
-                let above = self.design.evaluate(i, &self.parameters, &curves).force
-                    > self.points.list[i].force + tolerance;
-                // Points let go may rise again, and take turns for ever: after a few rounds none is let go any more.
-                let kept = round >= 4 && self.used[i] == Use::Fitted;
-                let wanted = if above || kept { Use::Fitted } else { before[i] };
-                changed += usize::from(wanted != self.used[i]);
-                self.used[i] = wanted;
-            }
-            if changed == 0 {
-                break;
-            }
-            self.weigh();
-            self.solve(self.smoothing, 6);
-        }
-        self.held_down = self.used.iter().zip(&before).map(|(u, b)| u != b).collect();
-        // They count in the fit, not in its errors: what the sensor reads of a slack muscle is not the muscle's force.
     }
+    (Screen { goes_slack, ..screen.with_use(used) }, parameters)
+}
+
+/// The result of [`hold_down`].
+pub(super) struct HeldDown {
+    pub screen: Screen,
+    pub weights: Vec<f64>,
+    pub parameters: Vec<f64>,
+}
+
+/// Takes points of a slack muscle back into the fit where the model would pull: there the force is at most what was read.
+pub(super) fn hold_down(
+    problem: &Problem,
+    screen: &Screen,
+    weights: Vec<f64>,
+    parameters: Vec<f64>,
+    smoothing: Smoothing,
+) -> HeldDown {
+    const ROUNDS: usize = 16;
+    /// From this round on no point is excluded again: otherwise two sets of points may alternate.
+    const KEPT_FROM: usize = 4;
+    let points = &problem.points;
+    let before = &screen.used;
+    let excluded = |u: PointUse| matches!(u, PointUse::Slack | PointUse::Clipped);
+    let mut result = HeldDown { screen: screen.clone(), weights, parameters };
+    if !before.iter().any(|u| excluded(*u)) {
+        return result;
+    }
+    let tolerance = (0.005 * points.force.span()).max(2.0 * points.row_noise);
+    let upper = problem.clips.1.map_or(f64::INFINITY, |c| c.force);
+    for round in 0..ROUNDS {
+        let curves = problem.design.curves(&result.parameters);
+        let mut changed = 0;
+        for (i, used) in result.screen.used.iter_mut().enumerate() {
+            if !excluded(before[i]) || points.list[i].force >= upper {
+                continue;
+            }
+            let model = problem.design.evaluate(i, &result.parameters, &curves).force;
+            let above = model > points.list[i].force + tolerance;
+            let kept = round >= KEPT_FROM && *used == PointUse::Fitted;
+            let wanted = if above || kept { PointUse::Fitted } else { before[i] };
+            changed += usize::from(wanted != *used);
+            *used = wanted;
+        }
+        if changed == 0 {
+            break;
+        }
+        result.weights = Weights::of(problem, &result.screen, &result.parameters).values;
+        result.parameters = problem.solve(&result.parameters, &result.weights, smoothing, 6);
+    }
+    // They count in the fit, not in its errors: what the sensor reads of a slack muscle is not the muscle's force.
+    result.screen.held_down = result.screen.used.iter().zip(before).map(|(u, b)| u != b).collect();
+    result
 }

@@ -4,34 +4,34 @@
 //! every candidate weight is tried on every group without touching the points again.
 
 use super::design::Design;
-use super::linear::dot;
-use super::normal::Normal;
+use super::normal_equations::NormalEquations;
+use crate::numerics::symmetric::dot;
 
 /// Scores that differ by less than this share are alike.
 const ALIKE: f64 = 0.01;
 
-/// Weights of the penalty on bending, relative to the data.
+/// Weights of the penalty on the curvature of the curves over pressure, relative to the data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Smoothing {
-    /// On the `E_k`.
+    /// Weight on the curvature of the `E_k`.
     pub elastic: f64,
-    /// On `k_F`.
+    /// Weight on the curvature of `k_F`.
     pub friction: f64,
 }
 
 impl Smoothing {
-    /// So stiff that curves are straight lines.
-    pub const STRAIGHT: Self = Self { elastic: 1e4, friction: 1e4 };
-    /// A start that bends freely yet bridges gaps.
+    /// So stiff that the curves are straight lines.
+    pub(crate) const STRAIGHT: Self = Self { elastic: 1e4, friction: 1e4 };
+    /// A start: flexible, yet bridges gaps between pressures.
     pub const START: Self = Self { elastic: 1e-3, friction: 1e-2 };
 }
 
-/// What was tried, and what it scored: mean square error of left-out points against their weight.
+/// One tried pair of weights with its score.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Trial {
+pub(crate) struct Trial {
     /// The weights.
     pub smoothing: Smoothing,
-    /// Mean weighted square error at left-out groups.
+    /// Mean weighted square error of left-out groups.
     pub score: f64,
 }
 
@@ -41,7 +41,7 @@ pub struct Trial {
 /// The first and the last pressure are predicted by continuation, which is another matter than prediction between pressures:
 /// they count only where there are too few others.
 #[must_use]
-pub fn choose(design: &Design, parameters: &[f64], weights: &[f64]) -> (Smoothing, Vec<Trial>) {
+pub(crate) fn choose(design: &Design, parameters: &[f64], weights: &[f64]) -> (Smoothing, Vec<Trial>) {
     let groups = design.normal_by_group(parameters, weights);
     let used: Vec<usize> = (0..groups.len()).filter(|g| groups[*g].weight > 0.0).collect();
     if used.len() < 3 {
@@ -86,7 +86,7 @@ pub fn choose(design: &Design, parameters: &[f64], weights: &[f64]) -> (Smoothin
 /// Chooses how strongly `E_k` are held constant over pressure, where pressure moved through a range and the muscle was slack
 /// at part of it: there a curve without data would run away.
 #[must_use]
-pub fn choose_level(design: &mut Design, parameters: &[f64], weights: &[f64]) -> f64 {
+pub(crate) fn choose_level(design: &Design, parameters: &[f64], weights: &[f64]) -> f64 {
     let candidates = [1e-4, 1e-3, 1e-2, 1e-1, 1.0];
     let groups = design.normal_by_group(parameters, weights);
     let used: Vec<usize> = (0..groups.len()).filter(|g| groups[*g].weight > 0.0).collect();
@@ -97,6 +97,7 @@ pub fn choose_level(design: &mut Design, parameters: &[f64], weights: &[f64]) ->
     for g in &used[1..] {
         total.add_scaled(&groups[*g], 1.0);
     }
+    let mut design = design.clone();
     let scores: Vec<f64> = candidates
         .iter()
         .map(|level| {
@@ -104,7 +105,7 @@ pub fn choose_level(design: &mut Design, parameters: &[f64], weights: &[f64]) ->
             let smoothing = [1e-3, 1e-1, 10.0].map(|elastic| Smoothing { elastic, ..Smoothing::START });
             // All groups, the ends too: continuation is what this penalty is for.
             smoothing
-                .map(|s| leave_out(design, parameters, &total, &groups, &used, s))
+                .map(|s| leave_out(&design, parameters, &total, &groups, &used, s))
                 .into_iter()
                 .fold(f64::INFINITY, f64::min)
         })
@@ -117,8 +118,8 @@ pub fn choose_level(design: &mut Design, parameters: &[f64], weights: &[f64]) ->
 fn leave_out(
     design: &Design,
     parameters: &[f64],
-    total: &Normal,
-    groups: &[Normal],
+    total: &NormalEquations,
+    groups: &[NormalEquations],
     inner: &[usize],
     smoothing: Smoothing,
 ) -> f64 {
@@ -142,7 +143,7 @@ fn leave_out(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::joint::tests::known;
+    use crate::fit::gauss_newton::tests::known;
 
     #[test]
     fn the_quadratic_short_cut_is_the_refit_itself() {

@@ -1,4 +1,4 @@
-//! The figures of a fit, for people and for programs.
+//! The figures of a fit, as text and as JSON.
 
 use serde::Serialize;
 
@@ -7,60 +7,61 @@ use model_core::table::MuscleTable;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Campaign;
 
-use super::determined::{Correlations, NotDetermined, not_determined};
 use super::dimensions::Adjusted;
 use super::errors::{ChunkError, errors};
-use super::prepared::Prepared;
-use super::screen::Use;
-use super::uncertainty::{self, Uncertain};
+use super::identifiability::{Correlations, NotDetermined, not_determined};
+use super::screen::{Outlier, PointUse};
+use super::solution::Solution;
+use super::uncertainty::{Uncertain, table_root};
 
-/// The figures of a fit; its JSON form is `pam-fit/1`.
+/// The figures of a fit; its JSON form is `pam-fit/1`. Errors in percent are those of eq. 24 of the thesis: the model against the
+/// mid-line of the loop, as a share of the blocked force at that pressure.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[allow(non_snake_case)] // Units are spelled as units are.
 pub struct Summary {
-    /// `pam-fit/1`.
+    /// The name of the JSON form, `pam-fit/1`.
     pub schema: &'static str,
-    /// The muscle's name.
+    /// The name of the muscle description.
     pub muscle: String,
-    /// Rows of the recordings.
+    /// Rows of all recordings.
     pub samples: usize,
-    /// `P0`.
+    /// The deadband pressure `P0`, kPa.
     pub deadband_kPa: f64,
-    /// Standard deviation of `P0`.
+    /// Standard deviation (1 σ) of `P0`, kPa.
     pub deadband_std_kPa: f64,
-    /// Friction-free force at rest length and the highest tested pressure.
+    /// Friction-free force at rest length and the highest tested pressure, N.
     pub blocked_force_N: f64,
-    /// Root mean square of residuals of the points that take part.
+    /// Root mean square of the residuals of the rows that take part, N.
     pub rms_N: f64,
-    /// By eq. 24, over all pressures.
+    /// Mean error over all pressures, percent of blocked force.
     pub mean_error_pct: f64,
-    /// By eq. 24, over all pressures.
+    /// Largest error over all pressures, percent of blocked force.
     pub max_error_pct: f64,
-    /// Each pressure predicted from the others, eq. 24; absent where there is but one.
+    /// Mean error where each pressure is predicted from the others, percent of blocked force; absent with one pressure only.
     pub left_out_pressure_mean_error_pct: Option<f64>,
-    /// Per tested pressure.
+    /// The figures of each tested pressure.
     pub pressures: Vec<AtPressure>,
     /// The thesis's models side by side.
     pub models: Vec<ModelError>,
-    /// What became of the rows.
+    /// How many rows took part, and why others did not.
     pub rows: RowUse,
-    /// Weight of the penalty on bending of `E_k(P)` and of `k_F(P)`.
+    /// Weight of the penalty on the curvature of `E_k(P)` and of `k_F(P)`, relative to the data.
     pub smoothing: [f64; 2],
-    /// How far from a turn rows were set aside, share of the ranges of stroke and pressure.
+    /// Distance from a reversal within which rows are excluded, as a share of the ranges of stroke and pressure.
     pub turn_zone: f64,
     /// Condition number of the scaled elastic columns; absent where they are dependent.
     pub condition: Option<f64>,
-    /// How the numbers of the table at the middle pressure depend on each other.
+    /// Correlations of the table's parameters at the middle pressure.
     pub correlations: Correlations,
-    /// Numbers that the recordings leave open.
+    /// Parameters that the recordings do not determine.
     pub not_determined: Vec<NotDetermined>,
-    /// What stress that rises with strain costs, where it was asked for.
+    /// What the constraint that stress rises with strain costs, where it was requested.
     pub physical: Option<PhysicalCost>,
-    /// Readings that do not belong to the rest.
+    /// Force readings outside the scatter of the others; they are not fitted.
     pub outliers: Vec<OutlierRow>,
-    /// Dimensions and lengths that were found too.
+    /// Fitted dimensions and mounting lengths.
     pub adjusted: Vec<Adjusted>,
-    /// In words.
+    /// What the user should know, one sentence or more each.
     pub warnings: Vec<String>,
 }
 
@@ -68,89 +69,89 @@ pub struct Summary {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[allow(non_snake_case)]
 pub struct AtPressure {
-    /// The level, or the middle of an interval.
+    /// The level, or the middle of an interval of a continuous range, kPa.
     pub pressure_kPa: f64,
-    /// `E_1 …`.
+    /// The elastic moduli `E_1 … E_M`, MPa.
     pub E_MPa: Vec<f64>,
-    /// Their standard deviations.
+    /// Their standard deviations (1 σ), MPa.
     pub E_std_MPa: Vec<f64>,
-    /// Friction factor.
+    /// The friction factor `k_F`.
     pub k_F: f64,
-    /// Its standard deviation.
+    /// Its standard deviation (1 σ).
     pub k_F_std: f64,
-    /// Friction-free force at rest length.
+    /// Friction-free force at rest length, N.
     pub blocked_force_N: f64,
     /// Contraction at which the friction-free force is zero; absent where it lies beyond what the braid or the recordings
     /// reach.
     pub free_contraction: Option<f64>,
-    /// By eq. 24.
+    /// Mean error, percent of blocked force.
     pub mean_error_pct: f64,
-    /// By eq. 24.
+    /// Largest error, percent of blocked force.
     pub max_error_pct: f64,
-    /// By eq. 24, this pressure predicted from the others.
+    /// Mean error of this pressure predicted from the others, percent of blocked force.
     pub left_out_mean_error_pct: Option<f64>,
     /// Rows at this pressure.
     pub samples: usize,
 }
 
-/// One model's errors.
+/// The errors of one model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelError {
-    /// Its name.
+    /// The model's name.
     pub name: String,
-    /// By eq. 24.
+    /// Mean error, percent of blocked force.
     pub mean_error_pct: f64,
-    /// By eq. 24.
+    /// Largest error, percent of blocked force.
     pub max_error_pct: f64,
 }
 
 /// How many rows took part, and why others did not.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct RowUse {
-    /// Took part.
+    /// Rows that took part.
     pub fitted: usize,
-    /// Just after a turn.
+    /// Rows just after a reversal.
     pub near_turn: usize,
-    /// Direction of motion not known.
+    /// Rows whose direction of motion is unknown.
     pub unknown_direction: usize,
-    /// Muscle slack.
+    /// Rows where the muscle is slack.
     pub slack: usize,
-    /// Force sensor at the end of its range.
+    /// Rows with the force sensor at the end of its range.
     pub clipped: usize,
-    /// Readings that do not belong.
+    /// Rows whose force is outside the scatter of the others.
     pub outliers: usize,
-    /// The gauge alone fell out; absent where it did not.
-    #[serde(skip_serializing_if = "nothing")]
+    /// Rows where the pressure sensor failed; absent where it did not.
+    #[serde(skip_serializing_if = "is_zero")]
     pub dropouts: usize,
 }
 
-#[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
-fn nothing(count: &usize) -> bool {
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference
+fn is_zero(count: &usize) -> bool {
     *count == 0
 }
 
-/// The errors without the demand that stress rise with strain: what that demand costs is the difference.
+/// The errors of the fit without the constraint that stress rises with strain: the difference is what the constraint costs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PhysicalCost {
-    /// By eq. 24, over all pressures, stress free to fall.
+    /// Mean error without the constraint, percent of blocked force.
     pub free_mean_error_pct: f64,
-    /// By eq. 24, over all pressures, stress free to fall.
+    /// Largest error without the constraint, percent of blocked force.
     pub free_max_error_pct: f64,
 }
 
-/// One outlier, for people.
+/// A force reading outside the scatter of the others.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[allow(non_snake_case)]
 pub struct OutlierRow {
-    /// The recording.
+    /// The name of the recording.
     pub recording: String,
-    /// Row below the header, from 1.
+    /// The row below the header, from 1.
     pub row: usize,
-    /// s.
+    /// Time, s.
     pub time_s: f64,
-    /// N.
+    /// The reading, N.
     pub force_N: f64,
-    /// How far off, N.
+    /// The distance of the reading from the model, or from the other readings around it, N.
     pub off_N: f64,
 }
 
@@ -171,7 +172,7 @@ impl Summary {
 
 impl std::fmt::Display for Summary {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        // An interval of no width would claim that nothing is left open.
+        // An interval of zero width would claim certainty.
         let half = 1.96 * self.deadband_std_kPa;
         let places = (1..4).find(|p| half >= 0.5 * 10.0_f64.powi(-p)).unwrap_or(4) as usize;
         writeln!(
@@ -185,7 +186,7 @@ impl std::fmt::Display for Summary {
             self.mean_error_pct, self.max_error_pct
         )?;
         if let Some(left_out) = self.left_out_pressure_mean_error_pct {
-            write!(f, "; {left_out:.3} % mean at pressures left out")?;
+            write!(f, "; {left_out:.3} % mean with each pressure left out in turn")?;
         }
         write!(
             f,
@@ -212,7 +213,7 @@ impl std::fmt::Display for Summary {
         if let Some(free) = &self.physical {
             write!(
                 f,
-                "\nstress that rises with strain costs error: {:.3} % mean and {:.3} % at most, against {:.3} % and {:.3} % without",
+                "\nwith stress constrained to rise with strain: error {:.3} % mean and {:.3} % at most; without {:.3} % and {:.3} %",
                 self.mean_error_pct, self.max_error_pct, free.free_mean_error_pct, free.free_max_error_pct
             )?;
         }
@@ -233,111 +234,133 @@ impl std::fmt::Display for Summary {
     }
 }
 
-#[allow(clippy::too_many_arguments)] // Everything that was found flows into one summary.
+/// What a summary draws from beside the solution.
+pub(super) struct Results<'a> {
+    pub table: &'a MuscleTable,
+    pub uncertain: &'a Uncertain,
+    /// `F − F_model` of every point by the table, N.
+    pub residuals: &'a [f64],
+    pub chunks: &'a [ChunkError],
+    /// The mean error of each pressure predicted from the others, percent.
+    pub left_out: &'a [Option<f64>],
+}
+
 pub(super) fn summarise(
-    prepared: &Prepared,
-    table: &MuscleTable,
+    solution: &Solution,
     campaign: &Campaign,
     muscle: &MuscleDescription,
-    uncertain: &Uncertain,
-    residuals: &[f64],
-    chunks: &[ChunkError],
-    left_out: &[Option<f64>],
+    results: &Results<'_>,
 ) -> Summary {
+    let Results { table, uncertain, residuals, chunks, left_out } = *results;
+    let Solution { problem, screen, .. } = solution;
     let all = errors(chunks, |_| true);
-    let levels = &prepared.pressures.levels;
-    let root = uncertainty::of_table(prepared, &uncertain.root, levels);
-    let order = prepared.design.layout().order;
-    let mut rows_at = vec![0_usize; levels.len()];
-    let mut rows = RowUse::default();
-    let (mut square, mut count) = (0.0, 0.0);
-    for i in 0..prepared.points.list.len() {
-        let n = prepared.points.list[i].rows as usize;
-        rows_at[prepared.design.bins[prepared.design.rows[i].bin as usize].group as usize] += n;
-        *match prepared.used[i] {
-            Use::Fitted => &mut rows.fitted,
-            Use::NearTurn => &mut rows.near_turn,
-            Use::UnknownDirection => &mut rows.unknown_direction,
-            Use::Slack => &mut rows.slack,
-            Use::Clipped => &mut rows.clipped,
-            Use::Outlier => &mut rows.outliers,
-            Use::Dropout => &mut rows.dropouts,
-        } += n;
-        if prepared.counts(i) {
-            square += n as f64 * residuals[i] * residuals[i];
-            count += n as f64;
-        }
-    }
-    let pressures = levels
-        .iter()
-        .enumerate()
-        .map(|(i, &p)| {
-            let (moduli, friction) = prepared.curves_at(p);
-            let e = errors(chunks, |c| c.group as usize == i);
-            AtPressure {
-                pressure_kPa: p / 1e3,
-                E_MPa: moduli.iter().map(|e| e / 1e6).collect(),
-                E_std_MPa: (0..order).map(|k| root.std(1 + k * levels.len() + i) / 1e6).collect(),
-                k_F: friction,
-                k_F_std: root.std(1 + order * levels.len() + i),
-                blocked_force_N: prepared.blocked(p),
-                free_contraction: free_contraction(prepared, p),
-                mean_error_pct: e.mean,
-                max_error_pct: e.max,
-                left_out_mean_error_pct: left_out.get(i).copied().flatten(),
-                samples: rows_at[i],
-            }
-        })
-        .collect();
+    let levels = &problem.pressures.levels;
     let known: Vec<f64> = left_out.iter().copied().flatten().collect();
-    let outliers = prepared
-        .outliers
-        .iter()
-        .map(|o| {
-            let recording = &campaign.recordings[o.recording as usize];
-            let row = recording.rows.as_ref().map_or(o.row as usize, |r| r[o.row as usize] as usize);
-            OutlierRow {
-                recording: recording.name.clone(),
-                row: row + 1,
-                time_s: o.time,
-                force_N: o.force,
-                off_N: o.off,
-            }
-        })
-        .collect();
+    let pressures = at_levels(solution, results);
+    let deadband_std = table_root(solution, &uncertain.root, levels).std(0);
     Summary {
         schema: "pam-fit/1",
         muscle: muscle.name.clone(),
-        samples: prepared.points.rows,
-        deadband_kPa: prepared.deadband() / 1e3,
-        deadband_std_kPa: root.std(0) / 1e3,
+        samples: problem.points.rows,
+        deadband_kPa: solution.deadband() / 1e3,
+        deadband_std_kPa: deadband_std / 1e3,
         blocked_force_N: f64::from(table.blocked_force.newtons()),
-        rms_N: (square / f64::max(count, 1.0)).sqrt(),
+        rms_N: rms(solution, residuals),
         mean_error_pct: all.mean,
         max_error_pct: all.max,
         left_out_pressure_mean_error_pct: (!known.is_empty())
             .then(|| known.iter().sum::<f64>() / known.len() as f64),
         pressures,
         models: vec![ModelError { name: "table".into(), mean_error_pct: all.mean, max_error_pct: all.max }],
-        rows,
-        smoothing: [prepared.smoothing.elastic, prepared.smoothing.friction],
-        turn_zone: prepared.turn_zone,
-        condition: Some(prepared.design.orthonormal.condition).filter(|c| c.is_finite()),
-        correlations: Correlations::at(prepared, &uncertain.root, levels[levels.len() / 2]),
-        not_determined: not_determined(prepared, &uncertain.root),
+        rows: row_use(solution),
+        smoothing: [solution.smoothing.elastic, solution.smoothing.friction],
+        turn_zone: screen.turn_zone,
+        condition: Some(problem.design.orthonormal.condition).filter(|c| c.is_finite()),
+        correlations: Correlations::at(solution, &uncertain.root, levels[levels.len() / 2]),
+        not_determined: not_determined(solution, &uncertain.root),
         physical: None,
-        outliers,
-        adjusted: prepared.adjusted.clone(),
-        warnings: super::warnings::warnings(prepared, all.mean, left_out),
+        outliers: screen.outliers.iter().map(|o| outlier_row(o, campaign)).collect(),
+        adjusted: problem.adjusted.clone(),
+        warnings: super::warnings::warnings(solution, all.mean, left_out),
     }
 }
 
-/// The contraction at which the friction-free force vanishes, looked for up to a little beyond the tested range: further
-/// out a polynomial says nothing.
-fn free_contraction(prepared: &Prepared, pressure: f64) -> Option<f64> {
-    let l0 = prepared.braid.rest_length();
-    let end = (1.3 * prepared.points.stroke.high / l0).min(prepared.braid.neutral_contraction());
-    let force = |c: f64| prepared.quasi(pressure, c * l0);
+/// The figures of every tested pressure.
+fn at_levels(solution: &Solution, results: &Results<'_>) -> Vec<AtPressure> {
+    let problem = &solution.problem;
+    let levels = &problem.pressures.levels;
+    let root = table_root(solution, &results.uncertain.root, levels);
+    let order = problem.design.layout().order;
+    let mut rows = vec![0_usize; levels.len()];
+    for (i, p) in problem.points.list.iter().enumerate() {
+        rows[problem.group_of(i)] += p.rows as usize;
+    }
+    let at = |(i, &p): (usize, &f64)| {
+        let (moduli, friction) = solution.curves_at(p);
+        let e = errors(results.chunks, |c| c.group as usize == i);
+        AtPressure {
+            pressure_kPa: p / 1e3,
+            E_MPa: moduli.iter().map(|e| e / 1e6).collect(),
+            E_std_MPa: (0..order).map(|k| root.std(1 + k * levels.len() + i) / 1e6).collect(),
+            k_F: friction,
+            k_F_std: root.std(1 + order * levels.len() + i),
+            blocked_force_N: solution.blocked(p),
+            free_contraction: free_contraction(solution, p),
+            mean_error_pct: e.mean,
+            max_error_pct: e.max,
+            left_out_mean_error_pct: results.left_out.get(i).copied().flatten(),
+            samples: rows[i],
+        }
+    };
+    levels.iter().enumerate().map(at).collect()
+}
+
+fn row_use(solution: &Solution) -> RowUse {
+    let mut rows = RowUse::default();
+    for (p, used) in solution.problem.points.list.iter().zip(&solution.screen.used) {
+        *match used {
+            PointUse::Fitted => &mut rows.fitted,
+            PointUse::NearReversal => &mut rows.near_turn,
+            PointUse::UnknownDirection => &mut rows.unknown_direction,
+            PointUse::Slack => &mut rows.slack,
+            PointUse::Clipped => &mut rows.clipped,
+            PointUse::Outlier => &mut rows.outliers,
+            PointUse::Dropout => &mut rows.dropouts,
+        } += p.rows as usize;
+    }
+    rows
+}
+
+/// Root mean square of the residuals of all rows that count, N.
+fn rms(solution: &Solution, residuals: &[f64]) -> f64 {
+    let (mut square, mut count) = (0.0, 0.0);
+    for (i, p) in solution.problem.points.list.iter().enumerate().filter(|(i, _)| solution.counts(*i)) {
+        let n = f64::from(p.rows);
+        square += n * residuals[i] * residuals[i];
+        count += n;
+    }
+    (square / f64::max(count, 1.0)).sqrt()
+}
+
+fn outlier_row(o: &Outlier, campaign: &Campaign) -> OutlierRow {
+    let recording = &campaign.recordings[o.recording as usize];
+    let row = recording.rows.as_ref().map_or(o.row as usize, |r| r[o.row as usize] as usize);
+    OutlierRow {
+        recording: recording.name.clone(),
+        row: row + 1,
+        time_s: o.time,
+        force_N: o.force,
+        off_N: o.off,
+    }
+}
+
+/// The contraction at which the friction-free force is zero, searched for up to 1.3 times the tested range: an extrapolated polynomial
+/// means nothing further out.
+fn free_contraction(solution: &Solution, pressure: f64) -> Option<f64> {
+    let l0 = solution.problem.braid.rest_length();
+    let end =
+        (1.3 * solution.problem.points.stroke.high / l0).min(solution.problem.braid.neutral_contraction());
+    let force = |c: f64| solution.quasi(pressure, c * l0);
     if !(force(0.0) > 0.0 && end > 0.0) {
         return None;
     }

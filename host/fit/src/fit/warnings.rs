@@ -1,249 +1,246 @@
-//! What a user should know about a fit, in words: what was seen, what it means, what to do.
+//! Warnings about a fit: what was seen, what it means, what to do.
 
-use super::prepared::Prepared;
-use super::screen::Use;
+use super::screen::PointUse;
+use super::solution::Solution;
+use super::weights::scatter;
 
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 
-/// A mean error beyond this, percent, is no misfit of a muscle: something else is wrong.
+/// Above this mean error, percent of blocked force, a wrong unit, sign or dimension is more likely than physics that the model lacks.
 const NO_MUSCLE: f64 = 10.0;
 
-/// A force that goes so many times further below zero than above has the wrong sign.
+/// A force whose range below zero is this many times that above has the wrong sign.
 const WRONG_SIGN: f64 = 3.0;
-/// One standard atmosphere, Pa: a gauge of absolute pressure never reads much less.
+/// One standard atmosphere, Pa: an absolute pressure sensor never reads much less.
 const ATMOSPHERE: f64 = 101_325.0;
 
-/// Everything worth saying. `mean_error` is that of all mid-lines by eq. 24, `left_out` the error of each pressure predicted from the
-/// others; both in percent.
+/// All warnings. `mean_error` is that of all mid-lines by eq. 24, `left_out` the error of each pressure predicted from the others; both
+/// in percent of blocked force.
 #[must_use]
-pub fn warnings(prepared: &Prepared, mean_error: f64, left_out: &[Option<f64>]) -> Vec<String> {
-    let mut out = prepared.warnings.clone();
-    agreement(prepared, mean_error, &mut out);
-    amount(prepared, &mut out);
-    lengths(prepared, &mut out);
-    friction(prepared, &mut out);
-    deadband(prepared, &mut out);
-    set_aside(prepared, &mut out);
-    dimensions(prepared, &mut out);
-    turns(prepared, &mut out);
+pub(super) fn warnings(solution: &Solution, mean_error: f64, left_out: &[Option<f64>]) -> Vec<String> {
+    let mut out = solution.warnings.clone();
+    agreement(solution, mean_error, &mut out);
+    amount(solution, &mut out);
+    lengths(solution, &mut out);
+    friction(solution, &mut out);
+    deadband(solution, &mut out);
+    excluded(solution, &mut out);
+    dimensions(solution, &mut out);
+    reversals(solution, &mut out);
     between_pressures(left_out, &mut out);
     out
 }
 
-/// Rows that were used so.
-fn rows(prepared: &Prepared, wanted: Use) -> usize {
-    let used = prepared.points.list.iter().zip(&prepared.used);
+/// How many rows have this use.
+fn rows(solution: &Solution, wanted: PointUse) -> usize {
+    let used = solution.problem.points.list.iter().zip(&solution.screen.used);
     used.filter(|(_, u)| **u == wanted).map(|(p, _)| p.rows as usize).sum()
 }
 
-/// Whether this is a muscle at all.
-fn agreement(prepared: &Prepared, mean_error: f64, out: &mut Vec<String>) {
-    let force = &prepared.points.force;
+/// Whether sign, units and dimensions can be right.
+fn agreement(solution: &Solution, mean_error: f64, out: &mut Vec<String>) {
+    let force = &solution.problem.points.force;
     if -force.low > WRONG_SIGN * force.high {
         out.push(format!(
-            "the force goes down to {:.1} N and up to {:.1} N only: it is positive as the muscle pulls; turn its sign round, with \
-             scale = -1 in an import description",
+            "the force ranges from {:.1} N to {:.1} N: force is positive as the muscle pulls; invert its sign with scale = -1 in an \
+             import description",
             force.low,
             force.high.max(0.0)
         ));
     }
     if mean_error > NO_MUSCLE {
         out.push(format!(
-            "the table does not describe these recordings: it is off by {mean_error:.0} % of the blocked force on average; check the \
-             units of force and pressure, the sign of the displacement, and the muscle's dimensions"
+            "the table does not describe these recordings: its mean error is {mean_error:.0} % of the blocked force; check the units of \
+             force and pressure, the sign of the displacement, and the muscle's dimensions"
         ));
     }
 }
 
-/// How many rows and pressures there are.
-fn amount(prepared: &Prepared, out: &mut Vec<String>) {
-    let fitted = rows(prepared, Use::Fitted);
-    let unknowns = prepared.design.layout().len();
-    if prepared.points.rows < 200 || fitted < 5 * unknowns {
+/// Whether there are enough rows and pressures.
+fn amount(solution: &Solution, out: &mut Vec<String>) {
+    let fitted = rows(solution, PointUse::Fitted);
+    let unknowns = solution.problem.design.layout().len();
+    if solution.problem.points.rows < 200 || fitted < 5 * unknowns {
         out.push(format!(
-            "{fitted} rows are fitted for {unknowns} unknowns: the penalty on bending decides much of the table; record more"
+            "{fitted} rows for {unknowns} unknowns: smoothing determines much of the table; record more rows"
         ));
     }
-    match prepared.pressures.levels.len() {
+    match solution.problem.pressures.levels.len() {
         1 => out.push(format!(
-            "only one pressure ({:.0} kPa) was tested: how anything changes with pressure is not known, and the table holds \
-             at this pressure only",
-            prepared.pressures.levels[0] / 1e3
+            "only one pressure ({:.0} kPa) was tested: the table holds at this pressure only; test more pressures",
+            solution.problem.pressures.levels[0] / 1e3
         )),
-        2 => out.push("only two pressures were tested: curves over pressure are straight lines between them".into()),
+        2 => out.push("only two pressures were tested: the curves over pressure are straight lines between them; test more pressures".into()),
         _ => {}
     }
 }
 
-/// Which lengths there are, and what they determine of the elasticity.
-fn lengths(prepared: &Prepared, out: &mut Vec<String>) {
-    let (design, points) = (&prepared.design, &prepared.points);
-    let l0 = prepared.braid.rest_length();
+/// What the recorded lengths determine of the elasticity.
+fn lengths(solution: &Solution, out: &mut Vec<String>) {
+    let (design, points) = (&solution.problem.design, &solution.problem.points);
+    let l0 = solution.problem.braid.rest_length();
     let (low, high) = (points.stroke.low / l0, points.stroke.high / l0);
     let order = design.orthonormal.order;
     let one_length = design.orthonormal.rank <= 1;
     if design.orthonormal.rank == 0 {
         out.push(
-            "every row is at rest length: nothing is known of the bladder's elasticity, the E_k are set to zero and the table holds at \
-             this length only; record slow strokes"
+            "every row is at rest length: the bladder's elasticity is not identifiable, the E_k are set to zero, and the table holds at this \
+             length only; record slow strokes"
                 .into(),
         );
     } else if one_length {
         out.push(format!(
-            "every row is at one length (contraction {low:.4}): P0 and elasticity cannot be told apart there, neither is determined \
-             though an interval is given, and the table holds at this length only; record slow strokes"
+            "every row is at one length (contraction {low:.4}): P0 and elasticity cannot be separated, their intervals do not include this, \
+             and the table holds at this length only; record slow strokes"
         ));
     } else if high - low < 0.01 {
         out.push(format!(
-            "contraction covers only {low:.4} to {high:.4}: the elastic coefficients are hardly determined; record a longer stroke"
+            "contraction covers only {low:.4} to {high:.4}: the elastic coefficients are poorly determined; record a longer stroke"
         ));
     }
     if low > 0.01 && !one_length {
         out.push(format!(
-            "the recordings begin at a contraction of {low:.3}: P0 rests on elasticity continued to rest length; record the \
-             blocked force too"
+            "the recordings begin at a contraction of {low:.3}: P0 is an extrapolation to rest length; record the blocked force too"
         ));
     }
     if (2..order).contains(&design.orthonormal.rank) {
         out.push(format!(
-            "the strokes determine only {} of the {order} elastic coefficients (too few different lengths); higher ones are set \
-             to zero",
+            "the recorded lengths determine only {} of the {order} elastic coefficients; higher ones are set to zero; record more lengths",
             design.orthonormal.rank
         ));
     } else if design.orthonormal.rank == order && design.orthonormal.condition > 1e5 {
         out.push(format!(
-            "the elastic columns have a condition number of {:.0}: single E_k mean little by themselves, only their sum does; a \
-             lower order or a longer stroke would help",
+            "the elastic columns have a condition number of {:.0}: single E_k are poorly determined, only their sum is well determined; \
+             use a lower order or record a longer stroke",
             design.orthonormal.condition
         ));
     }
 }
 
-/// Whether there is friction, and whether it may be what it is.
-fn friction(prepared: &Prepared, out: &mut Vec<String>) {
-    let (design, points) = (&prepared.design, &prepared.points);
+/// Whether friction is identifiable and has a possible sign.
+fn friction(solution: &Solution, out: &mut Vec<String>) {
+    let (design, points) = (&solution.problem.design, &solution.problem.points);
     if !design.friction {
         let known = points.list.iter().any(|p| p.direction != 0.0);
         out.push(if known {
-            "motion in one direction only: friction cannot be told from elasticity, k_F is set to zero, P0 and the E_k hold friction \
-             too, and the table holds for that direction"
+            "motion in one direction only: friction and elasticity cannot be separated, k_F is set to zero, P0 and the E_k include friction, \
+             and the table holds for that direction; record both directions"
                 .into()
         } else {
-            "no direction of motion was found: k_F is set to zero".into()
+            "no motion was found: friction is not identifiable and k_F is set to zero".into()
         });
     } else {
-        let levels = &prepared.pressures.levels;
-        let factors: Vec<f64> = levels.iter().map(|p| prepared.curves_at(*p).1).collect();
-        let scatter = prepared.scatter(&design.residuals(&prepared.parameters));
+        let levels = &solution.problem.pressures.levels;
+        let factors: Vec<f64> = levels.iter().map(|p| solution.curves_at(*p).1).collect();
+        let scatter = scatter(&solution.problem, &solution.screen, &design.residuals(&solution.parameters));
         let noise = scatter.iter().copied().fold(0.0, f64::max);
         let largest =
-            levels.iter().zip(&factors).map(|(p, k)| (k * prepared.blocked(*p)).abs()).fold(0.0, f64::max);
+            levels.iter().zip(&factors).map(|(p, k)| (k * solution.blocked(*p)).abs()).fold(0.0, f64::max);
         if largest < 0.5 * noise {
-            out.push("there is no hysteresis above the noise: k_F is zero within its error".into());
+            out.push("no hysteresis above the noise: k_F is zero within its uncertainty".into());
         }
         if let Some((p, k)) = levels.iter().zip(&factors).find(|(_, k)| **k < -0.01) {
             out.push(format!(
-                "k_F is {k:.3} at {:.0} kPa: friction that drives is impossible; check the sign of the displacement, and \
-                 whether force and displacement are in step",
+                "k_F is {k:.3} at {:.0} kPa: negative friction is impossible; check the sign of the displacement, and whether force and \
+                 displacement are synchronous",
                 p / 1e3
             ));
         }
     }
 }
 
-/// Where the deadband cannot be what it is.
-fn deadband(prepared: &Prepared, out: &mut Vec<String>) {
-    let points = &prepared.points;
-    let p0 = prepared.deadband();
+/// Whether the deadband pressure is possible.
+fn deadband(solution: &Solution, out: &mut Vec<String>) {
+    let points = &solution.problem.points;
+    let p0 = solution.deadband();
     if p0 < 0.0 {
         out.push(format!(
-            "the deadband comes out at {:.0} kPa, below zero: the nominal geometry (braid angle, diameter, rest length) does not \
-             fit the blocked force; try --fit-geometry",
+            "the deadband P0 is {:.0} kPa, below zero: the nominal geometry (braid angle, diameter, rest length) does not match the blocked \
+             force; try --fit-geometry",
             p0 / 1e3
         ));
-    } else if prepared.pressures.levels.iter().all(|p| *p < p0) {
+    } else if solution.problem.pressures.levels.iter().all(|p| *p < p0) {
         out.push(format!(
-            "the deadband comes out at {:.0} kPa, above every tested pressure: the muscle would never pull; check the unit and the \
-             sign of the force",
+            "the deadband P0 is {:.0} kPa, above every tested pressure: the muscle would never pull; check the unit and the sign of the \
+             force",
             p0 / 1e3
         ));
     } else if p0 > ATMOSPHERE && points.pressure.low > 0.9 * ATMOSPHERE {
         out.push(format!(
-            "the deadband comes out at {:.0} kPa and no pressure below {:.0} kPa was read: if the gauge reads absolute pressure, take \
-             one atmosphere off (101.3 kPa), with an offset in an import description",
+            "the deadband P0 is {:.0} kPa and the lowest pressure is {:.0} kPa: if the sensor reads absolute pressure, subtract one atmosphere \
+             (101.3 kPa) with an offset in an import description",
             p0 / 1e3,
             points.pressure.low / 1e3
         ));
     }
 }
 
-/// What was not fitted: the ends of the force sensor, a slack muscle, odd readings.
-fn set_aside(prepared: &Prepared, out: &mut Vec<String>) {
+/// Which rows are excluded: saturated force readings, a slack muscle, outliers.
+fn excluded(solution: &Solution, out: &mut Vec<String>) {
     let side = |name: &str, clip: &super::screen::Clip| {
         format!(
-            "left out of the fit: {} of exactly {:.2} N, where the force sensor stands at the {name} end of its range",
-            counted(clip.rows, "row"),
+            "excluded: {} of exactly {:.2} N, where the force sensor is at the {name} end of its range",
+            pluralise(clip.rows, "row"),
             clip.force
         )
     };
-    out.extend(prepared.clips.0.iter().map(|c| side("lower", c)));
-    out.extend(prepared.clips.1.iter().map(|c| side("upper", c)));
-    let slack = rows(prepared, Use::Slack);
+    out.extend(solution.problem.clips.0.iter().map(|c| side("lower", c)));
+    out.extend(solution.problem.clips.1.iter().map(|c| side("upper", c)));
+    let slack = rows(solution, PointUse::Slack);
     if slack > 0 {
         out.push(format!(
-            "the muscle is slack in {}: the force stays near zero where the model would push; this is not fitted, and the \
-             table stops at zero force",
-            counted(slack, "row")
+            "excluded: {} where the muscle is slack (force near zero where the model would push); the table's force ends at zero there",
+            pluralise(slack, "row")
         ));
     }
-    if !prepared.outliers.is_empty() {
+    if !solution.screen.outliers.is_empty() {
         out.push(format!(
-            "{} of the force out of line with the rest and not fitted, listed under `outliers`",
-            counted(prepared.outliers.len(), "reading")
+            "excluded: {} of the force outside the scatter of the others, listed under `outliers`",
+            pluralise(solution.screen.outliers.len(), "reading")
         ));
     }
 }
 
-/// Effective dimensions that were found at their bounds, or hardly.
-fn dimensions(prepared: &Prepared, out: &mut Vec<String>) {
-    for a in prepared.adjusted.iter().filter(|a| a.at_bound) {
+/// Effective dimensions at their bounds, or poorly determined.
+fn dimensions(solution: &Solution, out: &mut Vec<String>) {
+    for a in solution.problem.adjusted.iter().filter(|a| a.at_bound) {
         out.push(format!(
-            "{} stopped at its bound of {:.2} {}: either it was measured wrongly by more than is plausible, or it stands in for \
-             something else that the model lacks",
+            "{} is at its bound of {:.2} {}: either its measurement is wrong by more than is plausible, or it compensates for physics that \
+             the model lacks",
             a.name, a.value, a.unit
         ));
     }
     let undetermined: Vec<&str> =
-        prepared.adjusted.iter().filter(|a| a.determined < 0.5).map(|a| a.name.as_str()).collect();
+        solution.problem.adjusted.iter().filter(|a| a.determined < 0.5).map(|a| a.name.as_str()).collect();
     if !undetermined.is_empty() {
         out.push(format!(
-            "the recordings hardly determine {}: the value is mostly the described one",
+            "the recordings poorly determine {}: the value is mostly that of the muscle description",
             undetermined.join(", ")
         ));
     }
 }
 
-/// How much lies just after turns.
-fn turns(prepared: &Prepared, out: &mut Vec<String>) {
-    let points = &prepared.points;
-    let aside = rows(prepared, Use::NearTurn) as f64;
+/// Whether many rows are near reversals.
+fn reversals(solution: &Solution, out: &mut Vec<String>) {
+    let points = &solution.problem.points;
+    let aside = rows(solution, PointUse::NearReversal) as f64;
     if aside > 0.3 * points.rows as f64 {
         out.push(format!(
-            "{:.0} % of the rows lie just after a turn of motion and are not fitted: strokes are short against the way that \
-             friction needs to turn round",
+            "excluded: {:.0} % of the rows, just after reversals: strokes are short against the distance over which friction changes sign; \
+             record longer strokes",
             100.0 * aside / points.rows as f64
         ));
     }
 }
 
-/// How well pressures between those that were tested are known.
+/// How well the table interpolates between the tested pressures.
 fn between_pressures(left_out: &[Option<f64>], out: &mut Vec<String>) {
     let errors: Vec<f64> = left_out.iter().copied().flatten().collect();
     if let Some(worst) = errors.iter().copied().reduce(f64::max)
         && worst > 5.0
     {
         out.push(format!(
-            "a pressure predicted from the others is off by {worst:.1} % of blocked force: test more pressures between"
+            "a pressure predicted from the others has an error of {worst:.1} % of blocked force: test more pressures"
         ));
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::{Axis, Colour, Figure, Mark, Panel, Section, figures, wording};
 use pam_diagnose::verdict::{Diagnosis, Profile};
-use pam_fit::fit::points::median;
+use pam_fit::numerics::median;
 
 /// A coordinate's name and numbers as an engineer reads them.
 fn shown(profile: &Profile) -> (String, &'static str, f64, f64) {

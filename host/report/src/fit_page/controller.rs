@@ -19,7 +19,7 @@ pub(super) fn section(view: &View<'_>) -> Section {
          model. The valve's error is not included.",
         figures(worst, 2),
         figures(100.0 * worst / blocked.max(f64::MIN_POSITIVE), 2),
-        figures(pam_fit::band::HALF_95 * view.fit.summary.rms_N, 2)
+        figures(pam_fit::confidence_band::HALF_95 * view.fit.summary.rms_N, 2)
     ));
     section.figure(pressure_for_force(view, &places));
     section.figure(error_of_force(view, &places));
@@ -35,15 +35,15 @@ struct Place {
 
 impl Place {
     fn new(view: &View<'_>, share: f64) -> Self {
-        let prepared = &view.fit.prepared;
-        let (stroke, pressure) = (prepared.points.stroke, prepared.points.pressure);
+        let solution = &view.fit.solution;
+        let (stroke, pressure) = (solution.problem.points.stroke, solution.problem.points.pressure);
         let x = (stroke.low + share * stroke.span()).max(0.0);
-        let ways: &[(f64, &'static str)] = if prepared.design.friction {
+        let ways: &[(f64, &'static str)] = if solution.problem.design.friction {
             &[(1.0, "shortening"), (-1.0, "lengthening")]
         } else {
             &[(0.0, "mid-line")]
         };
-        let low = pressure.low.max(prepared.deadband());
+        let low = pressure.low.max(solution.deadband());
         let at: Vec<f64> =
             (0..STEPS).map(|i| low + (pressure.high - low) * i as f64 / (STEPS - 1) as f64).collect();
         let branches = ways.iter().map(|(direction, name)| {
@@ -78,7 +78,7 @@ fn pressure_for_force(view: &View<'_>, places: &[Place]) -> Figure {
         }
         panel
     });
-    let note = if view.fit.prepared.design.friction {
+    let note = if view.fit.solution.problem.design.friction {
         "Friction gives two pressures for one force: one while shortening, one while lengthening."
     } else {
         "No friction was found: each force has one pressure."

@@ -2,8 +2,8 @@
 
 use super::super::{Axis, Colour, Figure, Panel, Section, figures, fixed};
 use super::view::{Banded, View};
-use pam_fit::band::HALF_95;
-use pam_fit::fit::uncertainty;
+use pam_fit::confidence_band::HALF_95;
+use pam_fit::table_root;
 
 /// Places along the pressure axis.
 const PLACES: usize = 90;
@@ -16,9 +16,9 @@ pub(super) fn section(view: &View<'_>) -> Section {
 }
 
 fn over_pressure(view: &View<'_>) -> Figure {
-    let prepared = &view.fit.prepared;
-    let nodes = &prepared.pressures.nodes;
-    let range = prepared.points.pressure;
+    let solution = &view.fit.solution;
+    let nodes = &solution.problem.pressures.nodes;
+    let range = solution.problem.points.pressure;
     let (low, high) = (
         nodes.first().copied().unwrap_or(range.low).min(range.low).max(0.0),
         nodes.last().copied().unwrap_or(range.high).max(range.high),
@@ -26,10 +26,10 @@ fn over_pressure(view: &View<'_>) -> Figure {
     let at: Vec<f64> = (0..PLACES).map(|i| low + (high - low) * i as f64 / (PLACES - 1) as f64).collect();
     let kpa: Vec<f64> = at.iter().map(|p| p / 1e3).collect();
     let node_kpa: Vec<f64> = nodes.iter().map(|p| p / 1e3).collect();
-    let root = uncertainty::of_table(prepared, &view.fit.uncertain.root, &at);
-    let order = prepared.design.layout().order;
-    let curves: Vec<(Vec<f64>, f64)> = at.iter().map(|p| prepared.curves_at(*p)).collect();
-    let at_nodes: Vec<(Vec<f64>, f64)> = nodes.iter().map(|p| prepared.curves_at(*p)).collect();
+    let root = table_root(solution, &view.fit.uncertain.root, &at);
+    let order = solution.problem.design.layout().order;
+    let curves: Vec<(Vec<f64>, f64)> = at.iter().map(|p| solution.curves_at(*p)).collect();
+    let at_nodes: Vec<(Vec<f64>, f64)> = nodes.iter().map(|p| solution.curves_at(*p)).collect();
     let axis = || Axis::new("pressure P", "kPa");
     type Take<'a> = &'a dyn Fn(&(Vec<f64>, f64)) -> f64;
     let curve = |y: Axis, k: usize, scale: f64, take: Take<'_>| {
@@ -50,7 +50,7 @@ fn over_pressure(view: &View<'_>) -> Figure {
             curve(Axis::new(label.clone(), "MPa"), k, 1e-6, &|c| c.0[k]).titled(label)
         })
         .collect();
-    if prepared.design.friction {
+    if solution.problem.design.friction {
         panels.push(
             curve(Axis::new("k_{F}", "").from_zero(), order, 1.0, &|c| c.1).titled("Friction factor k_{F}"),
         );
@@ -81,7 +81,7 @@ fn density(view: &View<'_>, low: f64, high: f64) -> Panel {
 }
 
 fn stress(view: &View<'_>) -> Figure {
-    let prepared = &view.fit.prepared;
+    let solution = &view.fit.solution;
     let mut axial =
         Panel::new(Axis::new("axial strain ε_{z}", "%"), Axis::new("stress Σ E_{k} ε_{z}^{k}", "MPa"))
             .titled("Along the muscle");
@@ -89,10 +89,10 @@ fn stress(view: &View<'_>) -> Figure {
         Panel::new(Axis::new("radial strain ε_{x}", "%"), Axis::new("stress Σ E_{k} ε_{x}^{k}", "MPa"))
             .titled("Around the muscle");
     let mut falls = Vec::new();
-    let order = prepared.design.layout().order;
+    let order = solution.problem.design.layout().order;
     for group in 0..view.levels.len() {
-        let (moduli, _) = prepared.curves_at(view.levels[group]);
-        let root = uncertainty::of_table(prepared, &view.fit.uncertain.root, &view.levels[group..=group]);
+        let (moduli, _) = solution.curves_at(view.levels[group]);
+        let root = table_root(solution, &view.fit.uncertain.root, &view.levels[group..=group]);
         let half = |strain: f64| {
             let mut gradient = vec![0.0; root.rows];
             for (k, g) in gradient[1..=order].iter_mut().enumerate() {
@@ -104,7 +104,7 @@ fn stress(view: &View<'_>) -> Figure {
         let postures: Vec<_> = view
             .strokes(group, 60)
             .into_iter()
-            .map(|x| prepared.braid.posture(model_core::units::Length::from_metres(x)))
+            .map(|x| solution.problem.braid.posture(model_core::units::Length::from_metres(x)))
             .collect();
         let line = |strain: &dyn Fn(&model_core::braid::Posture<f64>) -> f64| -> (Vec<f64>, Banded) {
             let at = postures.iter().map(strain);

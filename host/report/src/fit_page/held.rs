@@ -75,7 +75,7 @@ pub(super) fn load_lines(view: &View<'_>) -> Figure {
 
 /// One panel per length: both directions of the table.
 pub(super) fn branches(view: &View<'_>) -> Figure {
-    let friction = view.fit.prepared.design.friction;
+    let friction = view.fit.solution.problem.design.friction;
     let panels = shown(view).into_iter().map(|length| {
         let of = view.points().iter().filter(|p| view.length_of(p.stroke) == length);
         let (x, y): (Vec<f64>, Vec<f64>) = of.map(|p| (p.pressure / 1e3, p.force)).unzip();

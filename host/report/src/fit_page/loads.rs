@@ -3,8 +3,8 @@
 use super::super::{Axis, Colour, Figure, Mark, Panel, Section, fixed};
 use super::held;
 use super::view::{Banded, View};
-use pam_data::counted::counted;
-use pam_fit::fit::basis::columns;
+use pam_data::pluralise::pluralise;
+use pam_fit::columns;
 
 /// At most this many small panels: more cannot be compared by eye.
 pub(super) const PANELS: usize = 9;
@@ -35,13 +35,13 @@ fn load_lines(view: &View<'_>) -> Figure {
         let (x, y): (Vec<f64>, Vec<f64>) = broken(points.iter().enumerate().map(|(i, p)| {
             (view.group(i) == group).then(|| (view.contraction(p.stroke), p.force, p.recording))
         }));
-        panel = if view.fit.prepared.pressures.held {
+        panel = if view.fit.solution.problem.pressures.held {
             panel.hair(view.name(group), view.colour(group), &x, &y)
         } else {
             panel.points(view.name(group), view.colour(group), &x, &y)
         };
     }
-    for group in (0..view.levels.len()).filter(|_| view.fit.prepared.pressures.held) {
+    for group in (0..view.levels.len()).filter(|_| view.fit.solution.problem.pressures.held) {
         let mid = view.fit.midline.iter().filter(|m| m.group as usize == group);
         let (x, y): (Vec<f64>, Vec<f64>) = mid.map(|m| (100.0 * m.contraction, m.force)).unzip();
         panel = panel.dashes(if group == 0 { "mid-line F_{AVG}" } else { "" }, Colour::Ink, &x, &y);
@@ -77,7 +77,7 @@ pub(super) fn broken(points: impl Iterator<Item = Option<(f64, f64, u32)>>) -> (
 }
 
 fn loops(view: &View<'_>) -> Figure {
-    let friction = view.fit.prepared.design.friction;
+    let friction = view.fit.solution.problem.design.friction;
     let panels = view.some(PANELS).into_iter().map(|group| {
         let mut of: Vec<usize> = (0..view.points().len()).filter(|i| view.group(*i) == group).collect();
         // Few enough to stay dots, so that one sees them on both sides of the line.
@@ -111,7 +111,7 @@ fn loops(view: &View<'_>) -> Figure {
     let more = view.levels.len().saturating_sub(PANELS);
     let left = match more {
         0 => String::new(),
-        n => format!(" Not shown: {} between them.", counted(n, "pressure")),
+        n => format!(" Not shown: {} between them.", pluralise(n, "pressure")),
     };
     Figure::multiples(
         "loops",
@@ -249,7 +249,7 @@ fn ends(view: &View<'_>) -> Figure {
 
 fn deadband(view: &View<'_>) -> Figure {
     let s = &view.fit.summary;
-    let area = columns(&view.fit.prepared.braid, 0.0).area;
+    let area = columns(&view.fit.solution.problem.braid, 0.0).area;
     let (p0, half) = (s.deadband_kPa, 1.96 * s.deadband_std_kPa);
     let top = view.levels.last().map_or(1.0, |p| p / 1e3);
     let (x, y): (Vec<f64>, Vec<f64>) = if view.held_length() {

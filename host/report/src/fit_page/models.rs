@@ -82,7 +82,7 @@ fn each(view: &View<'_>) -> Figure {
         groups.iter().fold(panel, |panel, group| {
             let of: Vec<usize> = shown.iter().copied().filter(|i| mid[*i].group as usize == *group).collect();
             let (x, y) = (at(&of, &contraction), at(&of, &force));
-            if view.fit.prepared.pressures.held {
+            if view.fit.solution.problem.pressures.held {
                 panel.line(view.name(*group), view.colour(*group), &x, &y)
             } else {
                 panel.points(view.name(*group), view.colour(*group), &x, &y)
@@ -151,7 +151,7 @@ fn error_lines(view: &View<'_>) -> Figure {
             .collect();
         of.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (x, y): (Vec<f64>, Vec<f64>) = of.into_iter().unzip();
-        panel = if view.fit.prepared.pressures.held {
+        panel = if view.fit.solution.problem.pressures.held {
             panel.hair(view.name(group), view.colour(group), &x, &y)
         } else {
             panel.points(view.name(group), view.colour(group), &x, &y)

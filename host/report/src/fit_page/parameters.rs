@@ -12,8 +12,8 @@ pub(super) fn section(view: &View<'_>) -> Section {
         with_interval(s.deadband_kPa, s.deadband_std_kPa),
         view.fit.uncertain.blocks
     ));
-    let order = view.fit.prepared.design.layout().order;
-    let friction = view.fit.prepared.design.friction;
+    let order = view.fit.solution.problem.design.layout().order;
+    let friction = view.fit.solution.problem.design.friction;
     let mut head = vec!["P (kPa)".to_owned()];
     head.extend((1..=order).map(|k| format!("E_{{{k}}} (MPa)")));
     if friction {

@@ -72,7 +72,7 @@ fn coordinates(view: &View<'_>) -> Figure {
     if rows.iter().all(|i| warm(*i).is_some()) && !rows.is_empty() {
         coordinates.push(("temperature", "°C", of(&|i| warm(i).unwrap_or(f64::NAN))));
     }
-    let held = view.fit.prepared.pressures.held;
+    let held = view.fit.solution.problem.pressures.held;
     let panels = coordinates.into_iter().map(|(label, unit, x)| {
         let (at, mean) =
             if held && unit == "kPa" { by_level(view, &rows, &residual) } else { trend(&x, &residual) };

@@ -4,10 +4,10 @@ use model_core::units::{Length, Pressure};
 
 use super::super::{Colour, figures, fixed};
 use pam_data::recording::Campaign;
-use pam_fit::band::{ForceBand, HALF_95};
-use pam_fit::fit::points::Point;
-use pam_fit::fit::result::Fit;
-use pam_fit::fit::screen::Use;
+use pam_fit::Fit;
+use pam_fit::Point;
+use pam_fit::PointUse;
+use pam_fit::confidence_band::{ConfidenceBand, HALF_95};
 use pam_fit::table_file::{About, TableFile};
 
 /// A fit, ready to be drawn.
@@ -23,7 +23,7 @@ pub(super) struct View<'a> {
     /// `F − F_model` of every point by the table itself, N.
     pub residual: Vec<f64>,
     muscle: Option<model_core::muscle::Muscle<f64>>,
-    band: Option<ForceBand>,
+    band: Option<ConfidenceBand>,
 }
 
 /// A curve with the edges of its interval.
@@ -48,12 +48,13 @@ impl FromIterator<[f64; 3]> for Banded {
 impl<'a> View<'a> {
     pub fn new(fit: &'a Fit, campaign: &'a Campaign) -> Self {
         let muscle = model_core::muscle::Muscle::<f64>::build(&fit.table).ok();
-        let l0 = fit.prepared.braid.rest_length();
-        let levels = fit.prepared.pressures.levels.as_slice();
+        let l0 = fit.solution.problem.braid.rest_length();
+        let levels = fit.solution.problem.pressures.levels.as_slice();
         let uncertainty = Some(fit.stored_uncertainty());
         let about = About { uncertainty, ..About::default() };
-        let band = ForceBand::of(&TableFile { table: fit.table.clone(), about });
-        let lengths = lengths(&fit.prepared.points.list, l0, fit.prepared.points.stroke_noise);
+        let band = ConfidenceBand::of(&TableFile { table: fit.table.clone(), about });
+        let lengths =
+            lengths(&fit.solution.problem.points.list, l0, fit.solution.problem.points.stroke_noise);
         let mut view = Self { fit, campaign, levels, l0, lengths, residual: Vec::new(), muscle, band };
         view.residual = view
             .points()
@@ -85,11 +86,11 @@ impl<'a> View<'a> {
     }
 
     pub fn points(&self) -> &'a [Point] {
-        &self.fit.prepared.points.list
+        &self.fit.solution.problem.points.list
     }
 
     fn direction(&self, p: &Point) -> f64 {
-        if self.fit.prepared.design.friction { p.direction } else { 0.0 }
+        if self.fit.solution.problem.design.friction { p.direction } else { 0.0 }
     }
 
     /// The table's force, N.
@@ -108,12 +109,12 @@ impl<'a> View<'a> {
 
     /// The tested pressure that a point belongs to.
     pub fn group(&self, i: usize) -> usize {
-        let design = &self.fit.prepared.design;
+        let design = &self.fit.solution.problem.design;
         design.bins[design.rows[i].bin as usize].group as usize
     }
 
     pub fn fitted(&self, i: usize) -> bool {
-        self.fit.prepared.used[i] == Use::Fitted
+        self.fit.solution.screen.used[i] == PointUse::Fitted
     }
 
     /// Contraction in percent.
@@ -123,7 +124,7 @@ impl<'a> View<'a> {
 
     pub fn name(&self, group: usize) -> String {
         let Some(p) = self.levels.get(group) else { return String::new() };
-        if self.fit.prepared.pressures.held {
+        if self.fit.solution.problem.pressures.held {
             format!("{} kPa", fixed(p / 1e3, 0))
         } else {
             format!("about {} kPa", fixed(p / 1e3, 0))

@@ -1,6 +1,6 @@
 //! Remarks on what can and cannot be concluded.
 
-use pam_data::counted::counted;
+use pam_data::pluralise::pluralise;
 use pam_diagnose::remark::{Refusal, Remark, RestFriction, Scatter, Unjudgeable};
 use pam_diagnose::reserve::Reserve;
 
@@ -33,7 +33,7 @@ pub fn remark(remark: &Remark) -> String {
         Remark::FrictionAtRest(law) => friction_at_rest(*law),
         Remark::SensorEnd { rows, force } => format!(
             "{} of exactly {force:.2} N excluded: end of the force sensor's range",
-            counted(*rows, "reading")
+            pluralise(*rows, "reading")
         ),
         Remark::Screening(text) => text.clone(),
         Remark::NoAdvice(error) => format!("no next experiment proposed: {error}"),
@@ -79,7 +79,7 @@ fn unjudgeable(reason: &Unjudgeable) -> String {
         }
         Unjudgeable::FewStrokes { found, least } => format!(
             "only {}; {least} are needed to tell an effect from chance",
-            counted(*found, "half-stroke")
+            pluralise(*found, "half-stroke")
         ),
         Unjudgeable::NoPressure { highest } => format!(
             "the pressure never rises above {:.1} kPa, where no muscle pulls. Check the gauge and its unit",

@@ -7,8 +7,8 @@ use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 use crate::commands::port::PortOption;
 use crate::console::Console;
 use crate::documents::{device as document, text};
-use pam_data::counted::counted;
 use pam_data::error::Result;
+use pam_data::pluralise::pluralise;
 use pam_device::{Client, Patience, Port, messages, recorder};
 
 pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()> {
@@ -24,7 +24,7 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
              link version {} (this program {LINK_VERSION}), schema {:016x} (this program {SCHEMA_HASH:016x})\n\
              table format {}, store format {}, {} muscle{}",
             recorder::serial(&hello),
-            counted(hello.starts, "start"),
+            pluralise(hello.starts, "start"),
             hello.link_version,
             hello.schema_hash,
             hello.table_format,
@@ -73,7 +73,7 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
         status.ticks,
         info.ticks_per_s,
         messages::started_by(info.started_by),
-        counted(status.overruns, "overrun"),
+        pluralise(status.overruns, "overrun"),
     ));
     for (number, table) in info.tables.iter().take(usize::from(info.muscles)).enumerate() {
         console.result(match table {

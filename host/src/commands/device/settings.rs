@@ -42,7 +42,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
                     .help("settings of a device are TOML, as `host device settings` prints them")
             })?;
             Some(toml::from_str::<Settings>(&text).map_err(|e| {
-                pam_data::toml_words::toml_error(DataCode::CallInvalid, &text, &e)
+                pam_data::toml_errors::toml_error(DataCode::CallInvalid, &text, &e)
                     .file(path)
                     .help("the file must hold all settings, as `host device settings` prints them")
             })?)

@@ -10,9 +10,9 @@ use model_core::link::messages::{TraceArm, TraceInfo, TraceRead, Trigger, Variab
 use crate::commands::port::PortOption;
 use crate::console::Console;
 use crate::documents::{device as document, text};
-use pam_data::counted::counted;
 use pam_data::error::{DataCode, Error, Result, nearest};
 use pam_data::output::write_whole;
+use pam_data::pluralise::pluralise;
 use pam_device::Client;
 use pam_device::error::DeviceCode;
 
@@ -133,8 +133,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     write_whole(&arguments.output, text.as_bytes())?;
     console.note(format!(
         "{} of {}",
-        counted(trace.records, "record"),
-        counted(trace.variables.len(), "variable")
+        pluralise(trace.records, "record"),
+        pluralise(trace.variables.len(), "variable")
     ));
     Ok(())
 }

@@ -4,16 +4,17 @@ use std::ops::Range;
 
 use super::unit;
 use crate::recording::{Campaign, Recording, white_noise};
+use crate::statistics::ranked;
 
 /// The longest stretch that is looked at, s: what lasts longer is how the bench was driven.
 const LONGEST: f64 = 10.0;
-/// About so many readings tell how high the pressure goes.
+/// About this many readings determine the highest pressure.
 const ROWS: usize = 100_000;
 /// A step is at least this share of the campaign's highest pressure.
 const LEAST_STEP: f64 = 0.1;
 /// And of the reading before: a valve's kick at the gauge is less, and is over before a muscle behind a hose feels it.
 const LEAST_PART: f64 = 0.5;
-/// And at least so many standard deviations of a reading.
+/// And at least this many standard deviations of a reading.
 const ABOVE_NOISE: f64 = 12.0;
 /// Within a stretch the pressure moves from reading to reading by no more than this share of the step.
 const STEADY: f64 = 0.1;
@@ -44,8 +45,8 @@ impl Scale {
             return None;
         }
         // Few readings at full scale must not set it.
-        let at = ((0.99 * sizes.len() as f64) as usize).min(sizes.len() - 1);
-        let highest = *sizes.select_nth_unstable_by(at, f64::total_cmp).1;
+        let rank = (0.99 * sizes.len() as f64) as usize;
+        let highest = ranked(&mut sizes, rank);
         let noise = with_force().map(|r| white_noise(&r.pressure)).fold(0.0, f64::max);
         let step = (LEAST_STEP * highest).max(ABOVE_NOISE * noise);
         (step > 0.0).then_some(Self { step })
@@ -61,7 +62,7 @@ pub(super) fn edges(campaign: &Campaign, scale: &Scale) -> Vec<Vec<usize>> {
     campaign.recordings.iter().map(|r| if r.force.is_some() { of(r) } else { Vec::new() }).collect()
 }
 
-/// Per recording the stretches that may be dropouts; `None` where there are none, or so many that they are the bench's way.
+/// Per recording the stretches that may be dropouts; `None` where there are none, or so many that they are normal for this bench.
 pub(super) fn masked(campaign: &Campaign, edges: &[Vec<usize>]) -> Option<Vec<Vec<Range<usize>>>> {
     let of = |(r, edges): (&Recording, &Vec<usize>)| -> Vec<Range<usize>> {
         stretches(edges, &r.time, &r.pressure).map(|s| s.rows).collect()

@@ -104,7 +104,7 @@ fn a_loose_plug_is_found_reading_by_reading() {
     assert_eq!(found(zero.clone()), places);
     let campaign = Campaign::new(vec![zero]);
     let said = Screened::of(&campaign).remark().expect("a remark");
-    assert!(said.ends_with("look at the gauge's plug and cable"), "{said}");
+    assert!(said.ends_with("check connector and cable of the pressure sensor"), "{said}");
     let full = places.iter().fold(clean, |r, rows| spoiled(r, rows.clone(), |_| 1e6));
     assert_eq!(found(full), places);
 }

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use super::scale::Scale;
 use super::turning::Leg;
+use crate::statistics::median;
 
 /// A stretch of samples at held length, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +27,7 @@ pub(super) fn holds(time: &[f64], smooth: &[f64], scale: &Scale, legs: &[Leg]) -
         return Vec::new();
     }
     if legs.is_empty() {
-        return vec![Hold { start: 0, end: n - 1, stroke: median(smooth) }];
+        return vec![Hold { start: 0, end: n - 1, stroke: sampled_median(smooth) }];
     }
     let mut holds: Vec<Hold> = Vec::new();
     let speeds: Vec<f64> = legs.iter().map(|l| speed(time, smooth, l, scale.threshold)).collect();
@@ -120,7 +121,7 @@ fn longest(
     while legs[*leg].end < start && *leg + 1 < legs.len() {
         *leg += 1;
     }
-    // The slower of the legs around it says how long the motion would take for this distance.
+    // The slower of the adjacent strokes determines how long the motion would take for this distance.
     let around = || legs[*leg..].iter().zip(&speeds[*leg..]).take_while(|(l, _)| l.start <= end).take(3);
     let slowest = around().map(|(_, speed)| *speed).fold(f64::INFINITY, f64::min);
     let shortest = around().map(|(l, _)| time[l.end] - time[l.start]).fold(f64::INFINITY, f64::min);
@@ -130,7 +131,7 @@ fn longest(
         return Found::Short;
     }
     // The stretch includes what of the motion before and after stays within the threshold; that is no rest.
-    let level = median(&smooth[start..end]);
+    let level = sampled_median(&smooth[start..end]);
     let tolerance = (3.0 * scale.smoothed_noise).max(0.1 * scale.threshold);
     let still = |i: &usize| (smooth[*i] - level).abs() <= tolerance;
     let (Some(first), Some(last)) = ((start..end).find(still), (start..end).rev().find(still)) else {
@@ -160,7 +161,7 @@ fn flat(smooth: &[f64], scale: &Scale) -> bool {
     let cut = smooth.len() / 20;
     let inner = &smooth[cut..smooth.len() - cut];
     let n = inner.len() as f64;
-    // Orthogonal polynomials on -1..1: the coefficient of each alone tells rise and bend.
+    // Orthogonal polynomials on -1..1: their coefficients are slope and curvature.
     let place = |i: usize| 2.0 * i as f64 / (n - 1.0) - 1.0;
     let mean_square = (0..inner.len()).map(|i| place(i).powi(2)).sum::<f64>() / n;
     let (mut pp, mut px, mut qq, mut qx) = (0.0, 0.0, 0.0, 0.0);
@@ -213,12 +214,8 @@ fn joined(holds: Vec<Hold>, smooth: &[f64], scale: &Scale) -> Vec<Hold> {
     joined
 }
 
-pub(super) fn median(column: &[f64]) -> f64 {
-    // Some thousands of samples tell a level as well as millions.
+/// The median of a column, from at most 4096 samples spread evenly over it: they determine a level as well as millions.
+pub(super) fn sampled_median(column: &[f64]) -> f64 {
     let mut some: Vec<f64> = column.iter().step_by(column.len() / 4096 + 1).copied().collect();
-    if some.is_empty() {
-        return 0.0;
-    }
-    let middle = some.len() / 2;
-    *some.select_nth_unstable_by(middle, f64::total_cmp).1
+    median(&mut some)
 }

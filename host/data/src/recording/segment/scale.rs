@@ -2,6 +2,7 @@
 
 use super::super::noise::{lagged_noise, quantum, white_noise};
 use super::turning::{Leg, legs};
+use crate::statistics::median;
 
 /// The scale of a column's noise.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,8 +97,7 @@ fn window(column: &[f64], legs: &[Leg], noise: f64) -> usize {
     if speeds.is_empty() {
         return 1;
     }
-    let middle = speeds.len() / 2;
-    let (_, typical, _) = speeds.select_nth_unstable_by(middle, f64::total_cmp);
+    let typical = median(&mut speeds);
     let shortest = legs.iter().map(|l| l.end - l.start).min().unwrap_or(1);
     let wanted = (4.0 * noise / typical.max(f64::MIN_POSITIVE)).powf(2.0 / 3.0);
     let most = (shortest / 8).min(column.len() / 8).min(2001);

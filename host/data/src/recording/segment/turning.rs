@@ -12,11 +12,11 @@ pub(super) struct Leg {
 }
 
 impl Leg {
-    pub fn amplitude(&self) -> f64 {
+    pub(super) fn amplitude(&self) -> f64 {
         (self.to - self.from).abs()
     }
 
-    pub fn sign(&self) -> f64 {
+    pub(super) fn sign(&self) -> f64 {
         (self.to - self.from).signum()
     }
 }
@@ -112,13 +112,13 @@ pub(super) struct Track<'a> {
 
 impl Track<'_> {
     /// First sample of the leg that is farther than `distance` from where the leg starts.
-    pub fn leaves(&self, leg: &Leg, distance: f64) -> usize {
+    pub(super) fn leaves(&self, leg: &Leg, distance: f64) -> usize {
         let far = |i: &usize| (self.smooth[*i] - leg.from) * leg.sign() > distance;
         (leg.start..=leg.end).find(far).unwrap_or(leg.end)
     }
 
     /// Last sample of the leg that is farther than `distance` from where the leg ends.
-    pub fn nears(&self, leg: &Leg, distance: f64) -> usize {
+    pub(super) fn nears(&self, leg: &Leg, distance: f64) -> usize {
         let far = |i: &usize| (leg.to - self.smooth[*i]) * leg.sign() > distance;
         (leg.start..=leg.end).rev().find(far).unwrap_or(leg.start)
     }
@@ -128,7 +128,7 @@ impl Track<'_> {
     /// Where single samples stand clear of the noise, the extremum's own sample is the only one in doubt: on a corner it lies
     /// on the line of one side, on a smooth turn the slope across it decides. Where they do not, the lines of both sides,
     /// taken at equal distances from the turn, meet there.
-    pub fn turn(&self, before: &Leg, after: &Leg) -> usize {
+    pub(super) fn turn(&self, before: &Leg, after: &Leg) -> usize {
         let k = after.start;
         let (first, last) = (before.start, after.end);
         let steps =
@@ -178,7 +178,7 @@ impl Track<'_> {
 
     /// The first sample of a leg that moves, after a rest that ends somewhere in `from..`. `level` is where it rested, and
     /// `tolerance` how far samples at rest stray from it.
-    pub fn departure(&self, leg: &Leg, from: usize, level: f64, tolerance: f64) -> usize {
+    pub(super) fn departure(&self, leg: &Leg, from: usize, level: f64, tolerance: f64) -> usize {
         let way = leg.sign();
         let gone = |i: usize| (self.smooth[i] - level) * way;
         let far = (from..=leg.end).find(|i| gone(*i) > self.threshold).unwrap_or(leg.end);

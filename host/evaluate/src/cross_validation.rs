@@ -1,4 +1,4 @@
-//! How good a table is on recordings that it has not seen.
+//! Cross-validation: the error of a table on recordings that it was not fitted to.
 
 use std::collections::BTreeMap;
 
@@ -10,24 +10,24 @@ use pam_fit::error::FitCode;
 use pam_fit::predict::predict;
 use pam_fit::table_file::{About, TableFile};
 
-use pam_fit::fit::result::Fit;
-use pam_fit::fit::{Options, fit};
+use pam_fit::Fit;
+use pam_fit::{Options, fit};
 
 use crate::published::Published;
 
-/// What is kept from the fit, in turn.
+/// The groups of recordings that are left out in turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Split {
     /// Every run: recordings that share their label `run`, or else each recording by itself.
     Run,
-    /// Every contraction that recordings were held at.
+    /// Every contraction at which recordings were held.
     Contraction,
 }
 
 /// Sums of errors over rows.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Score {
-    /// Rows.
+    /// The number of rows.
     pub rows: f64,
     /// `Σ |F − F_model|`, N.
     pub absolute: f64,
@@ -64,23 +64,23 @@ impl Score {
     }
 }
 
-/// Where errors sit.
+/// The errors at one contraction and direction of one left-out group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spot {
-    /// What was left out: a run's or a contraction's value.
+    /// The left-out group: the label of its run, or its stroke.
     pub left_out: String,
-    /// Contraction, in thousandths.
+    /// Contraction, in units of 0.001.
     pub contraction: i64,
     /// +1 filling or shortening, −1 emptying or lengthening.
     pub direction: i8,
-    /// The errors there.
+    /// The errors of these rows.
     pub score: Score,
 }
 
-/// Errors, together and by where they sit.
+/// Errors, in total and by place.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tally {
-    /// Of all rows.
+    /// The errors of all rows.
     pub score: Score,
     spots: BTreeMap<(String, i64, i8), Score>,
 }
@@ -99,25 +99,25 @@ impl Tally {
     }
 }
 
-/// Errors on what was left out.
+/// The errors on left-out recordings.
 #[derive(Debug, Clone)]
-pub struct HeldOut {
-    /// The table's.
+pub struct CrossValidation {
+    /// The errors of the table.
     pub table: Score,
-    /// A published formula's on the same rows, where one was given.
+    /// The errors of a published formula on the same rows, where one was given.
     pub published: Option<Score>,
-    /// Where the table's errors sit.
+    /// The errors of the table by place.
     pub spots: Vec<Spot>,
-    /// Force at rest length and the highest tested pressure, by the fit to everything, N.
+    /// Blocked force at the highest tested pressure, by the fit to all recordings, N.
     pub blocked: f64,
-    /// The fit to everything.
+    /// The fit to all recordings.
     pub whole: Fit,
 }
 
-/// A table file of a fit, with no more history than prediction needs.
+/// The table file of a fit, with the history that prediction needs.
 #[must_use]
 pub fn as_file(fit: &Fit) -> TableFile {
-    let mountings = fit.prepared.mountings.iter().map(|m| (m.stroke, m.offset)).collect();
+    let mountings = fit.solution.problem.mountings.iter().map(|m| (m.stroke, m.offset)).collect();
     TableFile { table: fit.table.clone(), about: About { mountings, ..About::default() } }
 }
 
@@ -134,17 +134,17 @@ fn key(recording: &Recording, index: usize, split: Split) -> String {
     }
 }
 
-/// Leaves each run or contraction out in turn, fits the rest, and scores what was left out.
+/// Leaves each run or contraction out in turn, fits the others, and scores the prediction of what was left out.
 ///
 /// # Errors
-/// [`FitCode::FitUnderdetermined`] where there is but one, or a fit that fails.
-pub fn hold_out(
+/// [`FitCode::FitUnderdetermined`] with fewer than two groups, or a fit that fails.
+pub fn cross_validate(
     campaign: &Campaign,
     muscle: &MuscleDescription,
     options: &Options,
     split: Split,
     published: Option<&Published>,
-) -> Result<HeldOut> {
+) -> Result<CrossValidation> {
     let keys: Vec<String> = campaign.recordings.iter().enumerate().map(|(i, r)| key(r, i, split)).collect();
     let mut values = keys.clone();
     values.sort();
@@ -152,14 +152,15 @@ pub fn hold_out(
     if values.len() < 2 {
         return Err(Error::new(
             FitCode::FitUnderdetermined,
-            "there is nothing to leave out: all recordings are one",
+            "cross-validation needs at least two groups, and all recordings belong to one",
         )
         .help("give several recordings, or an import description that splits the file by run"));
     }
     let whole = fit(campaign, muscle, options)?;
-    let clip = whole.prepared.clips.0.map(|c| c.force);
+    let clip = whole.solution.problem.clips.0.map(|c| c.force);
     let blocked = f64::from(whole.table.blocked_force.newtons());
-    let mut out = HeldOut { table: Score::default(), published: None, spots: Vec::new(), blocked, whole };
+    let mut out =
+        CrossValidation { table: Score::default(), published: None, spots: Vec::new(), blocked, whole };
     let mut reference = Score::default();
     let mut tally = Tally::default();
     for value in &values {
@@ -183,7 +184,7 @@ pub fn hold_out(
         {
             let measured = recording.require_force()?;
             for (i, force) in measured.iter().enumerate() {
-                // At the end of its range the sensor does not say what the force is.
+                // A saturated sensor does not measure the force.
                 if clip.is_some_and(|c| *force <= c) {
                     continue;
                 }

@@ -12,7 +12,7 @@ use crate::error::{DataCode, Error, Result, nearest};
 pub(super) enum Role {
     /// A quantity in SI.
     Quantity(Quantity),
-    /// A quantity given in words, with what each word stands for (in SI).
+    /// A quantity given as words, with the value of each word in SI units.
     Coded(Quantity, BTreeMap<String, f64>),
     /// The n-th column that sets recordings apart.
     Split(usize),
@@ -32,7 +32,7 @@ pub(super) struct LookedUp {
 
 /// What is read of a file.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Plan {
+pub(super) struct ColumnPlan {
     /// In ascending order of index.
     pub wanted: Vec<Wanted>,
     /// One per wanted column.
@@ -97,15 +97,15 @@ impl Context<'_> {
 }
 
 /// Decides what to read of a file with these column names.
-pub(super) fn plan(names: &[String], context: &Context<'_>) -> Result<Plan> {
-    let mut plan = Plan::default();
+pub(super) fn plan(names: &[String], context: &Context<'_>) -> Result<ColumnPlan> {
+    let mut plan = ColumnPlan::default();
     for (name, value) in context.import.constants.iter().map(|(n, v)| (n, *v)).chain(named_constants(context))
     {
         let (quantity, unit) = constant(name)?;
         plan.constants.push((quantity, value * unit.scale + unit.offset));
     }
     let mut columns: Vec<(Found, Role, Want)> = Vec::new();
-    let constant = |q: Quantity, plan: &Plan| plan.constants.iter().any(|(c, _)| *c == q);
+    let constant = |q: Quantity, plan: &ColumnPlan| plan.constants.iter().any(|(c, _)| *c == q);
     for name in context.import.columns.keys() {
         let Some(quantity) = Quantity::IN_HEADERS
             .into_iter()
@@ -193,7 +193,7 @@ fn described(quantity: Quantity, column: &Column) -> (Role, Want) {
     (Role::Quantity(quantity), want)
 }
 
-fn stroke_source(names: &[String], context: &Context<'_>, plan: &Plan) -> Result<Option<Quantity>> {
+fn stroke_source(names: &[String], context: &Context<'_>, plan: &ColumnPlan) -> Result<Option<Quantity>> {
     let sources = [Quantity::Displacement, Quantity::Length, Quantity::Contraction];
     let described: Vec<_> = sources
         .into_iter()

@@ -1,4 +1,4 @@
-//! Normal equations, summed bin by bin.
+//! NormalEquations equations, summed bin by bin.
 //!
 //! Points of nearly one pressure share their `φ_j`. Their normal equations are summed as a small matrix in the columns
 //! `(c̃_1 … c̃_M, −s q, g, z)` and spread over the nodes only once per such bin, so that the work per point does not grow
@@ -7,22 +7,22 @@
 use std::ops::Range;
 
 use super::design::{Curves, Design, Layout};
-use super::linear::Symmetric;
+use crate::numerics::symmetric::Symmetric;
 
-/// Normal equations at some parameters: `Σ w J Jᵀ`, `Σ w J r`, `Σ w r²`, `Σ w`.
+/// NormalEquations equations at some parameters: `Σ w J Jᵀ`, `Σ w J r`, `Σ w r²`, `Σ w`.
 #[derive(Debug, Clone)]
-pub struct Normal {
-    /// `Σ w J Jᵀ`.
+pub struct NormalEquations {
+    /// The matrix `Σ w J Jᵀ`.
     pub matrix: Symmetric,
-    /// `Σ w J r`.
+    /// The right-hand side `Σ w J r`.
     pub right: Vec<f64>,
-    /// `Σ w r²`.
+    /// The weighted sum of squares `Σ w r²`.
     pub misfit: f64,
-    /// `Σ w`.
+    /// The sum of weights `Σ w`.
     pub weight: f64,
 }
 
-impl Normal {
+impl NormalEquations {
     pub(super) fn zeros(n: usize) -> Self {
         Self { matrix: Symmetric::zeros(n), right: vec![0.0; n], misfit: 0.0, weight: 0.0 }
     }
@@ -87,7 +87,7 @@ impl Design {
         sums
     }
 
-    fn expand(&self, sums: &Sums, phi: &[f64], into: &mut Normal) {
+    fn expand(&self, sums: &Sums, phi: &[f64], into: &mut NormalEquations) {
         if sums.weight <= 0.0 {
             return;
         }
@@ -140,20 +140,20 @@ impl Design {
 
     /// The normal equations of all points.
     #[must_use]
-    pub fn normal(&self, parameters: &[f64], weights: &[f64]) -> Normal {
+    pub fn normal(&self, parameters: &[f64], weights: &[f64]) -> NormalEquations {
         self.normal_of(0..self.rows.len(), parameters, &self.curves(parameters), weights)
     }
 
     /// The normal equations of a stretch of points. `curves` are those of `parameters`.
     #[must_use]
-    pub fn normal_of(
+    pub(crate) fn normal_of(
         &self,
         rows: Range<usize>,
         parameters: &[f64],
         curves: &Curves,
         weights: &[f64],
-    ) -> Normal {
-        let mut normal = Normal::zeros(self.layout().len());
+    ) -> NormalEquations {
+        let mut normal = NormalEquations::zeros(self.layout().len());
         for (bin, s) in self.sums(rows, parameters, curves, weights) {
             self.expand(&s, &self.bins[bin as usize].phi, &mut normal);
         }
@@ -162,8 +162,8 @@ impl Design {
 
     /// The normal equations of each group by itself.
     #[must_use]
-    pub fn normal_by_group(&self, parameters: &[f64], weights: &[f64]) -> Vec<Normal> {
-        let mut normals = vec![Normal::zeros(self.layout().len()); self.groups];
+    pub(crate) fn normal_by_group(&self, parameters: &[f64], weights: &[f64]) -> Vec<NormalEquations> {
+        let mut normals = vec![NormalEquations::zeros(self.layout().len()); self.groups];
         for (bin, s) in self.sums(0..self.rows.len(), parameters, &self.curves(parameters), weights) {
             let bin = &self.bins[bin as usize];
             if let Some(normal) = normals.get_mut(bin.group as usize) {

@@ -1,15 +1,15 @@
 //! A muscle of a length that was not recorded, predicted from others of its stock.
 //!
-//! By the model two muscles of one stock pull alike at equal pressure and contraction, however long they are. Measured ones do not
-//! quite: near the fittings the braid acts less than on the rest, so that short muscles pull less (so says the published formula for
-//! Festo muscles, too: [`super::published`]). With an end effect `δ` that all lengths share
+//! By the model, muscles of one stock have the same force at equal pressure and contraction, whatever their length. Measured muscles
+//! deviate: near the fittings the braid acts less, so short muscles have less force (the published formula for Festo muscles has the same
+//! trend: [`super::published`]). With an end effect `δ` that all lengths share
 //!
 //! ```text
 //! ln F_B = a − δ / L0                    F(P, ε; L0) = mean_i F_i(P, ε) · exp(−δ (1/L0 − 1/L0_i))
 //! ```
-//! `δ` in metres by least squares over the blocked forces of the recorded muscles, held by what is known beforehand: ends reach
-//! about as far as the bladder is thick, `δ ~ N(0, (2 D0)²)`, and two muscles of one length differ by some 5 % in force. Where the
-//! lengths are few or alike the prior keeps `δ` near zero, and the prediction is the mean of the others.
+//! `δ` in metres is a least-squares estimate over the blocked forces of the recorded muscles with a prior: end effects extend over about
+//! the diameter of the bladder, `δ ~ N(0, (2 D0)²)`, and two muscles of one length differ by about 5 % in force. With few or similar
+//! lengths the prior keeps `δ` near zero, and the prediction is the mean of the others.
 
 use model_core::units::Length;
 
@@ -20,37 +20,37 @@ use pam_data::recording::segment::Motion;
 use pam_fit::predict::predict;
 use pam_fit::table_file::{About, TableFile};
 
-use pam_fit::fit::result::Fit;
+use pam_fit::Fit;
 
-use crate::hold_out::{Score, Spot, Tally};
+use crate::cross_validation::{Score, Spot, Tally};
 
-/// By how much the blocked forces of two muscles of one stock and length differ: standard deviation of the logarithm.
+/// Scatter of the blocked force among muscles of one stock and length: standard deviation of its logarithm.
 const SCATTER: f64 = 0.05;
-/// How far end effects reach, in diameters: standard deviation of `δ`.
+/// Prior standard deviation of the end effect `δ`, in bladder diameters.
 const REACH: f64 = 2.0;
 
 /// Errors of a prediction from other lengths.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Carried {
-    /// All rows.
+pub struct LengthTransfer {
+    /// The errors of all rows.
     pub score: Score,
-    /// Where the errors sit.
+    /// The errors by place.
     pub spots: Vec<Spot>,
-    /// `δ`, m.
+    /// The end effect `δ`, m.
     pub end_effect: f64,
 }
 
-/// `δ` of muscles given as rest length (m), blocked force (N) at one pressure, and bladder diameter (m).
+/// The end effect `δ` in m of muscles given as rest length (m), blocked force (N) at one pressure, and bladder diameter (m).
 ///
 /// ```
-/// use pam_evaluate::other_length::end_effect;
+/// use pam_evaluate::length_transfer::end_effect;
 ///
 /// // Blocked forces that fall by the law with δ = 25 mm, of muscles 10 mm thick.
 /// let law = |length: f64| (length, 480.0 * (-25e-3 / length).exp(), 10e-3);
 /// let found = end_effect(&[law(0.08), law(0.13), law(0.18), law(0.25), law(0.4)]);
-/// // What is known beforehand draws it a little towards zero.
+/// // The prior pulls it slightly towards zero.
 /// assert!((found - 22.6e-3).abs() < 1e-3, "{found}");
-/// // One length says nothing about lengths.
+/// // With a single length it is not identifiable, and the prior makes it zero.
 /// assert_eq!(end_effect(&[law(0.25), law(0.25)]), 0.0);
 /// ```
 #[must_use]
@@ -69,28 +69,29 @@ pub fn end_effect(muscles: &[(f64, f64, f64)]) -> f64 {
     across / square
 }
 
-/// Scores the prediction of a muscle from the fits of others of its stock. Rows whose force is at most `clip` do not count.
+/// Scores the prediction of a muscle from the fits of others of its stock. Rows with a force of at most `clip` (N) do not count.
 ///
 /// # Errors
 /// A table that cannot be used at this length, or a recording without force.
-pub fn unseen_length(
+pub fn predict_unseen_length(
     others: &[&Fit],
     campaign: &Campaign,
     muscle: &MuscleDescription,
     clip: Option<f64>,
-) -> Result<Carried> {
-    let pressure = others.iter().map(|f| f.prepared.points.pressure.high).fold(f64::INFINITY, f64::min);
+) -> Result<LengthTransfer> {
+    let pressure =
+        others.iter().map(|f| f.solution.problem.points.pressure.high).fold(f64::INFINITY, f64::min);
     let of = |f: &&Fit| {
-        let geometry = &f.prepared.geometry;
-        (geometry.rest_length.metres(), f.prepared.blocked(pressure), geometry.outer_diameter.metres())
+        let geometry = &f.solution.problem.geometry;
+        (geometry.rest_length.metres(), f.solution.blocked(pressure), geometry.outer_diameter.metres())
     };
     let end_effect = end_effect(&others.iter().map(of).collect::<Vec<_>>());
     let predictions = others
         .iter()
         .map(|other| {
-            let mut geometry = other.prepared.geometry;
+            let mut geometry = other.solution.problem.geometry;
             let share = 1.0 / muscle.rest_length() - 1.0 / geometry.rest_length.metres();
-            // At equal strains every force of the model goes with the square of the diameter, where the wall goes with it.
+            // At equal strains every force of the model scales with the square of the diameter if the wall scales with the diameter.
             let thicker = (-0.5 * end_effect * share).exp();
             geometry.rest_length = Length::from_metres(muscle.rest_length());
             geometry.outer_diameter = geometry.outer_diameter * thicker;
@@ -113,5 +114,5 @@ pub fn unseen_length(
             tally.add(&muscle.name, contraction, motion.direction[i], force - model);
         }
     }
-    Ok(Carried { score: tally.score, spots: tally.spots(), end_effect })
+    Ok(LengthTransfer { score: tally.score, spots: tally.spots(), end_effect })
 }

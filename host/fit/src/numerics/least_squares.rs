@@ -1,17 +1,66 @@
-//! Least squares whose standard deviations go by whole blocks: neighbouring samples of a sensor are no independent samples.
+//! Small linear least-squares problems.
 //!
-//! A check has a dozen blocks or less, and a block that pulls the line towards itself leaves little of its own error to see: so every
-//! block is left out in turn (the jackknife of clusters; R. M. Bell, D. F. McCaffrey, Survey Methodology 28 (2002) 169–181).
+//! [`by_blocks`] gives standard deviations for correlated rows: every block is left out in turn, because a block that pulls the
+//! solution towards itself leaves little of its own error in the residuals (the jackknife of clusters; R. M. Bell and D. F. McCaffrey,
+//! Survey Methodology 28 (2002) 169).
 
 use nalgebra::{DMatrix, DVector};
 
-/// A solution with its standard deviations.
-pub(super) struct Solution {
+use super::jackknife::variances;
+
+/// The `order` coefficients of least squares. A row holds the values of its columns, of which the first `order` count, and its target.
+///
+/// Columns are scaled to unit size and reduced to a triangle by Householder reflections (QR). The triangle is solved by its singular
+/// values, so that combinations which the rows do not determine stay at zero.
+///
+/// ```
+/// use pam_fit::numerics::least_squares::least_squares;
+///
+/// let rows: Vec<([f64; 2], f64)> = (0..5).map(|x| ([1.0, f64::from(x)], 1.0 + 2.0 * f64::from(x))).collect();
+/// let found = least_squares(&rows, 2);
+/// assert!((found[0] - 1.0).abs() < 1e-12 && (found[1] - 2.0).abs() < 1e-12);
+/// ```
+#[must_use]
+pub fn least_squares<const N: usize>(rows: &[([f64; N], f64)], order: usize) -> Vec<f64> {
+    if rows.is_empty() || order == 0 {
+        return vec![0.0; order];
+    }
+    let size = |k: usize| rows.iter().map(|(c, _)| c[k] * c[k]).sum::<f64>().sqrt();
+    let scale: Vec<f64> = (0..order).map(|k| Some(size(k)).filter(|s| *s > 0.0).unwrap_or(1.0)).collect();
+    // The target is one more column: above the triangle's last row it becomes Qᵀ b.
+    let height = rows.len().max(order + 1);
+    let all = DMatrix::from_fn(height, order + 1, |i, k| match rows.get(i) {
+        Some((c, target)) => {
+            if k < order {
+                c[k] / scale[k]
+            } else {
+                *target
+            }
+        }
+        None => 0.0,
+    });
+    let triangle = all.qr().unpack_r();
+    let solution = triangle
+        .view((0, 0), (order, order))
+        .into_owned()
+        .svd(true, true)
+        .solve(&triangle.view((0, order), (order, 1)).into_owned(), 1e-9);
+    match solution {
+        Ok(x) => x.iter().zip(&scale).map(|(x, s)| x / s).collect(),
+        Err(_) => vec![0.0; order],
+    }
+}
+
+/// Coefficients with their standard deviations, in the unit of the target per unit of each column.
+#[derive(Debug, Clone)]
+pub struct BlockSolution {
+    /// The coefficients.
     pub values: Vec<f64>,
+    /// Their standard deviations.
     pub deviations: Vec<f64>,
 }
 
-/// Normal equations of a stretch of rows.
+/// Normal equations of some rows.
 #[derive(Clone)]
 struct Normal {
     gram: DMatrix<f64>,
@@ -26,16 +75,19 @@ impl Normal {
         Self { gram: a.transpose() * &a, moment: a.transpose() * y }
     }
 
-    /// The solution; `None` where the columns cannot be told apart.
+    /// The solution; `None` where the columns are linearly dependent.
     fn solve(&self) -> Option<DVector<f64>> {
         (self.gram.clone().symmetric_eigenvalues().min() >= 1e-9)
             .then(|| self.gram.clone().cholesky().map(|c| c.solve(&self.moment)))?
     }
 }
 
-/// Fits `y` by the columns; rows of one block may be as alike as they like. `None` where the columns cannot be told apart, be it that one
-/// block is left out, or there are not more blocks than columns.
-pub(super) fn by_blocks(columns: &[Vec<f64>], y: &[f64], block: &[usize]) -> Option<Solution> {
+/// Fits `y` by the columns. Rows of one block may be correlated; standard deviations come from leaving each block out in turn.
+///
+/// `None` where the columns are linearly dependent, with all blocks or with one left out, or where there are no more blocks than
+/// columns.
+#[must_use]
+pub fn by_blocks(columns: &[Vec<f64>], y: &[f64], block: &[usize]) -> Option<BlockSolution> {
     let mut blocks = block.to_vec();
     blocks.dedup();
     let k = columns.len();
@@ -56,20 +108,11 @@ pub(super) fn by_blocks(columns: &[Vec<f64>], y: &[f64], block: &[usize]) -> Opt
             Normal { gram: &all.gram - out.gram, moment: &all.moment - out.moment }.solve()
         })
         .collect::<Option<Vec<_>>>()?;
-    let n = blocks.len() as f64;
-    let deviation = |j: usize| {
-        let mean = without.iter().map(|w| w[j]).sum::<f64>() / n;
-        ((n - 1.0) / n * without.iter().map(|w| (w[j] - mean).powi(2)).sum::<f64>()).sqrt()
-    };
-    Some(Solution {
+    let variances = variances(&without.iter().map(|w| w.as_slice()).collect::<Vec<_>>());
+    Some(BlockSolution {
         values: (0..k).map(|j| solution[j] / sizes[j]).collect(),
-        deviations: (0..k).map(|j| deviation(j) / sizes[j]).collect(),
+        deviations: (0..k).map(|j| variances[j].sqrt() / sizes[j]).collect(),
     })
-}
-
-/// A standard deviation beside a reference that may be off by up to a limit, anywhere within it alike likely (JCGM 100:2008, 4.3.7).
-pub(super) fn with_reference(deviation: f64, limit: f64) -> f64 {
-    deviation.hypot(limit / 3.0_f64.sqrt())
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-use super::mistake::ATMOSPHERE;
+use super::mistake::{ATMOSPHERE, Column, MistakeKind};
 use super::*;
 
 const PSI: f64 = 6.894_757;
@@ -29,7 +29,7 @@ fn campaign() -> Vec<Recording> {
 }
 
 fn found(recordings: &[Recording]) -> Vec<(usize, Mistake)> {
-    standing_apart(&Campaign::new(recordings.to_vec()))
+    inconsistent_recordings(&Campaign::new(recordings.to_vec()))
         .into_iter()
         .map(|a| (a.recording, a.mistake))
         .collect()
@@ -63,7 +63,7 @@ fn every_unit_in_every_recording_of_some_force_is_found_and_nothing_else() {
             (Column::Force, 0.001),
         ] {
             let there = found(&spoiled(which, column, |v| v / factor));
-            let [(at, Mistake { column: in_column, wrong: Wrong::Unit(told, _) })] = there[..] else {
+            let [(at, Mistake { column: in_column, wrong: MistakeKind::Unit(told, _) })] = there[..] else {
                 panic!("{column:?} / {factor} in {which}: {there:?}");
             };
             assert_eq!((at, in_column), (which, column));
@@ -75,14 +75,14 @@ fn every_unit_in_every_recording_of_some_force_is_found_and_nothing_else() {
 #[test]
 fn signs_and_zeros_are_found() {
     let other = |column, wrong| Mistake { column, wrong };
-    assert_eq!(found(&spoiled(2, Column::Force, |f| -f)), [(2, other(Column::Force, Wrong::Sign))]);
+    assert_eq!(found(&spoiled(2, Column::Force, |f| -f)), [(2, other(Column::Force, MistakeKind::Sign))]);
     let from_the_end = found(&spoiled(3, Column::Stroke, |x| 0.02 - x));
     assert!(
-        matches!(from_the_end[..], [(3, Mistake { column: Column::Stroke, wrong: Wrong::OtherEnd(sum) })] if (sum - 0.02).abs() < 1e-9),
+        matches!(from_the_end[..], [(3, Mistake { column: Column::Stroke, wrong: MistakeKind::OtherEnd(sum) })] if (sum - 0.02).abs() < 1e-9),
         "{from_the_end:?}"
     );
     let absolute = spoiled(1, Column::Pressure, |p| p + ATMOSPHERE);
-    assert_eq!(found(&absolute), [(1, other(Column::Pressure, Wrong::Absolute(ATMOSPHERE)))]);
+    assert_eq!(found(&absolute), [(1, other(Column::Pressure, MistakeKind::Absolute(ATMOSPHERE)))]);
 }
 
 #[test]
@@ -110,14 +110,14 @@ fn what_is_no_known_mistake_is_not_called_one() {
 }
 
 #[test]
-fn what_stands_apart_is_told_with_what_to_do() {
+fn an_inconsistent_recording_is_reported_with_the_remedy() {
     let campaign = Campaign::new(spoiled(3, Column::Pressure, |p| p / PSI));
     let screened = crate::recording::dropouts::Screened::of(&campaign);
     let said = screened.remark().expect("a remark");
     for part in [
-        "`d` stands apart",
-        "its 240 rows are left out",
-        "6.89 times what was read",
+        "`d` is inconsistent",
+        "its 240 rows are excluded",
+        "6.89 times the reading",
         "psi to kPa",
         "column's name",
     ] {

@@ -4,8 +4,8 @@
 //! converge quadratically.
 
 use super::design::Design;
-use super::linear::{Symmetric, dot};
-use super::normal::Normal;
+use super::normal_equations::NormalEquations;
+use crate::numerics::symmetric::{Symmetric, dot};
 
 impl Design {
     /// Gauss–Newton from `parameters`, in place; returns the normal equations at the end.
@@ -18,8 +18,8 @@ impl Design {
         weights: &[f64],
         penalty: &Symmetric,
         most: usize,
-    ) -> Normal {
-        let objective = |normal: &Normal, at: &[f64]| normal.misfit + penalty.quadratic(at);
+    ) -> NormalEquations {
+        let objective = |normal: &NormalEquations, at: &[f64]| normal.misfit + penalty.quadratic(at);
         let mut normal = self.normal(parameters, weights);
         let mut best = objective(&normal, parameters);
         for _ in 0..most {
@@ -146,7 +146,7 @@ pub(crate) mod tests {
         let normal = design.normal(&at, &weights);
         let curves = design.curves(&at);
         let n = design.layout().len();
-        let mut direct = Normal::zeros(n);
+        let mut direct = NormalEquations::zeros(n);
         for (i, w) in weights.iter().enumerate() {
             let j: Vec<(usize, f64)> = design.gradient(i, &at, &curves).into_iter().enumerate().collect();
             let r = design.rows[i].force - design.evaluate(i, &at, &curves).force;

@@ -1,24 +1,24 @@
-//! How uncertain a table's force is: the band about every curve.
+//! The confidence band of a table's force.
 
 use model_core::muscle::Muscle;
 use model_core::units::{Length, Pressure};
 
-use crate::fit::basis::PressureBasis;
+use crate::numerics::spline_basis::SplineBasis;
 use crate::table_file::TableFile;
 
 /// Half the width of a normal distribution's 95 % interval, in standard deviations.
 pub const HALF_95: f64 = 1.96;
 
-/// The uncertainty of a table's force, ready to be asked at many places.
+/// The uncertainty of a table's force, prepared for evaluation at many places.
 ///
 /// ```text
 /// var F = gᵀ C g,   g = ∂F/∂(P0, E_kj, k_F,j) = (−G g(L), G c_k φ_j, −s q φ_j),   G = 1 − s k_F
 /// ```
-/// with `C` the covariance that the table file holds. It is that of the base model; what effects add is not in it. To first order in
-/// the deviations, which is exact but for `k_F` times elasticity.
+/// with `C` the covariance that the table file holds. It covers the base model; effects add uncertainty that it does not contain. First
+/// order in the deviations, which is exact except for `k_F` times elasticity.
 ///
 /// ```
-/// use pam_fit::band::ForceBand;
+/// use pam_fit::confidence_band::ConfidenceBand;
 /// use pam_fit::table_file::{About, TableFile, Uncertainty};
 ///
 /// // A table whose only uncertain number is P0, by 1 kPa.
@@ -28,24 +28,24 @@ pub const HALF_95: f64 = 1.96;
 /// root[0] = 1e3;
 /// let uncertainty = Uncertainty { rows: rows as u32, columns: 1, root, residual_newtons: 0.3 };
 /// let about = About { uncertainty: Some(uncertainty), ..About::default() };
-/// let band = ForceBand::of(&TableFile { table, about }).expect("an uncertainty");
+/// let band = ConfidenceBand::of(&TableFile { table, about }).expect("an uncertainty");
 /// // At rest length the blocked force is (P − P0) g(L0), whatever the pressure.
 /// let std = band.std(300e3, 0.0, 0.0);
 /// assert!((std - band.std(500e3, 0.0, 0.0)).abs() < 1e-9 && std > 0.0);
 /// assert!((band.reading_std(300e3, 0.0, 0.0) - std.hypot(0.3)).abs() < 1e-12);
 /// ```
 #[derive(Debug, Clone)]
-pub struct ForceBand {
+pub struct ConfidenceBand {
     muscle: Muscle<f64>,
-    basis: PressureBasis,
+    basis: SplineBasis,
     order: usize,
     columns: usize,
     root: Vec<f64>,
     residual: f64,
 }
 
-impl ForceBand {
-    /// Of a table file; `None` where it holds no uncertainty, or one of another table.
+impl ConfidenceBand {
+    /// The band of a table file; `None` where the file holds no uncertainty, or that of another table.
     #[must_use]
     pub fn of(file: &TableFile) -> Option<Self> {
         let u = file.about.uncertainty.as_ref()?;
@@ -56,12 +56,12 @@ impl ForceBand {
         }
         let muscle = Muscle::<f64>::build(&file.table).ok()?;
         let nodes: Vec<f64> = file.table.nodes.iter().map(|p| f64::from(*p)).collect();
-        let basis = PressureBasis::new(&nodes);
+        let basis = SplineBasis::new(&nodes);
         Some(Self { muscle, basis, order, columns, root: u.root.clone(), residual: u.residual_newtons })
     }
 
     /// Standard deviation of the force at a pressure (Pa), a stroke (m) and a direction (+1 shortening, −1 lengthening, 0 for the
-    /// friction-free force), N: what the table's numbers leave open.
+    /// friction-free force), N, from the uncertainty of the table's parameters.
     #[must_use]
     pub fn std(&self, pressure: f64, stroke: f64, direction: f64) -> f64 {
         let held = self.muscle.held(Length::from_metres(stroke));
@@ -83,15 +83,15 @@ impl ForceBand {
         sum.iter().map(|s| s * s).sum::<f64>().sqrt()
     }
 
-    /// As [`ForceBand::std`], of a single reading: with what the table does not describe, as seen in its own residuals.
+    /// The standard deviation of a single reading, N: [`ConfidenceBand::std`] and the root mean square of the fit's residuals.
     #[must_use]
     pub fn reading_std(&self, pressure: f64, stroke: f64, direction: f64) -> f64 {
         self.with_scatter(self.std(pressure, stroke, direction))
     }
 
-    /// The standard deviation of a single reading where that of the force is `std`, N.
+    /// The standard deviation of a single reading where that of the force is `std`, both in N.
     #[must_use]
-    pub fn with_scatter(&self, std: f64) -> f64 {
+    pub(crate) fn with_scatter(&self, std: f64) -> f64 {
         std.hypot(self.residual)
     }
 }

@@ -4,22 +4,22 @@ use super::cells::Dialect;
 use super::import::{Decimal, Import};
 use super::line::Cells;
 use super::quantity::{Named, named};
-use crate::counted::counted;
 use crate::error::{DataCode, Error, Result};
+use crate::pluralise::pluralise;
 
 /// The beginning of a text file: how it is cut, and what its columns are called.
-pub(super) struct Head {
+pub(super) struct Header {
     pub dialect: Dialect,
     pub names: Vec<String>,
     /// Bytes above the header or the first row.
     pub preamble: usize,
-    /// Bytes and lines that the head takes.
+    /// Bytes and lines that the header takes.
     pub bytes: usize,
     pub lines: u64,
 }
 
-impl Head {
-    pub fn read(text: &[u8], import: &Import) -> Result<Self> {
+impl Header {
+    pub(super) fn read(text: &[u8], import: &Import) -> Result<Self> {
         let comment = import.comment.and_then(|c| u8::try_from(c).ok());
         let mut bytes = 0;
         let mut lines = 0;
@@ -29,7 +29,7 @@ impl Head {
         loop {
             let rest = &text[bytes..];
             if rest.is_empty() {
-                let cause = format!("the file ends within its first {}", counted(lines, "line"));
+                let cause = format!("the file ends within its first {}", pluralise(lines, "line"));
                 return Err(Error::new(DataCode::RecordingTooShort, cause)
                     .help("see skip_lines in the import description"));
             }
@@ -96,7 +96,7 @@ impl Head {
     }
 
     /// For streams of unknown size: none; the estimate is only for reserving memory.
-    pub fn average_line(&self, rest: &[u8]) -> Option<u64> {
+    pub(super) fn average_line(&self, rest: &[u8]) -> Option<u64> {
         (rest.len() < 65_536).then_some(rest.len() as u64)
     }
 }

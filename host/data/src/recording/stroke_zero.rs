@@ -1,5 +1,7 @@
 //! Where a stroke of arbitrary zero begins, found in a column of readings.
 
+use crate::statistics::median;
+
 /// The level that a column begins at: the median of the samples that stay within the noise of the first.
 pub(super) fn first_level(column: &[f64]) -> f64 {
     let noise = super::noise::white_noise(&column[..column.len().min(4096)]);
@@ -9,8 +11,7 @@ pub(super) fn first_level(column: &[f64]) -> f64 {
         }
         None => return 0.0,
     };
-    start.sort_unstable_by(f64::total_cmp);
-    start[start.len() / 2]
+    median(&mut start)
 }
 
 /// The smallest reading that a neighbour supports: a single wild one must not become the zero.
@@ -20,9 +21,7 @@ pub(super) fn smallest(column: &[f64]) -> f64 {
     if steps.is_empty() {
         return column.first().copied().unwrap_or(0.0);
     }
-    let middle = steps.len() / 2;
-    let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let near = 3.0 * step + 6.0 * super::noise::white_noise(some);
+    let near = 3.0 * median(&mut steps) + 6.0 * super::noise::white_noise(some);
     let pairs = column.windows(2).filter(|w| (w[1] - w[0]).abs() <= near);
     pairs.map(|w| w[0].min(w[1])).fold(f64::INFINITY, f64::min)
 }
@@ -38,6 +37,5 @@ pub(super) fn at_largest(stroke: &[f64], force: &[f64]) -> f64 {
         order.select_nth_unstable_by(count - 1, |a, b| force[*b].total_cmp(&force[*a]));
     }
     let mut top: Vec<f64> = order[..count].iter().map(|i| stroke[*i]).collect();
-    top.sort_unstable_by(f64::total_cmp);
-    top[count / 2]
+    median(&mut top)
 }

@@ -1,53 +1,51 @@
-//! What force the pressure makes in a campaign, and whether a force goes on while the pressure steps away.
+//! The force expected at a pressure and stroke in a campaign, and whether a force continues while the pressure reading steps away.
 
 use std::ops::Range;
 
-use nalgebra::{SMatrix, SVector};
-
 use super::steps::Stretch;
+use crate::recording::force_surface::{ForceSurface, TERMS};
 use crate::recording::{Campaign, Recording, white_noise};
+use crate::statistics::median;
 
-/// `F ≈ p (a0 + a1 u + a2 u² + a3 u³) + b0 + b1 u + b2 u² + b3 u³`, with pressure and stroke as shares of their ranges.
-const TERMS: usize = 8;
-/// Rows that are taken for it.
+/// Rows that the surface is fitted to.
 const ROWS: usize = 20_000;
-/// Rounds in which rows are left out that lie further off than so many times the median.
+/// Rounds that exclude rows whose residual exceeds [`FAR`] times the median.
 const ROUNDS: usize = 3;
 const FAR: f64 = 5.0;
-/// What the campaign leaves open is taken for nothing. Where only one pressure was tested the force is as good as proportional to it,
-/// which is the least that pressure can make: deadband and elasticity only take from it.
+/// Ridge towards zero, per row, for what the campaign does not determine. With one tested pressure the force comes out proportional to
+/// pressure, which is the smallest possible effect of pressure: deadband and elasticity reduce the force.
 const HELD: [f64; TERMS] = [1e-6, 1e-5, 1e-5, 1e-5, 1e-3, 1e-5, 1e-5, 1e-5];
-/// A muscle pulls from this share of the range of forces above the lowest.
+/// A muscle counts as pulling above this share of the range of forces.
 const PULLS: f64 = 0.05;
-/// The step must make this share of the range of forces, and so many standard deviations of a reading.
+/// The step must change the expected force by this share of the range of forces, and this many standard deviations of a reading.
 const NOTICEABLE: (f64, f64) = (0.03, 25.0);
-/// The force goes on if it follows by less than this share.
+/// The force continues if it follows less than this share of the expected change.
 const FOLLOWS: f64 = 0.15;
-/// Before and after, the campaign's other readings make the force that is read up to this share of what the step would make: of two
-/// levels between which a gauge changes, the muscle's is the one that the force fits.
+/// Before and after, the residual of the force stays below this share of the expected change: of two levels between which the reading
+/// changes, the true one is the one that the force agrees with.
 const SUPPORTED: f64 = 0.3;
-/// How long after a stretch the force is watched: what follows late follows too. s, and rows at least.
+/// How long after a stretch the force is checked for a late reaction: s, and rows at least.
 const LATE: (f64, usize) = (0.3, 2);
-/// Rows on either side from which the level is taken.
+/// Rows on either side that determine the level.
 const BESIDE: usize = 5;
-/// A force sensor that stands at the end of its range repeats one value in this share of the rows.
+/// A saturated force sensor repeats one value in at least this share of the rows.
 const CLIPPED: f64 = 1.0 / 300.0;
 
-/// The force that pressure makes at each stroke, from the rows of a campaign that no step is near.
+/// Force over pressure and stroke, from the rows of a campaign away from pressure steps.
 #[derive(Debug, Clone)]
-pub(super) struct Pull {
-    terms: SVector<f64, TERMS>,
+pub(super) struct ExpectedForce {
+    surface: ForceSurface,
     pressure: f64,
     stroke: (f64, f64),
     /// The lowest force, and the range above it, N.
     floor: f64,
     span: f64,
-    /// Where the force sensor ends, N.
+    /// Where the force sensor saturates, N.
     ceiling: f64,
 }
 
-impl Pull {
-    /// `None` where too few rows are left that pull, or the force hardly changes.
+impl ExpectedForce {
+    /// `None` where too few rows pull, or the force hardly changes.
     pub(super) fn of(campaign: &Campaign, masks: &[Vec<Range<usize>>]) -> Option<Self> {
         let total = campaign.samples();
         let stride = (total / ROWS).max(1);
@@ -67,7 +65,7 @@ impl Pull {
         let largest = forces.last().copied()?;
         let at = |share: f64| forces[(share * (forces.len() - 1) as f64) as usize];
         let (floor, top) = (at(0.002), at(0.998));
-        // Where the force hardly changes, as on a dead weight, no row lies above the lowest by a share of the largest.
+        // Where the force hardly changes, as on a dead weight, no row exceeds the lowest by a share of the largest.
         let span = (top - floor).max(top.abs());
         let at_largest = forces.iter().rev().take_while(|f| **f == largest).count();
         let clipped = at_largest >= 5 && at_largest as f64 >= CLIPPED * forces.len() as f64;
@@ -79,52 +77,43 @@ impl Pull {
             rows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), r| (l.min(r[k]), h.max(r[k])))
         };
         let ((lowest, highest), stroke) = (bounds(0), bounds(1));
-        let mut pull = Self {
-            terms: SVector::zeros(),
+        let mut expected = Self {
+            surface: ForceSurface::default(),
             pressure: highest.abs().max(lowest.abs()).max(f64::MIN_POSITIVE),
             stroke: (stroke.0, (stroke.1 - stroke.0).max(1e-9)),
             floor,
             span,
             ceiling: if clipped { largest } else { f64::INFINITY },
         };
-        pull.terms = pull.solved(&rows)?;
-        // What no step gave away, such as a wrong unit from the first row on, must not bend the surface.
+        expected.surface = expected.fitted(&rows)?;
+        // A wrong unit from the first row on shows no step; it must not bend the surface.
         for _ in 0..ROUNDS {
-            let off = |r: &[f64; 3]| (r[2] - pull.force(r[0], r[1])).abs();
+            let off = |r: &[f64; 3]| (r[2] - expected.force(r[0], r[1])).abs();
             let mut sizes: Vec<f64> = rows.iter().map(off).collect();
-            let middle = sizes.len() / 2;
-            let far = FAR * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+            let far = FAR * median(&mut sizes);
             let near: Vec<[f64; 3]> = rows.iter().copied().filter(|r| off(r) <= far).collect();
-            pull.terms = pull.solved(&near)?;
+            expected.surface = expected.fitted(&near)?;
         }
-        Some(pull)
+        Some(expected)
     }
 
-    /// The terms by least squares.
-    fn solved(&self, rows: &[[f64; 3]]) -> Option<SVector<f64, TERMS>> {
-        let (mut normal, mut moment) =
-            (SMatrix::<f64, TERMS, TERMS>::zeros(), SVector::<f64, TERMS>::zeros());
-        for [p, x, f] in rows {
-            let row = self.row(*p, *x);
-            normal += row * row.transpose();
-            moment += row * *f;
-        }
-        normal += SMatrix::from_diagonal(&(SVector::from(HELD) * rows.len() as f64));
-        Some(normal.cholesky()?.solve(&moment))
+    fn fitted(&self, rows: &[[f64; 3]]) -> Option<ForceSurface> {
+        let scaled = rows.iter().map(|[p, x, f]| (self.scaled(*p, *x), *f));
+        ForceSurface::fit(scaled, &HELD)
     }
 
-    fn row(&self, pressure: f64, stroke: f64) -> SVector<f64, TERMS> {
-        let (p, u) = (pressure / self.pressure, (stroke - self.stroke.0) / self.stroke.1);
-        SVector::from([p, p * u, p * u * u, p * u.powi(3), 1.0, u, u * u, u.powi(3)])
+    /// Pressure and stroke as shares of their ranges.
+    fn scaled(&self, pressure: f64, stroke: f64) -> [f64; 2] {
+        [pressure / self.pressure, (stroke - self.stroke.0) / self.stroke.1]
     }
 
-    /// N.
+    /// The force of the surface, N, at a pressure in Pa and a stroke in m.
     fn force(&self, pressure: f64, stroke: f64) -> f64 {
-        self.row(pressure, stroke).dot(&self.terms)
+        self.surface.force(self.scaled(pressure, stroke))
     }
 
-    /// Whether the force goes on through a stretch, and for a while after, as if its steps of pressure had not been.
-    pub(super) fn goes_on(&self, stretch: &Stretch, r: &Recording, force: &[f64]) -> bool {
+    /// Whether the force continues through a stretch, and for a while after, as if its pressure steps had not happened.
+    pub(super) fn continues(&self, stretch: &Stretch, r: &Recording, force: &[f64]) -> bool {
         let Range { start, end } = stretch.rows;
         let bridge = stretch.bridged(&r.time, &r.pressure);
         let inside = if start > 0 { start } else { end - 1 };

@@ -1,33 +1,34 @@
-//! What the recordings determine, and what they do not: correlations, and words with the reason.
+//! Which parameters the recordings determine: correlations, and the reason why a parameter is not identifiable.
 
 use std::fmt;
 
 use serde::Serialize;
 
-use super::prepared::Prepared;
-use super::uncertainty::{self, Root};
+use super::solution::Solution;
+use super::uncertainty::table_root;
+use crate::numerics::covariance_root::CovarianceRoot;
 
-/// How the numbers of a table at one pressure depend on each other.
+/// Correlations of the parameters of a table at one pressure.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[allow(non_snake_case)] // Units are spelled as units are.
 pub struct Correlations {
-    /// The pressure.
+    /// The pressure, kPa.
     pub pressure_kPa: f64,
     /// `P0`, `E_1` … `E_M`, and `k_F` where friction was fitted.
     pub names: Vec<String>,
-    /// Row after row; empty in a number whose deviation is zero, which depends on nothing.
+    /// Row after row; `None` for a parameter whose standard deviation is zero.
     pub matrix: Vec<Vec<Option<f64>>>,
 }
 
 impl Correlations {
     /// At a pressure in Pa. `root` is that of the fit's parameters.
     #[must_use]
-    pub fn at(prepared: &Prepared, root: &Root, pressure: f64) -> Self {
-        let root = uncertainty::of_table(prepared, root, &[pressure]);
-        let order = prepared.design.layout().order;
+    pub fn at(solution: &Solution, root: &CovarianceRoot, pressure: f64) -> Self {
+        let root = table_root(solution, root, &[pressure]);
+        let order = solution.problem.design.layout().order;
         let mut names = vec!["P0".to_owned()];
         names.extend((1..=order).map(|k| format!("E_{k}")));
-        if prepared.design.friction {
+        if solution.problem.design.friction {
             names.push("k_F".to_owned());
         }
         let n = names.len();
@@ -35,7 +36,7 @@ impl Correlations {
         Self { pressure_kPa: pressure / 1e3, names, matrix }
     }
 
-    /// The number that number `i` depends on most, and how.
+    /// The parameter with the largest correlation with parameter `i`, and that correlation.
     fn partner(&self, i: usize) -> Option<(&str, f64)> {
         let others = self.matrix[i].iter().enumerate().filter(|(j, _)| *j != i);
         others
@@ -44,17 +45,17 @@ impl Correlations {
     }
 }
 
-/// A number that the recordings leave open: its 95 % interval holds zero.
+/// A parameter that is not identifiable: its 95 % confidence interval contains zero.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[allow(non_snake_case)]
 pub struct NotDetermined {
-    /// `E_3`, `k_F`, …
+    /// The name of the parameter: `E_3`, `k_F`, …
     pub parameter: String,
-    /// Where.
+    /// The pressures at which it is not identifiable, kPa.
     pub pressures_kPa: Vec<f64>,
     /// Whether that is every tested pressure.
     pub everywhere: bool,
-    /// Why.
+    /// The reason, in words.
     pub reason: String,
 }
 
@@ -71,45 +72,44 @@ impl fmt::Display for NotDetermined {
     }
 }
 
-/// Two numbers correlated beyond this are told apart by a fifth of their deviations only.
-const TRADED: f64 = 0.9;
+/// Of two parameters correlated beyond this, less than a fifth of the variance is their own (1 − 0.9² = 0.19).
+const CORRELATED: f64 = 0.9;
 
-/// Every `E_k` and `k_F` whose 95 % interval holds zero, with the reason.
+/// Every `E_k` and `k_F` whose 95 % interval contains zero, with the reason.
 #[must_use]
-pub fn not_determined(prepared: &Prepared, root: &Root) -> Vec<NotDetermined> {
-    let levels = &prepared.pressures.levels;
-    let table = uncertainty::of_table(prepared, root, levels);
-    let at: Vec<Correlations> = levels.iter().map(|p| Correlations::at(prepared, root, *p)).collect();
-    let order = prepared.design.layout().order;
+pub(crate) fn not_determined(solution: &Solution, root: &CovarianceRoot) -> Vec<NotDetermined> {
+    let levels = &solution.problem.pressures.levels;
+    let table = table_root(solution, root, levels);
+    let at: Vec<Correlations> = levels.iter().map(|p| Correlations::at(solution, root, *p)).collect();
+    let order = solution.problem.design.layout().order;
     let values: Vec<Vec<f64>> = levels
         .iter()
         .map(|p| {
-            let (mut moduli, friction) = prepared.curves_at(*p);
+            let (mut moduli, friction) = solution.curves_at(*p);
             moduli.push(friction);
             moduli
         })
         .collect();
-    let contraction = 100.0 * prepared.points.stroke.span() / prepared.braid.rest_length();
-    let kinds = order + usize::from(prepared.design.friction);
+    let contraction = 100.0 * solution.problem.points.stroke.span() / solution.problem.braid.rest_length();
+    let kinds = order + usize::from(solution.problem.design.friction);
     let mut all = Vec::new();
     for k in 0..kinds {
         let loose: Vec<usize> = (0..levels.len())
             .filter(|i| !(values[*i][k].abs() > 1.96 * table.std(1 + k * levels.len() + i)))
             .collect();
         let Some(first) = loose.first() else { continue };
-        // The partner is told for the pressure at which it is closest.
+        // Of the pressures the one with the largest correlation is reported.
         let partner =
             loose.iter().filter_map(|i| at[*i].partner(1 + k)).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-        let dropped = k < order && k >= prepared.design.orthonormal.rank;
+        let dropped = k < order && k >= solution.problem.design.orthonormal.rank;
         let reason = match partner {
-            _ if dropped => "too few different strokes; it is set to zero".to_owned(),
-            Some((name, c)) if c.abs() > TRADED && k < order => format!(
-                "over a contraction of {contraction:.1} % an error in it is made good by {name} (correlation {c:.3}); a longer \
-                 stroke or a lower order would determine it"
+            _ if dropped => "too few different lengths; it is set to zero".to_owned(),
+            Some((name, c)) if c.abs() > CORRELATED && k < order => format!(
+                "over a contraction of {contraction:.1} % it is correlated with {name} ({c:.3}); record a longer stroke or use a lower order"
             ),
-            _ if k == order => "the loop is no wider than the noise".to_owned(),
+            _ if k == order => "the hysteresis loop is no wider than the noise".to_owned(),
             _ => format!(
-                "over a contraction of {contraction:.1} % it moves the force by less than its uncertainty"
+                "over a contraction of {contraction:.1} % its effect on the force is below the uncertainty"
             ),
         };
         all.push(NotDetermined {

@@ -2,11 +2,11 @@
 
 use super::blocks::Rows;
 use super::cells::{Want, Wanted, Words};
-use crate::counted::counted;
 use crate::error::{DataCode, Error, Result};
+use crate::pluralise::pluralise;
 
 /// The columns of one file, in its order.
-pub(super) type Sheet = Vec<(String, Column)>;
+pub(super) type ColumnTable = Vec<(String, Column)>;
 
 /// One column of a container.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,50 +21,50 @@ pub(super) enum Column {
     Other(String),
 }
 
-/// A failure inside a container, in the words of whoever read it.
+/// An error inside a binary file, with the reader's message.
 pub(super) fn damaged(what: impl std::fmt::Display) -> Error {
     Error::new(DataCode::RecordingContainer, what.to_string())
 }
 
 /// The columns of a matrix that is stored column after column, called `name(:,k)` as MATLAB does; a vector is one column.
-pub(super) fn matrix(name: &str, rows: usize, wide: usize, values: Vec<f64>, sheet: &mut Sheet) {
+pub(super) fn matrix(name: &str, rows: usize, wide: usize, values: Vec<f64>, table: &mut ColumnTable) {
     /// A wider matrix is a picture or a table of coefficients, no recording.
     const WIDEST: usize = 1000;
     if values.is_empty() || rows.checked_mul(wide) != Some(values.len()) {
         return;
     }
     if rows == 1 || wide == 1 {
-        sheet.push((name.to_owned(), Column::Numbers(values)));
+        table.push((name.to_owned(), Column::Numbers(values)));
     } else if wide <= WIDEST {
         let named = |(k, c): (usize, &[f64])| (format!("{name}(:,{})", k + 1), Column::Numbers(c.to_vec()));
-        sheet.extend(values.chunks_exact(rows).enumerate().map(named));
+        table.extend(values.chunks_exact(rows).enumerate().map(named));
     }
 }
 
 /// The same columns by the rest of their names, where all names share what stands before a point: the fields of the one struct,
 /// group or table that a file holds.
-pub(super) fn without_common_prefix(mut sheet: Sheet) -> Sheet {
+pub(super) fn without_common_prefix(mut table: ColumnTable) -> ColumnTable {
     loop {
         let Some(prefix) =
-            sheet.first().and_then(|(name, _)| name.split_once('.')).map(|(p, _)| format!("{p}."))
+            table.first().and_then(|(name, _)| name.split_once('.')).map(|(p, _)| format!("{p}."))
         else {
-            return sheet;
+            return table;
         };
-        if !sheet.iter().all(|(name, _)| name.len() > prefix.len() && name.starts_with(&prefix)) {
-            return sheet;
+        if !table.iter().all(|(name, _)| name.len() > prefix.len() && name.starts_with(&prefix)) {
+            return table;
         }
-        for (name, _) in &mut sheet {
+        for (name, _) in &mut table {
             name.drain(..prefix.len());
         }
     }
 }
 
 /// Takes the wanted columns, as numbers in SI or as words. Where text errors name a line, these name the row, counted from 1.
-pub(super) fn select(sheet: &Sheet, wanted: &[Wanted]) -> Result<Rows> {
+pub(super) fn select(table: &ColumnTable, wanted: &[Wanted]) -> Result<Rows> {
     let mut rows = Rows::default();
     let mut length: Option<(usize, &str)> = None;
     for wanted in wanted {
-        let Some((name, column)) = sheet.get(wanted.index) else { continue };
+        let Some((name, column)) = table.get(wanted.index) else { continue };
         let count = match column {
             Column::Numbers(n) => n.len(),
             Column::Texts(t) => t.len(),
@@ -81,7 +81,7 @@ pub(super) fn select(sheet: &Sheet, wanted: &[Wanted]) -> Result<Rows> {
             Some((n, first)) if n != count => {
                 return Err(Error::new(
                     DataCode::RecordingWrongWidth,
-                    format!("`{name}` has {} and `{first}` has {n}", counted(count, "row")),
+                    format!("`{name}` has {} and `{first}` has {n}", pluralise(count, "row")),
                 )
                 .help("all columns of a recording are equally long"));
             }

@@ -1,13 +1,13 @@
-//! What is wrong with a TOML file, in the words of whoever wrote it and not in those of the parser.
+//! Errors of TOML files in terms of the file, not of the parser.
 
 use crate::error::{Code, Error, nearest};
 
 /// The parser's complaint about `text` as an error with its line.
 pub fn toml_error(code: impl Into<Code>, text: &str, error: &toml::de::Error) -> Error {
     let said = error.message().trim().replace('\n', "; ");
-    let (cause, help) = in_words(&said);
+    let (cause, help) = explained(&said);
     let mut ours = Error::new(code, cause);
-    // What is missing is missing in no line.
+    // A missing field has no line.
     if let Some(span) = error.span().filter(|_| !said.starts_with("missing field")) {
         let before = text.get(..span.start).unwrap_or(text);
         ours = ours.line(before.matches('\n').count() as u64 + 1);
@@ -18,8 +18,8 @@ pub fn toml_error(code: impl Into<Code>, text: &str, error: &toml::de::Error) ->
     }
 }
 
-/// Cause and advice.
-fn in_words(said: &str) -> (String, Option<String>) {
+/// Cause and remedy.
+fn explained(said: &str) -> (String, Option<String>) {
     let quoted =
         |text: &str| -> Vec<String> { text.split('`').skip(1).step_by(2).map(str::to_owned).collect() };
     if let Some((found, wanted)) =

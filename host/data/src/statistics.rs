@@ -1,0 +1,59 @@
+//! Order statistics: the median and other quantiles, by partial sorting in linear time.
+//!
+//! Values that are not numbers sort to the ends ([`f64::total_cmp`]), so a few of them do not move a median.
+
+/// The value of a given rank, 0 for the smallest; the largest where the rank lies beyond the end, and 0 of no values.
+/// Reorders the values.
+///
+/// ```
+/// use pam_data::statistics::ranked;
+/// assert_eq!(ranked(&mut [3.0, 1.0, 2.0], 1), 2.0);
+/// assert_eq!(ranked(&mut [3.0, 1.0, 2.0], 9), 3.0);
+/// assert_eq!(ranked(&mut [], 0), 0.0);
+/// ```
+#[must_use]
+pub fn ranked(values: &mut [f64], rank: usize) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let rank = rank.min(values.len() - 1);
+    *values.select_nth_unstable_by(rank, f64::total_cmp).1
+}
+
+/// The median; of an even number of values the upper of the two in the middle, and 0 of no values. Reorders the values.
+///
+/// ```
+/// use pam_data::statistics::median;
+/// assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
+/// assert_eq!(median(&mut [4.0, 3.0, 1.0, 2.0]), 3.0);
+/// ```
+#[must_use]
+pub fn median(values: &mut [f64]) -> f64 {
+    ranked(values, values.len() / 2)
+}
+
+/// The value that is nearest in rank to a quantile, `share` from 0 (smallest) to 1 (largest); 0 of no values. Reorders the
+/// values.
+///
+/// ```
+/// use pam_data::statistics::quantile;
+/// let mut values: Vec<f64> = (0..=100).map(f64::from).collect();
+/// assert_eq!(quantile(&mut values, 0.95), 95.0);
+/// ```
+#[must_use]
+pub fn quantile(values: &mut [f64], share: f64) -> f64 {
+    ranked(values, (values.len().saturating_sub(1) as f64 * share).round() as usize)
+}
+
+/// Standard deviation of a normal distribution whose absolute values have this median.
+///
+/// The median of `|x|` is `Φ⁻¹(3/4) σ = 0.674 489 75 σ` (the median absolute deviation; P. J. Rousseeuw and C. Croux,
+/// J. Am. Stat. Assoc. 88 (1993) 1273, doi 10.1080/01621459.1993.10476408).
+///
+/// ```
+/// assert!((pam_data::statistics::deviation_from_median(0.674_489_75) - 1.0).abs() < 1e-12);
+/// ```
+#[must_use]
+pub fn deviation_from_median(median_of_sizes: f64) -> f64 {
+    median_of_sizes / 0.674_489_75
+}

@@ -1,0 +1,206 @@
+//! The problem that a fit solves: points, nodes, dimensions and the linear problem that they make. Solving does not change it.
+
+use model_core::braid::{Braid, Geometry};
+
+use super::basis::{Columns, Orthonormal, columns};
+use super::design::{Bin, Design, Layout, Row};
+use super::dimensions::{Adjusted, Mounting};
+use super::nodes::Pressures;
+use super::points::{Point, Points};
+use super::screen::{Clip, PointUse, Screen};
+use super::smoothing::Smoothing;
+use crate::numerics::median;
+use crate::numerics::spline_basis::SplineBasis;
+use crate::numerics::symmetric::Symmetric;
+
+/// A campaign as a linear problem.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// Means over short pieces of motion, in time order.
+    pub points: Points,
+    /// The tested pressures and the nodes of the curves over pressure, Pa.
+    pub pressures: Pressures,
+    /// The muscle at rest as the muscle description has it.
+    pub nominal: Geometry,
+    /// The muscle at rest as fitted: the nominal one unless the dimensions are fitted too.
+    pub geometry: Geometry,
+    /// The kinematics of `geometry`.
+    pub braid: Braid<f64>,
+    /// The correction of each point's stroke, m: zero unless the lengths of mountings are fitted.
+    pub shift: Vec<f64>,
+    /// Fitted dimensions and mounting lengths.
+    pub adjusted: Vec<Adjusted>,
+    /// Mountings with their correction.
+    pub mountings: Vec<Mounting>,
+    /// The lower and the upper end of the force sensor's range, where rows stand at them.
+    pub clips: (Option<Clip>, Option<Clip>),
+    /// The linear problem; one row per point, in the same order.
+    pub design: Design,
+}
+
+/// Bins of pressure; the curves are evaluated once per bin.
+const BINS: usize = 1024;
+
+/// What a problem is made of before its linear form exists.
+pub(super) struct Ingredients {
+    pub points: Points,
+    pub pressures: Pressures,
+    pub geometry: Geometry,
+    pub braid: Braid<f64>,
+    pub clips: (Option<Clip>, Option<Clip>),
+}
+
+impl Problem {
+    /// Builds the linear problem of an elastic polynomial of this order.
+    pub(super) fn new(from: Ingredients, screen: &Screen, order: usize) -> Self {
+        let Ingredients { points, pressures, geometry, braid, clips } = from;
+        let shift = vec![0.0; points.list.len()];
+        let design = design(&points, &pressures, &braid, &shift, screen, order);
+        Self {
+            points,
+            pressures,
+            nominal: geometry,
+            geometry,
+            braid,
+            shift,
+            adjusted: Vec::new(),
+            mountings: Vec::new(),
+            clips,
+            design,
+        }
+    }
+
+    /// The same points with an elastic polynomial of another order.
+    pub(super) fn of_order(&self, screen: &Screen, order: usize) -> Self {
+        let design = design(&self.points, &self.pressures, &self.braid, &self.shift, screen, order);
+        Self { design, ..self.clone() }
+    }
+
+    /// The tested level, or the interval of a continuous range, that a point belongs to.
+    pub(super) fn group_of(&self, point: usize) -> usize {
+        self.design.bins[self.design.rows[point].bin as usize].group as usize
+    }
+
+    /// Where pressure moves, mid-lines are cut into hundredths of its range; levels are not.
+    pub(super) fn fine_pressure(&self, pressure: f64) -> u32 {
+        let range = self.points.pressure;
+        if self.pressures.held { 0 } else { ((pressure - range.low) / range.span().max(1.0) * 100.0) as u32 }
+    }
+
+    /// The median ratio of the force to what the braid alone would make of the pressure (`P g`), over points above half of the
+    /// largest force. `None` where there are none.
+    pub(super) fn share_of_braid(&self) -> Option<f64> {
+        let shares =
+            self.points.list.iter().filter(|p| p.force > 0.5 * self.points.force.high).filter_map(|p| {
+                let of_braid = p.pressure * columns(&self.braid, p.stroke).area;
+                (of_braid > 0.0).then(|| p.force / of_braid)
+            });
+        let mut shares: Vec<f64> = shares.collect();
+        (!shares.is_empty()).then(|| median(&mut shares))
+    }
+
+    /// `P0` of a solution, Pa.
+    pub(super) fn deadband(&self, parameters: &[f64]) -> f64 {
+        self.design.origin + parameters[Layout::DEADBAND]
+    }
+
+    /// The penalty on bending at these parameters.
+    pub(super) fn penalty(&self, parameters: &[f64], weights: &[f64], smoothing: Smoothing) -> Symmetric {
+        let data = self.design.normal(parameters, weights);
+        self.design.penalty(&data, smoothing.elastic, smoothing.friction)
+    }
+
+    /// The solution from a start nearby, after at most `steps` steps of Gauss and Newton.
+    pub(super) fn solve(
+        &self,
+        start: &[f64],
+        weights: &[f64],
+        smoothing: Smoothing,
+        steps: usize,
+    ) -> Vec<f64> {
+        let penalty = self.penalty(start, weights, smoothing);
+        let mut parameters = start.to_vec();
+        self.design.solve(&mut parameters, weights, &penalty, steps);
+        parameters
+    }
+}
+
+fn design(
+    points: &Points,
+    pressures: &Pressures,
+    braid: &Braid<f64>,
+    shift: &[f64],
+    screen: &Screen,
+    order: usize,
+) -> Design {
+    let basis = SplineBasis::new(&pressures.nodes);
+    let columns: Vec<Columns> =
+        points.list.iter().zip(shift).map(|(p, s)| columns(braid, p.stroke + s)).collect();
+    let orthonormal = Orthonormal::over(&spread(points, &columns, &screen.used), order);
+    let range = points.pressure;
+    let per_bin = if range.span() > 0.0 { BINS as f64 / range.span() } else { 0.0 };
+    let mut sums = vec![(0.0, 0.0); BINS + 1];
+    let raw = |p: f64| (((p - range.low) * per_bin) as usize).min(BINS);
+    for p in &points.list {
+        let s = &mut sums[raw(p.pressure)];
+        s.0 += f64::from(p.rows) * p.pressure;
+        s.1 += f64::from(p.rows);
+    }
+    let mut index = vec![0_u32; sums.len()];
+    let mut bins = Vec::new();
+    for (to, (sum, n)) in index.iter_mut().zip(&sums) {
+        if *n > 0.0 {
+            *to = bins.len() as u32;
+            let mean = sum / n;
+            bins.push(Bin { phi: basis.at(mean), group: pressures.nearest(mean) });
+        }
+    }
+    let directed = both_directions(points, screen);
+    let rows = points
+        .list
+        .iter()
+        .zip(&columns)
+        .map(|(p, c)| {
+            let direction = if directed { p.direction } else { 0.0 };
+            Row::new(p.pressure, p.force, direction, c, &orthonormal, index[raw(p.pressure)])
+        })
+        .collect();
+    Design::new(basis, orthonormal, rows, bins, pressures.levels.len(), directed)
+}
+
+/// Whether enough points move in each direction to separate friction from elasticity.
+fn both_directions(points: &Points, screen: &Screen) -> bool {
+    let rows = |s: f64| {
+        let take = |(p, u): &(&Point, &PointUse)| {
+            p.direction == s && matches!(u, PointUse::Fitted | PointUse::NearReversal)
+        };
+        points.list.iter().zip(&screen.used).filter(take).map(|(p, _)| f64::from(p.rows)).sum::<f64>()
+    };
+    let (up, down) = (rows(1.0), rows(-1.0));
+    up.min(down) > 0.02 * (up + down) && up.min(down) >= 3.0
+}
+
+/// Columns at strokes spread evenly over the tested range, so that the time spent at a stroke does not matter. Strokes that differ by
+/// noise only count once.
+fn spread(points: &Points, columns: &[Columns], used: &[PointUse]) -> Vec<Columns> {
+    const PLACES: usize = 400;
+    /// Two readings of one length differ by less than this many standard deviations.
+    const APART: f64 = 12.0;
+    let range = points.stroke;
+    let per_place = if range.span() > 0.0 { PLACES as f64 / range.span() } else { 0.0 };
+    let mut taken = vec![None; PLACES + 1];
+    for ((p, c), u) in points.list.iter().zip(columns).zip(used) {
+        if matches!(u, PointUse::Fitted | PointUse::NearReversal) {
+            taken[((p.stroke - range.low) * per_place) as usize] = Some((p.stroke, *c));
+        }
+    }
+    let mut last = f64::NEG_INFINITY;
+    let apart = |(stroke, columns): (f64, Columns)| {
+        let far = stroke - last > APART * points.stroke_noise;
+        far.then(|| {
+            last = stroke;
+            columns
+        })
+    };
+    taken.into_iter().flatten().filter_map(apart).collect()
+}
