@@ -26,7 +26,7 @@ pub fn page(d: &Diagnosis, geometry: &Geometry, campaign: &Campaign) -> Page {
             format!("{} rows", fixed(d.samples as f64, 0))
         },
     );
-    head(&mut page, d);
+    header(&mut page, d);
     page.push(recommendation(d));
     page.push(located::section(d));
     for missing in &d.missing {
@@ -61,7 +61,7 @@ fn percent(part: f64, whole: f64) -> String {
     if whole > 0.0 { figures(100.0 * part / whole, 2) } else { "–".into() }
 }
 
-fn head(page: &mut Page, d: &Diagnosis) {
+fn header(page: &mut Page, d: &Diagnosis) {
     let tone = match d.verdict() {
         Verdict::Consistent if d.judged() => Tone::Good,
         Verdict::Unexplained => Tone::Bad,
