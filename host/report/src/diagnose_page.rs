@@ -170,7 +170,12 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
     for p in &m.parameters {
         let std = p.std.map_or("not identifiable".into(), |s| figures(wording::HALF_95 * s, 2));
         let unit = if p.unit.is_empty() { "–".to_owned() } else { p.unit.clone() };
-        let remark = if p.outside_known_range { "outside the published range" } else { "" };
+        // Of alternative laws those that were not chosen are zero.
+        let (std, remark) = match p {
+            p if p.value == 0.0 => ("–".to_owned(), "not used"),
+            p if p.outside_known_range => (std, "outside the published range"),
+            _ => (std, ""),
+        };
         let letter = candidate
             .and_then(|c| c.info().parameters.iter().find(|i| i.name == p.name))
             .map_or("–", |i| i.letter);
