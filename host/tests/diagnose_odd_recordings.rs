@@ -407,7 +407,10 @@ fn dead_sensors_are_told() {
             let answer: Value = serde_json::from_str(&json).unwrap();
             assert_eq!(answer["judged"], false, "{what}: {}", answer["remarks"]);
             let page = std::fs::read_to_string(folder.join("r.html")).unwrap();
-            assert!(page.contains("nothing could be judged") && !page.contains("recordings agree"), "{what}");
+            assert!(
+                page.contains("do not allow a judgement") && !page.contains("recordings agree"),
+                "{what}"
+            );
             // What it was made from.
             assert!(
                 sheets.iter().enumerate().all(|(i, _)| page.contains(&format!("<dt>{i}</dt>"))),

@@ -188,3 +188,17 @@ impl Remark {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_remark_refuses_the_effect_it_is_about_and_those_it_was_confused_with() {
+        let rivals = Refusal::Rivals { share: 0.5, others: vec!["leak".into(), "inertia".into()] };
+        let remark = Remark::Refused { effect: "backlash".into(), why: rivals };
+        assert!(remark.refuses("backlash") && remark.refuses("leak") && !remark.refuses("gravity"));
+        let alone = Remark::Refused { effect: "gauge-gain".into(), why: Refusal::SlowDrift };
+        assert!(alone.refuses("gauge-gain") && !alone.refuses("gain") && !Remark::HeldLength.refuses("gain"));
+    }
+}

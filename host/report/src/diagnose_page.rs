@@ -28,7 +28,7 @@ pub fn page(d: &Diagnosis, geometry: &Geometry, campaign: &Campaign) -> Page {
             format!("{} rows", fixed(d.samples as f64, 0))
         },
     );
-    head(&mut page, d);
+    header(&mut page, d);
     page.push(recommendation(d));
     page.push(history::section(d.history.as_ref()));
     page.push(located::section(d));
@@ -64,7 +64,7 @@ fn percent(part: f64, whole: f64) -> String {
     if whole > 0.0 { figures(100.0 * part / whole, 2) } else { "–".into() }
 }
 
-fn head(page: &mut Page, d: &Diagnosis) {
+fn header(page: &mut Page, d: &Diagnosis) {
     let tone = match d.verdict() {
         Verdict::Consistent if d.judged() => Tone::Good,
         Verdict::Unexplained => Tone::Bad,
@@ -174,7 +174,12 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
     for p in &m.parameters {
         let std = p.std.map_or("not identifiable".into(), |s| figures(wording::HALF_95 * s, 2));
         let unit = if p.unit.is_empty() { "–".to_owned() } else { p.unit.clone() };
-        let remark = if p.outside_known_range { "outside the published range" } else { "" };
+        // Of alternative laws those that were not chosen are zero.
+        let (std, remark) = match p {
+            p if p.value == 0.0 => ("–".to_owned(), "not used"),
+            p if p.outside_known_range => (std, "outside the published range"),
+            _ => (std, ""),
+        };
         let letter = candidate
             .and_then(|c| c.info().parameters.iter().find(|i| i.name == p.name))
             .map_or("–", |i| i.letter);

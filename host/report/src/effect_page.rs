@@ -144,8 +144,8 @@ pub fn chapter(trace: &Trace, figure: &super::Figure, all: &[(Trace, super::Figu
     );
     for table in [symbols(info), parameters(trace)] {
         let _ = writeln!(text, "{}:\n", table.caption);
-        let _ = writeln!(text, "| {} |", table.head.join(" | "));
-        let _ = writeln!(text, "|{}", " --- |".repeat(table.head.len()));
+        let _ = writeln!(text, "| {} |", table.header.join(" | "));
+        let _ = writeln!(text, "|{}", " --- |".repeat(table.header.len()));
         for row in &table.rows {
             let cells: Vec<String> = row.iter().map(|c| super::inline_markup::markdown(c)).collect();
             let _ = writeln!(text, "| {} |", cells.join(" | "));

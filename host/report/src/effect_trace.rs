@@ -141,24 +141,24 @@ impl Demonstration {
         let with: Vec<f64> = self.force.iter().zip(&trace.force).map(|(f, d)| f + d).collect();
         let n = self.loops;
         let done = Panel::new(Axis::new("time", "s"), Axis::new("contraction ΔL/L_{0}", "%"))
-            .titled("What is done")
+            .titled("Stroke")
             .line("", Colour::Muted, &time, &contraction);
         let filled = Panel::new(Axis::new("time", "s"), Axis::new("pressure P", "kPa").from_zero())
-            .titled("…and filled")
+            .titled("Pressure")
             .line("", Colour::Series(2), &time, &pressure);
         let added = Panel::new(Axis::new("time", "s"), Axis::new("added force", "N").from_zero())
-            .titled("What the effect adds")
+            .titled("Force of the effect")
             .line("the effect alone", Colour::Series(1), &time, &trace.force);
         let loops = Panel::new(Axis::new("contraction ΔL/L_{0}", "%"), Axis::new("force F", "N"))
-            .titled("The loops at 345 kPa")
+            .titled("Loops at 345 kPa")
             .line("with the effect", Colour::Series(0), &contraction[..n], &with[..n])
             .dashes("without", Colour::Muted, &contraction[..n], &self.force[..n]);
         Figure::multiples(
             trace.candidate.name(),
-            format!("The trace of {}", trace.candidate.name()),
+            format!("Trace of {}", trace.candidate.name()),
             format!(
-                "The third panel is the effect alone, to be held against motion and pressure in the first two; the fourth is \
-                 what a load line looks like with it. Drawn at {} % of the blocked force, which is more than is usual.",
+                "Stroke and pressure of the demonstration, the force of the effect alone, and the loops with and without it. The \
+                 effect is scaled to {} % of the blocked force, more than is usual.",
                 100.0 * DRAWN_AT
             ),
             vec![done, filled, added, loops],

@@ -36,7 +36,7 @@ pub fn page(fit: &Fit, campaign: &Campaign, options: &Options) -> Page {
             if options.tip_correction { ", tip correction" } else { "" }
         ),
     );
-    head(&mut page, &view);
+    header(&mut page, &view);
     page.push(loads::overview(&view));
     page.push(remarks(&view));
     page.push(loads::section(&view));
@@ -60,7 +60,7 @@ fn tone(percent: f64, good: f64, bad: f64) -> Tone {
     }
 }
 
-fn head(page: &mut Page, view: &View<'_>) {
+fn header(page: &mut Page, view: &View<'_>) {
     let s = &view.fit.summary;
     let unseen = s.left_out_pressure_mean_error_pct;
     let mut verdict = format!(

@@ -145,8 +145,8 @@ fn table(table: &Table) -> Markup {
                 @if !table.caption.is_empty() { caption { (inline_markup::html(&table.caption)) } }
                 thead {
                     tr {
-                        @for (i, head) in table.head.iter().enumerate() {
-                            th scope="col" class=[right(table, i)] { (inline_markup::html(head)) }
+                        @for (i, header) in table.header.iter().enumerate() {
+                            th scope="col" class=[right(table, i)] { (inline_markup::html(header)) }
                         }
                     }
                 }

@@ -73,9 +73,9 @@ fn table(out: &mut String, table: &Table) {
         let cells: Vec<String> = cells.iter().map(|c| inline_markup::markdown(c)).collect();
         format!("| {} |\n", cells.join(" | "))
     };
-    out.push_str(&line(&table.head));
+    out.push_str(&line(&table.header));
     out.push('|');
-    for i in 0..table.head.len() {
+    for i in 0..table.header.len() {
         out.push_str(if i == 0 { " --- |" } else { " ---: |" });
     }
     out.push('\n');

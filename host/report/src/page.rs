@@ -17,7 +17,7 @@ pub enum Tone {
     Bad,
 }
 
-/// One number of the summary head.
+/// One number of the summary header.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fact {
     /// What it is.
@@ -36,16 +36,16 @@ pub struct Table {
     /// What it shows.
     pub caption: String,
     /// Heads of the columns, with units.
-    pub head: Vec<String>,
+    pub header: Vec<String>,
     /// Rows of cells.
     pub rows: Vec<Vec<String>>,
 }
 
 impl Table {
     /// An empty table.
-    pub fn new(caption: impl Into<String>, head: &[&str]) -> Self {
-        let head = head.iter().map(|h| (*h).to_owned()).collect();
-        Self { caption: caption.into(), head, rows: Vec::new() }
+    pub fn new(caption: impl Into<String>, header: &[&str]) -> Self {
+        let header = header.iter().map(|h| (*h).to_owned()).collect();
+        Self { caption: caption.into(), header, rows: Vec::new() }
     }
 
     /// With one more row.
@@ -54,9 +54,9 @@ impl Table {
     }
 
     fn drop_empty_columns(&mut self) {
-        for column in (1..self.head.len()).rev() {
+        for column in (1..self.header.len()).rev() {
             if self.rows.iter().all(|r| r.get(column).is_none_or(String::is_empty)) {
-                self.head.remove(column);
+                self.header.remove(column);
                 self.rows.iter_mut().filter(|r| column < r.len()).for_each(|r| drop(r.remove(column)));
             }
         }
@@ -194,7 +194,7 @@ impl Page {
         self.verdict = Some((tone, text.into()));
     }
 
-    /// Adds a number to the summary head.
+    /// Adds a number to the summary header.
     pub fn fact(
         &mut self,
         label: impl Into<String>,
@@ -245,7 +245,7 @@ mod tests {
         let mut section = Section::new("x");
         section.table(table);
         let Block::Table(kept) = &section.blocks[0] else { panic!("a table") };
-        assert_eq!(kept.head, ["name", "value"]);
+        assert_eq!(kept.header, ["name", "value"]);
         assert_eq!(kept.rows, [["a", "1"], ["b", ""]]);
     }
 }

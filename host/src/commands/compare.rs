@@ -1,4 +1,4 @@
-//! `host compare`: two recordings, in numbers and in a picture.
+//! `host compare`: the difference between two recordings.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -34,7 +34,7 @@ pub struct Arguments {
     /// The muscle's description, where files give lengths or contractions in place of a stroke.
     #[arg(long, value_name = "MUSCLE.toml")]
     muscle: Option<PathBuf>,
-    /// How to read files that are not in the usual form: an import description.
+    /// An import description, for files that are not in the standard form.
     #[arg(long, value_name = "IMPORT.toml")]
     import: Option<PathBuf>,
     /// Print JSON.
@@ -51,7 +51,7 @@ impl Arguments {
     /// Files that cannot be read or written, recordings without a common stretch.
     pub fn run(self, console: &Console) -> Result<()> {
         let taken = to_standard_output(&[("--json", printed(self.json)), ("--report", self.reports.file())])?;
-        // Whoever asks for JSON is a program.
+        // With JSON the caller is a program.
         let watched = if self.json { Console::silent() } else { console.clone() };
         let progress = Arc::new(ProgressLine::new(&watched, "reading"));
         let sizes = [&self.a, &self.b].into_iter().filter_map(|f| std::fs::metadata(f).ok());

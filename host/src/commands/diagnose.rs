@@ -1,4 +1,4 @@
-//! `host diagnose`: what the model leaves out of recordings, where, and how sure that is; with `--reference`, what has changed.
+//! `host diagnose`: which effects the model lacks, where it is wrong, and how certain that is; with `--reference`, what has changed.
 
 mod reference;
 
@@ -46,32 +46,32 @@ pub struct Arguments {
     changed: reference::Options,
     #[command(flatten)]
     recordings: Recordings,
-    /// The table whose misfit is asked about; without it one is fitted to the recordings.
+    /// A table whose error on the recordings is reported; by default one is fitted.
     #[arg(long, value_name = "T.pam")]
     table: Option<PathBuf>,
-    /// A check of the bench (dead weights, rigid bar, reference gauge): what it measures is known before anything is fitted. May be
-    /// given more than once.
+    /// A check of the bench (dead weights, rigid bar, reference gauge). The recordings are corrected for what it measures. May be given
+    /// more than once.
     #[arg(long, value_name = "CHECK.csv")]
     check: Vec<PathBuf>,
-    /// Effects that are known to be there, such as a joint's play: they are fitted whatever the evidence and go into the table,
-    /// nothing else is searched for, and the answer says whether the recordings support them. `host effects` lists the names.
+    /// Effects that are known to be present, such as backlash. They are fitted and stored in the table in any case, no others are
+    /// searched for, and the answer says whether the recordings support them. `host effects` lists the names.
     #[arg(long, value_name = "EFFECT", value_delimiter = ',')]
     with: Vec<String>,
-    /// Write the table refitted beside the named effects; corrections of the bench stay apart in it.
+    /// Write the table refitted with the named effects; corrections of the bench are stored separately.
     #[arg(short, long, value_name = "T2.pam")]
     output: Option<PathBuf>,
-    /// Write the answer into a file as JSON; `-` is standard output.
+    /// Write the diagnosis as JSON to a file; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     #[command(flatten)]
     reports: Reports,
-    /// Write the protocol of the recording that would tell confusable effects apart.
+    /// Write the protocol of the next experiment, which separates confusable effects.
     #[arg(long, value_name = "P.toml")]
     next: Option<PathBuf>,
 }
 
 impl Arguments {
-    /// Does what was asked.
+    /// Runs the command.
     ///
     /// # Errors
     /// Files that cannot be read or written, recordings without force.
@@ -92,7 +92,7 @@ impl Arguments {
                 .help("give --muscle M.toml"));
         };
         let muscle = MuscleDescription::read(path)?;
-        // Whoever asks for JSON is a program, or will look at that.
+        // With JSON the caller is a program.
         let watched = if self.json.is_some() { Console::silent() } else { console.clone() };
         let (campaign, hashes) = self.recordings.read_hashed(Reader::of(&muscle), &watched)?;
         for warning in &campaign.warnings {
@@ -116,7 +116,7 @@ impl Arguments {
             options.progress.stage("fitting the table with the named effects", 0);
             refitted_table::refit(&campaign, &muscle, &answer)
         });
-        // The line of progress goes before anything else is said.
+        // The progress line is removed before other output.
         drop(options);
         console.detail(format!("diagnosed in {:.3} s", diagnosed.as_secs_f64()));
         let _turn = Turn::of([
@@ -128,7 +128,7 @@ impl Arguments {
         ]);
         match refitted {
             Some(Ok(refitted)) => self.with_model(console, &campaign, hashes, refitted, &mut answer)?,
-            // A table was asked for: then its absence is a failure. For advice alone it is not.
+            // Without a requested table a failed refit only costs the advice.
             Some(Err(e)) if self.output.is_some() => return Err(e),
             Some(Err(e)) => answer.remarks.push(Remark::NoAdvice(e.to_string())),
             None => {}

@@ -1,4 +1,4 @@
-//! `host effects`: what a diagnosis can find, explained.
+//! `host effects`: the library of effects.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -18,10 +18,10 @@ use pam_report::{effect_page, inline_markup};
     after_help = "Examples:\n  host effects\n  host effects mullins-softening\n  host effects mullins-softening --report mullins.html"
 )]
 pub struct Arguments {
-    /// The effect to explain; all are listed where none is named.
+    /// The effect to explain; without it all are listed.
     #[arg(value_name = "EFFECT")]
     effect: Option<String>,
-    /// Write a page with a picture of the effect's trace.
+    /// Write a page with a plot of the effect's trace.
     #[arg(long, value_name = "F.html", requires = "effect")]
     report: Option<PathBuf>,
     /// Write the book's chapters on all effects into a folder.
@@ -33,7 +33,7 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// Does what was asked.
+    /// Runs the command.
     ///
     /// # Errors
     /// An effect that does not exist, or a file that cannot be written.
@@ -80,7 +80,7 @@ fn catalogue() -> Result<Vec<(pam_report::effect_trace::Trace, pam_report::Figur
 /// The effect of this name.
 ///
 /// # Errors
-/// There is none; the nearest is suggested.
+/// An unknown name; the nearest is suggested.
 pub(super) fn named(name: &str) -> Result<Candidate> {
     Candidate::from_name(name).ok_or_else(|| unknown(name))
 }
@@ -88,7 +88,7 @@ pub(super) fn named(name: &str) -> Result<Candidate> {
 fn unknown(name: &str) -> Error {
     let near = nearest(name, Candidate::all().map(Candidate::name));
     let help = near.map_or(String::new(), |n| format!("did you mean `{n}`? "));
-    Error::new(DataCode::CallInvalid, "there is no such effect")
+    Error::new(DataCode::CallInvalid, "unknown effect")
         .value(name)
         .help(format!("{help}`host effects` lists all"))
 }

@@ -1,4 +1,4 @@
-//! `host evaluate`: errors on recordings that a fit has not seen.
+//! `host evaluate`: errors on held-out recordings.
 
 use std::path::PathBuf;
 
@@ -25,22 +25,22 @@ use pam_data::recording::{Campaign, Reader};
     host evaluate --muscle mini.toml loops/*.csv\n  \
     host evaluate --muscle short.toml --muscle long.toml --import festo.toml \\\n      \
         --fit-geometry --fit-lengths --published bolen-10mm settled_points.csv\n\n\
-    Each run (or contraction) is left out in turn, the rest is fitted, and what was left out is scored. With several \
-    muscles of one stock each is also predicted from the tables of the others, with an end effect that all lengths share.")]
+    Each run (or contraction) is held out in turn, the rest is fitted, and the held-out part is scored. With several \
+    muscles of one stock each is also predicted from the tables of the others, with a common end effect.")]
 pub struct Arguments {
     /// A muscle's description; several, where the import description selects each muscle's rows.
     #[arg(long, required = true, value_name = "MUSCLE.toml")]
     muscle: Vec<PathBuf>,
     #[command(flatten)]
     recordings: Recordings,
-    /// What is left out in turn.
+    /// What is held out in turn.
     #[arg(long, value_enum, value_name = "WHAT", default_value_t = LeaveOut::Both)]
     leave_out: LeaveOut,
     /// Order M of the elastic polynomial.
     #[arg(long, default_value_t = 4, value_name = "M", allow_negative_numbers = true,
         value_parser = clap::value_parser!(u8).range(1..=6))]
     order: u8,
-    /// Find effective dimensions too, within bounds.
+    /// Fit effective dimensions too, within bounds.
     #[arg(long)]
     fit_geometry: bool,
     /// Correct the length of every mounting by up to 1 mm.
@@ -49,7 +49,7 @@ pub struct Arguments {
     /// A published formula to compare with.
     #[arg(long, value_name = "NAME")]
     published: Option<String>,
-    /// Write the figures into a file as JSON; `-` is standard output.
+    /// Write the errors as JSON to a file; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -60,7 +60,7 @@ enum LeaveOut {
     Runs,
     /// Every contraction.
     Contractions,
-    /// One after the other.
+    /// Both, one after the other.
     Both,
 }
 
@@ -86,7 +86,7 @@ impl Arguments {
         };
         let watched = if self.json.is_some() { Console::silent() } else { console.clone() };
         let splits = if self.leave_out == LeaveOut::Both { 2 } else { 1 };
-        let progress = ProgressLine::new(&watched, "leaving out");
+        let progress = ProgressLine::new(&watched, "holding out");
         progress.total(splits * self.muscle.len() as u64);
         let mut cases = Vec::new();
         let mut failure: Option<Error> = None;
@@ -95,7 +95,7 @@ impl Arguments {
             let campaign = self.recordings.read(Reader::of(&muscle))?;
             let mut over = |split, wanted: bool| {
                 let score = || cross_validate(&campaign, &muscle, &options, split, published.as_ref());
-                // One split that cannot be fitted does not take the other figures away.
+                // A split that cannot be fitted does not suppress the others.
                 let scored = wanted.then(score)?;
                 progress.step();
                 match scored {

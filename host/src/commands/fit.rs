@@ -25,8 +25,8 @@ use pam_report::fit_page;
 #[command(after_help = "Examples:\n  \
     host fit --muscle mini.toml loops/*.csv -o mini.pam --report mini.html\n  \
     host fit --muscle festo.toml --import bench.toml run*.csv -o festo.pam\n\n\
-    Recordings: CSV or tab-separated text (also .gz and .zst), Parquet, MATLAB or HDF5, whose columns have their units behind \
-    the last underscore (time_s, pressure_kPa, displacement_mm, force_N); anything else comes in by --import.")]
+    Recordings: CSV or tab-separated text (also .gz and .zst), Parquet, MATLAB or HDF5, whose column names end in \
+    their unit (time_s, pressure_kPa, displacement_mm, force_N); other forms need --import.")]
 pub struct Arguments {
     /// The muscle's description.
     #[arg(long, value_name = "MUSCLE.toml")]
@@ -36,7 +36,7 @@ pub struct Arguments {
     /// Where to write the table.
     #[arg(short, long, value_name = "TABLE.pam")]
     output: Option<PathBuf>,
-    /// Write the figures of the fit into a file as JSON; `-` is standard output.
+    /// Write the results as JSON to a file; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     #[command(flatten)]
@@ -45,19 +45,19 @@ pub struct Arguments {
     #[arg(long, default_value_t = 4, value_name = "M", allow_negative_numbers = true,
         value_parser = clap::value_parser!(u8).range(1..=6))]
     order: u8,
-    /// Let the load-bearing length be shortened by the rounded ends (L′ in place of L).
+    /// Shorten the load-bearing length by the rounded ends (L′ instead of L).
     #[arg(long)]
     tip_correction: bool,
-    /// Weight of the penalty on curves over pressure that bend; chosen by leaving pressures out if not given.
+    /// Weight of the penalty on curvature over pressure; by default chosen by cross-validation over pressures.
     #[arg(long, value_name = "WEIGHT", allow_negative_numbers = true)]
     smoothing: Option<f64>,
-    /// Find effective dimensions (braid angle, bladder diameter, wall) too, within bounds.
+    /// Fit effective dimensions (braid angle, bladder diameter, wall) too, within bounds.
     #[arg(long)]
     fit_geometry: bool,
     /// Correct the length of every mounting (a stroke held through whole recordings) by up to 1 mm.
     #[arg(long)]
     fit_lengths: bool,
-    /// Make the bladder's stress rise with strain, and say what that costs in error.
+    /// Constrain the bladder's stress to rise with strain, and report the error with and without.
     #[arg(long)]
     physical: bool,
 }
@@ -73,13 +73,13 @@ impl Arguments {
         {
             return Err(Error::new(DataCode::CallInvalid, "a smoothing weight must be a number from 0 up")
                 .value(weight.to_string())
-                .help("1e-3 bends freely, 10 is nearly straight; leave the option out to have it chosen"));
+                .help("1e-3 allows much curvature, 10 is nearly straight; without the option it is chosen automatically"));
         }
         let table = ("-o", self.output.as_deref());
         to_standard_output(&[table, ("--json", self.json.as_deref()), ("--report", self.reports.file())])?;
         let start = Instant::now();
         let muscle = MuscleDescription::read(&self.muscle)?;
-        // Whoever asks for JSON is a program, or will look at that.
+        // With JSON the caller is a program.
         let watched = if self.json.is_some() { Console::silent() } else { console.clone() };
         let (campaign, hashes) = self.recordings.read_hashed(Reader::of(&muscle), &watched)?;
         console.detail(format!(

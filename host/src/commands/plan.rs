@@ -16,21 +16,21 @@ use pam_fit::table_file::TableFile;
 /// Arguments of `host plan`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  host plan --table mini.pam protocol.toml\n\n\
-    The table is one of the muscle or of one like it; the protocol is a file as virtual-bench runs it.")]
+    The table is that of the muscle or of a similar one; the protocol is a file for virtual-bench.")]
 pub struct Arguments {
-    /// A table of the muscle, or of one like it.
+    /// A table of the muscle, or of a similar one.
     #[arg(long, value_name = "T.pam")]
     table: PathBuf,
     /// The planned protocol.
     #[arg(value_name = "PROTOCOL.toml")]
     protocol: PathBuf,
-    /// Write the matrix into a file as JSON; `-` is standard output.
+    /// Write the result as JSON to a file; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
 
 impl Arguments {
-    /// Does what was asked.
+    /// Runs the command.
     ///
     /// # Errors
     /// Files that cannot be read, or a protocol that cannot be carried out.

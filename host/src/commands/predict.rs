@@ -28,10 +28,10 @@ pub struct Arguments {
     table: PathBuf,
     #[command(flatten)]
     recordings: Recordings,
-    /// Where to write the recordings with a column `force_model_N` added; `-` is standard output.
+    /// Write the recordings with a column `force_model_N` added; `-` is standard output.
     #[arg(short, long, value_name = "OUT.csv")]
     output: Option<PathBuf>,
-    /// Write the scores into a file as JSON; `-` is standard output.
+    /// Write the scores as JSON to a file; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -57,7 +57,7 @@ impl Arguments {
         let rest_length = f64::from(table.table.geometry.rest_length.metres());
         let mut reader = Reader::with_rest_length(rest_length);
         reader.muscle_name = Some(&table.about.muscle);
-        // Whoever asks for JSON is a program, or will look at that.
+        // With JSON the caller is a program.
         let watched = if self.json.is_some() { Console::silent() } else { console.clone() };
         let campaign = self.recordings.read_watched(reader, &watched)?;
         for warning in &campaign.warnings {
@@ -98,7 +98,7 @@ impl Arguments {
             console.note(format!("{}: {}, {rms}{band}", recording.name, pluralise(recording.len(), "row")));
         }
         if self.output.is_none() && self.json.is_none() {
-            console.detail("nothing is written: give -o or --json");
+            console.detail("nothing written: use -o or --json");
         }
         Ok(())
     }

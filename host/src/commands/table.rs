@@ -1,4 +1,4 @@
-//! `host table`: look at a table, judge it, hand it to other programs.
+//! `host table`: show, check and export a table.
 
 use std::path::PathBuf;
 
@@ -52,7 +52,7 @@ enum Action {
         after_help = "Examples:\n  host table show mini.pam\n  host table show mini.pam --json | jq .pressures"
     )]
     Show(File),
-    /// Judge a table: every number, and what the model does with them.
+    /// Check a table: its numbers, and the model's behaviour with them.
     #[command(
         after_help = "Example:\n  host table check mini.pam && host flash mini.pam --port /dev/ttyACM0"
     )]
@@ -91,7 +91,7 @@ struct File {
 }
 
 impl Arguments {
-    /// Does what was asked.
+    /// Runs the command.
     ///
     /// # Errors
     /// A file that cannot be read or is no valid table.
@@ -297,11 +297,11 @@ fn to_text(file: &TableFile) -> String {
         text += &format!("correction of the bench {}: {:?}\n", name(&c.effect), c.parameters);
     }
     text += &format!(
-        "\n{} samples, rms {:.3} N, error {:.3} % mean, {:.3} % at most, of blocked force",
+        "\n{} samples, rms {:.3} N, error {:.3} % mean, {:.3} % largest, of blocked force",
         a.fit.samples, a.fit.rms_newtons, a.fit.mean_error_percent, a.fit.max_error_percent
     );
     if let Some(left_out) = a.fit.left_out_percent {
-        text += &format!("; {left_out:.3} % mean at pressures left out");
+        text += &format!("; {left_out:.3} % mean at held-out pressures");
     }
     for s in &a.sources {
         text += &format!(

@@ -44,7 +44,7 @@ pub fn page(story: &Story<'_>) -> Result<Page> {
     page.verdict(
         if percent(best) < 2.0 { Tone::Good } else { Tone::Caution },
         format!(
-            "With its fitted table the controller follows the force to {:.2} % of blocked force while the muscle moves.",
+            "With the fitted table the force error of the controller is {:.2} % of blocked force (rms) while the muscle moves.",
             percent(best)
         ),
     );
@@ -52,7 +52,7 @@ pub fn page(story: &Story<'_>) -> Result<Page> {
     page.fact(
         "P_{0}",
         format!("{:.1} kPa", summary.deadband_kPa),
-        "pressure at which contraction begins",
+        "deadband: pressure at which contraction begins",
         Tone::Plain,
     );
     page.fact(
@@ -65,12 +65,12 @@ pub fn page(story: &Story<'_>) -> Result<Page> {
 
     let mut tracking = Section::new("Force tracking").summarised();
     tracking.text(format!(
-        "The controller is {}. The virtual bench moves the muscle all the while, one exchange a control tick, in lock-step. \
-         Each law runs the same tasks; what happens before {SETTLE} s, while the muscle fills, is shown and not judged.",
+        "The controller is {}. The virtual bench moves the muscle in lock-step with the control ticks. Each feed-forward runs the \
+         same tasks; the first {SETTLE} s, while the muscle fills, are shown but not scored.",
         story.controller
     ));
     let mut table = Table::new(
-        "Root mean square of measured less asked force",
+        "Rms force error: measured minus setpoint",
         &[
             "feed-forward",
             "sine 0.5 Hz, N",
@@ -109,10 +109,10 @@ pub fn page(story: &Story<'_>) -> Result<Page> {
     lines.figure(load_lines(story.campaign, story.fit)?);
     page.push(lines);
 
-    let mut back = Section::new("And back");
+    let mut back = Section::new("Telemetry as a recording");
     back.text(format!(
-        "The controller's telemetry is a recording like any other: on its {} rows inside the tested range, which no fit has seen, the table is wrong by \
-         {:.2} N rms ({:.2} % of blocked force).",
+        "The controller's telemetry is a recording like any other. On its {} rows inside the tested range, which were not fitted, the \
+         table's error is {:.2} N rms ({:.2} % of blocked force).",
         fixed(story.telemetry.1 as f64, 0),
         story.telemetry.0,
         percent(story.telemetry.0),
@@ -121,7 +121,7 @@ pub fn page(story: &Story<'_>) -> Result<Page> {
     page.origin("controller", story.controller);
     page.origin("device", story.device.clone());
     page.origin("program", format!("host {}", env!("CARGO_PKG_VERSION")));
-    page.origin("time for everything", format!("{:.1} s", story.seconds));
+    page.origin("duration", format!("{:.1} s", story.seconds));
     Ok(page)
 }
 
@@ -153,7 +153,7 @@ fn force_figure(tracks: &[Track], task: Task) -> Figure {
             Panel::new(Axis::new("time", "s"), Axis::new("force F", "N"))
                 .titled(track.law.name())
                 .line("measured", Colour::Series(0), &time, &measured)
-                .dashes("asked", Colour::Ink, &time, &asked)
+                .dashes("setpoint", Colour::Ink, &time, &asked)
         })
         .collect();
     let title = match task {

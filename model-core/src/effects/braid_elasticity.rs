@@ -33,7 +33,7 @@ impl Effect for BraidElasticity {
         start: Start::Known,
         fading: &[],
         equation: "F = −(1 − s·k_F)·c·(B³/4π²N⁴)·L·(P′ − h)·(P′ − h − L·h′), h = E·t_B·ε_x/R",
-        summary: "The fibres of the braid stretch under load, so the muscle swells more and pulls less at high pressure.",
+        summary: "The fibres of the braid stretch under load, so the muscle expands more and pulls less at high pressure.",
         source: "J. Chambers and N. Wereley, Actuators 11(8) (2022) 219, doi 10.3390/act11080219; the hoop balance is that of M. Gaylord, US patent 2,844,126",
     };
 

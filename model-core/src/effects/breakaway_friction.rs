@@ -33,7 +33,7 @@ impl Effect for BreakawayFriction {
         start: Start::Known,
         fading: &[],
         equation: "F = −s·(m·(ΔF_s + κ·|F_quasi|) + κ_h·|F_quasi|)·ln(1 + t_rest/τ_s·exp(−d_rest/δ))",
-        summary: "After a rest the muscle sticks: the first bit of motion needs an extra force that grows with the length of the rest.",
+        summary: "After a rest the first motion needs an extra force, which grows with the duration of the rest.",
         source: "J. H. Dieterich, J. Geophys. Res. 84 (1979) 2161–2168, doi 10.1029/JB084iB05p02161",
     };
 

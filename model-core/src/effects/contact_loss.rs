@@ -29,7 +29,7 @@ impl Effect for ContactLoss {
         start: Start::Known,
         fading: &[],
         equation: "F = −g·(1 − s·k_F)·[λ·clamp(P′, 0, p_c·ε_x) + p_1·ε_x]",
-        summary: "A shortened muscle needs some pressure before its bladder touches the braid and pulls.",
+        summary: "A shortened muscle pulls only above the pressure at which its bladder touches the braid.",
         source: "deadband that depends on length, after S. Davis and D. Caldwell, Int. J. Robotics Research 25 (2006) 359–369, doi 10.1177/0278364906063227",
     };
 

@@ -30,7 +30,7 @@ impl Effect for CoulombFriction {
         start: Start::Branch,
         fading: &[],
         equation: "F = −s_x·F_c − s·F_s",
-        summary: "A friction force of constant size opposes every motion, whatever the muscle pulls.",
+        summary: "A constant friction force opposes every motion, at any load.",
         source: "C.-P. Chou and B. Hannaford, IEEE Trans. Robotics and Automation 12 (1996) 90–102, doi 10.1109/70.481753",
     };
 

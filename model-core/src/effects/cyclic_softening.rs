@@ -35,7 +35,7 @@ impl Effect for CyclicSoftening {
         start: Start::Virgin,
         fading: &[],
         equation: "F = −(1 − s·k_F)·b·d·F_b, ℓ_0·dd/dℓ = (1 − d)^m",
-        summary: "Every cycle wears the bladder a little, so it resists less and less.",
+        summary: "Each cycle softens the bladder a little.",
         source: "B. Woods, M. Gentry, C. Kothera, N. Wereley, J. Intelligent Material Systems and Structures 23 (2012) 327–343: fatigue of swaged muscles",
     };
 

@@ -26,7 +26,7 @@ impl Effect for EndSlip {
         start: Start::Known,
         fading: &[],
         equation: "F = −∂F/∂x·δ for t ≥ t_s",
-        summary: "At one moment an end slipped in its fitting, and every reading after it belongs to another length.",
+        summary: "At one moment an end slipped in its fitting, and the length of all later readings is wrong.",
         source: "a step of the rest length at a change point; sensitivity of the base model",
     };
 

@@ -21,7 +21,7 @@ impl Effect for FrictionAsymmetry {
         start: Start::Known,
         fading: &[],
         equation: "F = −(Δk/2)·s²·F_quasi",
-        summary: "The muscle rubs more one way than the other.",
+        summary: "Friction is larger in one direction than in the other.",
         source: "M. Capace et al., Actuators 8(2) (2019) 49, doi 10.3390/act8020049; D. B. Reynolds et al. 2003, doi 10.1114/1.1554921",
     };
 

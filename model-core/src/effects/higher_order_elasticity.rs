@@ -29,7 +29,7 @@ impl Effect for HigherOrderElasticity {
         start: Start::Known,
         fading: &[],
         equation: "F = (1 − s·k_F)·[E_(M+1)·c_(M+1) + E_(M+2)·c_(M+2) + G·c_H]",
-        summary: "The rubber wall follows a more curved law than the table has terms for.",
+        summary: "The stress of the rubber wall has higher powers of strain than the table.",
         source: "E. G. Hocking, thesis, University of Maryland (2012), chapter 3; neo-Hookean law: L. R. G. Treloar, The Physics of Rubber Elasticity, 1975",
     };
 

@@ -21,7 +21,7 @@ impl Effect for Leak {
         start: Start::Known,
         fading: &[],
         equation: "F = −g·(1 − s·k_F)·λ·P",
-        summary: "The muscle leaks, so a part of the pressure is lost on the way to it.",
+        summary: "The muscle leaks, so its pressure is lower than the pressure at the gauge.",
         source: "continuity of laminar flow through line and leak in series; leak-down recordings of Festo muscles lose 5 to 480 kPa in two minutes",
     };
 

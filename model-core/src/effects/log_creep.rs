@@ -62,7 +62,7 @@ impl Effect for LogCreep {
             Spectrum::slot(0, 4),
         ],
         equation: "F = (1 − s·k_F)·[a·Σq_i(F_b) + E_c·Σq_i(c_1) − a_F·Σ(u − q_i)(F_quasi)], τ_i = τ_0·(1, 10, … 10⁴)",
-        summary: "At constant length and pressure the force creeps, as much in each tenfold of time, and remembers earlier runs.",
+        summary: "At constant length and pressure the force creeps by the same amount in each decade of time; earlier runs still act.",
         source: "S. M. Clarke, F. Elias, E. M. Terentjev, European Physical Journal E 2 (2000) 335–341, doi 10.1007/s101890050015; W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     };
 

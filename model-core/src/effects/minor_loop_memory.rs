@@ -32,7 +32,7 @@ impl Effect for MinorLoopMemory {
         start: Start::Branch,
         fading: &[],
         equation: "F = −(A + A_P·P)·Σ(ξ − y_i)/Σr_i, y_i = play of ξ, r_i each way, r_i = r·i/6, i = 1…6",
-        summary: "Inside a large loop the force depends on where the muscle turned before, whatever the speed.",
+        summary: "Inside a large loop the force depends on the points of earlier reversals, at any speed.",
         source: "Y. Liu et al., Strojniški vestnik 63 (2017) 56–64, doi 10.5545/sv-jme.2016.4027 (Prandtl–Ishlinskii operators for a pneumatic muscle); P. Krejčí and K. Kuhnen, IEE Proc. Control Theory and Applications 148 (2001) 185–192",
     };
 

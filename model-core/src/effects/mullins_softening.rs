@@ -31,7 +31,7 @@ impl Effect for MullinsSoftening {
         start: Start::Virgin,
         fading: &[],
         equation: "F = −(1 − s·k_F)·a·erf[(W_m − W)/(m + β·W_m)]·F_b",
-        summary: "The first stroke into new strain breaks bonds in the rubber; every later stroke meets less resistance.",
+        summary: "The first stroke into new strain breaks bonds in the rubber; all later strokes meet less resistance.",
         source: "R. W. Ogden and D. G. Roxburgh, Proc. R. Soc. A 455 (1999) 2861–2877, doi 10.1098/rspa.1999.0431",
     };
 

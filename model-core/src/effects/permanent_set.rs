@@ -33,7 +33,7 @@ impl Effect for PermanentSet {
         start: Start::Virgin,
         fading: &[],
         equation: "F = ∂F/∂x·[δ·(1 − exp(−ℓ/ℓ_0)) + δ_l·(1 − exp(−I/I_0))]",
-        summary: "Working stretches the muscle for good by a fraction of a per cent, mostly in its early life.",
+        summary: "Use lengthens the muscle permanently by a fraction of a per cent, mostly in its early life.",
         source: "change of rest length in early life, 0.1 to 1 %; E. G. Hocking, thesis, University of Maryland (2012): run-in over the first tests",
     };
 

@@ -31,7 +31,7 @@ impl Effect for PreslidingHysteresis {
         start: Start::Branch,
         fading: &[],
         equation: "F = (a·k_F·|F_quasi| + F_d)·(s − ¼·Σz_i), dz_i = dξ/d_i within ±1, d_i = δ/2^i, i = 1…4",
-        summary: "Just after a turn the strands stretch before they slide, so friction builds up over a distance instead of jumping.",
+        summary: "After a reversal the strands stretch before they slide, so friction builds up over a distance.",
         source: "F. Al-Bender, V. Lampaert, J. Swevers, Chaos 14 (2004) 446–460, doi 10.1063/1.1741752 (generalized Maxwell slip); T. Vo-Minh et al., Mechatronics 20 (2010) 402–414 (for a pneumatic muscle)",
     };
 

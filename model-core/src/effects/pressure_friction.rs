@@ -26,7 +26,7 @@ impl Effect for PressureFriction {
         start: Start::Known,
         fading: &[],
         equation: "F = −s·P·π·(μ·R² + μ_0·R0²)",
-        summary: "Pressure presses the braid strands together; they rub in proportion to it, even when the muscle pulls little.",
+        summary: "Pressure pushes the braid strands together; their friction is proportional to it, even at low load.",
         source: "B. Tondu and P. Lopez, IEEE Control Systems Magazine 20(2) (2000) 15–38, doi 10.1109/37.833638; B. Tondu, J. Intelligent Material Systems and Structures 23 (2012) 225–253, doi 10.1177/1045389X11435435",
     };
 

@@ -40,7 +40,7 @@ impl Effect for PressureLag {
         start: Start::Settled,
         fading: &[],
         equation: "F = −g·(1 − s·k_F)·[R_f·LP_τ(g·v) + T·LP_τ(dP/dt) + T_c/V_0·(V·LP_τ(dP/dt) + (P + P_a)·LP_τ(g·v))]",
-        summary: "Air takes time through the line, so the muscle does not have the pressure that the sensor shows.",
+        summary: "Air needs time to flow through the line, so the pressure in the muscle lags behind the sensor.",
         source: "simplified lumped model for pneumatic tubes, doi 10.1080/13873954.2017.1280512; E. Richer and Y. Hurmuzlu, J. Dynamic Systems, Measurement and Control 122 (2000) 416–425",
     };
 

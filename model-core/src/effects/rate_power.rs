@@ -23,7 +23,7 @@ impl Effect for RatePower {
         start: Start::Known,
         fading: &[],
         equation: "F = −s·c·|F_quasi|·(|v|/1 mm/s)^m",
-        summary: "Resistance grows with speed, but far more slowly than in proportion.",
+        summary: "Resistance grows with speed, but much less than in proportion.",
         source: "M. Bennington et al. 2023, arXiv 2301.04684; M. A. Mat Dzahir and S. Yamamoto, Applied Sciences 9(12) (2019) 2538, doi 10.3390/app9122538",
     };
 

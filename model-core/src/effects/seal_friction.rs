@@ -32,7 +32,7 @@ impl Effect for SealFriction {
         start: Start::Branch,
         fading: &[],
         equation: "F = −s_x·[F_0 + A_s·(P_a + P)]·(1 + (k−1)·exp(−|v|/v_s))",
-        summary: "The seal around a push-rod rubs, the more the higher the pressure, and most when slow.",
+        summary: "The seal around a push-rod causes friction, which grows with pressure and is largest at low speed.",
         source: "B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083–1138, doi 10.1016/0005-1098(94)90209-7",
     };
 

@@ -39,7 +39,7 @@ impl Effect for StressRelaxation {
         start: Start::Settled,
         fading: &[Solid::slot(0, 0)],
         equation: "F = (1 − s·k_F)·[a·q(F_b) + E_v·q(c_1) − g_P·q(F_G)], dq/dt = du/dt − q/τ",
-        summary: "After each change of length or pressure the force fades towards its final value, as rubber does.",
+        summary: "After each change of length or pressure the force decays towards its final value, as in all rubber.",
         source: "W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     };
 

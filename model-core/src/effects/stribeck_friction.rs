@@ -25,7 +25,7 @@ impl Effect for StribeckFriction {
         start: Start::Known,
         fading: &[],
         equation: "F = −s·(ΔF + κ·|F_quasi|)·exp(−|v|/v_s)",
-        summary: "Slow motion rubs more than fast motion.",
+        summary: "Friction is larger in slow motion than in fast motion.",
         source: "B. Tondu and P. Lopez, IEEE Control Systems Magazine 20(2) (2000) 15–38, doi 10.1109/37.833638; Armstrong-Hélouvry et al. 1994, doi 10.1016/0005-1098(94)90209-7",
     };
 

@@ -32,7 +32,7 @@ impl Effect for ThermalSoftening {
         start: Start::Settled,
         fading: &[0],
         equation: "F = −(1 − s·k_F)·(a_w·w + a_T·θ)·F_b + (b_w·w + b_T·θ)·s·k_F·F_quasi, τ·dw/dt = s·F_quasi·dx/dt − w",
-        summary: "Work warms the muscle, which changes the stiffness of its rubber; rest cools it again.",
+        summary: "Work warms the muscle, which changes the stiffness of its rubber; at rest it cools again.",
         source: "M. Doumit and S. Pardoel, Mechanical Systems and Signal Processing 91 (2017) 93–110; L. R. G. Treloar, The Physics of Rubber Elasticity, 1975",
     };
 

@@ -32,7 +32,7 @@ impl Effect for TipEffect {
         start: Start::Known,
         fading: &[],
         equation: "F = −(1 − s·k_F)·P′·[k_t·π·R²·(R/L)·ε + k_v·(R − R0)·(3R − R0)·L/(4πN²R)]",
-        summary: "The muscle narrows towards its ends, which do not pull like a cylinder.",
+        summary: "The muscle narrows towards its ends, which pull less than a cylinder.",
         source: "J. Chambers and N. Wereley, Actuators 10(4) (2021) 72, doi 10.3390/act10040072; E. G. Hocking, thesis, University of Maryland (2012), appendix on tip correction",
     };
 

@@ -25,7 +25,7 @@ impl Effect for ViscousDamping {
         start: Start::Known,
         fading: &[],
         equation: "F = −(c + c_P·P)·v",
-        summary: "The faster the muscle moves, the more it resists: a force proportional to speed.",
+        summary: "A friction force proportional to speed opposes the motion.",
         source: "D. B. Reynolds et al., Annals of Biomedical Engineering 31 (2003) 310–317, doi 10.1114/1.1554921",
     };
 

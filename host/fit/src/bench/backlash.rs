@@ -32,7 +32,7 @@ impl Effect for Backlash {
         start: Start::Branch,
         fading: &[],
         equation: "F = κ·[∂F/∂x·(y − x) + k_F·F_quasi·(s − s_y)], y = play of x, b wide, ds_y = (s − s_y)·|dy|/(η·b)",
-        summary: "A loose joint lets the sensor move before the muscle does, after every turn.",
+        summary: "A joint has play: after every reversal the sensor moves before the muscle does.",
         source: "play operator; sensitivity of the base model",
     };
 

@@ -21,7 +21,7 @@ impl Effect for CrossTalk {
         start: Start::Known,
         fading: &[],
         equation: "F = c·P",
-        summary: "Pressure in hose or fittings pushes on the load cell by itself.",
+        summary: "Pressure in the hose or the fittings pushes on the load cell.",
         source: "end-cap thrust; 0.1 to 5 N per 100 kPa",
     };
 

@@ -36,7 +36,7 @@ impl Effect for ForceDrift {
         start: Start::Settled,
         fading: &[Cell::slot(0, 0)],
         equation: "F = r·t + w·(1 − exp(−t/τ)) + c·LP_τ(F) + z·θ",
-        summary: "The zero of the load cell wanders in the course of the recording.",
+        summary: "The zero of the load cell drifts during the recording.",
         source: "creep of 0.02 to 0.05 % of full scale in 20 to 30 minutes: manufacturers of load cells (VPG technical note VPGT-02)",
     };
 

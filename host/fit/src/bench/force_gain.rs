@@ -24,7 +24,7 @@ impl Effect for ForceGain {
         start: Start::Known,
         fading: &[],
         equation: "F = γ·F + γ_2·F·|F|",
-        summary: "The scale of the load cell is off by some per cent.",
+        summary: "The scale of the load cell is wrong by some per cent.",
         source: "non-linearity of 0.02 to 0.1 % of full scale: manufacturers of load cells; wrong calibration 1 to 3 %",
     };
 

@@ -21,7 +21,7 @@ impl Effect for ForceOffset {
         start: Start::Known,
         fading: &[],
         equation: "F = b",
-        summary: "The load cell reads something when nothing pulls.",
+        summary: "The zero of the load cell is wrong.",
         source: "zero balance of ±1 to 5 % of rated output before taring: manufacturers of load cells",
     };
 

@@ -25,7 +25,7 @@ impl Effect for GaugeGain {
         start: Start::Known,
         fading: &[],
         equation: "F = g·(1 − s·k_F)·(γ·P + γ_2·P²)",
-        summary: "The scale of the pressure gauge is off by some per cent.",
+        summary: "The scale of the pressure gauge is wrong by some per cent.",
         source: "usual gauge accuracy, 0.1 to 1 %; sensitivity of the base model",
     };
 

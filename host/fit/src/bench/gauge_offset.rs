@@ -22,7 +22,7 @@ impl Effect for GaugeOffset {
         start: Start::Known,
         fading: &[],
         equation: "F = g·(1 − s·k_F)·δ",
-        summary: "The pressure gauge does not read zero when the muscle is vented.",
+        summary: "The zero of the pressure gauge is wrong.",
         source: "usual gauge accuracy, 0.1 to 0.5 % of full scale; sensitivity of the base model",
     };
 

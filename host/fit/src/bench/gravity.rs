@@ -25,7 +25,7 @@ impl Effect for Gravity {
         start: Start::Known,
         fading: &[],
         equation: "F = −g_n·(m + ρ·ΔL)",
-        summary: "Part of the muscle force carries the weight of muscle and fittings.",
+        summary: "A part of the muscle force carries the weight of muscle and fittings.",
         source: "Newton; 0.5 to 5 N for a hanging muscle",
     };
 

@@ -19,7 +19,7 @@ impl Effect for Inertia {
         start: Start::Known,
         fading: &[],
         equation: "F = −m·dv/dt",
-        summary: "Moving masses between muscle and load cell take force when they speed up.",
+        summary: "Moving masses between muscle and load cell need a force when they accelerate.",
         source: "Newton; moving heads of 0.1 to 2 kg",
     };
 

@@ -26,7 +26,7 @@ impl Effect for Misalignment {
         start: Start::Branch,
         fading: &[],
         equation: "F = −a·F·(L0/L)² − b·s·|F|",
-        summary: "The muscle pulls at an angle, which loses some force and rubs in the guide.",
+        summary: "The muscle pulls at an angle, which reduces the measured force and causes friction in the guide.",
         source: "statics of an inclined pull",
     };
 

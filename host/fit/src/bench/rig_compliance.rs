@@ -31,7 +31,7 @@ impl Effect for RigCompliance {
         start: Start::Branch,
         fading: &[],
         equation: "F = (1/K)·[∂F/∂x·F/(1 − c·∂F/∂x) + k_F·F_quasi·(s − z)/c], dz = dx/(c·k_F·F_quasi) within ±1",
-        summary: "The test frame bends, so the muscle is a little shorter than the stroke sensor says.",
+        summary: "The test frame bends, so the muscle is shorter than the stroke sensor shows.",
         source: "first-order sensitivity of the base model; frames of 0.5 to 50 N/µm",
     };
 

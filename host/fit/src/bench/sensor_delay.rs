@@ -45,7 +45,7 @@ impl Effect for SensorDelay {
         start: Start::Settled,
         fading: &[],
         equation: "F = −δ·(∂F/∂x·v + g·(1 − s·k_F)·dP/dt), or F = −κ·(F − LP_τ(F)), or F = −κ_d·(F − D_τ(F))",
-        summary: "The force channel is late against the other channels.",
+        summary: "The force channel lags behind the other channels.",
         source: "first-order filter or skew; 1 to 100 ms are usual",
     };
 

@@ -60,6 +60,7 @@ pub(super) fn section(d: &Diagnosis) -> Section {
     if !d.judged() {
         return section;
     }
+    section.text("The excess error is the squared residual above the noise.");
     if d.r#where.is_empty() {
         section.text("The error is spread evenly: no region of any coordinate holds more than its share.");
     } else {

@@ -14,13 +14,13 @@ pub(super) fn section(view: &View<'_>) -> Section {
     ));
     let order = view.fit.solution.problem.design.layout().order;
     let friction = view.fit.solution.problem.design.friction;
-    let mut head = vec!["P (kPa)".to_owned()];
-    head.extend((1..=order).map(|k| format!("E_{{{k}}} (MPa)")));
+    let mut header = vec!["P (kPa)".to_owned()];
+    header.extend((1..=order).map(|k| format!("E_{{{k}}} (MPa)")));
     if friction {
-        head.push("k_{F}".into());
+        header.push("k_{F}".into());
     }
     let mut table =
-        Table { caption: "Values ± half-width of the 95 % confidence interval; n. i.: not identifiable (interval includes zero)".into(), head, rows: Vec::new() };
+        Table { caption: "Values ± half-width of the 95 % confidence interval; n. i.: not identifiable (interval includes zero)".into(), header, rows: Vec::new() };
     for p in &s.pressures {
         let mut row = vec![fixed(p.pressure_kPa, 0)];
         for (value, std) in p.E_MPa.iter().zip(&p.E_std_MPa) {

@@ -12,7 +12,7 @@ use crate::effect_page::place;
 #[must_use]
 pub fn summary(d: &Diagnosis) -> String {
     let mut s = String::new();
-    head(&mut s, d);
+    header(&mut s, d);
     if !d.r#where.is_empty() {
         let _ = writeln!(s, "\nWhere the model is wrong");
         for r in d.r#where.iter().take(4) {
@@ -64,7 +64,7 @@ pub fn summary(d: &Diagnosis) -> String {
     s
 }
 
-fn head(s: &mut String, d: &Diagnosis) {
+fn header(s: &mut String, d: &Diagnosis) {
     let judged = d.judged();
     let _ = if judged {
         writeln!(s, "{}: {} rows, blocked force {:.1} N", d.muscle, d.samples, d.blocked_force_N)

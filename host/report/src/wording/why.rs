@@ -71,3 +71,32 @@ fn times(logarithm: f64) -> String {
         "more than a million times".to_owned()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_effect_that_was_given_is_said_to_be_supported_or_not() {
+        let unseen = UnseenError { without: 0.5, with: 0.2 };
+        let found = Evidence {
+            share: 0.83,
+            chance: Chance::FewStrokes { p: 0.2, log_ratio: 1e3 },
+            moment: Some(Moment::In("run-2".into(), 3.04)),
+        };
+        let text = why(&Why::GivenSupported(found, unseen));
+        assert!(text.starts_with("given, and the recordings support it: it explains 83 %"), "{text}");
+        assert!(
+            text.contains("more than a million times") && text.contains("in run-2, 3.0 s after"),
+            "{text}"
+        );
+        assert!(text.ends_with("error on held-out rows: 0.500 N without it, 0.200 N with it"), "{text}");
+        for not in [
+            Why::GivenWithoutSize,
+            Why::GivenNoImprovement(unseen),
+            Why::GivenNoEvidence { share: 0.1, unseen },
+        ] {
+            assert!(why(&not).contains("do not support it"), "{not:?}");
+        }
+    }
+}
