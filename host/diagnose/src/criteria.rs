@@ -5,11 +5,11 @@
 //!
 //! | criterion | inexactness of | as a share of |
 //! | --- | --- | --- |
-//! | [`selection::SELECTION_FLOOR`] | the base model, below which nothing is selected | blocked force |
-//! | [`judgement::LACK_OF_FIT`] | the base model with everything it admits, for the verdict | blocked force |
-//! | [`candidates::LAW_ERROR`] | a law in its sensitivities, as a penalty of its score | the law's own trace |
-//! | [`selection::RIVAL_FLOOR`] | a law, when two are compared by what they leave | the excess error |
-//! | [`uncertainty::LAW_DEVIATION`] | a law in its parameters, for their intervals | the parameter |
+//! | `selection::SELECTION_FLOOR` | the base model, below which nothing is selected | blocked force |
+//! | `judgement::LACK_OF_FIT` | the base model with everything it admits, for the verdict | blocked force |
+//! | `candidates::LAW_ERROR` | a law in its sensitivities, as a penalty of its score | the law's own trace |
+//! | `selection::RIVAL_FLOOR` | a law, when two are compared by what they leave | the excess error |
+//! | `uncertainty::LAW_DEVIATION` | a law in its parameters, for their intervals | the parameter |
 //!
 //! A sensitivity study scales one criterion at compile time, so that no setting of a running program can change an answer:
 //!

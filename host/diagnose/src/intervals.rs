@@ -8,7 +8,7 @@
 //! ```
 //! where the first is the scatter of whole half-strokes' scores and the next three are jackknives over groups left out. The last is what a
 //! law is off by where another law of the same thing made the recordings: of 57 effects given by name (two development sets of trials) 35
-//! intervals of 95 % held the truth by half-strokes alone, 45 with the groups, 53 with both. A moment has an interval [of its own](super::change_point).
+//! intervals of 95 % held the truth by half-strokes alone, 45 with the groups, 53 with both. A change point has an interval [of its own](super::change_point).
 
 use rayon::prelude::*;
 

@@ -123,18 +123,18 @@ fn directions(rows: &Rows, holds: &[(usize, usize)], pressures: &[Vec<f64>], law
 }
 
 /// What is left of a row, N, where friction acts in a direction.
-fn left_of(rows: &Rows, fitted: &Baseline, i: usize, direction: f64) -> f64 {
+fn residual_at(rows: &Rows, fitted: &Baseline, i: usize, direction: f64) -> f64 {
     fitted.raw_residual[i] + fitted.quasi[i] * fitted.friction[i] * (direction - rows.contexts()[i].direction)
 }
 
 /// What a law leaves of the rows at rest: the friction is that of the moving rows, and the part of the force that stays the same
 /// through a hold is not held against it.
-fn left(rows: &Rows, fitted: &Baseline, holds: &[(usize, usize)], directions: &[Vec<f64>]) -> f64 {
+fn energy_at_rest(rows: &Rows, fitted: &Baseline, holds: &[(usize, usize)], directions: &[Vec<f64>]) -> f64 {
     let mut sum = 0.0;
     for ((from, to), way) in holds.iter().zip(directions) {
         for i in *from..*to {
             let w = if rows.on_ramp[i] { 0.0 } else { rows.root_weight()[i] };
-            sum += (w * left_of(rows, fitted, i, way[i - from])).powi(2);
+            sum += (w * residual_at(rows, fitted, i, way[i - from])).powi(2);
         }
     }
     sum
@@ -149,7 +149,7 @@ pub(crate) fn settle_rest_friction(rows: &Rows) -> (Rows, Option<RestLaw>) {
     let pressures: Vec<Vec<f64>> = PRESSURE_SMOOTHING.iter().map(|h| smoothed(rows, *h)).collect();
     let stays: Vec<Vec<f64>> =
         holds.iter().map(|(a, b)| rows.contexts()[*a..*b].iter().map(|c| c.direction).collect()).collect();
-    let held = left(rows, &fitted, &holds, &stays);
+    let held = energy_at_rest(rows, &fitted, &holds, &stays);
     let Some((best, energy)) = best_law(rows, &fitted, &holds, &pressures) else {
         return (rows.clone(), None);
     };
@@ -196,7 +196,7 @@ fn best_law(
     let best_of = |laws: Vec<RestLaw>| {
         let tried: Vec<f64> = laws
             .par_iter()
-            .map(|l| left(rows, fitted, holds, &directions(rows, holds, pressures, *l)))
+            .map(|l| energy_at_rest(rows, fitted, holds, &directions(rows, holds, pressures, *l)))
             .collect();
         laws.into_iter().zip(tried).min_by(|a, b| a.1.total_cmp(&b.1))
     };

@@ -212,7 +212,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<(Rows, 
     let campaign = screened.campaign.as_ref();
     let pressures = range(campaign, |r| &r.pressure);
     let thresholds = thresholds(campaign, braid, pressures);
-    let isometric = held(campaign, thresholds.stroke);
+    let isometric = is_isometric(campaign, thresholds.stroke);
     let ends = readings::ends(campaign);
     let gathered = gather::gather(campaign, &screened, braid, thresholds, &ends, isometric)?;
     let remarks = remarks(&screened, &ends, gathered.spiked, campaign.samples());
@@ -291,7 +291,7 @@ fn thresholds(campaign: &Campaign, braid: &Braid<f64>, pressures: (f64, f64)) ->
 }
 
 /// Mounted at several lengths, but never moved while recording, is held all the same.
-fn held(campaign: &Campaign, least_motion: f64) -> bool {
+fn is_isometric(campaign: &Campaign, least_motion: f64) -> bool {
     campaign.recordings.iter().all(|r| {
         let (low, high) =
             r.stroke.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(*s), h.max(*s)));

@@ -14,7 +14,7 @@ criteria! {
     RANGE_OVERSHOOT: f64 = 0.02, "du", "1", Judgement;
     /// Halvings of the step while a shape is refined.
     REFINEMENT_HALVINGS: usize = 5, "n_halve", "1", Cost;
-    /// Steps at each size.
+    /// Steps of refining at each step size.
     REFINEMENT_STEPS: usize = 2, "n_step", "1", Cost;
     /// The first step is at least this part of the range.
     REFINEMENT_STEP: f64 = 0.05, "du_1", "1", Judgement;

@@ -1,6 +1,6 @@
 //! Slips of static friction at held length: the force steps, at once or in a burst of small slips.
 
-use super::left_of;
+use super::residual_at;
 use crate::baselines::Baseline;
 use crate::criteria::rest_friction::{
     STEP_BEFORE, STEP_BESIDE, STEP_NOISE, STEP_OF_GAP, STEP_ROWS, STEP_SHARPNESS, STEP_TIME,
@@ -18,7 +18,7 @@ pub(super) fn of(
     directions: &[Vec<f64>],
 ) -> Vec<Vec<bool>> {
     let found = |((from, to), way): (&(usize, usize), &Vec<f64>)| {
-        let left: Vec<f64> = (*from..*to).map(|i| left_of(rows, fitted, i, way[i - from])).collect();
+        let left: Vec<f64> = (*from..*to).map(|i| residual_at(rows, fitted, i, way[i - from])).collect();
         let noise = white_noise(&left);
         let least = |i: usize| {
             let gap = 2.0 * (fitted.quasi[from + i] * fitted.friction[from + i]).abs();

@@ -35,9 +35,32 @@ fn an_effect_of_one_file_and_one_line_is_considered_and_found() {
             *force += 3.0 * (std::f64::consts::TAU * x / 4.0e-3).sin();
         }
     }
-    assert_eq!(names(&ask(&rippled)).contains(&"stroke-ripple"), false, "the catalogue does not have it");
+    assert!(!names(&ask(&rippled)).contains(&"stroke-ripple"), "the catalogue does not have it");
     let with = diagnosed(&rippled);
     assert_eq!(names(&with).first(), Some(&"stroke-ripple"), "{:?}", with.missing);
     let [size, period] = [0, 1].map(|i| with.missing[0].parameters[i].value);
     assert!((size - 3.0).abs() < 0.3 && (period - 4.0e-3).abs() < 1e-4, "{size} N over {period} m");
+}
+
+/// What an effect is stands in its file: no other production code of the diagnosis knows one by its name.
+#[test]
+fn no_effect_is_known_by_its_name() {
+    let mut folders = vec![std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src")];
+    let mut found = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
+            let path = entry.path();
+            if path.is_dir() && !path.ends_with("tests") {
+                folders.push(path);
+            } else if path.is_file() && !path.ends_with("tests.rs") {
+                let text = std::fs::read_to_string(&path).expect("a source file");
+                let production = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or("");
+                let named =
+                    |law: &pam_fit::bench::Candidate| production.contains(&format!("\"{}\"", law.name()));
+                found
+                    .extend(pam_fit::bench::Candidate::all().filter(named).map(|l| (path.clone(), l.name())));
+            }
+        }
+    }
+    assert!(found.is_empty(), "{found:?}");
 }
