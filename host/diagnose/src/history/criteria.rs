@@ -43,6 +43,7 @@ criteria! {
     RIDGE: "λ_0" = 1e-6, "", "weight of squared spline coefficients", "numerical rank only";
     THRESHOLD_FROM: "p_1" = 0.84, "", "the tangent of the threshold starts at this share of the highest pressure", "the straight part of the pull";
     THRESHOLD_TO: "p_2" = 0.94, "", "the tangent of the threshold ends at this share of the highest pressure", "below the sparse last points";
+    ENGAGED: "P_e" = 60.0, "kPa", "pressure from which the bladder carries its part", "on the 29 cm muscle the squared residual is 3377 N² with it, 4396 N² with P_b in its place";
     RAMP: "ΔP_r" = 60.0, "kPa", "least pressure over which the bladder's carried part builds up", "width of the knee at full length";
     BALANCE_START: "P_b0" = 115.0, "kPa", "start value of the stress-free pressure, and its value where it is not identifiable", "best common value of eleven muscles";
     BALANCE_MOST: "P_b,max" = 200.0, "kPa", "largest stress-free pressure", "above it no muscle of the kind begins to pull";

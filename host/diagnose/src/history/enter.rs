@@ -52,10 +52,10 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     }
     let braid = geometry.build().map_err(|e| Error::new(DataCode::MuscleInvalid, e.to_string()))?;
     let mut diagnosis = statically(&without_memory(campaign, &found), geometry, options)?;
+    enter(&mut diagnosis, found);
     if let Some(misfit) = misfit(campaign, &braid)? {
         diagnosis.misfit_rms_N = misfit;
     }
-    enter(&mut diagnosis, found);
     Ok(diagnosis)
 }
 
@@ -95,6 +95,7 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
     // What the search calls a memory in recordings freed of it is the rest of the same.
     diagnosis.missing.retain(|m| !NAMES.contains(&m.effect.as_str()));
     diagnosis.missing.insert(0, memory(&answer, peak));
+    let freed_misfit = diagnosis.misfit_rms_N;
     let rest_agrees =
         !diagnosis.judged || matches!(diagnosis.verdict, Verdict::Consistent | Verdict::Explained);
     let well = unseen.gain >= EXPLAINED || resolved;
@@ -102,9 +103,8 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
         diagnosis.remarks.insert(
             0,
             format!(
-                "beside the memory the static model between mountings misses up to {:.2} N rms, and this part has no name: geometry, ends \
-                 and mounted lengths (by tape measure to 1 mm) are not told apart by one muscle",
-                diagnosis.misfit_rms_N
+                "freed of the memory, the static model over all mountings still misses {freed_misfit:.2} N rms, not all of which has a name: \
+                 geometry, ends and mounted lengths (by tape measure to 1 mm) are not told apart by one muscle"
             ),
         );
     }
@@ -115,6 +115,9 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
     );
     diagnosis.verdict = if well && rest_agrees { Verdict::Explained } else { Verdict::PartlyExplained };
     diagnosis.judged = true;
+    if !rest_agrees && diagnosis.unexplained.pattern != "none" {
+        diagnosis.unexplained.pattern = format!("of the static part: {}", diagnosis.unexplained.pattern);
+    }
     diagnosis.unexplained.share = left;
     diagnosis.r#where.splice(0..0, regions);
     diagnosis.held_out = HeldOut {
@@ -181,7 +184,7 @@ fn memory(history: &History, peak: f64) -> Missing {
         summary: "The bladder carries a part of the pressure. That part relaxes at constant length, as much in each tenfold of time, and \
                   comes back as slowly when the muscle is vented: the next runs remember it."
             .into(),
-        source: "P_eff = P + c·z̄, dz_k/dt = (u − z_k)/τ_k, u = p_el·clip((P − P_b)/max(|p_el|, 60 kPa), 0, 1), p_el = P_th(L) − P_b; \
+        source: "P_eff = P + c·z̄, dz_k/dt = (u − z_k)/τ_k, u = p_el·clip((P − 60 kPa)/max(|p_el|, 60 kPa), 0, 1), p_el = P_th(L) − P_b; \
                  linear relaxation with a flat spectrum over decades: W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear \
                  Viscoelastic Materials, 1976"
             .into(),

@@ -1,12 +1,13 @@
 //! The law of the bladder's relaxing back pressure, fitted to the settled points of one muscle.
 //!
 //! ```text
-//! F = S_m(P + c z̄)      dz_k/dt = (u − z_k)/τ_k      u = p_el clip((P − P_b)/max(|p_el|, ΔP_r), 0, 1)      p_el = P_th,m − P_b
+//! F = S_m(P + c z̄)      dz_k/dt = (u − z_k)/τ_k      u = p_el clip((P − P_e)/max(|p_el|, ΔP_r), 0, 1)      p_el = P_th,m − P_b
 //! ```
 //! | symbol | meaning | unit |
 //! | --- | --- | --- |
 //! | `c` | relaxed share of the back pressure over the whole spectrum, `c/5` a decade | – |
 //! | `P_b` | pressure at which the bladder carries no axial stress | kPa |
+//! | `P_e` | pressure from which the bladder is pressed against its braid and its part builds up | kPa |
 //! | `P_th,m` | pressure at which the muscle begins to pull at the length of mounting `m` | kPa |
 //! | `p_el` | part of the pressure that the bladder carries; negative where it is stretched | kPa |
 //!
@@ -16,8 +17,8 @@ use rayon::prelude::*;
 
 use super::campaign::Points;
 use super::criteria::{
-    BALANCE_MOST, BALANCE_MOVES, BALANCE_START, DAMPING, LOADED, NEAR_BALANCE, PAUSES, RAMP, THRESHOLD_FROM,
-    THRESHOLD_TO,
+    BALANCE_MOST, BALANCE_MOVES, BALANCE_START, DAMPING, ENGAGED, LOADED, NEAR_BALANCE, PAUSES, RAMP,
+    THRESHOLD_FROM, THRESHOLD_TO,
 };
 use super::memory::Clockwork;
 use super::shift_fit::{self, ShiftFit};
@@ -112,7 +113,7 @@ impl<'a> Layer<'a> {
         let drive: Vec<f64> = (0..p.len())
             .map(|i| {
                 let carried = self.carried(p.mounting[i], balance).abs();
-                ((p.pressure[i] - balance) / carried.max(RAMP)).clamp(0.0, 1.0)
+                ((p.pressure[i] - ENGAGED) / carried.max(RAMP)).clamp(0.0, 1.0)
             })
             .collect();
         self.clocks[choice.pause].1.mean_state(&drive, choice.loaded)

@@ -61,7 +61,7 @@ fn campaign(truth: Truth, seed: u64) -> Campaign {
             for k in 0..((50.0 + PAUSE) / step) as usize {
                 let t = k as f64 * step;
                 let p = if t < 50.0 { pressure(t) } else { 0.0 };
-                let engaged = ((p - truth.balance) / carried.abs().max(60.0)).clamp(0.0, 1.0);
+                let engaged = ((p - 60.0) / carried.abs().max(60.0)).clamp(0.0, 1.0);
                 for (z, tau) in states.iter_mut().zip(TIMES) {
                     *z += step / tau * (carried * engaged - *z);
                 }
