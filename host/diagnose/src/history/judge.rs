@@ -207,7 +207,7 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
             mounting: None,
             run: None,
             words: format!(
-                "the muscle had been loaded for about {loaded:.0} s before the first recorded run: a first-run deficit is not to be \
+                "the muscle had been loaded for about {loaded:.0} s before the first recorded run: a smaller first-run deficit is to be \
                  expected (chosen on a grid, weakly known)"
             ),
         });
