@@ -129,10 +129,10 @@ fn fits(points: &Points) -> Fits<'_> {
     let law = layer.fit(&everything, None, &[], None);
     let memory = unseen::with_memory(&layer, &law, &[], false);
     let offsets = run_offset::offsets(&layer, &law);
-    let events = run_offset::events(&layer, &law, &memory, &offsets);
+    let events = run_offset::events(&layer, &law, &offsets);
     let steps: Vec<Vec<f64>> = events
         .iter()
-        .filter(|e| e.lasts)
+        .filter(|e| e.lasts && e.sure)
         .map(|e| run_offset::step_column(points, e.mounting, e.run))
         .collect();
     let with_slips = (!steps.is_empty()).then(|| {
@@ -142,10 +142,8 @@ fn fits(points: &Points) -> Fits<'_> {
         let unseen = unseen::with_memory(&layer, &law, &steps, false);
         (law, unseen)
     });
-    let slips_alone = (!steps.is_empty()).then(|| {
-        let predicted = unseen::shifted_curves(&layer, &steps, &vec![0.0; steps.len()]);
-        Unseen { predicted, folds: Vec::new() }
-    });
+    let slips_alone =
+        (!steps.is_empty()).then(|| unseen::shifted_curves(&layer, &steps, &vec![0.0; steps.len()]).0);
     let (reported, seen) = with_slips.as_ref().map_or((&law, &memory), |(l, u)| (l, u));
     let friction = friction(&layer, reported, seen, &steps);
     let single = single_time(points, &law, &memory);

@@ -137,7 +137,11 @@ fn documented(text: &mut String, told: &[Told<'_>]) {
             .filter(|f| {
                 matches!(f.get("kind").and_then(Value::as_str), Some("slip" | "bad-run" | "loaded-before"))
             })
-            .filter_map(|f| f.get("words").and_then(Value::as_str).map(|w| w.replace('|', "/")))
+            .filter_map(|f| {
+                let sure = f.get("found").and_then(Value::as_bool) == Some(true);
+                let words = f.get("words").and_then(Value::as_str)?.replace('|', "/");
+                Some(if sure { words } else { format!("(not named) {words}") })
+            })
             .collect();
         let cause = finding(h, kinds[2]).and_then(|f| f.get("cause")).and_then(Value::as_str).unwrap_or("–");
         let _ = writeln!(

@@ -43,10 +43,11 @@ criteria! {
     RIDGE: "λ_0" = 1e-6, "", "weight of squared spline coefficients", "numerical rank only";
     THRESHOLD_FROM: "p_1" = 0.84, "", "the tangent of the threshold starts at this share of the highest pressure", "the straight part of the pull";
     THRESHOLD_TO: "p_2" = 0.94, "", "the tangent of the threshold ends at this share of the highest pressure", "below the sparse last points";
+    ENGAGED: "P_e" = 60.0, "kPa", "pressure from which the bladder carries its part", "on the 29 cm muscle the squared residual is 3377 N² with it, 4396 N² with P_b in its place";
     RAMP: "ΔP_r" = 60.0, "kPa", "least pressure over which the bladder's carried part builds up", "width of the knee at full length";
     BALANCE_START: "P_b0" = 115.0, "kPa", "start value of the stress-free pressure, and its value where it is not identifiable", "best common value of eleven muscles";
     BALANCE_MOST: "P_b,max" = 200.0, "kPa", "largest stress-free pressure", "above it no muscle of the kind begins to pull";
-    BALANCE_MOVES: "ΔP_b" = 0.5, "kPa", "the search for the stress-free pressure ends at smaller steps", "a tenth of its usual standard error";
+    BALANCE_MOVES: "ΔP_b" = 0.2, "kPa", "the search for the stress-free pressure ends at smaller steps", "a tenth of its usual standard error";
     NEAR_BALANCE: "r_b" = 1.5, "", "P_b is identifiable when a mounting pulls from less than this times P_b", "the sign of p_el must be seen";
     DAMPING: "d" = 0.9, "", "share of each Gauss-Newton step that is taken", "steps across the knee overshoot";
     VENT_TIME: "t_v" = 2.0, "s", "time after the last row until a muscle counts as vented", "emptying of the last pulse";
@@ -57,7 +58,6 @@ criteria! {
     LEAST_SHARE: "c_min" = 0.1, "", "least relaxed share that is named (2 % a decade)", "largest of 144 nulls 0.040; below what filled rubbers relax";
     LEAST_GAIN: "g_min" = 0.15, "", "least share of the squared unseen error that the memory must remove", "largest of 60 nulls with ten runs 0.10";
     SLIP_RUNS: "n_s" = 6.0, "", "least number of runs of a mounting in which a lasting slip is looked for", "two levels and their scatter";
-    SLIP_SCATTER: "r_s" = 0.5, "", "a slip's levels scatter at most this share of the whole", "chosen on six muscles";
     SLIP_ERRORS: "t_s" = 4.0, "", "a slip is at least this many standard errors", "chosen on six muscles";
     SLIP_LEAST: "Δp_s" = 5.0, "kPa", "least slip", "about 0.3 mm of length; changes of pulse width make up to 4 kPa";
     SLIP_GAIN: "g_s" = 0.2, "", "a slip lowers the mounting's unseen error (rms) at least by this share", "chosen on six muscles";
@@ -77,8 +77,8 @@ criteria! {
 pub(super) const TIMES: [f64; 5] = [1.0, 10.0, 100.0, 1e3, 1e4];
 /// Pauses between runs that are tried where the clock does not tell them, s.
 pub(super) const PAUSES: [f64; 4] = [2.5, 5.0, 12.0, 30.0];
-/// Times for which the muscle may have been loaded before the first run, s.
-pub(super) const LOADED: [f64; 4] = [0.0, 100.0, 1e3, 1e4];
+/// Times for which the muscle may have been loaded before the first run, s. Longer ones trade against the relaxed share.
+pub(super) const LOADED: [f64; 3] = [0.0, 100.0, 1e3];
 
 /// 97.5 % quantile of Student's t; to 0.3 % beyond thirty degrees of freedom.
 pub(super) fn t_quantile(freedom: usize) -> f64 {

@@ -53,10 +53,10 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     }
     let braid = geometry.build().map_err(|e| Error::new(DataCode::MuscleInvalid, e.to_string()))?;
     let mut diagnosis = statically(&without_memory(campaign, &found), geometry, options)?;
+    enter(&mut diagnosis, found);
     if let Some(misfit) = misfit(campaign, &braid)? {
         diagnosis.misfit_rms_N = misfit;
     }
-    enter(&mut diagnosis, found);
     Ok(diagnosis)
 }
 
@@ -96,11 +96,12 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
     // What the search calls a memory in recordings freed of it is the rest of the same.
     diagnosis.missing.retain(|m| !NAMES.contains(&m.effect.as_str()));
     diagnosis.missing.insert(0, memory(&answer, peak));
+    let freed_misfit = diagnosis.misfit_rms_N;
     let rest_agrees =
         !diagnosis.judged() || matches!(diagnosis.verdict(), Verdict::Consistent | Verdict::Explained);
     let well = unseen.gain >= EXPLAINED || resolved;
     if !rest_agrees {
-        diagnosis.remarks.insert(0, Remark::StaticMisfit(diagnosis.misfit_rms_N));
+        diagnosis.remarks.insert(0, Remark::StaticMisfit(freed_misfit));
     }
     diagnosis.remarks.push(Remark::MemoryNotInTable);
     let verdict = if well && rest_agrees { Verdict::Explained } else { Verdict::PartlyExplained };
@@ -167,7 +168,7 @@ fn memory(history: &History, peak: f64) -> Missing {
         summary: "The bladder carries a part of the pressure. That part relaxes at constant length, as much in each tenfold of time, and \
                   comes back as slowly when the muscle is vented: the next runs remember it."
             .into(),
-        source: "P_eff = P + c·z̄, dz_k/dt = (u − z_k)/τ_k, u = p_el·clip((P − P_b)/max(|p_el|, 60 kPa), 0, 1), p_el = P_th(L) − P_b; \
+        source: "P_eff = P + c·z̄, dz_k/dt = (u − z_k)/τ_k, u = p_el·clip((P − 60 kPa)/max(|p_el|, 60 kPa), 0, 1), p_el = P_th(L) − P_b; \
                  linear relaxation with a flat spectrum over decades: W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear \
                  Viscoelastic Materials, 1976"
             .into(),

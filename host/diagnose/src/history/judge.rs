@@ -174,11 +174,11 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
         let half = if e.lasts { t_quantile(fits.memory.folds.len().saturating_sub(1)) * e.error } else { 2.0 * e.error };
         Finding {
             kind: if e.lasts { FindingKind::Slip } else { FindingKind::BadRun },
-            found: true,
+            found: e.sure,
             size: Estimate::new(e.shift, Some(half), "kPa", "run"),
             units: points.mountings[e.mounting].runs.len(),
             squares: 0.0,
-            cause: e.lasts.then(|| "end-slip".to_owned()),
+            cause: (e.lasts && e.sure).then(|| "end-slip".to_owned()),
             mounting: Some(e.mounting + 1),
             run: Some(e.run),
             words: format!(
@@ -187,7 +187,11 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
                 e.run,
                 if e.lasts { "from this run on a" } else { "a" },
                 e.shift,
-                if e.lasts { "the held length changed" } else { "look at this run before it is used" }
+                match (e.lasts, e.sure) {
+                    (true, true) => "the held length changed",
+                    (true, false) => "the held length may have changed; four standard errors are asked before that is said",
+                    (false, _) => "look at this run before it is used",
+                }
             ),
         }
     }));
@@ -203,7 +207,7 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
             mounting: None,
             run: None,
             words: format!(
-                "the muscle had been loaded for about {loaded:.0} s before the first recorded run: a first-run deficit is not to be \
+                "the muscle had been loaded for about {loaded:.0} s before the first recorded run: a smaller first-run deficit is to be \
                  expected (chosen on a grid, weakly known)"
             ),
         });
@@ -301,7 +305,9 @@ fn gap(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool) -> Option
     let (_, unseen) = fits.best();
     let left = findings::gap_left(points, &unseen.predicted);
     let (rubs, friction, error) = fits.friction;
-    let cause = match (found, rubs, named) {
+    // What the memory leaves of the gap must exclude none before friction is its cause.
+    let rests = left.as_ref().is_none_or(|l| l.half.is_some_and(|h| l.mean > h));
+    let cause = match (found, rubs && rests, named) {
         (true, true, _) => Some("pressure-friction".to_owned()),
         (true, false, true) => Some("log-creep".to_owned()),
         _ => None,

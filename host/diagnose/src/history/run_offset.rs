@@ -7,12 +7,12 @@
 use super::campaign::Points;
 use super::criteria::{
     BAD_RUN_ERRORS, BAD_RUN_LEAST, BAD_RUN_NEXT, BAD_RUN_RUNS, SLIP_ERRORS, SLIP_GAIN, SLIP_LEAST, SLIP_RUNS,
-    SLIP_SCATTER, SUPPORT,
+    SUPPORT, t_quantile,
 };
 use super::law::{Law, Layer};
 use super::shift_fit;
 use super::spline::{Banded, Spline};
-use super::unseen::{Unseen, jackknife, with_memory};
+use super::unseen::{jackknife, shifted_curves};
 use crate::linear::median;
 
 /// Slopes below this say nothing about a shift, as a share of the largest.
@@ -32,6 +32,8 @@ pub(super) struct Event {
     pub shift: f64,
     /// Its standard error: by jackknife over runs, or the deviation of all runs.
     pub error: f64,
+    /// Whether every rule holds; of a slip that is only likely the interval excludes none.
+    pub sure: bool,
 }
 
 /// Offset of each run from the others of its mounting, kPa; not a number where it cannot be told.
@@ -112,10 +114,17 @@ fn bad_run(points: &Points, mounting: usize, offsets: &[f64], deviation: f64) ->
     let ((run, shift), next) = (away[0], away[1].1.abs());
     let large = shift.abs() > (BAD_RUN_ERRORS * deviation).max(BAD_RUN_LEAST);
     let alone = shift.abs() > BAD_RUN_NEXT * next;
-    (run > 1 && large && alone).then_some(Event { mounting, run, lasts: false, shift, error: deviation })
+    (run > 1 && large && alone).then_some(Event {
+        mounting,
+        run,
+        lasts: false,
+        shift,
+        error: deviation,
+        sure: true,
+    })
 }
 
-/// The best place at which the offsets of a mounting could step, where they do so clearly.
+/// The place at which the offsets of a mounting most likely step, if they do: the refit decides.
 fn candidate(points: &Points, mounting: usize, offsets: &[f64]) -> Option<usize> {
     let own = known(points, mounting, offsets);
     if (own.len() as f64) < SLIP_RUNS {
@@ -126,8 +135,8 @@ fn candidate(points: &Points, mounting: usize, offsets: &[f64]) -> Option<usize>
         part.iter().map(|o| (o.1 - mean).powi(2)).sum::<f64>()
     };
     let splits = (2..own.len() - 1).map(|s| (s, scatter(&own[..s]) + scatter(&own[s..])));
-    let (split, within) = splits.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (within < SLIP_SCATTER * scatter(&own)).then(|| own[split].0)
+    let (split, _) = splits.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(own[split].0)
 }
 
 /// The column of a step that lasts from a run of a mounting on.
@@ -136,25 +145,30 @@ pub(super) fn step_column(points: &Points, mounting: usize, from_run: usize) -> 
     (0..points.len()).map(|i| f64::from(u8::from(after(i)))).collect()
 }
 
-/// A slip that unseen runs support, in one mounting.
-fn slip(layer: &Layer<'_>, law: &Law, memory: &Unseen, mounting: usize, offsets: &[f64]) -> Option<Event> {
+/// A slip that unseen runs support, in one mounting; `P_b` and the unrecorded times are held.
+fn slip(layer: &Layer<'_>, law: &Law, mounting: usize, offsets: &[f64]) -> Option<Event> {
     let points = layer.points;
     let run = candidate(points, mounting, offsets)?;
-    let column = vec![step_column(points, mounting, run)];
+    let without = law.columns.clone();
+    let mut with = without.clone();
+    with.push(step_column(points, mounting, run));
     let everything = vec![true; points.len()];
-    let start = Law { fit: with_room(law), ..law.clone() };
-    let with = layer.fit(&everything, Some(law.choice), &column, Some(&start));
-    let shift = *with.fit.theta.last()?;
+    let start = with_room(law).theta;
+    let full = shift_fit::fit(points, &layer.spline, &everything, &with, &start, 6);
+    let shift = *full.theta.last()?;
     if !(shift.abs() >= SLIP_LEAST) {
         return None;
     }
-    let unseen = with_memory(layer, &with, &column, true);
-    let steps: Vec<f64> = unseen.folds.iter().filter_map(|f| f.fit.theta.last().copied()).collect();
+    let (stepped, thetas) = shifted_curves(layer, &with, &full.theta);
+    let (plain, _) = shifted_curves(layer, &without, &law.fit.theta);
+    let steps: Vec<f64> = thetas.iter().filter_map(|t| t.last().copied()).collect();
     let error = jackknife(&steps);
     let here = |i: usize| points.mounting[i] == mounting;
-    let (before, after) = (memory.sizes(points, here).rms, unseen.sizes(points, here).rms);
-    let kept = shift.abs() > SLIP_ERRORS * error && after <= (1.0 - SLIP_GAIN) * before;
-    kept.then_some(Event { mounting, run, lasts: true, shift, error })
+    let (before, after) = (plain.sizes(points, here).rms, stepped.sizes(points, here).rms);
+    let likely = shift.abs() > t_quantile(steps.len().saturating_sub(1)) * error
+        && after <= (1.0 - SLIP_GAIN) * before;
+    let sure = shift.abs() > SLIP_ERRORS * error;
+    likely.then_some(Event { mounting, run, lasts: true, shift, error, sure })
 }
 
 /// A fit with one more coefficient, zero.
@@ -165,11 +179,9 @@ pub(super) fn with_room(law: &Law) -> shift_fit::ShiftFit {
 }
 
 /// All slips and bad runs, mounting by mounting.
-pub(super) fn events(layer: &Layer<'_>, law: &Law, memory: &Unseen, offsets: &[f64]) -> Vec<Event> {
+pub(super) fn events(layer: &Layer<'_>, law: &Law, offsets: &[f64]) -> Vec<Event> {
     let deviation = deviation(layer.points, offsets);
     (0..layer.points.mountings.len())
-        .filter_map(|m| {
-            bad_run(layer.points, m, offsets, deviation).or_else(|| slip(layer, law, memory, m, offsets))
-        })
+        .filter_map(|m| bad_run(layer.points, m, offsets, deviation).or_else(|| slip(layer, law, m, offsets)))
         .collect()
 }

@@ -93,8 +93,13 @@ fn groups(points: &Points) -> Vec<Vec<usize>> {
     (0..count).map(|g| (g..runs).step_by(count).collect()).collect()
 }
 
-/// A curve for each mounting on pressures that are shifted by given columns alone (without memory).
-pub(super) fn shifted_curves(layer: &Layer<'_>, columns: &[Vec<f64>], start: &[f64]) -> Vec<f64> {
+/// A curve for each mounting on pressures that are shifted by given columns, their coefficients refitted without each run: what is predicted,
+/// and the coefficients of each fold.
+pub(super) fn shifted_curves(
+    layer: &Layer<'_>,
+    columns: &[Vec<f64>],
+    start: &[f64],
+) -> (Unseen, Vec<Vec<f64>>) {
     let points = layer.points;
     let fits: Vec<(Vec<usize>, ShiftFit)> = groups(points)
         .into_par_iter()
@@ -105,14 +110,14 @@ pub(super) fn shifted_curves(layer: &Layer<'_>, columns: &[Vec<f64>], start: &[f
         })
         .collect();
     let mut predicted = vec![f64::NAN; points.len()];
-    for (group, fit) in fits {
-        for r in group.into_iter().filter(|r| has_others(points, *r)) {
-            for i in points.runs[r].points.0..points.runs[r].points.1 {
-                predicted[i] = shift_fit::predict(points, &layer.spline, columns, &fit, i);
+    for (group, fit) in &fits {
+        for r in group.iter().filter(|r| has_others(points, **r)) {
+            for i in points.runs[*r].points.0..points.runs[*r].points.1 {
+                predicted[i] = shift_fit::predict(points, &layer.spline, columns, fit, i);
             }
         }
     }
-    predicted
+    (Unseen { predicted, folds: Vec::new() }, fits.into_iter().map(|(_, fit)| fit.theta).collect())
 }
 
 /// The law with memory, everything chosen without the run that is predicted: `c`, `P_b` and, of few runs, pause and earlier load (which are

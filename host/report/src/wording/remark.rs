@@ -10,7 +10,7 @@ pub fn remark(remark: &Remark) -> String {
     match remark {
         Remark::NotJudged(reason) => format!("not judged: {}", unjudgeable(reason)),
         Remark::StaticMisfit(rms) => format!(
-            "the static model leaves {rms:.2} N rms between mountings, which has no name: geometry, end effects and mounted lengths (±1 mm \
+            "without the memory, the static model over all mountings still leaves {rms:.2} N rms: geometry, end effects and mounted lengths (±1 mm \
              by tape measure) are not identifiable from one muscle"
         ),
         Remark::MemoryNotInTable => {

@@ -61,7 +61,7 @@ fn campaign(truth: Truth, seed: u64) -> Campaign {
             for k in 0..((50.0 + PAUSE) / step) as usize {
                 let t = k as f64 * step;
                 let p = if t < 50.0 { pressure(t) } else { 0.0 };
-                let engaged = ((p - truth.balance) / carried.abs().max(60.0)).clamp(0.0, 1.0);
+                let engaged = ((p - 60.0) / carried.abs().max(60.0)).clamp(0.0, 1.0);
                 for (z, tau) in states.iter_mut().zip(TIMES) {
                     *z += step / tau * (carried * engaged - *z);
                 }
@@ -154,7 +154,7 @@ fn dry_friction_alone_is_no_memory() {
 #[test]
 fn a_slip_is_found_at_its_run() {
     let h = asked(&campaign(Truth { runs: 8, slip: Some((1, 4, 15.0)), ..MEMORY }, 4));
-    let slips: Vec<_> = h.of(FindingKind::Slip).collect();
+    let slips: Vec<_> = h.of(FindingKind::Slip).filter(|f| f.found).collect();
     assert_eq!(slips.len(), 1, "{:?}", h.findings);
     assert_eq!((slips[0].mounting, slips[0].run), (Some(2), Some(5)));
     assert!((slips[0].size.value - 15.0).abs() < 3.0, "{:?}", slips[0].size);
