@@ -88,7 +88,7 @@ impl Bench {
         self.mishap.store(0, Ordering::Relaxed);
         let end = Instant::now() + HOPELESS;
         while let (1.., said) = self.refused(&["device", "faults", "--clear"]) {
-            assert!(said.contains("still there") && Instant::now() < end, "{said}");
+            assert!(said.contains("still present") && Instant::now() < end, "{said}");
         }
     }
 
@@ -192,7 +192,7 @@ fn a_run_is_a_recording_that_the_readers_of_recordings_read() {
         "{said}"
     );
     let said = bench.done(&["run", "--force=-200", "--seconds", "0.5"]);
-    assert!(said.contains("out of reach: less than it pulls there without pressure"), "{said}");
+    assert!(said.contains("could not be reached: less than it pulls there without pressure"), "{said}");
     // A muscle that is tested at less than it is used at.
     let mut table = model_core::table::example();
     table.tested.pressure_high = Pressure::from_kilopascals(220.0);
@@ -223,7 +223,7 @@ fn a_broken_load_cell_stops_a_run_in_words_and_the_rows_until_then_are_kept() {
     let (status, said) = bench.refused(&["run", "--force", "40", "--seconds", "1"]);
     assert!(status == 1 && said.contains("load cell"), "a latched fault stays: {said}");
     let (status, said) = bench.refused(&["device", "faults", "--clear"]);
-    assert!(status == 1 && said.contains("still there"), "{said}");
+    assert!(status == 1 && said.contains("still present"), "{said}");
     bench.mend();
     bench.done(&["run", "--force", "40", "--seconds", "0.5"]);
     let said = bench.done(&["device", "faults", "--json"]);

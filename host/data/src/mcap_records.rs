@@ -128,7 +128,8 @@ pub fn plausible(kind: u8, body: &[u8]) -> bool {
         fields.0 = rest;
         let mut entries = Fields(entries);
         while !entries.0.is_empty() {
-            (entries.text()?, entries.text()?);
+            entries.text()?;
+            entries.text()?;
         }
         Some(())
     };
@@ -136,7 +137,9 @@ pub fn plausible(kind: u8, body: &[u8]) -> bool {
         kind::HEADER => fields.text().and_then(|_| fields.text()).map(|_| ()),
         kind::METADATA => fields.text().and_then(|_| map(&mut fields)),
         kind::ATTACHMENT => (|| {
-            (fields.u64()?, fields.u64()?, fields.text()?, fields.text()?);
+            fields.take::<16>()?;
+            fields.text()?;
+            fields.text()?;
             let length = usize::try_from(fields.u64()?).ok()?;
             fields.0 = fields.0.split_at_checked(length)?.1;
             fields.u32().map(|_| ())
@@ -194,7 +197,7 @@ impl<R: Read> Records<R> {
     ///
     /// # Errors
     /// [`Trouble`].
-    pub fn next(&mut self) -> Result<Option<(u8, &[u8])>, Trouble> {
+    pub fn read(&mut self) -> Result<Option<(u8, &[u8])>, Trouble> {
         if !self.begun {
             self.begun = true;
             let mut magic = [0; MAGIC.len()];
@@ -249,7 +252,7 @@ mod tests {
             bytes.extend(length.to_le_bytes());
             bytes.extend([7; 100]);
             let mut records = Records::new(bytes.as_slice());
-            assert!(records.next().is_err());
+            assert!(records.read().is_err());
             assert!(records.body.capacity() < 4096);
         }
         // A text, an array of records: their announced lengths are looked for in what is there.
@@ -265,7 +268,7 @@ mod tests {
             file.extend((bytes.len() as u64).to_le_bytes());
             file.extend(&bytes);
             let mut records = Records::new(file.as_slice());
-            while let Ok(Some((_, body))) = records.next() {
+            while let Ok(Some((_, body))) = records.read() {
                 if let Some(chunk) = Chunk::parse(body) {
                     prop_assert!(chunk.iter().count() <= body.len());
                     let _ = chunk.intact();

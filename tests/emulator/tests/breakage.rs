@@ -77,7 +77,7 @@ fn a_host_that_is_killed_during_a_wave_of_the_devices_own_stops_it() {
         said.contains("1001 ticks against 1000 ticks") && said.contains("while running in pressure mode"),
         "{said}"
     );
-    assert!(said.contains("what to do: was the program ended"), "{said}");
+    assert!(said.contains("what to do: check that the program is running"), "{said}");
     let said = program::done(&line, folder.path(), &["device", "info", "--json"]);
     assert!(said.contains("\"state\": \"disarmed\""), "{said}");
 }

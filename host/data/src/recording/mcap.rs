@@ -19,7 +19,7 @@ const TOPIC: &str = "/telemetry";
 pub(super) fn columns(reader: impl Read, budget: Budget) -> Result<ColumnTable> {
     let mut samples = Samples { topics: HashMap::new(), table: Vec::new(), rows: 0, budget };
     let mut records = Records::new(reader);
-    while let Some((kind, body)) = records.next().map_err(trouble)? {
+    while let Some((kind, body)) = records.read().map_err(trouble)? {
         match kind {
             kind::CHUNK => {
                 let chunk = Chunk::parse(body)
