@@ -25,6 +25,7 @@
 //! | `localise` | which cells, since which file, at once or gradually |
 //! | `held_out` | how much of the difference is gone on recordings that the fit had not seen |
 //! | `units` | columns in other units, another actuator |
+//! | `report`, `staircase_answer`, `stroke_answer` | from two sides to the answer |
 //! | [`answer`] | the answer as values and JSON |
 //! | [`words`] | the answer in words |
 //! | [`correction`] | what the answer means for a table |
@@ -49,6 +50,8 @@ mod runs;
 pub mod shapes;
 mod slip;
 mod spline;
+mod staircase_answer;
+mod stroke_answer;
 mod stroked;
 mod strokes;
 mod surface;

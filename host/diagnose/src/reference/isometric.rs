@@ -125,12 +125,14 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
     let mut present = contrast.clone();
     let mut first: Option<Round> = None;
     loop {
-        let lag_open = !accepted.iter().any(|a| is_lag(a.change));
+        // Lag scores are of rows that still hold what was named before: a lag is named first or not at all.
+        let lag_open = accepted.is_empty();
         let round = weigh(&cells, &present, &surface, lag_open.then_some(&shift), prior_none);
         let leader = round.posterior.leader();
         let none = round.posterior.probability(Cause::None);
         // What a lag does to settled rows is not known well enough to look for more beneath it.
-        let more = leader.filter(|_| lag_open && none < NAMED && accepted.len() < MOST_CHANGES);
+        let lagged = accepted.iter().any(|a| is_lag(a.change));
+        let more = leader.filter(|_| !lagged && none < NAMED && accepted.len() < MOST_CHANGES);
         let next = more.and_then(|(change, p)| accept(&cells, &round, change, p, &shift));
         let last = round.posterior.clone();
         first.get_or_insert(round);

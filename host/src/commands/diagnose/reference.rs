@@ -181,13 +181,8 @@ pub fn run(arguments: &Arguments, console: &Console, taken: bool) -> Result<()> 
             Against::Table(table, &path)
         }
     };
-    let mut report = compare(&after, against, &asked)?;
+    let report = compare(&after, against, &asked)?;
     console.detail(format!("compared in {:.3} s", start.elapsed().as_secs_f64()));
-    if let (Some(output), Some(muscle)) = (&arguments.output, &muscle) {
-        let told = write_table(arguments, output, &report, &before, &after, muscle)?;
-        console.note(&told);
-        report.remarks.push(told);
-    }
     if let Some(path) = &arguments.json {
         write_whole(path, (report.to_json() + "\n").as_bytes())?;
     }
@@ -195,6 +190,11 @@ pub fn run(arguments: &Arguments, console: &Console, taken: bool) -> Result<()> 
     if arguments.json.as_deref() != Some(Path::new("-")) {
         let words = words::summary(&report);
         if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
+    }
+    // Last, so that the answer is there where no table can be written.
+    if let (Some(output), Some(muscle)) = (&arguments.output, &muscle) {
+        let told = write_table(arguments, output, &report, &before, &after, muscle)?;
+        console.note(told);
     }
     Ok(())
 }

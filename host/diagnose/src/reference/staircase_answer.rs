@@ -1,0 +1,208 @@
+//! The answer for pressure staircases at held lengths.
+
+use nalgebra::DVector;
+
+use super::answer::{
+    ChangeReport, Changed, Considered, Curve, HeldOut, NotComparable, Probability, Reference, Repeatability,
+    Verdict, not_comparable, size,
+};
+use super::criteria::{CELLS, FEWEST_CELLS, GATE, NAMED, PRIOR_NONE, SCALE_PRIOR, SIZES, SLOPE_ERROR};
+use super::held_out;
+use super::isometric::{Accepted, Analysis};
+use super::posterior::Cause;
+use super::report::{Options, left, prior, verdict};
+use super::shapes::{CHANGES, Change};
+use super::slip::rms_after;
+use super::{cells, localise, repeatability, words};
+
+/// Everything that was found, as the answer.
+pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport {
+    let first = &analysis.first.posterior;
+    let difference = held_out::difference(&analysis.cells, &analysis.contrast);
+    let shapes: Vec<DVector<f64>> = analysis.accepted.iter().map(|a| a.shape.clone()).collect();
+    let unseen = held_out::unseen(&analysis.cells, &analysis.contrast, &shapes);
+    let scale = analysis.contrast.without_shapes(&shapes).scale();
+    let noise = repeatability::spread(analysis.surface.largest, scale);
+    let verdict = verdict(
+        first.probability(Cause::None),
+        analysis.accepted.len(),
+        analysis.last.probability(Cause::None) < NAMED,
+    );
+    let mut remarks = remarks(analysis, verdict);
+    let not = incomparable(analysis);
+    if not.iter().any(|n| matches!(n, NotComparable::OneLength)) && analysis.runs.remounted {
+        remarks.push(words::ONE_LENGTH_REMOUNTED.to_owned());
+    }
+    let before: Vec<usize> = analysis.runs.side(false).map(|r| r.mounting).collect();
+    let measured = before.iter().any(|m| before.iter().filter(|o| *o == m).count() > 1);
+    if !measured && !before.is_empty() {
+        remarks.push(words::ASSUMED.to_owned());
+    }
+    let where_ = if verdict == Verdict::Consistent {
+        Vec::new()
+    } else {
+        localise::places(analysis, &difference, options.rest_length)
+    };
+    ChangeReport {
+        schema: "pam-diagnose/1",
+        muscle: None,
+        samples: 0,
+        verdict,
+        noise_N: noise,
+        misfit_rms_N: unseen.before,
+        largest_force_N: analysis.surface.largest,
+        unexplained: left(verdict, &unseen, &where_),
+        r#where: where_,
+        missing: analysis.accepted.iter().map(|a| changed(analysis, a)).collect(),
+        held_out: HeldOut {
+            split: words::split(unseen.held).to_owned(),
+            rms_before_N: unseen.before,
+            rms_after_N: unseen.after,
+            noise_N: noise,
+        },
+        next_experiment: None,
+        considered: considered(analysis, options),
+        probabilities: first
+            .all
+            .iter()
+            .map(|(c, p)| Probability { cause: c.name().into(), probability: *p })
+            .collect(),
+        set: first.set().into_iter().map(|c| c.name().to_owned()).collect(),
+        remarks,
+        reference: Reference {
+            files: Vec::new(),
+            table: None,
+            samples: 0,
+            repeatability_N: noise,
+            repeatability_from: if measured { Repeatability::Measured } else { Repeatability::Assumed },
+            mounted_anew: analysis.runs.remounted,
+            not_comparable: not_comparable(&not),
+        },
+        curves: curves(analysis, &difference),
+        abscissa: ("pressure P", "kPa"),
+    }
+}
+
+fn remarks(analysis: &Analysis, verdict: Verdict) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if let Some((mounting, log)) = analysis.first.local.filter(|l| l.1 > GATE.ln()) {
+        // With a change that all mountings show, the one that shows it most is no news.
+        if verdict == Verdict::Consistent || verdict == Verdict::Unexplained {
+            remarks.push(words::one_mounting(analysis.runs.strokes[mounting], log));
+        }
+    }
+    remarks
+}
+
+fn incomparable(analysis: &Analysis) -> Vec<NotComparable> {
+    let mut not = analysis.runs.not_comparable.clone();
+    for run in analysis.runs.side(true) {
+        let (out, all) = cells::beyond(run, &analysis.surface);
+        if out > 0 {
+            let share = out as f64 / all.max(1) as f64;
+            not.push(NotComparable::Pressure { recording: run.name.clone(), share });
+        }
+    }
+    let recorded = analysis.runs.side(false).next().is_some();
+    for (m, stroke) in analysis.runs.strokes.iter().enumerate() {
+        let mut kinds: Vec<[bool; 2]> = vec![[false; 2]; 2 * CELLS];
+        for c in analysis.cells.iter().filter(|c| c.mounting == m) {
+            kinds[c.bin + if c.direction < 0.0 { CELLS } else { 0 }][usize::from(c.after)] = true;
+        }
+        let after = kinds.iter().any(|k| k[1]);
+        if after && recorded && kinds.iter().filter(|k| k[0] && k[1]).count() < FEWEST_CELLS {
+            not.push(NotComparable::FewCells { stroke: *stroke });
+        }
+    }
+    if analysis.surface.curves.iter().all(|c| c.by_stroke.iter().all(|s| *s == 0.0)) {
+        not.push(NotComparable::OneLength);
+    }
+    not
+}
+
+fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
+    let about = accepted.change.about();
+    let freedom = SCALE_PRIOR + analysis.contrast.taught.min(analysis.contrast.free);
+    let unseen = held_out::unseen(&analysis.cells, &analysis.contrast, std::slice::from_ref(&accepted.shape));
+    let class = analysis.first.posterior.classes().get(&about.class).copied().unwrap_or(0.0);
+    Changed {
+        effect: about.name.into(),
+        probability: accepted.probability,
+        class_probability: class.max(accepted.probability),
+        class: about.class,
+        share_explained: unseen.share().max(0.0),
+        parameters: vec![size(about.parameter, accepted.size, accepted.std, freedom, SLOPE_ERROR)],
+        confusable_with: accepted.rivals.iter().map(|c| c.name().to_owned()).collect(),
+        since: localise::since(analysis, accepted),
+        owner: about.owner,
+        correction: accepted.change.is_bench(),
+        law: about.law.into(),
+        remedy: about.remedy.into(),
+        rms_N: rms_after(&analysis.cells, &accepted.shape) * accepted.size.abs(),
+    }
+}
+
+fn considered(analysis: &Analysis, options: &Options) -> Vec<Considered> {
+    let none = prior(options, PRIOR_NONE);
+    let round = &analysis.first;
+    let names =
+        round.posterior.all.iter().filter(|(c, _)| matches!(c, Cause::Named(_))).count().max(1) as f64;
+    let prior_name = ((1.0 - none) / names).max(1e-6);
+    let middle = SIZES[1] * analysis.surface.largest;
+    let open = |change: Change| !analysis.accepted.iter().any(|a| a.change == change);
+    CHANGES
+        .iter()
+        .filter(|about| open(about.change))
+        .map(|about| {
+            let p = round.posterior.probability(Cause::Named(about.change));
+            let estimate = round.estimates.iter().find(|e| e.change == about.change);
+            let detectable = estimate.map(|e| {
+                // What the prior, a lead of e³ and the price of the size ask of the evidence; 1.28: with 90 %.
+                let price = (middle / e.rms / e.std).powi(2).ln_1p();
+                let z = (2.0 * (none / prior_name).ln() + 6.0 + price).max(0.0).sqrt();
+                e.std * (z + 1.28)
+            });
+            Considered {
+                effect: about.name.into(),
+                gain: p,
+                why_not: words::why_not(detectable.is_some(), p).into(),
+                detectable: detectable.filter(|d| d.is_finite()),
+                unit: about.parameter.1.into(),
+            }
+        })
+        .collect()
+}
+
+/// Force before and after, the difference and what is explained, over pressure, by mounting.
+fn curves(analysis: &Analysis, difference: &DVector<f64>) -> Vec<Curve> {
+    let mut all = Vec::new();
+    for (m, stroke) in analysis.runs.strokes.iter().enumerate() {
+        let mut curve = Curve { title: format!("{:.1} mm", stroke * 1e3), ..Curve::default() };
+        let mut sums = [[[0.0; 4]; CELLS]; 2];
+        let after = analysis.cells.iter().enumerate().filter(|(_, c)| c.after);
+        for ((i, c), d) in after.zip(difference.iter()).filter(|((_, c), _)| c.mounting == m) {
+            let explained: f64 = analysis.accepted.iter().map(|a| a.size * a.shape[i]).sum();
+            let sum = &mut sums[usize::from(c.direction < 0.0)][c.bin];
+            let force = analysis.surface.force(m, c.means.pressure, c.direction) + c.means.residual;
+            *sum = [sum[0] + 1.0, sum[1] + d, sum[2] + explained, sum[3] + force];
+        }
+        let step = (analysis.surface.high - analysis.surface.low) / CELLS as f64;
+        for bin in 0..CELLS {
+            let p = analysis.surface.low + step * (bin as f64 + 0.5);
+            curve.at.push(p / 1e3);
+            for side in 0..2 {
+                let [n, d, e, f] = sums[side][bin];
+                let mean = |v: f64| if n > 0.0 { v / n } else { f64::NAN };
+                let direction = if side == 0 { 1.0 } else { -1.0 };
+                curve.before[side].push(analysis.surface.force(m, p, direction));
+                curve.after[side].push(mean(f));
+                curve.difference[side].push(mean(d));
+                curve.explained[side].push(mean(e));
+            }
+        }
+        if curve.after.iter().flatten().any(|v| v.is_finite()) {
+            all.push(curve);
+        }
+    }
+    all
+}

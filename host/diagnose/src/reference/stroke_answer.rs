@@ -1,0 +1,182 @@
+//! The answer for strokes at regulated pressures.
+
+use super::answer::{
+    ChangeReport, Changed, Considered, Curve, HeldOut, Place, Probability, Reference, Repeatability, Since,
+    Verdict, not_comparable, size,
+};
+use super::criteria::{NAMED, STROKE_PRIOR_NONE};
+use super::held_out::Unseen;
+use super::report::{Options, left, prior};
+use super::shapes::{Change, Class};
+use super::stroked::{self, Compared, Weighed};
+use super::words;
+use pam_data::error::Result;
+
+/// What was compared, weighed, as the answer.
+///
+/// # Errors
+/// Numbers that cannot be used.
+pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeReport> {
+    let none = prior(options, STROKE_PRIOR_NONE);
+    let weighed = stroked::weigh(compared, none)?;
+    let named = stroked::named(&weighed);
+    let (before, after) = stroked::unseen(compared, &named);
+    let verdict = if named.is_empty() && weighed.none() < 0.1 {
+        Verdict::Unexplained
+    } else if named.is_empty() {
+        Verdict::Consistent
+    } else {
+        let share = 1.0 - (after / before.max(f64::MIN_POSITIVE)).powi(2);
+        if share >= 0.5 { Verdict::Explained } else { Verdict::PartlyExplained }
+    };
+    let n = compared.keys.len();
+    let noise = (compared.covariance.trace() / (2 * n) as f64).sqrt();
+    let unseen = Unseen { before, after, held: true };
+    let places = if verdict == Verdict::Consistent { Vec::new() } else { stroke_places(compared) };
+    let mut probabilities: Vec<Probability> = stroked::ASKED
+        .iter()
+        .map(|c| Probability { cause: c.name().into(), probability: weighed.marginal(*c) })
+        .chain([Probability { cause: "none".into(), probability: weighed.none() }])
+        .collect();
+    probabilities.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    let mut remarks = vec![words::STROKES_ASSUMED.to_owned(), words::STROKES_MARGINAL.to_owned()];
+    if named.is_empty() && verdict == Verdict::Consistent && weighed.none() < NAMED {
+        remarks.push(words::not_acquitted(weighed.none()));
+    }
+    if named.iter().any(|c| c.class() == Class::Gain) {
+        remarks.push(words::GAIN_OF_STROKES.to_owned());
+    }
+    Ok(ChangeReport {
+        schema: "pam-diagnose/1",
+        muscle: None,
+        samples: 0,
+        verdict,
+        noise_N: noise,
+        misfit_rms_N: before,
+        largest_force_N: compared.largest,
+        unexplained: left(verdict, &unseen, &places),
+        r#where: places,
+        missing: named.iter().map(|c| stroke_change(compared, &weighed, *c)).collect(),
+        held_out: HeldOut {
+            split: words::STROKE_SPLIT.to_owned(),
+            rms_before_N: before,
+            rms_after_N: after,
+            noise_N: noise,
+        },
+        next_experiment: None,
+        considered: stroked::ASKED
+            .iter()
+            .filter(|c| !named.contains(c))
+            .map(|c| Considered {
+                effect: c.name().into(),
+                gain: weighed.marginal(*c),
+                why_not: words::why_not(true, weighed.marginal(*c)).into(),
+                detectable: weighed.alone.get(c).map(|(_, std)| std * (3.5 + 1.28)),
+                unit: c.about().parameter.1.into(),
+            })
+            .collect(),
+        set: probabilities.iter().filter(|p| p.probability >= 0.05).map(|p| p.cause.clone()).collect(),
+        probabilities,
+        remarks,
+        reference: Reference {
+            files: Vec::new(),
+            table: None,
+            samples: 0,
+            repeatability_N: noise,
+            repeatability_from: Repeatability::Assumed,
+            mounted_anew: true,
+            not_comparable: not_comparable(&compared.not_comparable),
+        },
+        curves: stroke_curves(compared, &weighed, &named),
+        abscissa: ("displacement", "mm"),
+    })
+}
+
+fn stroke_change(compared: &Compared, weighed: &Weighed, change: Change) -> Changed {
+    let about = change.about();
+    let (value, std) = weighed.sizes.get(&change).copied().unwrap_or_default();
+    let (before, after) = stroked::unseen(compared, &[change]);
+    let index = stroked::ASKED.iter().position(|c| *c == change).unwrap_or(0);
+    let shape = &compared.shapes[index];
+    let mut rivals: Vec<String> = stroked::ASKED
+        .iter()
+        .filter(|c| **c != change && c.class() == about.class && weighed.marginal(**c) >= 0.05)
+        .map(|c| c.name().to_owned())
+        .collect();
+    if change == Change::ForceGain {
+        // At regulated pressures the force grows with pressure: these three have one shape.
+        rivals.extend([Change::GaugeGain, Change::CrossTalk].map(|c| c.name().to_owned()));
+    }
+    Changed {
+        effect: about.name.into(),
+        probability: weighed.marginal(change),
+        class_probability: weighed.class(about.class),
+        class: about.class,
+        share_explained: (1.0 - (after / before.max(f64::MIN_POSITIVE)).powi(2)).clamp(0.0, 1.0),
+        parameters: vec![size(about.parameter, value, std, 1e6, 0.0)],
+        confusable_with: rivals,
+        since: Since::NotDetermined,
+        owner: about.owner,
+        correction: change.is_bench(),
+        law: about.law.into(),
+        remedy: about.remedy.into(),
+        rms_N: (shape.norm_squared() / shape.len().max(1) as f64).sqrt() * value.abs(),
+    }
+}
+
+fn stroke_places(c: &Compared) -> Vec<Place> {
+    let total = c.y.norm_squared();
+    let n = c.keys.len();
+    let mut all: Vec<Place> = c
+        .levels
+        .iter()
+        .enumerate()
+        .filter_map(|(l, pressure)| {
+            let own = stroked::of_level(c, l);
+            let energy: f64 = own.iter().map(|i| c.y[*i].powi(2) + c.y[n + i].powi(2)).sum();
+            let (share, rows) = (energy / total, own.len() as f64 / n as f64);
+            (share > rows && rows < 1.0).then(|| Place {
+                coordinate: "pressure".into(),
+                from: pressure / 1e3,
+                to: pressure / 1e3,
+                share,
+                rows,
+                unit: "kPa".into(),
+            })
+        })
+        .collect();
+    all.sort_by(|a, b| b.share.total_cmp(&a.share));
+    all
+}
+
+fn stroke_curves(c: &Compared, weighed: &Weighed, named: &[Change]) -> Vec<Curve> {
+    let n = c.keys.len();
+    let explained = |i: usize| -> f64 {
+        named
+            .iter()
+            .filter_map(|change| {
+                let index = stroked::ASKED.iter().position(|a| a == change)?;
+                Some(weighed.sizes.get(change)?.0 * c.shapes[index][i])
+            })
+            .sum()
+    };
+    let mut all = Vec::new();
+    for (l, pressure) in c.levels.iter().enumerate() {
+        let own = stroked::of_level(c, l);
+        if own.is_empty() {
+            continue;
+        }
+        let mut curve = Curve { title: format!("{:.0} kPa", pressure / 1e3), ..Curve::default() };
+        for i in own {
+            curve.at.push(c.before[i].stroke * 1e3);
+            for (side, sign) in [(0, -1.0), (1, 1.0)] {
+                curve.before[side].push(c.before[i].force[side]);
+                curve.after[side].push(c.after[i].force[side]);
+                curve.difference[side].push(c.y[i] + sign * c.y[n + i]);
+                curve.explained[side].push(explained(i) + sign * explained(n + i));
+            }
+        }
+        all.push(curve);
+    }
+    all
+}
