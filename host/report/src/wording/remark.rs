@@ -74,7 +74,7 @@ fn unjudgeable(reason: &Unjudgeable) -> String {
     match reason {
         Unjudgeable::FewRows { usable, least } => {
             let usable =
-                if *usable == 0 { "no row is".to_owned() } else { format!("only {usable} rows are") };
+                if *usable == 0 { "no row".to_owned() } else { format!("only {}", counted(*usable, "row")) };
             format!("{usable} usable (direction known, muscle not slack); {least} are needed")
         }
         Unjudgeable::FewStrokes { found, least } => format!(

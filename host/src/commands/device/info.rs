@@ -38,10 +38,13 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
     let status = client.call::<GetStatus>(&())?;
     if json {
         let settings = client.call::<GetSettings>(&())?;
-        let device = recorder::about_device(&hello, &info, &settings);
+        let about = recorder::about_device(&hello, &info, &settings);
+        let mut device = about.as_object().cloned().unwrap_or_default();
+        // There it is the link's; here it names the document, and the link's stands beside it.
+        device.remove("schema");
         console.result(text(&document::Info {
             schema: "pam-device/1",
-            device: device.as_object().cloned().unwrap_or_default(),
+            device,
             link_schema: format!("{:016x}", hello.schema_hash),
             muscles: info.muscles,
             table_capacity: info.table_capacity,
