@@ -84,7 +84,7 @@ fn bad_checks_are_refused_with_the_place_and_what_to_do() {
     let rows = |row: &str| row.repeat(30);
     for (text, says) in [
         (format!("time_s,force_N\n{}", rows("0,1\n")), "no column of the reference"),
-        ("time_s,force_N,reference_force_N\n0,1,1\n".to_owned(), "1 row,"),
+        ("time_s,force_N,reference_force_N\n0,1,1\n".to_owned(), "1 row;"),
         (
             format!("time_s,force_N,reference_force_N\n{}0,x,1\n", rows("0,1,1\n")),
             "line 32: `x` is no number for `force_N`",
