@@ -73,8 +73,11 @@ pub fn remark(remark: &Remark) -> String {
 fn unjudgeable(reason: &Unjudgeable) -> String {
     match reason {
         Unjudgeable::FewRows { usable, least } => {
-            let usable =
-                if *usable == 0 { "no row".to_owned() } else { format!("only {}", counted(*usable, "row")) };
+            let usable = if *usable == 0 {
+                "no row".to_owned()
+            } else {
+                format!("only {}", pluralise(*usable, "row"))
+            };
             format!("{usable} usable (direction known, muscle not slack); {least} are needed")
         }
         Unjudgeable::FewStrokes { found, least } => format!(
