@@ -133,7 +133,7 @@ fn a_joint_takes_angle_and_stiffness_and_says_which_it_can_have() {
         );
     }
     for (angle, wanted, why) in [
-        ("0", "20", "a stiffness of "),
+        ("0", "20", "the joint stiffness is "),
         ("sine mean=0 amplitude=4 frequency=1", "60", "N·m/rad at this angle"),
         ("60", "120", "both muscles of the joint are taut from -"),
     ] {
