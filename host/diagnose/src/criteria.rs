@@ -183,10 +183,14 @@ mod tests {
         while let Some(folder) = folders.pop() {
             for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
                 let path = entry.path();
-                // The comparison with references has criteria of its own.
-                if path.is_dir() && !path.ends_with("criteria") && !path.ends_with("reference") {
+                // The comparison with references and the history have criteria of their own.
+                let apart = ["criteria", "reference", "history"].iter().any(|name| path.ends_with(name));
+                if path.is_dir() && !apart {
                     folders.push(path);
-                } else if path.extension().is_some_and(|e| e == "rs") && !path.ends_with("criteria.rs") {
+                } else if path.extension().is_some_and(|e| e == "rs")
+                    && !path.ends_with("criteria.rs")
+                    && !path.ends_with("history.rs")
+                {
                     let text = std::fs::read_to_string(&path).expect("a source file");
                     let production = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or("");
                     let declares = |line: &&str| {

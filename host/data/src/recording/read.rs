@@ -413,8 +413,9 @@ impl Constants {
 
 fn read_lookup(recording: &Path, file: &str) -> Result<LookupTable> {
     let path = recording.parent().unwrap_or(Path::new("")).join(file);
-    let text = bounds::read(&path, bounds::WRITTEN)
-        .map_err(|e| e.help("the lookup table of an import description belongs in the folder of the recording"))?;
+    let text = bounds::read(&path, bounds::WRITTEN).map_err(|e| {
+        e.help("the lookup table of an import description belongs in the folder of the recording")
+    })?;
     let text = &text[source::check_text(&text).map_err(|e| e.file(&path))?..];
     let mut lines = text.split(|b| *b == b'\n').enumerate().filter(|(_, l)| !l.trim_ascii().is_empty());
     let mut table = LookupTable::default();
