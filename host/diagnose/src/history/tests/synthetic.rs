@@ -201,13 +201,3 @@ fn of_many_runs_groups_are_left_out_and_each_run_is_predicted() {
     assert_eq!(h.unseen.with_memory.points, h.points);
     assert!(h.named && h.unseen.gain > 0.5, "{:?}", h.unseen);
 }
-
-/// Run by hand, in release: `cargo test --release -p pam-diagnose --lib thirty_thousand -- --ignored --nocapture`.
-#[test]
-#[ignore = "prints a time"]
-fn thirty_thousand_settled_rows() {
-    let c = campaign(Truth { runs: 100, ..MEMORY }, 9);
-    let start = std::time::Instant::now();
-    let h = asked(&c);
-    println!("{} settled rows of {} runs: {:.2} s", h.points, h.runs.len(), start.elapsed().as_secs_f64());
-}
