@@ -11,7 +11,7 @@ use model_core::effects::{Context, MEMORY};
 use model_core::muscle::Muscle as Model;
 use model_core::units::{Length, Pressure};
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::recording::segment::Motion;
+use pam_data::recording::motion::Motion;
 use pam_data::recording::{Campaign, Follower, Recording};
 use pam_fit::bench::{Candidate, Span};
 use pam_fit::{Options, fit};

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::dropouts::Screened;
-use pam_data::recording::segment::Motion;
+use pam_data::recording::motion::Motion;
 use pam_data::recording::{Campaign, Clock, Import, Reader};
 use pam_evaluate::length_transfer::predict_unseen_length;
 use pam_fit::points;

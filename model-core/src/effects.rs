@@ -201,6 +201,8 @@ pub struct Parameter {
     pub role: Role,
     /// The axis of the recordings that it lives on.
     pub axis: Axis,
+    /// Whether no muscle and no bench exceeds the range, as of the lags; other sizes depend on muscle and bench.
+    pub bounded: bool,
 }
 
 impl Parameter {
@@ -212,7 +214,7 @@ impl Parameter {
         low: f64,
         high: f64,
     ) -> Self {
-        Self { letter, name, unit, low, high, role: Role::Amplitude, axis: Axis::Own }
+        Self { letter, name, unit, low, high, role: Role::Amplitude, axis: Axis::Own, bounded: false }
     }
     /// A parameter that shapes the force.
     pub const fn shape(
@@ -222,7 +224,13 @@ impl Parameter {
         low: f64,
         high: f64,
     ) -> Self {
-        Self { letter, name, unit, low, high, role: Role::Shape, axis: Axis::Own }
+        Self { letter, name, unit, low, high, role: Role::Shape, axis: Axis::Own, bounded: false }
+    }
+    /// The same with a range that no muscle and no bench exceeds.
+    #[must_use]
+    pub const fn bounded(mut self) -> Self {
+        self.bounded = true;
+        self
     }
     /// The same on an axis of the recordings.
     #[must_use]

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::recording::segment::Motion;
+use pam_data::recording::motion::Motion;
 use pam_data::recording::{Import, Reader};
 
 fn main() -> ExitCode {

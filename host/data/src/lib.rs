@@ -9,6 +9,7 @@
 //! | recognising files, writing them atomically | [`file_kind`], [`output`] |
 //! | comparing two recordings | [`compare`] |
 //! | order statistics | [`statistics`] |
+//! | thresholds with symbol, unit, meaning and source | [`criteria`] |
 //! | progress reports, dates, plurals | [`progress`], [`date`], [`pluralise`] |
 //!
 //! A file is parsed and converted to SI units once, at [`Reader`](recording::Reader); nothing behind it knows another unit. The crate
@@ -36,6 +37,7 @@
 
 pub mod bounds;
 pub mod compare;
+pub mod criteria;
 pub mod date;
 pub mod error;
 pub mod file_kind;

@@ -22,13 +22,13 @@ pub mod import;
 mod line;
 mod matlab;
 mod mcap;
+pub mod motion;
 mod noise;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod plausibility;
 mod quantity;
 mod read;
-pub mod segment;
 mod source;
 mod stroke_zero;
 mod unit_check;

@@ -46,7 +46,7 @@ impl CandidateFit {
     pub(super) fn is_within_known_range(&self, candidate: &Candidate) -> bool {
         let amplitudes = candidate.info.parameters.iter().zip(&self.amplitudes);
         let seen =
-            amplitudes.filter(|(p, _)| p.unit == "s").all(|(p, a)| a.abs() <= p.low.abs().max(p.high.abs()));
+            amplitudes.filter(|(p, _)| p.bounded).all(|(p, a)| a.abs() <= p.low.abs().max(p.high.abs()));
         seen && candidate.shapes().zip(&self.shapes).all(|(p, s)| unplace(&p, *s) > LOW_END)
     }
 }

@@ -11,111 +11,15 @@
 //! | `selection::RIVAL_FLOOR` | a law, when two are compared by what they leave | the excess error |
 //! | `uncertainty::LAW_DEVIATION` | a law in its parameters, for their intervals | the parameter |
 //!
-//! A sensitivity study scales one criterion at compile time, so that no setting of a running program can change an answer:
-//!
-//! ```text
-//! PAM_CRITERION=FAMILY_ALPHA PAM_CRITERION_FACTOR=0.5 cargo build --release -p host
-//! ```
-//! `cargo run -p pam-diagnose --example criteria` prints the page.
+//! `cargo run -p pam-diagnose --example criteria` prints the page. The criteria of the motion stand with it, in `pam-data`.
 
-mod scaling;
-
-/// Where the value of a criterion comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
-    /// It follows from the formula or the argument given.
-    Derived(&'static str),
-    /// A usual level of significance or precision.
-    Convention(&'static str),
-    /// Data sheets, or measurements on muscles, as given.
-    Measured(&'static str),
-    /// A publication.
-    Published(&'static str),
-    /// Set by trials on the virtual bench: the opened development sets.
-    Trials(&'static str),
-    /// Engineering judgement; the opened development sets were answered with it, and no derivation is known.
-    Judgement,
-    /// Limits time or memory, and does not decide by itself.
-    Cost,
-}
-
-impl std::fmt::Display for Source {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Derived(text) => write!(f, "derived: {text}"),
-            Self::Convention(text) => write!(f, "convention: {text}"),
-            Self::Measured(text) => write!(f, "measured: {text}"),
-            Self::Published(text) => write!(f, "{text}"),
-            Self::Trials("") => write!(f, "set by trials on the virtual bench"),
-            Self::Trials(text) => write!(f, "set by trials on the virtual bench: {text}"),
-            Self::Judgement => write!(f, "engineering judgement, used in all trials on the virtual bench"),
-            Self::Cost => write!(f, "limit of computing time"),
-        }
-    }
-}
-
-/// One criterion.
-#[derive(Clone, Copy, Debug)]
-pub struct Criterion {
-    /// Its name in the source.
-    pub name: &'static str,
-    /// Its symbol in formulas of the book, or the name of the quantity.
-    pub symbol: &'static str,
-    /// Its unit; `1` for a number or a share.
-    pub unit: &'static str,
-    /// Its value, as it stands in the source.
-    pub value: &'static str,
-    /// What it means.
-    pub meaning: &'static str,
-    /// Where the value comes from.
-    pub source: Source,
-}
-
-/// The criteria of one stage.
-#[derive(Clone, Copy, Debug)]
-pub struct Stage {
-    /// The stage.
-    pub title: &'static str,
-    /// Its criteria.
-    pub criteria: &'static [Criterion],
-}
-
-/// Declares the criteria of a stage as constants and as rows of the page.
-macro_rules! criteria {
-    ($title:literal: $($(#[doc = $meaning:literal])+ $name:ident: $type:tt = $value:expr, $symbol:literal, $unit:literal, $source:expr;)+) => {
-        use super::Source::{self, *};
-        $(
-            $(#[doc = $meaning])+
-            pub(crate) const $name: criteria!(@type $type) = criteria!(@value $type, $name, $value);
-        )+
-        /// This stage's part of the page.
-        pub(super) const STAGE: super::Stage = super::Stage {
-            title: $title,
-            criteria: &[$(super::Criterion {
-                name: stringify!($name),
-                symbol: $symbol,
-                unit: $unit,
-                value: stringify!($value),
-                meaning: concat!($($meaning),+),
-                source: { const SOURCE: Source = $source; SOURCE },
-            }),+],
-        };
-    };
-    (@type f64) => { f64 };
-    (@type usize) => { usize };
-    (@type u32) => { u32 };
-    (@type $other:tt) => { criteria!(@grouped $other) };
-    (@grouped ($($inner:tt)+)) => { $($inner)+ };
-    (@value f64, $name:ident, $value:expr) => { super::scaling::number(stringify!($name), $value) };
-    (@value usize, $name:ident, $value:expr) => { super::scaling::count(stringify!($name), $value) };
-    (@value $other:tt, $name:ident, $value:expr) => { $value };
-}
+pub use pam_data::criteria::{Criterion, Source, Stage};
+use pam_data::recording::motion;
 
 pub(crate) mod baseline;
 pub(crate) mod candidates;
 pub(crate) mod judgement;
 pub(crate) mod location;
-pub(crate) mod motion;
 pub(crate) mod noise;
 pub(crate) mod planning;
 pub(crate) mod rest_friction;
@@ -125,7 +29,7 @@ pub(crate) mod uncertainty;
 
 /// The whole page, stage by stage in the order in which they decide.
 pub const PAGE: [Stage; 11] = [
-    motion::STAGE,
+    motion::CRITERIA,
     rows::STAGE,
     baseline::STAGE,
     rest_friction::STAGE,
@@ -141,20 +45,7 @@ pub const PAGE: [Stage; 11] = [
 /// The page as Markdown tables.
 #[must_use]
 pub fn markdown() -> String {
-    let mut page = String::new();
-    for stage in PAGE {
-        page.push_str(&format!("### {}\n\n", stage.title));
-        page.push_str("| criterion | symbol | value | unit | meaning | source |\n| --- | --- | --- | --- | --- | --- |\n");
-        for c in stage.criteria {
-            let meaning = c.meaning.trim();
-            page.push_str(&format!(
-                "| `{}` | {} | {} | {} | {meaning} | {} |\n",
-                c.name, c.symbol, c.value, c.unit, c.source
-            ));
-        }
-        page.push('\n');
-    }
-    page
+    pam_data::criteria::markdown(&PAGE)
 }
 
 #[cfg(test)]

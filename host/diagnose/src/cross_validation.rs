@@ -215,3 +215,46 @@ impl HeldOutRows {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use model_core::units::{Length, Pressure};
+    use pam_data::recording::{Campaign, Recording};
+
+    use super::*;
+    use crate::rows::prepare;
+    use crate::tests::{geometry, muscle};
+
+    /// Pressure cycles at five held lengths, long enough that rows are thinned.
+    fn isometric() -> Campaign {
+        let muscle = muscle();
+        let n = 3 * HELD_OUT_ROWS / 5;
+        let held = |k: usize| {
+            let stroke = 1e-3 * k as f64;
+            let time: Vec<f64> = (0..n).map(|i| 0.1 * i as f64).collect();
+            let pressure: Vec<f64> = time.iter().map(|t| 4e5 - 1e5 * (0.02 * t).cos()).collect();
+            let force = |p: &f64| {
+                muscle.force(Pressure::from_pascals(*p), Length::from_metres(stroke), 0.0).newtons()
+            };
+            Recording {
+                name: format!("held {k}"),
+                force: Some(pressure.iter().map(force).collect()),
+                stroke: vec![stroke; n],
+                time,
+                pressure,
+                ..Recording::default()
+            }
+        };
+        Campaign::new((0..5).map(held).collect())
+    }
+
+    #[test]
+    fn isometric_recordings_are_predicted_from_the_others() {
+        let braid = geometry().build().expect("a braid");
+        let (rows, _) = prepare(&isometric(), &braid).expect("rows");
+        assert!(rows.isometric && stride(&rows) > 1);
+        let held = HeldOutRows::new(&rows, Kind::Stiff, &[]);
+        assert_eq!(held.rows.names.len(), 5);
+        assert_eq!((held.split.split, held.split.groups.len()), (Split::TenthRecordings, 5));
+    }
+}

@@ -262,9 +262,7 @@ impl<'a> ForwardSelection<'a> {
         let slow = self.library[winner.candidate].traits.slow;
         let least = if slow { LEAST_SCORE_ALONE } else { LEAST_SCORE };
         if !kept || score < least {
-            // The effects before it keep the amplitudes of this joint fit, until the next one.
-            self.chosen = joint.fits;
-            self.chosen.pop();
+            // The effects before it stay as they were fitted without it.
             self.excluded.push(winner.candidate);
             self.remarks.push(Remark::Refused {
                 effect: name.to_owned(),
@@ -354,5 +352,41 @@ impl<'a> ForwardSelection<'a> {
             noise,
             remarks,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+
+    use super::*;
+    use crate::candidates::library;
+    use crate::rows::{prepare, typical_step};
+    use crate::tests::{coloured, geometry, loops, recorded};
+
+    #[test]
+    fn a_refused_candidate_leaves_the_effects_before_it_as_they_were() {
+        let campaign = recorded(loops(&[0.05, 0.2, 0.8]), 4, coloured(0.1, 2.0), |v, _, _| -5.0e3 * v);
+        let braid = geometry().build().expect("a braid");
+        let (rows, _) = prepare(&campaign, &braid).expect("rows");
+        let library = library(&rows, &[]);
+        let blocked = rows.force.iter().copied().fold(0.0, f64::max);
+        let mut search = ForwardSelection::begin(&rows, &library, blocked, typical_step(&rows), &[]);
+        while search.chosen.is_empty() && search.next().is_continue() {}
+        let fitted = |search: &ForwardSelection<'_>| -> Vec<Vec<f64>> {
+            search.chosen.iter().map(|c| c.amplitudes.clone()).collect()
+        };
+        let before = fitted(&search);
+        assert_eq!(before.len(), 1);
+        // Whatever takes most of the rest, without evidence.
+        let scorer = Scorer::new(&search.joint, search.scale);
+        let (best, _) = scan_step(&library, &search.rows, &scorer, blocked);
+        let others = best.iter().filter(|t| t.candidate != search.chosen[0].candidate);
+        let most = others.max_by(|a, b| a.gain.total_cmp(&b.gain)).expect("another candidate");
+        let weak = CandidateFit { score: 0.0, ..most.clone() };
+        let metric = baselines::fit(&search.rows, Kind::Soft(weak.prior), &[]);
+        let refused = weak.candidate;
+        search.take(weak, 1.0, Vec::new(), metric);
+        assert!(search.excluded.contains(&refused));
+        assert_eq!(fitted(&search), before);
     }
 }

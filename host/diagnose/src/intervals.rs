@@ -10,6 +10,7 @@
 //! law is off by where another law of the same thing made the recordings: of 57 effects given by name (two development sets of trials) 35
 //! intervals of 95 % held the truth by half-strokes alone, 45 with the groups, 53 with both. A change point has an interval [of its own](super::change_point).
 
+use pam_fit::numerics::jackknife::variances;
 use rayon::prelude::*;
 
 use super::baselines;
@@ -141,14 +142,14 @@ fn by_groups(selection: &Selection, tangents: &[Tangent], rows: &Rows) -> Vec<f6
     let quarters: Vec<u32> = thin.block.iter().map(|b| b / quarter).collect();
     let mut largest = vec![0.0_f64; tangents.len()];
     for grouping in [&thin.level, &thin.recording, &quarters] {
-        let variances = jackknife(&thin, grouping, &moved);
+        let variances = by_group(&thin, grouping, &moved);
         largest.iter_mut().zip(variances).for_each(|(l, v)| *l = l.max(v));
     }
     largest
 }
 
 /// Jackknife variances of estimates, one group left out at a time; empty where there are too few groups, or too many.
-fn jackknife(rows: &Rows, group: &[u32], estimate: &(dyn Fn(&Rows) -> Vec<f64> + Sync)) -> Vec<f64> {
+fn by_group(rows: &Rows, group: &[u32], estimate: &(dyn Fn(&Rows) -> Vec<f64> + Sync)) -> Vec<f64> {
     let seen = group.iter().zip(rows.root_weight()).filter(|(_, w)| **w > 0.0);
     let mut groups: Vec<u32> = seen.map(|(g, _)| *g).collect();
     groups.sort_unstable();
@@ -158,11 +159,5 @@ fn jackknife(rows: &Rows, group: &[u32], estimate: &(dyn Fn(&Rows) -> Vec<f64> +
     }
     let without: Vec<Vec<f64>> =
         groups.par_iter().map(|g| estimate(&rows.without(|i| group[i] == *g))).collect();
-    let n = without.len() as f64;
-    (0..without[0].len())
-        .map(|i| {
-            let mean = without.iter().map(|w| w[i]).sum::<f64>() / n;
-            (n - 1.0) / n * without.iter().map(|w| (w[i] - mean).powi(2)).sum::<f64>()
-        })
-        .collect()
+    variances(&without)
 }

@@ -8,7 +8,7 @@
 //!
 //! | stage | module | what it does |
 //! | --- | --- | --- |
-//! | rows | `kinematics`, `rows` | averages samples between reversals, with the motion in each; finds levels, blocks, vented rows |
+//! | rows | `rows` | averages samples between reversals, with the motion in each; finds levels, blocks, vented rows |
 //! | | `bench_checks` | corrects faults that checks of the bench measured, and enters them into the answer |
 //! | | `preconditions` | says what can be judged |
 //! | base model | `baselines` | tables free over pressure; one bladder for all pressures; one that may differ a little |
@@ -47,7 +47,6 @@ mod forward_selection;
 pub mod history;
 mod intervals;
 pub mod isolability;
-mod kinematics;
 mod known_effects;
 mod likelihood;
 mod linear;

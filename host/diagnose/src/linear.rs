@@ -282,24 +282,6 @@ impl Random {
     }
 }
 
-/// The middle of a set of numbers; zero of none.
-pub(crate) fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
-/// The value below which a share of the numbers lies; zero of none.
-pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let at = ((values.len() - 1) as f64 * share).round() as usize;
-    *values.select_nth_unstable_by(at.min(values.len() - 1), f64::total_cmp).1
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

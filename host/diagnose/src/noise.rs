@@ -6,9 +6,10 @@ use super::criteria::noise::{
     CORRELATION_END, FEWEST_REPEATS, INSTRUMENT_MEMORY, INSTRUMENT_NOISE, LAG_GROWTH, LATER_REPEATS,
     LONGEST_LAG, REPEAT_BINS, REPEAT_OUTLIERS, REPEAT_PRESSURE_BINS, REPEAT_SPEED_BINS, SAME_LENGTH,
 };
-use super::linear::{Random, energy, median, quantile};
+use super::linear::{Random, energy};
 use super::remark::Scatter;
 use super::rows::Rows;
+use pam_fit::numerics::{median, quantile};
 
 /// The noise of the rows.
 #[derive(Clone, Copy, Debug)]

@@ -13,7 +13,7 @@ pub use pam_protocol::{Place, Protocol, Step};
 use super::criteria::planning::{FREE_STROKE, PROTOCOL_SAMPLES};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::file_kind::FileKind;
-use pam_data::recording::segment::Motion;
+use pam_data::recording::motion::Motion;
 use pam_data::recording::{Campaign, Follower, Recording};
 use pam_data::toml_errors::toml_error;
 

@@ -16,19 +16,15 @@ use model_core::effects::Context;
 pub(crate) use self::blocks::typical_step;
 use self::levels::Levels;
 pub(crate) use self::sleeve::{ORDERS, Shape, YEOH};
-use super::criteria::motion::{
-    HOLD_DRIFT, MOTION_NOISE, MOTION_PRESSURE_FLOOR, MOTION_PRESSURE_SHARE, MOTION_STROKE_FLOOR,
-    MOTION_STROKE_SHARE, RANGE_TRIM,
-};
-use super::criteria::rows::SPIKES_MENTIONED;
-use super::kinematics::{Thresholds, white_noise};
-use super::linear::quantile;
+use super::criteria::rows::{PRESSURE_TRIM, SPIKES_MENTIONED};
 use super::remark::Remark;
 use pam_data::error::Result;
 use pam_data::progress::SharedProgress;
+use pam_data::recording::Campaign;
 use pam_data::recording::dropouts::Screened;
-use pam_data::recording::{Campaign, Recording};
+use pam_data::recording::motion::Motion;
 use pam_fit::Clip;
+use pam_fit::numerics::quantile;
 
 /// What was recorded, row by row. Nothing changes it.
 #[derive(Clone, Debug, Default)]
@@ -164,7 +160,7 @@ impl Rows {
     pub(crate) fn with_force(&self, force: Vec<f64>) -> Self {
         Self { recorded: Arc::new(Recorded { force, ..Recorded::clone(&self.recorded) }), ..self.clone() }
     }
-    /// Every n-th row. Names, remarks and the number of samples stay behind.
+    /// Every n-th row.
     pub(crate) fn thinned(&self, stride: usize) -> Self {
         fn pick<T: Clone>(stride: usize, column: &[T]) -> Vec<T> {
             column.iter().step_by(stride).cloned().collect()
@@ -185,8 +181,10 @@ impl Rows {
             largest: pick(stride, &self.largest),
             local_time: pick(stride, &self.local_time),
             blocks: self.blocks,
+            names: self.names.clone(),
+            samples: self.samples,
+            has_temperature: self.has_temperature,
             isometric: self.isometric,
-            ..Recorded::default()
         };
         let rest_friction = RestFriction {
             settling: pick(stride, &self.at_rest().settling),
@@ -210,11 +208,11 @@ impl Rows {
 pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<(Rows, Vec<Remark>)> {
     let screened = Screened::of(campaign);
     let campaign = screened.campaign.as_ref();
-    let pressures = range(campaign, |r| &r.pressure);
-    let thresholds = thresholds(campaign, braid, pressures);
-    let isometric = is_isometric(campaign, thresholds.stroke);
+    let pressures = pressure_range(campaign);
+    let motions = Motion::of_campaign(campaign);
+    let isometric = motions.iter().all(|m| m.is_isometric);
     let ends = readings::ends(campaign);
-    let gathered = gather::gather(campaign, &screened, braid, thresholds, &ends, isometric)?;
+    let gathered = gather::gather(campaign, &screened, &motions, braid, &ends)?;
     let remarks = remarks(&screened, &ends, gathered.spiked, campaign.samples());
     let levels = Levels::find(&gathered.contexts, &gathered.piece, pressures);
     let vented = tares::vented(&gathered.contexts);
@@ -269,32 +267,8 @@ fn remarks(screened: &Screened<'_>, ends: &[Clip], spiked: usize, total: usize) 
     remarks
 }
 
-/// The range of a column over all recordings, without its few farthest values.
-fn range(campaign: &Campaign, column: impl Fn(&Recording) -> &Vec<f64>) -> (f64, f64) {
-    let mut all: Vec<f64> = campaign.recordings.iter().flat_map(|r| column(r).iter().copied()).collect();
-    (quantile(&mut all, RANGE_TRIM), quantile(&mut all, 1.0 - RANGE_TRIM))
-}
-
-/// What counts as a motion: well above the noise, and a noticeable part of the range.
-fn thresholds(campaign: &Campaign, braid: &Braid<f64>, pressures: (f64, f64)) -> Thresholds {
-    let strokes = range(campaign, |r| &r.stroke);
-    let noise =
-        |column: &dyn Fn(&Recording) -> f64| campaign.recordings.iter().map(column).fold(0.0, f64::max);
-    Thresholds {
-        stroke: (MOTION_NOISE * noise(&|r| white_noise(&r.stroke)))
-            .max(MOTION_STROKE_SHARE * (strokes.1 - strokes.0))
-            .max(MOTION_STROKE_FLOOR * braid.rest_length()),
-        pressure: (MOTION_NOISE * noise(&|r| white_noise(&r.pressure)))
-            .max(MOTION_PRESSURE_SHARE * (pressures.1 - pressures.0))
-            .max(MOTION_PRESSURE_FLOOR),
-    }
-}
-
-/// Mounted at several lengths, but never moved while recording, is held all the same.
-fn is_isometric(campaign: &Campaign, least_motion: f64) -> bool {
-    campaign.recordings.iter().all(|r| {
-        let (low, high) =
-            r.stroke.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(*s), h.max(*s)));
-        !(high - low > HOLD_DRIFT * least_motion)
-    })
+/// The range of the pressure over all recordings, without its few farthest values, Pa.
+fn pressure_range(campaign: &Campaign) -> (f64, f64) {
+    let mut all: Vec<f64> = campaign.recordings.iter().flat_map(|r| r.pressure.iter().copied()).collect();
+    (quantile(&mut all, PRESSURE_TRIM), quantile(&mut all, 1.0 - PRESSURE_TRIM))
 }

@@ -9,9 +9,10 @@ use rayon::prelude::*;
 use super::criteria::location::{
     LINE_NEIGHBOURS, LINE_PERIODS, LINE_SHUFFLES, LINE_WIDTH, LONGEST_STRETCH, SHORTEST_STRETCH, STRETCHES,
 };
-use super::linear::{Random, median};
+use super::linear::Random;
 use super::location::shuffled;
 use super::rows::Rows;
+use pam_fit::numerics::median;
 
 /// A line in the spectrum of the misfit.
 #[derive(Clone, Copy, Debug)]

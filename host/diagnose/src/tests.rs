@@ -9,7 +9,7 @@ use model_core::muscle::Muscle;
 use model_core::table::{self, MuscleTable};
 use model_core::units::{Length, Pressure};
 
-use super::linear::{Random, quantile};
+use super::linear::Random;
 use super::outcome::Verdict;
 use super::protocol_simulation::{Place, Protocol, Step, play};
 use super::remark::Remark;
@@ -17,6 +17,7 @@ use super::why::Why;
 use super::{Diagnosis, Options, diagnose, refitted_table};
 use pam_data::muscle_description::{Kind, MuscleDescription};
 use pam_data::recording::{Campaign, Recording};
+use pam_fit::numerics::quantile;
 use pam_fit::predict::predict;
 use pam_fit::table_file::TableFile;
 use pam_fit::{Options as FitOptions, fit};
@@ -30,16 +31,16 @@ fn one_bladder() -> MuscleTable {
     one_bladder
 }
 
-fn muscle() -> Muscle<f64> {
+pub(crate) fn muscle() -> Muscle<f64> {
     Muscle::build(&one_bladder()).expect("the example table")
 }
 
-fn geometry() -> Geometry {
+pub(crate) fn geometry() -> Geometry {
     table::example().geometry.cast()
 }
 
 /// Classic loops: six pressures, three triangular cycles each, one or more speeds (mm/s).
-fn loops(speeds: &[f64]) -> Campaign {
+pub(crate) fn loops(speeds: &[f64]) -> Campaign {
     let mut step = Vec::new();
     for p in [230.0, 290.0, 350.0, 410.0, 480.0, 550.0] {
         step.push(Step::Pressure { to_kpa: p, rate_kpa_s: Some(50.0), settle_s: 1.0 });
@@ -55,7 +56,7 @@ fn loops(speeds: &[f64]) -> Campaign {
 }
 
 /// Puts friction of 8 %, an effect and noise on the forces. `effect` sees speed, direction and the friction-free force.
-fn recorded(
+pub(crate) fn recorded(
     mut campaign: Campaign,
     seed: u64,
     noise: impl Fn(&mut Random, &mut [f64; 2]) -> f64,
@@ -98,7 +99,7 @@ fn names(d: &Diagnosis) -> Vec<&str> {
 }
 
 /// AR(1) of the given size and correlation time at 10 Hz.
-fn coloured(size: f64, tau: f64) -> impl Fn(&mut Random, &mut [f64; 2]) -> f64 {
+pub(crate) fn coloured(size: f64, tau: f64) -> impl Fn(&mut Random, &mut [f64; 2]) -> f64 {
     let a = (-0.1 / tau).exp();
     move |r, s| {
         s[0] = a * s[0] + size * (1.0 - a * a).sqrt() * r.normal();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use pam_data::error::{Error, Result};
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::recording::segment::Motion;
+use pam_data::recording::motion::Motion;
 use pam_data::recording::{Campaign, Recording};
 use pam_fit::error::FitCode;
 use pam_fit::predict::predict;

@@ -16,7 +16,7 @@ use model_core::units::Length;
 use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Campaign;
-use pam_data::recording::segment::Motion;
+use pam_data::recording::motion::Motion;
 use pam_fit::predict::predict;
 use pam_fit::table_file::{About, TableFile};
 

@@ -20,7 +20,7 @@ use crate::table_file::{Correction, TableFile};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::physical_limits::Contractions;
 use pam_data::recording::dropouts::Screened;
-use pam_data::recording::segment::Motion;
+use pam_data::recording::motion::Motion;
 use pam_data::recording::{Campaign, Follower, Recording, has_decimal_commas};
 
 /// The predicted force of a campaign.

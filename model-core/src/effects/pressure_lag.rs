@@ -30,8 +30,8 @@ impl Effect for PressureLag {
         link: Link::Air,
         parameters: &[
             Parameter::amplitude("R_f", "flow_resistance", "Pa·s/m³", 1.0e6, 1.0e11),
-            Parameter::amplitude("T", "filling_time", "s", 1.0e-3, 1.0),
-            Parameter::amplitude("T_c", "charging_time", "s", 1.0e-3, 1.0),
+            Parameter::amplitude("T", "filling_time", "s", 1.0e-3, 1.0).bounded(),
+            Parameter::amplitude("T_c", "charging_time", "s", 1.0e-3, 1.0).bounded(),
             Parameter::shape("τ", "time_constant", "s", 5.0e-3, 2.0),
         ],
         depends_on_pressure: true,

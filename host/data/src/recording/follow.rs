@@ -2,7 +2,7 @@
 
 use model_core::motion::Motion;
 
-use super::segment::{self, Rates};
+use super::motion::{self, Rates};
 use super::{Campaign, Recording};
 
 /// An unknown pause between recordings counts as this long, s.
@@ -27,7 +27,7 @@ impl Follower {
     pub fn follow(
         &mut self,
         recording: &Recording,
-        motion: &segment::Motion,
+        motion: &motion::Motion,
         pause: Option<f64>,
     ) -> Vec<Motion<f64>> {
         let columns = motion.columns(recording);
@@ -79,7 +79,7 @@ impl Follower {
 }
 
 /// Where the first motion of a recording ends: at its first turn or rest.
-fn first_motion(motion: &segment::Motion) -> usize {
+fn first_motion(motion: &motion::Motion) -> usize {
     let n = motion.direction.len();
     let begun = motion.direction.iter().position(|d| *d != 0).unwrap_or(n);
     let turned = (begun..n).find(|i| motion.direction[*i] != motion.direction[begun]).unwrap_or(n);

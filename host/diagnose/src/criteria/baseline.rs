@@ -1,6 +1,6 @@
 //! The base model: orders, limits, priors.
 
-criteria! {
+pam_data::criteria! {
     "Base model":
     /// Elastic orders of the production table.
     TABLE_ORDER: usize = 4, "M", "1", Trials("four orders leave 0.03 to 0.06 % of the blocked force on a hyperelastic wall");

@@ -1,6 +1,6 @@
 //! The fit of one candidate effect beside a base.
 
-criteria! {
+pam_data::criteria! {
     "Candidate fit":
     /// Change points of a trace that are tried first, over the campaign.
     CHANGE_POINTS: usize = 40, "n_t", "1", Cost;

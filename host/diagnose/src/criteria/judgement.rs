@@ -1,6 +1,6 @@
 //! Preconditions, verdict, findings, the refitted table.
 
-criteria! {
+pam_data::criteria! {
     "Preconditions, verdict, findings":
     /// Rows from which anything is judged.
     FEWEST_ROWS: usize = 60, "N_min", "1", Derived("the base has up to thirty coefficients: two rows for each");

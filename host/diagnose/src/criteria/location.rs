@@ -1,6 +1,6 @@
 //! Where the error is: along coordinates, and in time.
 
-criteria! {
+pam_data::criteria! {
     "Location of the error":
     /// Bins along a coordinate.
     BINS: usize = 12, "n_bin", "1", Judgement;

@@ -1,6 +1,6 @@
 //! Noise: repeats, memory, instruments.
 
-criteria! {
+pam_data::criteria! {
     "Noise":
     /// Contractions that differ by less are one held length.
     SAME_LENGTH: f64 = 1e-3, "d_eps", "1", Judgement;

@@ -1,6 +1,6 @@
 //! The next experiment, and what a planned protocol shows.
 
-criteria! {
+pam_data::criteria! {
     "Next experiment, protocol simulation":
     /// A difference below this share of the noise is not worth an experiment.
     WORTHWHILE_DIFFERENCE: f64 = 0.3, "dF/s", "1", Judgement;

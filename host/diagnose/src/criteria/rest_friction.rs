@@ -1,6 +1,6 @@
 //! What friction does while the length is held.
 
-criteria! {
+pam_data::criteria! {
     "Friction at rest":
     /// Settling times of friction that are tried.
     SETTLING_TIMES: ([f64; 8]) = [0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 30.0, 100.0], "tau", "s", Derived("factors of about two over the lengths of usual holds");

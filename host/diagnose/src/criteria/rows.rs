@@ -1,7 +1,9 @@
 //! Which readings count, pressure levels, blocks, vented rows.
 
-criteria! {
+pam_data::criteria! {
     "Rows: readings, pressure levels, blocks":
+    /// Share of the readings at either end that the range of the pressure leaves out.
+    PRESSURE_TRIM: f64 = 0.002, "q_trim,P", "1", Judgement;
     /// Rows aimed at: enough for every reversal, few enough for seconds of computing.
     TARGET_ROWS: usize = 24_000, "N", "1", Cost;
     /// A reading is a spike where it differs from the median of five by this many deviations of the noise.

@@ -1,6 +1,6 @@
 //! Forward selection: when an effect is taken, what it must explain, what it cannot be distinguished from.
 
-criteria! {
+pam_data::criteria! {
     "Forward selection":
     /// Family-wise error probability that a selected effect may have, by whole blocks.
     FAMILY_ALPHA: f64 = 0.01, "alpha", "1", Convention("one false selection in a hundred campaigns without a missing effect");

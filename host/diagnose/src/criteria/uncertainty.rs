@@ -1,6 +1,6 @@
 //! Held-out rows, intervals of parameters, change points, calibration of probabilities.
 
-criteria! {
+pam_data::criteria! {
     "Held-out rows, intervals, probabilities":
     /// Held-out error with an effect must be less than this share of the error without it.
     HELD_OUT_LEAVES: f64 = 0.96, "e_with/e_without", "1", Derived("an effect that takes a third of the excess lowers the whole by more");

@@ -13,7 +13,7 @@ use super::law::{Law, Layer};
 use super::shift_fit;
 use super::spline::{Banded, Spline};
 use super::unseen::{jackknife, shifted_curves};
-use crate::linear::median;
+use pam_fit::numerics::median;
 
 /// Slopes below this say nothing about a shift, as a share of the largest.
 const FLAT: f64 = 0.03;

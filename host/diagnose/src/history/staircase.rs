@@ -40,7 +40,7 @@ pub(super) fn settled(recording: &Recording, force: &[f64]) -> (Vec<Point>, bool
 
 fn averages(recording: &Recording, force: &[f64], directions: &[i8]) -> (Vec<Point>, bool) {
     let mut steps: Vec<f64> = recording.time.windows(2).map(|w| w[1] - w[0]).collect();
-    let interval = crate::linear::median(&mut steps);
+    let interval = pam_fit::numerics::median(&mut steps);
     if !(interval < SETTLED_INTERVAL) {
         let points = (0..recording.len())
             .map(|i| Point {

@@ -5,9 +5,9 @@ use crate::baselines::Baseline;
 use crate::criteria::rest_friction::{
     STEP_BEFORE, STEP_BESIDE, STEP_NOISE, STEP_OF_GAP, STEP_ROWS, STEP_SHARPNESS, STEP_TIME,
 };
-use crate::kinematics::white_noise;
-use crate::linear::median;
 use crate::rows::Rows;
+use pam_data::recording::white_noise;
+use pam_fit::numerics::median;
 
 /// Where the force steps while the length is held, hold by hold: static friction let go there, shaken by more than the pressure's
 /// samples show.

@@ -2,16 +2,17 @@
 
 use model_core::braid::Braid;
 use model_core::effects::Context;
+use model_core::motion::Motion as MotionSample;
 use model_core::units::Length;
 
 use super::readings;
 use super::sleeve::{self, Shape};
 use crate::criteria::baseline::TABLE_ORDER;
 use crate::criteria::rows::TARGET_ROWS;
-use crate::kinematics::{Kinematics, Recorded, Thresholds, kinematics};
 use pam_data::error::Result;
 use pam_data::recording::dropouts::Screened;
-use pam_data::recording::{Campaign, Recording, UNKNOWN_PAUSE};
+use pam_data::recording::motion::{Motion, MotionState};
+use pam_data::recording::{Campaign, Follower, Recording};
 use pam_fit::Clip;
 
 /// The rows of a campaign before levels, blocks and weights are known.
@@ -47,26 +48,23 @@ pub(super) struct Gathered {
 pub(super) fn gather(
     campaign: &Campaign,
     screened: &Screened<'_>,
+    motions: &[Motion],
     braid: &Braid<f64>,
-    thresholds: Thresholds,
     ends: &[Clip],
-    isometric: bool,
 ) -> Result<Gathered> {
     let total = campaign.samples();
     let mut gathering = Gathering {
         rows: Gathered { has_temperature: total > 0, ..Gathered::default() },
         braid,
-        thresholds,
         ends,
-        isometric,
+        isometric: motions.iter().all(|m| m.is_isometric),
         per_row: total.div_ceil(TARGET_ROWS).max(1),
-        clock: campaign.beginning(),
-        turns: 0,
+        follower: Follower::of(campaign),
         pieces: 0,
         largest: f64::NEG_INFINITY,
     };
-    for (index, recording) in campaign.recordings.iter().enumerate() {
-        gathering.add(recording, &screened.read(index), campaign.pause_before(index))?;
+    for (index, (recording, motion)) in campaign.recordings.iter().zip(motions).enumerate() {
+        gathering.add(recording, motion, &screened.read(index), campaign.pause_before(index))?;
     }
     Ok(gathering.rows)
 }
@@ -75,38 +73,36 @@ pub(super) fn gather(
 struct Gathering<'a> {
     rows: Gathered,
     braid: &'a Braid<f64>,
-    thresholds: Thresholds,
     ends: &'a [Clip],
     isometric: bool,
     /// Samples in a row at most.
     per_row: usize,
-    /// The campaign's time at the beginning of the present recording, s.
-    clock: f64,
-    /// Turns of the recordings so far.
-    turns: u32,
+    /// The motion as predictions see it, sample by sample.
+    follower: Follower,
     /// Half-strokes so far.
     pieces: u32,
     /// The largest stroke so far, m.
     largest: f64,
 }
 
-/// Sums over the samples of a row, then their means.
+/// Means over the samples of a row.
 #[derive(Clone, Copy, Default)]
 struct Average {
-    time: f64,
+    motion: MotionSample<f64>,
+    /// Time within the recording, s.
+    local: f64,
     pressure: f64,
-    stroke: f64,
-    speed: f64,
-    acceleration: f64,
-    pressure_rate: f64,
-    travel: f64,
-    since_reversal: f64,
-    hold_time: f64,
-    temperature: f64,
     still: f64,
     /// Force of the good readings, N, and their number.
     force: f64,
     good: f64,
+}
+
+/// The motion of a recording, and the state of each of its samples.
+#[derive(Clone, Copy)]
+struct Moved<'a> {
+    samples: &'a [MotionSample<f64>],
+    state: &'a MotionState,
 }
 
 /// The readings of a recording's force, whether each stands out alone, and whether the pressure beside it was read.
@@ -122,58 +118,55 @@ impl Gathering<'_> {
     ///
     /// # Errors
     /// A recording without force.
-    fn add(&mut self, recording: &Recording, read: &[bool], pause: Option<f64>) -> Result<()> {
-        let first = self.rows.names.is_empty();
+    fn add(
+        &mut self,
+        recording: &Recording,
+        motion: &Motion,
+        read: &[bool],
+        pause: Option<f64>,
+    ) -> Result<()> {
         self.rows.names.push(recording.name.clone());
         let force = recording.require_force()?;
         if recording.is_empty() {
             return Ok(());
         }
         self.rows.has_temperature &= recording.temperature.is_some();
-        let before = pause.unwrap_or(UNKNOWN_PAUSE);
-        let recorded = Recorded {
-            time: &recording.time,
-            stroke: &recording.stroke,
-            pressure: &recording.pressure,
-            given: recording.direction.as_deref(),
-        };
-        let k = kinematics(recorded, before, self.thresholds);
+        let samples = self.follower.follow(recording, motion, pause);
+        let pressure_rate: Vec<f64> = samples.iter().map(|s| s.pressure_rate).collect();
+        let state = motion.state(recording, &pressure_rate);
+        let moved = Moved { samples: &samples, state: &state };
         let spike = readings::spikes(force);
         let readings = Readings { force, spike: &spike, read };
-        let pause = if first { 0.0 } else { before };
-        self.clock += pause;
-        let start = recording.time[0];
         let mut previous: Option<f64> = None;
         let mut piece = None;
         let mut i = 0;
         while i < recording.len() {
-            let j = self.row_end(&k, i);
-            if piece != Some(k.piece[i]) {
-                piece = Some(k.piece[i]);
+            let j = self.row_end(&state, i);
+            if piece != Some(state.piece[i]) {
+                piece = Some(state.piece[i]);
                 self.pieces += 1;
             }
-            let mean = self.average(recording, &readings, &k, i..j);
-            let dt = previous.map_or(pause, |p| mean.time - p);
-            previous = Some(mean.time);
-            self.push(&mean, &k, i, mean.time - start, dt);
+            let mut mean = self.average(recording, &readings, moved, i..j);
+            // The pause before the recording counts for its first row.
+            mean.motion.dt = previous.map_or(samples[i].dt, |p| mean.motion.time - p);
+            previous = Some(mean.motion.time);
+            self.push(&mean, &state, i);
             self.rows.cycle.push(recording.cycle.as_ref().map_or(0, |c| c[i]));
             i = j;
         }
-        self.turns += k.turns.last().copied().unwrap_or(0) + 1;
-        self.clock += recording.duration();
         Ok(())
     }
 
     /// Where the row that begins at a sample ends: before the next turn, hold or ramp, or when it is full.
-    fn row_end(&self, k: &Kinematics, i: usize) -> usize {
+    fn row_end(&self, state: &MotionState, i: usize) -> usize {
         let alike = |j: usize| {
-            k.piece[j] == k.piece[i]
-                && k.sure[j] == k.sure[i]
-                && k.ramped[j] == k.ramped[i]
-                && k.on_ramp[j] == k.on_ramp[i]
-                && k.turns[j] == k.turns[i]
+            state.piece[j] == state.piece[i]
+                && state.sure[j] == state.sure[i]
+                && state.ramped[j] == state.ramped[i]
+                && state.on_ramp[j] == state.on_ramp[i]
+                && state.turns[j] == state.turns[i]
         };
-        let full = (i + self.per_row).min(k.piece.len());
+        let full = (i + self.per_row).min(state.piece.len());
         (i + 1..full).find(|j| !alike(*j)).unwrap_or(full)
     }
 
@@ -181,23 +174,31 @@ impl Gathering<'_> {
         &mut self,
         recording: &Recording,
         readings: &Readings<'_>,
-        k: &Kinematics,
+        moved: Moved<'_>,
         samples: std::ops::Range<usize>,
     ) -> Average {
         let count = samples.len() as f64;
         let mean = |column: &[f64]| column[samples.clone()].iter().sum::<f64>() / count;
+        let of = |value: fn(&MotionSample<f64>) -> f64| {
+            moved.samples[samples.clone()].iter().map(value).sum::<f64>() / count
+        };
+        let first = moved.samples[samples.start];
         let mut average = Average {
-            time: mean(&recording.time),
+            motion: MotionSample {
+                time: of(|m| m.time),
+                stroke: of(|m| m.stroke),
+                speed: of(|m| m.speed),
+                acceleration: of(|m| m.acceleration),
+                pressure_rate: of(|m| m.pressure_rate),
+                travel: of(|m| m.travel),
+                since_reversal: of(|m| m.since_reversal),
+                hold_time: of(|m| m.hold_time),
+                temperature: of(|m| m.temperature),
+                ..first
+            },
+            local: mean(&recording.time) - recording.time[0],
             pressure: mean(&recording.pressure),
-            stroke: mean(&recording.stroke),
-            speed: mean(&k.speed),
-            acceleration: mean(&k.acceleration),
-            pressure_rate: mean(&k.pressure_rate),
-            travel: mean(&k.travel),
-            since_reversal: mean(&k.since_reversal),
-            hold_time: mean(&k.hold_time),
-            temperature: recording.temperature.as_deref().map_or(0.0, mean),
-            still: mean(&k.still),
+            still: mean(&moved.state.still),
             ..Average::default()
         };
         let Readings { force, spike, read } = *readings;
@@ -221,27 +222,28 @@ impl Gathering<'_> {
         average
     }
 
-    /// Appends a row that begins at sample `i` of its recording, at `local` seconds of it.
-    fn push(&mut self, mean: &Average, k: &Kinematics, i: usize, local: f64, dt: f64) {
+    /// Appends a row that begins at sample `i` of its recording.
+    fn push(&mut self, mean: &Average, state: &MotionState, i: usize) {
         let Self { rows, braid, .. } = self;
-        let posture = braid.posture(Length::from_metres(mean.stroke));
-        self.largest = mean.stroke.max(self.largest);
+        let motion = &mean.motion;
+        let posture = braid.posture(Length::from_metres(motion.stroke));
+        self.largest = motion.stroke.max(self.largest);
         rows.contexts.push(Context {
-            dt: if rows.contexts.is_empty() { 0.0 } else { dt },
-            time: self.clock + local,
+            dt: if rows.contexts.is_empty() { 0.0 } else { motion.dt },
+            time: motion.time,
             pressure: mean.pressure,
-            pressure_rate: mean.pressure_rate,
-            stroke: mean.stroke,
-            contraction: mean.stroke / braid.rest_length(),
-            speed: mean.speed,
-            acceleration: mean.acceleration,
-            direction: k.direction[i],
-            travel: mean.travel,
-            since_reversal: mean.since_reversal,
-            hold_time: mean.hold_time,
-            resting: if k.held[i] || i == 0 { 1.0 } else { 0.0 },
-            cycles: f64::from(self.turns + k.turns[i]) * 0.5,
-            temperature: mean.temperature,
+            pressure_rate: motion.pressure_rate,
+            stroke: motion.stroke,
+            contraction: motion.stroke / braid.rest_length(),
+            speed: motion.speed,
+            acceleration: motion.acceleration,
+            direction: motion.direction,
+            travel: motion.travel,
+            since_reversal: motion.since_reversal,
+            hold_time: motion.hold_time,
+            resting: motion.resting,
+            cycles: motion.cycles,
+            temperature: motion.temperature,
             rest_length: braid.rest_length(),
             radius: posture.radius,
             rest_radius: braid.rest_radius(),
@@ -256,21 +258,21 @@ impl Gathering<'_> {
             order: TABLE_ORDER as f64,
             ..Context::default()
         });
-        rows.shapes.push(sleeve::shape(braid, mean.stroke));
+        rows.shapes.push(sleeve::shape(braid, motion.stroke));
         rows.force.push(mean.force);
         // Just after a turn of the pressure at held length the model only guesses how far friction has turned; where the muscle
         // also moves, its strokes and what ramps are steady are what is judged.
-        let on_ramp = k.on_ramp[i] && !self.isometric;
-        let judged = k.sure[i] && (self.isometric || !k.ramped[i] || on_ramp);
+        let on_ramp = state.on_ramp[i] && !self.isometric;
+        let judged = state.sure[i] && (self.isometric || !state.ramped[i] || on_ramp);
         rows.on_ramp.push(on_ramp);
         let read = (mean.good / self.per_row as f64).sqrt();
-        rows.readable.push(if k.held[i] { read } else { 0.0 });
+        rows.readable.push(if state.held[i] { read } else { 0.0 });
         rows.judged.push(if judged { read } else { 0.0 });
         rows.recording.push(rows.names.len() as u32 - 1);
         rows.piece.push(self.pieces);
-        rows.sign.push(k.direction[i]);
+        rows.sign.push(motion.direction);
         rows.still.push(mean.still);
         rows.largest.push(self.largest / braid.rest_length());
-        rows.local_time.push(local);
+        rows.local_time.push(mean.local);
     }
 }

@@ -1,9 +1,8 @@
 //! Readings of less weight: outliers, ends of the sensor's range, readings on steep flanks.
 
 use crate::criteria::rows::{FLANK_STEP, NEGLIGIBLE_ERROR, NO_LOAD, SIMULTANEITY, SPIKE_NOISE, SPIKE_RANGE};
-use crate::kinematics::white_noise;
-use crate::linear::median;
-use pam_data::recording::Campaign;
+use pam_data::recording::{Campaign, white_noise};
+use pam_fit::numerics::median;
 use pam_fit::{Clip, clip};
 
 /// Isolated spikes of a series: rows that stand out from the middle of their five neighbours by more than noise can.

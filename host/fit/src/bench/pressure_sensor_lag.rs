@@ -14,7 +14,7 @@ impl Effect for PressureSensorLag {
     const INFO: Info = Info {
         name: "pressure-sensor-lag",
         link: Link::Air,
-        parameters: &[Parameter::amplitude("τ", "delay", "s", 1.0e-3, 0.1)],
+        parameters: &[Parameter::amplitude("τ", "delay", "s", 1.0e-3, 0.1).bounded()],
         depends_on_pressure: true,
         persistent: false,
         alternatives: false,

@@ -34,7 +34,7 @@ impl Effect for SensorDelay {
         name: "sensor-delay",
         link: Link::Reading,
         parameters: &[
-            Parameter::amplitude("δ", "skew", "s", -0.1, 0.1),
+            Parameter::amplitude("δ", "skew", "s", -0.1, 0.1).bounded(),
             Parameter::amplitude("κ", "filtered_part", "", 0.1, 1.2),
             Parameter::amplitude("κ_d", "delayed_part", "", 0.1, 1.2),
             Parameter::shape("τ", "filter_time", "s", 1.0e-3, 0.5),

@@ -133,7 +133,7 @@ mod tests {
     use super::*;
     use crate::fit::points::points;
     use pam_data::recording::dropouts::Screened;
-    use pam_data::recording::segment::Motion;
+    use pam_data::recording::motion::Motion;
     use pam_data::recording::{Campaign, Recording};
 
     fn at(pressures: Vec<f64>) -> Points {

@@ -6,7 +6,7 @@
 
 use crate::numerics::median;
 use pam_data::recording::dropouts::Screened;
-use pam_data::recording::segment::Motion;
+use pam_data::recording::motion::Motion;
 use pam_data::recording::{Campaign, Recording, white_noise};
 
 /// A mean over consecutive rows of one recording.

@@ -16,7 +16,7 @@ use pam_data::pluralise::pluralise;
 use pam_data::progress::Progress;
 use pam_data::recording::Campaign;
 use pam_data::recording::dropouts::Screened;
-use pam_data::recording::segment::Motion;
+use pam_data::recording::motion::Motion;
 
 use super::Options;
 use super::nodes::pressures;

@@ -1,5 +1,7 @@
 //! Turning points: where a column turns back by more than a threshold, and exactly where it did so.
 
+use super::criteria::{LINE_REACH, LINE_SHARE, ONSET_CLEAR, SHARP_RATIO, SHARP_SAMPLES, SHARP_STEP};
+
 /// A stretch between two turning points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Leg {
@@ -111,6 +113,11 @@ pub(super) struct Track<'a> {
 }
 
 impl Track<'_> {
+    /// How far readings stray from the level of a rest or a reversal.
+    pub(super) fn tolerance(&self) -> f64 {
+        (ONSET_CLEAR * self.noise).min(self.threshold / 2.0)
+    }
+
     /// First sample of the leg that is farther than `distance` from where the leg starts.
     pub(super) fn leaves(&self, leg: &Leg, distance: f64) -> usize {
         let far = |i: &usize| (self.smooth[*i] - leg.from) * leg.sign() > distance;
@@ -136,12 +143,14 @@ impl Track<'_> {
         let left = self.nears(before, self.threshold);
         let right = self.leaves(after, self.threshold);
         let step = steps(left, k).min(steps(k, right));
-        if step > 5.0 * self.noise || right - left < 6 {
+        if step > SHARP_STEP * self.noise || right - left < SHARP_SAMPLES {
             return self.sharp_turn(k, first, last, before.sign());
         }
         // Samples close to the extremum may belong to either side; far ones tell little about it.
-        let near = (3.0 * self.noise).min(self.threshold / 2.0);
-        let far = (3.0 * self.threshold).min(0.4 * before.amplitude()).min(0.4 * after.amplitude());
+        let near = self.tolerance();
+        let far = (LINE_REACH * self.threshold)
+            .min(LINE_SHARE * before.amplitude())
+            .min(LINE_SHARE * after.amplitude());
         let a = self.nears(before, far)..self.nears(before, near).max(first + 1);
         let b = self.leaves(after, near)..(self.leaves(after, far) + 1).min(last + 1);
         let lines = (Line::through(self.time, self.raw, a), Line::through(self.time, self.raw, b));
@@ -165,10 +174,10 @@ impl Track<'_> {
             if let (Some(a), Some(b)) = (a, b) {
                 let (off_a, off_b) =
                     ((x[k] - a.value(self.time[k])).abs(), (x[k] - b.value(self.time[k])).abs());
-                if off_a > 3.0 * off_b + 3.0 * self.noise {
+                if off_a > SHARP_RATIO * off_b + ONSET_CLEAR * self.noise {
                     return k;
                 }
-                if off_b > 3.0 * off_a + 3.0 * self.noise {
+                if off_b > SHARP_RATIO * off_a + ONSET_CLEAR * self.noise {
                     return k + 1;
                 }
             }

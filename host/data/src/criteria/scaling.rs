@@ -46,12 +46,14 @@ const fn factor(name: &str) -> f64 {
 }
 
 /// A criterion, scaled where this build scales it.
-pub(super) const fn number(name: &str, value: f64) -> f64 {
+#[must_use]
+pub const fn number(name: &str, value: f64) -> f64 {
     value * factor(name)
 }
 
 /// A criterion that counts, at least one.
-pub(super) const fn count(name: &str, value: usize) -> usize {
+#[must_use]
+pub const fn count(name: &str, value: usize) -> usize {
     let scaled = (value as f64 * factor(name)) as usize;
     if scaled == 0 && value > 0 { 1 } else { scaled }
 }

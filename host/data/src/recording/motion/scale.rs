@@ -1,6 +1,11 @@
 //! What in a column is noise and what is change: thresholds, and how much smoothing the motion allows.
 
 use super::super::noise::{lagged_noise, quantum, white_noise};
+use super::criteria::{
+    HOLD_TOLERANCE, MOTION_NOISE, MOTION_PRESSURE_FLOOR, MOTION_PRESSURE_MOST, MOTION_PRESSURE_SHARE,
+    NOISE_LAG, NOISE_LAG_PART, NOISE_RISE, ONSET_CLEAR, PRESSURE_NOISE_MOST, QUANTUM_SHARE, RIPPLE_LARGEST,
+    RIPPLE_RAISE, RIPPLE_RAISES, RIPPLE_SMALL, RIPPLE_STROKES, SMOOTHING_MOST, SMOOTHING_PART,
+};
 use super::turning::{Leg, legs};
 use crate::statistics::median;
 
@@ -15,6 +20,13 @@ pub(super) struct Scale {
     pub threshold: f64,
 }
 
+impl Scale {
+    /// How far smoothed samples at rest stray from their level.
+    pub(super) fn rest_tolerance(&self) -> f64 {
+        (ONSET_CLEAR * self.smoothed_noise).max(HOLD_TOLERANCE * self.threshold)
+    }
+}
+
 /// Standard deviation of noise of any short correlation: second differences at growing lags stay level for white noise, rise
 /// slowly for coloured noise, and rise fourfold per doubling where the motion's own curvature shows. They are followed as
 /// long as they rise like noise.
@@ -22,9 +34,9 @@ fn coloured_noise(column: &[f64]) -> f64 {
     let mut noise = white_noise(column);
     let mut last = noise;
     let mut lag = 2;
-    while lag <= (column.len() / 16).min(64) {
+    while lag <= (column.len() / NOISE_LAG_PART).min(NOISE_LAG) {
         let here = lagged_noise(column, lag);
-        if here > 1.8 * last {
+        if here > NOISE_RISE * last {
             break;
         }
         noise = noise.max(here);
@@ -32,7 +44,7 @@ fn coloured_noise(column: &[f64]) -> f64 {
         lag *= 2;
     }
     // A converter's steps are noise too, even where neighbours are mostly equal.
-    noise.max(quantum(column).min(1e-3 * range(column)) / 12f64.sqrt())
+    noise.max(quantum(column).min(QUANTUM_SHARE * range(column)) / 12f64.sqrt())
 }
 
 /// Largest minus smallest.
@@ -44,48 +56,46 @@ pub(super) fn range(column: &[f64]) -> f64 {
 
 /// How many standard deviations `n` samples of noise spread over, with a margin: twice the expected largest of n, plus one.
 fn spread(n: usize) -> f64 {
-    2.0 * (2.0 * (n.max(2) as f64).ln()).sqrt() + 1.0
+    MOTION_NOISE * (2.0 * (n.max(2) as f64).ln()).sqrt() + 1.0
 }
 
-/// The scale of a stroke, and the stroke smoothed as far as its turning points allow.
-pub(super) fn of_stroke(time: &[f64], stroke: &[f64]) -> (Scale, Vec<f64>) {
-    // Less than a micrometre is no motion of a muscle.
-    const FLOOR: f64 = 1e-6;
+/// The scale of a stroke, and the stroke smoothed as far as its turning points allow. Less than `least`, m, is no motion.
+pub(super) fn of_stroke(stroke: &[f64], least: f64) -> (Scale, Vec<f64>) {
     let noise = coloured_noise(stroke);
-    let raw = raise(stroke, (spread(stroke.len()) * noise).max(FLOOR));
+    let raw = raise(stroke, (spread(stroke.len()) * noise).max(least));
     let window = window(stroke, &legs(stroke, raw), noise);
     if window < 3 {
         return (Scale { noise, smoothed_noise: noise, threshold: raw }, stroke.to_vec());
     }
     let smooth = moving_mean(stroke, window);
     let correlated = lagged_noise(&smooth, window.min(smooth.len() / 3)).max(noise / (window as f64).sqrt());
-    let threshold = (spread(stroke.len() / window) * correlated).max(FLOOR);
+    let threshold = (spread(stroke.len() / window) * correlated).max(least);
     let threshold = raise(&smooth, threshold.min(raw));
-    debug_assert_eq!(time.len(), smooth.len());
     (Scale { noise, smoothed_noise: correlated, threshold }, smooth)
 }
 
 /// The scale of a pressure. Regulators ripple by parts of a per cent of their range, and no isometric test turns back by less
 /// than two per cent of its pressure on purpose.
 pub(super) fn of_pressure(pressure: &[f64]) -> Scale {
-    let top = pressure.iter().fold(0.0, |m: f64, p| m.max(p.abs())).max(20e3);
+    let top = pressure.iter().fold(0.0, |m: f64, p| m.max(p.abs())).max(MOTION_PRESSURE_FLOOR);
     // Settled readings of a staircase differ by whole steps; that is no noise, and no pressure sensor is that bad.
-    let noise = coloured_noise(pressure).min(0.005 * top);
-    let threshold = (spread(pressure.len()) * noise).clamp(0.02 * top, 0.08 * top);
+    let noise = coloured_noise(pressure).min(PRESSURE_NOISE_MOST * top);
+    let threshold =
+        (spread(pressure.len()) * noise).clamp(MOTION_PRESSURE_SHARE * top, MOTION_PRESSURE_MOST * top);
     Scale { noise, smoothed_noise: noise, threshold: raise(pressure, threshold) }
 }
 
 /// Raises a threshold while most legs are hardly larger than it and the largest much larger: that is how ripple and hum look
 /// that the noise estimate missed. Motion has legs of its own size.
 fn raise(column: &[f64], mut threshold: f64) -> f64 {
-    for _ in 0..12 {
+    for _ in 0..RIPPLE_RAISES {
         let legs = legs(column, threshold);
         let largest = legs.iter().map(|l| l.amplitude()).fold(0.0, f64::max);
-        let small = legs.iter().filter(|l| l.amplitude() < 2.5 * threshold).count();
-        if legs.len() < 6 || 2 * small < legs.len() || largest < 8.0 * threshold {
+        let small = legs.iter().filter(|l| l.amplitude() < RIPPLE_SMALL * threshold).count();
+        if legs.len() < RIPPLE_STROKES || 2 * small < legs.len() || largest < RIPPLE_LARGEST * threshold {
             break;
         }
-        threshold *= 1.5;
+        threshold *= RIPPLE_RAISE;
     }
     threshold
 }
@@ -100,7 +110,7 @@ fn window(column: &[f64], legs: &[Leg], noise: f64) -> usize {
     let typical = median(&mut speeds);
     let shortest = legs.iter().map(|l| l.end - l.start).min().unwrap_or(1);
     let wanted = (4.0 * noise / typical.max(f64::MIN_POSITIVE)).powf(2.0 / 3.0);
-    let most = (shortest / 8).min(column.len() / 8).min(2001);
+    let most = (shortest / SMOOTHING_PART).min(column.len() / SMOOTHING_PART).min(SMOOTHING_MOST);
     let window = if wanted < most as f64 { wanted as usize } else { most };
     window.max(1) | 1
 }

@@ -23,7 +23,7 @@ struct Truth {
 }
 
 /// Pseudo-random numbers of a normal distribution: the sum of twelve uniform ones.
-struct Noise(u64);
+pub(super) struct Noise(pub(super) u64);
 
 impl Noise {
     fn uniform(&mut self) -> f64 {
@@ -31,7 +31,7 @@ impl Noise {
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    fn normal(&mut self) -> f64 {
+    pub(super) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 }
@@ -136,6 +136,67 @@ fn smooth_turns_are_no_rests() {
                 found.holds
             );
         }
+    }
+}
+
+/// Sines among few readings, from 7 a cycle on, at any phase: each half-stroke has its direction from its first sample on.
+#[test]
+fn a_sine_among_few_readings_turns_at_its_extremes() {
+    for per_cycle in [7.3, 9.1, 12.7, 20.3, 41.9, 97.1] {
+        for k in 0..40 {
+            let phase = 0.157 * f64::from(k);
+            let mut random = Noise(k as u64);
+            let angle = |i: usize| std::f64::consts::TAU * i as f64 / per_cycle + phase;
+            let recording = Recording {
+                time: (0..300).map(|i| 0.1 * i as f64).collect(),
+                stroke: (0..300)
+                    .map(|i| 10.0 * MM * (1.0 - angle(i).cos()) + 2e-6 * random.normal())
+                    .collect(),
+                pressure: vec![300e3; 300],
+                ..Recording::default()
+            };
+            let found = Motion::of(&recording);
+            // A reading this near to an extreme belongs to either side: the noise moves it by as much.
+            let clear = |i: &usize| angle(*i).sin().abs() > 0.08;
+            let wrong: Vec<usize> = (2..298)
+                .filter(clear)
+                .filter(|i| f64::from(found.direction[*i]) != angle(*i).sin().signum())
+                .collect();
+            assert!(wrong.is_empty(), "{per_cycle} a cycle, phase {phase}: {wrong:?}");
+        }
+    }
+}
+
+/// Strokes that begin and end like a cosine, with rests between them, among few readings.
+#[test]
+fn a_smooth_stroke_after_a_rest_begins_with_its_first_sample() {
+    for per_stroke in [6, 10, 15, 25] {
+        let mut random = Noise(per_stroke as u64);
+        let period = 2 * (per_stroke + 30);
+        let place = |i: usize| {
+            let at = i % period;
+            let (half, up) = if at < period / 2 { (at, true) } else { (at - period / 2, false) };
+            let share = (half.saturating_sub(30) as f64 / per_stroke as f64).min(1.0);
+            let gone = 0.5 * (1.0 - (std::f64::consts::PI * share).cos());
+            if up { gone } else { 1.0 - gone }
+        };
+        let n = 6 * period;
+        let recording = Recording {
+            time: (0..n).map(|i| 0.1 * i as f64).collect(),
+            stroke: (0..n).map(|i| 20.0 * MM * place(i) + 2e-6 * random.normal()).collect(),
+            pressure: vec![300e3; n],
+            ..Recording::default()
+        };
+        let found = Motion::of(&recording);
+        // A sample has moved when it is farther from the rest than the noise.
+        let moved = |i: usize| {
+            let step = place(i) - place(i - 1);
+            let begun = 20.0 * MM * step.abs() > 12e-6;
+            begun.then_some(if step > 0.0 { 1 } else { -1 })
+        };
+        let wrong: Vec<usize> =
+            (1..n).filter(|i| moved(*i).is_some_and(|d| d != found.direction[*i])).collect();
+        assert!(wrong.is_empty(), "{per_stroke} a stroke: {wrong:?}");
     }
 }
 

@@ -2,6 +2,10 @@
 
 use rayon::prelude::*;
 
+use super::criteria::{
+    ACCELERATION_PRECISION, PRESSURE_RANGE_NOISE, PRESSURE_TIME, RATE_HALF_SAMPLES, RATE_SAMPLES,
+    SPEED_PRECISION,
+};
 use super::scale::{moving_mean, range};
 use super::{Motion, Recording};
 
@@ -16,12 +20,10 @@ pub struct Rates {
     pub pressure_rate: Vec<f64>,
 }
 
-/// Samples on either side of the one in question, at most.
-const WIDEST: usize = 24;
-
 impl Rates {
-    /// Rates from parabolas through a window about each sample, by least squares. The window is as wide as noise asks for (3 %
-    /// of the recording's typical speed) and never reaches across a turning point or into or out of a hold, where speed jumps.
+    /// Rates from parabolas through a window about each sample, by least squares. The window is as wide as noise asks for and
+    /// never reaches across a turning point or into or out of a hold, where speed jumps. A held length has no speed: what its slope
+    /// shows is noise, or a frame that yields.
     #[must_use]
     pub fn of(recording: &Recording, motion: &Motion) -> Self {
         let n = recording.len();
@@ -38,13 +40,26 @@ impl Rates {
             .sum::<f64>()
             + range(&recording.stroke);
         let typical = travelled / duration;
-        let (speed, _) =
+        let (mut speed, _) =
             derivatives(&recording.time, &recording.stroke, motion.stroke_noise, typical, &edges);
-        // A second derivative is noisier by far: its window is that of a speed known ten times as well.
-        let (_, acceleration) =
-            derivatives(&recording.time, &recording.stroke, motion.stroke_noise, 0.1 * typical, &edges);
+        // A second derivative is noisier by far: its window is that of a speed known better.
+        let (_, mut acceleration) = derivatives(
+            &recording.time,
+            &recording.stroke,
+            motion.stroke_noise,
+            typical / ACCELERATION_PRECISION,
+            &edges,
+        );
+        for hold in &motion.holds {
+            for column in [&mut speed, &mut acceleration] {
+                if let Some(part) = column.get_mut(hold.start..=hold.end) {
+                    part.fill(0.0);
+                }
+            }
+        }
         // Pressure has no turning points of its own here; its window follows from its whole range over some seconds.
-        let typical = range(&recording.pressure).max(20.0 * motion.pressure_noise) / duration.min(5.0);
+        let typical = range(&recording.pressure).max(PRESSURE_RANGE_NOISE * motion.pressure_noise)
+            / duration.min(PRESSURE_TIME);
         let (pressure_rate, _) =
             derivatives(&recording.time, &recording.pressure, motion.pressure_noise, typical, &[]);
         Self { speed, acceleration, pressure_rate }
@@ -66,9 +81,11 @@ fn derivatives(
     let dt = (last - first) / (n - 1) as f64;
     // A line's slope over m samples has the standard deviation σ √12 / (dt m^1.5); a parabola at the end of its window needs
     // about twice the width for the same.
-    let wanted = (12f64.sqrt() * noise / (dt * 0.03 * typical).max(f64::MIN_POSITIVE)).powf(2.0 / 3.0);
-    let half = if wanted < 2000.0 { (wanted as usize).max(2) } else { 2000 };
-    let stride = half.div_ceil(WIDEST);
+    let wanted =
+        (12f64.sqrt() * noise / (dt * SPEED_PRECISION * typical).max(f64::MIN_POSITIVE)).powf(2.0 / 3.0);
+    let (least, most) = RATE_HALF_SAMPLES;
+    let half = if wanted < most as f64 { (wanted as usize).max(least) } else { most };
+    let stride = half.div_ceil(RATE_SAMPLES);
     let reach = half / stride;
     let averaged;
     let column = if stride > 1 {

@@ -1,0 +1,124 @@
+//! Criteria as data: a number that decides, with its symbol, unit, value, statistical meaning and source.
+//!
+//! The macro [`criteria!`](crate::criteria!) declares the criteria of one stage as constants and as rows of the page that
+//! `cargo run -p pam-diagnose --example criteria` prints. A sensitivity study scales one criterion at compile time, so that no setting of
+//! a running program can change an answer:
+//!
+//! ```text
+//! PAM_CRITERION=FAMILY_ALPHA PAM_CRITERION_FACTOR=0.5 cargo build --release -p host
+//! ```
+
+mod scaling;
+
+pub use scaling::{count, number};
+
+/// Where the value of a criterion comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// It follows from the formula or the argument given.
+    Derived(&'static str),
+    /// A usual level of significance or precision.
+    Convention(&'static str),
+    /// Data sheets, or measurements on muscles, as given.
+    Measured(&'static str),
+    /// A publication.
+    Published(&'static str),
+    /// Set by trials on the virtual bench: the opened development sets.
+    Trials(&'static str),
+    /// Engineering judgement; the opened development sets were answered with it, and no derivation is known.
+    Judgement,
+    /// Limits time or memory, and does not decide by itself.
+    Cost,
+}
+
+impl std::fmt::Display for Source {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Derived(text) => write!(f, "derived: {text}"),
+            Self::Convention(text) => write!(f, "convention: {text}"),
+            Self::Measured(text) => write!(f, "measured: {text}"),
+            Self::Published(text) => write!(f, "{text}"),
+            Self::Trials("") => write!(f, "set by trials on the virtual bench"),
+            Self::Trials(text) => write!(f, "set by trials on the virtual bench: {text}"),
+            Self::Judgement => write!(f, "engineering judgement, used in all trials on the virtual bench"),
+            Self::Cost => write!(f, "limit of computing time"),
+        }
+    }
+}
+
+/// One criterion.
+#[derive(Clone, Copy, Debug)]
+pub struct Criterion {
+    /// Its name in the source.
+    pub name: &'static str,
+    /// Its symbol in formulas of the book, or the name of the quantity.
+    pub symbol: &'static str,
+    /// Its unit; `1` for a number or a share.
+    pub unit: &'static str,
+    /// Its value, as it stands in the source.
+    pub value: &'static str,
+    /// What it means.
+    pub meaning: &'static str,
+    /// Where the value comes from.
+    pub source: Source,
+}
+
+/// The criteria of one stage.
+#[derive(Clone, Copy, Debug)]
+pub struct Stage {
+    /// The stage.
+    pub title: &'static str,
+    /// Its criteria.
+    pub criteria: &'static [Criterion],
+}
+
+/// Declares the criteria of a stage as constants and as rows of the page.
+#[macro_export]
+macro_rules! criteria {
+    ($title:literal: $($(#[doc = $meaning:literal])+ $name:ident: $type:tt = $value:expr, $symbol:literal, $unit:literal, $source:expr;)+) => {
+        use $crate::criteria::Source::{self, *};
+        $(
+            $(#[doc = $meaning])+
+            pub(crate) const $name: $crate::criteria!(@type $type) = $crate::criteria!(@value $type, $name, $value);
+        )+
+        /// This stage's part of the page.
+        pub(crate) const STAGE: $crate::criteria::Stage = $crate::criteria::Stage {
+            title: $title,
+            criteria: &[$($crate::criteria::Criterion {
+                name: stringify!($name),
+                symbol: $symbol,
+                unit: $unit,
+                value: stringify!($value),
+                meaning: concat!($($meaning),+),
+                source: { const SOURCE: Source = $source; SOURCE },
+            }),+],
+        };
+    };
+    (@type f64) => { f64 };
+    (@type usize) => { usize };
+    (@type u32) => { u32 };
+    (@type $other:tt) => { $crate::criteria!(@grouped $other) };
+    (@grouped ($($inner:tt)+)) => { $($inner)+ };
+    (@value f64, $name:ident, $value:expr) => { $crate::criteria::number(stringify!($name), $value) };
+    (@value usize, $name:ident, $value:expr) => { $crate::criteria::count(stringify!($name), $value) };
+    (@value $other:tt, $name:ident, $value:expr) => { $value };
+}
+
+/// Stages as Markdown tables.
+#[must_use]
+pub fn markdown(stages: &[Stage]) -> String {
+    let mut page = String::new();
+    for stage in stages {
+        page.push_str(&format!("### {}\n\n", stage.title));
+        page.push_str("| criterion | symbol | value | unit | meaning | source |\n| --- | --- | --- | --- | --- | --- |\n");
+        for c in stage.criteria {
+            let meaning = c.meaning.trim();
+            page.push_str(&format!(
+                "| `{}` | {} | {} | {} | {meaning} | {} |\n",
+                c.name, c.symbol, c.value, c.unit, c.source
+            ));
+        }
+        page.push('\n');
+    }
+    page
+}
