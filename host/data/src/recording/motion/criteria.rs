@@ -66,6 +66,14 @@ crate::criteria! {
     HOLD_DRIFT: f64 = 3.0, "n_hold", "1", Judgement;
     /// Strokes that small are creep at a held length below this share of the typical speed.
     CREEP_SPEED: f64 = 0.05, "v_creep/v", "1", Judgement;
+    /// A stroke of fewer thresholds has the mean speed of all of it; of a larger one, the threshold at either end is left out.
+    SMALL_STROKE: f64 = 4.0, "A_small/x_rev", "1", Judgement;
+    /// A stroke is divided into at most this many parts to find holds on its way.
+    PACE_PARTS: usize = 10, "m_pace", "1", Judgement;
+    /// ... of at least this many samples each, on average.
+    PACE_SAMPLES: usize = 3, "k_pace", "1", Judgement;
+    /// A part that takes this many times the median part contains a hold; the ends of a sine take three times as long.
+    DWELL_RATIO: f64 = 10.0, "t_dwell/t_med", "1", Derived("three times what the ends of a sine take");
     /// Fewest samples of a hold.
     HOLD_SAMPLES: usize = 6, "N_hold", "1", Judgement;
     /// A hold lasts longer than the motion around it takes for the threshold, by this factor.

@@ -3,8 +3,9 @@
 use std::collections::VecDeque;
 
 use super::criteria::{
-    CREEP_SPEED, FLAT_NOISE, FLAT_SHARE, HOLD_DRIFT, HOLD_EDGE_SHARE, HOLD_EDGE_TIME, HOLD_JOIN, HOLD_REACH,
-    HOLD_SAMPLES, HOLD_TIME, LEVEL_SAMPLES, LONG_HOLD_SHARE, LONG_HOLD_TIME,
+    CREEP_SPEED, DWELL_RATIO, FLAT_NOISE, FLAT_SHARE, HOLD_DRIFT, HOLD_EDGE_SHARE, HOLD_EDGE_TIME, HOLD_JOIN,
+    HOLD_REACH, HOLD_SAMPLES, HOLD_TIME, LEVEL_SAMPLES, LONG_HOLD_SHARE, LONG_HOLD_TIME, PACE_PARTS,
+    PACE_SAMPLES, SMALL_STROKE,
 };
 use super::scale::{Scale, range};
 use super::turning::Leg;
@@ -165,20 +166,34 @@ impl Search<'_> {
     }
 }
 
-/// The mean speed of a leg while it moves: what it spends within the threshold of its ends may be rest.
+/// The mean speed of a leg while it moves, m/s: what it spends within the threshold of its ends may be rest, and so may a part of its way
+/// that takes much longer than the others.
 fn speed(time: &[f64], smooth: &[f64], leg: &Leg, threshold: f64) -> f64 {
     let over = |distance: f64, duration: f64| distance / duration.max(f64::MIN_POSITIVE);
     let whole = over(leg.amplitude(), time[leg.end] - time[leg.start]);
-    if leg.amplitude() < 4.0 * threshold {
+    if leg.amplitude() < SMALL_STROKE * threshold {
         return whole;
     }
     let gone = |i: usize| (smooth[i] - leg.from) * leg.sign();
     let left = (leg.start..=leg.end).find(|i| gone(*i) > threshold);
     let near = (leg.start..=leg.end).rev().find(|i| gone(*i) < leg.amplitude() - threshold);
-    match (left, near) {
-        (Some(left), Some(near)) if near > left => over(gone(near) - gone(left), time[near] - time[left]),
-        _ => whole,
+    let (Some(left), Some(near)) = (left, near) else { return whole };
+    if near <= left {
+        return whole;
     }
+    let (from, travelled) = (gone(left), gone(near) - gone(left));
+    let parts = ((near - left) / PACE_SAMPLES).clamp(1, PACE_PARTS);
+    let mut passed = vec![time[left]];
+    for i in left..near {
+        while passed.len() < parts && gone(i) - from >= travelled * passed.len() as f64 / parts as f64 {
+            passed.push(time[i]);
+        }
+    }
+    passed.push(time[near]);
+    let taken: Vec<f64> = passed.windows(2).map(|w| w[1] - w[0]).collect();
+    let usual = median(&mut taken.clone());
+    let rests = |t: &f64| usual > 0.0 && *t > DWELL_RATIO * usual;
+    over(travelled, taken.iter().map(|t| if rests(t) { usual } else { *t }).sum())
 }
 
 /// What a stretch turned out to be.
