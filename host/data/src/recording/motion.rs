@@ -1,8 +1,8 @@
 //! How the muscle was moved: direction, reversals, holds, ramps, noise, speed.
 //!
 //! This is the one reconstruction of the motion from whole recordings: fit, prediction, evaluation and diagnosis use it. The controller
-//! cannot look ahead; what its causal reconstruction (`model_core::motion::MotionTracker`) does differently stands in
-//! `docs/src/decisions/11-motion.md`.
+//! cannot look ahead; `docs/src/decisions/11-motion.md` lists what its causal reconstruction
+//! (`model_core::motion::MotionTracker`) does differently.
 //!
 //! | file | contents |
 //! | --- | --- |
@@ -14,9 +14,8 @@
 //! | `state` | what each sample tells: held, in doubt, on a ramp |
 //! | `rates` | speed, acceleration, pressure rate |
 //!
-//! Which way friction points: while the muscle moves, the sign of its speed; while its length is held, the way the pressure
-//! drives it (filling counts as shortening); while neither changes, the last direction stays; before anything has changed it
-//! is unknown. Noise and ripple flip nothing: a turn counts only when the column goes back by more than noise can. But it
+//! The direction of friction is the sign of the speed while the muscle moves. While its length is held, it is the way the pressure
+//! drives it: filling counts as shortening. While neither changes, the last direction stays; before the first change it is unknown. Noise and ripple flip nothing: a turn counts only when the column goes back by more than noise can. But it
 //! counts from where it began, not from where it was noticed, for a sample on the wrong side costs 2 k_F F.
 
 mod columns;

@@ -42,7 +42,7 @@ impl Motion {
             columns.since_reversal.push(time[i] - time[from]);
         }
         for (k, hold) in self.holds.iter().enumerate() {
-            // The rest before a motion is told until that motion turns or rests.
+            // The rest before a motion counts until that motion turns or rests.
             let mut turn = self.turns.partition_point(|t| t.index <= hold.end);
             let leaving = |t: &Turn| {
                 t.index <= hold.end + 2 || (stroke[t.index] - hold.stroke).abs() <= self.stroke_threshold

@@ -10,11 +10,11 @@ crate::criteria! {
     QUANTUM_SAMPLES: usize = 65_536, "N_q", "1", Cost;
     /// Fewest samples for fourth differences beside second ones.
     FOURTH_DIFFERENCES: usize = 16, "N_4", "1", Judgement;
-    /// Noise is followed to lags at which its second differences rise by less than this factor when the lag doubles; those of a smooth motion rise fourfold.
+    /// Second differences of noise rise by less than this factor when the lag doubles. Those of a smooth motion rise fourfold.
     NOISE_RISE: f64 = 1.8, "r_lag", "1", Derived("below the geometric mean of 1 for white noise and 4 for curvature");
     /// The longest such lag in samples.
     NOISE_LAG: usize = 64, "k_lag", "1", Judgement;
-    /// ... as a part of the recording.
+    /// It is at most this part of the recording.
     NOISE_LAG_PART: usize = 16, "N/k_lag", "1", Judgement;
     /// The smallest step between readings is a step of the converter up to this share of the range.
     QUANTUM_SHARE: f64 = 1e-3, "q/range", "1", Measured("converters of 10 bits and more");
@@ -22,43 +22,43 @@ crate::criteria! {
     PRESSURE_NOISE_MOST: f64 = 0.005, "s_P/P_max", "1", Measured("no industrial pressure sensor is noisier");
     /// A change is a motion above this many times the largest of as many readings of noise, plus one deviation.
     MOTION_NOISE: f64 = 2.0, "n_motion", "1", Derived("n normal values spread over twice their expected largest, sqrt(2 ln n) deviations");
-    /// ... and above this share of the range that the campaign's strokes have.
+    /// It is also above this share of the range of the campaign's strokes.
     MOTION_STROKE_SHARE: f64 = 0.004, "x_rev/range", "1", Judgement;
-    /// ... and above this stroke.
+    /// It is also above this stroke.
     MOTION_STROKE_FLOOR: f64 = 1e-5, "x_rev", "m", Measured("frames and mountings yield by some micrometres");
     /// Share of the readings at either end that the range of a column leaves out.
     RANGE_TRIM: f64 = 0.002, "q_trim", "1", Judgement;
     /// A change of pressure at held length is filling or emptying above this share of the recording's largest pressure.
     MOTION_PRESSURE_SHARE: f64 = 0.02, "P_rev/P_max", "1", Judgement;
-    /// ... and the threshold is at most this share.
+    /// The threshold is at most this share.
     MOTION_PRESSURE_MOST: f64 = 0.08, "P_rev,max/P_max", "1", Judgement;
     /// The largest pressure counts as at least this.
     MOTION_PRESSURE_FLOOR: f64 = 100e3, "P_max", "Pa", Measured("2 % of it, 2 kPa, is the hysteresis of regulators, 0.2 to 1 % of 200 to 1000 kPa");
     /// A threshold is raised by this factor while ripple remains.
     RIPPLE_RAISE: f64 = 1.5, "r_ripple", "1", Judgement;
-    /// ... at most this often.
+    /// It is raised at most this often.
     RIPPLE_RAISES: usize = 12, "m_ripple", "1", Cost;
     /// Ripple has at least this many strokes.
     RIPPLE_STROKES: usize = 6, "N_ripple", "1", Judgement;
-    /// ... of which at least half are below this many thresholds.
+    /// At least half of them are below this many thresholds.
     RIPPLE_SMALL: f64 = 2.5, "A_ripple/x_rev", "1", Judgement;
-    /// ... while the largest stroke exceeds this many thresholds.
+    /// The largest stroke exceeds this many thresholds.
     RIPPLE_LARGEST: f64 = 8.0, "A_max/x_rev", "1", Judgement;
     /// A moving mean averages at most this part of the shortest stroke, and of the recording.
     SMOOTHING_PART: usize = 8, "N_stroke/m_mean", "1", Judgement;
-    /// ... and this many samples.
+    /// It averages at most this many samples.
     SMOOTHING_MOST: usize = 2001, "m_mean", "1", Cost;
     /// Readings stray from the level of a rest or a reversal by this many standard deviations.
     ONSET_CLEAR: f64 = 3.0, "n_onset", "1", Convention("three deviations");
     /// A reversal is found on single samples where the stroke changes by this many deviations of the noise from one to the next.
     SHARP_STEP: f64 = 5.0, "n_step", "1", Convention("five deviations");
-    /// ... or where fewer samples than this lie within the threshold of it.
+    /// The same where fewer samples than this lie within the threshold of it.
     SHARP_SAMPLES: usize = 6, "m_sharp", "1", Judgement;
     /// The sample at a corner belongs to the side from whose line it is this many times nearer.
     SHARP_RATIO: f64 = 3.0, "r_side", "1", Judgement;
     /// Lines on either side of a reversal reach this many thresholds far.
     LINE_REACH: f64 = 3.0, "x_line/x_rev", "1", Judgement;
-    /// ... and this share of the strokes on either side.
+    /// They reach at most this share of the strokes on either side.
     LINE_SHARE: f64 = 0.4, "x_line/A", "1", Judgement;
     /// A pressure has left its level by this part of its threshold.
     PRESSURE_ONSET: f64 = 0.25, "dP_onset/P_rev", "1", Judgement;
@@ -70,7 +70,7 @@ crate::criteria! {
     SMALL_STROKE: f64 = 4.0, "A_small/x_rev", "1", Judgement;
     /// A stroke is divided into at most this many parts to find holds on its way.
     PACE_PARTS: usize = 10, "m_pace", "1", Judgement;
-    /// ... of at least this many samples each, on average.
+    /// A part has at least this many samples, on average.
     PACE_SAMPLES: usize = 3, "k_pace", "1", Judgement;
     /// A part that takes this many times the median part contains a hold; the ends of a sine take three times as long.
     DWELL_RATIO: f64 = 10.0, "t_dwell/t_med", "1", Derived("three times what the ends of a sine take");
@@ -79,20 +79,20 @@ crate::criteria! {
     /// A hold lasts longer than the motion around it takes for the threshold, by this factor.
     HOLD_TIME: f64 = 4.0, "t_hold/t_pass", "1", Judgement;
     /// What lasts longer by this factor is a hold even if it creeps.
-    LONG_HOLD_TIME: f64 = 60.0, "t_long/t_pass", "1", Derived("about the turns of a sine this and LONG_HOLD_SHARE are never passed at once");
-    /// ... and longer than this share of the shortest stroke beside it.
+    LONG_HOLD_TIME: f64 = 60.0, "t_long/t_pass", "1", Derived("a sine never passes this and LONG_HOLD_SHARE together");
+    /// It also lasts longer than this share of the shortest stroke beside it.
     LONG_HOLD_SHARE: f64 = 0.1, "t_long/t_stroke", "1", Derived("with LONG_HOLD_TIME: a sine of amplitude A spends 0.9 sqrt(x_rev/A) of a stroke within x_rev");
     /// Samples at rest stray from its level by at least this share of the threshold.
     HOLD_TOLERANCE: f64 = 0.1, "dx_rest/x_rev", "1", Judgement;
     /// A hold is entered and left within this many times what passing takes; the round top of a smooth turn is not.
     HOLD_EDGE_TIME: f64 = 2.5, "t_edge/t_pass", "1", Judgement;
-    /// ... or within this share of its duration.
+    /// The same within this share of its duration.
     HOLD_EDGE_SHARE: f64 = 0.3, "t_edge/t_hold", "1", Judgement;
     /// Slope and curvature of a hold are within this many deviations of what noise makes.
     FLAT_NOISE: f64 = 5.0, "n_flat", "1", Convention("five deviations: one rest in a million is missed");
-    /// ... bounded to these shares of the threshold.
+    /// They are bounded to these shares of the threshold.
     FLAT_SHARE: ((f64, f64)) = (0.05, 0.25), "dx_flat/x_rev", "1", Derived("a smooth turn that fills the threshold bends by half of it; half of that divides the two");
-    /// Beyond its ends a hold goes on to samples this near to its level, in thresholds.
+    /// Beyond its ends a hold extends to samples this near to its level, in thresholds.
     HOLD_REACH: f64 = 0.6, "dx_reach/x_rev", "1", Judgement;
     /// Two holds side by side are one where their levels differ by less than this many thresholds.
     HOLD_JOIN: f64 = 0.5, "dx_join/x_rev", "1", Judgement;
@@ -118,10 +118,10 @@ crate::criteria! {
     RAMP_NOISE: f64 = 4.0, "n_ramp", "1", Convention("four deviations");
     /// A ramp may begin this long before the length is held, and end this long after.
     RAMP_MARGIN: f64 = 1.0, "t_margin", "s", Judgement;
-    /// ... in samples, at least and at most.
+    /// The same in samples, at least and at most.
     RAMP_MARGIN_SAMPLES: ((usize, usize)) = (6, 200), "m_margin", "1", Judgement;
     /// A ramp is judged from this time after its reversal: a regulator's step response comes before.
     RAMP_SETTLES: f64 = 3.0, "t_ramp", "s", Judgement;
-    /// A ramp goes on while its rate exceeds this share of its mean rate since the reversal.
+    /// A ramp continues while its rate exceeds this share of its mean rate since the reversal.
     RAMP_STEADY: f64 = 0.3, "r_ramp", "1", Judgement;
 }

@@ -50,8 +50,8 @@ struct Stroke {
     speed: f64,
 }
 
-/// The legs without those of a held length that creeps, because its frame yields to the force or its holder drifts: small ones, far
-/// slower than the leg in the middle by travel.
+/// The legs without the creep of a held length, where the frame yields to the force. Creep is small and far slower than the leg in the
+/// middle by travel.
 fn without_creep(time: &[f64], smooth: &[f64], scale: &Scale, legs: &[Leg]) -> Vec<Stroke> {
     let with_speed = |leg: &Leg| Stroke { leg: *leg, speed: speed(time, smooth, leg, scale.threshold) };
     let strokes: Vec<Stroke> = legs.iter().map(with_speed).collect();
@@ -166,8 +166,8 @@ impl Search<'_> {
     }
 }
 
-/// The mean speed of a leg while it moves, m/s: what it spends within the threshold of its ends may be rest, and so may a part of its way
-/// that takes much longer than the others.
+/// The mean speed of a leg while it moves, m/s. What it spends within the threshold of its ends may be rest, and so may a part that
+/// takes much longer than the others.
 fn speed(time: &[f64], smooth: &[f64], leg: &Leg, threshold: f64) -> f64 {
     let over = |distance: f64, duration: f64| distance / duration.max(f64::MIN_POSITIVE);
     let whole = over(leg.amplitude(), time[leg.end] - time[leg.start]);
@@ -204,7 +204,7 @@ enum Found {
     Short,
 }
 
-/// A window over a column with its smallest and largest value at hand.
+/// A window over a column with its smallest and largest value.
 #[derive(Default)]
 struct Window {
     start: usize,
@@ -274,7 +274,7 @@ fn flat(smooth: &[f64], scale: &Scale) -> bool {
 }
 
 /// Holds as long as they are, and joined where a wild sample has parted them: with its level known from many samples, a hold
-/// goes on as far as noise about that level explains the samples.
+/// extends as far as noise about that level explains the samples.
 fn joined(holds: Vec<Hold>, smooth: &[f64], scale: &Scale) -> Vec<Hold> {
     let tolerance = scale.rest_tolerance();
     let near = |level: f64, i: usize| (smooth[i] - level).abs() <= HOLD_REACH * scale.threshold;

@@ -22,7 +22,7 @@ pub struct Rates {
 
 impl Rates {
     /// Rates from parabolas through a window about each sample, by least squares. The window is as wide as noise asks for and
-    /// never reaches across a turning point or into or out of a hold, where speed jumps. A held length has no speed: what its slope
+    /// never reaches across a reversal or into or out of a hold, where speed jumps. A held length has no speed: what its slope
     /// shows is noise, or a frame that yields.
     #[must_use]
     pub fn of(recording: &Recording, motion: &Motion) -> Self {
@@ -57,7 +57,7 @@ impl Rates {
                 }
             }
         }
-        // Pressure has no turning points of its own here; its window follows from its whole range over some seconds.
+        // Pressure has no reversals of its own here; its window follows from its whole range over some seconds.
         let typical = range(&recording.pressure).max(PRESSURE_RANGE_NOISE * motion.pressure_noise)
             / duration.min(PRESSURE_TIME);
         let (pressure_rate, _) =
@@ -127,7 +127,7 @@ fn parabola(
 ) -> (f64, f64) {
     let before = ((i - low) / stride).min(reach);
     let after = ((high - i) / stride).min(reach);
-    // Near an edge the window goes on to the other side, so that it keeps its width.
+    // Near an edge the window extends to the other side, so that it keeps its width.
     let before = before.max((2 * reach - after).min((i - low) / stride));
     let after = after.max((2 * reach - before).min((high - i) / stride));
     let from = i - before * stride;

@@ -53,7 +53,7 @@ pub(super) fn with_pressure(stroke: Vec<Turn>, holds: &[Hold], air: &Track<'_>) 
             let leg = Leg { start: leg.start + hold.start, end: leg.end + hold.start, ..*leg };
             let tolerance = (ONSET_CLEAR * air.noise).max(PRESSURE_ONSET * air.threshold);
             let index = match air.departure(&leg, leg.start, leg.from, tolerance) {
-                // A recording that begins in the middle of filling has no rest to tell apart.
+                // A recording that begins in the middle of filling has no rest to distinguish.
                 1 if leg.start == 0 => 0,
                 index => index,
             };

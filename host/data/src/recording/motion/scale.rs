@@ -59,7 +59,7 @@ fn spread(n: usize) -> f64 {
     MOTION_NOISE * (2.0 * (n.max(2) as f64).ln()).sqrt() + 1.0
 }
 
-/// The scale of a stroke, and the stroke smoothed as far as its turning points allow. Less than `least`, m, is no motion.
+/// The scale of a stroke, and the stroke smoothed as far as its reversals allow. Less than `least`, m, is no motion.
 pub(super) fn of_stroke(stroke: &[f64], least: f64) -> (Scale, Vec<f64>) {
     let noise = coloured_noise(stroke);
     let raw = raise(stroke, (spread(stroke.len()) * noise).max(least));

@@ -126,7 +126,7 @@ impl Motion {
         }
     }
 
-    /// Marks the ramps on which friction has turned, as long as the pressure goes on the same way.
+    /// Marks the ramps on which friction has turned, as long as the pressure keeps its way.
     fn steady_ramps(&self, recording: &Recording, pressure_rate: &[f64], state: &mut MotionState) {
         let (time, pressure) = (&recording.time, &recording.pressure);
         let n = state.held.len();
@@ -259,8 +259,8 @@ mod tests {
 
     #[test]
     fn a_length_that_creeps_under_a_ramp_is_held() {
-        // Up 2 mm and, after 160 s, 2 mm more, each within a second; meanwhile the pressure falls for 80 s and rises again, and the
-        // frame yields by 70 µm with the force, or by a quarter of it. Then all the way back, and once more.
+        // Up 2 mm and, after 160 s, 2 mm more, each within a second. Meanwhile the pressure falls for 80 s and rises again. The frame
+        // yields by 70 µm with the force, or by a quarter of it. Then all the way back, and once more.
         for creep in [7e-5, 1.8e-5] {
             let mut noise = Noise(3);
             let period = 500.0;

@@ -1,8 +1,8 @@
-//! Turning points: where a column turns back by more than a threshold, and exactly where it did so.
+//! Reversals: where a column turns back by more than a threshold, and exactly where it did so.
 
 use super::criteria::{LINE_REACH, LINE_SHARE, ONSET_CLEAR, SHARP_RATIO, SHARP_SAMPLES, SHARP_STEP};
 
-/// A stretch between two turning points.
+/// A stretch between two reversals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Leg {
     /// Sample of the extremum it starts from.
@@ -162,7 +162,7 @@ impl Track<'_> {
 
     fn sharp_turn(&self, k: usize, first: usize, last: usize, way: f64) -> usize {
         let x = self.raw;
-        // The extremum of the recorded column may stand beside that of the smoothed one.
+        // The extremum of the recorded column may be beside that of the smoothed one.
         let around = k.saturating_sub(2).max(first)..=(k + 2).min(last);
         let k = around.max_by(|a, b| (x[*a] * way).total_cmp(&(x[*b] * way))).unwrap_or(k);
         if k == 0 || k + 1 >= x.len() {
