@@ -52,10 +52,20 @@ function pieces(text) {
     return out;
 }
 
-/// Lines of Markdown, as many as the source has: comments of consecutive lines stay one paragraph, strings get one of their own.
+/// Lines of Markdown, as many as the source has: comments of consecutive lines stay one paragraph, strings are sentences of their own.
 function markdown(text) {
     const lines = Array(text.split("\n").length).fill("");
     let fence = false;
+    let previous = "comment";
+    // A string does not continue the text before it, and a comment does not continue a string.
+    const separate = (kind, line) => {
+        if (kind === "string" || previous === "string") {
+            for (const k of [line - 2, line - 1]) {
+                if (/[^\s.:;!?]\s*$/.test(lines[k] ?? "")) lines[k] += ".";
+            }
+        }
+        previous = kind;
+    };
     for (const { kind, line, text: body } of pieces(text)) {
         if (kind === "comment") {
             if (/^\s*```/.test(body)) {
@@ -63,8 +73,12 @@ function markdown(text) {
                 continue;
             }
             // Code, lists of symbols and drawings are indented.
-            if (!fence && !/^ {2,}/.test(body)) lines[line - 1] = body;
+            if (!fence && !/^ {2,}/.test(body)) {
+                separate(kind, line);
+                lines[line - 1] = body;
+            }
         } else if (PROSE.test(body) && !OTHER_LANGUAGE.test(body)) {
+            separate(kind, line);
             body.split("\n").forEach((part, k) => {
                 const clean = part.replace(/\{[^}]*\}/g, "0").trim();
                 lines[line - 1 + k] = `${lines[line - 1 + k]} ${clean}`.trim();

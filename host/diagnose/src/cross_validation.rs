@@ -1,4 +1,4 @@
-//! The improvement on rows that the fit had not seen: whole pressures, recordings, cycles or stretches of time, never random
+//! The improvement on held-out rows: whole pressures, recordings, cycles or stretches of time, never random
 //! rows of the same stroke.
 
 use std::ops::RangeInclusive;
@@ -110,7 +110,7 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Groups, tares:
     })
 }
 
-/// Whether what the base leaves of an effect's trace sits in one group.
+/// Whether the residual of an effect's trace is concentrated in one group.
 fn seen_once(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Groups) -> bool {
     let base = baselines::fit(rows, kind, &[]);
     baselines::projected(traces, rows.root_weight(), &base.span).iter().any(|trace| {
@@ -175,7 +175,7 @@ impl HeldOutRows {
         let tares = traces.iter().any(shows);
         let mut split = strictest(&thin, kind);
         if !thin.isometric && split.groups.len() > 1 && seen_once(&thin, kind, &traces, &split) {
-            // What a virgin muscle's first stroke alone shows no other stroke can foretell.
+            // What only the first stroke of a virgin muscle shows cannot be predicted from another stroke.
             let strokes = strokes(&thin);
             let part = (strokes.end() - strokes.start()) / STROKE_PARTS;
             let of =

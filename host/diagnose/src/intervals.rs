@@ -130,7 +130,7 @@ fn by_groups(selection: &Selection, tangents: &[Tangent], rows: &Rows) -> Vec<f6
     let mut columns: Vec<Vec<f64>> = tangents.iter().map(|t| t.column.clone()).collect();
     columns.extend(selection.traces.iter().cloned());
     let (thin, mut columns) = thin(rows, &columns);
-    // What is left to the tangents is how far the estimate is off.
+    // The remaining distance to the tangents is the error of the estimate.
     let mut force = thin.force.clone();
     for trace in columns.split_off(tangents.len()) {
         force.iter_mut().zip(&trace).for_each(|(f, t)| *f -= t);

@@ -69,7 +69,7 @@ pub(crate) struct Hypothesis {
     pub given: Vec<f64>,
 }
 
-/// Weighs columns against what is to be explained; at most `most` of them at once.
+/// Weighs columns against what is to be explained; at most `most` of them together.
 pub(crate) fn likelihood(
     scale: &Scale,
     target: &Target<'_>,
@@ -231,7 +231,7 @@ mod tests {
         // A surface of 5 N rms that differs between pressures.
         let t = target(50.0, 5.0, 1.0);
         let null = likelihood(&scale, &t, &nothing, &[], 0);
-        // An effect with the same proportion of soft to beyond explains both parts at once.
+        // An effect with the same proportion of soft to beyond explains both parts together.
         let fits = likelihood(&scale, &t, &effect(10.0, 1.0, &t, 5.0), &[Sign::Free], 1);
         assert!((fits.amplitudes[0] - 5.0).abs() < 0.05, "{:?}", fits.amplitudes);
         assert!(null.deviance - fits.deviance > 50.0, "{} {}", null.deviance, fits.deviance);

@@ -1,4 +1,4 @@
-//! Slips of static friction at held length: the force steps, at once or in a burst of small slips.
+//! Slips of static friction at held length: the force steps, in one step or in a burst of small slips.
 
 use super::residual_at;
 use crate::baselines::Baseline;
@@ -57,7 +57,7 @@ fn sharp_steps(
     least: &impl Fn(usize) -> f64,
 ) -> impl Iterator<Item = (usize, f64)> {
     let beside = STEP_BESIDE.max(2 * within);
-    // At once is at once soon after a hold's beginning, too; a burst needs a time before it.
+    // A single step can follow the start of a hold directly; a burst needs a time before it.
     let begin = if within == STEP_ROWS[0] { STEP_BEFORE } else { within + beside };
     (begin..left.len().saturating_sub(within + beside - 1)).filter_map(move |i| {
         let middle = |part: &[f64]| median(&mut part.to_vec());
