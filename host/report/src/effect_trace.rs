@@ -166,7 +166,7 @@ impl Demonstration {
     }
 }
 
-/// How alike what a fit leaves of two traces is: the size of the cosine of the angle between them, 1 where one is a multiple
+/// Similarity of the residuals of two traces after a fit: the size of the cosine of the angle between them, 1 where one is a multiple
 /// of the other.
 #[must_use]
 pub fn likeness(a: &Trace, b: &Trace) -> f64 {
@@ -200,7 +200,7 @@ fn imitations(contexts: &[Context<f64>]) -> Vec<Vec<f64>> {
 }
 
 fn without(mut trace: Vec<f64>, basis: &[Vec<f64>]) -> Vec<f64> {
-    // Twice, since the columns of higher order are nearly alike.
+    // Twice, since the columns of higher order are nearly the same.
     for column in basis.iter().chain(basis) {
         let share = dot(&trace, column);
         trace.iter_mut().zip(column).for_each(|(t, c)| *t -= share * c);

@@ -58,7 +58,7 @@ impl Surface {
         let l0 = geometry.rest_length;
         let longest = (l0 * 1.02).min(geometry.fibre() * 0.5 + l0 * 0.5);
         // Nodes are equally spaced in the braid's radius: against the length everything bends sharply near rest.
-        // Beyond a slight extension the braid would crush the bladder: the force goes on straight there.
+        // Beyond a slight extension the braid would crush the bladder: the force continues linearly there.
         let first = geometry.braid_radius(longest).max(0.85 * geometry.radius);
         let pitch =
             (geometry.braid_radius(l0 * shortest.clamp(0.5, 0.97)) - first) / (LENGTH_NODES - 1) as f64;
