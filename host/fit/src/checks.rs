@@ -46,7 +46,7 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Whether the check shows the fault beyond its own uncertainty: the first number that it varied stands for all.
+    /// Whether the check shows the fault beyond its own uncertainty: the first number that it varied represents all.
     #[must_use]
     pub fn is_sure(&self) -> bool {
         let mut varied =

@@ -271,7 +271,7 @@ fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
         if recording.rows.is_some() {
             return None;
         }
-        // A pipe was read already, and would hold this program up for ever.
+        // A pipe was read already, and would hold this program up permanently.
         fs::metadata(&recording.source).ok().filter(fs::Metadata::is_file)?;
         let text = fs::read(&recording.source).ok().and_then(|b| String::from_utf8(b).ok())?;
         let mut lines = text.trim_start_matches('\u{feff}').lines().filter(|l| !l.trim().is_empty());

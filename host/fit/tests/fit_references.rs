@@ -82,7 +82,7 @@ fn separate_fits_are_those_of_numpy() {
     }
 }
 
-/// P0, every E_k and every k_F at once, both branches, nothing smoothed: the least squares of SciPy's minimiser.
+/// P0, every E_k and every k_F together, both branches, nothing smoothed: the least squares of SciPy's minimiser.
 #[test]
 fn the_joint_fit_is_that_of_scipy() {
     let points: Vec<Measured> = table("joint_fit_points.csv")

@@ -1,6 +1,6 @@
 //! `pamtools`: recordings, fits, predictions and diagnoses of pneumatic artificial muscles, with numpy arrays.
 //!
-//! Everything is in SI units inside arrays (s, Pa, m, N, K), whatever the files' units were.
+//! Everything is in SI units inside arrays (s, Pa, m, N, K), regardless of the units in the files.
 
 use std::ffi::CString;
 use std::path::PathBuf;
@@ -298,7 +298,7 @@ enum Paths {
     Several(Vec<PathBuf>),
 }
 
-/// Reads a file, or several in chronological order; `import_description` is the TOML file for foreign formats.
+/// Reads a file, or several in chronological order; `import_description` is the TOML file for other formats.
 #[pyfunction]
 #[pyo3(signature = (paths, muscle = None, import_description = None))]
 fn read(
@@ -451,7 +451,7 @@ impl Table {
         Ok(prediction.recordings.into_iter().map(|r| r.force.into_pyarray(py)).collect())
     }
 
-    /// The same with how sure it is and how well it fits: one prediction a recording, with force, band, rms and inside.
+    /// The same with its uncertainty and its error: one prediction per recording, with force, band, rms and inside.
     fn predict_with_bands(&self, py: Python<'_>, campaign: PyRef<'_, Campaign>) -> PyResult<Vec<Prediction>> {
         let (table, campaign) = (self.0.clone(), campaign.0.clone());
         let prediction = py.detach(move || predict_with_bands(&table, &campaign)).map_err(raised)?;
@@ -469,7 +469,7 @@ impl Table {
     }
 }
 
-/// What the user should know, as Python's own warnings: shown once a line, and silenced or raised by its filters.
+/// Warnings, as Python's own: shown once per line, and silenced or raised by its filters.
 fn warn(py: Python<'_>, warnings: &[String]) -> PyResult<()> {
     for text in warnings {
         let text = CString::new(text.as_str())?;

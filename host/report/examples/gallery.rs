@@ -114,8 +114,13 @@ fn multiples() -> Figure {
             .points("measured", Colour::Muted, &x, &y)
             .line("model", Colour::Series(0), &x, &model)
     });
-    Figure::multiples("multiples", "Model on the loops", "In a good fit, the line covers the dots.", panels.collect())
-        .shared(true, true)
+    Figure::multiples(
+        "multiples",
+        "Model on the loops",
+        "In a good fit, the line covers the dots.",
+        panels.collect(),
+    )
+    .shared(true, true)
 }
 
 fn log_errors() -> Figure {

@@ -48,7 +48,7 @@ struct Set {
     /// How many trials; the mixture of the final set is kept.
     #[arg(long, default_value_t = 330)]
     n: usize,
-    /// Make and judge the first so many only: a stratified share, where time is short.
+    /// Make and judge only this number of first trials: a stratified share, where time is short.
     #[arg(long)]
     take: Option<usize>,
     /// Seed instead of the set's own.
@@ -62,7 +62,7 @@ struct Set {
     output: PathBuf,
 }
 
-/// How the tool is asked.
+/// How the tool is called.
 #[derive(Args)]
 struct Tool {
     /// The tool.
@@ -71,7 +71,7 @@ struct Tool {
     /// Longest time for one answer, s.
     #[arg(long, default_value_t = 120)]
     limit: u64,
-    /// Begin no further trial after this many minutes; the same command goes on later.
+    /// Begin no further trial after this many minutes; the same command continues later.
     #[arg(long)]
     minutes: Option<f64>,
 }
@@ -86,7 +86,7 @@ impl Tool {
     }
 }
 
-/// What is asked about the real recordings of the 10 mm fluidic muscle.
+/// Options of the trials on the real recordings of the 10 mm fluidic muscle.
 #[derive(Args)]
 struct Real {
     /// Directory that holds aarl-festo-10mm-2021 and -2022.
@@ -104,7 +104,7 @@ struct Real {
 }
 
 impl Real {
-    /// Copies what was written to the page of the book, where one is wanted.
+    /// Copies what was written to the page of the book, where one is requested.
     fn copy_to_book(&self, written: &str) -> Result<(), Box<dyn Error>> {
         if let Some(page) = &self.page {
             std::fs::copy(self.output.join(written), page)?;
@@ -123,7 +123,7 @@ enum Command {
         #[command(flatten)]
         what: Set,
     },
-    /// Ask `host diagnose` about every trial of a set, once, and freeze the answers; goes on where it was broken off.
+    /// Ask `host diagnose` about every trial of a set, once, and freeze the answers; continues where it was interrupted.
     Answer {
         /// The set's directory.
         set: PathBuf,
@@ -165,7 +165,7 @@ enum Command {
         /// Real recordings whose residuals half of the trials have as noise.
         #[arg(long, default_value = "../shared/data")]
         data: PathBuf,
-        /// Begin no further trial after this many minutes; the same command goes on later.
+        /// Begin no further trial after this many minutes; the same command continues later.
         #[arg(long)]
         minutes: Option<f64>,
     },
@@ -177,7 +177,7 @@ enum Command {
     FestoHistory(Real),
     /// Ask what has changed: changes put into later runs of real recordings, untouched pairs, a cylinder whose seal was swapped.
     Reference(reference::Reference),
-    /// Generate, answer and score in one go; each goes on where an earlier run was broken off.
+    /// Generate, answer and score in one go; each continues where an earlier run was interrupted.
     Prove {
         /// dev or final.
         #[arg(long, default_value = "final")]
@@ -195,14 +195,14 @@ enum Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    // A second pool cannot be asked for: this is the only call.
+    // A second pool cannot be made: this is the only call.
     let _ = rayon::ThreadPoolBuilder::new().num_threads(cli.jobs.max(1)).build_global();
     let done = match cli.command {
         Command::Generate { set, what } => generate(&set, &what),
         Command::Answer { set, tool } => answer::ask(&set, &tool.asking()).map(|all| told(&set, all)),
         Command::Oracle { set, tool } => oracle::ask(&set, &tool.asking()).map(|all| {
             if !all {
-                println!("not every trial has its oracle; `oracle` goes on");
+                println!("not every trial has its oracle; `oracle` continues");
             }
         }),
         Command::Score { set, host, no_held_out, close, page } => {
@@ -241,7 +241,7 @@ fn main() -> ExitCode {
 fn told(set: &Path, all: bool) {
     if !all {
         println!(
-            "not every trial is answered; `answer` goes on, `score --close {}` judges what there is",
+            "not every trial is answered; `answer` continues, `score --close {}` judges what there is",
             set.display()
         );
     }
@@ -272,7 +272,7 @@ fn write_page(set: &Path, page: &Path) -> Result<(), Box<dyn Error>> {
     let text = format!(
         "# The proof: sealed trials\n\n\
          Muscles of a bench that shares no equation with the model conceal one effect of the catalogue, two, none, or something that no \
-         name describes. Truths are sealed by their hashes before the tool is asked, answers are frozen by theirs before a seal is \
+         name describes. Truths are sealed by their hashes before the tool runs, answers are frozen by theirs before a seal is \
          opened; the seed of the final set comes from the operating system. Half of the trials carry noise resampled from residuals of \
          real recordings, where these are. Protocol A is the classic one (ascending levels, one slow speed), D the enriched one \
          (shuffled levels, one of them twice, three speeds, dwells, nested loops, tares), C the complete one (more of each, tares \

@@ -1,7 +1,7 @@
 //! Noise from real recordings: residuals of settled points about a smooth curve, resampled in blocks.
 //!
 //! The recordings are the settled points of two sets of isometric pressure staircases (half a second apart). In each run and
-//! direction the force is fitted by a cubic in pressure; what is left is coloured, not normal, and nobody here made it.
+//! direction the force is fitted by a cubic in pressure; the residual is coloured, not normal, and not synthetic.
 
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;

@@ -22,7 +22,7 @@ pub struct Campaign {
     pub recordings: Vec<Recording>,
     /// Whether times of different recordings can be compared.
     pub clock: Clock,
-    /// What a careful reader should know, such as files that were put into order.
+    /// Remarks on the data, such as files that were put into order.
     pub warnings: Vec<String>,
 }
 

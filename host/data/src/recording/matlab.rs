@@ -189,7 +189,7 @@ mod tests {
         out.resize(out.len().next_multiple_of(8), 0);
     }
 
-    /// An array `x` of so many numbers of one byte each.
+    /// An array `x` of this length, one byte for each number.
     fn bytes(count: usize) -> Vec<u8> {
         let mut out = Vec::new();
         element(&mut out, 6, &[9, 0, 0, 0, 0, 0, 0, 0]);

@@ -1,4 +1,4 @@
-//! Play between the stroke sensor and the muscle: after a turn the sensor moves and the muscle does not.
+//! Play between the stroke sensor and the muscle: after a reversal the sensor moves and the muscle does not.
 //!
 //! ```text
 //! F_add = κ · [∂F/∂x · (y − x) + k_F F_quasi (s − s_y)]        y = play_{b/2}(x)

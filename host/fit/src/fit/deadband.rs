@@ -66,7 +66,7 @@ fn reaches_rest(problem: &Problem) -> bool {
     problem.points.stroke.low <= 0.02 * problem.points.stroke.high
 }
 
-/// `P0` by a fit of this order, from a start `near`, Pa; `None` where the strokes do not determine so many coefficients.
+/// `P0` by a fit of this order, from a start `near`, Pa; `None` where the strokes do not determine as many coefficients.
 fn by_order(
     problem: &Problem,
     screen: &Screen,

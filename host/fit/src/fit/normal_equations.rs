@@ -160,7 +160,7 @@ impl Design {
         normal
     }
 
-    /// The normal equations of each group by itself.
+    /// The normal equations of each group alone.
     #[must_use]
     pub(crate) fn normal_by_group(&self, parameters: &[f64], weights: &[f64]) -> Vec<NormalEquations> {
         let mut normals = vec![NormalEquations::zeros(self.layout().len()); self.groups];

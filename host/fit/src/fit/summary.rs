@@ -61,7 +61,7 @@ pub struct Summary {
     pub outliers: Vec<OutlierRow>,
     /// Fitted dimensions and mounting lengths.
     pub adjusted: Vec<Adjusted>,
-    /// What the user should know, one sentence or more each.
+    /// What the user must know, one sentence or more each.
     pub warnings: Vec<String>,
 }
 

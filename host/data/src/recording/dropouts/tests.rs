@@ -45,7 +45,7 @@ fn as_read(pressure: &[f64]) -> Vec<f64> {
     pressure.to_vec()
 }
 
-/// As a muscle behind a hose has it: by so many seconds later.
+/// As a muscle behind a hose has it: delayed by this time, s.
 fn behind_a_hose(seconds: f64) -> impl Fn(&[f64]) -> Vec<f64> {
     move |pressure| {
         let share = 1.0 - (-1.0 / (RATE * seconds)).exp();
