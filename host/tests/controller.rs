@@ -83,7 +83,7 @@ impl Bench {
         ended
     }
 
-    /// Mends what was broken, and clears the fault once the device has seen that it is.
+    /// Repairs the broken part, and clears the fault once the device has detected the repair.
     fn mend(&self) {
         self.mishap.store(0, Ordering::Relaxed);
         let end = Instant::now() + HOPELESS;

@@ -71,7 +71,7 @@ fn loops(level: f64, rows: usize, noise: f64) -> Sheet {
 /// What may happen to one column of a recording.
 #[derive(Debug, Clone)]
 enum Damage {
-    /// The sensor stands still.
+    /// The sensor is frozen.
     Constant,
     /// Another unit, another sign.
     Scaled(f64),

@@ -82,7 +82,7 @@ impl Noise {
     }
 }
 
-/// Three strokes there and back at a pressure, which ripples by `ripple` Pa. `turned` is how many rows before each turn at rest
+/// Three strokes back and forth at a pressure, which ripples by `ripple` Pa. `turned` is how many rows before each reversal at rest
 /// length friction has turned already.
 fn strokes(
     level: f64,
@@ -162,7 +162,7 @@ fn two_close_pressures_are_two_levels() {
     assert_truth(&found, 500.0, 0.005);
 }
 
-/// At one length `P0` and elasticity are one number: said, not guessed.
+/// At one length `P0` and elasticity are confounded: the fit reports it.
 #[test]
 fn one_held_length_determines_no_deadband() {
     let (mut force_noise, mut white) = (Noise::new(4, 0.0), Noise::new(5, 0.0));

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::bounds;
 use crate::error::{DataCode, Error, Result};
 
-/// So much of a file is looked at: names of columns and keys stand near its beginning.
+/// Bytes of a file that are examined: names of columns and keys are near its beginning.
 const LOOKED_AT: u64 = 65_536;
 
 /// A kind of file that commands take.

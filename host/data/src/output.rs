@@ -110,7 +110,7 @@ mod unnamed {
 }
 
 /// While this lives, other runs of this program write no results into the same folders: the table, the report and the JSON that
-/// stand there afterwards are those of one run.
+/// exist afterwards are those of one run.
 #[derive(Debug)]
 pub struct Turn {
     _locked: Vec<fs::File>,

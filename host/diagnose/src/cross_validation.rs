@@ -163,8 +163,8 @@ pub(super) struct HeldOutRows {
 impl HeldOutRows {
     /// For effects of these traces, by the strictest split that the recordings allow.
     pub(super) fn new(rows: &Rows, kind: Kind, traces: &[Vec<f64>]) -> Self {
-        // Directions with a prior are made for the pressures they were fitted to; a pressure left out asks for one bladder, where
-        // there is one.
+        // Directions with a prior are made for the pressures they were fitted to; a pressure left out needs one bladder,
+        // if the base has one.
         let kind = match kind {
             Kind::Flexible(m) => Kind::Flexible(m.min(TABLE_ORDER)),
             Kind::Soft(prior) if prior.elastic > ONE_BLADDER * strongest(rows) => Kind::Flexible(TABLE_ORDER),

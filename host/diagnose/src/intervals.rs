@@ -1,7 +1,7 @@
 //! Confidence intervals of the parameters of the selected effects.
 //!
 //! Noise is the smaller part of it. Model error repeats itself from stroke to stroke and looks like certainty: it shows where parts of the
-//! campaign that should agree do not, and laws themselves are not exact. So the variance of a parameter is
+//! campaign that ideally agree do not, and laws themselves are not exact. So the variance of a parameter is
 //!
 //! ```text
 //! s² = max(half-strokes, pressures, recordings, quarters of the time) + (0.07 θ)²

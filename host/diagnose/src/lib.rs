@@ -4,7 +4,7 @@
 //! recordings → rows → rest friction → base model, noise → forward selection → cross-validation → location → verdict
 //! ```
 //! [`diagnose`] is that chain; `diagnosis` reads as its summary. Every number that decides is listed in [`criteria`]; what is to be known of
-//! an effect stands in the effect's file ([`model_core::effects`], `pam_fit::bench`).
+//! an effect is in the effect's file ([`model_core::effects`], `pam_fit::bench`).
 //!
 //! | stage | module | what it does |
 //! | --- | --- | --- |

@@ -27,7 +27,7 @@
 //! | `units` | columns in other units, another actuator |
 //! | `report`, `staircase_answer`, `stroke_answer` | from two sides to the answer |
 //! | [`answer`] | the answer as values and JSON |
-//! | [`words`] | the answer in words |
+//! | [`words`] | the answer as text |
 //! | [`correction`] | what the answer means for a table |
 //!
 //! The same recordings give the same answer on any number of threads.

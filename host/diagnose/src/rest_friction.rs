@@ -267,9 +267,9 @@ fn weight_at(rows: &Rows, holds: &[(usize, usize)]) -> f64 {
     resting.map(|i| rows.root_weight()[i].powi(2)).sum()
 }
 
-/// Numbers of the stretches over which friction rests at an unknown place. Static friction slips in steps too small and too quick for the pressure's samples: between those that a law predicts or
-/// the force itself shows, where friction rests is fitted; where no law is doubted, only after such a step. A force that steps more often
-/// than that is periodic, which is no slip of friction.
+/// Numbers of the stretches over which friction rests at an unknown place. Static friction slips in steps too small and too quick for the
+/// pressure's samples: between the steps that a law predicts or the force shows, the place of rest is fitted. Without doubt about the law it is
+/// fitted only after such a step. A force that steps more often is periodic, which is not a slip of friction.
 fn rests(
     rows: &Rows,
     holds: &[(usize, usize)],

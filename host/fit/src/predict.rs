@@ -288,7 +288,7 @@ fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
             Some(_) => {}
         }
         let rows: Vec<&str> = lines.collect();
-        // Points among decimal commas are no table.
+        // Points among decimal commas do not make a table.
         let commas = rows
             .first()
             .is_some_and(|r| delimiter != ',' && has_decimal_commas(r.as_bytes(), delimiter as u8));

@@ -63,7 +63,7 @@ fn separate_fits_are_those_of_numpy() {
     let all = side_by_side(&fitted.solution, &mid, None);
     let m4 = all.iter().find(|m| m.name == "m4").expect("a model");
     let expected = table("separate_fits.csv");
-    // The reference has every chunk; here the ones right at the turns are set aside, so the comparison is of forces.
+    // The reference has every chunk; here those at the reversals are set aside, so the comparison is of forces.
     for (g, row) in expected.iter().enumerate() {
         let at = |i: usize| {
             let c = pam_fit::columns(&fitted.solution.problem.braid, mid[i].stroke);

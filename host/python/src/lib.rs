@@ -271,7 +271,7 @@ impl Campaign {
         self.0.recordings.len()
     }
 
-    /// One recording, from the end where the number is negative; so a campaign can be walked through, too.
+    /// One recording, from the end where the number is negative; for iteration over a campaign.
     fn __getitem__(&self, index: isize) -> PyResult<Recording> {
         let count = self.0.recordings.len();
         let from_start = if index < 0 { index.checked_add_unsigned(count) } else { Some(index) };
@@ -425,7 +425,7 @@ impl Table {
         })
     }
 
-    /// Half the width of the 95 % interval of that force (N), at the same places: what the table's numbers leave open. None where
+    /// Half the width of the 95 % interval of that force (N), at the same places: the uncertainty of the table's numbers. None where
     /// the table holds no uncertainty.
     #[pyo3(signature = (pressure, stroke, direction = None))]
     fn force_band<'py>(
@@ -587,7 +587,7 @@ fn fit(
         .filter(|m| (1..=6).contains(m))
         .ok_or_else(|| wrong(format!("`order` is {order}; it must lie between 1 and 6")))?;
     if smoothing.is_some_and(|w| !(w.is_finite() && w >= 0.0)) {
-        return Err(wrong("`smoothing` must be a number from 0 up, or None to have it chosen"));
+        return Err(wrong("`smoothing` must be a number from 0 up, or None for an automatic choice"));
     }
     let options = Options {
         order,

@@ -1,7 +1,7 @@
 //! What an effect does to one muscle on one demonstration, so that all can be compared by eye.
 //!
-//! The demonstration is one table and one protocol: slow loops to a smaller and then to a larger contraction, loops five times
-//! as fast, a hold, a small loop inside a large one, and filling and emptying at held length, while the room warms by 4 K.
+//! The demonstration is one table and one protocol, while the room warms by 4 K: slow loops to a smaller and then to a larger
+//! contraction, loops five times as fast, a hold, a minor loop, and filling and emptying at held length.
 
 use model_core::effects::{Context, MEMORY, Role};
 use model_core::motion::{MotionSettings, MotionTracker};

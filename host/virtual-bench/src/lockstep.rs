@@ -45,7 +45,7 @@
 //!    answered one, without `RESET`, is answered with the same bytes again and advances nothing.
 //! 4. `VENT` opens the dump valve: the command counts as zero regardless of what it says. A command that is not finite counts as
 //!    zero and sets `BAD_COMMAND`.
-//! 5. `SCRIPT_DONE`: the motion script has ended (the plant then holds its last position). `END` tells the bench
+//! 5. `SCRIPT_DONE`: the motion script has ended (the plant then holds its last position). `END` asks the bench
 //!    that the board is finished; it is answered, then the bench closes the connection.
 
 use std::io::{self, Read, Write};

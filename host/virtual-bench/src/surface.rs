@@ -330,7 +330,7 @@ mod tests {
         };
         let cylinder = p * c.area + c.elastic;
         assert!((force(1e8) / cylinder - 1.0).abs() < 1e-3);
-        assert!(force(2e4) < 0.995 * cylinder, "soft fibres give way: {} {cylinder}", force(2e4));
+        assert!(force(2e4) < 0.995 * cylinder, "soft fibres yield: {} {cylinder}", force(2e4));
     }
 
     #[test]

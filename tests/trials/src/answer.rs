@@ -236,7 +236,7 @@ pub fn ask(set: &Path, how: &Asking) -> Result<bool, Box<dyn Error>> {
     Ok(true)
 }
 
-/// End the answering of a set of which a part only was answered: the rest is left out for good. What is judged is the part of
+/// End the answering of a set of which a part only was answered: the rest is left out permanently. What is judged is the part of
 /// the numbers, in order, that is answered without a gap; trials are mixed, so that it is a stratified share.
 pub fn close(set: &Path) -> Result<usize, Box<dyn Error>> {
     let mut ledger: Ledger = read_ledger(set)?;

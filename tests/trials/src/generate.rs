@@ -63,7 +63,7 @@ pub struct TrialTruth {
     pub blocked_force: f64,
     /// The muscle and its bench in full.
     pub bench: BenchSpec,
-    /// Salt, so that the hash cannot be guessed from a likely truth.
+    /// Salt, so that the hash cannot be found from a likely truth.
     pub salt: String,
 }
 

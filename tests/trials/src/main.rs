@@ -130,7 +130,7 @@ enum Command {
         #[command(flatten)]
         tool: Tool,
     },
-    /// Tell the tool what is hidden in the muscles of an answered set, and see what the true structure, refitted, is worth on held-out
+    /// Give the tool the hidden effects of an answered set, and evaluate the true structure, refitted, on held-out
     /// recordings: what gains are measured against.
     Oracle {
         /// The set's directory.
@@ -148,7 +148,7 @@ enum Command {
         /// Leave the held-out recordings alone (quicker).
         #[arg(long)]
         no_held_out: bool,
-        /// End the answering of a set of which a part only is answered, for good, and judge that part.
+        /// End the answering of a set of which a part only is answered, permanently, and judge that part.
         #[arg(long)]
         close: bool,
         /// Write the report as this page of the book, too.
@@ -169,13 +169,13 @@ enum Command {
         #[arg(long)]
         minutes: Option<f64>,
     },
-    /// Put effects into the real recordings of the 10 mm fluidic muscle and ask what was put in.
+    /// Add effects to the real recordings of the 10 mm fluidic muscle and diagnose them.
     Semi(Real),
-    /// Ask about the real recordings of the 10 mm fluidic muscle as they are, and set the answers beside what is written about them.
+    /// Diagnose the real recordings of the 10 mm fluidic muscle as they are, and compare the answers with the published findings.
     Festo(Real),
     /// The same for settled points only: writes the section of the page on what the muscles remember.
     FestoHistory(Real),
-    /// Ask what has changed: changes put into later runs of real recordings, untouched pairs, a cylinder whose seal was swapped.
+    /// Diagnose changes: changes added to later runs of real recordings, untouched pairs, a cylinder whose seal was replaced.
     Reference(reference::Reference),
     /// Generate, answer and score in one go; each continues where an earlier run was interrupted.
     Prove {
@@ -274,10 +274,10 @@ fn write_page(set: &Path, page: &Path) -> Result<(), Box<dyn Error>> {
          Muscles of a bench that shares no equation with the model conceal one effect of the catalogue, two, none, or something that no \
          name describes. Truths are sealed by their hashes before the tool runs, answers are frozen by theirs before a seal is \
          opened; the seed of the final set comes from the operating system. Half of the trials carry noise resampled from residuals of \
-         real recordings, where these are. Protocol A is the classic one (ascending levels, one slow speed), D the enriched one \
-         (shuffled levels, one of them twice, three speeds, dwells, nested loops, tares), C the complete one (more of each, tares \
-         between levels, half an hour of rest, checks of the bench); `tests/trials/README.md` and `host/virtual-bench/src/campaigns.rs` say \
-         it in full.\n\n\
+         real recordings, where these are. Protocol A is the classic one (ascending levels, one slow speed), D the extended one \
+         (shuffled levels, one of them twice, three speeds, dwells, nested loops, tares). C is the complete one (more of each, tares \
+         between levels, half an hour of rest, checks of the bench); `tests/trials/README.md` and `host/virtual-bench/src/campaigns.rs` describe \
+         them in full.\n\n\
          ```text\n\
          cargo run --release -p trials -- prove -o DIR\n\
          cargo run --release -p trials -- oracle DIR\n\

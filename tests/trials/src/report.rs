@@ -119,7 +119,7 @@ pub struct Figures {
     pub outside_confident: Rate,
     /// Outside the library: nothing named.
     pub outside_silent: Rate,
-    /// Regions that sit where the effect is.
+    /// Regions that agree with the effect's.
     pub located: Rate,
     /// Regions whose overlap with the true one is more than half.
     pub overlapping: Rate,

@@ -66,7 +66,7 @@ fn of_table(text: &str) -> Vec<Vec<f64>> {
     let head: Vec<&str> = lines.next().unwrap_or("").split(',').collect();
     let at = |name: &str| head.iter().position(|c| *c == name);
     let (Some(p), Some(f)) = (at("pressure_kPa"), at("force_N")) else { return Vec::new() };
-    // Whatever is not measured tells runs apart.
+    // Unmeasured quantities differ between runs.
     let keys: Vec<usize> = ["rest_length_mm", "mounted_length_mm", "contraction", "run", "direction"]
         .iter()
         .filter_map(|n| at(n))

@@ -158,7 +158,7 @@ const DECOYS: [(&str, &str); 5] = [
 
 /// Draw a set of trials. `family` sets its random numbers apart: no seed of the development set makes a trial of the final one.
 ///
-/// Strata are mixed, so that the first trials of a set are a stratified share of it, and a number tells nothing.
+/// Strata are mixed, so that the first trials of a set are a stratified share of it, and a number carries no information.
 pub fn draw(seed: u64, family: &str, composition: Composition) -> Vec<Spec> {
     let mut r = Rng::stream(seed, &format!("{family} set"));
     let mut singles: Vec<usize> = (0..SINGLES.len()).collect();

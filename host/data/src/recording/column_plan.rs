@@ -268,7 +268,7 @@ fn unknown_unit(quantity: Quantity, name: &str) -> Error {
         None => format!("unknown unit of {}", quantity.name()),
     };
     let headers: Vec<_> = quantity.headers().collect();
-    // Only the spelling of a unit can be guessed, not another unit.
+    // The correction covers the spelling of a unit, not another unit.
     let near = headers.iter().find(|h| h.eq_ignore_ascii_case(&usual));
     let mut help = format!("the unit follows the last underscore: {}", quantity.unit_list());
     match near {

@@ -11,7 +11,7 @@ use crate::error::Result;
 
 const COMPRESSED: u32 = 15;
 const MATRIX: u32 = 14;
-/// A struct in a struct in a struct is no recording any more.
+/// A recording is at most this many structs deep.
 const DEEPEST: usize = 4;
 
 /// The vectors of a file. A matrix gives its columns as `name(:,k)`, a struct its fields as `name.field`, or as `field` alone

@@ -65,7 +65,7 @@ pub(super) fn open(path: &Path, progress: Option<&Arc<dyn Progress>>, hashed: bo
     Ok(Source { reader, size, magic, again, bytes })
 }
 
-/// A file that tells how far it is read, and what its bytes were.
+/// A file that counts and hashes the bytes that are read.
 struct Counted {
     bytes: io::Chain<io::Cursor<Vec<u8>>, File>,
     hash: Option<Sha256>,

@@ -49,8 +49,8 @@ pub(super) fn of(
     holds.iter().zip(directions).map(found).collect()
 }
 
-/// Moments of what is left in a hold, `within` rows of which each way it goes by more than the `least` step and most of the way that it goes
-/// from the time before to the time after; with how far it goes.
+/// Times in a hold at which the residual changes, within `within` rows on either side, by more than the `least` step and by most of the change
+/// from the time before to the time after; with the size of the change.
 fn sharp_steps(
     left: &[f64],
     within: usize,

@@ -3,8 +3,8 @@
 //! ```text
 //! F_add = −δ (∂F/∂x v + g (1 − s k_F) dP/dt)    or    F_add = −κ (F − LP_τ(F))    or    F_add = −κ_d (F − D_τ(F)),  D_τ = LP⁴_{τ/4}
 //! ```
-//! `δ`, s, a skew between the channels, to first order and away from turns (negative: the stroke is the late one); or a first-order filter
-//! of time constant `τ`, s, in the force channel, `κ = 1` for the whole, which also rounds the jumps at turns; or a delay by `τ` behind a
+//! `δ`, s, a skew between the channels, to first order and away from reversals (negative: the stroke is the late one); or a first-order filter
+//! of time constant `τ`, s, in the force channel, `κ = 1` for the whole, which also rounds the jumps at reversals; or a delay by `τ` behind a
 //! converter's filter: four equal filters in a row, which bring a jump late and not immediately. `F`, N, is the base model's force. Laws to
 //! choose from.
 
@@ -88,7 +88,7 @@ struct Turn<T> {
     after: T,
 }
 
-/// The turn since the last moment, if there was one: where the strokes before and after it, each going on at its speed, meet.
+/// The reversal since the last sample, if any: where the strokes before and after it meet, each extrapolated at its speed.
 fn turn<T: Scalar>(context: &Context<T>, memory: &Memory<T>) -> Option<Turn<T>> {
     let came = memory[WAY];
     let (speed, dt) = (memory[SPEED], context.dt);

@@ -60,7 +60,7 @@ struct Unknowns {
 }
 
 impl Unknowns {
-    /// What `options` leaves open.
+    /// The dimensions that `options` leaves free.
     fn of(problem: &Problem, options: &Options) -> Self {
         let (strokes, mounting) = mountings(&problem.points);
         let mut list = Vec::new();
@@ -117,7 +117,7 @@ pub(super) fn lacks_mountings(problem: &Problem, options: &Options) -> bool {
     options.fit_lengths && mountings(&problem.points).0.is_empty()
 }
 
-/// Finds the dimensions that `options` leaves open: the problem with these dimensions, and the table's parameters there. Both are as
+/// Finds the dimensions that `options` leaves free: the problem with these dimensions, and the table's parameters there. Both are as
 /// they were where nothing is open.
 pub(super) fn adjust(
     problem: &Problem,

@@ -1,7 +1,7 @@
 //! NormalEquations equations, summed bin by bin.
 //!
-//! Points of nearly one pressure share their `φ_j`. Their normal equations are summed as a small matrix in the columns
-//! `(c̃_1 … c̃_M, −s q, g, z)` and spread over the nodes only once per such bin, so that the work per point does not grow
+//! Points of nearly one pressure share their `φ_j`. Their normal equations are a small matrix in the columns
+//! `(c̃_1 … c̃_M, −s q, g, z)`. It is spread over the nodes only once per such bin, so that the work per point does not grow
 //! with the number of nodes.
 
 use std::ops::Range;

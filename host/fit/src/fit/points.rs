@@ -97,7 +97,7 @@ impl Points {
         median(&mut self.list.iter().filter(|p| p.rows >= 4).map(deviation).collect::<Vec<_>>())
     }
 
-    /// Whether a turn of the motion lies just before and just after a point.
+    /// Whether a reversal of the motion lies just before and just after a point.
     #[must_use]
     pub(crate) fn beside_turn(&self, i: usize) -> (bool, bool) {
         let here = &self.list[i];

@@ -20,7 +20,7 @@ pub struct Smoothing {
 }
 
 impl Smoothing {
-    /// So stiff that the curves are straight lines.
+    /// Stiff enough for straight lines.
     pub(crate) const STRAIGHT: Self = Self { elastic: 1e4, friction: 1e4 };
     /// A start: flexible, yet bridges gaps between pressures.
     pub const START: Self = Self { elastic: 1e-3, friction: 1e-2 };

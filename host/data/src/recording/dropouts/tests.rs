@@ -9,7 +9,7 @@ fn pull(pressure: f64, contraction: f64) -> f64 {
     ((pressure - 30e3) * 8e-4 * (1.0 - 3.0 * contraction).powi(2) - 600.0 * contraction).max(0.0)
 }
 
-/// A recording of strokes there and back over `most` contraction, at pressures of each row's time; the force is what `felt` makes of
+/// A recording of strokes back and forth over `most` contraction, at pressures of each row's time; the force is what `felt` makes of
 /// those.
 fn recorded(
     seconds: f64,
