@@ -64,7 +64,8 @@ target=${CARGO_TARGET_DIR:-target}
 export PROPTEST_RNG_SEED="${PROPTEST_RNG_SEED:-1}"
 
 browser() {
-    cargo build --quiet --locked --package host && python3 tests/studio.py "$target/debug/host"
+    # The features of the whole workspace, as in the tests: other features would compile most dependencies again.
+    cargo build --quiet --locked --workspace --bin host && python3 tests/studio.py "$target/debug/host"
 }
 
 language() {
