@@ -27,7 +27,8 @@ impl Recorded {
         let spec = presets::miniature();
         let mut protocol = campaigns::thesis(&Muscle::new(spec.clone()), &presets::miniature_pressures());
         protocol.sample_hz = sample_hz;
-        let files = Bench::new(&BenchSpec::laboratory(spec.clone(), 1)).run(&protocol).map_err(io::Error::other)?;
+        let files =
+            Bench::new(&BenchSpec::laboratory(spec.clone(), 1)).run(&protocol).map_err(io::Error::other)?;
         let mut paths = Vec::new();
         for file in &files {
             let path = folder.join(format!("{}.csv", file.name));

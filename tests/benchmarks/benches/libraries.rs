@@ -32,7 +32,8 @@ fn recorded(sample_hz: f64) -> (TempDir, Recorded) {
 #[divan::bench(args = RATES)]
 fn read(bencher: Bencher, sample_hz: f64) {
     let (folder, recorded) = recorded(sample_hz);
-    let mut files: Vec<PathBuf> = std::fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().path()).collect();
+    let mut files: Vec<PathBuf> =
+        std::fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().path()).collect();
     files.sort();
     bencher
         .counter(ItemsCount::new(recorded.campaign.samples()))
