@@ -8,7 +8,7 @@ use pam_data::recording::segment::Motion;
 use pam_data::recording::{Campaign, Recording};
 use pam_fit::error::FitCode;
 use pam_fit::predict::predict;
-use pam_fit::table_file::{About, TableFile};
+use pam_fit::table_file::{self, About, TableFile};
 
 use pam_fit::Fit;
 use pam_fit::{Options, fit};
@@ -117,7 +117,7 @@ pub struct CrossValidation {
 /// The table file of a fit, with the history that prediction needs.
 #[must_use]
 pub fn as_file(fit: &Fit) -> TableFile {
-    let mountings = fit.solution.problem.mountings.iter().map(|m| (m.stroke, m.offset)).collect();
+    let mountings = table_file::stored_mountings(&fit.solution.problem);
     TableFile { table: fit.table.clone(), about: About { mountings, ..About::default() } }
 }
 

@@ -20,6 +20,7 @@
 //! | `P0` from a higher order | `Deadband` | [`deadband`] |
 //! | smoothing of the curves, stress that rises with strain | `Smoothing` | [`smoothing`], [`monotonic_stress`] |
 //! | effective dimensions | `Problem` | [`dimensions`], [`dimension_search`] |
+//! | dimensions that held lengths ask for | `Solution` | [`held_lengths`] |
 //! | errors as the thesis measures them | `ChunkError` | [`chunks`], [`errors`], [`midline`] |
 //! | models to compare with | `Model` | [`models`] |
 //! | uncertainty, and what the data do not determine | `Uncertain` | [`uncertainty`], [`identifiability`] |
@@ -35,6 +36,7 @@ mod dimension_search;
 pub(crate) mod dimensions;
 pub(crate) mod errors;
 mod gauss_newton;
+mod held_lengths;
 pub(crate) mod identifiability;
 pub(crate) mod midline;
 pub(crate) mod models;
@@ -78,6 +80,8 @@ pub struct Options {
     pub fit_lengths: bool,
     /// Whether the bladder's stress is constrained to rise with strain.
     pub physical: bool,
+    /// Whether dimensions and lengths stay as described where recordings at held lengths ask for others; see [`held_lengths`].
+    pub as_described: bool,
 }
 
 impl Default for Options {
@@ -89,6 +93,7 @@ impl Default for Options {
             fit_geometry: false,
             fit_lengths: false,
             physical: false,
+            as_described: false,
         }
     }
 }

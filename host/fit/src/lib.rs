@@ -60,6 +60,7 @@ mod fit;
 pub mod numerics;
 pub mod predict;
 pub mod table_export;
+pub mod table_faults;
 pub mod table_file;
 
 pub use fit::basis::{Columns, columns};
@@ -70,7 +71,7 @@ pub use fit::identifiability::{Correlations, NotDetermined};
 pub use fit::midline::{MidPoint, midline};
 pub use fit::models::{Model, moduli_at_one_pressure, side_by_side};
 pub use fit::nodes::{Pressures, pressures};
-pub use fit::points::{Point, Points, Range, points};
+pub use fit::points::{HeldMounting, Point, Points, Range, points};
 pub use fit::problem::Problem;
 pub use fit::result::Fit;
 pub use fit::screen::{Clip, Outlier, PointUse, Screen, clip};

@@ -4,6 +4,7 @@ use clap::Args;
 use clap_complete::Shell;
 
 use crate::console::Console;
+use crate::program_name;
 use pam_data::error::Result;
 use pam_data::output::write_whole;
 
@@ -22,7 +23,7 @@ impl Arguments {
     /// None so far.
     pub fn run(self, command: &mut clap::Command, _console: &Console) -> Result<()> {
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, command, "host", &mut script);
+        clap_complete::generate(self.shell, command, program_name::called(), &mut script);
         write_whole(std::path::Path::new("-"), &script)
     }
 }

@@ -46,6 +46,9 @@ pub struct Arguments {
     /// Correct the length of every mounting by up to 1 mm.
     #[arg(long)]
     fit_lengths: bool,
+    /// Keep the described dimensions and lengths, also where recordings at held lengths ask for others.
+    #[arg(long, conflicts_with_all = ["fit_geometry", "fit_lengths"])]
+    as_described: bool,
     /// A published formula to compare with.
     #[arg(long, value_name = "NAME")]
     published: Option<String>,
@@ -82,6 +85,7 @@ impl Arguments {
             order: usize::from(self.order),
             fit_geometry: self.fit_geometry,
             fit_lengths: self.fit_lengths,
+            as_described: self.as_described,
             ..Options::default()
         };
         let watched = if self.json.is_some() { Console::silent() } else { console.clone() };

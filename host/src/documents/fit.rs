@@ -35,6 +35,8 @@ pub(super) struct Fit {
     outliers: Vec<Outlier>,
     adjusted: Vec<Adjusted>,
     warnings: Vec<String>,
+    /// What makes the table useless for control.
+    faults: Vec<String>,
 }
 
 /// The fit at one tested pressure.

@@ -63,6 +63,8 @@ pub struct Summary {
     pub adjusted: Vec<Adjusted>,
     /// What the user should know, one sentence or more each.
     pub warnings: Vec<String>,
+    /// What makes the table useless for control; empty where nothing does ([`crate::table_faults`]).
+    pub faults: Vec<String>,
 }
 
 /// The fit at one tested pressure.
@@ -282,6 +284,7 @@ pub(super) fn summarise(
         outliers: screen.outliers.iter().map(|o| outlier_row(o, campaign)).collect(),
         adjusted: problem.adjusted.clone(),
         warnings: super::warnings::warnings(solution, all.mean, left_out),
+        faults: Vec::new(),
     }
 }
 
