@@ -34,7 +34,7 @@ mod source;
 mod stroke_zero;
 mod unit_check;
 
-pub use campaign::{Campaign, Clock};
+pub use campaign::{Campaign, Clock, largest_force};
 pub use columns::{HELD, Recording};
 pub use follow::{Follower, UNKNOWN_PAUSE};
 pub use header::has_decimal_commas;

@@ -28,6 +28,7 @@
 //! | the order of all steps | | [`solve`](mod@solve), [`result`], [`summary`], [`warnings`] |
 
 pub(crate) mod basis;
+pub(crate) mod by_recording;
 pub(crate) mod chunks;
 mod cross_validation;
 mod deadband;

@@ -64,6 +64,7 @@ pub mod table_faults;
 pub mod table_file;
 
 pub use fit::basis::{Columns, columns};
+pub use fit::by_recording::{RecordingResidual, ResidualSums, by_recording, recording_table};
 pub use fit::design::{Design, Layout, Measured};
 pub use fit::dimensions::{Adjusted, Mounting};
 pub use fit::errors::ChunkError;

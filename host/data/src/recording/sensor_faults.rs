@@ -146,11 +146,19 @@ impl Usual {
     fn noticeable(&self, share: f64) -> f64 {
         (share * self.spans[2]).max(CLEAR * self.residual)
     }
+
+    /// The same for a reading that stands still in a way that is unknown of this bench, N.
+    fn noticeable_unusually(&self) -> f64 {
+        (UNUSUALLY.0 * self.spans[2]).max(UNUSUALLY.1 * self.residual)
+    }
 }
 
 /// Six times the usual residual: of a normal distribution next to nothing lies there, and friction (both branches, twice the residual
 /// that it leaves) stays below.
 const CLEAR: f64 = 6.0;
+/// For a reading that stands still in a way that is unknown of this bench: a share of the range of forces, and usual residuals (friction
+/// alone changes the residual by two).
+const UNUSUALLY: (f64, f64) = (0.05, 2.0);
 /// Some thousand rows of a recording are examined.
 const EXAMINED: usize = 4000;
 /// At most this many faults are listed one by one.

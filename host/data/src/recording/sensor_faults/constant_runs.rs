@@ -10,9 +10,7 @@ const SHORTEST: usize = 10;
 /// While a reading stands still, the force changes by this share of its range beyond what the reading allows (the expected force where the
 /// force stands still, else the residual), and by this many usual residuals: friction alone changes it by two.
 const MOVES: (f64, f64) = (0.15, 6.0);
-/// Where constant readings are unknown of this column: neighbours are rarely equal in the other recordings ([`RARE`]), and no run there
-/// is a tenth as long.
-const MOVES_UNUSUALLY: (f64, f64) = (0.05, 2.0);
+/// Constant readings are unknown of a column whose neighbours are rarely equal in the other recordings, with no run there a tenth as long.
 const RARE: f64 = 0.2;
 const LONGER: usize = 10;
 /// Where constant readings are usual: more than this share of neighbours are equal in the other recordings.
@@ -96,13 +94,10 @@ impl Habit {
     /// How far the force must move during a run of this many rows, N.
     fn bound(&self, rows: usize, usual: &Usual) -> f64 {
         let unknown = self.longest.is_some_and(|longest| rows >= LONGER * longest);
-        let (share, residuals) = if self.equal > USUAL {
-            MOVES_MUCH
-        } else if self.equal < RARE && unknown {
-            MOVES_UNUSUALLY
-        } else {
-            MOVES
-        };
+        if self.equal < RARE && unknown {
+            return usual.noticeable_unusually();
+        }
+        let (share, residuals) = if self.equal > USUAL { MOVES_MUCH } else { MOVES };
         (share * usual.spans[2]).max(residuals * usual.residual)
     }
 }

@@ -54,7 +54,9 @@ fn is_dead(r: &Recording, channel: Channel, usual: &Usual) -> bool {
         }
         Channel::Force => {
             let expected = |i: usize| usual.expected.at(r, i) - middle;
-            share(&|i| expected(i) > usual.noticeable(PULLS)) > ROWS
+            // A force without any scatter is no measurement; one that scatters may be that of a slack muscle.
+            let least = if spread > 0.0 { usual.noticeable(PULLS) } else { usual.noticeable_unusually() };
+            share(&|i| expected(i) > least) > ROWS
         }
         Channel::Stroke => spread_of(&|i| usual.expected.residual(r, i)) > usual.noticeable(UNEXPLAINED),
     }

@@ -4,7 +4,7 @@ use super::{Campaign, Channel, Kind, Recording, SensorFault, Usual};
 use crate::recording::white_noise;
 
 /// A step is at least this share of the column's range, and this many standard deviations of a reading.
-const STEP: (f64, f64) = (0.15, 12.0);
+const STEP: (f64, f64) = (0.06, 12.0);
 /// The row after differs from the row before by less than this share of the step, beyond what was to be expected.
 const BACK: f64 = 0.25;
 /// Within a drop-out the reading changes by less than this share of the step from its first value.
