@@ -15,7 +15,7 @@ use pam_data::error::Result;
 /// Recordings of pneumatic artificial muscles to tables, tables to controllers.
 #[derive(Debug, Parser)]
 #[command(name = "host", version, about, propagate_version = true, arg_required_else_help = true)]
-// Longer lines than these nobody reads with ease; narrower terminals get theirs.
+// Longer lines are hard to read; a narrower terminal sets its own width.
 #[command(max_term_width = 100)]
 #[command(after_help = "Examples:\n  \
     host demo\n  \
@@ -65,21 +65,21 @@ enum Colours {
 /// Every sub-command. A new one is one file in `commands/` and one line here and in [`Command::run`].
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// The whole story on this machine, no hardware: record, fit, flash, track.
+    /// Demonstrate the whole workflow without hardware: record, fit, flash, track.
     Demo(commands::demo::Arguments),
     /// Describe a muscle by answering what to measure, with drawings.
     New(commands::new::Arguments),
     /// Fit a muscle's table to recordings.
     Fit(commands::fit::Arguments),
-    /// Score a fit on recordings that it has not seen.
+    /// Score a fit on recordings that it did not use.
     Evaluate(commands::evaluate::Arguments),
     /// Compute the force of a table on recordings, and score it.
     Predict(commands::predict::Arguments),
-    /// Say what the model leaves out: where, what, how sure, what to record next.
+    /// Say what the model leaves out: where, what, with what probability, what to record next.
     Diagnose(commands::diagnose::Arguments),
     /// Explain what the model leaves out, effect by effect.
     Effects(commands::effects::Arguments),
-    /// Say before recording what a planned protocol can and cannot tell apart.
+    /// Say before recording what a planned protocol can and cannot distinguish.
     Plan(commands::plan::Arguments),
     /// Two recordings, in numbers and in a picture.
     Compare(commands::compare::Arguments),

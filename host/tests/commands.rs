@@ -9,7 +9,7 @@ use clap::CommandFactory;
 
 fn host(folder: &Path, arguments: &[&str], port: Option<&str>) -> (i32, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_host"));
-    // Settings of whoever runs the tests do not count.
+    // Settings of anyone who runs the tests do not count.
     command.args(arguments).current_dir(folder).env("XDG_CONFIG_HOME", folder).env_remove("PAM_SETTINGS");
     match port {
         Some(port) => command.env("PAM_PORT", port),

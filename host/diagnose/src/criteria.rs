@@ -35,7 +35,7 @@ pub enum Source {
     Trials(&'static str),
     /// Engineering judgement; the opened development sets were answered with it, and no derivation is known.
     Judgement,
-    /// Limits time or memory, and does not decide by itself.
+    /// Limits time or memory, and does not decide a verdict.
     Cost,
 }
 
@@ -63,7 +63,7 @@ pub struct Criterion {
     pub symbol: &'static str,
     /// Its unit; `1` for a number or a share.
     pub unit: &'static str,
-    /// Its value, as it stands in the source.
+    /// Its value, as written in the source.
     pub value: &'static str,
     /// What it means.
     pub meaning: &'static str,

@@ -100,7 +100,7 @@ struct Settled {
     misfit: f64,
 }
 
-/// Settles what friction does at rest, and fits the model as it was; or says why nothing can be judged.
+/// Settles what friction does at rest, and fits the model as it was, or returns why nothing can be judged.
 fn settle(rows: &Rows, remarks: &mut Vec<Remark>) -> Result<Settled, Unjudgeable> {
     let (rows, law) = rest_friction::settle_rest_friction(rows);
     remarks.extend(law.map(|law| Remark::FrictionAtRest(law.into())));
@@ -156,7 +156,7 @@ fn select(
 struct Excess {
     /// Share of it that the selected effects explain.
     explained: f64,
-    /// What is left of it, root mean square, N.
+    /// Root mean square of the residual, N.
     left: f64,
     /// What the model admits of it, root mean square, N.
     admitted: f64,
@@ -178,7 +178,7 @@ impl Excess {
         let weight = energy(selection.rows.root_weight()).max(1e-12);
         let left = (energy(&selection.joint.residual) / weight - sigma * sigma).max(0.0).sqrt();
         let admitted = (LACK_OF_FIT * blocked).max(LACK_OF_FIT_NOISE * sigma);
-        // What free tables take up where one bladder should serve all pressures.
+        // What free tables absorb where one bladder has to serve all pressures.
         let taken_up = energy(&selection.base_alone.core) - energy(&selection.base_alone.residual);
         let concealed = (taken_up / weight).max(0.0).sqrt();
         if missing.is_empty() && concealed > LACK_OF_FIT * blocked {
@@ -192,13 +192,13 @@ impl Excess {
     }
 }
 
-/// Where the error sits.
+/// Where the error is concentrated.
 struct Located {
     /// A line in its spectrum.
     line: Option<Line>,
     regions: Vec<Region>,
     profiles: Vec<Profile>,
-    /// The pattern of what is left.
+    /// The pattern of the residual.
     pattern: Pattern,
 }
 

@@ -1,4 +1,4 @@
-//! What a muscle remembers over a campaign of isometric staircases: found before any static model is asked.
+//! The memory of a muscle over a campaign of isometric staircases, found before any static model is fitted.
 //!
 //! Visits of different runs to the same pressure, length and direction differ by history alone, so a free static curve for each mounting is all
 //! that is needed beside it.
@@ -13,7 +13,7 @@
 //! | `unseen` | each run predicted from the others; jackknife over runs |
 //! | `run_offset` | slips and bad runs |
 //! | `findings` | documented contrasts with intervals over runs or mountings |
-//! | `places` | where the static error sits: run within mounting, time since mounting, mounting |
+//! | `places` | where the static error is concentrated: run within mounting, time since mounting, mounting |
 //! | `judge` | rules of the verdict |
 //! | [`answer`] | the findings as values and JSON |
 //! | `enter` | the history beside what the static search says |
@@ -57,7 +57,7 @@ const SINGLE_TIMES: [f64; 2] = [30.0, 300.0];
 #[derive(Clone, Debug)]
 pub(super) struct Found {
     pub answer: History,
-    /// Where the static error of unseen runs sits.
+    /// Where the static error of held-out runs is concentrated.
     pub regions: Vec<Region>,
     /// By recording: times, s, and shifts of pressure, Pa.
     pub shifts: Vec<(Vec<f64>, Vec<f64>)>,

@@ -1,10 +1,10 @@
-//! Model discrepancy: where recordings and model differ, which physical effect explains it, how sure that is, which experiment decides.
+//! Model discrepancy: where recordings and model differ, which physical effect explains it, with what probability, and which experiment decides.
 //!
 //! ```text
 //! recordings → rows → rest friction → base model, noise → forward selection → cross-validation → location → verdict
 //! ```
-//! [`diagnose`] is that chain; `diagnosis` reads as its summary. Every number that decides stands in [`criteria`]; what is to be known of
-//! an effect stands in the effect's file ([`model_core::effects`], `pam_fit::bench`).
+//! [`diagnose`] is that chain; `diagnosis` reads as its summary. Every number that decides is listed in [`criteria`]; what is to be known of
+//! an effect is in the effect's file ([`model_core::effects`], `pam_fit::bench`).
 //!
 //! | stage | module | what it does |
 //! | --- | --- | --- |

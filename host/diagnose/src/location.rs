@@ -278,7 +278,7 @@ fn names(rows: &Rows, from: f64, to: f64) -> Vec<String> {
     (0..rows.names.len()).filter(within).map(|i| rows.names[i].clone()).collect()
 }
 
-/// Values with whole blocks in another order, each turned round in itself: both what belongs to a block and what belongs to a place
+/// Values with whole blocks in another order, each reversed in itself: both what belongs to a block and what belongs to a place
 /// within it are torn from the coordinate, while the residual's own correlation stays.
 pub(crate) fn shuffled(values: &[f64], blocks: &[(usize, usize)], random: &mut Random) -> Vec<f64> {
     let mut order: Vec<usize> = (0..blocks.len()).collect();

@@ -22,12 +22,12 @@
 //! | `posterior` | probabilities, set, verdict |
 //! | `isometric` | all of this for pressure staircases at held lengths |
 //! | `strokes`, `stroked` | the same question for strokes at regulated pressures |
-//! | `localise` | which cells, since which file, at once or gradually |
-//! | `held_out` | how much of the difference is gone on recordings that the fit had not seen |
+//! | `localise` | which cells, since which file, abruptly or gradually |
+//! | `held_out` | how much of the difference is removed on held-out recordings |
 //! | `units` | columns in other units, another actuator |
 //! | `report`, `staircase_answer`, `stroke_answer` | from two sides to the answer |
 //! | [`answer`] | the answer as values and JSON |
-//! | [`words`] | the answer in words |
+//! | [`words`] | the answer as text |
 //! | [`correction`] | what the answer means for a table |
 //!
 //! The same recordings give the same answer on any number of threads.

@@ -19,7 +19,7 @@ use crate::published::Published;
 /// The groups of recordings that are left out in turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Split {
-    /// Every run: recordings that share their label `run`, or else each recording by itself.
+    /// Every run: recordings that share their label `run`, or else each recording alone.
     Run,
     /// Every contraction at which recordings were held.
     Contraction,

@@ -283,7 +283,7 @@ fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
         if recording.rows.is_some() {
             return None;
         }
-        // A pipe was read already, and would hold this program up for ever.
+        // A pipe was read already, and would hold this program up permanently.
         fs::metadata(&recording.source).ok().filter(fs::Metadata::is_file)?;
         let text = fs::read(&recording.source).ok().and_then(|b| String::from_utf8(b).ok())?;
         let mut lines = text.trim_start_matches('\u{feff}').lines().filter(|l| !l.trim().is_empty());
@@ -300,7 +300,7 @@ fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
             Some(_) => {}
         }
         let rows: Vec<&str> = lines.collect();
-        // Points among decimal commas are no table.
+        // Points among decimal commas do not make a table.
         let commas = rows
             .first()
             .is_some_and(|r| delimiter != ',' && has_decimal_commas(r.as_bytes(), delimiter as u8));

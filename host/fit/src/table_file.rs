@@ -1,4 +1,4 @@
-//! The table file `*.pam`: the controller's image, and what a person wants to know about it later.
+//! The table file `*.pam`: the controller's image, and what a user wants to know about it later.
 //!
 //! ```text
 //! "PAMF"  version u16 LE  0 u16  length u32 LE  body (postcard of [`TableFile`]'s parts)  CRC-32 u32 LE over all before

@@ -213,7 +213,7 @@ fn to_text(cases: &[Case], lengths: &[Option<LengthTransfer>], published: Option
             }
         }
     }
-    text += "\nWhere it sits: mean error F − F_model, N, at contractions (filling or shortening / emptying or lengthening)\n";
+    text += "\nWhere the error is: mean of F − F_model, N, at contractions (filling or shortening / emptying or lengthening)\n";
     for (case, length) in cases.iter().zip(lengths) {
         text += &format!("{}\n", case.muscle.name);
         if let Some(held) = &case.runs {

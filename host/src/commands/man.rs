@@ -48,7 +48,7 @@ fn page(command: clap::Command) -> Result<Vec<u8>> {
     Ok(text)
 }
 
-/// What stands below the help: examples as lines to be copied, which a paragraph would join and hyphenate, and notes.
+/// The text below the help: examples as lines to be copied, which a paragraph would join and hyphenate, and notes.
 fn closing(below: &str) -> String {
     let (mut page, mut notes) = (String::new(), false);
     for line in below.lines().filter(|l| !l.is_empty()) {

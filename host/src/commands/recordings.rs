@@ -56,7 +56,7 @@ impl Recordings {
         Ok((campaign, hashes.of(&self.files)?))
     }
 
-    /// As [`Recordings::read`], with a bar where somebody watches the console.
+    /// As [`Recordings::read`], with a progress bar on an interactive console.
     ///
     /// # Errors
     /// As [`Recordings::read`].

@@ -116,7 +116,7 @@ enum Source {
 }
 
 impl Arguments {
-    /// Does what was asked.
+    /// Does what was requested.
     ///
     /// # Errors
     /// A wrong setpoint profile, a device that is silent or refuses, the fault that stopped it, a recording that cannot be written.
@@ -222,7 +222,7 @@ impl Arguments {
     }
 }
 
-/// In its first second a vented muscle fills, whatever is asked, µs.
+/// In its first second a vented muscle fills, at any setpoint, µs.
 const FILLING: u64 = 1_000_000;
 
 /// Errors squared and summed.
@@ -243,7 +243,7 @@ impl Squares {
     }
 }
 
-/// How far what was measured stayed from what was asked: all the time, and after the muscle had filled.
+/// Deviation of the measurement from the setpoint: over all the time, and after the muscle had filled.
 #[derive(Debug)]
 struct Errors {
     joint: Joint,

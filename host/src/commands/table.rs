@@ -95,7 +95,7 @@ impl Arguments {
     /// Runs the command.
     ///
     /// # Errors
-    /// A file that cannot be read or is no valid table.
+    /// A file that cannot be read or is not a valid table.
     pub fn run(self, console: &Console) -> Result<()> {
         match self.action {
             Action::Show(file) => {

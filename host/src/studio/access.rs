@@ -1,4 +1,4 @@
-//! Who may use the page: this machine, under the page's own address, and for everything but the page itself whoever has the token.
+//! Who may use the page: this machine, under the page's own address, and for everything but the page itself, anyone who has the token.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ pub(super) fn token() -> std::io::Result<String> {
     if let Ok(mut source) = std::fs::File::open("/dev/urandom") {
         source.read_exact(&mut bytes)?;
     } else {
-        // Elsewhere the standard library's own seeds, which the system makes random, stand in.
+        // Elsewhere the standard library's own seeds, which the system makes random, are used.
         use std::hash::{BuildHasher, Hasher};
         for half in bytes.chunks_mut(8) {
             let seed = std::collections::hash_map::RandomState::new().build_hasher().finish();
@@ -69,7 +69,7 @@ fn allowed(access: &Access, request: &Request) -> Result<(), &'static str> {
     }
 }
 
-/// Refuses foreign hosts and origins, and forbids the browser to keep or embed anything.
+/// Refuses unknown hosts and origins, and forbids the browser to keep or embed anything.
 pub(super) async fn guard(State(access): State<Access>, request: Request, next: Next) -> Response {
     if let Err(why) = allowed(&access, &request) {
         return (StatusCode::FORBIDDEN, why).into_response();

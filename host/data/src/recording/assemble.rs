@@ -31,7 +31,7 @@ struct Table {
 
 pub(super) struct Job<'a> {
     pub path: &'a Path,
-    /// Fewer rows are no recording.
+    /// A recording has at least this many rows.
     pub min_rows: usize,
     /// L0 of the muscle that made it, m, where it is known.
     pub rest_length: Option<f64>,
@@ -50,7 +50,7 @@ pub(super) struct Job<'a> {
 pub(super) fn assemble(job: &Job<'_>, mut rows: Rows) -> Result<Vec<Recording>> {
     if rows.rows < job.min_rows {
         let cause = match rows.rows {
-            0 => "there is no row below the header".to_owned(),
+            0 => "the file has no row below the header".to_owned(),
             1 => "there is one row only".to_owned(),
             n => format!("there are {n} rows only"),
         };

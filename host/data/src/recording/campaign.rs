@@ -22,7 +22,7 @@ pub struct Campaign {
     pub recordings: Vec<Recording>,
     /// Whether times of different recordings can be compared.
     pub clock: Clock,
-    /// What a careful reader should know, such as files that were put into order.
+    /// Remarks on the data, such as files that were put into order.
     pub warnings: Vec<String>,
 }
 
@@ -77,7 +77,7 @@ impl Campaign {
     }
 
     /// The first reading's moment on the clock on which effects are timed, s: the bench's own where all recordings share it and it counts
-    /// from a beginning of its own; a clock of the world's says nothing of the muscle, and readings count from the first then.
+    /// from a beginning of its own; an absolute clock (time of day) does not start with the muscle, so that readings count from the first then.
     #[must_use]
     pub fn beginning(&self) -> f64 {
         let bench = if self.clock == Clock::Shared { self.first_time() } else { None };

@@ -1,4 +1,4 @@
-//! Foreign files by description: a small TOML file, written once per bench.
+//! Files of other formats by description: a small TOML file, written once per bench.
 //!
 //! ```toml
 //! skip_lines = 5                    # lines before the header, or before the first row

@@ -60,7 +60,7 @@ const TEMPERATURE: &[Unit] = &[Unit { name: "C", scale: 1.0, offset: 273.15 }, u
 const NONE: &[Unit] = &[unit("", 1.0)];
 
 impl Quantity {
-    /// The quantities that a recording's header can name. Rest length and direction come in by import description only.
+    /// The quantities that a recording's header can name. Only an import description can provide rest length and direction.
     pub(crate) const IN_HEADERS: [Self; 9] = [
         Self::Time,
         Self::Pressure,

@@ -66,7 +66,7 @@ impl Hashes {
 
 /// Lines below what was taken for the header among which the header itself is looked for.
 const LOOKED_BELOW: usize = 100;
-/// Fewer rows than this are no recording of a muscle, but a mistake.
+/// Fewer rows than this are not a recording of a muscle, but a mistake.
 const MIN_ROWS: usize = 10;
 
 impl<'a> Reader<'a> {

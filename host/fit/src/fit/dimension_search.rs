@@ -1,7 +1,7 @@
 //! Effective dimensions, and the length of each mounting: what a tape measure and a data sheet leave uncertain.
 //!
 //! Each such unknown enters as one more column of the joint problem, `∂F/∂p` at the present solution, with a prior as wide as the
-//! uncertainty of the measurement that it stands for. The columns are computed anew at every step (Gauss–Newton), and a step goes only
+//! uncertainty of the measurement that it represents. The columns are computed anew at every step (Gauss–Newton), and a step goes only
 //! as far as it lowers the objective of a table solved anew at its end. Values stay within stated bounds. Each is reported with the
 //! share of the prior's variance that the recordings removed.
 
@@ -49,7 +49,7 @@ struct Unknowns {
 }
 
 impl Unknowns {
-    /// What `options` leaves open.
+    /// The dimensions that `options` leaves free.
     fn of(problem: &Problem, options: &Options) -> Self {
         let (held, mounting) = mountings(&problem.points);
         let mut list = Vec::new();
@@ -106,7 +106,7 @@ pub(super) fn lacks_mountings(problem: &Problem, options: &Options) -> bool {
     options.fit_lengths && mountings(&problem.points).0.is_empty()
 }
 
-/// Finds the dimensions that `options` leaves open: the problem with these dimensions, and the table's parameters there. Both are as
+/// Finds the dimensions that `options` leaves free: the problem with these dimensions, and the table's parameters there. Both are as
 /// they were where nothing is open.
 pub(super) fn adjust(
     problem: &Problem,

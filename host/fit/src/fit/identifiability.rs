@@ -55,7 +55,7 @@ pub struct NotDetermined {
     pub pressures_kPa: Vec<f64>,
     /// Whether that is every tested pressure.
     pub everywhere: bool,
-    /// The reason, in words.
+    /// Description of the reason.
     pub reason: String,
 }
 

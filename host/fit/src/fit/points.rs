@@ -140,7 +140,7 @@ impl Points {
         if distinct.iter().all(|d| (d.stroke - first).abs() <= HELD) { Vec::new() } else { distinct }
     }
 
-    /// Whether a turn of the motion lies just before and just after a point.
+    /// Whether a reversal of the motion lies just before and just after a point.
     #[must_use]
     pub(crate) fn beside_turn(&self, i: usize) -> (bool, bool) {
         let here = &self.list[i];

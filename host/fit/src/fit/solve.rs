@@ -193,7 +193,7 @@ fn first(mut problem: Problem, screen: Screen, options: &Options) -> Stage {
     stage
 }
 
-/// The solution with the dimensions that `options` leaves open. With the right dimensions it shows better where the muscle is slack, so
+/// The solution with the dimensions that `options` leaves free. With the right dimensions it shows better where the muscle is slack, so
 /// they are found twice.
 fn with_dimensions(stage: Stage, options: &Options) -> Stage {
     let Stage { problem, screen, weights, parameters } = stage;

@@ -66,7 +66,7 @@ pub struct Summary {
     pub recordings: Vec<RecordingResidual>,
     /// The largest force that was measured, without readings that are no measurement, N: a scale that no fit enters.
     pub largest_force_N: f64,
-    /// What the user should know, one sentence or more each.
+    /// What the user must know, one sentence or more each.
     pub warnings: Vec<String>,
     /// What makes the table useless for control; empty where nothing does ([`crate::table_faults`]).
     pub faults: Vec<String>,

@@ -167,7 +167,7 @@ pub struct DiagnosisDocument<'a> {
     schema: &'static str,
     muscle: &'a str,
     samples: usize,
-    /// False where there was nothing to judge: then nothing was fitted, and the first remark says why.
+    /// False where there was nothing to judge: then nothing was fitted, and the first remark gives the reason.
     judged: bool,
     verdict: VerdictName,
     noise_N: f64,

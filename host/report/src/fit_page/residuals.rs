@@ -84,7 +84,7 @@ fn coordinates(view: &View<'_>) -> Figure {
     Figure::multiples(
         "residuals",
         "Residuals against each coordinate",
-        "The mean should stay at zero. Where it does not, the force depends on that coordinate in a way that the model lacks.",
+        "In a good fit, the mean stays at zero. Where it does not, the force depends on that coordinate in a way that the model lacks.",
         panels.collect(),
     )
     .shared(false, true)

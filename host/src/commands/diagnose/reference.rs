@@ -145,7 +145,7 @@ fn check(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Does what was asked. `taken`: standard output belongs to a file.
+/// Does what was requested. `taken`: standard output belongs to a file.
 ///
 /// # Errors
 /// Files that cannot be read or written, sides that cannot be compared.

@@ -64,7 +64,7 @@ impl Connected {
         Self::new(address.clone(), Client::open(&address)?, None)
     }
 
-    /// Starts an emulated controller with a muscle of the bench, and connects to it. Also gives what it runs on, in words.
+    /// Starts an emulated controller with a muscle of the bench, and connects to it. Also returns a description of what it runs on.
     ///
     /// # Errors
     /// A muscle that the bench does not know, or as [`Emulated::start`] and [`Client::open`].
@@ -252,7 +252,7 @@ impl Connected {
                 let cleared = self.client.call_once::<ClearFault>(&());
                 self.status = self.client.call::<GetStatus>(&())?;
                 self.note_fault()?;
-                // What is wanted is that none is latched: one that is gone already is no failure.
+                // The purpose is that none is latched: one that is gone already is no failure.
                 if self.status.state == State::Fault {
                     cleared?;
                 }

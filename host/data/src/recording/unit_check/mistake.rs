@@ -116,7 +116,7 @@ impl Mistake {
 
 /// One standard atmosphere, Pa.
 pub(super) const ATMOSPHERE: f64 = 101_325.0;
-/// Ratios of units that are easily confused: the factor, and the pair of units.
+/// Ratios of units that are often confused: the factor, and the pair of units.
 const PRESSURES: [(f64, &str); 6] = [
     (6.894_757, "psi to kPa"),
     (10.0, "MPa to bar, or kPa to mbar"),
