@@ -68,6 +68,10 @@ browser() {
     cargo build --quiet --locked --workspace --bin host && python3 tests/studio.py "$target/debug/host"
 }
 
+packages() {
+    cargo build --quiet --locked --package host --bins && bash packaging/test.sh "$target/debug/pam"
+}
+
 language() {
     local status=0
     bash tests/prose/run.sh || status=$?
@@ -115,6 +119,11 @@ else
     fi
     if require "Python bindings" python3 python3 python3-venv; then
         step "Python bindings" bash host/python/tests/run.sh
+    fi
+    if has dpkg-deb; then
+        step "packages" packages
+    else
+        say "skipped: packages: dpkg-deb is missing"
     fi
     if require "image of the Nucleo, executed" python3 python3 python3-venv; then
         step "image of the Nucleo, executed" bash tests/nucleo/run.sh

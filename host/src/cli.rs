@@ -8,6 +8,7 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::commands;
 use crate::console::{Colour, Console, unprinted};
+use crate::program_name;
 use crate::settings::{all_settings, apply};
 use pam_data::error::Result;
 
@@ -130,7 +131,7 @@ impl Command {
             Self::Emulate(a) => a.run(console),
             Self::Device(a) => a.run(console),
             Self::Settings(a) => a.run(&Cli::command(), console),
-            Self::Completions(a) => a.run(&mut Cli::command(), console),
+            Self::Completions(a) => a.run(&mut program_name::renamed(Cli::command()), console),
             Self::Man(a) => a.run(built(), console),
         }
     }
@@ -138,7 +139,7 @@ impl Command {
 
 /// The command line with everything that is found out when it is parsed: shared options in every command.
 fn built() -> clap::Command {
-    let mut command = Cli::command();
+    let mut command = program_name::renamed(Cli::command());
     command.build();
     command
 }
@@ -155,7 +156,7 @@ fn parse() -> Result<Cli> {
         Err(error) => return Err(error),
     };
     // clap itself prints usage errors and ends with status 2.
-    let matches = apply(Cli::command(), &settings).get_matches();
+    let matches = apply(program_name::renamed(Cli::command()), &settings).get_matches();
     Ok(Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit()))
 }
 

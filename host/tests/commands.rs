@@ -247,3 +247,19 @@ fn commands_that_the_readme_and_the_help_show_are_understood() {
     }
     assert!(seen > 40, "only {seen} commands were found");
 }
+
+#[test]
+fn the_second_name_is_the_same_program() {
+    let said = |arguments: &[&str]| {
+        let output =
+            Command::new(env!("CARGO_BIN_EXE_pam")).args(arguments).env_remove("PAM_PORT").output().unwrap();
+        assert!(output.status.success());
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let help = said(&["fit", "--help"]);
+    assert!(help.contains("Usage: pam fit") && help.contains("  pam fit --muscle"), "{help}");
+    assert!(!help.contains("host fit"), "{help}");
+    assert!(said(&["--version"]).starts_with("pam "));
+    assert!(said(&["completions", "bash"]).contains("complete -F _pam"));
+    assert!(said(&["man"]).contains("pam"));
+}

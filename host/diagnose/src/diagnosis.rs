@@ -9,8 +9,8 @@ use super::candidates::{Candidate, library};
 use super::confirmation::select_and_confirm;
 use super::criteria::baseline::TABLE_ORDER;
 use super::criteria::judgement::{
-    EXPLAINED, LACK_OF_FIT, LACK_OF_FIT_NOISE, LINE_ALPHA, LINE_SHARE, LINE_UNEXPLAINED, PARTLY_EXPLAINED,
-    TRACE_POINTS,
+    EXPLAINED, EXPLAINED_UNSEEN, LACK_OF_FIT, LACK_OF_FIT_NOISE, LINE_ALPHA, LINE_SHARE, LINE_UNEXPLAINED,
+    PARTLY_EXPLAINED, TRACE_POINTS,
 };
 use super::criteria::rows::{SLACK_MENTIONED, SLACK_ROUNDS};
 use super::findings::{considered, missing};
@@ -225,6 +225,7 @@ impl Located {
             rows: 1.0,
             p: l.p,
             unit: "Hz".into(),
+            recordings: Vec::new(),
         }));
         Self { line, regions, profiles, pattern }
     }
@@ -237,13 +238,20 @@ fn judge(selected: &SelectionResult, excess: &Excess, line: Option<&Line>) -> Ve
         // A periodic residual is no noise, even where repeats seem to explain it; nor is a residual larger than any instrument's noise.
         let steady = line.is_none_or(|l| l.share < LINE_UNEXPLAINED) && !excess.restless;
         if small && steady { Verdict::Consistent } else { Verdict::Unexplained }
-    } else if excess.explained >= EXPLAINED || small {
+    } else if (excess.explained >= EXPLAINED || small) && removes_on_unseen(&selected.held, excess.admitted) {
         Verdict::Explained
-    } else if excess.explained >= PARTLY_EXPLAINED {
+    } else if excess.explained >= PARTLY_EXPLAINED || small {
         Verdict::PartlyExplained
     } else {
         Verdict::Unexplained
     }
+}
+
+/// Whether the effects remove most of the excess error on unseen rows, or leave no more than the model admits (N).
+fn removes_on_unseen(held: &HeldOut, admitted: f64) -> bool {
+    let excess = |rms: f64| (rms.powi(2) - held.noise_N.powi(2)).max(0.0);
+    let (before, after) = (excess(held.rms_before_N), excess(held.rms_after_N));
+    after <= admitted.powi(2) || after <= (1.0 - EXPLAINED_UNSEEN) * before
 }
 
 /// Forces that the answer states.

@@ -266,8 +266,16 @@ impl Binned {
             rows: part,
             p: (as_good as f64 + 1.0) / (REGION_SHUFFLES as f64 + 1.0),
             unit: c.unit.into(),
+            recordings: if c.name == "recording" { names(rows, from, to) } else { Vec::new() },
         })
     }
+}
+
+/// The names of recordings by their numbers, from 1.
+fn names(rows: &Rows, from: f64, to: f64) -> Vec<String> {
+    let number = |i: usize| (i + 1) as f64;
+    let within = |i: &usize| number(*i) >= from && number(*i) <= to;
+    (0..rows.names.len()).filter(within).map(|i| rows.names[i].clone()).collect()
 }
 
 /// Values with whole blocks in another order, each reversed in itself: both what belongs to a block and what belongs to a place

@@ -29,6 +29,8 @@ pub struct Region {
     pub p: f64,
     /// Unit of `from` and `to`.
     pub unit: String,
+    /// What the recordings from `from` to `to` are called, where the coordinate is their number.
+    pub recordings: Vec<String>,
 }
 
 /// One parameter of a named effect.

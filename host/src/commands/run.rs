@@ -145,7 +145,12 @@ impl Arguments {
         let saturated_before = client.call::<GetStatus>(&())?.saturated_ticks;
         let progress = ProgressLine::new(console, "run");
         progress.total(self.seconds.map_or(0, |s| (s * 1e3) as u64));
-        let mut reached = if quantity == Quantity::Pressure { None } else { Reachability::of(&mut client)? };
+        let reachable = Reachability::of(&mut client)?;
+        // Before anything moves, not after ten seconds at the highest pressure.
+        if let Some(words) = reachable.as_ref().and_then(|r| r.beyond(quantity, &plan.profile)) {
+            console.warning(words);
+        }
+        let mut reached = reachable.filter(|_| quantity != Quantity::Pressure);
         let mut start = None;
         let outcome = run(
             &mut client,

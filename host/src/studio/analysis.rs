@@ -262,7 +262,7 @@ impl Analysis {
             fit: fitted.summary.quality(),
             uncertainty: Some(fitted.stored_uncertainty()),
             corrections: Vec::new(),
-            mountings: fitted.solution.problem.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
+            mountings: table_file::stored_mountings(&fitted.solution.problem),
         };
         let path = self.free("fitted", "pam");
         TableFile { table: fitted.table.clone(), about }.write(&path)?;

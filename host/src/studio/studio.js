@@ -6,7 +6,7 @@ const token = new URLSearchParams(location.search).get("token") || sessionStorag
 sessionStorage.setItem("token", token);
 history.replaceState(null, "", location.pathname);
 
-let hideMessage = 0;
+let hideMessage = 0, failed = false;
 function message(text) {
   $("message").textContent = text; $("message").hidden = false;
   clearTimeout(hideMessage); hideMessage = setTimeout(() => { $("message").hidden = true; }, 9000);
@@ -18,7 +18,9 @@ async function send(path, body) {
   catch { message("The program on this machine does not answer. Is `host studio` still running?"); return null; }
   let value = null;
   try { value = await response.json(); } catch { /* a refusal is plain text */ }
-  if (response.ok) return value === null ? true : value;
+  // What went wrong before is over once something succeeds.
+  if (response.ok) { if (failed) $("message").hidden = true; failed = false; return value === null ? true : value; }
+  failed = true;
   message(value ? value.error + (value.at ? "\nat " + value.at : "") + (value.help ? "\n→ " + value.help : "") : "refused");
   return null;
 }

@@ -21,6 +21,7 @@ mod report;
 mod residuals;
 mod score;
 mod semi;
+mod sensors;
 mod spec;
 mod tool;
 
@@ -175,6 +176,8 @@ enum Command {
     Festo(Real),
     /// The same for settled points only: writes the section of the page on what the muscles remember.
     FestoHistory(Real),
+    /// Spoil one recording of clean campaigns in every way that sensors and loggers fail, and count what is found.
+    Sensors(sensors::Sensors),
     /// Diagnose changes: changes added to later runs of real recordings, untouched pairs, a cylinder whose seal was replaced.
     Reference(reference::Reference),
     /// Generate, answer and score in one go; each continues where an earlier run was interrupted.
@@ -226,6 +229,7 @@ fn main() -> ExitCode {
         Command::FestoHistory(real) => {
             festo::run_history(&real.data, &real.output, &real.host, real.page.as_deref())
         }
+        Command::Sensors(what) => sensors::run(&what),
         Command::Reference(what) => reference::run(&what),
         Command::Prove { set, what, tool, check } => prove(&set, &what, &tool, check),
     };

@@ -99,6 +99,34 @@ impl Campaign {
     }
 }
 
+/// Of ten thousand readings one may be a spike.
+const SPIKES: f64 = 1e-4;
+
+/// The largest force that was measured in a campaign, N; its sign is kept, and the few largest readings do not count. A scale for errors
+/// that depends on no fit. 0 without force.
+///
+/// ```
+/// use pam_data::recording::{Campaign, Recording, largest_force};
+/// let recording = Recording { force: Some(vec![-1.0, 40.0, 130.5]), ..Recording::default() };
+/// assert_eq!(largest_force(&Campaign::new(vec![recording])), 130.5);
+/// ```
+#[must_use]
+pub fn largest_force(campaign: &Campaign) -> f64 {
+    let forces = || campaign.recordings.iter().filter_map(|r| r.force.as_deref()).flatten().copied();
+    // Only the upper end is sorted.
+    let kept = 1 + (SPIKES * forces().count() as f64) as usize;
+    let mut top: Vec<f64> = Vec::with_capacity(2 * kept);
+    for force in forces() {
+        top.push(force);
+        if top.len() == 2 * kept {
+            top.select_nth_unstable_by(kept - 1, |a, b| b.total_cmp(a));
+            top.truncate(kept);
+        }
+    }
+    top.sort_by(|a, b| b.total_cmp(a));
+    top.get(kept - 1).or(top.last()).copied().unwrap_or(0.0)
+}
+
 /// A warning about a recording whose time has another unit than that of the others: its sample interval is a thousand times theirs, or a
 /// thousandth, and the stroke per row is the same.
 fn other_clock(recordings: &[Recording]) -> Option<String> {

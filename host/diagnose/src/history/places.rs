@@ -52,6 +52,7 @@ pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Re
             rows,
             p: p_first,
             unit: unit.into(),
+            recordings: Vec::new(),
         };
         let ends = first.iter().map(|r| points.runs[*r].points.1.saturating_sub(1));
         let end = ends.map(|i| since[i]).fold(0.0, f64::max);
@@ -78,6 +79,7 @@ pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Re
                 rows,
                 p,
                 unit: String::new(),
+                recordings: Vec::new(),
             });
         }
     }

@@ -124,7 +124,7 @@ impl Gathering<'_> {
     /// A recording without force.
     fn add(&mut self, recording: &Recording, read: &[bool], pause: Option<f64>) -> Result<()> {
         let first = self.rows.names.is_empty();
-        self.rows.names.push(recording.name.clone());
+        self.rows.names.push(recording.title());
         let force = recording.require_force()?;
         if recording.is_empty() {
             return Ok(());

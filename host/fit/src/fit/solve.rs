@@ -27,7 +27,7 @@ use super::screen::{self, Screen};
 use super::smoothing::{self, Smoothing};
 use super::solution::Solution;
 use super::weights::{Weights, robust};
-use super::{deadband, dimension_search, monotonic_stress, outliers, reversals, slack};
+use super::{deadband, dimension_search, held_lengths, monotonic_stress, outliers, reversals, slack};
 
 /// Screens a campaign, builds its problem and solves it.
 ///
@@ -71,7 +71,14 @@ pub(super) fn solve(
                 .into(),
         );
     }
-    Ok(Solution { warnings, ..search(problem, screen, options, progress) })
+    let solution = search(problem.clone(), screen.clone(), options, progress);
+    let open = held_lengths::open(&solution, options);
+    let Some(open) = open.map(|options| search(problem, screen, &options, progress)) else {
+        return Ok(Solution { warnings, ..solution });
+    };
+    let choice = held_lengths::choose(solution, open);
+    warnings.push(choice.reason);
+    Ok(Solution { warnings, ..choice.solution })
 }
 
 /// # Errors

@@ -237,7 +237,7 @@ impl<'a> DiagnosisDocument<'a> {
 
 fn region(r: &Region) -> RegionDocument<'_> {
     let words = wording::region(r);
-    let Region { coordinate, from, to, share, rows, p, unit } = r;
+    let Region { coordinate, from, to, share, rows, p, unit, .. } = r;
     RegionDocument { coordinate, from: *from, to: *to, share: *share, rows: *rows, p: *p, unit, words }
 }
 

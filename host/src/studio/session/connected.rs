@@ -23,6 +23,7 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::json_of;
 use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::error::DeviceCode;
+use pam_device::reachability::Reachability;
 use pam_device::recorder::{Recorder, about_losses, about_start, serial};
 use pam_device::run::{Plan, Steps, arm, vent};
 use pam_device::setpoint_profile::Quantity;
@@ -236,6 +237,10 @@ impl Connected {
                 if self.status.state == State::Disarmed {
                     return Err(Error::new(DeviceCode::DeviceRefused, "the controller is disarmed")
                         .help("arm it first"));
+                }
+                let reachable = Reachability::of(&mut self.client)?;
+                if let Some(words) = reachable.and_then(|r| r.beyond(quantity, &profile)) {
+                    return Err(Error::new(DataCode::CallInvalid, words).help("ask for less"));
                 }
                 if self.status.state == State::Running && self.status.mode != quantity.mode() {
                     self.client.call::<Stop>(&())?;

@@ -148,6 +148,7 @@ pub(super) fn mistakes(rows: &[Row]) -> impl Iterator<Item = Mistake> {
     let (low, high) =
         rows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), r| (l.min(r[1]), h.max(r[1])));
     let shifted = [
+        Mistake { column: Column::Stroke, wrong: MistakeKind::Sign },
         Mistake { column: Column::Force, wrong: MistakeKind::Sign },
         Mistake { column: Column::Stroke, wrong: MistakeKind::OtherEnd(low + high) },
         Mistake { column: Column::Pressure, wrong: MistakeKind::Absolute(ATMOSPHERE) },
