@@ -29,8 +29,8 @@ pub enum DateSource {
 /// `first` is the first time of the recording, s: a clock that counts from 1970 is a date.
 #[must_use]
 pub fn of_recording(path: &Path, first: Option<f64>) -> Option<(f64, DateSource)> {
-    let name = |p: &Path| p.file_stem().and_then(|n| in_text(&n.to_string_lossy()));
-    if let Some(date) = name(path).or_else(|| path.parent().and_then(name)) {
+    let dated = |name: Option<&std::ffi::OsStr>| name.and_then(|n| in_text(&n.to_string_lossy()));
+    if let Some(date) = dated(path.file_stem()).or_else(|| dated(path.parent()?.file_name())) {
         return Some((date, DateSource::Name));
     }
     let clock = first.filter(|t| *t > YEAR_2000 && *t < YEAR_2100);
