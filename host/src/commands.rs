@@ -10,6 +10,7 @@ pub mod emulate;
 pub mod evaluate;
 pub mod fit;
 pub mod flash;
+pub mod history;
 pub mod man;
 pub mod new;
 pub mod plan;
