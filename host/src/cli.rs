@@ -76,6 +76,10 @@ enum Command {
     Predict(commands::predict::Arguments),
     /// Say what the model leaves out: where, what, how sure, what to record next.
     Diagnose(commands::diagnose::Arguments),
+    /// Fit and diagnose every muscle of a manifest, in parallel, into Parquet tables.
+    Batch(commands::batch::Arguments),
+    /// Show the results of a batch as one fleet: distributions, outlying muscles, effects, groups.
+    Fleet(commands::fleet::Arguments),
     /// Explain what the model leaves out, effect by effect.
     Effects(commands::effects::Arguments),
     /// Say before recording what a planned protocol can and cannot tell apart.
@@ -117,6 +121,8 @@ impl Command {
             Self::Evaluate(a) => a.run(console),
             Self::Predict(a) => a.run(console),
             Self::Diagnose(a) => a.run(console),
+            Self::Batch(a) => a.run(console),
+            Self::Fleet(a) => a.run(console),
             Self::Effects(a) => a.run(console),
             Self::Plan(a) => a.run(console),
             Self::Compare(a) => a.run(console),

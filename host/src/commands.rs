@@ -1,5 +1,6 @@
 //! The sub-commands, one file each: arguments in, library calls, results out.
 
+pub mod batch;
 pub mod compare;
 pub mod completions;
 pub mod demo;
@@ -10,6 +11,7 @@ pub mod emulate;
 pub mod evaluate;
 pub mod fit;
 pub mod flash;
+pub mod fleet;
 pub mod man;
 pub mod new;
 pub mod plan;
