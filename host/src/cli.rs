@@ -80,6 +80,8 @@ enum Command {
     Batch(commands::batch::Arguments),
     /// Show the results of a batch as one fleet: distributions, outlying muscles, effects, groups.
     Fleet(commands::fleet::Arguments),
+    /// Fit a muscle with few recordings beside others of its type that were fitted before.
+    Stock(commands::stock::Arguments),
     /// Explain what the model leaves out, effect by effect.
     Effects(commands::effects::Arguments),
     /// Say before recording what a planned protocol can and cannot tell apart.
@@ -123,6 +125,7 @@ impl Command {
             Self::Diagnose(a) => a.run(console),
             Self::Batch(a) => a.run(console),
             Self::Fleet(a) => a.run(console),
+            Self::Stock(a) => a.run(console),
             Self::Effects(a) => a.run(console),
             Self::Plan(a) => a.run(console),
             Self::Compare(a) => a.run(console),

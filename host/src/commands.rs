@@ -22,5 +22,6 @@ pub mod recordings;
 pub mod reports;
 pub mod run;
 pub mod settings;
+pub mod stock;
 pub mod studio;
 pub mod table;

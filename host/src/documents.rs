@@ -72,6 +72,7 @@ mod tests {
         published::<super::evaluate::Evaluate>("pam-evaluate-1");
         published::<super::fit::Fit>("pam-fit-1");
         published::<super::fleet::Fleet<'_>>("pam-fleet-1");
+        published::<super::fleet::Stock<'_>>("pam-stock-1");
         published::<super::predict::Predict>("pam-predict-1");
         published::<super::table::Check>("pam-check-1");
         published::<super::table::Export>("pam-export-1");

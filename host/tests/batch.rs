@@ -202,7 +202,7 @@ const WAYS: &[Spoil] = &[
             lines.join("\n") + "\n"
         })
     }),
-    ("gzip file cut off", "file::unreadable", |w| spoil(w, |bytes| gzip(&bytes)[..300].to_vec())),
+    ("gzip file cut off", "recording::container", |w| spoil(w, |bytes| gzip(&bytes)[..300].to_vec())),
     ("binary file", "recording::not-text", |w| spoil(w, |_| (0..=255).cycle().take(4000).collect())),
     ("no recording in the row", "manifest::invalid", |_| "w,w/muscle.toml,".into()),
     ("cell missing in the row", "manifest::invalid", |_| "w,w/muscle.toml".into()),
@@ -213,11 +213,18 @@ const WAYS: &[Spoil] = &[
         fs::write(w.join("import.toml"), "skip_line = 5\n").unwrap();
         "w,w/muscle.toml,w/*.csv,w/import.toml".into()
     }),
-    ("one pressure with hardly any stroke", "fit::underdetermined", |w| {
-        let text = fs::read_to_string(w.join("a.csv")).unwrap();
-        let rows: String = text.lines().take(13).map(|l| format!("{l}\n")).collect();
-        fs::write(w.join("short.csv"), rows).unwrap();
-        "w,w/muscle.toml,w/short.csv".into()
+    ("force that never changes", "fit::underdetermined", |w| {
+        for path in fs::read_dir(w).unwrap().flatten().map(|e| e.path()) {
+            if path.extension().unwrap() == "csv" {
+                let text = fs::read_to_string(&path).unwrap();
+                let dead = |(i, l): (usize, &str)| match i {
+                    0 => format!("{l}\n"),
+                    _ => format!("{},0\n", l.rsplit_once(',').unwrap().0),
+                };
+                fs::write(&path, text.lines().enumerate().map(dead).collect::<String>()).unwrap();
+            }
+        }
+        "w,w/muscle.toml,w/*.csv".into()
     }),
 ];
 

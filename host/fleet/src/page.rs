@@ -23,10 +23,10 @@ const MOST_POINTS: usize = 5000;
 pub fn page(fleet: &Fleet, overview: &Overview, results: &str) -> Page {
     let mut page = Page::new("Fleet", pluralise(fleet.members.len(), "muscle"));
     head(&mut page, fleet, overview);
-    page.push(outlying(fleet, overview, results));
-    page.push(distributions(fleet, overview));
-    page.push(effects(fleet, overview, results));
     page.push(differences(fleet, overview));
+    page.push(outlying(fleet, overview, results));
+    page.push(effects(fleet, overview, results));
+    page.push(distributions(fleet, overview));
     page.push(dates(fleet));
     page.push(failures(fleet, results));
     page.push(members(fleet, overview, results));
@@ -97,25 +97,33 @@ fn outlying(fleet: &Fleet, overview: &Overview, results: &str) -> Section {
         section.notice(Tone::Good, "No muscle is outlying.");
         return section;
     }
-    let mut table = Table::new("Outlying muscles", &["muscle", "quantity", "value", "median", "z", "tags"]);
-    for Outlying { member, quantity, value, z } in overview.outlying.iter().take(MOST_ROWS) {
-        let (m, q) = (&fleet.members[*member], &fleet.quantities[*quantity]);
-        let middle = overview.distributions[*quantity].quantiles[2];
-        table.linked_row(
-            address(results, m),
-            [
-                m.muscle.clone(),
-                name_of(q, fleet),
-                with_unit(*value, q),
-                with_unit(middle, q),
-                fixed(*z, 1),
-                tags(m),
-            ],
-        );
+    let mut table = Table::new("Outlying muscles", &["muscle", "largest z", "outlying in", "tags"]);
+    let rows = by_muscle(overview);
+    for (member, all) in rows.iter().take(MOST_ROWS) {
+        let m = &fleet.members[*member];
+        let one = |o: &&Outlying| {
+            let q = &fleet.quantities[o.quantity];
+            format!("{} = {} (z = {})", name_of(q, fleet), with_unit(o.value, q), fixed(o.z, 1))
+        };
+        let list = all.iter().map(one).collect::<Vec<_>>().join(", ");
+        let largest = all.first().map_or_else(String::new, |o| fixed(o.z, 1));
+        table.linked_row(address(results, m), [m.muscle.clone(), largest, list, tags(m)]);
     }
     section.table(table);
-    more(&mut section, overview.outlying.len());
+    more(&mut section, rows.len());
     section
+}
+
+/// Outlying muscles with all their outlying quantities, the largest z first.
+fn by_muscle(overview: &Overview) -> Vec<(usize, Vec<&Outlying>)> {
+    let mut rows: Vec<(usize, Vec<&Outlying>)> = Vec::new();
+    for o in &overview.outlying {
+        match rows.iter_mut().find(|(member, _)| *member == o.member) {
+            Some((_, all)) => all.push(o),
+            None => rows.push((o.member, vec![o])),
+        }
+    }
+    rows
 }
 
 fn more(section: &mut Section, rows: usize) {
@@ -200,7 +208,7 @@ fn effects(fleet: &Fleet, overview: &Overview, results: &str) -> Section {
     let shares: Vec<f64> = overview.effects.iter().map(|e| 100.0 * e.share).collect();
     let names = overview.effects.iter().map(|e| e.effect.clone()).collect();
     let panel = Panel::new(
-        Axis::new("share of the diagnosed muscles", "%").from_zero(),
+        Axis::new("share of the diagnosed muscles", "%").range(0.0, 100.0),
         Axis::names("effect", names),
     )
     .bars("", Colour::Series(0), &shares, &places);

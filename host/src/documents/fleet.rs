@@ -125,3 +125,25 @@ pub(crate) struct Fleet<'a> {
     /// Codes and their numbers.
     pub failures: &'a std::collections::BTreeMap<String, usize>,
 }
+
+/// `host stock --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Stock<'a> {
+    /// `pam-stock/1`.
+    pub schema: &'static str,
+    pub muscle: &'a str,
+    /// Muscles of the stock that were used.
+    pub kin: usize,
+    pub samples: usize,
+    pub deadband_kPa: f64,
+    pub blocked_force_N: f64,
+    /// Residuals of the recordings, N.
+    pub rms_N: f64,
+    /// The same of the fit without the stock.
+    pub rms_alone_N: f64,
+    /// Factor by which the bands were widened so that they hold for the kin.
+    pub bands_widened: f64,
+    pub pressure_low_kPa: f64,
+    pub pressure_high_kPa: f64,
+}
