@@ -79,6 +79,12 @@ enum Command {
     Diagnose(commands::diagnose::Arguments),
     /// Follow one actuator over several campaigns: what changed, when, and by how much.
     History(commands::history::Arguments),
+    /// Fit and diagnose every muscle of a manifest, in parallel, into Parquet tables.
+    Batch(commands::batch::Arguments),
+    /// Show the results of a batch as one fleet: distributions, outlying muscles, effects, groups.
+    Fleet(commands::fleet::Arguments),
+    /// Fit a muscle with few recordings beside others of its type that were fitted before.
+    Stock(commands::stock::Arguments),
     /// Explain what the model leaves out, effect by effect.
     Effects(commands::effects::Arguments),
     /// Say before recording what a planned protocol can and cannot distinguish.
@@ -121,6 +127,9 @@ impl Command {
             Self::Predict(a) => a.run(console),
             Self::Diagnose(a) => a.run(console),
             Self::History(a) => a.run(console),
+            Self::Batch(a) => a.run(console),
+            Self::Fleet(a) => a.run(console),
+            Self::Stock(a) => a.run(console),
             Self::Effects(a) => a.run(console),
             Self::Plan(a) => a.run(console),
             Self::Compare(a) => a.run(console),
