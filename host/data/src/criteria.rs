@@ -27,7 +27,7 @@ pub enum Source {
     Trials(&'static str),
     /// Engineering judgement; the opened development sets were answered with it, and no derivation is known.
     Judgement,
-    /// Limits time or memory, and does not decide on its own.
+    /// Limits time or memory, and does not decide a verdict.
     Cost,
 }
 
@@ -55,7 +55,7 @@ pub struct Criterion {
     pub symbol: &'static str,
     /// Its unit; `1` for a number or a share.
     pub unit: &'static str,
-    /// Its value, as in the source.
+    /// Its value, as written in the source.
     pub value: &'static str,
     /// What it means.
     pub meaning: &'static str,

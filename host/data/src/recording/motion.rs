@@ -1,7 +1,7 @@
 //! How the muscle was moved: direction, reversals, holds, ramps, noise, speed.
 //!
 //! This is the one reconstruction of the motion from whole recordings: fit, prediction, evaluation and diagnosis use it. The controller
-//! cannot look ahead; `docs/src/decisions/11-motion.md` lists what its causal reconstruction
+//! cannot look ahead; `docs/src/decisions/12-motion.md` lists what its causal reconstruction
 //! (`model_core::motion::MotionTracker`) does differently.
 //!
 //! | file | contents |

@@ -1,4 +1,4 @@
-//! Samples become rows: averages that end at every turn, hold and ramp.
+//! Samples become rows: averages that end at every reversal, hold and ramp.
 
 use model_core::braid::Braid;
 use model_core::effects::Context;
@@ -125,7 +125,7 @@ impl Gathering<'_> {
         read: &[bool],
         pause: Option<f64>,
     ) -> Result<()> {
-        self.rows.names.push(recording.name.clone());
+        self.rows.names.push(recording.title());
         let force = recording.require_force()?;
         if recording.is_empty() {
             return Ok(());
@@ -260,7 +260,7 @@ impl Gathering<'_> {
         });
         rows.shapes.push(sleeve::shape(braid, motion.stroke));
         rows.force.push(mean.force);
-        // Just after a turn of the pressure at held length the model only guesses how far friction has turned; where the muscle
+        // Just after a reversal of the pressure at held length the model only estimates how far friction has reversed; where the muscle
         // also moves, its strokes and what ramps are steady are what is judged.
         let on_ramp = state.on_ramp[i] && !self.isometric;
         let judged = state.sure[i] && (self.isometric || !state.ramped[i] || on_ramp);

@@ -59,7 +59,7 @@ crate::criteria! {
     /// Lines on either side of a reversal reach this many thresholds far.
     LINE_REACH: f64 = 3.0, "x_line/x_rev", "1", Judgement;
     /// They reach at most this share of the strokes on either side.
-    LINE_SHARE: f64 = 0.4, "x_line/A", "1", Judgement;
+    LINE_STROKE_SHARE: f64 = 0.4, "x_line/A", "1", Judgement;
     /// A pressure has left its level by this part of its threshold.
     PRESSURE_ONSET: f64 = 0.25, "dP_onset/P_rev", "1", Judgement;
     /// A length is held while the stroke stays within this many motion thresholds: frames yield to the force.

@@ -1,6 +1,6 @@
 //! Reversals: where a column turns back by more than a threshold, and exactly where it did so.
 
-use super::criteria::{LINE_REACH, LINE_SHARE, ONSET_CLEAR, SHARP_RATIO, SHARP_SAMPLES, SHARP_STEP};
+use super::criteria::{LINE_REACH, LINE_STROKE_SHARE, ONSET_CLEAR, SHARP_RATIO, SHARP_SAMPLES, SHARP_STEP};
 
 /// A stretch between two reversals.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -149,8 +149,8 @@ impl Track<'_> {
         // Samples close to the extremum may belong to either side; far ones tell little about it.
         let near = self.tolerance();
         let far = (LINE_REACH * self.threshold)
-            .min(LINE_SHARE * before.amplitude())
-            .min(LINE_SHARE * after.amplitude());
+            .min(LINE_STROKE_SHARE * before.amplitude())
+            .min(LINE_STROKE_SHARE * after.amplitude());
         let a = self.nears(before, far)..self.nears(before, near).max(first + 1);
         let b = self.leaves(after, near)..(self.leaves(after, far) + 1).min(last + 1);
         let lines = (Line::through(self.time, self.raw, a), Line::through(self.time, self.raw, b));
