@@ -7,7 +7,7 @@
 //! ```
 //! Watches look at every tick before the command is made, so a fault changes the command of the tick it is noticed in.
 
-use model_core::link::messages::{Fault, FaultReport, Mode, Side, State};
+use model_core::link::messages::{Fault, FaultReport, Mode, Session, Side, State};
 use model_core::link::settings::{Reaction, Settings};
 use model_core::motion::{MotionSettings, MotionTracker};
 use model_core::single;
@@ -69,8 +69,10 @@ pub struct Controller {
     coming: f32,
     coming_step: f32,
     asked_age: u32,
-    /// Ticks since a host's last frame.
-    host_age: u32,
+    /// The session that armed the device or started its mode.
+    owner: Session,
+    /// Ticks since the owner's last keep-alive request.
+    owner_age: u32,
     /// Ticks for which a fault has held the last command.
     held_ticks: u32,
     sides: [Actuator; 2],
@@ -111,7 +113,8 @@ impl Controller {
             coming: 0.0,
             coming_step: 0.0,
             asked_age: 0,
-            host_age: 0,
+            owner: Session::default(),
+            owner_age: 0,
             sides: [Actuator::new(settings, first), Actuator::new(settings, second)],
             settings: *settings,
             pair: PairState::default(),
@@ -240,11 +243,6 @@ impl Controller {
         self.sides[side.index()].model.clear();
     }
 
-    /// A whole frame of a host has come.
-    pub fn heard(&mut self) {
-        self.host_age = 0;
-    }
-
     /// One telemetry sample every so many ticks, 0 for none.
     pub fn set_telemetry(&mut self, every_ticks: u16) {
         self.telemetry_every = every_ticks;
@@ -325,7 +323,10 @@ impl Controller {
                 self.drive();
             }
             (State::Disarmed, Arming::Filling(_) | Arming::Dumping(_)) => self.test_valves(inputs),
-            _ => self.rest(),
+            _ => {
+                self.disarm_when_silent();
+                self.rest();
+            }
         }
         self.record()
     }

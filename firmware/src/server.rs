@@ -1,6 +1,6 @@
 //! Answers the host: reads a frame, asks the controller or the store, writes a frame. No allocation.
 
-mod session;
+mod answers;
 mod upload;
 mod wear;
 
@@ -15,13 +15,13 @@ use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 use model_core::table::{MuscleTable, TableError};
 
 use crate::board::Identity;
-use crate::control::{self, Controller};
+use crate::control;
 use crate::modes::Model;
 use crate::shared::Shared;
 use crate::store::{self, Kept, Store};
 use crate::watch::Finding;
 
-use self::session::Session;
+use self::answers::Answers;
 use self::upload::Upload;
 use self::wear::Wear;
 
@@ -217,14 +217,13 @@ impl<F: NorFlash> Server<F> {
         if header.kind != Kind::Request {
             return &[];
         }
-        shared.with(Controller::heard);
         let answered = if header.id == hello::ID {
             let hello = self.hello().to_bytes();
             frame::encode_bytes(Header { kind: Kind::Response, ..header }, &hello, exchange.room())
                 .map_err(|_| Refusal::Range)
         } else {
-            let mut session = Session { server: self, shared };
-            endpoints::answer(&mut session, &mut exchange)
+            let mut answers = Answers { server: self, shared };
+            endpoints::answer(&mut answers, &mut exchange)
                 .or_else(|mut refusal| exchange.answer(Kind::Refusal, &mut refusal))
         };
         exchange.written(answered.unwrap_or(0))

@@ -196,6 +196,7 @@ mod tests {
     use super::*;
     use crate::board::{Inputs, Readings};
     use model_core::link::frame::Accumulator;
+    use model_core::link::messages::Session;
 
     #[test]
     fn a_change_of_state_wakes_the_link_to_keep_what_must_not_be_lost() {
@@ -203,7 +204,7 @@ mod tests {
         let inputs = Inputs { sides: [Some(Readings::default()), None], ..Inputs::default() };
         shared.step(&inputs);
         assert!(!shared.has_changed());
-        assert_eq!(shared.with(Controller::arm), Ok(()));
+        assert_eq!(shared.with(|controller| controller.arm(Session::default())), Ok(()));
         shared.step(&inputs);
         assert!(shared.has_changed());
         assert!(!shared.has_changed(), "once for each change");

@@ -1,6 +1,6 @@
 //! What a host asks of the controller: states, modes, set-points, references.
 
-use model_core::link::messages::{Fault, Field, Mode, Reference, Refusal, SetPoint, Side, State};
+use model_core::link::messages::{Fault, Field, Mode, Reference, Refusal, Session, SetPoint, Side, State};
 use model_core::link::settings::{FeedForward, Settings};
 
 use super::actuator::Actuator;
@@ -27,12 +27,12 @@ impl Controller {
         Ok(())
     }
 
-    /// Starts a mode at what is measured now.
+    /// Starts a mode at what is measured now, for a session that has to keep it alive.
     ///
     /// # Errors
     /// As [`Machine::request`](crate::safety::Machine::request); [`Refusal::NoTable`], with the fault latched, where the mode needs
     /// a table.
-    pub fn start(&mut self, mode: Mode) -> Result<(), Refusal> {
+    pub fn start(&mut self, mode: Mode, session: Session) -> Result<(), Refusal> {
         self.machine.allows(Cause::Start)?;
         let needs: &[Side] = match mode {
             Mode::Vent | Mode::Pressure => &[],
@@ -46,6 +46,7 @@ impl Controller {
             return Err(Refusal::NoTable(side));
         }
         self.change(Cause::Start)?;
+        self.own(session);
         self.mode = mode;
         self.generator.begin(Reference::SetPoint)?;
         let first = self.sides[0].sample;
@@ -94,6 +95,28 @@ impl Controller {
     pub fn disarm(&mut self) -> Result<(), Refusal> {
         self.vent_now();
         self.change(Cause::Disarm)
+    }
+
+    /// The session that asks is the one that owns the device from now on.
+    pub(super) fn own(&mut self, session: Session) {
+        self.owner = session;
+        self.owner_age = 0;
+    }
+
+    /// The owner's program is alive.
+    ///
+    /// # Errors
+    /// [`Refusal::OtherSession`] where another session owns what is armed or running. A device that is neither has no owner.
+    pub fn keep_alive(&mut self, session: Session) -> Result<(), Refusal> {
+        let owned = self.arming != Arming::Idle
+            || matches!(self.machine.state(), State::Armed | State::Running)
+            || !self.is_vented();
+        if session == self.owner {
+            self.owner_age = 0;
+        } else if owned {
+            return Err(Refusal::OtherSession);
+        }
+        Ok(())
     }
 
     pub(super) fn vent_now(&mut self) {
@@ -224,7 +247,7 @@ mod tests {
             let command = controller.step(&Inputs { sides: [Some(now), None], ..Inputs::default() }).sides[0];
             let target = if command.vent { 0.0 } else { command.pressure_pa };
             *pressure_pa += (target - *pressure_pa) / 31.0;
-            controller.heard();
+            assert_eq!(controller.keep_alive(Session::default()), Ok(()));
         }
     }
 
@@ -235,12 +258,12 @@ mod tests {
         let mut controller = Controller::new(&settings);
         let mut pressure = 0.0;
         run(&mut controller, &mut pressure, 10);
-        assert_eq!(controller.arm(), Ok(()));
-        assert_eq!(controller.start(Mode::Pressure), Ok(()));
+        assert_eq!(controller.arm(Session::default()), Ok(()));
+        assert_eq!(controller.start(Mode::Pressure, Session::default()), Ok(()));
         assert_eq!(controller.set_point(SetPoint::Pressure(300e3)), Ok(()));
         run(&mut controller, &mut pressure, 1000);
         assert!((pressure - 300e3).abs() < 1e3, "{pressure}");
-        assert_eq!(controller.start(Mode::Vent), Ok(()));
+        assert_eq!(controller.start(Mode::Vent, Session::default()), Ok(()));
         run(&mut controller, &mut pressure, 1000);
         assert_eq!((controller.state(), controller.faults().latched), (State::Running, None));
         assert!(pressure < 1e3, "{pressure}");

@@ -398,20 +398,60 @@ fn what_this_format_wrote_is_read_and_written_alike() {
 /// faults and starts have kept their layout.
 #[test]
 fn settings_of_older_formats_are_taken_over_field_by_field() {
-    let formats =
-        [(include_str!("fixtures/format-2.txt"), 0.0), (include_str!("fixtures/format-3.txt"), 4.5e-3)];
-    for (fixture, line_s) in formats {
+    let formats = [
+        (include_str!("fixtures/format-2.txt"), 0.0, 77),
+        (include_str!("fixtures/format-3.txt"), 4.5e-3, 77),
+        (include_str!("fixtures/format-4.txt"), 4.5e-3, 10_000),
+    ];
+    for (fixture, line_s, hold_ticks) in formats {
         let mut store = open(flash_of(fixture));
         let mut settings = Settings::default();
         settings.watch.hold_ticks = 77;
+        settings.watch.armed_silence_ticks = 7_777;
         assert_eq!(store.settings(&mut settings), Ok(Kept::Older));
         assert_eq!((settings.regulator.line_s, settings.pressure_band_pa), (line_s, 1_234.0));
-        assert_eq!(settings.watch.hold_ticks, 77);
+        assert_eq!(settings.watch.hold_ticks, hold_ticks);
+        assert_eq!(settings.watch.armed_silence_ticks, 7_777);
         assert_eq!(kept(&mut store, Side::Agonist).as_deref(), Some(&table(2)[..]));
         assert_eq!(store.past_fault(0), Ok(Some(report())));
         assert_eq!(store.count_start(), Ok(2));
         store.put_settings(&mut settings).expect("room");
         assert_eq!(settings_of(&mut store), Some(settings));
+    }
+}
+
+/// Power fails while settings of an older layout are replaced by those of this one.
+#[test]
+fn a_migration_that_loses_power_leaves_the_older_settings_or_the_new() {
+    for fixture in [include_str!("fixtures/format-3.txt"), include_str!("fixtures/format-4.txt")] {
+        let mut store = open(flash_of(fixture));
+        let mut settings = Settings::default();
+        assert_eq!(store.settings(&mut settings), Ok(Kept::Older));
+        let before = store.close();
+        let cuts = cut_everywhere(
+            &before,
+            |store| store.put_settings(&mut { settings }).is_ok(),
+            |store, left| assert_eq!(settings_of(store), Some(settings), "after {left} words"),
+        );
+        assert!(cuts > 50, "{cuts} cuts tried");
+    }
+}
+
+/// Every bit of settings of the layout before: a wrong one is noticed there, too.
+#[test]
+fn settings_of_the_layout_before_of_which_a_bit_is_wrong_are_not_trusted() {
+    let flash = flash_of(include_str!("fixtures/format-4.txt"));
+    let mut store = open(flash.clone());
+    let mut settings = Settings::default();
+    assert_eq!(store.settings(&mut settings), Ok(Kept::Older));
+    let bytes = store.bytes(0x33).expect("readable").expect("kept").to_vec();
+    let place = flash.bytes.windows(bytes.len()).position(|w| w == bytes).expect("they are there");
+    for bit in 0..8 * bytes.len() {
+        let mut damaged = flash.clone();
+        damaged.bytes[place + bit / 8] ^= 1 << (bit % 8);
+        let mut settings = Settings::default();
+        assert_eq!(open(damaged).settings(&mut settings), Ok(Kept::Untrusted), "bit {bit}");
+        assert_eq!(settings, Settings::default());
     }
 }
 

@@ -102,7 +102,7 @@ pub fn arm(client: &mut Client) -> Result<()> {
     let deadline = Instant::now() + ARMING;
     let empty = Refusal::StillFaulty(Fault::NotVented);
     loop {
-        let now = match client.try_call::<Arm>(&())? {
+        let now = match client.try_call::<Arm>(&client.session())? {
             Ok(status) => status.state,
             Err(refusal) if refusal == empty && Instant::now() < deadline => State::Disarmed,
             Err(refusal) => return Err(messages::refused(Arm::NAME, refusal)),
@@ -141,7 +141,7 @@ fn follow(
         send_points(client, values)?;
     }
     client.call::<SetTelemetry>(&TelemetryRate { every_ticks: plan.every_ticks })?;
-    client.call::<StartMode>(&Start { mode: plan.quantity.mode() })?;
+    client.call::<StartMode>(&Start { mode: plan.quantity.mode(), session: client.session() })?;
     let mut steps = Steps::begin(client, plan)?;
     let mut begun = None;
     let mut heard = Instant::now();

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::fields::codes;
 
-pub use self::asked::{REFERENCE_PIECE, Reference, ReferencePoints, SetPoint, Start};
+pub use self::asked::{REFERENCE_PIECE, Reference, ReferencePoints, Session, SetPoint, Start};
 pub use self::device::{DeviceInfo, StartedBy, Status};
 pub use self::refusal::{Field, Refusal, StoreFault, TableFault};
 pub use self::safety::{FAULT_LOG, Fault, FaultReport, Faults, PastFault, Sensor, State};

@@ -175,7 +175,7 @@ pub struct Watch {
     pub follow_ticks: u16,
     /// How long a streamed set-point stays good, ticks; 0 for ever. References of the device are not set-points.
     pub silence_ticks: u32,
-    /// How long a running mode goes on without any whole frame of a host, ticks; above zero.
+    /// How long a running mode continues without a keep-alive request of the session that owns it, ticks; above zero.
     pub host_silence_ticks: u32,
     /// Whether a running mode may go on without a host for ever. Off unless somebody asks for it.
     pub autonomous: bool,
@@ -189,6 +189,8 @@ pub struct Watch {
     pub vent_ticks: u32,
     /// Pressure of the test of regulator and dump valve before arming, Pa; zero for none. Best below the muscle's deadband.
     pub valve_test_pa: f32,
+    /// How long the device stays armed without a keep-alive request of the session that armed it, ticks; then it is disarmed.
+    pub armed_silence_ticks: u32,
 }
 
 fields!(Watch {
@@ -205,7 +207,8 @@ fields!(Watch {
     hold_ticks,
     vented_pa,
     vent_ticks,
-    valve_test_pa
+    valve_test_pa,
+    armed_silence_ticks
 });
 
 /// Everything a user may choose. One for the device; both muscles of a pair share it.
@@ -314,6 +317,8 @@ impl Settings {
             // From 7 bar to 20 kPa are 3.6 time constants: enough for a line of half a second.
             vent_ticks: 2_000,
             valve_test_pa: 0.0,
+            // Time to look at the muscle between arming and starting; nothing is under pressure meanwhile.
+            armed_silence_ticks: 60_000,
         },
         hold_on: 0,
         motion_band_m: 20e-6,

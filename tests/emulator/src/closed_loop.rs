@@ -6,7 +6,7 @@ use firmware::control::Controller;
 use firmware::regulator::SMOOTHING;
 use firmware::spoken::Sample;
 use firmware::tick::TICK_S;
-use model_core::link::messages::{Mode, Reference, SetPoint, Side, State};
+use model_core::link::messages::{Mode, Reference, Session, SetPoint, Side, State};
 use model_core::link::settings::{FeedForward, Settings};
 use model_core::table::MuscleTable;
 use model_core::units::Length;
@@ -55,8 +55,8 @@ impl Loop {
         controller.use_table(Side::Agonist, table).expect("a valid table");
         let mut this = Self { controller, plant: Plant::new(bench, motion), outputs: Outputs::VENT };
         this.tick();
-        this.controller.arm().expect("it arms");
-        this.controller.start(mode).expect("it starts");
+        this.controller.arm(Session::default()).expect("it arms");
+        this.controller.start(mode, Session::default()).expect("it starts");
         this
     }
 

@@ -2,7 +2,7 @@
 
 use firmware::board::{Inputs, Outputs, Readings};
 use firmware::control::Controller;
-use model_core::link::messages::{Mode, Refusal, SetPoint, Side, State};
+use model_core::link::messages::{Mode, Refusal, Session, SetPoint, Side, State};
 use model_core::link::settings::Settings;
 use model_core::table::MuscleTable;
 
@@ -72,8 +72,8 @@ impl PairLoop {
         }
         let mut this = Self { controller, joint, outputs: Outputs::VENT };
         this.tick();
-        this.controller.arm().expect("it arms");
-        this.controller.start(Mode::Pair).expect("it starts");
+        this.controller.arm(Session::default()).expect("it arms");
+        this.controller.start(Mode::Pair, Session::default()).expect("it starts");
         this
     }
 

@@ -104,7 +104,7 @@ pub fn start(client: &mut Client, mode: Mode) {
         sample(client).expect("no fault while disarmed");
     }
     pam_device::run::arm(client).expect("it arms");
-    client.call::<StartMode>(&Start { mode }).expect("it starts");
+    client.call::<StartMode>(&Start { mode, session: client.session() }).expect("it starts");
 }
 
 /// Runs stretches of one mode and gives the samples that are judged; ends disarmed.

@@ -218,12 +218,17 @@ fn a_program_that_hangs_is_restarted_vented_and_says_so() {
     assert_eq!(faults.latched.map(|report| report.fault), Some(Fault::Watchdog));
     assert_eq!(faults.counts[usize::from(Fault::Watchdog.code())], 1);
     // Nothing starts by itself, and nothing can be started before somebody has looked.
-    assert_eq!(client.try_call::<Arm>(&()).expect("an answer"), Err(Refusal::Latched(Fault::Watchdog)));
+    assert_eq!(
+        client.try_call::<Arm>(&client.session()).expect("an answer"),
+        Err(Refusal::Latched(Fault::Watchdog))
+    );
     let begun = station.periods();
     station.until("it stays vented", |now| now > begun + 500);
     assert!(station.since(0).iter().all(|exchange| exchange.command == 0.0));
     client.call::<ClearFault>(&()).expect("it clears");
-    client.call::<Arm>(&()).expect("it arms");
-    client.call::<StartMode>(&Start { mode: Mode::Pressure }).expect("it runs again");
+    client.call::<Arm>(&client.session()).expect("it arms");
+    client
+        .call::<StartMode>(&Start { mode: Mode::Pressure, session: client.session() })
+        .expect("it runs again");
     assert_eq!(client.call::<GetStatus>(&()).expect("a status").state, State::Running);
 }

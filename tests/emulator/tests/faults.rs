@@ -146,7 +146,10 @@ fn every_fault_of_the_plant_is_noticed_in_time_and_latched() {
             "{fault:?} (case {number}) vents after {vented:?} periods"
         );
         // It stays vented and says no to everything but being cleared.
-        assert_eq!(client.try_call::<Arm>(&()).expect("an answer"), Err(Refusal::Latched(fault)));
+        assert_eq!(
+            client.try_call::<Arm>(&client.session()).expect("an answer"),
+            Err(Refusal::Latched(fault))
+        );
         assert_eq!(client.call::<GetStatus>(&()).expect("a status").state, State::Fault);
         let faults = client.call::<GetFaults>(&()).expect("its faults");
         // Compared as text: a reading that is no number is not equal to itself.
@@ -214,8 +217,10 @@ fn a_mode_without_its_table_is_a_fault_and_nothing_starts_by_itself() {
     let Some(machine) = board(&folder, &station) else { return };
     let mut client = machine.client();
     station.pass(50);
-    client.call::<Arm>(&()).expect("it arms");
-    let refused = client.try_call::<StartMode>(&Start { mode: Mode::Force }).expect("an answer");
+    client.call::<Arm>(&client.session()).expect("it arms");
+    let refused = client
+        .try_call::<StartMode>(&Start { mode: Mode::Force, session: client.session() })
+        .expect("an answer");
     assert_eq!(refused, Err(Refusal::NoTable(Side::Agonist)));
     let latched = client.call::<GetFaults>(&()).expect("its faults").latched.map(|report| report.fault);
     assert_eq!(latched, Some(Fault::TableMissing));
@@ -244,7 +249,7 @@ fn a_calculation_that_fails_vents_and_is_told_with_its_result() {
     let commands = station.since(0);
     assert!(commands.iter().all(|exchange| exchange.command.is_finite()));
     assert_eq!(commands.last().map(|exchange| exchange.command), Some(0.0));
-    let latched = client.try_call::<Arm>(&()).expect("an answer");
+    let latched = client.try_call::<Arm>(&client.session()).expect("an answer");
     assert_eq!(latched, Err(Refusal::Latched(Fault::NotANumber)));
     // The air takes some lags of the regulator to leave.
     station.pass(300);
@@ -291,12 +296,15 @@ fn settings_of_which_a_bit_is_wrong_stop_the_device_until_they_are_confirmed() {
     let latched = client.call::<GetFaults>(&()).expect("its faults").latched.map(|report| report.fault);
     assert_eq!(latched, Some(untrusted));
     station.pass(10);
-    assert_eq!(client.try_call::<Arm>(&()).expect("an answer"), Err(Refusal::Latched(untrusted)));
+    assert_eq!(
+        client.try_call::<Arm>(&client.session()).expect("an answer"),
+        Err(Refusal::Latched(untrusted))
+    );
     let refused = client.try_call::<ClearFault>(&()).expect("an answer");
     assert_eq!(refused, Err(Refusal::StillFaulty(untrusted)));
     tracking::set(&mut client, |settings| settings.limits.pressure_pa = 250e3);
     client.call::<ClearFault>(&()).expect("they are confirmed");
-    client.call::<Arm>(&()).expect("it arms");
+    client.call::<Arm>(&client.session()).expect("it arms");
 }
 
 #[test]

@@ -71,8 +71,8 @@ fn flipped_bits_cost_repeats_and_nothing_else() {
             assert!((0..50).any(|_| act(client)), "fifty tries at {rate}");
         };
         patient(&mut client, &|client| {
-            let _ = client.try_call::<model_core::link::endpoints::Arm>(&());
-            let start = model_core::link::messages::Start { mode: Mode::Pressure };
+            let _ = client.try_call::<model_core::link::endpoints::Arm>(&client.session());
+            let start = model_core::link::messages::Start { mode: Mode::Pressure, session: client.session() };
             let _ = client.try_call::<model_core::link::endpoints::StartMode>(&start);
             client.try_call::<GetStatus>(&()).is_ok_and(|s| s.is_ok_and(|s| s.state == State::Running))
         });

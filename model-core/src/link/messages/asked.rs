@@ -15,9 +15,21 @@ pub const REFERENCE_PIECE: usize = 32;
 pub struct Start {
     /// What to control.
     pub mode: Mode,
+    /// The session that owns the mode from now on.
+    pub session: Session,
 }
 
-fields!(Start { mode });
+fields!(Start { mode, session });
+
+/// The session of one program, from when it opens the link until it ends: a number that the program draws at random. The session that
+/// armed the device or started its mode owns it, and only its keep-alive requests count for the watch of host silence.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Session {
+    /// The number.
+    pub id: u32,
+}
+
+fields!(Session { id });
 
 /// What is wanted, in the terms of a mode.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]

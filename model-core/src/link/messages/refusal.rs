@@ -47,6 +47,8 @@ pub enum Refusal {
         /// The greatest, rad.
         high_rad: f32,
     },
+    /// Another session armed the device or started its mode.
+    OtherSession,
 }
 
 told!(Refusal {
@@ -64,6 +66,7 @@ told!(Refusal {
     11 NotSupported {},
     12 Stiffness { low_nm_per_rad: low, high_nm_per_rad: high },
     13 Angle { low_rad: low, high_rad: high },
+    14 OtherSession {},
 });
 
 /// The setting or value that a refusal is about.

@@ -66,7 +66,7 @@ codes! {
         Watchdog,
         /// A calculation gave something that is no number.
         NotANumber,
-        /// No frame of a host for too long while running: the program that was in charge is gone.
+        /// No keep-alive request of the session that started the mode: its program has ended or its line is cut.
         HostSilence,
         /// The kept settings are damaged, or another firmware wrote them: look at them and send them again.
         SettingsInvalid,
