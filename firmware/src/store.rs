@@ -363,4 +363,6 @@ fn fits(image: &[u8], described: &Described) -> bool {
 }
 
 #[cfg(test)]
+mod protection_tests;
+#[cfg(test)]
 pub(crate) mod tests;

@@ -1,10 +1,11 @@
 //! What the controller does when something goes wrong, as physical statements on a muscle that follows its command within 30 ms.
 
-use model_core::link::messages::{Event, Fault, Mode, Refusal, Session, SetPoint, State};
+use model_core::link::messages::{Event, Fault, Mode, Refusal, Session, SetPoint, Side, State};
 use model_core::link::settings::Settings;
 
 use super::Controller;
 use crate::board::{Inputs, Outputs, Readings};
+use crate::watch::Finding;
 
 /// The session that arms and starts in these tests.
 const OWNER: Session = Session { id: 7 };
@@ -347,4 +348,36 @@ fn an_armed_device_whose_owner_is_silent_disarms_itself() {
     assert!(bench.is_vented());
     assert_eq!(bench.latched(), None);
     assert_eq!(bench.controller.start(Mode::Pressure, OWNER), Err(Refusal::WrongState(State::Disarmed)));
+}
+
+#[test]
+fn a_fault_before_anything_runs_vents_even_where_the_settings_would_hold() {
+    // The valve test is the only time before a run at which the command is not to vent.
+    let mut bench = Bench::new(|settings| {
+        settings.watch.valve_test_pa = 40e3;
+        settings.hold_on = u32::MAX;
+    });
+    bench.pass(10);
+    assert_eq!(bench.controller.arm(OWNER), Ok(()));
+    bench.pass(5);
+    assert!(!bench.is_vented());
+    let finding = Finding { fault: Fault::SensorRange, sensor: None, value: 0.0, limit: 0.0 };
+    bench.controller.raise(Side::Agonist, &finding);
+    bench.pass(1);
+    assert!(bench.is_vented() && bench.controller.is_vented());
+    assert_eq!((bench.controller.state(), bench.latched()), (State::Fault, Some(Fault::SensorRange)));
+}
+
+#[test]
+fn a_fault_that_is_not_held_for_vents_in_the_tick_in_which_it_is_found() {
+    let mut bench = Bench::running(|_| ());
+    let finding = Finding { fault: Fault::SensorRange, sensor: None, value: 0.0, limit: 0.0 };
+    bench.controller.raise(Side::Agonist, &finding);
+    assert!(bench.controller.is_vented());
+    let mut never = Bench::running(|settings| {
+        settings.hold_on = u32::MAX;
+        settings.watch.hold_ticks = 0;
+    });
+    never.controller.raise(Side::Agonist, &finding);
+    assert!(never.controller.is_vented(), "a hold of no time is none");
 }

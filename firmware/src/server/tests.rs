@@ -9,6 +9,8 @@ use model_core::link::settings::Settings;
 use model_core::table;
 use model_core::units::Pressure;
 
+mod protection;
+
 use super::answers::Answers;
 use super::*;
 use crate::board::{Inputs, Readings};

@@ -22,6 +22,8 @@ pub(crate) struct MockFlash {
     lasts: usize,
     /// What a cut leaves of the word or page it hits: 0 nothing happened, 1 half, 2 all of it.
     tear: usize,
+    /// The word, counted from now, of which a bit is not written as it should be.
+    wrong: usize,
 }
 
 #[derive(Debug)]
@@ -37,13 +39,18 @@ impl MockFlash {
     pub(crate) fn erased() -> Self {
         let mut bytes = Vec::new();
         bytes.resize(PAGE * PAGES, 0xFF).expect("its own size");
-        Self { bytes, left: usize::MAX, done: 0, off: false, lasts: usize::MAX, tear: 0 }
+        Self { bytes, left: usize::MAX, done: 0, off: false, lasts: usize::MAX, tear: 0, wrong: usize::MAX }
     }
 
     /// The same worn out: so many more writes work, and everything is read.
     pub(crate) fn failing_after(mut self, writes: usize) -> Self {
         self.lasts = writes;
         self
+    }
+
+    /// Words and pages since the flash was set up.
+    pub(super) fn words_written(&self) -> usize {
+        self.done
     }
 
     /// Counts one operation; false when the power goes with it.
@@ -55,6 +62,12 @@ impl MockFlash {
         self.left -= 1;
         self.done += 1;
         true
+    }
+
+    /// The same with a bad cell in the word that is written after so many others.
+    pub(super) fn wrong_at(mut self, word: usize) -> Self {
+        (self.done, self.wrong) = (0, word);
+        self
     }
 
     pub(crate) fn powered(mut self, left: usize, tear: usize) -> Self {
@@ -128,12 +141,16 @@ impl NorFlash for MockFlash {
                 return Err(PowerCut);
             }
             self.bytes[place..place + WORD].copy_from_slice(word);
+            if self.done - 1 == self.wrong {
+                // A cell that has lost its charge reads as written, or as not written.
+                self.bytes[place] ^= 0x04;
+            }
         }
         Ok(())
     }
 }
 
-fn table(fill: u8) -> [u8; 700] {
+pub(super) fn table(fill: u8) -> [u8; 700] {
     let mut bytes = [fill; 700];
     for (n, byte) in bytes.iter_mut().enumerate() {
         *byte ^= n as u8;
@@ -141,15 +158,15 @@ fn table(fill: u8) -> [u8; 700] {
     bytes
 }
 
-fn open(flash: MockFlash) -> Store<MockFlash> {
+pub(super) fn open(flash: MockFlash) -> Store<MockFlash> {
     Store::open(flash).expect("six pages are a store")
 }
 
-fn kept(store: &mut Store<MockFlash>, side: Side) -> Option<std::vec::Vec<u8>> {
+pub(super) fn kept(store: &mut Store<MockFlash>, side: Side) -> Option<std::vec::Vec<u8>> {
     store.table(side).expect("what is selected is whole").map(<[u8]>::to_vec)
 }
 
-fn settings_of(store: &mut Store<MockFlash>) -> Option<Settings> {
+pub(super) fn settings_of(store: &mut Store<MockFlash>) -> Option<Settings> {
     let mut settings = Settings::default();
     let kept = store.settings(&mut settings).expect("readable");
     assert!(kept != Kept::Untrusted, "nothing is damaged");
@@ -157,7 +174,7 @@ fn settings_of(store: &mut Store<MockFlash>) -> Option<Settings> {
 }
 
 /// A store with some history, so that an operation meets pages that are nearly full and has to move what is alive.
-fn used(commits: u8) -> Store<MockFlash> {
+pub(super) fn used(commits: u8) -> Store<MockFlash> {
     let mut store = open(MockFlash::erased());
     for n in 0..commits {
         store.commit(Side::Agonist, &table(n)).expect("room");
