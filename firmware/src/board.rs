@@ -48,12 +48,12 @@ pub struct Outputs {
     /// Command to each regulator.
     pub sides: [Command; 2],
     /// What is asked for, for a plant that logs it.
-    pub asked: f32,
+    pub setpoint: f32,
 }
 
 impl Outputs {
     /// Every muscle vented: what a board does before the first step.
-    pub const VENT: Self = Self { sides: [Command::VENT; 2], asked: 0.0 };
+    pub const VENT: Self = Self { sides: [Command::VENT; 2], setpoint: 0.0 };
 }
 
 /// The sensors and regulators of a board, which also keep its time: one return is one control tick.

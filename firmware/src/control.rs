@@ -27,7 +27,7 @@ mod actuator;
 mod arming;
 mod check;
 mod drive;
-mod look_out;
+mod monitor;
 mod record;
 mod requests;
 
@@ -46,7 +46,7 @@ fn motion_settings(settings: &Settings) -> MotionSettings<f32> {
 
 /// What the host is to hear of; the report of a fault is the latched one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum News {
+enum Notice {
     Fault,
     State(State),
     TraceFull,
@@ -63,12 +63,12 @@ pub struct Controller {
     unconfirmed: bool,
     mode: Mode,
     generator: Generator,
-    asked: f32,
-    asked_second: f32,
+    setpoint: f32,
+    setpoint_second: f32,
     /// What will be asked when a command of this tick has come to act, as far as it is known, and how it came there in this tick.
-    coming: f32,
-    coming_step: f32,
-    asked_age: u32,
+    lookahead: f32,
+    lookahead_step: f32,
+    setpoint_age: u32,
     /// The session that armed the device or started its mode.
     owner: Session,
     /// Ticks since the owner's last keep-alive request.
@@ -87,7 +87,7 @@ pub struct Controller {
     trace: Trace,
     /// A finding of the last tick: what would stand in the way of clearing.
     present: Option<Fault>,
-    news: Option<News>,
+    notice: Option<Notice>,
     step_us: f32,
 }
 
@@ -108,11 +108,11 @@ impl Controller {
             machine: Machine::default(),
             mode: Mode::Vent,
             generator: Generator::default(),
-            asked: 0.0,
-            asked_second: 0.0,
-            coming: 0.0,
-            coming_step: 0.0,
-            asked_age: 0,
+            setpoint: 0.0,
+            setpoint_second: 0.0,
+            lookahead: 0.0,
+            lookahead_step: 0.0,
+            setpoint_age: 0,
             owner: Session::default(),
             owner_age: 0,
             sides: [Actuator::new(settings, first), Actuator::new(settings, second)],
@@ -127,7 +127,7 @@ impl Controller {
             telemetry_number: 0,
             trace: Trace::default(),
             present: None,
-            news: None,
+            notice: None,
             step_us: 0.0,
         }
     }
@@ -167,7 +167,7 @@ impl Controller {
         self.overruns
     }
 
-    /// Ticks in which a wish was out of reach.
+    /// Ticks in which a demand was out of reach.
     pub fn saturated_ticks(&self) -> u32 {
         self.saturated_ticks
     }
@@ -259,7 +259,7 @@ impl Controller {
         if !self.machine.fault(&report) {
             return;
         }
-        self.news = Some(News::Fault);
+        self.notice = Some(Notice::Fault);
         self.trace.on_fault();
         self.held_ticks = 0;
         // A fault of a start that never ran leaves nothing pressurised.
@@ -283,7 +283,7 @@ impl Controller {
         self.machine.ended_hold(&report);
         self.vent_now();
         // The link's task keeps the report, now that nothing is held.
-        self.news = Some(News::State(State::Fault));
+        self.notice = Some(Notice::State(State::Fault));
     }
 
     fn report(&self, side: Side, finding: &Finding) -> FaultReport {
@@ -335,11 +335,11 @@ impl Controller {
     fn ask(&mut self) {
         match self.generator.step_ahead(regulator::ahead(&self.settings.regulator)) {
             Some((now, coming)) => {
-                self.asked = now;
-                self.coming_step = coming - self.coming;
-                self.coming = coming;
+                self.setpoint = now;
+                self.lookahead_step = coming - self.lookahead;
+                self.lookahead = coming;
             }
-            None => (self.coming, self.coming_step) = (self.asked, 0.0),
+            None => (self.lookahead, self.lookahead_step) = (self.setpoint, 0.0),
         }
     }
 

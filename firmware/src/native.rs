@@ -172,7 +172,7 @@ fn serve(
                 connected.store(false, Ordering::Relaxed);
             }
             Err(_) => {
-                while shared.next_spoken(&mut spoken).is_some() {}
+                while shared.next_outgoing(&mut spoken).is_some() {}
                 thread::sleep(Duration::from_millis(2));
             }
         }
@@ -200,7 +200,7 @@ fn talk(
     let mut bytes = [0; 1024];
     let mut out = [0; MAX_TOPIC];
     while !stop.load(Ordering::Relaxed) {
-        while let Some(length) = shared.next_spoken(&mut out) {
+        while let Some(length) = shared.next_outgoing(&mut out) {
             stream.write_all(&out[..length])?;
         }
         let count = match stream.read(&mut bytes) {

@@ -8,11 +8,11 @@ use heapless::Vec;
 use micromath::F32Ext;
 use model_core::link::messages::{Field, REFERENCE_PIECE, Reference, ReferencePoints, Refusal};
 
-use crate::brief::Brief;
-use crate::room::{Room, room};
+use crate::compact_float::CompactFloat;
+use crate::placement::{Placed, placed};
 use crate::tick::{TICK_S, TICKS_PER_S};
 
-/// Points that a reference table holds, three bytes each ([`Brief`]).
+/// Points that a reference table holds, three bytes each ([`CompactFloat`]).
 pub const CAPACITY: usize = 256;
 
 /// Ticks that a wave can be looked at ahead of its time.
@@ -27,10 +27,10 @@ pub struct Generator {
     /// Ticks since it began.
     ticks: u32,
     phase: u32,
-    points: Room<Vec<Brief, CAPACITY>>,
+    points: Placed<Vec<CompactFloat, CAPACITY>>,
     last: f32,
     /// The last values made, at their number; how many were made, and how many of these have had their time.
-    coming: [f32; AHEAD],
+    lookahead: [f32; AHEAD],
     made: u32,
     given: u32,
 }
@@ -41,9 +41,9 @@ impl Default for Generator {
             reference: Reference::SetPoint,
             ticks: 0,
             phase: 0,
-            points: room!(Vec<Brief, CAPACITY>, Vec::new()),
+            points: placed!(Vec<CompactFloat, CAPACITY>, Vec::new()),
             last: 0.0,
-            coming: [0.0; AHEAD],
+            lookahead: [0.0; AHEAD],
             made: 0,
             given: 0,
         }
@@ -149,7 +149,7 @@ impl Generator {
             return Err(Refusal::Range);
         }
         for point in &piece.points {
-            self.points.push(Brief::of(*point)).map_err(|_| Refusal::Range)?;
+            self.points.push(CompactFloat::of(*point)).map_err(|_| Refusal::Range)?;
         }
         Ok(self.points.len() as u16)
     }
@@ -160,7 +160,7 @@ impl Generator {
         let ticks = ticks.min(AHEAD - 1) as u32;
         while self.made.wrapping_sub(self.given) <= ticks {
             let value = self.step()?;
-            self.coming[self.made as usize % AHEAD] = value;
+            self.lookahead[self.made as usize % AHEAD] = value;
             self.made = self.made.wrapping_add(1);
         }
         Some(())
@@ -170,7 +170,7 @@ impl Generator {
     /// by one tick.
     pub fn step_ahead(&mut self, ticks: usize) -> Option<(f32, f32)> {
         self.look_ahead(ticks)?;
-        let now = self.coming[self.given as usize % AHEAD];
+        let now = self.lookahead[self.given as usize % AHEAD];
         self.given = self.given.wrapping_add(1);
         Some((now, self.last))
     }

@@ -9,7 +9,7 @@
 //! that widens draws air through the line. Gain and offset are inverted exactly; line and lag by lead as far as the settings
 //! ask, each by a rate that is smoothed over a seventh of the lag, so that a sensor's noise is not made ten times as large or
 //! more. What that smoothing and the loop itself are late by is led too, or wished for ahead of time where what comes is known
-//! ([`Wish::foreseen_pa`]). A rate limit and a deadband cannot be inverted; they are only predicted, so that the watch on
+//! ([`Demand::lookahead_pa`]). A rate limit and a deadband cannot be inverted; they are only predicted, so that the watch on
 //! pressure knows what to expect. What the measured pressure lacks of the predicted is added slowly
 //! ([`RegulatorState::observe`]).
 
@@ -47,11 +47,11 @@ impl Default for Air {
 
 /// What is wanted of the regulator in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Wish {
+pub struct Demand {
     /// Pressure in the muscle, Pa.
     pub pressure_pa: f32,
     /// What of the last change of that was known ahead of time, Pa; it is wished for [`ahead`] ticks before its time.
-    pub foreseen_pa: f32,
+    pub lookahead_pa: f32,
 }
 
 /// Ticks before its time that what is known should be wished for.
@@ -62,7 +62,7 @@ pub fn ahead(regulator: &Regulator) -> usize {
 /// Keeps the regulator's model and the last wanted pressure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RegulatorState {
-    wanted_pa: f32,
+    pressure_demand_pa: f32,
     rate_pa_per_s: f32,
     /// What the regulator's outlet should have, smoothed, and what of its rate was known.
     outlet_pa: f32,
@@ -79,10 +79,10 @@ pub struct RegulatorState {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Driven {
     /// Wanted pressure after slew and limits, Pa.
-    pub wanted_pa: f32,
+    pub pressure_demand_pa: f32,
     /// Command, Pa.
     pub command_pa: f32,
-    /// Whether a limit cut the wish: an integrator behind it must not go on.
+    /// Whether a limit cut the demand: an integrator behind it must not go on.
     pub saturated: bool,
 }
 
@@ -91,7 +91,7 @@ impl RegulatorState {
     pub fn begin(&mut self, pressure_pa: f32) {
         let pressure_pa = if pressure_pa.is_finite() { pressure_pa.at_least(0.0) } else { 0.0 };
         *self = Self {
-            wanted_pa: pressure_pa,
+            pressure_demand_pa: pressure_pa,
             outlet_pa: pressure_pa,
             supplied_pa: pressure_pa,
             model_pa: pressure_pa,
@@ -124,7 +124,7 @@ impl RegulatorState {
     pub fn step(
         &mut self,
         dt: f32,
-        wish: Wish,
+        demand: Demand,
         high_pa: f32,
         air: &Air,
         regulator: &Regulator,
@@ -132,13 +132,16 @@ impl RegulatorState {
     ) -> Driven {
         let slew = limits.slew_pa_per_s * dt;
         let high = high_pa.at_least(0.0);
-        let wanted = wish.pressure_pa.within(0.0, high).within(self.wanted_pa - slew, self.wanted_pa + slew);
+        let wanted = demand
+            .pressure_pa
+            .within(0.0, high)
+            .within(self.pressure_demand_pa - slew, self.pressure_demand_pa + slew);
         let smoothing = SMOOTHING * regulator.lag_s;
         let share = dt / (dt + smoothing);
-        self.rate_pa_per_s += ((wanted - self.wanted_pa) / dt - self.rate_pa_per_s) * share;
-        let foreseen = wish.foreseen_pa.within(-slew, slew) / dt;
+        self.rate_pa_per_s += ((wanted - self.pressure_demand_pa) / dt - self.rate_pa_per_s) * share;
+        let foreseen = demand.lookahead_pa.within(-slew, slew) / dt;
         self.foreseen_pa_per_s += (foreseen - self.foreseen_pa_per_s) * share;
-        self.wanted_pa = wanted;
+        self.pressure_demand_pa = wanted;
         let line = regulator.line_s * air.fill;
         let draught = (wanted + ATMOSPHERE_PA) * air.widening_per_s;
         let outlet_rate =
@@ -156,9 +159,9 @@ impl RegulatorState {
         self.predict(dt, modelled, air, regulator);
         self.command_pa = command;
         Driven {
-            wanted_pa: wanted,
+            pressure_demand_pa: wanted,
             command_pa: command,
-            saturated: wanted != wish.pressure_pa || command != free,
+            saturated: wanted != demand.pressure_pa || command != free,
         }
     }
 
@@ -200,8 +203,8 @@ mod tests {
     use super::*;
     use model_core::link::settings::Settings;
 
-    fn plain(pressure_pa: f32) -> Wish {
-        Wish { pressure_pa, foreseen_pa: 0.0 }
+    fn plain(pressure_pa: f32) -> Demand {
+        Demand { pressure_pa, lookahead_pa: 0.0 }
     }
 
     #[test]
@@ -257,7 +260,7 @@ mod tests {
         let settings = Settings::default();
         let regulator = Regulator { line_s: 5e-3, ..settings.regulator };
         let step = |state: &mut RegulatorState, wanted: f32| {
-            let foreseen = Wish { pressure_pa: wanted, foreseen_pa: 100.0 };
+            let foreseen = Demand { pressure_pa: wanted, lookahead_pa: 100.0 };
             state.step(1e-3, foreseen, 600e3, &Air::default(), &regulator, &settings.limits)
         };
         let mut vented = RegulatorState::default();

@@ -34,7 +34,7 @@ use sequential_storage::Error;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage, SerializationError, Value};
 
-use crate::room::{Room, room};
+use crate::placement::{Placed, placed};
 
 mod settings;
 
@@ -143,7 +143,7 @@ fn fault_of<E>(error: Error<E>) -> StoreFault {
 /// The store over a flash. Its flash is one that answers at once (it blocks, or it is a file), so that no task waits on it.
 pub struct Store<F: NorFlash> {
     map: MapStorage<u8, F, NoCache>,
-    buffer: Room<[u8; BUFFER]>,
+    buffer: Placed<[u8; BUFFER]>,
 }
 
 impl<F: NorFlash> Store<F> {
@@ -156,7 +156,7 @@ impl<F: NorFlash> Store<F> {
         let config = MapConfig::try_new(0..end).map_err(|_| StoreFault::Full)?;
         Ok(Self {
             map: MapStorage::new(flash, config, Cache::new_uncached()),
-            buffer: room!([u8; BUFFER], [0; BUFFER]),
+            buffer: placed!([u8; BUFFER], [0; BUFFER]),
         })
     }
 
@@ -363,6 +363,10 @@ fn fits(image: &[u8], described: &Described) -> bool {
 }
 
 #[cfg(test)]
+mod format_tests;
+#[cfg(test)]
+pub(crate) mod mock_flash;
+#[cfg(test)]
 mod protection_tests;
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;

@@ -37,7 +37,7 @@ impl Way for &[u8] {
     }
 }
 
-/// Room to write.
+/// Placed to write.
 impl Way for &mut [u8] {
     fn reads(&self) -> bool {
         false
@@ -223,7 +223,7 @@ macro_rules! choices {
 }
 
 /// As [`choices`], for what a controller says and never reads.
-macro_rules! told {
+macro_rules! one_of {
     ($name:ty { $($number:literal $variant:ident { $($field:tt: $binding:ident),* }),* $(,)? }) => {
         impl $crate::fields::Fields for $name {
             fn walk(&mut self, walk: &mut $crate::fields::Walk<'_>) {
@@ -238,7 +238,7 @@ macro_rules! told {
     };
 }
 
-pub(crate) use {choices, codes, fields, told};
+pub(crate) use {choices, codes, fields, one_of};
 
 impl Fields for () {
     fn walk(&mut self, _: &mut Walk<'_>) {}

@@ -4,7 +4,7 @@
 //! together once, and Newton's method runs on them; a bracket keeps it from leaving, so that it ends for every table.
 
 use crate::effects::{Chain, Context};
-use crate::muscle::{COMMON_ORDER, Held, HeldSlopes, Moment, Muscle, Piece};
+use crate::muscle::{AtStroke, COMMON_ORDER, Moment, Muscle, Piece, StrokeSlopes};
 use crate::scalar::Scalar;
 use crate::spline::{self, Cubic};
 use crate::units::{Force, Pressure};
@@ -157,7 +157,7 @@ fn judge<T: Scalar>(miss: T, slope: T, tolerance: T) -> Reach {
 /// The base model at one stroke and direction: one product of two cubics in each piece.
 struct Base<'a, T> {
     muscle: &'a Muscle<T>,
-    held: &'a Held<T>,
+    held: &'a AtStroke<T>,
     direction: T,
     quasi: Cubic<T>,
     grip: Cubic<T>,
@@ -171,7 +171,7 @@ struct Base<'a, T> {
 impl<'a, T: Scalar> Base<'a, T> {
     /// Without cubics yet; they are put together where the search enters.
     #[inline(always)]
-    fn new(muscle: &'a Muscle<T>, held: &'a Held<T>, direction: T) -> Self {
+    fn new(muscle: &'a Muscle<T>, held: &'a AtStroke<T>, direction: T) -> Self {
         let (quasi, grip) = ([T::ZERO; 4], [T::ZERO; 4]);
         Self { muscle, held, direction, quasi, grip, origin: T::ZERO, from: T::ZERO, to: T::ZERO }
     }
@@ -214,8 +214,8 @@ impl<T: Scalar> Curve<T> for Base<'_, T> {
 /// The base model and effects that change with pressure.
 struct Whole<'a, T> {
     muscle: &'a Muscle<T>,
-    held: &'a Held<T>,
-    slopes: &'a HeldSlopes<T>,
+    held: &'a AtStroke<T>,
+    slopes: &'a StrokeSlopes<T>,
     chain: &'a Chain<T>,
     /// The present moment, moved to the pressures that are tried.
     context: Context<T>,
@@ -265,7 +265,7 @@ impl<T: Scalar> Muscle<T> {
     pub fn pressure_for(
         &self,
         force: Force<T>,
-        held: &Held<T>,
+        held: &AtStroke<T>,
         direction: T,
         guess: Pressure<T>,
         search: &Search<T>,

@@ -5,7 +5,7 @@ use model_core::link::settings::{FeedForward, Settings};
 
 use super::actuator::Actuator;
 use super::arming::Arming;
-use super::{Controller, News};
+use super::{Controller, Notice};
 use crate::board::Command;
 use crate::pair::{self, Arm};
 use crate::regulator;
@@ -17,7 +17,7 @@ impl Controller {
         let before = self.machine.state();
         let state = self.machine.request(cause)?;
         if state != before {
-            self.news = Some(News::State(state));
+            self.notice = Some(Notice::State(state));
         }
         self.arming = Arming::Idle;
         if state != State::Running {
@@ -51,21 +51,21 @@ impl Controller {
         self.generator.begin(Reference::SetPoint)?;
         let first = self.sides[0].sample;
         let joint = self.settings.joint;
-        self.asked_second = 0.0;
-        self.asked = match mode {
+        self.setpoint_second = 0.0;
+        self.setpoint = match mode {
             Mode::Vent => 0.0,
             Mode::Pressure => first.pressure_pa.max(0.0),
             Mode::Force => first.force_n.max(0.0),
             Mode::Stroke => first.stroke_m,
             Mode::Pair => (first.stroke_m - self.sides[1].sample.stroke_m) / (2.0 * joint.radius_m),
         };
-        self.asked_age = 0;
+        self.setpoint_age = 0;
         for side in &mut self.sides {
             side.regulator.begin(side.sample.pressure_pa);
             side.trim.reset();
             side.stroke_loop.reset();
             side.guess_pa = side.sample.pressure_pa;
-            side.cut = 0.0;
+            side.saturation = 0.0;
             side.watch.restart();
         }
         if mode == Mode::Pair
@@ -169,8 +169,8 @@ impl Controller {
             self.can_pose(asked, second)?;
         }
         self.generator.begin(Reference::SetPoint)?;
-        (self.asked, self.asked_second) = (asked, second);
-        self.asked_age = 0;
+        (self.setpoint, self.setpoint_second) = (asked, second);
+        self.setpoint_age = 0;
         Ok(())
     }
 
@@ -209,13 +209,13 @@ impl Controller {
         }
         if self.mode == Mode::Pair {
             let (low, high) = self.generator.range(reference);
-            self.can_pose(low, self.asked_second)?;
-            self.can_pose(high, self.asked_second)?;
+            self.can_pose(low, self.setpoint_second)?;
+            self.can_pose(high, self.setpoint_second)?;
         }
         self.generator.begin(reference)?;
         // Here, so that no tick has all of it to do.
         self.generator.look_ahead(regulator::ahead(&self.settings.regulator));
-        self.asked_age = 0;
+        self.setpoint_age = 0;
         self.trace.on_start();
         Ok(())
     }

@@ -10,15 +10,15 @@ use model_core::link::messages::{
     TablePiece, TableRead, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead, Value,
 };
 use model_core::link::settings::Settings;
-use model_core::muscle::Held;
+use model_core::muscle::AtStroke;
 use model_core::single;
 use model_core::units::{Length, Pressure};
 
 use super::{Server, table_refusal};
-use crate::common_room::{Incoming, TRACE_CAPACITY};
 use crate::control::{self, Controller};
 use crate::reference;
 use crate::shared::Shared;
+use crate::shared_buffer::{Incoming, TRACE_CAPACITY};
 use crate::tick::TICKS_PER_S;
 
 /// A server and the controller that it asks.
@@ -209,7 +209,7 @@ impl<F: NorFlash> Service for Answers<'_, F> {
             let value = self.shared.with(|controller| {
                 let muscle = &controller.model(request.side)?.muscle;
                 // As the control step does it, so that no other form of either is in the image.
-                let mut held = Held::NONE;
+                let mut held = AtStroke::NONE;
                 let force = single::pose(muscle, &mut held, stroke, pressure, direction);
                 let found = single::pressure_for(muscle, &held, direction, force, pressure, &muscle.search());
                 Some(Value { force_n: force.newtons(), pressure_pa: found.pressure.pascals() })

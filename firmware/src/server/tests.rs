@@ -15,7 +15,7 @@ use super::answers::Answers;
 use super::*;
 use crate::board::{Inputs, Readings};
 use crate::control::Controller;
-use crate::store::tests::MockFlash;
+use crate::store::mock_flash::MockFlash;
 
 /// The session that arms and starts in these tests.
 const OWNER: Session = Session { id: 7 };
@@ -75,7 +75,7 @@ fn deadband_in_use(shared: &Shared) -> Option<f32> {
     // The force at no stroke vanishes at the deadband.
     shared.with(|controller| {
         let muscle = &controller.model(Side::Agonist)?.muscle;
-        let mut held = model_core::muscle::Held::NONE;
+        let mut held = model_core::muscle::AtStroke::NONE;
         let (stroke, force) = (Default::default(), model_core::units::Force::from_newtons(10.0));
         model_core::single::hold(muscle, &mut held, stroke);
         let guess = Pressure::from_kilopascals(100.0);

@@ -1,6 +1,7 @@
 //! Checks of the store that keep people safe: each test fails if the check that it names is removed.
 
-use super::tests::{MockFlash, kept, open, settings_of, table, used};
+use super::mock_flash::MockFlash;
+use super::tests::{kept, open, settings_of, table, used};
 use super::*;
 use model_core::link::settings::Settings;
 
@@ -14,7 +15,7 @@ fn with_each_word_wrong(
         let mut store = open(before.clone().wrong_at(word));
         let said = operation(&mut store);
         let flash = store.close();
-        let written = flash.words_written();
+        let written = flash.done;
         look(&mut open(flash), said, word);
         if written <= word {
             assert!(said, "without a bad cell it succeeds");

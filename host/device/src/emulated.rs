@@ -180,7 +180,7 @@ impl Emulated {
         stand.reset(0);
         let plant = move |outputs: &Outputs| {
             let side = &outputs.sides[0];
-            let readings = stand.step(if side.vent { 0.0 } else { side.pressure_pa }, outputs.asked);
+            let readings = stand.step(if side.vent { 0.0 } else { side.pressure_pa }, outputs.setpoint);
             let now = Readings {
                 pressure_pa: readings.pressure,
                 stroke_m: readings.stroke,

@@ -309,8 +309,8 @@ mod tests {
             tick: time_us / 1000,
             state: State::Running,
             mode: Mode::Force,
-            asked: 1.0,
-            asked_second: 0.0,
+            setpoint: 1.0,
+            setpoint_second: 0.0,
             sides: [side].into_iter().collect(),
         }
     }

@@ -243,7 +243,7 @@ impl Squares {
     }
 }
 
-/// How far what was measured stayed from what was asked: all the time, and after the muscle had filled.
+/// How far what was measured stayed from what was setpoint: all the time, and after the muscle had filled.
 #[derive(Debug)]
 struct Errors {
     joint: Joint,
@@ -268,7 +268,7 @@ impl Errors {
                 None => return,
             },
         };
-        let error = f64::from(measured - sample.asked);
+        let error = f64::from(measured - sample.setpoint);
         if error.is_finite() {
             let begun = *self.begun.get_or_insert(sample.time_us);
             self.all.add(error);

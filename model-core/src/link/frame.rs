@@ -258,7 +258,7 @@ impl<'a> Exchange<'a> {
         &self.bytes[HEADER..HEADER + self.body]
     }
 
-    /// Room for an answer; what has come is overwritten.
+    /// Placed for an answer; what has come is overwritten.
     pub fn room(&mut self) -> &mut [u8; MAX_WIRE] {
         self.bytes
     }

@@ -26,8 +26,9 @@ pub struct Bandwidth {
 /// The true force's amplitude as a part of what is asked for, of a sine that a host sends tick by tick.
 fn gain(subject: &Subject, law: Law, hz: f64) -> f64 {
     let bench = BenchSpec::laboratory(subject.spec.clone(), 11);
-    let settings = subject.settings(law, Load::Held);
-    let mut control = Loop::start(&bench, &subject.motion(Load::Held), &subject.table, settings, Mode::Force);
+    let settings = subject.settings(law, Load::AtStroke);
+    let mut control =
+        Loop::start(&bench, &subject.motion(Load::AtStroke), &subject.table, settings, Mode::Force);
     let (mean, _) = subject.wish(Mode::Force);
     let amplitude = AMPLITUDE * subject.blocked();
     control.point(SetPoint::Force(mean));

@@ -3,8 +3,8 @@
 
 use firmware::board::{Inputs, Outputs, Readings};
 use firmware::control::Controller;
+use firmware::outbox::Sample;
 use firmware::regulator::SMOOTHING;
-use firmware::spoken::Sample;
 use firmware::tick::TICK_S;
 use model_core::link::messages::{Mode, Reference, Session, SetPoint, Side, State};
 use model_core::link::settings::{FeedForward, Settings};
@@ -26,7 +26,7 @@ pub struct Loop {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tick {
     /// What was asked for.
-    pub asked: f64,
+    pub setpoint: f64,
     /// True force, N.
     pub force: f64,
     /// True stroke, m.
@@ -85,7 +85,7 @@ impl Loop {
                 assert!(self.controller.state() == State::Running, "stopped by {latched:?}");
                 let truth = self.plant.truth();
                 Tick {
-                    asked: f64::from(sample.map_or(f32::NAN, |sample| sample.asked)),
+                    setpoint: f64::from(sample.map_or(f32::NAN, |sample| sample.setpoint)),
                     force: truth.force,
                     stroke: truth.stroke,
                     pressure: truth.pressure,
@@ -119,7 +119,7 @@ impl Loop {
 
 /// Root mean square of what was asked for less `value`.
 pub fn rms(ticks: &[Tick], value: impl Fn(&Tick) -> f64) -> f64 {
-    let sum: f64 = ticks.iter().map(|tick| (tick.asked - value(tick)).powi(2)).sum();
+    let sum: f64 = ticks.iter().map(|tick| (tick.setpoint - value(tick)).powi(2)).sum();
     (sum / ticks.len().max(1) as f64).sqrt()
 }
 

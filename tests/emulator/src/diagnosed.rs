@@ -35,7 +35,7 @@ pub struct Case {
     /// How its free end is moved while the controller works.
     pub motion: Motion,
     /// What is asked of the force meanwhile.
-    pub asked: Vec<Stretch>,
+    pub setpoint: Vec<Stretch>,
     /// Blocked force at the highest level, N.
     pub blocked: f64,
 }
@@ -118,7 +118,7 @@ pub fn cases() -> Vec<Case> {
         let (blocked, x, v) = sizes(&plain);
         let mut spec = plain.clone();
         let words = conceal(&mut spec, blocked, x, v);
-        Case { effect, words, plain, spec, motion: motion(x), asked: asked(blocked), blocked }
+        Case { effect, words, plain, spec, motion: motion(x), setpoint: asked(blocked), blocked }
     })
     .to_vec()
 }
@@ -215,7 +215,7 @@ pub fn here(spec: &MuscleSpec, case: &Case, table: &MuscleTable) -> f64 {
     let with = closed_loop::forward(settings(&bench, table, case.blocked), FeedForward::Table);
     let mut control = Loop::start(&bench, &case.motion, table, with, Mode::Force);
     let mut judged = Vec::new();
-    for stretch in &case.asked {
+    for stretch in &case.setpoint {
         match stretch.wanted {
             Wanted::Wave(wave) => control.wave(wave),
             Wanted::Point(point) => control.point(point),
@@ -255,7 +255,7 @@ pub fn in_emulator(spec: &MuscleSpec, case: &Case, tables: &[&MuscleTable]) -> R
             });
             // Motion and course begin together, on a muscle that has not waited, however long all this took.
             station.with(|bench| *bench.plant() = start);
-            let samples = tracking::run(&mut client, Mode::Force, &case.asked);
+            let samples = tracking::run(&mut client, Mode::Force, &case.setpoint);
             Ok(100.0 * tracking::rms(&samples, tracking::force) / case.blocked)
         })
         .collect()

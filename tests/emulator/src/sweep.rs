@@ -1,4 +1,4 @@
-//! How well force and stroke follow what is asked: each muscle on several loads, under several control laws, against what the
+//! How well force and stroke follow what is setpoint: each muscle on several loads, under several control laws, against what the
 //! regulator alone would allow.
 //!
 //! The controller is the firmware's own library on the bench's plant, a tick after the other and as fast as this machine goes.
@@ -24,7 +24,7 @@ use crate::{fitting, upload};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Load {
     /// Its length is held.
-    Held,
+    AtStroke,
     /// Its free end is moved at 0.3 Hz over a quarter of the free stroke.
     Moved,
     /// It pulls a mass against a spring.
@@ -73,7 +73,7 @@ impl Load {
     /// In words.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Held => "held",
+            Self::AtStroke => "held",
             Self::Moved => "moved",
             Self::Spring => "mass and spring",
         }
@@ -168,7 +168,7 @@ impl Subject {
     pub(crate) fn motion(&self, load: Load) -> Motion {
         let free_mm = self.free_stroke() * 1e3;
         match load {
-            Load::Held => Motion::Held { stroke_mm: 0.2 * free_mm },
+            Load::AtStroke => Motion::Held { stroke_mm: 0.2 * free_mm },
             Load::Moved => {
                 Motion::Sine { mean_mm: 0.22 * free_mm, amplitude_mm: 0.12 * free_mm, frequency_hz: 0.3 }
             }
@@ -310,11 +310,11 @@ impl Subject {
             per_pascal /= 2.0 * spring * 1e3;
         }
         let most = bench.pneumatics.rate * per_pascal * f64::from(TICK_S);
-        let mut reached = ticks[0].asked;
+        let mut reached = ticks[0].setpoint;
         let mut squares = 0.0;
         for tick in &ticks {
-            reached += (tick.asked - reached).clamp(-most, most);
-            squares += (tick.asked - reached).powi(2);
+            reached += (tick.setpoint - reached).clamp(-most, most);
+            squares += (tick.setpoint - reached).powi(2);
         }
         let late = squares / ticks.len() as f64;
         let held = Motion::Held { stroke_mm: self.middle(load) * 1e3 };

@@ -138,7 +138,7 @@ pub fn run(client: &mut Client, mode: Mode, stretches: &[Stretch]) -> Vec<Teleme
 
 /// Root mean square of `asked − value`.
 pub fn rms(samples: &[Telemetry], value: impl Fn(&Telemetry) -> f32) -> f64 {
-    let sum: f64 = samples.iter().map(|s| f64::from(s.asked - value(s)).powi(2)).sum();
+    let sum: f64 = samples.iter().map(|s| f64::from(s.setpoint - value(s)).powi(2)).sum();
     (sum / samples.len().max(1) as f64).sqrt()
 }
 

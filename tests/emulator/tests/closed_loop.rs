@@ -134,7 +134,10 @@ fn stroke_is_reached_against_a_spring_without_a_lasting_error() {
 
 /// Ticks until what is wanted is within a part of `scale` for good.
 fn settled(ticks: &[Tick], scale: f64, value: impl Fn(&Tick) -> f64) -> usize {
-    ticks.iter().rposition(|tick| (value(tick) - tick.asked).abs() > 0.03 * scale).map_or(0, |last| last + 1)
+    ticks
+        .iter()
+        .rposition(|tick| (value(tick) - tick.setpoint).abs() > 0.03 * scale)
+        .map_or(0, |last| last + 1)
 }
 
 #[test]
@@ -230,7 +233,7 @@ fn a_wish_that_stands_still_is_held_without_swinging_while_a_load_moves_the_musc
     use emulator_tests::sweep::{Law, Load, Subject};
     for spec in [presets::miniature(), presets::contractile(), presets::push()] {
         let subject = Subject::of(spec);
-        for load in [Load::Held, Load::Moved, Load::Spring] {
+        for load in [Load::AtStroke, Load::Moved, Load::Spring] {
             let [table, trimmed] = [Law::Table, Law::Trimmed].map(|law| subject.still(load, law));
             eprintln!(
                 "{} {load:?}: {table:.3?} with the table, {trimmed:.3?} with a trim",
@@ -255,7 +258,7 @@ fn force_with_table_and_trim_follows_within_a_percent_and_a_stiffer_bladder_does
     use emulator_tests::sweep::{Course, Law, Load, Subject};
     let subject = Subject::of(presets::miniature());
     let cases = [
-        (Load::Held, Course::Sine(1.0)),
+        (Load::AtStroke, Course::Sine(1.0)),
         (Load::Moved, Course::Ramps),
         (Load::Moved, Course::Sine(1.0)),
         (Load::Spring, Course::Ramps),

@@ -204,7 +204,7 @@ fn a_host_that_falls_silent_and_a_hold_that_was_asked_for() {
     let first = held[0].command;
     assert!((first - 300e3).abs() < 10e3, "it holds {first} Pa");
     assert!(held.iter().all(|exchange| exchange.command == first), "it stays at {first} Pa");
-    // Held pressure can still be let go of without leaving the fault.
+    // AtStroke pressure can still be let go of without leaving the fault.
     assert_eq!(client.call::<Stop>(&()).expect("it vents").state, State::Fault);
     station.pass(5);
     assert_eq!(station.since(station.periods() - 1)[0].command, 0.0);

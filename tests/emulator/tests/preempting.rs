@@ -88,7 +88,7 @@ fn answers_are_whole_while_control_steps_interrupt_their_making() {
             match topic {
                 Topic::Telemetry(sample) => {
                     assert_eq!(sample.time_us, 1000 * sample.tick, "round {round}: {sample:?}");
-                    let asked = sample.asked;
+                    let asked = sample.setpoint;
                     assert!((24.9..65.1).contains(&asked) || sample.tick <= began.ticks + 1, "{sample:?}");
                 }
                 // That it was armed and started.

@@ -67,7 +67,7 @@ impl Bench {
         Self { uart, tick: 0, started: false, buffer: [0; ANSWER], held: 0 }
     }
 
-    fn request(&self, command: &Command, asked: f32) -> [u8; REQUEST] {
+    fn request(&self, command: &Command, setpoint: f32) -> [u8; REQUEST] {
         let mut bytes = [0; REQUEST];
         bytes[0] = REQUEST_SYNC;
         bytes[1] = if self.started { 0 } else { RESET } | if command.vent { VENT } else { 0 };
@@ -137,7 +137,7 @@ impl Bench {
     }
 
     /// One exchange.
-    async fn exchange(&mut self, command: &Command, asked: f32) -> Option<Said> {
+    async fn exchange(&mut self, command: &Command, setpoint: f32) -> Option<Said> {
         watchdog::feed();
         let request = self.request(command, asked);
         let Ok(()) = Sender(self.uart).write_all(&request).await;
@@ -180,7 +180,7 @@ impl Benches {
 impl Plant for Benches {
     async fn exchange(&mut self, outputs: &Outputs) -> Inputs {
         let step_us = self.stepped_at.elapsed().as_micros() as u32 as f32;
-        let first = self.first.exchange(&outputs.sides[0], outputs.asked).await;
+        let first = self.first.exchange(&outputs.sides[0], outputs.setpoint).await;
         let mut second = None;
         if self.second.started || self.second.look() {
             second = self.second.exchange(&outputs.sides[1], 0.0).await;

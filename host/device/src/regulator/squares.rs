@@ -23,7 +23,7 @@ pub(super) struct Search {
     low: usize,
     high: usize,
     /// How many levels of this size were asked for, the last of them, Pa, and when, s.
-    asked: usize,
+    setpoint: usize,
     wanted: f64,
     since: f64,
     /// When the device's command came to it, s, and its last command, Pa.
@@ -41,7 +41,7 @@ impl Search {
             gain,
             low: 0,
             high: SIZES.len(),
-            asked: 0,
+            setpoint: 0,
             wanted: middle,
             since: 0.0,
             seen: None,
@@ -71,34 +71,34 @@ impl Search {
         if self.found().is_some() {
             return None;
         }
-        if self.asked > 0 {
+        if self.setpoint > 0 {
             let there = (self.command - self.wanted).abs() < 1.0 || time - self.since > PATIENCE;
             self.seen = self.seen.or(there.then_some(time));
             if self.seen.is_none_or(|seen| time - seen < LEVEL) {
                 return None;
             }
         }
-        if self.asked == LEVELS {
+        if self.setpoint == LEVELS {
             let middle = (self.low + self.high) / 2;
             if self.answer(SIZES[middle]) > 0.5 * self.gain * SIZES[middle] {
                 self.high = middle;
             } else {
                 self.low = middle + 1;
             }
-            self.asked = 0;
+            self.setpoint = 0;
             self.samples.clear();
             if self.found().is_some() {
                 return None;
             }
         }
         let size = SIZES[(self.low + self.high) / 2];
-        self.wanted = match self.asked {
+        self.wanted = match self.setpoint {
             0 => self.middle - FROM,
             1 => self.middle,
             n if n % 2 == 0 => self.middle + 0.5 * size,
             _ => self.middle - 0.5 * size,
         };
-        self.asked += 1;
+        self.setpoint += 1;
         (self.since, self.seen) = (time, None);
         Some(self.wanted)
     }

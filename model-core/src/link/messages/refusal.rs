@@ -4,7 +4,7 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use super::{Fault, Mode, Side, State};
-use crate::fields::told;
+use crate::fields::one_of;
 
 /// Why a device refuses a request.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -51,7 +51,7 @@ pub enum Refusal {
     OtherSession,
 }
 
-told!(Refusal {
+one_of!(Refusal {
     0 UnknownEndpoint {},
     1 Malformed {},
     2 WrongState { 0: state },
@@ -97,7 +97,7 @@ pub enum Field {
     Rate,
 }
 
-told!(Field { 0 SetPoint {}, 1 Reference {}, 2 ForceLoop {}, 3 StrokeLoop {}, 4 Joint {}, 5 Regulator {}, 6 Limits {}, 7 SensorWatch {}, 8 Watch {}, 9 Bands {}, 10 Rate {} });
+one_of!(Field { 0 SetPoint {}, 1 Reference {}, 2 ForceLoop {}, 3 StrokeLoop {}, 4 Joint {}, 5 Regulator {}, 6 Limits {}, 7 SensorWatch {}, 8 Watch {}, 9 Bands {}, 10 Rate {} });
 
 /// Why a table is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
@@ -131,7 +131,7 @@ pub enum TableFault {
     UnknownEffect,
 }
 
-told!(TableFault {
+one_of!(TableFault {
     0 NotBegun {},
     1 Gap { 0: offset },
     2 TooLong { 0: length },
@@ -159,4 +159,4 @@ pub enum StoreFault {
     Verify,
 }
 
-told!(StoreFault { 0 Medium {}, 1 Full {}, 2 NoPrevious {}, 3 Verify {} });
+one_of!(StoreFault { 0 Medium {}, 1 Full {}, 2 NoPrevious {}, 3 Verify {} });

@@ -28,15 +28,15 @@ codes! {
         /// Direction of friction, −1 to 1.
         Direction,
         /// First value asked for.
-        Asked,
+        Setpoint,
         /// Wanted force, N.
-        WantedForce,
+        ForceDemand,
         /// Feed-forward pressure, Pa.
         FeedForward,
         /// Trim, Pa.
         Trim,
         /// Wanted pressure after its limits, Pa.
-        WantedPressure,
+        PressureDemand,
         /// Command to the regulator, Pa.
         Command,
         /// Pressure of the regulator's model, Pa.

@@ -88,7 +88,7 @@ fn main() -> io::Result<()> {
     let subjects = [presets::miniature(), presets::contractile(), presets::push()].map(Subject::of);
     for subject in &subjects {
         let _ = write!(text, "\n## {}: force\n\n{HEAD}", subject.spec.name);
-        for load in [Load::Held, Load::Moved, Load::Spring] {
+        for load in [Load::AtStroke, Load::Moved, Load::Spring] {
             let rows = rows(&mut text, subject, Mode::Force, load);
             let [table, trimmed, times, times_trimmed] = against_the_aim(&rows);
             let _ = writeln!(
@@ -118,7 +118,7 @@ fn main() -> io::Result<()> {
          | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for subject in &subjects {
-        for load in [Load::Held, Load::Moved, Load::Spring] {
+        for load in [Load::AtStroke, Load::Moved, Load::Spring] {
             let [table, trimmed] = [Law::Table, Law::Trimmed].map(|law| {
                 let Still { error, swing, jump } = subject.still(load, law);
                 format!("{error:.2} | {swing:.2} | {:.1}", 1e-3 * jump)
