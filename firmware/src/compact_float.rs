@@ -8,7 +8,7 @@ pub struct CompactFloat([u8; 3]);
 impl CompactFloat {
     /// The nearest.
     pub fn of(value: f32) -> Self {
-        // What is no number stays none: rounding could carry it into the sign.
+        // What is not a number stays none: rounding could carry it into the sign.
         let nearest = if value.is_nan() { f32::NAN.to_bits() } else { value.to_bits() + 0x80 };
         let [_, low, middle, high] = nearest.to_le_bytes();
         Self([low, middle, high])

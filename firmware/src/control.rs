@@ -1,7 +1,7 @@
-//! The control step: readings and what was asked for, to commands. One pure function of its state, each millisecond.
+//! The control step: readings and the setpoint, to commands. One pure function of its state, each millisecond.
 //!
 //! ```text
-//! set-point ─► mode ─► wanted force ─► inverse of the table ─► + trim ─► limits, slew ─► regulator ─► command
+//! setpoint ─► mode ─► demanded force ─► inverse of the table ─► + trim ─► limits, slew ─► regulator ─► command
 //!                          ▲                  ▲                   ▲
 //!                       stroke            stroke, direction    load cell
 //! ```
@@ -44,7 +44,7 @@ fn motion_settings(settings: &Settings) -> MotionSettings<f32> {
     }
 }
 
-/// What the host is to hear of; the report of a fault is the latched one.
+/// What the host is to receive; the report of a fault is the latched one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Notice {
     Fault,
@@ -59,13 +59,13 @@ pub struct Controller {
     hardware: &'static Hardware,
     machine: Machine,
     arming: Arming,
-    /// Whether somebody has to send settings before the device can be armed.
+    /// Whether someone has to send settings before the device can be armed.
     unconfirmed: bool,
     mode: Mode,
     generator: Generator,
     setpoint: f32,
     setpoint_second: f32,
-    /// What will be asked when a command of this tick has come to act, as far as it is known, and how it came there in this tick.
+    /// What will be queried when a command of this tick has come to act, as far as it is known, and how it came there in this tick.
     lookahead: f32,
     lookahead_step: f32,
     setpoint_age: u32,
@@ -85,7 +85,7 @@ pub struct Controller {
     telemetry_countdown: u16,
     telemetry_number: u16,
     trace: Trace,
-    /// A finding of the last tick: what would stand in the way of clearing.
+    /// A finding of the last tick: what would be in the way of clearing.
     present: Option<Fault>,
     notice: Option<Notice>,
     step_us: f32,
@@ -167,7 +167,7 @@ impl Controller {
         self.overruns
     }
 
-    /// Ticks in which a demand was out of reach.
+    /// Ticks in which a demand was saturated.
     pub fn saturated_ticks(&self) -> u32 {
         self.saturated_ticks
     }
@@ -201,14 +201,14 @@ impl Controller {
         }
     }
 
-    /// The kept settings could not be trusted: nothing can be armed until somebody has sent settings.
+    /// The kept settings could not be trusted: nothing can be armed until someone has sent settings.
     pub fn distrust_settings(&mut self) {
         self.unconfirmed = true;
         let finding = Finding { fault: Fault::SettingsInvalid, sensor: None, value: 0.0, limit: 0.0 };
         self.raise(Side::Agonist, &finding);
     }
 
-    /// Settings were sent by somebody who has seen them.
+    /// Settings were sent by someone who has seen them.
     pub fn confirm_settings(&mut self) {
         self.unconfirmed = false;
     }
@@ -243,7 +243,7 @@ impl Controller {
         self.sides[side.index()].model.clear();
     }
 
-    /// One telemetry sample every so many ticks, 0 for none.
+    /// One telemetry sample every n ticks, 0 for none.
     pub fn set_telemetry(&mut self, every_ticks: u16) {
         self.telemetry_every = every_ticks;
         self.telemetry_countdown = 0;
@@ -331,7 +331,7 @@ impl Controller {
         self.record()
     }
 
-    /// Brings what is asked to this tick. A wave of the device's own is known ahead of its time, a host's set-points are not.
+    /// Brings the setpoint to this tick. A wave of the device's own is known ahead of its time, a host's setpoints are not.
     fn ask(&mut self) {
         match self.generator.step_ahead(regulator::ahead(&self.settings.regulator)) {
             Some((now, coming)) => {
@@ -351,7 +351,7 @@ impl Controller {
         actuator.sample.stroke_m = stroke_m;
         actuator.sample.force_n = force_n;
         actuator.sample.model_n = 0.0;
-        // A reading that is no number must not get into what is remembered.
+        // A reading that is not a number must not get into what is remembered.
         if !(pressure_pa.is_finite() && stroke_m.is_finite()) {
             return None;
         }

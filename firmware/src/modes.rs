@@ -1,4 +1,4 @@
-//! Which pressure a mode wants: the mathematics between a set-point and the regulator.
+//! Which pressure a mode wants: the mathematics between a setpoint and the regulator.
 
 use model_core::effects::{Chain, EffectName};
 use model_core::inverse::{Reach, Search};
@@ -58,19 +58,19 @@ const PLAY: f32 = 0.05;
 const PLAY_CALM: f32 = 0.2;
 /// The same where a trim answers for what the table leaves. Two that answer for one friction hunt: each swing of a mass on a spring
 /// turns the one before the other has undone it. So friction rests until the muscle is moved far, and the trim does the rest. So it
-/// does in a joint, where each muscle is the other's load and a push should meet the stiffness that was asked for, not less.
+/// does in a joint, where each muscle is the other's load and a push should meet the stiffness that was requested, not less.
 const PLAY_RESTING: f32 = 20.0;
-/// Part of friction that is made good in a joint. Of two muscles that pull against each other each is the other's load: with all of
+/// Part of friction that is corrected in a joint. Of two muscles that pull against each other each is the other's load: with all of
 /// its friction taken away, nothing holds the joint where it stands. It creeps, the friction turns, and it jumps to the other end of
-/// what friction would have held, some hundredths of a radian to and fro. What a push meets is then a matter of where it was. A
-/// quarter of the friction that stays holds it, at the cost of some stiffness more than was asked for.
+/// what friction would have held, some hundredths of a radian back and forth. What a push meets is then a matter of where it was. A
+/// quarter of the friction that stays holds it, at the cost of some stiffness more than was requested.
 const JOINT_SHARE: f32 = 0.75;
-/// How long the same force is wanted until a demand stands still, s.
+/// How long the same force is demanded until a demand does not move, s.
 const CALM_S: f32 = 0.2;
 /// Part of blocked force at which a muscle surely pulls, whatever its table leaves out.
 const TAUT: f32 = 0.02;
 
-/// A force that is asked of a table.
+/// A force that is queried of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Demand {
     force_n: f32,
@@ -202,8 +202,8 @@ impl Model {
         self.taut_n
     }
 
-    /// The pressure for a wanted force in this tick, and whether it can be had; `rests` where friction is not to turn while the same
-    /// force is wanted, `share` of it made good.
+    /// The pressure for a demanded force in this tick, and whether it can be had; `rests` where friction is not to turn while the same
+    /// force is demanded, `share` of it corrected.
     pub fn pressure_for(&mut self, force_n: f32, guess_pa: f32, rests: bool, share: f32) -> (f32, bool) {
         let still_s = if self.demand.force_n == force_n { self.demand.still_s + TICK_S } else { 0.0 };
         self.demand = Demand { force_n, still_s, rests };
@@ -299,7 +299,7 @@ impl Seat {
     }
 }
 
-/// The feed-forward pressure of a wanted force, Pa; without a table there is none.
+/// The feed-forward pressure of a demanded force, Pa; without a table there is none.
 pub fn feed_forward(
     settings: &Settings,
     mode: Mode,
@@ -318,7 +318,7 @@ pub fn feed_forward(
     }
 }
 
-/// An integrator that stops where going on would only push further against a limit.
+/// An integrator that stops where continuing would only push further against a limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Integral(f32);
 
@@ -344,7 +344,7 @@ impl Integral {
 
 /// Trim of force on the load cell, Pa. `saturation` is the sign of what the last command's limits took away.
 ///
-/// Without a table the error is that of the wanted force, and the loop `L(s) = g (K_p + K_i/s)` with `g = ∂F/∂P` crosses over
+/// Without a table the error is that of the demanded force, and the loop `L(s) = g (K_p + K_i/s)` with `g = ∂F/∂P` crosses over
 /// near `g K_i` rad/s; the regulator's lag asks for a good deal less than `1/lag`. With one it is that of the force which the
 /// table gives at the measured pressure, less what the trim has added: an observer of what the table leaves out. The
 /// regulator's lag is not in that loop, which has to wait for nothing but its own filter of `g K_i` rad/s, and the trim does not
@@ -358,7 +358,7 @@ pub fn trim(force_loop: &ForceLoop, integral: &mut Integral, error_n: f32, satur
     (force_loop.proportional_pa_per_n * error_n + integral.value()).within(-limit, limit)
 }
 
-/// Wanted force of the stroke loop, N, for the stroke wanted now and the one that will be when a command acts. `saturation` as in [`trim`]; the
+/// Demanded force of the stroke loop, N, for the stroke demanded now and the one that will be when a command acts. `saturation` as in [`trim`]; the
 /// loop's own limits hold its integral as well.
 pub fn stroke_force(
     stroke_loop: &StrokeLoop,

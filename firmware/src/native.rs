@@ -6,7 +6,7 @@
 //! use firmware::native::{Device, Options};
 //! use std::io::{Read, Write};
 //!
-//! // A plant that follows its command at once.
+//! // A plant that follows its command immediately.
 //! let plant = |outputs: &Outputs| {
 //!     let pressure_pa = outputs.sides[0].pressure_pa;
 //!     let readings = Readings { pressure_pa, ..Readings::default() };
@@ -127,7 +127,7 @@ impl Drop for Device {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         for thread in self.threads.drain(..) {
-            // A thread that panicked has said so itself.
+            // A thread that panicked has reported it itself.
             let _ = thread.join();
         }
     }
@@ -167,7 +167,7 @@ fn serve(
         match listener.accept() {
             Ok((stream, _)) => {
                 connected.store(true, Ordering::Relaxed);
-                // A connection that breaks is the peer's affair; the device goes on and waits for the next.
+                // A connection that breaks is the peer's affair; the device continues and waits for the next.
                 let _ = talk(stream, &mut server, shared, stop);
                 connected.store(false, Ordering::Relaxed);
             }

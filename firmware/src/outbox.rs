@@ -1,4 +1,4 @@
-//! What the device says by itself, as it waits for the link.
+//! What the device says without a request, as it waits for the link.
 
 use model_core::fields::{Fields, Walk};
 use model_core::link::endpoints::{EVENT, TELEMETRY};
@@ -12,7 +12,7 @@ use crate::tick::TICK_US;
 pub(crate) const SIDES: usize = if pair::SUPPORTED { 2 } else { 1 };
 
 /// One tick. On the wire it is a [`Telemetry`](model_core::link::messages::Telemetry); here it is as small as it can be, since many
-/// wait at once.
+/// wait immediately.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Number of the sample: a gap is a loss on the way.
@@ -23,7 +23,7 @@ pub struct Sample {
     pub state: State,
     /// Mode.
     pub mode: Mode,
-    /// What was asked for, in the unit of the mode.
+    /// the setpoint, in the unit of the mode.
     pub setpoint: f32,
     /// A pair's second value.
     pub setpoint_second: f32,
@@ -62,7 +62,7 @@ impl Fields for Sample {
     }
 }
 
-/// What the device says by itself.
+/// What the device says without a request.
 #[derive(Clone, Debug)]
 pub(crate) enum Outgoing {
     Sample(Sample),

@@ -5,7 +5,7 @@
 //! F₁ = T + τ/2r,      F₂ = T − τ/2r            tension T that both share, torque τ
 //! K  = r² Σ −∂F_i/∂x  at held pressures, without friction
 //! ```
-//! `K` is what the joint resists by itself, quicker than any loop: its air and its braid. It rises with the tension. Both muscles
+//! `K` is what the joint resists without a request, quicker than any loop: its air and its braid. It rises with the tension. Both muscles
 //! must pull, since a slack one resists nothing, and neither may need more than its highest pressure: so at each angle `K` has
 //! a least and a greatest value.
 
@@ -34,7 +34,7 @@ const HALVINGS: usize = 12;
 pub struct Arm<'a> {
     /// Its table, brought to this tick.
     pub model: &'a Model,
-    /// Pressure that the last wish came to, Pa.
+    /// Pressure that the last demand came to, Pa.
     pub pressure_pa: f32,
     /// The highest that may be commanded, Pa.
     pub high_pa: f32,
@@ -50,9 +50,9 @@ pub struct PairState {
 /// What the joint is doing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Posed {
-    /// Wanted angle, rad.
+    /// Demanded angle, rad.
     pub angle_rad: f32,
-    /// Wanted stiffness, N·m/rad.
+    /// Demanded stiffness, N·m/rad.
     pub stiffness_nm_per_rad: f32,
     /// Measured angle, rad.
     pub measured_rad: f32,
@@ -79,10 +79,10 @@ impl PairState {
         *self = Self { integral: Integral::default(), tension_n: quasi[0].min(quasi[1]) };
     }
 
-    /// Wanted forces of both muscles.
+    /// Demanded forces of both muscles.
     ///
-    /// One Newton step a tick moves the tension to where the stiffness is the wanted one. The torque is `K (θ* − θ)`, by which
-    /// pressures stay what they are when the joint is pushed, and the angle's loop for what is left.
+    /// One Newton step a tick moves the tension to where the stiffness is the demanded one. The torque is `K (θ* − θ)`, by which
+    /// pressures stay what they are when the joint is pushed, and the angle's loop for the rest.
     pub fn forces(&mut self, joint: &Joint, posed: &Posed, arms: [Arm<'_>; 2], saturation: f32) -> Pull {
         let r = joint.radius_m;
         let (mut stiffness, mut gain, mut quickest) = (0.0, 0.0, f32::MAX);

@@ -69,7 +69,7 @@ impl Generator {
         self.reference
     }
 
-    /// Whether set-points come from the host.
+    /// Whether setpoints come from the host.
     pub fn is_set_point(&self) -> bool {
         matches!(self.reference, Reference::SetPoint)
     }
@@ -154,8 +154,8 @@ impl Generator {
         Ok(self.points.len() as u16)
     }
 
-    /// Makes the values of this tick and so many later ones, as far as they are not there yet: one each tick, and the first of them
-    /// when a wave begins. `None` when set-points come from the host.
+    /// Makes the values of this tick and n later ones, as far as they are not there yet: one each tick, and the first of them
+    /// when a wave begins. `None` when setpoints come from the host.
     pub fn look_ahead(&mut self, ticks: usize) -> Option<()> {
         let ticks = ticks.min(AHEAD - 1) as u32;
         while self.made.wrapping_sub(self.given) <= ticks {
@@ -166,7 +166,7 @@ impl Generator {
         Some(())
     }
 
-    /// The value of this tick and that of so many ticks later (at most 15); `None` when set-points come from the host. Moves on
+    /// The value of this tick and that of n ticks later (at most 15); `None` when setpoints come from the host. Moves on
     /// by one tick.
     pub fn step_ahead(&mut self, ticks: usize) -> Option<(f32, f32)> {
         self.look_ahead(ticks)?;
@@ -175,7 +175,7 @@ impl Generator {
         Some((now, self.last))
     }
 
-    /// The value of this tick; `None` when set-points come from the host. Moves on by one tick.
+    /// The value of this tick; `None` when setpoints come from the host. Moves on by one tick.
     fn step(&mut self) -> Option<f32> {
         let value = match self.reference {
             Reference::SetPoint => return None,

@@ -1,4 +1,4 @@
-//! The pressure regulator: what it and its line will do with a command, and which command makes the muscle have what is wanted.
+//! The pressure regulator: what it and its line will do with a command, and which command makes the muscle have what is demanded.
 //!
 //! ```text
 //! target  = gain · (command + offset)
@@ -8,7 +8,7 @@
 //! The line fills a muscle of volume `V`, which the braid gives at every stroke: a muscle that is wide takes longer, and one
 //! that widens draws air through the line. Gain and offset are inverted exactly; line and lag by lead as far as the settings
 //! ask, each by a rate that is smoothed over a seventh of the lag, so that a sensor's noise is not made ten times as large or
-//! more. What that smoothing and the loop itself are late by is led too, or wished for ahead of time where what comes is known
+//! more. What that smoothing and the loop itself are late by is led too, or demanded for ahead of time where what comes is known
 //! ([`Demand::lookahead_pa`]). A rate limit and a deadband cannot be inverted; they are only predicted, so that the watch on
 //! pressure knows what to expect. What the measured pressure lacks of the predicted is added slowly
 //! ([`RegulatorState::observe`]).
@@ -45,21 +45,21 @@ impl Default for Air {
     }
 }
 
-/// What is wanted of the regulator in a tick.
+/// What is demanded of the regulator in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Demand {
     /// Pressure in the muscle, Pa.
     pub pressure_pa: f32,
-    /// What of the last change of that was known ahead of time, Pa; it is wished for [`ahead`] ticks before its time.
+    /// What of the last change of that was known ahead of time, Pa; it is demanded for [`ahead`] ticks before its time.
     pub lookahead_pa: f32,
 }
 
-/// Ticks before its time that what is known should be wished for.
+/// Ticks before its time that what is known should be demanded for.
 pub fn ahead(regulator: &Regulator) -> usize {
     if regulator.lead > 0.0 { ((LOOP_S + SMOOTHING * regulator.lag_s) / TICK_S) as usize } else { 0 }
 }
 
-/// Keeps the regulator's model and the last wanted pressure.
+/// Keeps the regulator's model and the last demanded pressure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RegulatorState {
     pressure_demand_pa: f32,
@@ -78,11 +78,11 @@ pub struct RegulatorState {
 /// What [`RegulatorState::step`] decided.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Driven {
-    /// Wanted pressure after slew and limits, Pa.
+    /// Demanded pressure after slew and limits, Pa.
     pub pressure_demand_pa: f32,
     /// Command, Pa.
     pub command_pa: f32,
-    /// Whether a limit cut the demand: an integrator behind it must not go on.
+    /// Whether a limit cut the demand: an integrator behind it must not continue.
     pub saturated: bool,
 }
 
@@ -120,7 +120,7 @@ impl RegulatorState {
         self.command_pa
     }
 
-    /// One tick of `dt` seconds towards a wanted pressure, which is limited to `high_pa`.
+    /// One tick of `dt` seconds towards a demanded pressure, which is limited to `high_pa`.
     pub fn step(
         &mut self,
         dt: f32,
@@ -165,13 +165,13 @@ impl RegulatorState {
         }
     }
 
-    /// Zero pressure at once. Nothing of what was wanted is left, only what is still in line and muscle.
+    /// Zero pressure immediately. Nothing of what was demanded is left, only what is still in line and muscle.
     pub fn vent(&mut self, dt: f32, air: &Air, regulator: &Regulator) {
         *self = Self { supplied_pa: self.supplied_pa, model_pa: self.model_pa, ..Self::default() };
         self.predict(dt, 0.0, air, regulator);
     }
 
-    /// A command of somebody else's: only the model follows it.
+    /// A command of someone else's: only the model follows it.
     pub fn expect(&mut self, command_pa: f32, regulator: &Regulator) {
         self.predict(TICK_S, command_pa, &Air::default(), regulator);
     }

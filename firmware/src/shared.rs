@@ -56,7 +56,7 @@ impl Drop for Entered<'_> {
 }
 
 /// That a task has left the controller: for a board that lets its loop interrupt at that very moment, when whatever should have been
-/// taken out of it at once and was not shows.
+/// taken out of it immediately and was not shows.
 #[cfg(feature = "preempting")]
 pub static LEFT: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
@@ -90,7 +90,7 @@ impl Shared {
         }
     }
 
-    /// The one of a board: a static of its own, made in its place and apart from what goes on to use it.
+    /// The one of a board: a static of its own, made in its place and apart from what continues to use it.
     #[cfg(feature = "board")]
     #[inline(never)]
     pub fn take(hardware: &'static Hardware, seats: [Seat; 2]) -> &'static Self {
@@ -134,7 +134,7 @@ impl Shared {
         crate::log::tell(self.with(|controller| controller.ticks()), event.as_ref());
         if let Some(event) = event {
             self.changed.signal(());
-            // The host must hear of it, whatever else waits: the oldest sample makes room.
+            // The host must receive it, whatever else waits: the oldest sample makes room.
             if self.outbox.is_full() && self.outbox.try_receive().is_ok() {
                 self.drop_one();
             }

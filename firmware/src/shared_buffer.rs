@@ -1,4 +1,4 @@
-//! One room for what is never needed at once: a trace, or a table on its way into use. A small chip has no memory for both.
+//! One room for what is never needed immediately: a trace, or a table on its way into use. A small chip has no memory for both.
 
 use heapless::Vec;
 use model_core::image;
@@ -31,7 +31,7 @@ enum Content {
     Table(Incoming),
 }
 
-/// The room. Whoever has it uses it for one of the two; what was in it for the other is lost.
+/// The room. Anyone who has it uses it for one of the two; what was in it for the other is lost.
 #[derive(Debug)]
 pub struct SharedBuffer(Placed<Content>);
 

@@ -72,7 +72,7 @@ fields!(Selected { slot, table, previous });
 fields!(Described { length, crc, generation });
 
 impl Selected {
-    /// As the host is told.
+    /// As the host is reported.
     pub fn info(&self) -> TableInfo {
         TableInfo {
             length: u32::from(self.table.length),
@@ -98,7 +98,7 @@ impl Value<'_> for Written<'_> {
     }
 }
 
-/// Memories on their way into the store, asked for one at a time: all of them are half a kilobyte. Only ever written.
+/// Memories on their way into the store, requested one at a time: all of them are half a kilobyte. Only ever written.
 struct Remembered<'m> {
     generation: u32,
     count: usize,
@@ -140,7 +140,7 @@ fn fault_of<E>(error: Error<E>) -> StoreFault {
     }
 }
 
-/// The store over a flash. Its flash is one that answers at once (it blocks, or it is a file), so that no task waits on it.
+/// The store over a flash. Its flash is one that answers immediately (it blocks, or it is a file), so that no task waits on it.
 pub struct Store<F: NorFlash> {
     map: MapStorage<u8, F, NoCache>,
     buffer: Placed<[u8; BUFFER]>,
@@ -280,7 +280,7 @@ impl<F: NorFlash> Store<F> {
         Ok(kept.map_or(0, |bytes| each_kept(bytes, generation, act)))
     }
 
-    /// Keeps what so many effects remember, by their places in the table; none forgets.
+    /// Keeps what n effects remember, by their places in the table; none forgets.
     ///
     /// # Errors
     /// As the medium fails.

@@ -9,7 +9,7 @@
 //! | pressure not following | `follow_ticks` of pressure and regulator's model apart by `follow_pa` |
 //! | not vented | `debounce_ticks` above `vented_pa` once the command has been to vent for `vent_ticks` |
 //! | hold ended | `hold_ticks` of a held command |
-//! | set-point silence | `silence_ticks` without one |
+//! | setpoint silence | `silence_ticks` without one |
 //! | host silence | `host_silence_ticks` without a whole frame, while running and not `autonomous` |
 //! | loop overrun | `overrun_ticks` missed in a row |
 //!
@@ -42,7 +42,7 @@ pub struct Finding {
 struct InARow(u16);
 
 impl InARow {
-    /// Counts, or begins again; tells whether there have been enough.
+    /// Counts, or begins again; returns whether there have been enough.
     fn count(&mut self, bad: bool, enough: u16) -> bool {
         self.0 = if bad { self.0.saturating_add(1) } else { 0 };
         bad && self.0 >= enough.max(1)
@@ -65,7 +65,7 @@ struct Jumps {
 impl Jumps {
     fn count(&mut self) -> u32 {
         self.now += 1;
-        // Two bytes at once: all four together may come to more than one of them holds.
+        // Two bytes immediately: all four together may come to more than one of them holds.
         let pairs = (self.before & 0x00FF_00FF) + (self.before >> 8 & 0x00FF_00FF);
         u32::from(self.now) + (pairs >> 16) + (pairs & 0xFFFF)
     }
@@ -99,7 +99,7 @@ impl OneSensor {
             return None;
         }
         let found = |fault, value, limit| Some(Finding { fault, sensor: Some(sensor), value, limit });
-        // `!(…)` so that a reading that is no number counts as outside.
+        // `!(…)` so that a reading that is not a number counts as outside.
         let outside = !(value >= watch.low && value <= watch.high);
         if self.out.count(outside, settings.watch.debounce_ticks) {
             return found(Fault::SensorRange, value, if value < watch.low { watch.low } else { watch.high });

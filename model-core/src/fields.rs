@@ -87,7 +87,7 @@ impl<'a> Walk<'a> {
         one[0]
     }
 
-    /// A number in at most so many bytes, of which the last may have so many bits.
+    /// A number in at most n bytes, of which the last may have n bits.
     #[inline(never)]
     fn number(&mut self, number: u64, most: usize, bits: u32) -> u64 {
         let mut bytes = [0_u8; 10];

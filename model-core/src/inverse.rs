@@ -1,4 +1,4 @@
-//! The pressure that makes the muscle exert a wanted force at a measured stroke.
+//! The pressure that makes the muscle exert a demanded force at a measured stroke.
 //!
 //! At one stroke and within one segment of the table, `F_G + F_NLFB` and `1 − k_F s` are cubics in pressure. They are put
 //! together once, and Newton's method runs on them; a bracket keeps it from leaving, so that it ends for every table.
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// Whether the force can be had, and if not, why.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reach {
-    /// The pressure gives the wanted force.
+    /// The pressure gives the demanded force.
     Reached,
     /// The muscle cannot pull that hard at this stroke: the pressure is the highest allowed.
     BeyondBlockedForce,
@@ -67,7 +67,7 @@ struct Bracket<T> {
 }
 
 impl<T: Scalar> Bracket<T> {
-    /// Where to go instead of a step that leaves the bracket or is no number.
+    /// Where to go instead of a step that leaves the bracket or is not a number.
     #[cold]
     #[inline(never)]
     fn instead(&self, lowest: T, highest: T) -> T {
@@ -84,7 +84,7 @@ impl<T: Scalar> Bracket<T> {
 /// Newton's method within a bracket, which ends for every curve.
 ///
 /// It ends with a step below the tolerance. It also ends when the step `s` and the one before it, `s₀`, both on one piece,
-/// foretell that the next would be: steps of Newton's method shrink by a ratio that shrinks itself, so that it would be less
+/// predict that the next would be: steps of Newton's method shrink by a ratio that shrinks itself, so that it would be less
 /// than `s²/s₀`.
 #[inline(always)]
 fn solve<T: Scalar>(
@@ -127,7 +127,7 @@ fn solve<T: Scalar>(
             if size * size <= tolerance * before {
                 break 'search (miss, slope);
             }
-            // A jump foretells nothing.
+            // A jump predicts nothing.
             before = if jumps { T::ZERO } else { size };
         }
     };
@@ -228,7 +228,7 @@ struct Whole<'a, T> {
 impl<T: Scalar> Curve<T> for Whole<'_, T> {
     fn enter(&mut self, _: T) {}
 
-    /// Never: effects may bend anywhere, so that no step foretells the next.
+    /// Never: effects may bend anywhere, so that no step predicts the next.
     fn holds(&self, _: T) -> bool {
         false
     }
@@ -258,9 +258,9 @@ impl<T: Scalar> Muscle<T> {
         }
     }
 
-    /// The pressure for a wanted force of the base model, starting from a guess (best: the last tick's answer).
+    /// The pressure for a demanded force of the base model, starting from an estimate (best: the last tick's answer).
     ///
-    /// `direction` as in [`Muscle::force`]. A force out of reach gives the nearest allowed pressure, and says so.
+    /// `direction` as in [`Muscle::force`]. A force saturated gives the nearest allowed pressure, and says so.
     #[inline(always)]
     pub fn pressure_for(
         &self,
@@ -273,7 +273,7 @@ impl<T: Scalar> Muscle<T> {
         solve(&mut Base::new(self, held, direction), force.si(), guess, search)
     }
 
-    /// The pressure for a wanted force with effects, at a moment to which `chain` has been stepped.
+    /// The pressure for a demanded force with effects, at a moment to which `chain` has been stepped.
     ///
     /// What the effects add regardless of pressure is subtracted exactly. Where an effect's force depends on the pressure the
     /// whole force is solved for, by Newton's method with the base model's slope and a secant for that of the effects, within

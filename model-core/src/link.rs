@@ -7,7 +7,7 @@
 //! | messages | [`messages`], [`settings`] | the bodies, as postcard writes them; closed enums, never text |
 //! | endpoints | [`endpoints`] | ONE table: number, name, request, response; and the hash of all of it |
 //!
-//! A conversation begins with `hello`. The host compares [`endpoints::SCHEMA_HASH`] with the peer's and goes on only
+//! A conversation begins with `hello`. The host compares [`endpoints::SCHEMA_HASH`] with the peer's and continues only
 //! when they are equal, because from there on nothing in a body says what it is.
 
 pub mod endpoints;

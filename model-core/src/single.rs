@@ -73,7 +73,7 @@ pub fn pressure_for(
     muscle.pressure_for(force, held, direction, guess, search)
 }
 
-/// The same for a stroke that nothing else is asked about.
+/// The same for a stroke that nothing else is queried about.
 #[inline(never)]
 pub fn pressure_at(
     muscle: &Muscle<f32>,

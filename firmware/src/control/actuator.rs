@@ -53,7 +53,7 @@ impl Actuator {
         }
     }
 
-    /// Lets the air out, and nothing of what was wanted stays.
+    /// Lets the air out, and nothing of what was demanded stays.
     pub(super) fn vent(&mut self, regulator: &Regulator) {
         let air = self.air();
         self.regulator.vent(TICK_S, &air, regulator);

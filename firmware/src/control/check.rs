@@ -12,7 +12,7 @@ use crate::board::Hardware;
 type Bound = (f32, f32, f32);
 
 /// Longest times of the watches, ticks. A reading that is out of range does harm within some tens of milliseconds; a regulator answers
-/// within some tenths of a second; a person who takes a cable away is noticed within a minute. An armed device is vented, so it may
+/// within some tenths of a second; a user who takes a cable away is noticed within a minute. An armed device is vented, so it may
 /// wait for an hour; a host that keeps it alive every tenth of a second must not be disarmed by a few lost frames.
 const MOST_DEBOUNCE: u16 = 20;
 const MOST_JUMPS: u16 = 64;

@@ -1,4 +1,4 @@
-//! Commands: from what is asked, by way of force and feed-forward, to what the regulators are told.
+//! Commands: from the setpoint, by way of force and feed-forward, to what the regulators are reported.
 
 use model_core::link::messages::{Fault, Mode, Side, State};
 use model_core::link::settings::FeedForward;
@@ -67,7 +67,7 @@ impl Controller {
             let most =
                 actuator.model.as_ref().map_or(f32::MAX, |model| model.muscle.max_pressure().pascals());
             let high = most.at_most(settings.limits.pressure_pa).at_most(hardware.command_ceiling_pa);
-            // Without lead a command is what was asked for, as whoever measures the regulator itself wants it.
+            // Without lead a command is the setpoint, as anyone who measures the regulator itself wants it.
             if settings.pressure.fitted && settings.regulator.lead > 0.0 {
                 actuator.regulator.observe(TICK_S, actuator.sample.pressure_pa, &settings.regulator);
             }
@@ -85,7 +85,7 @@ impl Controller {
             if !reached || driven.saturated {
                 self.saturated_ticks = self.saturated_ticks.saturating_add(1);
             }
-            // What is sent is judged, not only what was wished for: the regulator's model comes between.
+            // What is sent is judged, not only what was demanded for: the regulator's model comes between.
             let sent = driven.command_pa;
             if !(sent >= 0.0
                 && sent <= hardware.command_ceiling_pa
@@ -102,7 +102,7 @@ impl Controller {
         }
     }
 
-    /// Feed-forward for the force that will be wanted when a command acts, and trim for the one that is wanted now. `foreseen_n` of
+    /// Feed-forward for the force that will be demanded when a command acts, and trim for the one that is demanded now. `foreseen_n` of
     /// the last change of the former was known ahead of time.
     fn demand_for_force(
         &mut self,

@@ -24,7 +24,7 @@ impl Controller {
         }
     }
 
-    /// Something to tell the host, once.
+    /// Something to report the host, once.
     #[inline(never)]
     pub fn take_event(&mut self) -> Option<Event> {
         match self.notice.take()? {

@@ -1,4 +1,4 @@
-//! What a host asks of the controller: states, modes, set-points, references.
+//! What a host asks of the controller: states, modes, setpoints, references.
 
 use model_core::link::messages::{Fault, Field, Mode, Reference, Refusal, Session, SetPoint, Side, State};
 use model_core::link::settings::{FeedForward, Settings};
@@ -144,10 +144,10 @@ impl Controller {
         self.change(Cause::Clear)
     }
 
-    /// A new set-point; ends a reference.
+    /// A new setpoint; ends a reference.
     ///
     /// # Errors
-    /// [`Refusal::WrongMode`] where it is not the running mode's, [`Refusal::Value`] where it is no finite number,
+    /// [`Refusal::WrongMode`] where it is not the running mode's, [`Refusal::Value`] where it is not a finite number,
     /// [`Refusal::Angle`] or [`Refusal::Stiffness`] where a joint cannot have it.
     pub fn set_point(&mut self, set_point: SetPoint) -> Result<(), Refusal> {
         let (mode, asked, second) = match set_point {
@@ -234,7 +234,7 @@ mod tests {
     use super::*;
     use crate::board::{Inputs, Readings};
 
-    /// So many ticks of a muscle that follows its command within 30 ms.
+    /// N ticks of a muscle that follows its command within 30 ms.
     fn run(controller: &mut Controller, pressure_pa: &mut f32, ticks: u32) {
         for tick in 0..ticks {
             // Live sensors never read the same twice.

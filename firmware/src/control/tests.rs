@@ -39,7 +39,7 @@ impl Bench {
         }
     }
 
-    /// So many ticks, whose readings and supply are changed on their way.
+    /// N ticks, whose readings and supply are changed on their way.
     fn pass_with(&mut self, ticks: u32, change: impl Fn(&mut Readings, &mut Inputs)) {
         for _ in 0..ticks {
             self.tick += 1;
@@ -85,7 +85,7 @@ impl Bench {
         bench
     }
 
-    /// Holding 400 kPa after a silence of set-points.
+    /// Holding 400 kPa after a silence of setpoints.
     fn holding() -> Self {
         Self::holding_for(Fault::SetPointSilence)
     }

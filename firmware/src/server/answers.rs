@@ -28,7 +28,7 @@ pub(super) struct Answers<'a, F: NorFlash> {
 }
 
 impl<F: NorFlash> Answers<'_, F> {
-    /// The status, if what was asked for could be done.
+    /// The status, if the setpoint could be done.
     #[inline(never)]
     fn status_after(&self, done: Result<(), Refusal>, answer: &mut Status) -> Result<(), Refusal> {
         done?;

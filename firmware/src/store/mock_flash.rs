@@ -41,7 +41,7 @@ impl MockFlash {
         Self { bytes, left: usize::MAX, done: 0, off: false, lasts: usize::MAX, tear: 0, wrong: usize::MAX }
     }
 
-    /// The same worn out: so many more writes work, and everything is read.
+    /// The same worn out: n more writes work, and everything is read.
     pub(crate) fn failing_after(mut self, writes: usize) -> Self {
         self.lasts = writes;
         self
@@ -58,7 +58,7 @@ impl MockFlash {
         true
     }
 
-    /// The same with a bad cell in the word that is written after so many others.
+    /// The same with a bad cell in the word that is written after n others.
     pub(super) fn wrong_at(mut self, word: usize) -> Self {
         (self.done, self.wrong) = (0, word);
         self

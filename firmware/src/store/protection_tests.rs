@@ -5,7 +5,7 @@ use super::tests::{kept, open, settings_of, table, used};
 use super::*;
 use model_core::link::settings::Settings;
 
-/// Writes with a bad cell in each word in turn, until all words are good; `look` is told whether the store said that it had succeeded.
+/// Writes with a bad cell in each word in turn, until all words are good; `look` is reported whether the store said that it had succeeded.
 fn with_each_word_wrong(
     before: &MockFlash,
     operation: impl Fn(&mut Store<MockFlash>) -> bool,

@@ -82,7 +82,7 @@ fn each_limit_has_its_fault() {
     }
 }
 
-/// A cell whose contact loosens for a tick, from `first` on so many times, so many ticks apart: two jumps each.
+/// A cell whose contact loosens for a tick, from `first` on n times, n ticks apart: two jumps each.
 fn loose(first: usize, times: usize, apart: usize) -> Option<usize> {
     let spikes = with(move |_, readings, tick| {
         let since = tick.wrapping_sub(first);

@@ -16,7 +16,7 @@ use super::{Address, Port, VentLine, messages};
 use crate::error::DeviceCode;
 use pam_data::error::{DataCode, Error, Result};
 
-/// Telemetry that nobody fetches is kept up to this many samples: a minute at 1 kHz.
+/// Telemetry that no one fetches is kept up to this many samples: a minute at 1 kHz.
 const BACKLOG: usize = 60_000;
 
 /// Time between two keep-alive requests of the session that armed the controller. Without them, the controller vents after
@@ -30,7 +30,7 @@ pub struct Patience {
     pub answer: Duration,
     /// Time for an answer that waits for flash memory to be erased.
     pub slow_answer: Duration,
-    /// Times that a question is asked, when asking twice does no harm and the line is silent.
+    /// Times that a question is queried, when asking twice does no harm and the line is silent.
     pub tries: u32,
     /// The same on a line that is not silent but noisy: frames arrive and fail their check.
     pub noisy_tries: u32,
@@ -47,7 +47,7 @@ impl Default for Patience {
     }
 }
 
-/// What a device says by itself.
+/// What a device says without a request.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Topic {
     /// A sample.
@@ -67,7 +67,7 @@ pub struct Losses {
     pub gaps: u64,
     /// Frames whose check failed, and bytes between frames that were none.
     pub bad_frames: u64,
-    /// Questions that had to be asked again.
+    /// Questions that had to be queried again.
     pub repeats: u64,
     /// Samples that arrived and were never fetched.
     pub unread: u64,
@@ -216,10 +216,10 @@ impl Client {
         Losses { bad_frames: u64::from(self.accumulator.counts().bad), ..self.losses }
     }
 
-    /// Asks once more when no answer comes: for questions that may be asked twice.
+    /// Asks once more when no answer comes: for questions that may be queried twice.
     ///
     /// # Errors
-    /// [`DeviceCode::DeviceSilent`], or [`DeviceCode::DeviceRefused`] with the device's reason in words.
+    /// [`DeviceCode::DeviceSilent`], or [`DeviceCode::DeviceRefused`] with the device's reason as text.
     pub fn call<E: Endpoint>(&mut self, request: &E::Request) -> Result<E::Response> {
         match self.ask::<E>(request, self.patience.answer, self.patience.tries)? {
             Ok(response) => Ok(response),
@@ -298,7 +298,7 @@ impl Client {
         self.ask::<E>(request, self.patience.answer, 1)
     }
 
-    /// The next thing the device said by itself, waiting at most `patience` for one.
+    /// The next thing the device said without a request, waiting at most `patience` for one.
     ///
     /// # Errors
     /// [`DeviceCode::DeviceSilent`] when the line is gone.
@@ -356,7 +356,7 @@ impl Client {
             .help("check the cable and the supply; a running controller without its host vents by itself"))
     }
 
-    /// How often a question may be asked, when so many frames were bad before it was asked first.
+    /// How often a question may be queried, when n frames were bad before it was queried first.
     fn allowed(&self, tries: u32, bad_before: u32) -> u32 {
         if tries > 1 && self.accumulator.counts().bad != bad_before {
             self.patience.noisy_tries
@@ -411,7 +411,7 @@ impl Client {
         let count = match self.port.read(&mut buffer, patience) {
             Ok(count) => count,
             Err(e) => {
-                // A foreign peer often hangs up on bytes it does not understand; what it said until then is the better news.
+                // A other peer often hangs up on bytes it does not understand; what it said until then is the better news.
                 return Err(if heard.bytes > 0 { heard.error(&self.port) } else { lost(&self.port, &e) });
             }
         };

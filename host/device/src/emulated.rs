@@ -41,7 +41,7 @@ pub enum Mishap {
     LoadCell = 1,
     /// The supply air is closed: no pressure follows.
     Supply = 2,
-    /// The pressure sensor reads the same for ever.
+    /// The pressure sensor reads the same without end.
     StuckGauge = 3,
 }
 
@@ -218,7 +218,7 @@ impl Emulated {
         self.why_native.as_deref()
     }
 
-    /// In words, for people.
+    /// As text, for people.
     #[must_use]
     pub fn words(&self) -> String {
         match (self.kind, &self.why_native) {

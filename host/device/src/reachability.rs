@@ -75,7 +75,7 @@ impl Reachability {
         }
     }
 
-    /// The seconds of each, for so many samples in a second.
+    /// The seconds of each, for n samples in a second.
     #[must_use]
     pub fn to_json(&self, per_s: f64) -> Value {
         let seconds = |samples: u64| samples as f64 / per_s;

@@ -161,7 +161,7 @@ impl<'a> Words<'a> {
 }
 
 impl SetpointProfile {
-    /// Reads what a person wrote, in the quantity's unit.
+    /// Reads what a user wrote, in the quantity's unit.
     ///
     /// # Errors
     /// [`DataCode::CallInvalid`] naming the word at fault; for `@FILE` also [`DataCode::FileUnreadable`] and the line at fault.

@@ -31,7 +31,7 @@ pub struct Row {
     pub id: u8,
     /// Name.
     pub name: &'static str,
-    /// Type of what is asked, one of [`messages`](super::messages) or [`settings`](super::settings).
+    /// Type of the setpoint, one of [`messages`](super::messages) or [`settings`](super::settings).
     pub request: &'static str,
     /// Type of what is answered.
     pub response: &'static str,
@@ -134,15 +134,15 @@ endpoints! {
     1 info GetInfo: () => DeviceInfo;
     /// What the device is doing.
     2 status GetStatus: () => Status;
-    /// `Disarmed` → `Armed`, at once or after a test of the dump valve (`watch.valve_test_pa`); refused while pressure stands in a muscle. The session owns the device.
+    /// `Disarmed` → `Armed`, immediately or after a test of the dump valve (`watch.valve_test_pa`); refused while pressure is in a muscle. The session owns the device.
     3 arm Arm: Session => Status;
-    /// `Armed` → `Running`, or another mode while running. The first set-point is what is measured. The session owns the mode.
+    /// `Armed` → `Running`, or another mode while running. The first setpoint is what is measured. The session owns the mode.
     4 start StartMode: Start => Status;
     /// Vents and goes to `Armed`; allowed always except in `Fault`, where it vents and stays.
     5 stop Stop: () => Status;
     /// Vents and goes to `Disarmed`; in `Fault` it vents and stays.
     6 disarm Disarm: () => Status;
-    /// What is wanted from now on; ends a reference.
+    /// What is demanded from now on; ends a reference.
     7 set_point SetTo: SetPoint => Status;
     /// Starts a reference generator.
     8 reference SetReference: Reference => Status;

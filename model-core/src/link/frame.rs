@@ -33,7 +33,7 @@ pub const MAX_RAW: usize = HEADER + MAX_BODY + CHECK;
 /// Largest frame on the wire, its closing zero included: COBS adds one byte for each 254 begun.
 pub const MAX_WIRE: usize = MAX_RAW + MAX_RAW.div_ceil(254) + 1;
 
-/// Largest frame on the wire of what the device says by itself: it is short, so that its sender needs little room.
+/// Largest frame on the wire of what the device says without a request: it is short, so that its sender needs little room.
 pub const MAX_TOPIC: usize = 112;
 
 /// What a frame is.
@@ -46,7 +46,7 @@ pub enum Kind {
     Response = 1,
     /// The device refuses; the body is a [`Refusal`].
     Refusal = 2,
-    /// The device speaks by itself: telemetry and events.
+    /// The device speaks without a request: telemetry and events.
     Topic = 3,
 }
 

@@ -25,7 +25,7 @@ pub struct Loop {
 /// What one tick was like.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tick {
-    /// What was asked for.
+    /// the setpoint.
     pub setpoint: f64,
     /// True force, N.
     pub force: f64,
@@ -49,7 +49,7 @@ impl Loop {
         mut settings: Settings,
         mode: Mode,
     ) -> Self {
-        // There is no link here, and so no host to hear from.
+        // There is no link here, and so no host to receive from.
         settings.watch.autonomous = true;
         let mut controller = Controller::new(&settings);
         controller.use_table(Side::Agonist, table).expect("a valid table");
@@ -72,7 +72,7 @@ impl Loop {
         self.controller.take_sample()
     }
 
-    /// Goes on for some ticks and tells what was true in each.
+    /// Goes on for some ticks and returns what was true in each.
     ///
     /// # Panics
     /// When a fault stops the controller.
@@ -117,7 +117,7 @@ impl Loop {
     }
 }
 
-/// Root mean square of what was asked for less `value`.
+/// Root mean square of the setpoint less `value`.
 pub fn rms(ticks: &[Tick], value: impl Fn(&Tick) -> f64) -> f64 {
     let sum: f64 = ticks.iter().map(|tick| (tick.setpoint - value(tick)).powi(2)).sum();
     (sum / ticks.len().max(1) as f64).sqrt()

@@ -17,7 +17,7 @@ use crate::machine::HOPELESS;
 /// Waits for the event of a fault.
 ///
 /// # Panics
-/// When none is told.
+/// When none is reported.
 pub fn stopped(client: &mut Client) -> FaultReport {
     let deadline = Instant::now() + HOPELESS;
     while Instant::now() < deadline {
@@ -30,10 +30,10 @@ pub fn stopped(client: &mut Client) -> FaultReport {
     panic!("no fault was told");
 }
 
-/// What is asked for.
+/// the setpoint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wanted {
-    /// A set-point.
+    /// A setpoint.
     Point(SetPoint),
     /// A wave of the device.
     Wave(Reference),
@@ -42,7 +42,7 @@ pub enum Wanted {
 /// A stretch of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stretch {
-    /// What is asked for.
+    /// the setpoint.
     pub wanted: Wanted,
     /// For how many ticks.
     pub ticks: u64,
@@ -87,7 +87,7 @@ pub fn sample(client: &mut Client) -> Result<Telemetry, Event> {
     }
 }
 
-/// Brings a device to `Running` from wherever it is, at full telemetry. It goes on by itself however long this process has to wait for a
+/// Brings a device to `Running` from wherever it is, at full telemetry. It continues without a request however long this process has to wait for a
 /// busy machine, on a bench that may answer three times as fast as a watch goes.
 ///
 /// # Panics

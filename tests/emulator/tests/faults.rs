@@ -152,7 +152,7 @@ fn every_fault_of_the_plant_is_noticed_in_time_and_latched() {
         );
         assert_eq!(client.call::<GetStatus>(&()).expect("a status").state, State::Fault);
         let faults = client.call::<GetFaults>(&()).expect("its faults");
-        // Compared as text: a reading that is no number is not equal to itself.
+        // Compared as text: a reading that is not a number is not equal to itself.
         assert_eq!(format!("{:?}", faults.latched), format!("{:?}", Some(report)));
         assert!(faults.counts[usize::from(fault.code())] >= 1);
         let past = client.call::<GetPastFault>(&PastFault { back: 0 }).expect("the log");
@@ -185,7 +185,7 @@ fn a_fault_whose_cause_is_still_there_is_not_cleared() {
 fn a_host_that_falls_silent_and_a_hold_that_was_asked_for() {
     let folder = Folder::new();
     let station = station();
-    // No faster than a real board: the first set-point must come before its silence is noticed.
+    // No faster than a real board: the first setpoint must come before its silence is noticed.
     let options = Options { first: Some(Box::new(station.clone())), speed: Some(1.0), ..Options::default() };
     let Ok(machine) = Machine::start(folder.path(), options) else { return };
     let mut client = machine.client();
@@ -200,7 +200,7 @@ fn a_host_that_falls_silent_and_a_hold_that_was_asked_for() {
     assert_eq!((report.fault, report.value, report.limit), (Fault::SetPointSilence, 2_001.0, 2_000.0));
     station.pass(100);
     let held = station.since(station.periods() - 50);
-    // The command is the wish and what the drift of this regulator asks for; held, it no longer moves.
+    // The command is the demand and what the drift of this regulator asks for; held, it no longer moves.
     let first = held[0].command;
     assert!((first - 300e3).abs() < 10e3, "it holds {first} Pa");
     assert!(held.iter().all(|exchange| exchange.command == first), "it stays at {first} Pa");
@@ -225,7 +225,7 @@ fn a_mode_without_its_table_is_a_fault_and_nothing_starts_by_itself() {
     let latched = client.call::<GetFaults>(&()).expect("its faults").latched.map(|report| report.fault);
     assert_eq!(latched, Some(Fault::TableMissing));
     client.call::<ClearFault>(&()).expect("it clears");
-    // A set-point to a device that does not run moves nothing.
+    // A setpoint to a device that does not run moves nothing.
     let refused = client.try_call::<SetTo>(&SetPoint::Pressure(300e3)).expect("an answer");
     assert_eq!(refused, Err(Refusal::WrongState(State::Disarmed)));
     station.pass(50);

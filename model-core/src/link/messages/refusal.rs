@@ -9,7 +9,7 @@ use crate::fields::one_of;
 /// Why a device refuses a request.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Refusal {
-    /// The number is no endpoint of this schema.
+    /// The number is not an endpoint of this schema.
     UnknownEndpoint,
     /// The body is not the endpoint's request.
     Malformed,
@@ -21,7 +21,7 @@ pub enum Refusal {
     StillFaulty(Fault),
     /// The muscle has no table.
     NoTable(Side),
-    /// The set-point or reference does not belong to the running mode.
+    /// The setpoint or reference does not belong to the running mode.
     WrongMode(Mode),
     /// A value is not finite or out of range.
     Value(Field),
@@ -72,7 +72,7 @@ one_of!(Refusal {
 /// The setting or value that a refusal is about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Field {
-    /// A set-point.
+    /// A setpoint.
     #[default]
     SetPoint,
     /// A reference generator's parameter.
@@ -119,7 +119,7 @@ pub enum TableFault {
         /// Version that the device reads.
         known: u16,
     },
-    /// The bytes are no table.
+    /// The bytes are not a table.
     Malformed,
     /// A number is not finite.
     NotFinite,

@@ -31,7 +31,7 @@ pub struct Session {
 
 fields!(Session { id });
 
-/// What is wanted, in the terms of a mode.
+/// What is demanded, in the terms of a mode.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum SetPoint {
     /// Pressure, Pa.
@@ -63,14 +63,14 @@ choices!(SetPoint {
     3 Pair { angle_rad: angle, stiffness_nm_per_rad: stiffness },
 });
 
-/// A wave that the device makes itself, in the unit of the mode's first value (Pa, N, m, rad); it begins at once and
-/// holds its last value at its end. A pair's stiffness is the last set-point's.
+/// A wave that the device makes itself, in the unit of the mode's first value (Pa, N, m, rad); it begins immediately and
+/// holds its last value at its end. A pair's stiffness is the last setpoint's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Reference {
-    /// None: set-points of the host.
+    /// None: setpoints of the host.
     #[default]
     SetPoint,
-    /// `mean + amplitude · sin(2π f t)`, for ever.
+    /// `mean + amplitude · sin(2π f t)`, without end.
     Sine {
         /// Mean.
         mean: f32,

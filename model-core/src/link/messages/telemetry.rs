@@ -1,4 +1,4 @@
-//! What a device says by itself.
+//! What a device says without a request.
 
 use heapless::Vec;
 use postcard_schema::Schema;
@@ -10,7 +10,7 @@ use crate::fields::{fields, one_of};
 /// Sets the stream of telemetry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct TelemetryRate {
-    /// One sample every so many ticks; 0 stops.
+    /// One sample every n ticks; 0 stops.
     pub every_ticks: u16,
 }
 
@@ -25,7 +25,7 @@ pub struct SideSample {
     pub stroke_m: f32,
     /// Measured force, N.
     pub force_n: f32,
-    /// Wanted pressure, Pa: feed-forward and trim.
+    /// Demanded pressure, Pa: feed-forward and trim.
     pub pressure_demand_pa: f32,
     /// Command to the regulator, Pa.
     pub command_pa: f32,
@@ -46,7 +46,7 @@ pub struct Telemetry {
     pub state: State,
     /// Mode.
     pub mode: Mode,
-    /// What was asked for, in the unit of the mode.
+    /// the setpoint, in the unit of the mode.
     pub setpoint: f32,
     /// A pair's second value.
     pub setpoint_second: f32,

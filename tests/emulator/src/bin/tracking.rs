@@ -13,7 +13,7 @@ use virtual_bench::presets;
 const HEAD: &str = "| load | asked | table | table + trim | Gaylord | PI alone | regulator's limit | PI : table + trim |\n\
                     | --- | --- | --- | --- | --- | --- | --- | --- |\n";
 
-/// What was asked, and the error of each law and the regulator's limit.
+/// What was queried, and the error of each law and the regulator's limit.
 type Row = (Course, [f64; 5]);
 
 fn rows(text: &mut String, subject: &Subject, mode: Mode, load: Load) -> Vec<Row> {
