@@ -381,3 +381,12 @@ fn a_fault_that_is_not_held_for_vents_in_the_tick_in_which_it_is_found() {
     never.controller.raise(Side::Agonist, &finding);
     assert!(never.controller.is_vented(), "a hold of no time is none");
 }
+
+#[test]
+fn settings_that_were_not_confirmed_are_refused_even_without_a_latched_fault() {
+    let mut bench = Bench::new(|_| ());
+    bench.pass(10);
+    bench.controller.unconfirmed = true;
+    assert_eq!(bench.controller.arm(OWNER), Err(Refusal::StillFaulty(Fault::SettingsInvalid)));
+    assert_eq!(bench.controller.state(), State::Disarmed);
+}

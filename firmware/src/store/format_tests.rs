@@ -178,3 +178,15 @@ fn settings_that_are_gone_or_of_a_newer_layout_are_not_trusted() {
     lost.put_value(0x3F, &mut { FORMAT + 1 }).expect("room");
     assert_eq!(lost.settings(&mut settings), Ok(Kept::Untrusted), "a newer firmware's");
 }
+
+/// Whole settings of the layout before, which are not those that were last confirmed: limits of long ago, for instance.
+#[test]
+fn settings_of_the_layout_before_that_the_seal_does_not_name_are_not_trusted() {
+    let mut store = open(flash_of(include_str!("fixtures/format-4.txt")));
+    let mut bytes = store.bytes(0x33).expect("readable").expect("kept").to_vec();
+    *bytes.last_mut().expect("a byte") ^= 1;
+    store.put_bytes(0x33, &bytes).expect("room");
+    let mut settings = Settings::default();
+    assert_eq!(store.settings(&mut settings), Ok(Kept::Untrusted));
+    assert_eq!(settings, Settings::default());
+}
