@@ -8,7 +8,7 @@ import unittest
 
 from board import TABLE, Board
 from link import (
-    ARM, CLEAR_FAULT, FORCE_MODE, INFO, PRESSURE_MODE, RESTART, SET_SETTINGS, SETTINGS, STATUS, STOP, TABLE_PIECE, TABLE_READ, Reader,
+    CLEAR_FAULT, FORCE_MODE, INFO, PRESSURE_MODE, RESTART, SET_SETTINGS, SETTINGS, STATUS, STOP, TABLE_PIECE, TABLE_READ, Reader,
     Refused, frame, varint,
 )
 
@@ -177,7 +177,7 @@ class Store(unittest.TestCase):
         board.restarted()
         self.assertEqual(board.link.status()["fault"], "settings-invalid")
         with self.assertRaises(Refused):
-            board.link.ask(ARM)
+            board.link.arm()
         with self.assertRaises(Refused):
             board.link.ask(CLEAR_FAULT)
         board.link.ask(SET_SETTINGS, settings, wait=5.0)
