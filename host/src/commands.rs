@@ -11,6 +11,7 @@ pub mod emulate;
 pub mod evaluate;
 pub mod fit;
 pub mod flash;
+pub mod history;
 pub mod fleet;
 pub mod man;
 pub mod new;

@@ -9,7 +9,7 @@ use pam_data::recording::Campaign;
 pub enum Tone {
     /// Neither good nor bad.
     Plain,
-    /// As it should be.
+    /// As required.
     Good,
     /// To be looked at.
     Caution,
