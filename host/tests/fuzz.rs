@@ -48,7 +48,7 @@ impl Random {
     }
 }
 
-/// Every seed as it is, and so many damaged ones.
+/// Every seed as it is, and a number of damaged ones.
 fn run(entry: fn(&[u8]), seeds: &[Vec<u8>], cases: usize) {
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
     entry(&[]);

@@ -142,7 +142,7 @@ class Store(unittest.TestCase):
         board = Board()
         chip = board.chip
         chip.erase_s = 1.2
-        # Bytes that come while the processor does not move: ten times what the ring holds.
+        # Bytes that come while the processor is stalled: ten times what the ring holds.
         erase = chip.flash.erase
 
         def erased(sector):

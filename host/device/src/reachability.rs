@@ -7,7 +7,7 @@ use model_core::table::MuscleTable;
 use model_core::units::{Force, Length, Pressure};
 use serde_json::{Value, json};
 
-use super::setpoint_profile::Quantity;
+use super::setpoint_profile::{Quantity, SetpointProfile};
 use super::{Client, tables};
 use pam_data::error::Result;
 
@@ -45,6 +45,34 @@ impl Reachability {
                 outside_tested: 0,
             })
         }))
+    }
+
+    /// Why a profile asks for more than the muscle can do, before it moves: a pressure above the highest allowed one, or a force above that
+    /// at rest length and this pressure, friction included. `None` where its largest value is within reach.
+    #[must_use]
+    pub fn beyond(&self, quantity: Quantity, profile: &SetpointProfile) -> Option<String> {
+        let highest = profile.highest();
+        let most = self.table.max_pressure;
+        match quantity {
+            Quantity::Pressure if highest > 1.001 * most.pascals() => Some(format!(
+                "{:.0} kPa is asked for, and the highest pressure of the table is {:.0} kPa: the controller limits the setpoint to it",
+                highest / 1e3,
+                most.kilopascals()
+            )),
+            Quantity::Force => {
+                let friction = self.table.friction.iter().copied().fold(0.0, f32::max);
+                let rest = self.muscle.held(Length::from_metres(0.0));
+                let largest = self.muscle.parts(&rest, most).quasi() * (1.0 + friction);
+                (highest > largest).then(|| {
+                    format!(
+                        "{highest:.0} N is asked for, and the muscle pulls at most {largest:.0} N, at rest length and {:.0} kPa: the pressure \
+                         would stay at its highest value",
+                        most.kilopascals()
+                    )
+                })
+            }
+            _ => None,
+        }
     }
 
     /// Takes a sample of a run.

@@ -1,4 +1,4 @@
-//! `host record` and `host recover`: what a controller measures, to a recording that outlives whatever goes wrong.
+//! `host record` and `host recover`: what a controller measures, to a recording that survives failures.
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -55,7 +55,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Silence of the telemetry after which the device is asked what is wrong.
+/// Silence of the telemetry after which the device's faults are read.
 const SILENCE: Duration = Duration::from_secs(2);
 
 /// How a recording ended.
@@ -106,7 +106,7 @@ impl Arguments {
         about["rows"] = json!(rows);
         about["files"] = json!(output.iter().map(|f| f.display().to_string()).collect::<Vec<_>>());
         let kept = end(recorder, &about, console);
-        // A device that is gone cannot be asked to be quiet; the recording is whole all the same.
+        // A device that is gone cannot stop its telemetry; the recording is complete nevertheless.
         let quiet = client.try_call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 });
         if let Err(error) = &watched
             && kept.is_ok()
@@ -187,9 +187,9 @@ fn watch(
 #[command(
     arg_required_else_help = true,
     after_help = "Example:\n  host recover run.csv.part run.mcap.part\n\n\
-    A recording is named NAME.part while it grows. What is whole in it goes to a file of its own, also behind damage; what is \
-    missing is said in bytes and samples, and the original is then kept as NAME.part.original. The next recording of the same \
-    name does so by itself. A damaged recording of another name stays, and what is whole in it goes to NAME.rescued-N."
+    A recording is named NAME.part while it grows. Intact data, also after the damage, go to a new file. The program \
+    prints the missing bytes and samples, and keeps the original as NAME.part.original. The next recording of the same \
+    name recovers it automatically. A damaged recording of another name stays, and its intact data go to NAME.rescued-N."
 )]
 pub struct RecoverArguments {
     /// Recordings that were cut off or damaged.

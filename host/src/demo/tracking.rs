@@ -1,4 +1,4 @@
-//! How well a controller's force follows what is asked while the muscle moves, under one control law after another.
+//! How well a controller's force follows the setpoint while the muscle moves, under one control law after another.
 
 use model_core::link::endpoints::{GetSettings, SetSettings};
 use model_core::link::messages::{Reference, Telemetry};
@@ -68,7 +68,7 @@ impl Law {
     }
 }
 
-/// What is asked of the force.
+/// The force setpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Task {
     /// A sine of 0.5 Hz.

@@ -24,7 +24,7 @@ pub(super) struct Arguments {
     /// What to record, separated by commas.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', default_value = "pressure,force,asked,command")]
     variables: Vec<String>,
-    /// One record every so many ticks.
+    /// Ticks from one record to the next.
     #[arg(long, value_name = "TICKS", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     every: u16,
     /// When to begin.
@@ -46,7 +46,7 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Begin {
-    /// At once.
+    /// Immediately.
     Now,
     /// With the next start of a mode or reference.
     Start,

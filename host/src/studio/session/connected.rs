@@ -23,6 +23,7 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::json_of;
 use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::error::DeviceCode;
+use pam_device::reachability::Reachability;
 use pam_device::recorder::{Recorder, about_losses, about_start, serial};
 use pam_device::run::{Plan, Steps, arm, vent};
 use pam_device::setpoint_profile::Quantity;
@@ -64,7 +65,7 @@ impl Connected {
         Self::new(address.clone(), Client::open(&address)?, None)
     }
 
-    /// Starts an emulated controller with a muscle of the bench, and connects to it. Also gives what it runs on, in words.
+    /// Starts an emulated controller with a muscle of the bench, and connects to it. Also returns a description of what it runs on.
     ///
     /// # Errors
     /// A muscle that the bench does not know, or as [`Emulated::start`] and [`Client::open`].
@@ -244,6 +245,10 @@ impl Connected {
                     return Err(Error::new(DeviceCode::DeviceRefused, "the controller is disarmed")
                         .help("arm it first"));
                 }
+                let reachable = Reachability::of(&mut self.client)?;
+                if let Some(words) = reachable.and_then(|r| r.beyond(quantity, &profile)) {
+                    return Err(Error::new(DataCode::CallInvalid, words).help("ask for less"));
+                }
                 if self.status.state == State::Running && self.status.mode != quantity.mode() {
                     self.client.call::<Stop>(&())?;
                 }
@@ -260,7 +265,7 @@ impl Connected {
                 let cleared = self.client.call_once::<ClearFault>(&());
                 self.status = self.client.call::<GetStatus>(&())?;
                 self.note_fault()?;
-                // What is wanted is that none is latched: one that is gone already is no failure.
+                // The purpose is that none is latched: one that is gone already is no failure.
                 if self.status.state == State::Fault {
                     cleared?;
                 }
