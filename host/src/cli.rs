@@ -23,7 +23,7 @@ use pam_data::error::Result;
     host fit --muscle mini.toml loops/*.csv -o mini.pam --report mini.html\n  \
     host diagnose --muscle mini.toml loops/*.csv --report why.html\n  \
     host studio --emulate\n\n\
-    Results for programs: fit, evaluate, predict, diagnose and plan write JSON into the file behind --json (`-` is standard \
+    Results for programs: fit, evaluate, predict, diagnose, history and plan write JSON into the file behind --json (`-` is standard \
     output); with all others --json stands alone, and they print it in place of words.\n\n\
     Exit status: 0 done, 1 the input or the device is at fault, 2 the call is at fault.")]
 pub struct Cli {
@@ -77,6 +77,14 @@ enum Command {
     Predict(commands::predict::Arguments),
     /// Say what the model leaves out: where, what, with what probability, what to record next.
     Diagnose(commands::diagnose::Arguments),
+    /// Follow one actuator over several campaigns: what changed, when, and by how much.
+    History(commands::history::Arguments),
+    /// Fit and diagnose every muscle of a manifest, in parallel, into Parquet tables.
+    Batch(commands::batch::Arguments),
+    /// Show the results of a batch as one fleet: distributions, outlying muscles, effects, groups.
+    Fleet(commands::fleet::Arguments),
+    /// Fit a muscle with few recordings beside others of its type that were fitted before.
+    Stock(commands::stock::Arguments),
     /// Explain what the model leaves out, effect by effect.
     Effects(commands::effects::Arguments),
     /// Say before recording what a planned protocol can and cannot distinguish.
@@ -118,6 +126,10 @@ impl Command {
             Self::Evaluate(a) => a.run(console),
             Self::Predict(a) => a.run(console),
             Self::Diagnose(a) => a.run(console),
+            Self::History(a) => a.run(console),
+            Self::Batch(a) => a.run(console),
+            Self::Fleet(a) => a.run(console),
+            Self::Stock(a) => a.run(console),
             Self::Effects(a) => a.run(console),
             Self::Plan(a) => a.run(console),
             Self::Compare(a) => a.run(console),

@@ -1,5 +1,6 @@
 //! The sub-commands, one file each: arguments in, library calls, results out.
 
+pub mod batch;
 pub mod compare;
 pub mod completions;
 pub mod demo;
@@ -10,6 +11,8 @@ pub mod emulate;
 pub mod evaluate;
 pub mod fit;
 pub mod flash;
+pub mod history;
+pub mod fleet;
 pub mod man;
 pub mod new;
 pub mod plan;
@@ -20,5 +23,6 @@ pub mod recordings;
 pub mod reports;
 pub mod run;
 pub mod settings;
+pub mod stock;
 pub mod studio;
 pub mod table;

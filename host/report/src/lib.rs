@@ -24,6 +24,7 @@ pub mod effect_trace;
 pub mod fit_page;
 pub mod history_text;
 pub mod inline_markup;
+pub mod timeline_page;
 
 pub mod document;
 pub mod wording;
