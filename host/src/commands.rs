@@ -1,5 +1,6 @@
 //! The sub-commands, one file each: arguments in, library calls, results out.
 
+pub mod campaign;
 pub mod compare;
 pub mod completions;
 pub mod demo;

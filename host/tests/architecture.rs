@@ -18,6 +18,11 @@ const ALLOWED: &[(&str, &str, &[&str])] = &[
     ("pam-report", "host/report", &["model-core", "pam-data", "pam-fit", "pam-diagnose", "pam-evaluate"]),
     ("pam-device", "host/device", &["model-core", "pam-data", "firmware", "virtual-bench"]),
     (
+        "pam-campaign",
+        "host/campaign",
+        &["model-core", "pam-data", "pam-fit", "pam-diagnose", "pam-device", "pam-protocol", "virtual-bench"],
+    ),
+    (
         "host",
         "host",
         &[
@@ -28,6 +33,7 @@ const ALLOWED: &[(&str, &str, &[&str])] = &[
             "pam-diagnose",
             "pam-report",
             "pam-device",
+            "pam-campaign",
             "pam-protocol",
             "virtual-bench",
         ],

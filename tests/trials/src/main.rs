@@ -3,6 +3,7 @@
 mod again;
 mod answer;
 mod baselines;
+mod campaign;
 mod clopper;
 mod festo;
 mod festo_history;
@@ -177,6 +178,8 @@ enum Command {
     FestoHistory(Real),
     /// Ask what has changed: changes put into later runs of real recordings, untouched pairs, a cylinder whose seal was swapped.
     Reference(reference::Reference),
+    /// Campaigns that choose their own steps, beside protocol C for the same time, a random menu, and the proposal of today.
+    Campaign(campaign::Campaigns),
     /// Generate, answer and score in one go; each goes on where an earlier run was broken off.
     Prove {
         /// dev or final.
@@ -226,6 +229,7 @@ fn main() -> ExitCode {
         Command::FestoHistory(real) => {
             festo::run_history(&real.data, &real.output, &real.host, real.page.as_deref())
         }
+        Command::Campaign(what) => campaign::run(&what),
         Command::Reference(what) => reference::run(&what),
         Command::Prove { set, what, tool, check } => prove(&set, &what, &tool, check),
     };
