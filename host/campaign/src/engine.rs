@@ -163,7 +163,8 @@ impl Engine {
         for (step, why) in opening(&self.places, &self.rig) {
             let kind = |s: &Step| s.name();
             let done = self.steps.iter().chain(&self.left_out).any(|s| kind(s) == kind(&step));
-            if !done && step.seconds(&self.places) <= left {
+            // How long it takes is known only when the free stroke is; without these steps nothing else can be chosen.
+            if !done && left > 0.0 {
                 let seconds = step.seconds(&self.places);
                 return Ok(chosen(step, why.to_owned(), Gain::default(), seconds));
             }
@@ -181,6 +182,9 @@ impl Engine {
             return Ok(close(words::settled(self.diagnosis.as_ref(), self.purpose)));
         }
         Ok(match best {
+            Some((step, gain, seconds)) if self.findings.is_none() => {
+                chosen(step, words::NO_TABLE.to_owned(), gain, seconds)
+            }
             Some((step, gain, seconds)) => {
                 let why = words::why(&gain, self.diagnosis.as_ref(), &step);
                 chosen(step, why, gain, seconds)
@@ -201,7 +205,7 @@ impl Engine {
         let Some(findings) = &self.findings else {
             let next = menu(&self.places, &self.rig)
                 .into_iter()
-                .find(|s| !self.steps.contains(s) && s.seconds(&self.places) <= left_s);
+                .find(|s| !self.steps.contains(s) && self.may_follow(s) && s.seconds(&self.places) <= left_s);
             return (next.map(|s| (s, Gain::default(), s.seconds(&self.places))), false);
         };
         let sets = match (&self.diagnosis, self.purpose) {

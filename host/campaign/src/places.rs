@@ -135,7 +135,8 @@ impl Places {
     /// The slow speed, m/s.
     #[must_use]
     pub fn slow_speed(&self) -> f64 {
-        let free = if self.free > 0.0 { self.free } else { 0.5 * self.stroke_max };
+        // A quarter of the longest stroke before it is known: a tenth of the rest length.
+        let free = if self.free > 0.0 { self.free } else { 0.25 * self.stroke_max };
         (free / SLOW_STROKE).max(1e-6)
     }
 
@@ -149,7 +150,9 @@ impl Places {
     #[must_use]
     pub fn free_stroke(&self, pressure: f64) -> f64 {
         let limit = self.stroke_max;
-        if let Some(model) = &self.model {
+        if self.free > 0.0
+            && let Some(model) = &self.model
+        {
             return (1.02 * pam_diagnose::protocol_simulation::free_stroke(model, pressure)).min(limit);
         }
         if self.free > 0.0 {

@@ -9,6 +9,9 @@ use crate::step::Step;
 
 /// Why a campaign ends with a tare.
 pub const CLOSING: &str = "Zeros at the end show whether the instruments drifted.";
+/// Why a step was chosen while there is no table.
+pub const NO_TABLE: &str =
+    "The recordings do not determine a table yet, so the steps of the menu are made in their order.";
 /// Why a campaign ends although not everything is known.
 pub const NOTHING_MORE: &str =
     "No step that this rig can do within the time left is expected to tell anything more.";
