@@ -12,7 +12,7 @@ use serde_json::Value;
 fn campaign(folder: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_host"));
     command
-        .args(["campaign", "--emulate", "mini", "--on", "native", "--minutes", "2.5", "--speed", "60", "-o"])
+        .args(["campaign", "--emulate", "mini", "--on", "native", "--minutes", "2.5", "--speed", "10", "-o"])
         .arg(folder.join("c"))
         .env("XDG_CONFIG_HOME", folder)
         .env_remove("PAM_SETTINGS")

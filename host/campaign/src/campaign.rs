@@ -64,6 +64,9 @@ pub enum Outcome {
     Interrupted,
 }
 
+/// Bench time that must be left for an ended campaign to continue, s: less fits no step.
+const LEAST_MORE_S: f64 = 60.0;
+
 /// Where rows and events go.
 trait Sink {
     fn begin(&mut self, number: u32, name: &str) -> Result<()>;
@@ -196,7 +199,11 @@ pub fn run(
         let away = last.map_or(1.0, |at| (unix_seconds().saturating_sub(at) as f64 - spent).max(1.0));
         actuation.set_clock(clock.max(last_time(engine)) + away);
     }
-    if let Some(Event::Ended { reason, .. }) = journal.events().last() {
+    // One that ended at its limit continues where the limit is higher now.
+    let more = engine.budget() - spent > LEAST_MORE_S;
+    if let Some(Event::Ended { reason, .. }) = journal.events().last()
+        && !(more && reason.starts_with(crate::words::TIME_IS_OVER))
+    {
         return Ok((Outcome::Complete(reason.clone()), course));
     }
     journal.write(Event::Begin {

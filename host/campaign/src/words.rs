@@ -86,8 +86,11 @@ pub fn settled(diagnosis: Option<&Diagnosis>, purpose: Purpose) -> String {
     }
 }
 
+/// How the reason of a campaign begins that ended at its limit.
+pub const TIME_IS_OVER: &str = "The time of";
+
 /// Why a campaign ended at its limit.
 #[must_use]
 pub fn time_is_over(budget_s: f64) -> String {
-    format!("The time of {:.0} min is used.", budget_s / 60.0)
+    format!("{TIME_IS_OVER} {:.0} min is used.", budget_s / 60.0)
 }

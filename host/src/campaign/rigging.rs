@@ -23,6 +23,9 @@ use crate::console::Console;
 use crate::demo::campaign::muscle;
 use crate::demo::tracking::{Law, Task, choose, track};
 
+/// Most ticks without a host that the firmware's settings allow.
+const LONGEST_SILENCE: u32 = 60_000;
+
 /// Everything that carries out steps.
 pub(crate) struct Rigging {
     pub(crate) controller: Controller,
@@ -59,8 +62,9 @@ pub(crate) fn emulated(
     let mut client = Client::open(emulated.address())?;
     // The watch counts device time, which goes so much faster, and twice as fast again after a pause of a busy machine.
     let mut settings = client.call::<GetSettings>(&())?;
-    let faster = if speed.is_finite() { (2.0 * speed).ceil() as u32 } else { 200 };
-    settings.watch.host_silence_ticks = settings.watch.host_silence_ticks.saturating_mul(faster.max(1));
+    let faster = (2.0 * speed).ceil().max(1.0) as u32;
+    settings.watch.host_silence_ticks =
+        settings.watch.host_silence_ticks.saturating_mul(faster).min(LONGEST_SILENCE);
     client.call_once::<SetSettings>(&settings)?;
     limit(&mut rig, &mut client)?;
     let made: MakeCheck = Box::new(move |check, force, pressure, clock| {
