@@ -64,7 +64,12 @@ target=${CARGO_TARGET_DIR:-target}
 export PROPTEST_RNG_SEED="${PROPTEST_RNG_SEED:-1}"
 
 browser() {
-    cargo build --quiet --locked --package host && python3 tests/studio.py "$target/debug/host"
+    # The features of the whole workspace, as in the tests: other features would compile most dependencies again.
+    cargo build --quiet --locked --workspace --bin host && python3 tests/studio.py "$target/debug/host"
+}
+
+packages() {
+    cargo build --quiet --locked --package host --bins && bash packaging/test.sh "$target/debug/pam"
 }
 
 language() {
@@ -115,13 +120,21 @@ else
     if require "Python bindings" python3 python3 python3-venv; then
         step "Python bindings" bash host/python/tests/run.sh
     fi
+    if has dpkg-deb; then
+        step "packages" packages
+    else
+        say "skipped: packages: dpkg-deb is missing"
+    fi
+    if require "fleet on a workflow engine" python3 python3 python3-venv; then
+        step "fleet on a workflow engine" bash tests/fleet/run.sh
+    fi
     if require "image of the Nucleo, executed" python3 python3 python3-venv; then
         step "image of the Nucleo, executed" bash tests/nucleo/run.sh
     fi
 fi
 if [ $tier = long ]; then
     step "long tests" env PAM_LONG=1 cargo test --workspace --release --locked --no-fail-fast \
-        --test kills --test closed_loop --test commands
+        --test kills --test closed_loop --test commands --test batch
     if has cargo-llvm-cov; then
         step "coverage" bash tests/coverage.sh
     else

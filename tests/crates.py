@@ -15,11 +15,11 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PICTURE = ROOT / "docs/src/pictures/crates.svg"
-TESTS = {"emulator-tests", "trials"}
+TESTS = {"benchmarks", "emulator-tests", "published-schemas", "trials"}
 # Columns in which no line crosses a box; a new crate is drawn in a column of its own until it has an entry here.
 COLUMN = {
-    "host": 1, "pamtools": 3, "pam-report": 2, "pam-evaluate": 1.2, "pam-diagnose": 2.6, "pam-device": 0.2, "pam-fit": 1.9,
-    "pam-campaign": 1.6, "firmware": 0, "virtual-bench": 1, "pam-data": 2, "model-core": 0.6, "pam-protocol": 3,
+    "host": 1, "pamtools": 3, "pam-report": 2, "pam-fleet": 2, "pam-evaluate": 1.2, "pam-diagnose": 2.6, "pam-device": 0.2, "pam-fit": 1.9,
+    "pam-campaign": 3.1, "firmware": 0, "virtual-bench": 1, "pam-data": 2, "model-core": 0.6, "pam-protocol": 3,
 }
 WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN = 132, 36, 28, 52, 16
 

@@ -1,5 +1,5 @@
 //! What bytes from outside reach: one function for each door. `cargo fuzz` calls them without end, the ordinary tests for a moment
-//! with seeds of their own. They return whatever the bytes are; a panic, or a value that breaks a promise, is a finding.
+//! with seeds of their own. They return for any bytes; a panic, or a value that breaks a promise, is a finding.
 #![allow(clippy::unwrap_used, dead_code, reason = "a helper of tests: a failure here is a finding")]
 
 use std::io::Write;
@@ -113,7 +113,7 @@ pub fn log(bytes: &[u8]) {
     let _ = LogTable::of_formats(&formats, Some("{=u64:us}")).decode(bytes);
 }
 
-/// What is asked of a controller over time, as a person writes it.
+/// A setpoint profile as a user writes it.
 pub fn setpoint_profile(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     // Behind this sign stands the name of a file.

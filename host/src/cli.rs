@@ -8,13 +8,14 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::commands;
 use crate::console::{Colour, Console, unprinted};
+use crate::program_name;
 use crate::settings::{all_settings, apply};
 use pam_data::error::Result;
 
 /// Recordings of pneumatic artificial muscles to tables, tables to controllers.
 #[derive(Debug, Parser)]
 #[command(name = "host", version, about, propagate_version = true, arg_required_else_help = true)]
-// Longer lines than these nobody reads with ease; narrower terminals get theirs.
+// Longer lines are hard to read; a narrower terminal sets its own width.
 #[command(max_term_width = 100)]
 #[command(after_help = "Examples:\n  \
     host demo\n  \
@@ -22,7 +23,7 @@ use pam_data::error::Result;
     host fit --muscle mini.toml loops/*.csv -o mini.pam --report mini.html\n  \
     host diagnose --muscle mini.toml loops/*.csv --report why.html\n  \
     host studio --emulate\n\n\
-    Results for programs: fit, evaluate, predict, diagnose and plan write JSON into the file behind --json (`-` is standard \
+    Results for programs: fit, evaluate, predict, diagnose, history and plan write JSON into the file behind --json (`-` is standard \
     output); with all others --json stands alone, and they print it in place of words.\n\n\
     Exit status: 0 done, 1 the input or the device is at fault, 2 the call is at fault.")]
 pub struct Cli {
@@ -64,21 +65,29 @@ enum Colours {
 /// Every sub-command. A new one is one file in `commands/` and one line here and in [`Command::run`].
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// The whole story on this machine, no hardware: record, fit, flash, track.
+    /// Demonstrate the whole workflow without hardware: record, fit, flash, track.
     Demo(commands::demo::Arguments),
     /// Describe a muscle by answering what to measure, with drawings.
     New(commands::new::Arguments),
     /// Fit a muscle's table to recordings.
     Fit(commands::fit::Arguments),
-    /// Score a fit on recordings that it has not seen.
+    /// Score a fit on recordings that it did not use.
     Evaluate(commands::evaluate::Arguments),
     /// Compute the force of a table on recordings, and score it.
     Predict(commands::predict::Arguments),
-    /// Say what the model leaves out: where, what, how sure, what to record next.
+    /// Say what the model leaves out: where, what, with what probability, what to record next.
     Diagnose(commands::diagnose::Arguments),
+    /// Follow one actuator over several campaigns: what changed, when, and by how much.
+    History(commands::history::Arguments),
+    /// Fit and diagnose every muscle of a manifest, in parallel, into Parquet tables.
+    Batch(commands::batch::Arguments),
+    /// Show the results of a batch as one fleet: distributions, outlying muscles, effects, groups.
+    Fleet(commands::fleet::Arguments),
+    /// Fit a muscle with few recordings beside others of its type that were fitted before.
+    Stock(commands::stock::Arguments),
     /// Explain what the model leaves out, effect by effect.
     Effects(commands::effects::Arguments),
-    /// Say before recording what a planned protocol can and cannot tell apart.
+    /// Say before recording what a planned protocol can and cannot distinguish.
     Plan(commands::plan::Arguments),
     /// Record, judge, fit and diagnose by itself: the program chooses each step of the campaign.
     Campaign(commands::campaign::Arguments),
@@ -119,6 +128,10 @@ impl Command {
             Self::Evaluate(a) => a.run(console),
             Self::Predict(a) => a.run(console),
             Self::Diagnose(a) => a.run(console),
+            Self::History(a) => a.run(console),
+            Self::Batch(a) => a.run(console),
+            Self::Fleet(a) => a.run(console),
+            Self::Stock(a) => a.run(console),
             Self::Effects(a) => a.run(console),
             Self::Plan(a) => a.run(console),
             Self::Campaign(a) => a.run(console),
@@ -133,7 +146,7 @@ impl Command {
             Self::Emulate(a) => a.run(console),
             Self::Device(a) => a.run(console),
             Self::Settings(a) => a.run(&Cli::command(), console),
-            Self::Completions(a) => a.run(&mut Cli::command(), console),
+            Self::Completions(a) => a.run(&mut program_name::renamed(Cli::command()), console),
             Self::Man(a) => a.run(built(), console),
         }
     }
@@ -141,7 +154,7 @@ impl Command {
 
 /// The command line with everything that is found out when it is parsed: shared options in every command.
 fn built() -> clap::Command {
-    let mut command = Cli::command();
+    let mut command = program_name::renamed(Cli::command());
     command.build();
     command
 }
@@ -158,7 +171,7 @@ fn parse() -> Result<Cli> {
         Err(error) => return Err(error),
     };
     // clap itself prints usage errors and ends with status 2.
-    let matches = apply(Cli::command(), &settings).get_matches();
+    let matches = apply(program_name::renamed(Cli::command()), &settings).get_matches();
     Ok(Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit()))
 }
 

@@ -1,5 +1,6 @@
 //! The sub-commands, one file each: arguments in, library calls, results out.
 
+pub mod batch;
 pub mod campaign;
 pub mod compare;
 pub mod completions;
@@ -11,6 +12,8 @@ pub mod emulate;
 pub mod evaluate;
 pub mod fit;
 pub mod flash;
+pub mod fleet;
+pub mod history;
 pub mod man;
 pub mod new;
 pub mod plan;
@@ -21,5 +24,6 @@ pub mod recordings;
 pub mod reports;
 pub mod run;
 pub mod settings;
+pub mod stock;
 pub mod studio;
 pub mod table;

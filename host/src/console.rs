@@ -78,25 +78,25 @@ impl Console {
         Self::new(true, false, Colour::Never)
     }
 
-    /// Whether progress bars and live lines are welcome: somebody watches, and did not ask for quiet.
+    /// Whether progress bars and live lines are shown: the console is interactive, and `--quiet` is not set.
     #[must_use]
     pub fn live(&self) -> bool {
         !self.quiet && std::io::stderr().is_terminal()
     }
 
-    /// Whether only results and errors are wanted.
+    /// Whether only results and errors are requested.
     #[must_use]
     pub fn quiet(&self) -> bool {
         self.quiet
     }
 
-    /// Whether details were asked for.
+    /// Whether details were requested.
     #[must_use]
     pub fn verbose(&self) -> bool {
         self.verbose
     }
 
-    /// A result, on standard output. A reader that stopped reading (`| head`) is no failure; any other failure is told by
+    /// A result, on standard output. A reader that stopped reading (`| head`) is no failure; any other failure is reported by
     /// [`unprinted`] when the command has ended.
     pub fn result(&self, text: impl Display) {
         if let Err(error) = print(format!("{}\n", printable(&text.to_string())).as_bytes()) {
@@ -118,7 +118,7 @@ impl Console {
         }
     }
 
-    /// Something that the user should know about a result, on standard error.
+    /// A remark about a result, on standard error.
     pub fn warning(&self, text: impl Display) {
         if !self.quiet {
             let text = printable(&text.to_string()).into_owned();

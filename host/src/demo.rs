@@ -1,4 +1,4 @@
-//! The whole story on one machine: a campaign on the virtual bench, a table, a controller, force tracking, and back.
+//! The whole workflow on one machine: a campaign on the virtual bench, a table, a controller, force tracking, and back.
 //!
 //! | step | where |
 //! | --- | --- |

@@ -7,6 +7,8 @@ pub(crate) mod effects;
 pub(crate) mod evaluate;
 #[cfg(test)]
 mod fit;
+pub(crate) mod fleet;
+pub(crate) mod history;
 pub(crate) mod predict;
 pub(crate) mod table;
 
@@ -49,6 +51,7 @@ mod tests {
     #[test]
     fn every_published_schema_is_that_of_the_types() {
         published::<super::campaign::Campaign>("pam-campaign-1");
+        published::<super::fleet::Batch<'_>>("pam-batch-1");
         published::<super::bench::Compare<'_>>("pam-compare-1");
         published::<super::bench::Demo<'_>>("pam-demo-1");
         published::<super::bench::Emulate<'_>>("pam-emulate-1");
@@ -71,6 +74,9 @@ mod tests {
         published::<super::effects::Effects>("pam-effects-1");
         published::<super::evaluate::Evaluate>("pam-evaluate-1");
         published::<super::fit::Fit>("pam-fit-1");
+        published::<super::history::History>("pam-history-1");
+        published::<super::fleet::Fleet<'_>>("pam-fleet-1");
+        published::<super::fleet::Stock<'_>>("pam-stock-1");
         published::<super::predict::Predict>("pam-predict-1");
         published::<super::table::Check>("pam-check-1");
         published::<super::table::Export>("pam-export-1");

@@ -4,6 +4,7 @@ use pam_data::error::{Code, DataCode};
 use pam_data::error_codes;
 use pam_device::error::DeviceCode;
 use pam_fit::error::FitCode;
+use pam_fleet::error::FleetCode;
 
 error_codes! {
     /// Failures of the program itself.
@@ -22,6 +23,6 @@ pub fn all_codes() -> Vec<Code> {
     }
     let (calls, files): (Vec<Code>, Vec<Code>) =
         of(DataCode::ALL).partition(|code| *code == DataCode::CallInvalid);
-    let ours = of(FitCode::ALL).chain(of(HostCode::ALL)).chain(of(DeviceCode::ALL));
+    let ours = of(FitCode::ALL).chain(of(FleetCode::ALL)).chain(of(HostCode::ALL)).chain(of(DeviceCode::ALL));
     files.into_iter().chain(ours).chain(calls).collect()
 }

@@ -7,6 +7,7 @@ pub mod console;
 pub mod demo;
 mod documents;
 pub mod error;
+mod program_name;
 pub mod progress;
 pub mod settings;
 pub mod studio;

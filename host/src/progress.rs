@@ -1,4 +1,4 @@
-//! How far a piece of work has come, and how long it still takes: one line on the terminal, nothing where nobody watches.
+//! How far a piece of work has come, and how long it still takes: one line on the terminal, nothing where the output is not a terminal.
 
 use std::io::Write;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -11,7 +11,7 @@ use crate::console::Console;
 
 /// Time between two pictures of the line.
 const REDRAW: Duration = Duration::from_millis(100);
-/// Work that is done sooner shows no line at all: a flash on the screen tells nothing.
+/// Work that is done sooner shows no line at all: it would vanish before it could be read.
 const PATIENCE: Duration = Duration::from_millis(400);
 /// Width of the bar where the terminal has room for it, characters.
 const BAR: usize = 24;
@@ -143,7 +143,7 @@ impl Drop for ProgressLine {
 }
 
 /// The line: what, a bar, the share, and the time that is left if the rest goes as fast as what is done. It stays within the columns of the
-/// terminal: one that goes on in a second line could not be drawn over.
+/// terminal: one that continues in a second line could not be drawn over.
 fn line(what: &str, done: u64, total: u64, elapsed: Duration, columns: usize) -> String {
     let room = columns.saturating_sub(1);
     let text = match (done, total) {
@@ -165,7 +165,7 @@ fn line(what: &str, done: u64, total: u64, elapsed: Duration, columns: usize) ->
     text.chars().take(room).collect()
 }
 
-/// A time in the unit that a person would say.
+/// A time in a readable unit.
 fn span(time: Duration) -> String {
     let seconds = time.as_secs_f64().round() as u64;
     match seconds {

@@ -1,4 +1,4 @@
-//! The settings file: what stands in for options that are not given, so that a bench's port and muscle are written once.
+//! The settings file: values of options that are not given, so that a bench's port and muscle are written once.
 //!
 //! ```toml
 //! # pam.toml
@@ -188,7 +188,7 @@ impl Reading<'_> {
             let fits: Vec<Result<Vec<String>>> =
                 found.iter().map(|arg| self.values(at, key, arg, &texts)).collect();
             // An option of one name may mean different things to two commands, such as a file, a switch and a number. The kind of the
-            // value says which is meant, whatever the order of the commands; after that, the first that it suits.
+            // value says which is meant, regardless of the order of the commands; after that, the first that it suits.
             let likely = match value.get_ref() {
                 DeValue::Boolean(_) => Kind::Flag,
                 DeValue::Integer(_) | DeValue::Float(_) => Kind::Other,
@@ -325,7 +325,7 @@ pub fn all_settings(command: &Command) -> Result<Vec<Setting>> {
     let mut out = Vec::new();
     for file in files()? {
         let mut settings = read(&file, command)?;
-        // A command's own section goes before what is said for all, whatever the order in the file.
+        // A command's own section goes before the general section, regardless of the order in the file.
         settings.sort_by_key(|s| s.command.split_whitespace().count());
         out.extend(settings);
     }

@@ -16,6 +16,7 @@ const ALLOWED: &[(&str, &str, &[&str])] = &[
     ("pam-evaluate", "host/evaluate", &["model-core", "pam-data", "pam-fit"]),
     ("pam-diagnose", "host/diagnose", &["model-core", "pam-data", "pam-fit", "pam-protocol"]),
     ("pam-report", "host/report", &["model-core", "pam-data", "pam-fit", "pam-diagnose", "pam-evaluate"]),
+    ("pam-fleet", "host/fleet", &["model-core", "pam-data", "pam-fit", "pam-diagnose", "pam-report"]),
     ("pam-device", "host/device", &["model-core", "pam-data", "firmware", "virtual-bench"]),
     (
         "pam-campaign",
@@ -32,6 +33,7 @@ const ALLOWED: &[(&str, &str, &[&str])] = &[
             "pam-evaluate",
             "pam-diagnose",
             "pam-report",
+            "pam-fleet",
             "pam-device",
             "pam-campaign",
             "pam-protocol",

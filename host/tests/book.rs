@@ -1,7 +1,7 @@
 //! The book's commands are run, their output is compared, its tables are made from the source.
 //!
 //! In a ```` ```console ```` block a line that begins with `$ ` is run by `sh` in a folder of the page's own; the lines after it are
-//! what it prints. `…` alone on a line stands for any lines. Numbers may differ somewhat, for they belong to a seed and
+//! what it prints. `…` alone on a line represents any lines. Numbers may differ somewhat, for they belong to a seed and
 //! a version; words may not. ```` ```toml file=NAME ```` writes a file first. Between `<!-- begin NAME -->` and `<!-- end -->` stands a
 //! table that the source makes. A line `<!-- picture FILE -->` before an image says which file of that folder the image is.
 //!
@@ -64,7 +64,7 @@ fn run(command: &str, folder: &Path, bin: &Path) -> (String, bool) {
         .env("PATH", path)
         .env("NO_COLOR", "1")
         .env("COLUMNS", "100")
-        // Settings of whoever runs the tests do not count.
+        // Settings of anyone who runs the tests do not count.
         .env("XDG_CONFIG_HOME", bin)
         .env_remove("PAM_SETTINGS")
         .env_remove("PAM_PORT")
@@ -114,7 +114,7 @@ fn same(expected: &[String], actual: &[String]) -> bool {
     }
 }
 
-/// Runs one page; gives it back as it should read, and what differs.
+/// Runs one page; returns its expected text, and the differences.
 fn check(page: &Path, text: &str) -> (String, Vec<String>) {
     let name = page.strip_prefix(book()).unwrap_or(page).display().to_string();
     let folder =
@@ -361,7 +361,7 @@ fn the_chapters_on_effects_are_those_of_this_program() {
         let name = path.file_name().expect("a name");
         let committed = fs::read_to_string(book().join("effects").join(name)).unwrap_or_default();
         let (a, b) = (fs::read_to_string(&path).expect("a chapter"), committed);
-        // Pictures differ in the last digit between processors, and so does the order of effects that are nearly alike.
+        // Pictures differ in the last digit between processors, and so does the order of effects that are nearly the same.
         let ranked = |line: &str| line.starts_with("After a fit of the base model");
         let well = if name.to_string_lossy().ends_with(".md") {
             a.lines().count() == b.lines().count()

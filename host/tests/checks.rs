@@ -87,7 +87,7 @@ fn bad_checks_are_refused_with_the_place_and_what_to_do() {
         ("time_s,force_N,reference_force_N\n0,1,1\n".to_owned(), "1 row;"),
         (
             format!("time_s,force_N,reference_force_N\n{}0,x,1\n", rows("0,1,1\n")),
-            "line 32: `x` is no number for `force_N`",
+            "line 32: `x` is not a number for `force_N`",
         ),
         (format!("time_s,force_N,reference_force_stone\n{}", rows("0,1,1\n")), "unknown unit of the column"),
         (format!("time_s,force_N,reference_force_N\n{}0,1\n", rows("0,1,1\n")), "line 32"),

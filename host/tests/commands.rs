@@ -9,7 +9,7 @@ use clap::CommandFactory;
 
 fn host(folder: &Path, arguments: &[&str], port: Option<&str>) -> (i32, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_host"));
-    // Settings of whoever runs the tests do not count.
+    // Settings of anyone who runs the tests do not count.
     command.args(arguments).current_dir(folder).env("XDG_CONFIG_HOME", folder).env_remove("PAM_SETTINGS");
     match port {
         Some(port) => command.env("PAM_PORT", port),
@@ -246,4 +246,20 @@ fn commands_that_the_readme_and_the_help_show_are_understood() {
         seen += 1;
     }
     assert!(seen > 40, "only {seen} commands were found");
+}
+
+#[test]
+fn the_second_name_is_the_same_program() {
+    let said = |arguments: &[&str]| {
+        let output =
+            Command::new(env!("CARGO_BIN_EXE_pam")).args(arguments).env_remove("PAM_PORT").output().unwrap();
+        assert!(output.status.success());
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let help = said(&["fit", "--help"]);
+    assert!(help.contains("Usage: pam fit") && help.contains("  pam fit --muscle"), "{help}");
+    assert!(!help.contains("host fit"), "{help}");
+    assert!(said(&["--version"]).starts_with("pam "));
+    assert!(said(&["completions", "bash"]).contains("complete -F _pam"));
+    assert!(said(&["man"]).contains("pam"));
 }

@@ -83,7 +83,7 @@ impl Bench {
         ended
     }
 
-    /// Mends what was broken, and clears the fault once the device has seen that it is.
+    /// Repairs the broken part, and clears the fault once the device has detected the repair.
     fn mend(&self) {
         self.mishap.store(0, Ordering::Relaxed);
         let end = Instant::now() + HOPELESS;
@@ -157,7 +157,7 @@ fn a_run_is_a_recording_that_the_readers_of_recordings_read() {
     assert!((1990..=2001).contains(&recording.len()), "{}", recording.len());
     let force = recording.force.as_ref().unwrap();
     let mean = force.iter().skip(500).sum::<f64>() / (force.len() - 500) as f64;
-    // The table is an example of this kind of muscle, not a fit of this one: the force is near, not at, what was asked.
+    // The table is an example of this kind of muscle, not a fit of this one: the force is near, not at, what was requested.
     assert!((20.0..70.0).contains(&mean), "{mean} N");
     assert!(recording.pressure_command.is_some());
     let side: serde_json::Value = serde_json::from_slice(&std::fs::read(side_file(&path)).unwrap()).unwrap();
@@ -173,7 +173,7 @@ fn a_run_is_a_recording_that_the_readers_of_recordings_read() {
         predicted.status.success() && String::from_utf8_lossy(&predicted.stdout).contains("pam-predict/1")
     );
     assert!(side["saturated_ticks"].is_u64(), "{side}");
-    // The first second, in which the vented muscle fills, is told apart.
+    // The first second, in which the vented muscle fills, is reported separately.
     let rms = |key: &str| side[key].as_f64().unwrap();
     assert!(rms("tracking_rms_after_1_s") < rms("tracking_rms"), "{side}");
     // Numbers of single precision are written as such.
@@ -218,7 +218,7 @@ fn a_broken_load_cell_stops_a_run_in_words_and_the_rows_until_then_are_kept() {
             && said.contains("a sensor reading is out of range (load cell)"),
         "{said}"
     );
-    assert!(said.contains("broken wire"), "the remedy is told: {said}");
+    assert!(said.contains("broken wire"), "the remedy is reported: {said}");
     assert!(rows(&bench.folder.join("broken.csv")) >= BREAKS_AFTER);
     let (status, said) = bench.refused(&["run", "--force", "40", "--seconds", "1"]);
     assert!(status == 1 && said.contains("load cell"), "a latched fault stays: {said}");

@@ -71,11 +71,11 @@ fn loops(level: f64, rows: usize, noise: f64) -> Sheet {
 /// What may happen to one column of a recording.
 #[derive(Debug, Clone)]
 enum Damage {
-    /// The sensor stands still.
+    /// The sensor is frozen.
     Constant,
     /// Another unit, another sign.
     Scaled(f64),
-    /// A zero that is off by so many ranges.
+    /// A zero that is off by a multiple of the range.
     Shifted(f64),
     /// One cell.
     Cell(usize, &'static str),
@@ -217,7 +217,7 @@ fn host(folder: &Path, arguments: &[String]) -> Output {
 
 fn number(of: &Value, key: &str) -> f64 {
     let value = of[key].as_f64();
-    value.unwrap_or_else(|| panic!("`{key}` is no number in {of}"))
+    value.unwrap_or_else(|| panic!("`{key}` is not a number in {of}"))
 }
 
 /// The shape that scripts rely on.
@@ -353,7 +353,7 @@ proptest! {
         ..ProptestConfig::default()
     })]
 
-    /// Whatever is in the files and whatever is asked for: an answer of the promised shape or a clear error, and soon.
+    /// For any files and options: an answer of the promised shape or a clear error, in a short time.
     #[test]
     fn any_recording_gives_an_answer_or_a_reason(
         muscle in description(),

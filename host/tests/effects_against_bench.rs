@@ -1,5 +1,5 @@
 //! The library's laws against the virtual bench's own: the bench has other equations (bristles, relays, network damage, path
-//! of strain, Eyring's law, a thermal network, a line of air), and each effect of the library has to describe most of what its
+//! of strain, Eyring's law, a thermal network, a line of air). Each effect of the library has to describe most of what its
 //! namesake there leaves in the force once a base model has taken its part. Laws that only describe themselves would pass every
 //! other test.
 

@@ -41,7 +41,7 @@ fn the_three_muscles_of_the_thesis() {
         for better in [["m2", "gaylord-corrected"], ["m3", "m2"], ["m4", "m3"], ["m2", "m2-linear-part"]] {
             assert!(error(better[0]) < error(better[1]), "{better:?}");
         }
-        assert!(error("table") < 2.0 * error("m4"), "fitted together, hardly worse than each by itself");
+        assert!(error("table") < 2.0 * error("m4"), "fitted together, hardly worse than each alone");
     }
 }
 
@@ -100,7 +100,7 @@ fn without_blocked_force_the_interval_of_the_deadband_holds_the_truth() {
     assert!(last > 1.0, "{last}");
 }
 
-/// A curve through separate fits, as the thesis joins them: M = 4 at each pressure by itself, natural splines between.
+/// A curve through separate fits, as the thesis joins them: M = 4 at each pressure alone, natural splines between.
 fn joined(fitted: &Fit, pressure: f64, stroke: f64) -> f64 {
     let m4 = fitted.models.iter().find(|m| m.name == "m4").expect("a model");
     let levels = &fitted.solution.problem.pressures.levels;
@@ -159,7 +159,7 @@ fn stated_intervals_cover() {
     let muscle = description(&spec);
     let options = Options { order: 2, ..Options::default() };
     let truth = fit(&base, &muscle, &options).expect("a fit");
-    // The truth is the model itself on the recording's motion; what is left after a turn is the model's too.
+    // The truth is the model itself on the recording's motion; the force after a reversal is the model's too.
     let table = pam_evaluate::cross_validation::as_file(&truth);
     let clean = pam_fit::predict::predict(&table, &base).expect("a prediction");
     let (mut inside, mut all) = (0, 0);
@@ -184,7 +184,7 @@ fn stated_intervals_cover() {
         let fitted = fit(&campaign, &muscle, &options).expect("a fit");
         for i in 0..levels.len() {
             let (f, t) = (&fitted.summary.pressures[i], &truth.summary.pressures[i]);
-            // The force at half the free stroke stands for the curve: single E_k trade with each other.
+            // The force at half the free stroke represents the curve: single E_k trade with each other.
             let x = 0.5 * t.free_contraction.expect("a free contraction") * muscle.rest_length();
             let p = fitted.solution.problem.pressures.levels[i];
             let mut with_band = pam_evaluate::cross_validation::as_file(&fitted);

@@ -83,7 +83,7 @@ fn units_and_forms_change_nothing() {
             .recordings
             .iter()
             .map(|r| {
-                // Columns in another order, and one that nobody asked for.
+                // Columns in another order, and one that no one requested.
                 let mut text = format!("{force}{d}note{d}{time}{d}{stroke}{d}{pressure}\n");
                 for i in 0..r.len() {
                     let reading = r.force.as_ref().unwrap()[i] / f;
@@ -137,7 +137,7 @@ fn the_raw_files_of_the_thesis_give_the_same_table() {
         let campaign = Reader::of(&muscle).import(Some(&import)).campaign(&raw).unwrap();
         fit(&campaign, &muscle, &Options::default()).unwrap()
     };
-    // With the crosshead's zero known, what is left is rounding: 25 nm and 20 µN.
+    // With the crosshead's zero known, the residual is rounding: 25 nm and 20 µN.
     let known = by(&text.replace("zero = \"longest\"", "zero = 1.7"));
     assert_eq!(known.summary.samples, own.summary.samples);
     let (a, b) = (known.summary.deadband_kPa, own.summary.deadband_kPa);

@@ -1,4 +1,4 @@
-//! Recordings of a kind that a tidy campaign does not have: the fit gives the truth, or says why it cannot.
+//! Recordings of a kind that a tidy campaign does not have: the fit gives the truth, or gives the reason why not.
 //!
 //! The truth is the thesis's own model (shared/model.md), written out here once more, so that nothing but the recording is odd.
 
@@ -82,7 +82,7 @@ impl Noise {
     }
 }
 
-/// Three strokes there and back at a pressure, which ripples by `ripple` Pa. `turned` is how many rows before each turn at rest
+/// Three strokes back and forth at a pressure, which ripples by `ripple` Pa. `turned` is how many rows before each reversal at rest
 /// length friction has turned already.
 fn strokes(
     level: f64,
@@ -125,16 +125,16 @@ fn assert_truth(found: &Fit, deadband: f64, share: f64) {
     }
 }
 
-/// A row or two at each turn belong to the other branch: the stroke turned between two samples, or the instruments are not in step to
+/// A row or two at each reversal belong to the other branch: the stroke turned between two samples, or the instruments are not in step to
 /// the sample. They lie off by twice friction where the load line is steepest, and must not move the table.
 #[test]
 fn rows_of_the_other_branch_at_a_turn_move_nothing() {
     let mut noise = Noise::new(1, 0.0);
     let files = SIX.map(|p| strokes(p, 3000, 100.0, 0.0, 2, (0.05, &mut noise)));
     let found = fit(&Campaign::new(files.to_vec()), &description(), &Options::default()).unwrap();
-    // What is left of them in P0 is a few hundred pascals, less than a thousandth of the blocked force.
+    // Their influence on P0 is a few hundred pascals, less than a thousandth of the blocked force.
     assert_truth(&found, 400.0, 0.003);
-    // Those rows stand in the mid-line that the model is judged against, two in some twenty of a chunk.
+    // Those rows are in the mid-line that the model is judged against, two in some twenty of a chunk.
     assert!(found.summary.max_error_pct < 2.0, "{}", found.summary.max_error_pct);
     assert_eq!(found.summary.outliers.len(), 0, "{:?}", found.summary.outliers);
 }
@@ -162,7 +162,7 @@ fn two_close_pressures_are_two_levels() {
     assert_truth(&found, 500.0, 0.005);
 }
 
-/// At one length `P0` and elasticity are one number: said, not guessed.
+/// At one length `P0` and elasticity are confounded: the fit reports it.
 #[test]
 fn one_held_length_determines_no_deadband() {
     let (mut force_noise, mut white) = (Noise::new(4, 0.0), Noise::new(5, 0.0));
@@ -180,7 +180,7 @@ fn one_held_length_determines_no_deadband() {
     assert!(found.summary.warnings.iter().any(|w| w.contains("one length")), "{:?}", found.summary.warnings);
 }
 
-/// Readings in another unit, and readings of a loose plug, change nothing but their own rows: in the table, in what it foretells, and in
+/// Readings in another unit, and readings of a loose plug, change nothing but their own rows: in the table, in what it predicts, and in
 /// the answer of a diagnosis.
 #[test]
 fn a_gauge_that_falls_out_does_no_harm() {
@@ -195,7 +195,7 @@ fn a_gauge_that_falls_out_does_no_harm() {
     let found = fit(&spoiled, &description(), &Options::default()).unwrap();
     assert_truth(&found, 400.0, 0.003);
     assert_eq!(found.summary.rows.dropouts, 49);
-    assert_eq!(found.summary.pressures.len(), SIX.len(), "no level at which nobody tested");
+    assert_eq!(found.summary.pressures.len(), SIX.len(), "no level that was not recorded");
     let remark = |all: &[String]| all.iter().find(|w| w.contains("49 rows excluded")).cloned();
     let said = remark(&found.summary.warnings).unwrap();
     assert!(said.contains("276 rows 221 to 260 (2.20 to 2.59 s) from 27"), "{said}");
@@ -219,7 +219,7 @@ fn words(answer: &pam_diagnose::Diagnosis) -> Vec<String> {
     answer.remarks.iter().map(pam_report::wording::remark).collect()
 }
 
-/// A whole recording in psi under a heading in kPa: told, left out, and the rest as good as ever, in the fit, in what a table foretells
+/// A whole recording in psi under a heading in kPa: reported, left out, and the rest as good as ever, in the fit, in what a table predicts
 /// and in a diagnosis.
 #[test]
 fn a_recording_in_another_unit_does_no_harm() {
@@ -274,7 +274,7 @@ fn a_campaign_in_another_unit_throughout_is_told_by_how_much() {
     assert!((30.0..110.0).contains(&times) && advice.contains("what this braid makes"), "{advice}");
 }
 
-/// What no braid can do is told with the recording and the moment.
+/// A motion that no braid permits is reported with the recording and the time.
 #[test]
 fn a_stroke_of_the_other_sign_is_told_with_its_place() {
     let mut noise = Noise::new(9, 0.0);

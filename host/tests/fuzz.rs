@@ -48,7 +48,7 @@ impl Random {
     }
 }
 
-/// Every seed as it is, and so many damaged ones.
+/// Every seed as it is, and a number of damaged ones.
 fn run(entry: fn(&[u8]), seeds: &[Vec<u8>], cases: usize) {
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
     entry(&[]);
@@ -81,8 +81,8 @@ fn mcap() -> Vec<u8> {
                 tick: i,
                 state: State::Running,
                 mode: Mode::Force,
-                asked: 1.0,
-                asked_second: 0.0,
+                setpoint: 1.0,
+                setpoint_second: 0.0,
                 sides: [side].into_iter().collect(),
             })
             .unwrap();

@@ -39,7 +39,7 @@ fn a_pipe_is_hashed_as_it_is_read_and_the_command_ends() {
         .min()
         .unwrap();
     let name = first.file_name().unwrap().to_str().unwrap();
-    // A program that opens the pipe a second time waits for ever: the time-out ends it with status 124.
+    // A program that opens the pipe a second time never ends: the time-out ends it with status 124.
     let output = run(
         folder.path(),
         &format!(

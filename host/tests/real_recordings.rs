@@ -80,7 +80,7 @@ fn the_pressure_alone_tells_filling_from_emptying() {
             let told = recording.direction.take().unwrap();
             let found = Motion::of(&recording).direction;
             let wrong: Vec<usize> = (0..told.len()).filter(|i| told[*i] != found[*i]).collect();
-            // The file says what the valve was told. At the top it is told to empty up to one period before the pressure
+            // The file contains the valve's command. At the top the command to empty comes up to one period before the pressure
             // falls, and it is the pressure that the muscle feels.
             let top = told.iter().position(|d| *d < 0).unwrap();
             assert!(

@@ -1,4 +1,4 @@
-//! Recordings outlive what goes wrong: a program that is killed, a device that is gone, a disk that is full.
+//! Recordings outlive what goes wrong: a program that is stopped, a device that is gone, a disk that is full.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)] // what fails here fails the test
@@ -64,7 +64,7 @@ fn piece(file: &Path) -> usize {
     pieces[pieces.len() / 2]
 }
 
-/// Waits until a file has so many bytes.
+/// Waits until a file has this size, bytes.
 fn grown(file: &Path, bytes: u64) {
     let end = Instant::now() + HOPELESS;
     while std::fs::metadata(file).map_or(0, |m| m.len()) < bytes {
@@ -96,7 +96,7 @@ fn both_forms_hold_the_same_samples_and_say_how_they_were_made() {
     assert_eq!(about["rows"], a.len());
     assert!(about["device"]["settings"]["limits"].is_object() && about["device"]["schema"].is_string());
     assert!(about["device"]["tables"].is_array() && about["losses"]["samples"] == 0);
-    // The same stands in the MCAP itself.
+    // The same is in the MCAP itself.
     let bytes = std::fs::read(&mcap).unwrap();
     let text = String::from_utf8_lossy(&bytes);
     for word in
@@ -221,7 +221,7 @@ fn a_disk_without_room_keeps_every_row_that_fitted() {
     assert!(a.len() > 1000 && a.len().abs_diff(b.len()) <= 600, "{} and {}", a.len(), b.len());
     let text = std::fs::read_to_string(kept.join("run.csv")).unwrap();
     assert!(text.ends_with('\n') && !kept.join("run.csv.part").exists());
-    // What was known at the start stands beside it.
+    // What was known at the start is beside it.
     let about = std::fs::read_to_string(side_file(&kept.join("run.csv"))).unwrap();
     assert!(about.contains("link_version"), "{about}");
 }
@@ -230,7 +230,7 @@ fn a_disk_without_room_keeps_every_row_that_fitted() {
 fn a_full_disk_ends_the_files_at_a_whole_sample_and_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let controller = controller();
-    // A limit of the system stands for the end of the disk: writes beyond it fail half-way.
+    // A limit of the system replaces a full disk: writes beyond it fail half-way.
     let script = format!(
         "trap '' XFSZ; ulimit -f 100; exec '{}' record --port {} -o run.csv -o run.mcap",
         env!("CARGO_BIN_EXE_host"),

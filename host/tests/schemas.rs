@@ -2,11 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "what fails here fails the test")]
 
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
 use pam_device::emulated::{Emulated, Kind, Stand};
+use published_schemas::Schemas;
 use serde_json::Value;
 use virtual_bench::presets;
 use virtual_bench::recording::Columns;
@@ -27,27 +27,12 @@ fn host(folder: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-fn schemas() -> BTreeMap<String, Value> {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/schema");
-    let files = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path());
-    let named = |path: std::path::PathBuf| {
-        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
-        (name, serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap())
-    };
-    files.map(named).collect()
-}
-
-/// `pam-fit/1` has its schema in `pam-fit-1.json`.
-fn valid(all: &BTreeMap<String, Value>, call: &str, text: &str) -> String {
+/// The name of a document's schema, by which it has to be valid.
+fn valid(all: &Schemas, call: &str, text: &str) -> String {
     let document: Value = serde_json::from_str(text).unwrap_or_else(|e| panic!("{call}: {e}: {text}"));
-    let name =
-        document["schema"].as_str().unwrap_or_else(|| panic!("{call} names no schema")).replace('/', "-");
-    let schema = all.get(&name).unwrap_or_else(|| panic!("{call}: there is no schema {name}"));
-    let validator = jsonschema::validator_for(schema).unwrap();
-    let errors: Vec<String> =
-        validator.iter_errors(&document).map(|e| format!("{} at {}", e, e.instance_path())).collect();
-    assert!(errors.is_empty(), "{call} is no {name}: {errors:#?}");
-    name
+    let errors = all.check(&document).unwrap_or_else(|e| panic!("{call}: {e}"));
+    assert!(errors.is_empty(), "{call}: invalid: {errors:#?}");
+    document["schema"].as_str().unwrap().replace('/', "-")
 }
 
 /// Loops of the miniature muscle at three pressures, with its description.
@@ -66,7 +51,7 @@ fn campaign(folder: &Path) -> Vec<String> {
 
 #[test]
 fn results_of_recordings_and_tables_are_valid() {
-    let all = schemas();
+    let all = Schemas::read().unwrap();
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let recordings = campaign(folder);
@@ -108,7 +93,7 @@ fn results_of_recordings_and_tables_are_valid() {
 
 #[test]
 fn results_of_a_controller_are_valid() {
-    let all = schemas();
+    let all = Schemas::read().unwrap();
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let stand = Stand::swinging(presets::miniature());

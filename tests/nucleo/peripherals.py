@@ -80,7 +80,7 @@ class Rcc(Registers):
         return self.apb1() * (1 if self.get(0x08) >> 10 & 7 < 4 else 2)
 
     def lose_crystal(self):
-        """The crystal stops. With the clock security on (CSSON) the processor goes on with its own oscillator and takes an NMI."""
+        """The crystal stops. With the clock security on (CSSON) the processor continues with its own oscillator and takes an NMI."""
         self.chip.crystal_dead = True
         control = self.get(0x00)
         if control >> 19 & 1:
@@ -121,7 +121,7 @@ class Exti(Registers):
 
 
 class Flash(Registers):
-    """Flash (chapter 3): one bank, so that the processor stands still while it programs or erases. Bits are only ever cleared."""
+    """Flash (chapter 3): one bank, so that the processor does not move while it programs or erases. Bits are only ever cleared."""
 
     STARTS = [0, 0x4000, 0x8000, 0xC000, 0x10000, 0x20000, 0x40000, 0x60000]
     SIZES = [0x4000] * 4 + [0x10000] + [0x20000] * 3

@@ -8,7 +8,7 @@ import unittest
 
 from board import TABLE, Board
 from link import (
-    ARM, CLEAR_FAULT, FORCE_MODE, INFO, PRESSURE_MODE, RESTART, SET_SETTINGS, SETTINGS, STATUS, STOP, TABLE_PIECE, TABLE_READ, Reader,
+    CLEAR_FAULT, FORCE_MODE, INFO, PRESSURE_MODE, RESTART, SET_SETTINGS, SETTINGS, STATUS, STOP, TABLE_PIECE, TABLE_READ, Reader,
     Refused, frame, varint,
 )
 
@@ -142,7 +142,7 @@ class Store(unittest.TestCase):
         board = Board()
         chip = board.chip
         chip.erase_s = 1.2
-        # Bytes that come while the processor stands still: ten times what the ring holds.
+        # Bytes that come while the processor is stalled: ten times what the ring holds.
         erase = chip.flash.erase
 
         def erased(sector):
@@ -177,7 +177,7 @@ class Store(unittest.TestCase):
         board.restarted()
         self.assertEqual(board.link.status()["fault"], "settings-invalid")
         with self.assertRaises(Refused):
-            board.link.ask(ARM)
+            board.link.arm()
         with self.assertRaises(Refused):
             board.link.ask(CLEAR_FAULT)
         board.link.ask(SET_SETTINGS, settings, wait=5.0)

@@ -40,7 +40,7 @@ function pieces(text) {
             let stop = at + 1;
             while (stop < text.length && text[stop] !== '"') stop += text[stop] === "\\" ? 2 : 1;
             // A backslash at a line's end joins the lines; keep the line break for the numbering.
-            const body = text.slice(at + 1, stop).replace(/\\\n/g, "\n").replace(/\\n/g, " ").replace(/\\(["\\])/g, "$1");
+            const body = text.slice(at + 1, stop).replace(/\\\n/g, "\n").replace(/([.:;,!?]?)(?:\\n)+/g, (_, mark) => `${mark || "."} `).replace(/\\(["\\])/g, "$1");
             out.push({ kind: "string", line, text: body });
             advance(stop + 1);
         } else if ((m = /^'(?:\\.[^']*|[^'\\\n])'/.exec(rest))) {
@@ -52,10 +52,17 @@ function pieces(text) {
     return out;
 }
 
-/// Lines of Markdown, as many as the source has: comments of consecutive lines stay one paragraph, strings get one of their own.
+/// Lines of Markdown, as many as the source has: comments of consecutive lines stay one paragraph, strings are sentences of their own.
 function markdown(text) {
     const lines = Array(text.split("\n").length).fill("");
     let fence = false;
+    let previous = "comment";
+    // A string does not continue the text before it, nor a comment a string: each is an item of a list.
+    const item = (kind, line, body) => {
+        const separate = kind === "string" || previous === "string";
+        previous = kind;
+        return separate && lines[line - 1] === "" ? `- ${body}` : body;
+    };
     for (const { kind, line, text: body } of pieces(text)) {
         if (kind === "comment") {
             if (/^\s*```/.test(body)) {
@@ -63,11 +70,14 @@ function markdown(text) {
                 continue;
             }
             // Code, lists of symbols and drawings are indented.
-            if (!fence && !/^ {2,}/.test(body)) lines[line - 1] = body;
+            if (!fence && !/^ {2,}/.test(body)) {
+                lines[line - 1] = item(kind, line, body);
+            }
         } else if (PROSE.test(body) && !OTHER_LANGUAGE.test(body)) {
             body.split("\n").forEach((part, k) => {
-                const clean = part.replace(/\{[^}]*\}/g, "0").trim();
-                lines[line - 1 + k] = `${lines[line - 1 + k]} ${clean}`.trim();
+                const clean = part.replace(/\{[^}]*\}/g, "`0`").replace(/ +/g, " ").trim();
+                const start = k === 0 ? item(kind, line, "") : "";
+                lines[line - 1 + k] = `${lines[line - 1 + k]} ${start}${clean}`.trim();
             });
         }
     }

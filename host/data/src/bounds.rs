@@ -1,4 +1,4 @@
-//! Bounds on what a file may make this program take into memory: 1 GiB in all, whatever the file says of itself.
+//! Bounds on what a file may make this program take into memory: 1 GiB in all, regardless of the sizes that the file states.
 
 use std::fs::File;
 use std::io::Read;
@@ -12,7 +12,7 @@ pub const VALUES: usize = 48 << 20;
 /// Bytes of a container that is taken into memory whole, packed or unpacked. Its readers hold up to four copies of a value at a time:
 /// as stored, as a number, as a matrix and as a column.
 pub const WHOLE: u64 = 128 << 20;
-/// Bytes of a description, a table of names, settings: what a person wrote.
+/// Bytes of a description, a table of names, settings: text written by hand.
 pub const WRITTEN: u64 = 16 << 20;
 
 /// Values that may still be taken.
@@ -29,7 +29,7 @@ impl Default for Budget {
 }
 
 impl Budget {
-    /// For so many values.
+    /// For a number of values.
     #[must_use]
     pub fn new(values: usize) -> Self {
         Self { left: values, all: values }
@@ -41,7 +41,7 @@ impl Budget {
         Self::new(WHOLE as usize / size_of::<f64>())
     }
 
-    /// Takes so many.
+    /// Takes a number of bytes.
     ///
     /// # Errors
     /// [`DataCode::FileUnreadable`] where there are not as many left.

@@ -1,4 +1,7 @@
-//! Calendar dates of results.
+//! Calendar dates of results and of recordings.
+
+use std::path::Path;
+use std::time::UNIX_EPOCH;
 
 /// The present time as ISO 8601 in UTC; `SOURCE_DATE_EPOCH` replaces the clock where it is set, so that builds can be
 /// repeated to the byte.
@@ -8,6 +11,149 @@ pub fn now_utc() -> String {
     let clock =
         || std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |d| d.as_secs());
     iso_8601(fixed.unwrap_or_else(clock))
+}
+
+/// Where the date of a recording is from, the surest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum DateSource {
+    /// The name of the file or of its folder.
+    Name,
+    /// A column or a remark of the file.
+    Column,
+    /// The file's time of modification, which a copy may have changed.
+    Modified,
+}
+
+/// When a recording was made, s since 1970, and how that is known. A date without a time of day counts from its midnight.
+///
+/// `first` is the first time of the recording, s: a clock that counts from 1970 is a date.
+#[must_use]
+pub fn of_recording(path: &Path, first: Option<f64>) -> Option<(f64, DateSource)> {
+    let dated = |name: Option<&std::ffi::OsStr>| name.and_then(|n| in_text(&n.to_string_lossy()));
+    if let Some(date) = dated(path.file_stem()).or_else(|| dated(path.parent()?.file_name())) {
+        return Some((date, DateSource::Name));
+    }
+    let clock = first.filter(|t| *t > YEAR_2000 && *t < YEAR_2100);
+    if let Some(date) = clock.or_else(|| in_head(path)) {
+        return Some((date, DateSource::Column));
+    }
+    let modified = std::fs::metadata(path).and_then(|m| m.modified()).ok()?;
+    Some((modified.duration_since(UNIX_EPOCH).ok()?.as_secs_f64(), DateSource::Modified))
+}
+
+/// s since 1970 of the year 2000: dates before it are none.
+const YEAR_2000: f64 = 946_684_800.0;
+/// s since 1970 of the year 2100.
+const YEAR_2100: f64 = 4_102_444_800.0;
+/// Bytes of a text file in which a date is looked for.
+const HEAD: usize = 4096;
+/// Names of columns that hold a date in words.
+const DATE_COLUMNS: [&str; 6] = ["date", "datetime", "date_time", "timestamp", "recorded", "started"];
+
+/// The first date in a text: `2026-01-05`, `20260105`, `2026_01_05`, also with a time of day behind it (`T14:30`, `_143000`). The order
+/// is year, month, day: others are ambiguous.
+///
+/// ```
+/// use pam_data::date::in_text;
+/// assert_eq!(in_text("loops_2026-11-21"), Some(1_795_219_200.0));
+/// assert_eq!(in_text("run20261121T013000Z"), Some(1_795_219_200.0 + 5400.0));
+/// assert_eq!(in_text("pressure_20261399"), None);
+/// ```
+#[must_use]
+pub fn in_text(text: &str) -> Option<f64> {
+    let bytes = text.as_bytes();
+    (0..bytes.len()).find_map(|start| {
+        let alone = start == 0 || !bytes[start - 1].is_ascii_digit();
+        if alone { date_at(&bytes[start..]) } else { None }
+    })
+}
+
+/// A number of so many digits at the beginning, and what follows.
+fn number(bytes: &[u8], digits: usize) -> Option<(u64, &[u8])> {
+    let (own, rest) = bytes.split_at_checked(digits)?;
+    let value = own.iter().try_fold(0, |v, b| b.is_ascii_digit().then(|| 10 * v + u64::from(b - b'0')))?;
+    Some((value, rest))
+}
+
+/// What follows a separator; the same text where there is none.
+fn after<'a>(bytes: &'a [u8], separators: &[u8]) -> &'a [u8] {
+    match bytes.split_first() {
+        Some((first, rest)) if separators.contains(first) => rest,
+        _ => bytes,
+    }
+}
+
+fn date_at(bytes: &[u8]) -> Option<f64> {
+    let (year, rest) = number(bytes, 4)?;
+    let (month, rest) = number(after(rest, b"-_."), 2)?;
+    let (day, rest) = number(after(rest, b"-_."), 2)?;
+    if !(2000..2100).contains(&year)
+        || !(1..=12).contains(&month)
+        || !(1..=days_of(year, month)).contains(&day)
+    {
+        return None;
+    }
+    let midnight = seconds_since_1970(year, month, day);
+    // A digit right behind the day belongs to some other number.
+    let timed = rest.first().is_some_and(|b| b"T_- ".contains(b));
+    let (seconds, rest) = if timed { time_of_day(&rest[1..]).unwrap_or((0, rest)) } else { (0, rest) };
+    if rest.first().is_some_and(u8::is_ascii_digit) { None } else { Some((midnight + seconds) as f64) }
+}
+
+fn time_of_day(bytes: &[u8]) -> Option<(u64, &[u8])> {
+    let (hour, rest) = number(bytes, 2)?;
+    let (minute, rest) = number(after(rest, b":-_."), 2)?;
+    let (second, rest) = number(after(rest, b":-_."), 2).unwrap_or((0, rest));
+    (hour < 24 && minute < 60 && second < 60).then_some((3600 * hour + 60 * minute + second, rest))
+}
+
+fn days_of(year: u64, month: u64) -> u64 {
+    match month {
+        4 | 6 | 9 | 11 => 30,
+        2 if year % 4 == 0 && (year % 100 != 0 || year % 400 == 0) => 29,
+        2 => 28,
+        _ => 31,
+    }
+}
+
+/// The way back of [`iso_8601`] (same source).
+fn seconds_since_1970(year: u64, month: u64, day: u64) -> u64 {
+    let year = year - u64::from(month <= 2);
+    let (era, year_of_era) = (year / 400, year % 400);
+    let shifted = (month + 9) % 12;
+    let day_of_year = (153 * shifted + 2) / 5 + day - 1;
+    let day_of_era = year_of_era * 365 + year_of_era / 4 - year_of_era / 100 + day_of_year;
+    86_400 * (era * 146_097 + day_of_era - 719_468)
+}
+
+/// A date in a remark above the header, or in the first row of a column that is named for it.
+fn in_head(path: &Path) -> Option<f64> {
+    use std::io::Read;
+    let mut head = Vec::new();
+    std::fs::File::open(path).ok()?.take(HEAD as u64).read_to_end(&mut head).ok()?;
+    let text = String::from_utf8_lossy(&head);
+    let mut columns: Option<Vec<usize>> = None;
+    for line in text.lines() {
+        if line.starts_with('#') {
+            if let Some(date) = in_text(line) {
+                return Some(date);
+            }
+            continue;
+        }
+        let cells: Vec<&str> = line.split([',', ';', '\t']).map(|c| c.trim().trim_matches('"')).collect();
+        if let Some(dated) = &columns {
+            return dated.iter().find_map(|i| in_text(cells.get(*i)?));
+        }
+        let named = |c: &str| DATE_COLUMNS.contains(&c.to_lowercase().as_str());
+        columns = Some((0..cells.len()).filter(|i| named(cells[*i])).collect());
+    }
+    None
+}
+
+/// Seconds since 1970 as a calendar day.
+#[must_use]
+pub fn day(seconds: f64) -> String {
+    iso_8601(if seconds > 0.0 { seconds as u64 } else { 0 })[..10].to_owned()
 }
 
 /// Seconds since 1970 as a calendar date (algorithm of H. Hinnant, "chrono-compatible low-level date algorithms").
@@ -36,5 +182,38 @@ mod tests {
         assert_eq!(iso_8601(951_782_399), "2000-02-28T23:59:59Z");
         assert_eq!(iso_8601(951_782_400), "2000-02-29T00:00:00Z");
         assert_eq!(iso_8601(1_795_219_200), "2026-11-21T00:00:00Z");
+    }
+
+    #[test]
+    fn a_date_in_a_name_goes_there_and_back() {
+        for seconds in [951_782_400_u64, 1_795_219_200, 1_709_164_800] {
+            let text = iso_8601(seconds);
+            assert_eq!(in_text(&format!("run_{text}_a")), Some(seconds as f64), "{text}");
+            assert_eq!(day(seconds as f64), text[..10]);
+        }
+        assert_eq!(in_text("2026-02-29"), None);
+        assert_eq!(in_text("serial 120260105"), None);
+        assert_eq!(in_text("2026-01-05_207kPa"), in_text("20260105"));
+    }
+
+    #[test]
+    fn a_recording_is_dated_by_name_then_column_then_modification() {
+        let folder = tempfile::tempdir().unwrap();
+        let named = folder.path().join("a-2026-01-05.csv");
+        let column = folder.path().join("b.csv");
+        let plain = folder.path().join("c.csv");
+        std::fs::write(&named, "time_s\n0\n").unwrap();
+        std::fs::write(&column, "time_s,date\n0,2026-01-06\n").unwrap();
+        std::fs::write(&plain, "time_s\n0\n").unwrap();
+        assert_eq!(of_recording(&named, None).unwrap().1, DateSource::Name);
+        assert_eq!(
+            of_recording(&column, None).unwrap(),
+            (in_text("2026-01-06").unwrap(), DateSource::Column)
+        );
+        assert_eq!(
+            of_recording(&plain, Some(1_795_219_200.5)).unwrap(),
+            (1_795_219_200.5, DateSource::Column)
+        );
+        assert_eq!(of_recording(&plain, Some(3.0)).unwrap().1, DateSource::Modified);
     }
 }

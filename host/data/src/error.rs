@@ -392,7 +392,7 @@ pub fn nearest<'a>(wanted: &str, candidates: impl IntoIterator<Item = &'a str>) 
     let wanted = wanted.chars().take(64).collect::<String>().to_lowercase();
     candidates
         .into_iter()
-        // Swapped neighbours are one mistake of the fingers, not two.
+        // Two transposed letters are one typing error, not two.
         .map(|c| (strsim::osa_distance(&wanted, &c.to_lowercase()), c))
         .filter(|(d, c)| *d <= 1 + wanted.chars().count().max(c.chars().count()) / 4)
         .min_by_key(|(d, _)| *d)
@@ -410,7 +410,7 @@ mod tests {
         names.dedup();
         assert_eq!(names.len(), DataCode::ALL.len());
         assert!(DataCode::ALL.iter().all(|c| matches!(Code::from(*c).fault().exit_status(), 1 | 2)));
-        // Whoever forgets the advice gives that of the kind.
+        // An error without its own advice has that of its kind.
         assert!(DataCode::ALL.iter().all(|c| Error::new(*c, "x").advice().is_some_and(|a| a.len() > 20)));
     }
 

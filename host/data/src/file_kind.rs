@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::bounds;
 use crate::error::{DataCode, Error, Result};
 
-/// So much of a file is looked at: names of columns and keys stand near its beginning.
+/// Bytes of a file that are examined: names of columns and keys are near its beginning.
 const LOOKED_AT: u64 = 65_536;
 
 /// A kind of file that commands take.
@@ -75,14 +75,14 @@ impl FileKind {
     /// What a file is; `None` where it cannot be read or is none of ours.
     #[must_use]
     pub fn of_file(path: &Path) -> Option<Self> {
-        // A pipe was read already, and would hold this program up for ever.
+        // A pipe was read already, and a second read would block.
         std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?;
         let mut bytes = Vec::new();
         std::fs::File::open(path).ok()?.take(LOOKED_AT).read_to_end(&mut bytes).ok()?;
         Self::of_bytes(&bytes)
     }
 
-    /// What a person calls it.
+    /// Its common name.
     #[must_use]
     pub fn words(self) -> &'static str {
         match self {
@@ -97,7 +97,7 @@ impl FileKind {
         }
     }
 
-    /// The failure of a file that should be of this kind and is not.
+    /// The failure of a file that is expected to be of this kind and is not.
     fn code(self) -> DataCode {
         match self {
             Self::Muscle => DataCode::MuscleInvalid,
@@ -109,8 +109,8 @@ impl FileKind {
         }
     }
 
-    /// An error about a file that should be of this kind. Where it is recognised as another the cause says so, and the advice is
-    /// that for all failures of the kind: what is wrong in line 1 of a file that is the wrong one helps nobody.
+    /// An error about a file that is expected to be of this kind. Where it is recognised as another the cause states it, and the advice is
+    /// that for all failures of the kind: an error in line 1 of the wrong file is of no use.
     #[must_use]
     pub fn wanted(self, path: &Path, error: Error) -> Error {
         match Self::of_file(path) {

@@ -1,6 +1,6 @@
-//! The records of an MCAP file as far as recordings need them, read with a bound on memory whatever the file announces.
+//! The records of an MCAP file as far as recordings need them, read with a bound on memory at any announced size.
 //!
-//! A file is magic, records, magic; a record is its kind (one byte), the length of its body (u64) and the body. Messages stand in
+//! A file is magic, records, magic; a record is its kind (one byte), the length of its body (u64) and the body. Messages are in
 //! chunks, each with a checksum over its records. Source of the layout: <https://mcap.dev/spec>.
 
 use std::io::{self, Read};
@@ -70,7 +70,7 @@ impl<'a> Fields<'a> {
 pub struct Chunk<'a> {
     /// How its records are compressed; empty where they are not.
     pub compression: &'a str,
-    /// Its records as they stand in the file.
+    /// Its records as they are in the file.
     pub records: &'a [u8],
     crc: u32,
     /// Bytes of the records without compression.
@@ -118,7 +118,7 @@ impl<'a> Chunk<'a> {
     }
 }
 
-/// Whether the lengths in a record that has no checksum, and stands beside the chunks, lead to its end.
+/// Whether the lengths in a record that has no checksum, and is beside the chunks, lead to its end.
 #[must_use]
 pub fn plausible(kind: u8, body: &[u8]) -> bool {
     let mut fields = Fields(body);

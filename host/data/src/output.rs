@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use crate::error::{DataCode, Error, Result};
 use crate::file_kind::FileKind;
 
-/// Writes a file that appears at `path` whole: a reader sees the old file or the new one, and a program that is killed leaves the old
+/// Writes a file that appears at `path` whole: a reader sees the old file or the new one, and a program that is stopped leaves the old
 /// one and nothing else. A new file that takes an old one's place has its permissions. A path of `-` is standard output.
 ///
 /// # Errors
@@ -110,7 +110,7 @@ mod unnamed {
 }
 
 /// While this lives, other runs of this program write no results into the same folders: the table, the report and the JSON that
-/// stand there afterwards are those of one run.
+/// exist afterwards are those of one run.
 #[derive(Debug)]
 pub struct Turn {
     _locked: Vec<fs::File>,
@@ -177,7 +177,7 @@ pub fn printed(json: bool) -> Option<&'static Path> {
 /// ```
 #[must_use]
 pub fn json_of(value: &impl serde::Serialize) -> serde_json::Value {
-    // Text is the one form in which a single-precision number is written by itself; as a `Value` it is widened first.
+    // Text is the one form in which a single-precision number is written exactly; as a `Value` it is widened first.
     serde_json::to_string(value).ok().and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default()
 }
 

@@ -29,12 +29,13 @@ mod plausibility;
 mod quantity;
 mod read;
 pub mod segment;
+pub mod sensor_faults;
 mod source;
 mod stroke_zero;
 mod unit_check;
 
-pub use campaign::{Campaign, Clock};
-pub use columns::Recording;
+pub use campaign::{Campaign, Clock, largest_force};
+pub use columns::{HELD, Recording};
 pub use follow::{Follower, UNKNOWN_PAUSE};
 pub use header::has_decimal_commas;
 pub use import::Import;

@@ -1,4 +1,4 @@
-//! What a user sees when a recording is not as it should be: one line per case, kept as a snapshot.
+//! The message for each invalid recording: one line per case, kept as a snapshot.
 
 #![allow(clippy::unwrap_used)] // what fails here fails the test
 

@@ -43,7 +43,7 @@ pub enum Mishap {
     LoadCell = 1,
     /// The supply air is closed: no pressure follows.
     Supply = 2,
-    /// The pressure sensor reads the same for ever.
+    /// The pressure sensor reads the same without end.
     StuckGauge = 3,
 }
 
@@ -193,7 +193,7 @@ impl Emulated {
         stand.reset(0);
         let plant = move |outputs: &Outputs| {
             let side = &outputs.sides[0];
-            let readings = stand.step(if side.vent { 0.0 } else { side.pressure_pa }, outputs.asked);
+            let readings = stand.step(if side.vent { 0.0 } else { side.pressure_pa }, outputs.setpoint);
             let now = Readings {
                 pressure_pa: readings.pressure,
                 stroke_m: readings.stroke,
@@ -231,7 +231,7 @@ impl Emulated {
         self.why_native.as_deref()
     }
 
-    /// In words, for people.
+    /// As text, for people.
     #[must_use]
     pub fn words(&self) -> String {
         match (self.kind, &self.why_native) {

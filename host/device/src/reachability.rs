@@ -7,7 +7,7 @@ use model_core::table::MuscleTable;
 use model_core::units::{Force, Length, Pressure};
 use serde_json::{Value, json};
 
-use super::setpoint_profile::Quantity;
+use super::setpoint_profile::{Quantity, SetpointProfile};
 use super::{Client, tables};
 use pam_data::error::Result;
 
@@ -47,6 +47,34 @@ impl Reachability {
         }))
     }
 
+    /// Why a profile asks for more than the muscle can do, before it moves: a pressure above the highest allowed one, or a force above that
+    /// at rest length and this pressure, friction included. `None` where its largest value is within reach.
+    #[must_use]
+    pub fn beyond(&self, quantity: Quantity, profile: &SetpointProfile) -> Option<String> {
+        let highest = profile.highest();
+        let most = self.table.max_pressure;
+        match quantity {
+            Quantity::Pressure if highest > 1.001 * most.pascals() => Some(format!(
+                "{:.0} kPa is asked for, and the highest pressure of the table is {:.0} kPa: the controller limits the setpoint to it",
+                highest / 1e3,
+                most.kilopascals()
+            )),
+            Quantity::Force => {
+                let friction = self.table.friction.iter().copied().fold(0.0, f32::max);
+                let rest = self.muscle.held(Length::from_metres(0.0));
+                let largest = self.muscle.parts(&rest, most).quasi() * (1.0 + friction);
+                (highest > largest).then(|| {
+                    format!(
+                        "{highest:.0} N is asked for, and the muscle pulls at most {largest:.0} N, at rest length and {:.0} kPa: the pressure \
+                         would stay at its highest value",
+                        most.kilopascals()
+                    )
+                })
+            }
+            _ => None,
+        }
+    }
+
     /// Takes a sample of a run.
     pub fn add(&mut self, quantity: Quantity, sample: &Telemetry) {
         let Some(side) = sample.sides.first() else { return };
@@ -61,9 +89,9 @@ impl Reachability {
         let inside = side.pressure_pa <= 1.02 * tested.pressure_high.pascals()
             && (tested.contraction_low - slack..=tested.contraction_high + slack).contains(&contraction);
         self.outside_tested += u64::from(!inside);
-        if quantity == Quantity::Force && sample.asked.is_finite() {
+        if quantity == Quantity::Force && sample.setpoint.is_finite() {
             let held = self.muscle.held(Length::from_metres(side.stroke_m));
-            let force = Force::from_newtons(sample.asked);
+            let force = Force::from_newtons(sample.setpoint);
             let found = self.muscle.pressure_for(force, &held, 0.0, self.guess, &self.muscle.search());
             self.guess = found.pressure;
             match found.reach {
@@ -75,7 +103,7 @@ impl Reachability {
         }
     }
 
-    /// The seconds of each, for so many samples in a second.
+    /// The seconds of each, for n samples in a second.
     #[must_use]
     pub fn to_json(&self, per_s: f64) -> Value {
         let seconds = |samples: u64| samples as f64 / per_s;

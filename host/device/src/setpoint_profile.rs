@@ -161,7 +161,23 @@ impl<'a> Words<'a> {
 }
 
 impl SetpointProfile {
-    /// Reads what a person wrote, in the quantity's unit.
+    /// The largest setpoint, SI.
+    #[must_use]
+    pub fn highest(&self) -> f32 {
+        let largest = |values: &[f32]| values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        match self {
+            Self::Constant(value) => *value,
+            Self::Wave(
+                Reference::Sine { mean, amplitude, .. } | Reference::Chirp { mean, amplitude, .. },
+            ) => mean + amplitude.abs(),
+            Self::Wave(Reference::Trapezoid { low, high, .. }) => low.max(*high),
+            // What the device plays or is sent later is not known here.
+            Self::Wave(Reference::SetPoint | Reference::Table { .. }) => f32::NEG_INFINITY,
+            Self::Steps { values, .. } | Self::Points { values, .. } => largest(values),
+        }
+    }
+
+    /// Reads what a user wrote, in the quantity's unit.
     ///
     /// # Errors
     /// [`DataCode::CallInvalid`] naming the word at fault; for `@FILE` also [`DataCode::FileUnreadable`] and the line at fault.

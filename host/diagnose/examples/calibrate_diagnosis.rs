@@ -60,7 +60,7 @@ fn probability(c: &[f64; 3], x: &[f64; 3]) -> f64 {
     1.0 / (1.0 + (-(c[0] * x[0] + c[1] * x[1] + c[2] * x[2])).exp())
 }
 
-/// Penalised maximum likelihood by gradient steps; towards belief as it is.
+/// Penalised maximum likelihood by gradient steps; towards the uncalibrated model weight.
 fn fit(names: &[&Name]) -> [f64; 3] {
     let prior = [0.0, 1.0, 0.0];
     let mut c = prior;
@@ -123,7 +123,7 @@ fn main() -> ExitCode {
     let (log, error) = quality(&left_out);
     let (log_plain, error_plain) = quality(&plain);
     println!("{} names, {} of them right", all.len(), all.iter().filter(|n| n.right).count());
-    println!("belief as it is: log score {log_plain:.3}, calibration error {error_plain:.3}");
+    println!("uncalibrated model weight: log score {log_plain:.3}, calibration error {error_plain:.3}");
     println!("calibrated, on trials left out: log score {log:.3}, calibration error {error:.3}");
     println!("const CALIBRATION: [f64; 3] = [{:.2}, {:.2}, {:.2}];", c[0], c[1], c[2]);
     ExitCode::SUCCESS

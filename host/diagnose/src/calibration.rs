@@ -1,6 +1,6 @@
-//! From belief to probability: how often names of the same standing were right on the development set.
+//! From model weight to probability: how often names of the same weight were right on the development set.
 //!
-//! The weights of its rivals give the belief in a selected effect (`selection_step`). How often such an effect is right is learned
+//! The weights of its competitors give the model weight of a selected effect (`selection_step`). How often such an effect is right is learned
 //! from trials with known truth, by a command that prints the constants:
 //!
 //! ```text
@@ -15,7 +15,7 @@ fn logit(x: f64) -> f64 {
     (x / (1.0 - x)).ln()
 }
 
-/// The probability of a name with this belief among its rivals, where all names together explain this share of the misfit above noise.
+/// The probability of a name with this model weight among its competitors, where all names together explain this share of the misfit above noise.
 pub(crate) fn probability(belief: f64, explained: f64) -> f64 {
     let [a, b, c] = CALIBRATION;
     1.0 / (1.0 + (-(a + b * logit(belief) + c * logit(explained))).exp())

@@ -24,7 +24,7 @@ pub(crate) struct Scorer<'a> {
     pub deviance: f64,
     /// The sizes of its soft directions without any further effect.
     pub prior: PriorDeviations,
-    /// What is left without any further effect, N².
+    /// Residual sum of squares without any further effect, N².
     pub left: f64,
     /// What is to be explained in the metric of that prior, freed of the effects chosen.
     residual: Vec<f64>,
@@ -126,7 +126,7 @@ impl<'a> Scorer<'a> {
             columns.iter().map(|c| c.iter().zip(weight).map(|(v, w)| (v * w).powi(2)).sum::<f64>()).sum();
         let after: f64 = z.iter().map(|v| energy(v)).sum();
         let within: f64 = products.components[given..].iter().map(|c| energy(c)).sum();
-        // What is left of the columns where the bladder may differ as much as it does without them.
+        // The residual of the columns where the bladder may differ as much as it does without them.
         let share = |e: f64| if before > 0.0 { (e / before).max(0.0) } else { 0.0 };
         let mut fit = CandidateFit {
             candidate: index,
@@ -210,7 +210,7 @@ impl<'a> Scorer<'a> {
         fit.size = (fit.size / self.scale.weight.max(1e-12)).sqrt();
     }
 
-    /// The penalty for an inexact law: where the base cancels nearly all of a trace, what remains is no larger than the law's own error.
+    /// The penalty for an inexact law: where the base cancels nearly all of a trace, the residual is no larger than the law's own error.
     fn inexactness(&self, fit: &CandidateFit, law_error: f64) -> f64 {
         if fit.gain <= 0.0 {
             return 0.0;

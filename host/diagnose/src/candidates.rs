@@ -108,7 +108,7 @@ impl Candidate {
             .collect()
     }
 
-    /// Whether a tare shows it by itself: a weight, or an offset.
+    /// Whether a tare alone shows it: a weight, or an offset.
     pub(crate) fn shown_vented(&self, rows: &Rows) -> bool {
         self.traits.vented == Vented::Constant && rows.vented.contains(&true)
     }

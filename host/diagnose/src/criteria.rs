@@ -35,7 +35,7 @@ pub enum Source {
     Trials(&'static str),
     /// Engineering judgement; the opened development sets were answered with it, and no derivation is known.
     Judgement,
-    /// Limits time or memory, and does not decide by itself.
+    /// Limits time or memory, and does not decide a verdict.
     Cost,
 }
 
@@ -63,7 +63,7 @@ pub struct Criterion {
     pub symbol: &'static str,
     /// Its unit; `1` for a number or a share.
     pub unit: &'static str,
-    /// Its value, as it stands in the source.
+    /// Its value, as written in the source.
     pub value: &'static str,
     /// What it means.
     pub meaning: &'static str,
@@ -113,18 +113,21 @@ macro_rules! criteria {
 
 pub(crate) mod baseline;
 pub(crate) mod candidates;
+pub(crate) mod history;
 pub(crate) mod judgement;
 pub(crate) mod location;
 pub(crate) mod motion;
 pub(crate) mod noise;
 pub(crate) mod planning;
+pub(crate) mod reference;
 pub(crate) mod rest_friction;
 pub(crate) mod rows;
 pub(crate) mod selection;
+pub(crate) mod timeline;
 pub(crate) mod uncertainty;
 
 /// The whole page, stage by stage in the order in which they decide.
-pub const PAGE: [Stage; 11] = [
+pub const PAGE: [Stage; 14] = [
     motion::STAGE,
     rows::STAGE,
     baseline::STAGE,
@@ -136,6 +139,9 @@ pub const PAGE: [Stage; 11] = [
     judgement::STAGE,
     location::STAGE,
     planning::STAGE,
+    history::STAGE,
+    reference::STAGE,
+    timeline::STAGE,
 ];
 
 /// The page as Markdown tables.
@@ -183,13 +189,11 @@ mod tests {
         while let Some(folder) = folders.pop() {
             for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
                 let path = entry.path();
-                // The comparison with references and the history have criteria of their own.
-                let apart = ["criteria", "reference", "history"].iter().any(|name| path.ends_with(name));
-                if path.is_dir() && !apart {
+                if path.is_dir() && !path.ends_with("criteria") && !path.ends_with("tests") {
                     folders.push(path);
                 } else if path.extension().is_some_and(|e| e == "rs")
                     && !path.ends_with("criteria.rs")
-                    && !path.ends_with("history.rs")
+                    && !path.ends_with("tests.rs")
                 {
                     let text = std::fs::read_to_string(&path).expect("a source file");
                     let production = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or("");

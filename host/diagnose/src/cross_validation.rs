@@ -1,4 +1,4 @@
-//! The improvement on rows that the fit had not seen: whole pressures, recordings, cycles or stretches of time, never random
+//! The improvement on held-out rows: whole pressures, recordings, cycles or stretches of time, never random
 //! rows of the same stroke.
 
 use std::ops::RangeInclusive;
@@ -110,7 +110,7 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Groups, tares:
     })
 }
 
-/// Whether what the base leaves of an effect's trace sits in one group.
+/// Whether the residual of an effect's trace is concentrated in one group.
 fn seen_once(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Groups) -> bool {
     let base = baselines::fit(rows, kind, &[]);
     baselines::projected(traces, rows.root_weight(), &base.span).iter().any(|trace| {
@@ -163,8 +163,8 @@ pub(super) struct HeldOutRows {
 impl HeldOutRows {
     /// For effects of these traces, by the strictest split that the recordings allow.
     pub(super) fn new(rows: &Rows, kind: Kind, traces: &[Vec<f64>]) -> Self {
-        // Directions with a prior are made for the pressures they were fitted to; a pressure left out asks for one bladder, where
-        // there is one.
+        // Directions with a prior are made for the pressures they were fitted to; a pressure left out needs one bladder,
+        // if the base has one.
         let kind = match kind {
             Kind::Flexible(m) => Kind::Flexible(m.min(TABLE_ORDER)),
             Kind::Soft(prior) if prior.elastic > ONE_BLADDER * strongest(rows) => Kind::Flexible(TABLE_ORDER),
@@ -175,7 +175,7 @@ impl HeldOutRows {
         let tares = traces.iter().any(shows);
         let mut split = strictest(&thin, kind);
         if !thin.isometric && split.groups.len() > 1 && seen_once(&thin, kind, &traces, &split) {
-            // What a virgin muscle's first stroke alone shows no other stroke can foretell.
+            // What only the first stroke of a virgin muscle shows cannot be predicted from another stroke.
             let strokes = strokes(&thin);
             let part = (strokes.end() - strokes.start()) / STROKE_PARTS;
             let of =

@@ -9,8 +9,8 @@ use super::candidates::{Candidate, library};
 use super::confirmation::select_and_confirm;
 use super::criteria::baseline::TABLE_ORDER;
 use super::criteria::judgement::{
-    EXPLAINED, LACK_OF_FIT, LACK_OF_FIT_NOISE, LINE_ALPHA, LINE_SHARE, LINE_UNEXPLAINED, PARTLY_EXPLAINED,
-    TRACE_POINTS,
+    EXPLAINED, EXPLAINED_UNSEEN, LACK_OF_FIT, LACK_OF_FIT_NOISE, LINE_ALPHA, LINE_SHARE, LINE_UNEXPLAINED,
+    PARTLY_EXPLAINED, TRACE_POINTS,
 };
 use super::criteria::rows::{SLACK_MENTIONED, SLACK_ROUNDS};
 use super::findings::{considered, missing};
@@ -100,7 +100,7 @@ struct Settled {
     misfit: f64,
 }
 
-/// Settles what friction does at rest, and fits the model as it was; or says why nothing can be judged.
+/// Settles what friction does at rest, and fits the model as it was, or returns why nothing can be judged.
 fn settle(rows: &Rows, remarks: &mut Vec<Remark>) -> Result<Settled, Unjudgeable> {
     let (rows, law) = rest_friction::settle_rest_friction(rows);
     remarks.extend(law.map(|law| Remark::FrictionAtRest(law.into())));
@@ -156,7 +156,7 @@ fn select(
 struct Excess {
     /// Share of it that the selected effects explain.
     explained: f64,
-    /// What is left of it, root mean square, N.
+    /// Root mean square of the residual, N.
     left: f64,
     /// What the model admits of it, root mean square, N.
     admitted: f64,
@@ -178,7 +178,7 @@ impl Excess {
         let weight = energy(selection.rows.root_weight()).max(1e-12);
         let left = (energy(&selection.joint.residual) / weight - sigma * sigma).max(0.0).sqrt();
         let admitted = (LACK_OF_FIT * blocked).max(LACK_OF_FIT_NOISE * sigma);
-        // What free tables take up where one bladder should serve all pressures.
+        // What free tables absorb where one bladder has to serve all pressures.
         let taken_up = energy(&selection.base_alone.core) - energy(&selection.base_alone.residual);
         let concealed = (taken_up / weight).max(0.0).sqrt();
         if missing.is_empty() && concealed > LACK_OF_FIT * blocked {
@@ -192,13 +192,13 @@ impl Excess {
     }
 }
 
-/// Where the error sits.
+/// Where the error is concentrated.
 struct Located {
     /// A line in its spectrum.
     line: Option<Line>,
     regions: Vec<Region>,
     profiles: Vec<Profile>,
-    /// The pattern of what is left.
+    /// The pattern of the residual.
     pattern: Pattern,
 }
 
@@ -225,6 +225,7 @@ impl Located {
             rows: 1.0,
             p: l.p,
             unit: "Hz".into(),
+            recordings: Vec::new(),
         }));
         Self { line, regions, profiles, pattern }
     }
@@ -237,13 +238,20 @@ fn judge(selected: &SelectionResult, excess: &Excess, line: Option<&Line>) -> Ve
         // A periodic residual is no noise, even where repeats seem to explain it; nor is a residual larger than any instrument's noise.
         let steady = line.is_none_or(|l| l.share < LINE_UNEXPLAINED) && !excess.restless;
         if small && steady { Verdict::Consistent } else { Verdict::Unexplained }
-    } else if excess.explained >= EXPLAINED || small {
+    } else if (excess.explained >= EXPLAINED || small) && removes_on_unseen(&selected.held, excess.admitted) {
         Verdict::Explained
-    } else if excess.explained >= PARTLY_EXPLAINED {
+    } else if excess.explained >= PARTLY_EXPLAINED || small {
         Verdict::PartlyExplained
     } else {
         Verdict::Unexplained
     }
+}
+
+/// Whether the effects remove most of the excess error on unseen rows, or leave no more than the model admits (N).
+fn removes_on_unseen(held: &HeldOut, admitted: f64) -> bool {
+    let excess = |rms: f64| (rms.powi(2) - held.noise_N.powi(2)).max(0.0);
+    let (before, after) = (excess(held.rms_before_N), excess(held.rms_after_N));
+    after <= admitted.powi(2) || after <= (1.0 - EXPLAINED_UNSEEN) * before
 }
 
 /// Forces that the answer states.

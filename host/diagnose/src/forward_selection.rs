@@ -24,7 +24,7 @@ use super::selection_step::{
     JointFit, SelectedEffect, Selection, best_of_each, is_selectable, refit, rivals, scan_step,
 };
 
-/// Selects the effects that are missing. Candidates in `refused` are scored and may be rivals, but are not selected.
+/// Selects the effects that are missing. Candidates in `refused` are scored and may compete, but are not selected.
 pub(crate) fn forward_selection(
     rows: &Rows,
     library: &[Candidate],
@@ -234,7 +234,7 @@ impl<'a> ForwardSelection<'a> {
         // A wall at the end of the stroke is high and narrow.
         let narrow =
             winner.peak >= NARROW_PEAK * self.blocked && winner.score >= NARROW_SCORE * LEAST_SCORE_ALONE;
-        // A few readings that come a sample late at a turn make a likelihood of any size, and move little.
+        // A few readings that are one sample late at a reversal give an arbitrarily large likelihood, and move little.
         let relief = if by_blocks { winner.relief } else { 0.0 };
         let moved = (winner.gain.max(relief) / self.scale.weight).sqrt();
         let shown = self.library[winner.candidate].shown_vented(&self.rows);
@@ -254,7 +254,7 @@ impl<'a> ForwardSelection<'a> {
         let joint = refit(&self.rows, beside, chosen, self.library);
         // The gain is that of a linear step; the joint refit has to keep a good part of it.
         let kept = energy(&joint.base.residual) <= winner.before - KEPT_GAIN * winner.gain;
-        // What the effect leaves tells anew how many rows are independent: a wandering zero that flexible tables had followed from
+        // The new residual determines how many rows are independent: a drifting zero that flexible tables had followed from
         // pressure to pressure shows itself only now.
         let left = noise::estimate(&joint.rows, &joint.base.residual, self.step);
         let independent = left.independent.max(FEWEST_INDEPENDENT);

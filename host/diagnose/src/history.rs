@@ -1,4 +1,4 @@
-//! What a muscle remembers over a campaign of isometric staircases: found before any static model is asked.
+//! The memory of a muscle over a campaign of isometric staircases, found before any static model is fitted.
 //!
 //! Visits of different runs to the same pressure, length and direction differ by history alone, so a free static curve for each mounting is all
 //! that is needed beside it.
@@ -13,14 +13,14 @@
 //! | `unseen` | each run predicted from the others; jackknife over runs |
 //! | `run_offset` | slips and bad runs |
 //! | `findings` | documented contrasts with intervals over runs or mountings |
-//! | `places` | where the static error sits: run within mounting, time since mounting, mounting |
+//! | `places` | where the static error is concentrated: run within mounting, time since mounting, mounting |
+//! | `student` | quantiles of Student's t |
 //! | `judge` | rules of the verdict |
 //! | [`answer`] | the findings as values and JSON |
 //! | `enter` | the history beside what the static search says |
-//! | [`criteria`] | every constant |
+//! | [`crate::criteria`] | every constant |
 
 pub mod answer;
-pub mod criteria;
 
 mod campaign;
 mod enter;
@@ -33,6 +33,7 @@ mod run_offset;
 mod shift_fit;
 mod spline;
 mod staircase;
+mod student;
 #[cfg(test)]
 mod tests;
 mod unseen;
@@ -44,20 +45,18 @@ use model_core::braid::Geometry;
 use pam_data::recording::Campaign;
 
 use self::campaign::Points;
-use self::criteria::{KEPT_ERRORS, KEPT_GAIN, TIMES};
+use self::criteria::{KEPT_ERRORS, MEMORY_KEPT_GAIN, MEMORY_SINGLE_TIMES, TIMES};
 use self::law::{Law, Layer};
 use self::run_offset::Event;
 use self::unseen::{Unseen, jackknife};
 use super::verdict::Region;
-
-/// Time constants of the laws with a single one that the spectrum is compared with, s.
-const SINGLE_TIMES: [f64; 2] = [30.0, 300.0];
+pub(crate) use crate::criteria::history as criteria;
 
 /// A history with what its use needs beside the answer.
 #[derive(Clone, Debug)]
 pub(super) struct Found {
     pub answer: History,
-    /// Where the static error of unseen runs sits.
+    /// Where the static error of held-out runs is concentrated.
     pub regions: Vec<Region>,
     /// By recording: times, s, and shifts of pressure, Pa.
     pub shifts: Vec<(Vec<f64>, Vec<f64>)>,
@@ -180,7 +179,7 @@ fn friction(layer: &Layer<'_>, law: &Law, memory: &Unseen, steps: &[Vec<f64>]) -
     let counts = |i: usize| supported[i];
     let (before, after) = (memory.sizes(points, counts).rms, unseen.sizes(points, counts).rms);
     let value = last(&with);
-    let kept = after.powi(2) <= (1.0 - KEPT_GAIN) * before.powi(2) && value > KEPT_ERRORS * error;
+    let kept = after.powi(2) <= (1.0 - MEMORY_KEPT_GAIN) * before.powi(2) && value > KEPT_ERRORS * error;
     (kept, value, error)
 }
 
@@ -189,7 +188,7 @@ fn single_time(points: &Points, law: &Law, memory: &Unseen) -> f64 {
     let supported = points.supported();
     let counts = |i: usize| supported[i];
     let spectrum = memory.sizes(points, counts).rms;
-    let best = SINGLE_TIMES
+    let best = MEMORY_SINGLE_TIMES
         .iter()
         .map(|time| {
             let layer = Layer::new(points, &[*time]);

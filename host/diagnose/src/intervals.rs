@@ -1,7 +1,7 @@
 //! Confidence intervals of the parameters of the selected effects.
 //!
 //! Noise is the smaller part of it. Model error repeats itself from stroke to stroke and looks like certainty: it shows where parts of the
-//! campaign that should agree do not, and laws themselves are not exact. So the variance of a parameter is
+//! campaign that ideally agree do not, and laws themselves are not exact. So the variance of a parameter is
 //!
 //! ```text
 //! s² = max(half-strokes, pressures, recordings, quarters of the time) + (0.07 θ)²
@@ -130,7 +130,7 @@ fn by_groups(selection: &Selection, tangents: &[Tangent], rows: &Rows) -> Vec<f6
     let mut columns: Vec<Vec<f64>> = tangents.iter().map(|t| t.column.clone()).collect();
     columns.extend(selection.traces.iter().cloned());
     let (thin, mut columns) = thin(rows, &columns);
-    // What is left to the tangents is how far the estimate is off.
+    // The remaining distance to the tangents is the error of the estimate.
     let mut force = thin.force.clone();
     for trace in columns.split_off(tangents.len()) {
         force.iter_mut().zip(&trace).for_each(|(f, t)| *f -= t);

@@ -75,7 +75,7 @@ pub fn isolability(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Vec<Isol
         .map(|law| {
             let shape = span.and_then(|s| law.grid(1, &s).into_iter().next()).unwrap_or_default();
             let columns = law.columns(&contexts, &shape, &mut [0.0; MEMORY]);
-            // The first law of several alternatives stands for the effect, all parts of one law together.
+            // The first law of several alternatives represents the effect, all parts of one law together.
             let mut sum = vec![0.0; keep.len()];
             let parts = if law.info().alternatives { 1 } else { columns.len() };
             for (p, c) in law.amplitudes().iter().zip(&columns).take(parts) {

@@ -1,4 +1,4 @@
-//! Effects that the user gives as known: fitted with the base like selected ones, whatever the evidence, and then compared with what the
+//! Effects that the user gives as known: fitted with the base like selected ones, without a test of the evidence, and then compared with what the
 //! recordings support.
 
 use model_core::effects::Imitates;
@@ -168,7 +168,7 @@ pub(super) fn judge(missing: &mut [Missing], selection: &Selection, held: &HeldO
         m.probability = 1.0;
         m.supported = sized && likely && helps;
         if !m.supported {
-            // What is not there has no rivals.
+            // An absent effect has no competitors.
             m.confusable_with.clear();
         }
         if !sized {

@@ -1,10 +1,10 @@
-//! Model discrepancy: where recordings and model differ, which physical effect explains it, how sure that is, which experiment decides.
+//! Model discrepancy: where recordings and model differ, which physical effect explains it, with what probability, and which experiment decides.
 //!
 //! ```text
 //! recordings → rows → rest friction → base model, noise → forward selection → cross-validation → location → verdict
 //! ```
-//! [`diagnose`] is that chain; `diagnosis` reads as its summary. Every number that decides stands in [`criteria`]; what is to be known of
-//! an effect stands in the effect's file ([`model_core::effects`], `pam_fit::bench`).
+//! [`diagnose`] is that chain; `diagnosis` reads as its summary. Every number that decides is listed in [`criteria`]; what is to be known of
+//! an effect is in the effect's file ([`model_core::effects`], `pam_fit::bench`).
 //!
 //! | stage | module | what it does |
 //! | --- | --- | --- |
@@ -24,6 +24,7 @@
 //! | | `intervals`, `change_point` | confidence intervals |
 //! | | `location`, `spectrum`, `table_evidence` | where the error is: along coordinates, in time, in the tables |
 //! | | [`history`] | what the muscle remembers over a campaign of isometric staircases, before the search |
+//! | over campaigns | [`reference`], [`timeline`] | what changed since a reference; quantities and change points over several campaigns |
 //! | answer | [`verdict`], [`outcome`], [`remark`], [`why`], [`why_not`], [`experiment`], [`reserve`] | the answer as values; the report writes the sentences |
 //! | | [`refitted_table`] | the table refitted beside the selected effects |
 //! | | [`next_experiment`], [`isolability`], [`protocol_simulation`] | the experiment that decides; what a planned protocol can show |
@@ -69,6 +70,7 @@ mod spectrum;
 mod table_evidence;
 #[cfg(test)]
 mod tests;
+pub mod timeline;
 pub mod verdict;
 pub mod why;
 pub mod why_not;

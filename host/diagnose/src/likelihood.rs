@@ -4,7 +4,7 @@
 //! y = hard·b + Σ_j u_j q_j + effects·a + noise        u_j ~ N(0, V_j),  noise of n independent rows ~ N(0, σ²)
 //! D = n ln σ² + n S/(W σ²) + Σ_j ln(1 + V_j/σ_e²) + prior(V)        σ_e² = σ² W/n
 //! ```
-//! `q_j` are the directions of the flexible tables beyond one bladder for all pressures, `S` the least squares left in the metric
+//! `q_j` are the directions of the flexible tables beyond one bladder for all pressures; `S` the residual sum of squares in the metric
 //! in which `u` is integrated out, `W` the rows' weight and `n` how many independent rows they amount to. `D` is twice the negative
 //! logarithm of the likelihood. For every hypothesis the size of `V` (how much bladder and friction may differ between pressures) and
 //! `σ²` (not below the pure error of repeats) take their best values: an effect that lets one bladder serve all pressures gains
@@ -69,7 +69,7 @@ pub(crate) struct Hypothesis {
     pub given: Vec<f64>,
 }
 
-/// Weighs columns against what is to be explained; at most `most` of them at once.
+/// Weighs columns against what is to be explained; at most `most` of them together.
 pub(crate) fn likelihood(
     scale: &Scale,
     target: &Target<'_>,
@@ -231,7 +231,7 @@ mod tests {
         // A surface of 5 N rms that differs between pressures.
         let t = target(50.0, 5.0, 1.0);
         let null = likelihood(&scale, &t, &nothing, &[], 0);
-        // An effect with the same proportion of soft to beyond explains both parts at once.
+        // An effect with the same proportion of soft to beyond explains both parts together.
         let fits = likelihood(&scale, &t, &effect(10.0, 1.0, &t, 5.0), &[Sign::Free], 1);
         assert!((fits.amplitudes[0] - 5.0).abs() < 0.05, "{:?}", fits.amplitudes);
         assert!(null.deviance - fits.deviance > 50.0, "{} {}", null.deviance, fits.deviance);

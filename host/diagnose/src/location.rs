@@ -266,11 +266,19 @@ impl Binned {
             rows: part,
             p: (as_good as f64 + 1.0) / (REGION_SHUFFLES as f64 + 1.0),
             unit: c.unit.into(),
+            recordings: if c.name == "recording" { names(rows, from, to) } else { Vec::new() },
         })
     }
 }
 
-/// Values with whole blocks in another order, each turned round in itself: both what belongs to a block and what belongs to a place
+/// The names of recordings by their numbers, from 1.
+fn names(rows: &Rows, from: f64, to: f64) -> Vec<String> {
+    let number = |i: usize| (i + 1) as f64;
+    let within = |i: &usize| number(*i) >= from && number(*i) <= to;
+    (0..rows.names.len()).filter(within).map(|i| rows.names[i].clone()).collect()
+}
+
+/// Values with whole blocks in another order, each reversed in itself: both what belongs to a block and what belongs to a place
 /// within it are torn from the coordinate, while the residual's own correlation stays.
 pub(crate) fn shuffled(values: &[f64], blocks: &[(usize, usize)], random: &mut Random) -> Vec<f64> {
     let mut order: Vec<usize> = (0..blocks.len()).collect();

@@ -58,7 +58,7 @@ pub fn next_experiment(
             let contexts = moments(muscle, &campaign);
             let basis = tables(&contexts);
             let mine = trace(law, shape, amplitudes, &contexts);
-            // The rival is free to take its best shape and size: what then still differs is what would be seen.
+            // The competitor takes its best shape and size: the remaining difference is what the experiment would show.
             let mut least = f64::INFINITY;
             for rival in &rivals {
                 let span = pam_fit::bench::Span::of(&contexts)?;

@@ -171,7 +171,7 @@ pub(crate) fn estimate(rows: &Rows, residual: &[f64], step: f64) -> Noise {
     Noise { sigma, from_repeats: repeats.is_some(), memory, independent }
 }
 
-/// How often the largest of many statistics, each a sum over blocks divided by its own scatter, exceeds each observed one
+/// The frequency with which the largest of many statistics (sums over blocks, divided by their scatter) exceeds each observed one
 /// when the sign of every block is thrown by a coin: p-values that hold for the whole family.
 ///
 /// `scores[j][b]` is statistic `j`'s share from block `b`. Blocks stay whole, so correlation within them does not matter.

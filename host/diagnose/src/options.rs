@@ -12,7 +12,7 @@ pub struct Options {
     pub muscle: String,
     /// Checks of the bench on which the recordings were made.
     pub checks: Checks,
-    /// Effects that are known to be there: they are fitted whatever the evidence, and no other is selected.
+    /// Effects that are known to be present: they are fitted without a test of the evidence, and no other is selected.
     pub given: Vec<Candidate>,
     /// Receives progress; nothing by default.
     pub progress: SharedProgress,

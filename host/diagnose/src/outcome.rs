@@ -9,7 +9,7 @@ use crate::verdict::Region;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// Nothing stands above the noise and the model's own stated inexactness.
+    /// Nothing exceeds the noise and the model's own stated inexactness.
     Consistent,
     /// What stood above is explained by the effects named.
     Explained,
@@ -50,7 +50,7 @@ pub enum Split {
     NothingLeftOut,
     /// Each pressure from the others.
     Pressures,
-    /// Each of so many runs from the other runs of the muscle.
+    /// Each of `runs` runs from the other runs of the muscle.
     Runs(usize),
     /// Every fourth cycle from the others, in turn.
     Cycles,

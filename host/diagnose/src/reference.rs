@@ -6,7 +6,7 @@
 //! ```
 //! | file | what |
 //! | --- | --- |
-//! | [`criteria`] | every constant with its meaning and source |
+//! | [`crate::criteria`] | every constant with its meaning and source |
 //! | `runs` | recordings as runs: mountings, run numbers, what cannot be compared |
 //! | `motion` | settled rows; which way the pressure or the stroke moves |
 //! | `spline`, `surface` | the force before, over pressure and direction, by mounting; its slopes |
@@ -22,12 +22,13 @@
 //! | `posterior` | probabilities, set, verdict |
 //! | `isometric` | all of this for pressure staircases at held lengths |
 //! | `strokes`, `stroked` | the same question for strokes at regulated pressures |
-//! | `localise` | which cells, since which file, at once or gradually |
-//! | `held_out` | how much of the difference is gone on recordings that the fit had not seen |
+//! | `sweeps` | runs at the reference's lengths, for quantities that are followed over campaigns |
+//! | `localise` | which cells, since which file, abruptly or gradually |
+//! | `held_out` | how much of the difference is removed on held-out recordings |
 //! | `units` | columns in other units, another actuator |
 //! | `report`, `staircase_answer`, `stroke_answer` | from two sides to the answer |
 //! | [`answer`] | the answer as values and JSON |
-//! | [`words`] | the answer in words |
+//! | [`words`] | the answer as text |
 //! | [`correction`] | what the answer means for a table |
 //!
 //! The same recordings give the same answer on any number of threads.
@@ -36,7 +37,6 @@ pub mod answer;
 mod cells;
 mod contrast;
 pub mod correction;
-pub mod criteria;
 mod gate;
 mod held_out;
 mod isometric;
@@ -44,7 +44,7 @@ mod lag;
 mod localise;
 mod motion;
 mod posterior;
-mod repeatability;
+pub(crate) mod repeatability;
 mod report;
 mod runs;
 pub mod shapes;
@@ -52,9 +52,10 @@ mod slip;
 mod spline;
 mod staircase_answer;
 mod stroke_answer;
-mod stroked;
-mod strokes;
+pub(crate) mod stroked;
+pub(crate) mod strokes;
 mod surface;
+pub(crate) mod sweeps;
 mod table_surface;
 #[cfg(test)]
 mod tests;
@@ -62,5 +63,8 @@ mod units;
 mod unknown;
 pub mod words;
 
+pub(crate) use crate::criteria::reference as criteria;
 pub use answer::{ChangeReport, Verdict};
+pub(crate) use contrast::{log_mean, log_sum};
+pub(crate) use report::protocol_is_held;
 pub use report::{Against, Mounted, Options, compare};

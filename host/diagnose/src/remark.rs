@@ -40,7 +40,7 @@ pub enum Unjudgeable {
 pub enum RestFriction {
     /// The hysteresis gap closes with this time constant, s.
     Fades(f64),
-    /// Friction follows a wandering pressure.
+    /// Friction follows a slowly drifting pressure.
     Follows {
         /// Change of pressure that static friction carries, Pa.
         carries: f64,
@@ -52,7 +52,7 @@ pub enum RestFriction {
 /// Why an effect was not kept after it had been selected.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Refusal {
-    /// It does not improve rows that the fit had not seen.
+    /// It does not improve held-out rows.
     NotConfirmed {
         /// Error without it, N.
         without: f64,
@@ -61,14 +61,14 @@ pub enum Refusal {
     },
     /// It acts in the first strokes of recordings only, where the state of this memory effect is not known.
     UnknownMemory(String),
-    /// So many others explain the same share that none is named.
+    /// Too many others explain the same share, so that none is named.
     Rivals {
         /// Share of the misfit that each explains.
         share: f64,
         /// Their names.
         others: Vec<String>,
     },
-    /// A slowly wandering reading would explain it as well.
+    /// A slowly drifting reading would explain it as well.
     SlowDrift,
     /// The joint refit keeps little of its gain.
     LostInRefit,
@@ -174,7 +174,7 @@ pub struct Scatter {
 }
 
 impl Remark {
-    /// Whether it says that an effect could not be told from others or was not kept.
+    /// Whether it reports that an effect is confounded with others or was not kept.
     #[must_use]
     pub fn refuses(&self, name: &str) -> bool {
         match self {

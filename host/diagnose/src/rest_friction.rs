@@ -122,13 +122,13 @@ fn directions(rows: &Rows, holds: &[(usize, usize)], pressures: &[Vec<f64>], law
     }
 }
 
-/// What is left of a row, N, where friction acts in a direction.
+/// Residual of a row, N, where friction acts in a direction.
 fn residual_at(rows: &Rows, fitted: &Baseline, i: usize, direction: f64) -> f64 {
     fitted.raw_residual[i] + fitted.quasi[i] * fitted.friction[i] * (direction - rows.contexts()[i].direction)
 }
 
 /// What a law leaves of the rows at rest: the friction is that of the moving rows, and the part of the force that stays the same
-/// through a hold is not held against it.
+/// through a hold is not counted as an error of it.
 fn energy_at_rest(rows: &Rows, fitted: &Baseline, holds: &[(usize, usize)], directions: &[Vec<f64>]) -> f64 {
     let mut sum = 0.0;
     for ((from, to), way) in holds.iter().zip(directions) {
@@ -267,9 +267,9 @@ fn weight_at(rows: &Rows, holds: &[(usize, usize)]) -> f64 {
     resting.map(|i| rows.root_weight()[i].powi(2)).sum()
 }
 
-/// Numbers of the stretches over which friction rests at an unknown place. Static friction slips in steps too small and too quick for the pressure's samples: between those that a law predicts or
-/// the force itself shows, where friction rests is fitted; where no law is doubted, only after such a step. A force that steps more often
-/// than that is periodic, which is no slip of friction.
+/// Numbers of the stretches over which friction rests at an unknown place. Static friction slips in steps too small and too quick for the
+/// pressure's samples: between the steps that a law predicts or the force shows, the place of rest is fitted. Without doubt about the law it is
+/// fitted only after such a step. A force that steps more often is periodic, which is not a slip of friction.
 fn rests(
     rows: &Rows,
     holds: &[(usize, usize)],

@@ -1,4 +1,4 @@
-//! One step of forward selection: scan of all candidates, family-wise tests by whole blocks, rivals.
+//! One step of forward selection: scan of all candidates, family-wise tests by whole blocks, competitors.
 
 use rayon::prelude::*;
 
@@ -16,7 +16,7 @@ use super::noise::{Noise, family_p};
 use super::remark::Remark;
 use super::rows::Rows;
 
-/// A selected effect, with its standing among its rivals at that step.
+/// A selected effect, with its weight among its competitors at that step.
 #[derive(Clone, Debug)]
 pub(crate) struct SelectedEffect {
     /// The fit that won.
@@ -25,7 +25,7 @@ pub(crate) struct SelectedEffect {
     pub p: f64,
     /// Share of all misfit above noise.
     pub share: f64,
-    /// Rivals: candidate, weight against the winner (1), cosine with it.
+    /// Competitors: candidate, weight against the winner (1), cosine with it.
     pub rivals: Vec<(usize, f64, f64)>,
     /// Rms after it, N.
     pub rms: f64,
@@ -147,7 +147,7 @@ pub(crate) struct JointFit {
 
 /// Refits the baseline with the effects of `fits` beside it, renewing what the effects see of the model.
 ///
-/// A law of first order goes by the model's slope. Where the slope changes fast, that of the new baseline may serve it worse than the one
+/// A law of first order is proportional to the model's slope. Where the slope changes fast, that of the new baseline may serve it worse than the one
 /// by which the effect was found; then that one stays.
 pub(crate) fn refit(rows: &Rows, kind: Kind, fits: Vec<CandidateFit>, library: &[Candidate]) -> JointFit {
     let first = fitted_beside(rows, kind, fits, library);
@@ -217,7 +217,7 @@ fn is_visible_beyond_tables(
     selected >= LEAST_SHARE * excess_energy && selected >= weight * (SELECTION_FLOOR * blocked).powi(2)
 }
 
-/// The weight of each rival against the winner, from what each leaves of the misfit above noise where the bladder differs between
+/// The weight of each competitor against the winner, from what each leaves of the misfit above noise where the bladder differs between
 /// pressures as much as it does beside the winner.
 pub(crate) fn rivals(
     winner: &CandidateFit,

@@ -1,7 +1,7 @@
 //! Lines in the spectrum of the residual: mains hum, its alias with the sampling, an oscillating regulator.
 //!
 //! Mean power of overlapping windowed stretches (P. D. Welch, IEEE Trans. Audio and Electroacoustics 15 (1967) 70–73); a line is a
-//! frequency whose power stands out from its neighbours'. How far it does by chance is told by the same recordings with their
+//! frequency whose power stands out from its neighbours'. How far it does by chance is estimated from the same recordings with their
 //! half-strokes shuffled and turned round in themselves, which tears a steady beat apart and leaves the rest.
 
 use rayon::prelude::*;

@@ -29,6 +29,8 @@ pub struct Region {
     pub p: f64,
     /// Unit of `from` and `to`.
     pub unit: String,
+    /// What the recordings from `from` to `to` are called, where the coordinate is their number.
+    pub recordings: Vec<String>,
 }
 
 /// One parameter of a named effect.
@@ -61,9 +63,9 @@ impl ParameterValue {
 pub struct Missing {
     /// Its name in the catalogue.
     pub effect: String,
-    /// How probable this very name is: its belief, calibrated where truths are known.
+    /// How probable this name is: its model weight, calibrated where truths are known.
     pub probability: f64,
-    /// Its belief among its rivals, before calibration.
+    /// Its weight among its competitors, before calibration.
     pub belief: f64,
     /// Share of the misfit's energy above noise that it explains.
     pub share_explained: f64,
@@ -77,11 +79,11 @@ pub struct Missing {
     pub correction: bool,
     /// Whether a check of the bench measured it, apart from the recordings.
     pub checked: bool,
-    /// Whether the user gave it as known: then it was fitted whatever the evidence, and its probability is one.
+    /// Whether the user gave it as known: then it was fitted without a test of the evidence, and its probability is one.
     pub given: bool,
     /// Whether the recordings support it, or a check of the bench; always so where it was not given.
     pub supported: bool,
-    /// What it is, for someone who has never heard of it.
+    /// What it is, for a reader who does not know it.
     pub summary: String,
     /// Its equation and where it comes from.
     pub source: String,
@@ -102,7 +104,7 @@ pub struct Unexplained {
     pub pattern: Pattern,
 }
 
-/// The improvement on rows that the fit had not seen.
+/// The improvement on held-out rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeldOut {
     /// How rows were held out.
@@ -137,13 +139,13 @@ pub struct NextExperiment {
 pub struct Considered {
     /// Its name.
     pub effect: String,
-    /// Share of the misfit's energy above noise that it takes by itself.
+    /// Share of the misfit's energy above noise that it explains alone.
     pub gain: f64,
     /// Why it is not named.
     pub why_not: WhyNot,
     /// The largest peak, N, at which it could be hidden in this recording; absent where the recording does not excite it.
     pub hidden_up_to_N: Option<f64>,
-    /// Whether a check of the bench has said so, apart from the recordings.
+    /// Whether a check of the bench has shown it, independently of the recordings.
     pub checked: bool,
     /// Share of its trace that the flexible tables cannot imitate.
     pub visible: f64,
@@ -205,13 +207,13 @@ pub struct Diagnosis {
     pub noise_N: f64,
     /// Misfit of the model as it was, N.
     pub misfit_rms_N: f64,
-    /// Where it sits.
+    /// Where it is concentrated.
     pub r#where: Vec<Region>,
     /// What is missing.
     pub missing: Vec<Missing>,
-    /// What remains.
+    /// The residual.
     pub unexplained: Unexplained,
-    /// The improvement on unseen rows.
+    /// The improvement on held-out rows.
     pub held_out: HeldOut,
     /// What to record next.
     pub next_experiment: Option<NextExperiment>,
@@ -240,7 +242,7 @@ impl Diagnosis {
         matches!(self.outcome, Outcome::Judged(_))
     }
 
-    /// The judgement; consistent where there was nothing to judge, for nothing stands above anything then.
+    /// The judgement; consistent where there was nothing to judge.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         match self.outcome {

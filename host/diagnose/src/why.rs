@@ -28,7 +28,7 @@ pub enum Moment {
     After(String),
     /// Between two recordings.
     Between(String, String),
-    /// In a recording, so many seconds after its first reading.
+    /// In a recording, at this time after its first reading, s.
     In(String, f64),
 }
 
@@ -43,7 +43,7 @@ pub struct Evidence {
     pub moment: Option<Moment>,
 }
 
-/// Error on rows that the fit had not seen, N.
+/// Error on held-out rows, N.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnseenError {
     /// Without the effect.
@@ -83,13 +83,13 @@ pub enum Why {
     GivenWithoutSize,
     /// Given, and supported by the recordings.
     GivenSupported(Evidence, UnseenError),
-    /// Given; unseen rows do not improve.
+    /// Given; held-out rows do not improve.
     GivenNoImprovement(UnseenError),
     /// Given; no more than chance or the tables could explain.
     GivenNoEvidence {
         /// Share of the misfit above noise that it explains.
         share: f64,
-        /// On unseen rows.
+        /// On held-out rows.
         unseen: UnseenError,
     },
 }

@@ -13,7 +13,7 @@ pub enum WhyNot {
     Hidden,
     /// It explains no more than chance does over all effects tried; the family-wise p.
     Chance(f64),
-    /// It was selected and not kept: a remark says why.
+    /// It was selected and not kept: a remark gives the reason.
     Refused,
     /// It would explain much of a misfit that is within the model's own inexactness.
     WithinInexactness,

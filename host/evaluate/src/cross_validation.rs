@@ -4,21 +4,22 @@ use std::collections::BTreeMap;
 
 use pam_data::error::{Error, Result};
 use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::dropouts::Screened;
 use pam_data::recording::segment::Motion;
-use pam_data::recording::{Campaign, Recording};
+use pam_data::recording::{Campaign, Recording, largest_force};
 use pam_fit::error::FitCode;
 use pam_fit::predict::predict;
-use pam_fit::table_file::{About, TableFile};
+use pam_fit::table_file::{self, About, TableFile};
 
 use pam_fit::Fit;
-use pam_fit::{Options, fit};
+use pam_fit::{Options, RecordingResidual, ResidualSums, by_recording, fit};
 
 use crate::published::Published;
 
 /// The groups of recordings that are left out in turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Split {
-    /// Every run: recordings that share their label `run`, or else each recording by itself.
+    /// Every run: recordings that share their label `run`, or else each recording alone.
     Run,
     /// Every contraction at which recordings were held.
     Contraction,
@@ -110,6 +111,10 @@ pub struct CrossValidation {
     pub spots: Vec<Spot>,
     /// Blocked force at the highest tested pressure, by the fit to all recordings, N.
     pub blocked: f64,
+    /// The largest measured force, N: what percentages refer to. A share of a fitted force would change with the fit.
+    pub largest: f64,
+    /// The errors of every recording, when it was left out.
+    pub recordings: Vec<RecordingResidual>,
     /// The fit to all recordings.
     pub whole: Fit,
 }
@@ -117,7 +122,7 @@ pub struct CrossValidation {
 /// The table file of a fit, with the history that prediction needs.
 #[must_use]
 pub fn as_file(fit: &Fit) -> TableFile {
-    let mountings = fit.solution.problem.mountings.iter().map(|m| (m.stroke, m.offset)).collect();
+    let mountings = table_file::stored_mountings(&fit.solution.problem);
     TableFile { table: fit.table.clone(), about: About { mountings, ..About::default() } }
 }
 
@@ -125,7 +130,7 @@ fn key(recording: &Recording, index: usize, split: Split) -> String {
     match split {
         Split::Run => {
             let label = recording.labels.iter().find(|(name, _)| name.starts_with("run"));
-            label.map_or_else(|| format!("{} ({index})", recording.name), |(_, v)| v.clone())
+            label.map_or_else(|| format!("{} ({})", recording.title(), index + 1), |(_, v)| v.clone())
         }
         Split::Contraction => {
             let middle = recording.stroke.iter().sum::<f64>() / recording.len().max(1) as f64;
@@ -159,8 +164,16 @@ pub fn cross_validate(
     let whole = fit(campaign, muscle, options)?;
     let clip = whole.solution.problem.clips.0.map(|c| c.force);
     let blocked = f64::from(whole.table.blocked_force.newtons());
-    let mut out =
-        CrossValidation { table: Score::default(), published: None, spots: Vec::new(), blocked, whole };
+    let mut out = CrossValidation {
+        table: Score::default(),
+        published: None,
+        spots: Vec::new(),
+        blocked,
+        largest: largest_force(campaign),
+        recordings: Vec::new(),
+        whole,
+    };
+    let mut sums = vec![ResidualSums::default(); campaign.recordings.len()];
     let mut reference = Score::default();
     let mut tally = Tally::default();
     for value in &values {
@@ -179,17 +192,21 @@ pub fn cross_validate(
         let test = part(true);
         let prediction = predict(&as_file(&fitted), &test)?;
         let motions = Motion::of_campaign(&test);
-        for ((recording, predicted), motion) in
-            test.recordings.iter().zip(&prediction.recordings).zip(&motions)
+        let index = (0..keys.len()).filter(|i| keys[*i] == *value);
+        let screened = Screened::of(&test);
+        for (k, ((recording, predicted), (motion, index))) in
+            test.recordings.iter().zip(&prediction.recordings).zip(motions.iter().zip(index)).enumerate()
         {
+            let read = screened.read(k);
             let measured = recording.require_force()?;
             for (i, force) in measured.iter().enumerate() {
-                // A saturated sensor does not measure the force.
-                if clip.is_some_and(|c| *force <= c) {
+                // A saturated or failed sensor does not measure the force.
+                if clip.is_some_and(|c| *force <= c) || !read[i] {
                     continue;
                 }
                 let residual = force - predicted.force[i];
                 let contraction = recording.stroke[i] / muscle.rest_length();
+                sums[index].add(1.0, residual);
                 tally.add(value, contraction, motion.direction[i], residual);
                 if let Some(p) = published {
                     reference.add(force - p.force(muscle, recording.pressure[i], contraction));
@@ -198,6 +215,7 @@ pub fn cross_validate(
         }
     }
     out.published = published.map(|_| reference);
+    out.recordings = by_recording(campaign, &sums);
     out.table = tally.score;
     out.spots = tally.spots();
     Ok(out)

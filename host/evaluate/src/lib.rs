@@ -1,4 +1,4 @@
-//! Evaluation of fits on recordings that they have not seen, and against published formulas.
+//! Evaluation of fits on recordings that they did not use, and against published formulas.
 //!
 //! | what | where |
 //! | --- | --- |

@@ -1,8 +1,8 @@
 //! How long the solutions take that other programs are compared with: `cargo run --release -p pam-fit --example fit_speed POINTS.csv`.
 //!
 //! POINTS.csv has `pressure_Pa,stroke_m,force_N`, as tests/benchmarks/fit.py writes it: mid-lines of the thesis's miniature muscle.
-//! Prints microseconds as JSON: `separate_us` for the very problem of the thesis (each pressure by itself, `P0` given, errors
-//! relative to the force), `joint_us` for all pressures at once with `P0`; both from strokes to moduli. `separate` has the moduli
+//! Prints microseconds as JSON: `separate_us` for the very problem of the thesis (each pressure alone, `P0` given, errors
+//! relative to the force), `joint_us` for all pressures together with `P0`; both from strokes to moduli. `separate` has the moduli
 //! of every pressure in MPa, so that they can be compared.
 
 use std::time::Instant;

@@ -47,7 +47,7 @@ model_core::effect_list! {
     Backlash = backlash;
     /// The load cell's zero.
     ForceOffset = force_offset;
-    /// A wandering zero.
+    /// A drifting zero.
     ForceDrift = force_drift;
     /// The load cell's scale.
     ForceGain = force_gain;

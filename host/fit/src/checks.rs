@@ -5,7 +5,7 @@
 //! rigid bar         x_read = x_bar − δ − F/K − b/2·sign F a bar in the muscle's place, pulled and pushed
 //! reference gauge   P_read = (1 + ν) P + q                a better gauge beside the bench's own
 //! ```
-//! Loops of a muscle hardly separate a gain error of the load cell from one of the pressure sensor, or the compliance of the frame from
+//! Loops of a muscle hardly separate a gain error of the load cell from that of the pressure sensor, or the frame's compliance from
 //! that of the braid: the table absorbs more than nine tenths of such an error. A check of one minute with a weight measures it. The
 //! recordings are corrected for measured faults before the fit.
 //!
@@ -46,7 +46,7 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Whether the check shows the fault beyond its own uncertainty: the first number that it varied stands for all.
+    /// Whether the check shows the fault beyond its own uncertainty: the first number that it varied represents all.
     #[must_use]
     pub fn is_sure(&self) -> bool {
         let mut varied =

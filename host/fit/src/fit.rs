@@ -20,6 +20,7 @@
 //! | `P0` from a higher order | `Deadband` | [`deadband`] |
 //! | smoothing of the curves, stress that rises with strain | `Smoothing` | [`smoothing`], [`monotonic_stress`] |
 //! | effective dimensions | `Problem` | [`dimensions`], [`dimension_search`] |
+//! | dimensions that held lengths ask for | `Solution` | [`held_lengths`] |
 //! | errors as the thesis measures them | `ChunkError` | [`chunks`], [`errors`], [`midline`] |
 //! | models to compare with | `Model` | [`models`] |
 //! | uncertainty, and what the data do not determine | `Uncertain` | [`uncertainty`], [`identifiability`] |
@@ -27,6 +28,7 @@
 //! | the order of all steps | | [`solve`](mod@solve), [`result`], [`summary`], [`warnings`] |
 
 pub(crate) mod basis;
+pub(crate) mod by_recording;
 pub(crate) mod chunks;
 mod cross_validation;
 mod deadband;
@@ -35,6 +37,7 @@ mod dimension_search;
 pub(crate) mod dimensions;
 pub(crate) mod errors;
 mod gauss_newton;
+mod held_lengths;
 pub(crate) mod identifiability;
 pub(crate) mod midline;
 pub(crate) mod models;
@@ -78,6 +81,8 @@ pub struct Options {
     pub fit_lengths: bool,
     /// Whether the bladder's stress is constrained to rise with strain.
     pub physical: bool,
+    /// Whether dimensions and lengths stay as described where recordings at held lengths ask for others; see [`held_lengths`].
+    pub as_described: bool,
 }
 
 impl Default for Options {
@@ -89,6 +94,7 @@ impl Default for Options {
             fit_geometry: false,
             fit_lengths: false,
             physical: false,
+            as_described: false,
         }
     }
 }

@@ -11,7 +11,7 @@
 //! | [`median`], [`quantile`], [`ranked`] | order statistics |
 //!
 //! nalgebra provides QR, SVD, eigenvectors and the Cholesky factorisation of small full-rank systems. [`symmetric`] is a
-//! factorisation of its own because a fit has unknowns that the data leave open: nalgebra's fails at such a pivot, this one
+//! factorisation of its own because a fit has unknowns that the data do not determine: nalgebra's fails at such a pivot, this one
 //! leaves the unknown at zero and counts it.
 //!
 //! ```

@@ -16,12 +16,13 @@ use rayon::prelude::*;
 
 use crate::bench::Candidate;
 use crate::confidence_band::{ConfidenceBand, HALF_95};
-use crate::table_file::{Correction, TableFile};
+use crate::fit::points::HeldMounting;
+use crate::table_file::{Correction, StoredMounting, TableFile};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::physical_limits::Contractions;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::segment::Motion;
-use pam_data::recording::{Campaign, Follower, Recording, has_decimal_commas};
+use pam_data::recording::{Campaign, Follower, HELD, Recording, has_decimal_commas};
 
 /// The predicted force of a campaign.
 #[derive(Debug, Clone, PartialEq)]
@@ -216,14 +217,25 @@ impl Model<'_> {
 
 /// The recording with the correction of its mounting, where the table knows the stroke that it was held at.
 fn with_true_length<'a>(file: &TableFile, recording: &'a Recording) -> Cow<'a, Recording> {
-    let known = |held: f64| file.about.mountings.iter().find(|(s, _)| (s - held).abs() <= 1e-4);
-    match recording.held_stroke().filter(|_| !file.about.mountings.is_empty()).and_then(known) {
+    match offset_of(&file.about.mountings, recording) {
         None => Cow::Borrowed(recording),
-        Some((_, offset)) => {
+        Some(offset) => {
             let stroke = recording.stroke.iter().map(|x| x + offset).collect();
             Cow::Owned(Recording { stroke, ..recording.clone() })
         }
     }
+}
+
+/// The correction of a recording's stroke, m: that of its own mounting, or where no mounting has its label, the mean of those of its
+/// stroke.
+fn offset_of(mountings: &[StoredMounting], recording: &Recording) -> Option<f64> {
+    let held = HeldMounting::of(recording).filter(|_| !mountings.is_empty())?;
+    let same = |m: &&StoredMounting| (m.stroke - held.stroke).abs() <= HELD;
+    if let Some(own) = mountings.iter().filter(same).find(|m| m.label == held.label) {
+        return Some(own.offset);
+    }
+    let (sum, count) = mountings.iter().filter(same).fold((0.0, 0.0), |(s, n), m| (s + m.offset, n + 1.0));
+    (count > 0.0).then(|| sum / count)
 }
 
 /// Says where pressures (Pa) and strokes (m), pair by pair, leave the range that a table was fitted to: there its force is an
@@ -271,7 +283,7 @@ fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
         if recording.rows.is_some() {
             return None;
         }
-        // A pipe was read already, and would hold this program up for ever.
+        // A pipe was read already, and would hold this program up permanently.
         fs::metadata(&recording.source).ok().filter(fs::Metadata::is_file)?;
         let text = fs::read(&recording.source).ok().and_then(|b| String::from_utf8(b).ok())?;
         let mut lines = text.trim_start_matches('\u{feff}').lines().filter(|l| !l.trim().is_empty());
@@ -288,7 +300,7 @@ fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
             Some(_) => {}
         }
         let rows: Vec<&str> = lines.collect();
-        // Points among decimal commas are no table.
+        // Points among decimal commas do not make a table.
         let commas = rows
             .first()
             .is_some_and(|r| delimiter != ',' && has_decimal_commas(r.as_bytes(), delimiter as u8));

@@ -87,7 +87,7 @@ pub fn c_header(file: &TableFile) -> String {
         file.about.date, file.about.tool
     );
     if g.tip_correction {
-        text += "/* With the tip correction L' = L - 2 (pi/2 - 1)(R - R0) stands for L in the forces. */\n";
+        text += "/* With the tip correction L' = L - 2 (pi/2 - 1)(R - R0) represents L in the forces. */\n";
     }
     if t.goes_slack {
         text += "/* A slack muscle exerts no force: replace F below zero by zero (GOES_SLACK). */\n";

@@ -1,4 +1,4 @@
-//! The table file `*.pam`: the controller's image, and what a person wants to know about it later.
+//! The table file `*.pam`: the controller's image, and what a user wants to know about it later.
 //!
 //! ```text
 //! "PAMF"  version u16 LE  0 u16  length u32 LE  body (postcard of [`TableFile`]'s parts)  CRC-32 u32 LE over all before
@@ -15,6 +15,8 @@ use model_core::table::MuscleTable;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::fit::dimensions::Mounting;
+use crate::fit::problem::Problem;
 use pam_data::bounds;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::file_kind::FileKind;
@@ -23,7 +25,7 @@ use pam_data::recording::Campaign;
 
 const MAGIC: [u8; 4] = *b"PAMF";
 /// The version that is written, and the only one read.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 const HEADER: usize = 12;
 const CHECKSUM: usize = 4;
 /// A file that announces more is not read: no table comes near it.
@@ -55,9 +57,19 @@ pub struct About {
     pub uncertainty: Option<Uncertainty>,
     /// Corrections of the bench that the recordings were made on. `predict` applies them; a controller never sees them.
     pub corrections: Vec<Correction>,
-    /// Strokes that whole recordings were held at, and what is to be added to each, m. `predict` adds it to recordings
-    /// held at the same stroke.
-    pub mountings: Vec<(f64, f64)>,
+    /// Mountings whose recordings were held at one length. `predict` adds the correction to recordings of the same mounting.
+    pub mountings: Vec<StoredMounting>,
+}
+
+/// A mounting whose recordings were held at one length.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct StoredMounting {
+    /// What the recordings' file calls it; empty where it has no label.
+    pub label: String,
+    /// The stroke as recorded, m.
+    pub stroke: f64,
+    /// What is to be added to it, m.
+    pub offset: f64,
 }
 
 /// One file that a table was fitted to.
@@ -219,7 +231,7 @@ impl About {
         if self.corrections.iter().flat_map(|c| &c.parameters).any(|p| !p.is_finite()) {
             return wrong("a correction's parameter is not finite");
         }
-        if self.mountings.iter().any(|(s, o)| !s.is_finite() || !o.is_finite()) {
+        if self.mountings.iter().any(|m| !m.stroke.is_finite() || !m.offset.is_finite()) {
             return wrong("a mounting's length is not finite");
         }
         if let Some(u) = &self.uncertainty {
@@ -233,6 +245,13 @@ impl About {
         }
         Ok(())
     }
+}
+
+/// The mountings of a fit, as a table file keeps them.
+#[must_use]
+pub fn stored_mountings(problem: &Problem) -> Vec<StoredMounting> {
+    let stored = |m: &Mounting| StoredMounting { label: m.label.clone(), stroke: m.stroke, offset: m.offset };
+    problem.mountings.iter().map(stored).collect()
 }
 
 /// SHA-256 of a file's bytes, in hexadecimal.

@@ -94,7 +94,7 @@ fn an_unknown_beginning_fades() {
         let shape = [30.0];
         let traces = candidate.fading_columns(&contexts, &shape);
         assert_eq!(traces.len(), candidate.info().fading.len());
-        // What is left of an over-stress in the muscle is rubbed as all that it pulls.
+        // The residual of an over-stress in the muscle is rubbed as all that it pulls.
         let rubbed = |row: usize| if candidate.is_bench() { 1.0 } else { contexts[row].rubbed(1.0) };
         for trace in traces {
             assert!(trace[0].abs() > 0.5, "{name} begins with {}", trace[0]);

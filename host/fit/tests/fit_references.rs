@@ -63,7 +63,7 @@ fn separate_fits_are_those_of_numpy() {
     let all = side_by_side(&fitted.solution, &mid, None);
     let m4 = all.iter().find(|m| m.name == "m4").expect("a model");
     let expected = table("separate_fits.csv");
-    // The reference has every chunk; here the ones right at the turns are set aside, so the comparison is of forces.
+    // The reference has every chunk; here those at the reversals are set aside, so the comparison is of forces.
     for (g, row) in expected.iter().enumerate() {
         let at = |i: usize| {
             let c = pam_fit::columns(&fitted.solution.problem.braid, mid[i].stroke);
@@ -82,7 +82,7 @@ fn separate_fits_are_those_of_numpy() {
     }
 }
 
-/// P0, every E_k and every k_F at once, both branches, nothing smoothed: the least squares of SciPy's minimiser.
+/// P0, every E_k and every k_F together, both branches, nothing smoothed: the least squares of SciPy's minimiser.
 #[test]
 fn the_joint_fit_is_that_of_scipy() {
     let points: Vec<Measured> = table("joint_fit_points.csv")

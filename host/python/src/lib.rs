@@ -1,6 +1,6 @@
 //! `pamtools`: recordings, fits, predictions and diagnoses of pneumatic artificial muscles, with numpy arrays.
 //!
-//! Everything is in SI units inside arrays (s, Pa, m, N, K), whatever the files' units were.
+//! Everything is in SI units inside arrays (s, Pa, m, N, K), regardless of the units in the files.
 
 use std::ffi::CString;
 use std::path::PathBuf;
@@ -271,7 +271,7 @@ impl Campaign {
         self.0.recordings.len()
     }
 
-    /// One recording, from the end where the number is negative; so a campaign can be walked through, too.
+    /// One recording, from the end where the number is negative; for iteration over a campaign.
     fn __getitem__(&self, index: isize) -> PyResult<Recording> {
         let count = self.0.recordings.len();
         let from_start = if index < 0 { index.checked_add_unsigned(count) } else { Some(index) };
@@ -298,7 +298,7 @@ enum Paths {
     Several(Vec<PathBuf>),
 }
 
-/// Reads a file, or several in chronological order; `import_description` is the TOML file for foreign formats.
+/// Reads a file, or several in chronological order; `import_description` is the TOML file for other formats.
 #[pyfunction]
 #[pyo3(signature = (paths, muscle = None, import_description = None))]
 fn read(
@@ -425,7 +425,7 @@ impl Table {
         })
     }
 
-    /// Half the width of the 95 % interval of that force (N), at the same places: what the table's numbers leave open. None where
+    /// Half the width of the 95 % interval of that force (N), at the same places: the uncertainty of the table's numbers. None where
     /// the table holds no uncertainty.
     #[pyo3(signature = (pressure, stroke, direction = None))]
     fn force_band<'py>(
@@ -451,7 +451,7 @@ impl Table {
         Ok(prediction.recordings.into_iter().map(|r| r.force.into_pyarray(py)).collect())
     }
 
-    /// The same with how sure it is and how well it fits: one prediction a recording, with force, band, rms and inside.
+    /// The same with its uncertainty and its error: one prediction per recording, with force, band, rms and inside.
     fn predict_with_bands(&self, py: Python<'_>, campaign: PyRef<'_, Campaign>) -> PyResult<Vec<Prediction>> {
         let (table, campaign) = (self.0.clone(), campaign.0.clone());
         let prediction = py.detach(move || predict_with_bands(&table, &campaign)).map_err(raised)?;
@@ -469,7 +469,7 @@ impl Table {
     }
 }
 
-/// What the user should know, as Python's own warnings: shown once a line, and silenced or raised by its filters.
+/// Warnings, as Python's own: shown once per line, and silenced or raised by its filters.
 fn warn(py: Python<'_>, warnings: &[String]) -> PyResult<()> {
     for text in warnings {
         let text = CString::new(text.as_str())?;
@@ -587,7 +587,7 @@ fn fit(
         .filter(|m| (1..=6).contains(m))
         .ok_or_else(|| wrong(format!("`order` is {order}; it must lie between 1 and 6")))?;
     if smoothing.is_some_and(|w| !(w.is_finite() && w >= 0.0)) {
-        return Err(wrong("`smoothing` must be a number from 0 up, or None to have it chosen"));
+        return Err(wrong("`smoothing` must be a number from 0 up, or None for an automatic choice"));
     }
     let options = Options {
         order,

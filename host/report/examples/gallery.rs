@@ -114,8 +114,13 @@ fn multiples() -> Figure {
             .points("measured", Colour::Muted, &x, &y)
             .line("model", Colour::Series(0), &x, &model)
     });
-    Figure::multiples("multiples", "Model on the loops", "The line should cover the dots.", panels.collect())
-        .shared(true, true)
+    Figure::multiples(
+        "multiples",
+        "Model on the loops",
+        "In a good fit, the line covers the dots.",
+        panels.collect(),
+    )
+    .shared(true, true)
 }
 
 fn log_errors() -> Figure {
@@ -160,9 +165,9 @@ fn field() -> Figure {
             Mark::Heat { x: edges(10, 0.8), y: edges(8, 60.0), values, label: "mean residual (N)".into() },
         )
         .with(
-            "the misfit sits here",
+            "the misfit is here",
             Colour::Alarm,
             Mark::Region { x: (Some(1.6), Some(4.0)), y: (Some(0.0), Some(120.0)) },
         );
-    Figure::new("field", "Where the misfit sits", "Blue: the model is too strong; orange: too weak.", panel)
+    Figure::new("field", "Where the misfit is", "Blue: the model is too strong; orange: too weak.", panel)
 }

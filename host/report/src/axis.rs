@@ -20,7 +20,7 @@ pub enum Scale {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// What it shows, in words, with its symbol.
+    /// What it shows, with its symbol.
     pub label: String,
     /// Unit, or empty.
     pub unit: String,
@@ -113,7 +113,7 @@ pub(crate) struct Tick {
 }
 
 /// Ticks of a linear axis, about `wanted` of them, at multiples of 1, 2 or 5 times a power of ten, with as many decimals
-/// as tell them apart.
+/// as they need to differ.
 pub(crate) fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
     let span = high - low;
     if !(span > 0.0 && span.is_finite()) {
@@ -204,7 +204,7 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     out
 }
 
-/// A number with about `digits` significant figures, the way a person writes it.
+/// A number with about `digits` significant figures, in the usual notation.
 ///
 /// ```
 /// use pam_report::figures;
@@ -268,7 +268,7 @@ mod tests {
         assert_eq!(texts(&log_ticks(0.01, 100.0, 6)), ["0.01", "0.1", "1", "10", "100"]);
         assert_eq!(texts(&log_ticks(0.9, 12.0, 6)), ["1", "2", "5", "10"]);
         assert_eq!(texts(&log_ticks(1e-12, 1.0, 4)), ["10^{−12}", "10^{−9}", "10^{−6}", "0.001", "1"]);
-        // A single decade in a small panel: 1 alone would tell nobody what the others are.
+        // A single decade in a small panel: 1 alone would not identify the others.
         assert_eq!(texts(&log_ticks(0.27, 6.0, 3)), ["0.5", "1", "2", "5"]);
         assert!(log_ticks(0.0, 1.0, 4).is_empty());
     }

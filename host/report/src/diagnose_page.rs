@@ -1,4 +1,4 @@
-//! The report of a diagnosis, for an engineer who has never heard of the effect.
+//! The report of a diagnosis, for an engineer who does not know the effect.
 
 mod history;
 mod located;
@@ -46,7 +46,7 @@ pub fn page(d: &Diagnosis, geometry: &Geometry, campaign: &Campaign) -> Page {
     page
 }
 
-/// Which of the names stand for several effects that the recordings cannot tell apart.
+/// Which of the names represent several effects that the recordings cannot distinguish.
 fn in_doubt(d: &Diagnosis) -> String {
     let open: Vec<String> = d
         .missing
@@ -317,7 +317,7 @@ fn unseen(d: &Diagnosis) -> Section {
     section.figure(Figure::new(
         "unseen",
         "Error on held-out rows without and with the named effects",
-        "The error with the effects should come close to the noise, the least possible error.",
+        "In a good model, the error with the effects comes close to the noise, which is the least possible error.",
         panel,
     ));
     if !(h.rms_after_N < h.rms_before_N) {

@@ -1,4 +1,4 @@
-//! Result documents: what a program reads. Typed, with the words that the enums of a diagnosis stand for.
+//! Result documents: what a program reads. Typed, with the names of the enums of a diagnosis.
 
 mod diagnosis;
 

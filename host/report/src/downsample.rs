@@ -212,7 +212,7 @@ mod tests {
         let mut points: Vec<(f64, f64)> = (0..=100).map(|i| (f64::from(i), 3.0 * f64::from(i))).collect();
         points.extend((1..=100).map(|i| (100.0 + f64::from(i), 300.0)));
         assert_eq!(needed(&points, 0.1), [(0.0, 0.0), (100.0, 300.0), (200.0, 300.0)]);
-        // There and back along one line: the far end must stay.
+        // Back and forth along one line: the far end must stay.
         let back: Vec<(f64, f64)> = (0..=20).map(|i| (10.0 - f64::from((i - 10_i32).abs()), 0.0)).collect();
         assert_eq!(needed(&back, 0.1), [(0.0, 0.0), (10.0, 0.0), (0.0, 0.0)]);
     }

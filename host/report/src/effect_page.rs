@@ -10,7 +10,7 @@ use super::symbols::symbols;
 use super::{Page, Section, Table, figures};
 use pam_fit::bench::Candidate;
 
-/// Where in the chain from the air to the reading an effect acts, in words.
+/// Description of where an effect acts in the chain from the air to the reading.
 #[must_use]
 pub fn place(link: Link) -> &'static str {
     match link {

@@ -1,7 +1,7 @@
 //! What an effect does to one muscle on one demonstration, so that all can be compared by eye.
 //!
-//! The demonstration is one table and one protocol: slow loops to a smaller and then to a larger contraction, loops five times
-//! as fast, a hold, a small loop inside a large one, and filling and emptying at held length, while the room warms by 4 K.
+//! The demonstration is one table and one protocol, while the room warms by 4 K: slow loops to a smaller and then to a larger
+//! contraction, loops five times as fast, a hold, a minor loop, and filling and emptying at held length.
 
 use model_core::effects::{Context, MEMORY, Role};
 use model_core::motion::{MotionSettings, MotionTracker};
@@ -166,7 +166,7 @@ impl Demonstration {
     }
 }
 
-/// How alike what a fit leaves of two traces is: the size of the cosine of the angle between them, 1 where one is a multiple
+/// Similarity of the residuals of two traces after a fit: the size of the cosine of the angle between them, 1 where one is a multiple
 /// of the other.
 #[must_use]
 pub fn likeness(a: &Trace, b: &Trace) -> f64 {
@@ -200,7 +200,7 @@ fn imitations(contexts: &[Context<f64>]) -> Vec<Vec<f64>> {
 }
 
 fn without(mut trace: Vec<f64>, basis: &[Vec<f64>]) -> Vec<f64> {
-    // Twice, since the columns of higher order are nearly alike.
+    // Twice, since the columns of higher order are nearly the same.
     for column in basis.iter().chain(basis) {
         let share = dot(&trace, column);
         trace.iter_mut().zip(column).for_each(|(t, c)| *t -= share * c);

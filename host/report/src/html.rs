@@ -151,11 +151,16 @@ fn table(table: &Table) -> Markup {
                     }
                 }
                 tbody {
-                    @for row in &table.rows {
+                    @for (line, row) in table.rows.iter().enumerate() {
                         tr {
                             @for (i, cell) in row.iter().enumerate() {
                                 @if i == 0 {
-                                    th scope="row" class=[right(table, i)] { (inline_markup::html(cell)) }
+                                    th scope="row" class=[right(table, i)] {
+                                        @match table.links.get(line).filter(|l| !l.is_empty()) {
+                                            Some(address) => a href=(address) { (inline_markup::html(cell)) },
+                                            None => (inline_markup::html(cell)),
+                                        }
+                                    }
                                 } @else {
                                     td class=[right(table, i)] { (inline_markup::html(cell)) }
                                 }

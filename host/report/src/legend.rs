@@ -12,7 +12,7 @@ use super::marks;
 const ROW: f64 = 20.0;
 const SWATCH: f64 = 22.0;
 
-/// The legend and the height it takes; empty where there is nothing to tell apart.
+/// The legend and the height it takes; empty where there is nothing to distinguish.
 pub(crate) fn draw(figure: &Figure, width: f64) -> (String, f64) {
     let mut out = String::new();
     let (mut x, mut y) = (0.0, 0.0);

@@ -2,7 +2,7 @@
 //!
 //! This room only draws what others computed. A picture is a value ([`Figure`]: panels, axes, marks); a report is a value
 //! ([`Page`]: verdict, facts, sections). Both turn into text in one place, so that every report of this program looks
-//! alike, in light and dark, on a page, on a phone and in print.
+//! equally, in light and dark, on a page, on a phone and in print.
 //!
 //! ```
 //! use pam_report::{Axis, Colour, Figure, Panel};
@@ -24,6 +24,7 @@ pub mod effect_trace;
 pub mod fit_page;
 pub mod history_text;
 pub mod inline_markup;
+pub mod timeline_page;
 
 pub mod document;
 pub mod wording;

@@ -9,7 +9,7 @@ use pam_data::recording::Campaign;
 pub enum Tone {
     /// Neither good nor bad.
     Plain,
-    /// As it should be.
+    /// As required.
     Good,
     /// To be looked at.
     Caution,
@@ -39,18 +39,31 @@ pub struct Table {
     pub header: Vec<String>,
     /// Rows of cells.
     pub rows: Vec<Vec<String>>,
+    /// Where the name of each row leads, as a relative address; rows beyond the end, or with an empty one, have no link.
+    pub links: Vec<String>,
 }
 
 impl Table {
     /// An empty table.
     pub fn new(caption: impl Into<String>, header: &[&str]) -> Self {
         let header = header.iter().map(|h| (*h).to_owned()).collect();
-        Self { caption: caption.into(), header, rows: Vec::new() }
+        Self { caption: caption.into(), header, rows: Vec::new(), links: Vec::new() }
     }
 
     /// With one more row.
     pub fn row(&mut self, cells: impl IntoIterator<Item = impl Into<String>>) {
         self.rows.push(cells.into_iter().map(Into::into).collect());
+    }
+
+    /// With one more row, whose name leads to another file; an empty address is no link.
+    pub fn linked_row(
+        &mut self,
+        address: impl Into<String>,
+        cells: impl IntoIterator<Item = impl Into<String>>,
+    ) {
+        self.links.resize(self.rows.len(), String::new());
+        self.links.push(address.into());
+        self.row(cells);
     }
 
     fn drop_empty_columns(&mut self) {
@@ -236,6 +249,20 @@ impl Page {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_name_of_a_row_can_be_a_link() {
+        let mut table = Table::new("", &["muscle", "P0"]);
+        table.row(["a", "1"]);
+        table.linked_row("results/muscle=b/fit.html?\"x", ["b", "2"]);
+        let mut section = Section::new("x");
+        section.table(table);
+        let mut page = Page::new("t", "");
+        page.push(section);
+        let html = page.html();
+        assert!(html.contains("<a href=\"results/muscle=b/fit.html?&quot;x\">b</a>"), "{html}");
+        assert_eq!(html.matches("<a href=\"results").count(), 1);
+    }
 
     #[test]
     fn a_column_in_which_nothing_stands_is_not_shown() {

@@ -1,7 +1,7 @@
 //! Drawing a [`Figure`] as SVG: deterministic text, no fonts, no scripts, no outside resources.
 //!
 //! Every picture has two layouts, one for a page and one for a phone, since text must not shrink with the screen.
-//! The legend stands above the panels, where no data can be.
+//! The legend is above the panels, where no data can be.
 
 use std::fmt::Write as _;
 
@@ -13,7 +13,7 @@ use super::inline_markup;
 use super::legend;
 use super::marks;
 
-/// For what width a picture is laid out.
+/// The width for which a picture is designed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Layout {
     /// A page: 760 px.
@@ -282,7 +282,7 @@ fn axes(out: &mut String, panel: &Panel, frame: &Frame, y_ticks: &[Tick]) -> f64
     below
 }
 
-/// A name that would run off the paper is cut; its whole form stands in the numbers.
+/// A name that would run off the paper is cut; its whole form is in the numbers.
 fn shortened(tick: &Tick, room: f64) -> String {
     let fits = |text: &str| inline_markup::width(text) * FONT_SIZE <= room.max(40.0) - 6.0;
     if fits(&tick.text) {

@@ -69,7 +69,7 @@ fn names(law: &str) -> Vec<String> {
     let mut names = vec![String::new()];
     let (mut index, mut last) = (false, ' ');
     for c in law.chars() {
-        // An index of more than one letter stands in brackets: `c_(M+1)`.
+        // An index of more than one letter is in brackets: `c_(M+1)`.
         index = if index { last != ')' } else { c == '(' && last == '_' };
         let letter = (c.is_alphanumeric() && !"²³⁴π¼Σ".contains(c)) || "_′∂".contains(c);
         if letter || index {
@@ -130,7 +130,7 @@ mod tests {
     fn every_letter_that_is_explained_stands_in_an_equation_where_it_is_no_parameter() {
         for (letter, _) in SYMBOLS {
             let used = Candidate::all().any(|c| symbols(c.info()).rows.iter().any(|r| r[0] == letter));
-            assert!(used, "{letter} stands in no equation");
+            assert!(used, "{letter} is in no equation");
         }
     }
 

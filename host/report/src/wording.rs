@@ -5,6 +5,7 @@ mod outcome;
 mod region;
 mod remark;
 mod summary;
+pub mod timeline;
 mod value;
 mod why;
 mod why_not;

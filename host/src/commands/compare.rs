@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use clap::Args;
 
+use super::recordings;
 use super::reports::Reports;
 use crate::console::Console;
 use crate::documents::{bench, text};
@@ -18,11 +19,15 @@ use crate::progress::ProgressLine;
 use pam_data::recording::{Import, Reader};
 use pam_report::compare_page;
 
+/// At most this many recordings of a file are listed.
+const LISTED: usize = 6;
+
 /// Arguments of `host compare`.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  host compare before.csv after.csv\n  host compare a.csv b.csv --report difference.html --json\n  \
-    host compare --muscle mini.toml --import bench.toml a.txt b.txt"
+    host compare --muscle mini.toml --import bench.toml a.txt b.txt\n  \
+    host compare --import runs.toml all.csv all.csv --where-a run=1 --where-b run=2"
 )]
 pub struct Arguments {
     /// The first recording.
@@ -37,6 +42,15 @@ pub struct Arguments {
     /// An import description, for files that are not in the standard form.
     #[arg(long, value_name = "IMPORT.toml")]
     import: Option<PathBuf>,
+    /// Take only rows of both where a column has this value, as `host fit --where`; may be given several times.
+    #[arg(long = "where", value_name = "COLUMN=VALUE")]
+    filters: Vec<String>,
+    /// The same for the first recording only: picks a run of a file of many.
+    #[arg(long = "where-a", value_name = "COLUMN=VALUE")]
+    filters_a: Vec<String>,
+    /// The same for the second recording only.
+    #[arg(long = "where-b", value_name = "COLUMN=VALUE")]
+    filters_b: Vec<String>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -58,21 +72,31 @@ impl Arguments {
         progress.total(sizes.map(|m| m.len()).sum());
         let muscle = self.muscle.as_ref().map(MuscleDescription::read).transpose()?;
         let import = self.import.as_ref().map(Import::read).transpose()?;
-        let one = |path: &PathBuf| {
+        let one = |path: &PathBuf, own: &[String], option: &str| {
             let mut reader = muscle.as_ref().map_or_else(Reader::new, Reader::of).import(import.as_ref());
             reader.progress = Some(progress.clone());
+            for text in self.filters.iter().chain(own) {
+                reader.filters.push(recordings::filter(text)?);
+            }
             let mut all = reader.file(path)?;
             if all.len() == 1 {
-                Ok(all.remove(0))
-            } else {
-                Err(Error::new(DataCode::RecordingTooShort, "the file holds more than one recording")
-                    .file(path)
-                    .help(
-                        "an import description with a group splits it; compare files of one recording each",
-                    ))
+                return Ok(all.remove(0));
             }
+            let mut titles: Vec<String> = all.iter().take(LISTED).map(|r| r.title()).collect();
+            if all.len() > LISTED {
+                titles.push(format!("and {} more", all.len() - LISTED));
+            }
+            let label = all.first().and_then(|r| r.labels.last());
+            let example = label.map_or("run=1".to_owned(), |(name, value)| format!("{name}={value}"));
+            Err(Error::new(
+                DataCode::CallInvalid,
+                format!("the file holds {} recordings: {}", all.len(), titles.join("; ")),
+            )
+            .file(path)
+            .help(format!("pick one with {option} {example}; the option may be given several times")))
         };
-        let (a, b) = (one(&self.a)?, one(&self.b)?);
+        let (a, b) =
+            (one(&self.a, &self.filters_a, "--where-a")?, one(&self.b, &self.filters_b, "--where-b")?);
         drop(progress);
         let found = compare(&a, &b)?;
         self.reports.write(console, || compare_page::page(&a, &b, &found))?;

@@ -1,9 +1,10 @@
 //! `host completions`: a completion script for a shell.
 
-use clap::Args;
+use clap::{Args, ValueHint};
 use clap_complete::Shell;
 
 use crate::console::Console;
+use crate::program_name;
 use pam_data::error::Result;
 use pam_data::output::write_whole;
 
@@ -22,7 +23,20 @@ impl Arguments {
     /// None so far.
     pub fn run(self, command: &mut clap::Command, _console: &Console) -> Result<()> {
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, command, "host", &mut script);
+        files_for_paths_only(command);
+        clap_complete::generate(self.shell, command, program_name::called(), &mut script);
         write_whole(std::path::Path::new("-"), &script)
+    }
+}
+
+/// Shells offer files after an option of which nothing is known; here that is everything that is no path.
+fn files_for_paths_only(command: &mut clap::Command) {
+    let taken = std::mem::take(command);
+    let hinted = taken.mut_args(|arg| {
+        if arg.get_value_hint() == ValueHint::Unknown { arg.value_hint(ValueHint::Other) } else { arg }
+    });
+    *command = hinted;
+    for sub in command.get_subcommands_mut() {
+        files_for_paths_only(sub);
     }
 }

@@ -1,4 +1,4 @@
-//! `host demo`: the whole story on this machine, no hardware.
+//! `host demo`: the whole workflow on this machine, without hardware.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -30,7 +30,7 @@ use crate::progress::ProgressLine;
 use pam_data::recording::{Campaign, Reader};
 use pam_fit::table_file::{self, About, TableFile};
 
-/// Device seconds in a second: nobody should wait for what a real controller would take.
+/// Device seconds in a second: faster than a real controller, to shorten the demonstration.
 const SPEED: u32 = 4;
 
 /// Arguments of `host demo`.
@@ -58,7 +58,7 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// Tells the story.
+    /// Runs the demonstration.
     ///
     /// # Errors
     /// What went wrong in any of its steps.

@@ -47,7 +47,7 @@ enum Action {
         #[arg(long)]
         json: bool,
     },
-    /// Follow what the device reports by itself: states and faults in words, and its log.
+    /// Follow the device's own reports: states, faults, and its log.
     #[command(after_help = "Examples:\n  host device log\n  host device log --seconds 10\n  \
         host device log --elf target/firmware/nucleo-f446re-log.elf")]
     Log(log::Arguments),
@@ -70,7 +70,7 @@ enum Action {
         host device identify --low 100 --high 250 --dry-run --json\n\n\
         The muscle is pressurised between the two pressures for about half a minute, and vented at the end.")]
     Identify(identify::Arguments),
-    /// The latched fault, counts, and past faults; in words, with the remedy.
+    /// The latched fault, counts, and past faults, with the remedy.
     #[command(after_help = "Examples:\n  host device faults\n  host device faults --clear")]
     Faults {
         #[command(flatten)]
@@ -107,10 +107,10 @@ enum Action {
 }
 
 impl Arguments {
-    /// Does what was asked.
+    /// Does what was requested.
     ///
     /// # Errors
-    /// A device that is silent, foreign or refuses; a file that cannot be read or written.
+    /// A device that is silent, of another kind, or refuses; a file that cannot be read or written.
     pub fn run(self, console: &Console) -> Result<()> {
         match self.action {
             Action::List { json } => list::run(json, console),

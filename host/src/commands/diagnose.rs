@@ -1,6 +1,6 @@
 //! `host diagnose`: which effects the model lacks, where it is wrong, and how certain that is; with `--reference`, what has changed.
 
-mod reference;
+pub(super) mod reference;
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -16,7 +16,7 @@ use pam_device::emulated::{Emulated, Kind, Stand};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  host emulate\n  host emulate contractile --on native\n\n\
     The firmware runs in QEMU where that and its image are there (`firmware/build mps2-an386`), else in this process, on a \
-    muscle of the virtual bench that is moved to and fro. The first line says at which port: give it to the other commands \
+    muscle of the virtual bench that is moved back and forth. The first line says at which port: give it to the other commands \
     by --port, or write it into the variable PAM_PORT. One program may connect at a time.")]
 pub struct Arguments {
     /// The muscle of the bench: mini, contractile, push or random:SEED.

@@ -14,7 +14,7 @@ use pam_evaluate::cross_validation::{CrossValidation, Score, Split, Spot, cross_
 use pam_evaluate::length_transfer::{LengthTransfer, predict_unseen_length};
 use pam_evaluate::published::Published;
 use pam_fit::Fit;
-use pam_fit::Options;
+use pam_fit::{Options, recording_table};
 
 use crate::progress::ProgressLine;
 use pam_data::recording::{Campaign, Reader};
@@ -46,6 +46,9 @@ pub struct Arguments {
     /// Correct the length of every mounting by up to 1 mm.
     #[arg(long)]
     fit_lengths: bool,
+    /// Keep the described dimensions and lengths, also where recordings at held lengths ask for others.
+    #[arg(long, conflicts_with_all = ["fit_geometry", "fit_lengths"])]
+    as_described: bool,
     /// A published formula to compare with.
     #[arg(long, value_name = "NAME")]
     published: Option<String>,
@@ -82,6 +85,7 @@ impl Arguments {
             order: usize::from(self.order),
             fit_geometry: self.fit_geometry,
             fit_lengths: self.fit_lengths,
+            as_described: self.as_described,
             ..Options::default()
         };
         let watched = if self.json.is_some() { Console::silent() } else { console.clone() };
@@ -160,9 +164,9 @@ fn percent(score: &Score, blocked: f64) -> (f64, f64) {
 
 fn to_text(cases: &[Case], lengths: &[Option<LengthTransfer>], published: Option<&str>) -> String {
     let mut text = format!(
-        "Errors on held-out data: mean |F − F_model| in N, and in percent of the blocked force at the highest pressure.\n\
-         {:<22} {:>8} {:>17} {:>17} {:>17} {:>17}\n",
-        "muscle", "F_B N", "held-out runs", "same, published", "held-out contr.", "other lengths"
+        "Errors on held-out data: mean |F − F_model| in N, and in percent of the largest measured force (F_max).\n\
+         {:<22} {:>8} {:>8} {:>17} {:>17} {:>17} {:>17}\n",
+        "muscle", "F_max N", "F_B N", "held-out runs", "same, published", "held-out contr.", "other lengths"
     );
     let cell = |s: Option<&Score>, blocked: f64| {
         s.map_or("–".to_owned(), |s| format!("{:.2} N  {:.2} %", s.mean(), percent(s, blocked).0))
@@ -170,7 +174,7 @@ fn to_text(cases: &[Case], lengths: &[Option<LengthTransfer>], published: Option
     let mut sums = [(0.0, 0.0); 4];
     for (case, length) in cases.iter().zip(lengths) {
         let Some(any) = case.runs.as_ref().or(case.contractions.as_ref()) else { continue };
-        let b = any.blocked;
+        let (b, blocked) = (any.largest, any.blocked);
         let columns = [
             case.runs.as_ref().map(|h| h.table),
             any.published,
@@ -183,7 +187,7 @@ fn to_text(cases: &[Case], lengths: &[Option<LengthTransfer>], published: Option
             }
         }
         text += &format!(
-            "{:<22} {b:8.1} {:>17} {:>17} {:>17} {:>17}\n",
+            "{:<22} {b:8.1} {blocked:8.1} {:>17} {:>17} {:>17} {:>17}\n",
             case.muscle.name,
             cell(columns[0].as_ref(), b),
             cell(columns[1].as_ref(), b),
@@ -194,12 +198,13 @@ fn to_text(cases: &[Case], lengths: &[Option<LengthTransfer>], published: Option
     let means: Vec<String> =
         sums.iter().map(|(s, n)| if *n > 0.0 { format!("{:.2} %", s / n) } else { "–".into() }).collect();
     text += &format!(
-        "{:<22} {:>8} {:>17} {:>17} {:>17} {:>17}\n",
-        "mean", "", means[0], means[1], means[2], means[3]
+        "{:<22} {:>8} {:>8} {:>17} {:>17} {:>17} {:>17}\n",
+        "mean", "", "", means[0], means[1], means[2], means[3]
     );
     if let Some(name) = published {
         text += &format!("published: {name}, on the rows of the first column\n");
     }
+    text += "F_B: blocked force, friction-free at rest length and the highest tested pressure, by the fit to all rows\n";
     if lengths.iter().any(Option::is_some) {
         text += "unseen length: the mean of the other muscles' tables, with an end effect of\n";
         for (case, length) in cases.iter().zip(lengths) {
@@ -208,11 +213,15 @@ fn to_text(cases: &[Case], lengths: &[Option<LengthTransfer>], published: Option
             }
         }
     }
-    text += "\nWhere it sits: mean error F − F_model, N, at contractions (filling or shortening / emptying or lengthening)\n";
+    text += "\nWhere the error is: mean of F − F_model, N, at contractions (filling or shortening / emptying or lengthening)\n";
     for (case, length) in cases.iter().zip(lengths) {
         text += &format!("{}\n", case.muscle.name);
         if let Some(held) = &case.runs {
             text += &places("run", &held.spots);
+            let table = recording_table(&held.recordings);
+            if !table.is_empty() {
+                text += &format!("held-out {table}\n");
+            }
         }
         if let Some(held) = &case.contractions {
             text += &places("left out", &held.spots);
@@ -260,9 +269,10 @@ fn places(what: &str, spots: &[Spot]) -> String {
 }
 
 fn to_document(case: &Case, length: Option<&LengthTransfer>) -> document::Muscle {
-    let blocked = case.runs.as_ref().or(case.contractions.as_ref()).map_or(f64::NAN, |h| h.blocked);
+    let any = case.runs.as_ref().or(case.contractions.as_ref());
+    let (blocked, largest) = any.map_or((f64::NAN, f64::NAN), |h| (h.blocked, h.largest));
     let score = |s: &Score| {
-        let (mean_pct, rms_pct) = percent(s, blocked);
+        let (mean_pct, rms_pct) = percent(s, largest);
         let (mean, rms) = (s.mean(), s.rms());
         document::Score { rows: s.rows, mean_N: mean, rms_N: rms, mean_pct, rms_pct, bias_N: s.bias() }
     };
@@ -284,12 +294,14 @@ fn to_document(case: &Case, length: Option<&LengthTransfer>) -> document::Muscle
             table: score(&h.table),
             published: h.published.as_ref().map(score),
             r#where: spots(&h.spots),
+            recordings: json_of(&h.recordings),
             adjusted: json_of(&h.whole.summary.adjusted),
         })
     };
     document::Muscle {
         muscle: case.muscle.name.clone(),
         blocked_force_N: blocked,
+        largest_force_N: largest,
         unseen_runs: held(&case.runs),
         unseen_contractions: held(&case.contractions),
         unseen_length: length.map(|l| document::OtherLength {

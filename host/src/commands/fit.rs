@@ -17,6 +17,7 @@ use pam_fit::{Options, fit_with_progress};
 
 use crate::progress::ProgressLine;
 use pam_data::recording::Reader;
+use pam_fit::error::FitCode;
 use pam_fit::table_file::{self, TableFile};
 use pam_report::fit_page;
 
@@ -57,6 +58,12 @@ pub struct Arguments {
     /// Correct the length of every mounting (a stroke held through whole recordings) by up to 1 mm.
     #[arg(long)]
     fit_lengths: bool,
+    /// Keep the described dimensions and lengths, also where recordings at held lengths ask for others.
+    #[arg(long, conflicts_with_all = ["fit_geometry", "fit_lengths"])]
+    as_described: bool,
+    /// Write the table even if it is useless for control (negative P0 or friction, a large error, an inverse that fails).
+    #[arg(long)]
+    force: bool,
     /// Constrain the bladder's stress to rise with strain, and report the error with and without.
     #[arg(long)]
     physical: bool,
@@ -95,6 +102,7 @@ impl Arguments {
             fit_geometry: self.fit_geometry,
             fit_lengths: self.fit_lengths,
             physical: self.physical,
+            as_described: self.as_described,
         };
         let files = self.recordings.files.clone();
         let progress = ProgressLine::new(&watched, "fitting");
@@ -109,7 +117,7 @@ impl Arguments {
             fit: fitted.summary.quality(),
             uncertainty: Some(fitted.stored_uncertainty()),
             corrections: Vec::new(),
-            mountings: fitted.solution.problem.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
+            mountings: table_file::stored_mountings(&fitted.solution.problem),
         };
         let table = TableFile { table: fitted.table.clone(), about };
         let json = serde_json::to_string_pretty(&fitted.summary)
@@ -120,7 +128,8 @@ impl Arguments {
             self.reports.file(),
             self.reports.figures.as_deref(),
         ]);
-        if let Some(path) = &self.output {
+        let faults = &fitted.summary.faults;
+        if let Some(path) = self.output.as_ref().filter(|_| faults.is_empty() || self.force) {
             table.write(path)?;
         }
         if let Some(path) = &self.json {
@@ -134,6 +143,17 @@ impl Arguments {
             console.note(fitted.summary.to_string());
         }
         console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));
-        Ok(())
+        if faults.is_empty() {
+            return Ok(());
+        }
+        if self.force {
+            console.warning(format!("the table is useless for control: {}", faults.join(". ")));
+            return Ok(());
+        }
+        let unwritten = if self.output.is_some() { ", and it was not written" } else { "" };
+        Err(Error::new(
+            FitCode::FitImplausible,
+            format!("the table is useless for control{unwritten}: {}", faults.join(". ")),
+        ))
     }
 }

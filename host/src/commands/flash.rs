@@ -59,10 +59,10 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// Does what was asked.
+    /// Does what was requested.
     ///
     /// # Errors
-    /// A bad file, a device that is silent, foreign or refuses, a table that does not come back as it was sent.
+    /// A bad file, a device that is silent, of another kind, or refuses, a table that does not come back as it was sent.
     pub fn run(self, console: &Console) -> Result<()> {
         match (&self.firmware, &self.chip, &self.table) {
             (Some(firmware), Some(chip), _) => program(firmware, chip, console),

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::console::Console;
+use crate::program_name;
 use pam_data::error::{Error, Result};
 use pam_data::output::write_whole;
 
@@ -30,7 +31,7 @@ impl Arguments {
             None => write_whole(Path::new("-"), &page(command)?),
             Some(folder) => {
                 std::fs::create_dir_all(folder).map_err(|e| Error::unwritable(folder, &e))?;
-                let count = write_all(command, "host", folder)?;
+                let count = write_all(command, program_name::called(), folder)?;
                 console.note(format!("{count} pages in {}", folder.display()));
                 Ok(())
             }
@@ -47,7 +48,7 @@ fn page(command: clap::Command) -> Result<Vec<u8>> {
     Ok(text)
 }
 
-/// What stands below the help: examples as lines to be copied, which a paragraph would join and hyphenate, and notes.
+/// The text below the help: examples as lines to be copied, which a paragraph would join and hyphenate, and notes.
 fn closing(below: &str) -> String {
     let (mut page, mut notes) = (String::new(), false);
     for line in below.lines().filter(|l| !l.is_empty()) {

@@ -40,7 +40,7 @@ const DRAWING: &str = r"
    -----+-----> radial                               '------'
 ";
 
-/// One question: key, what to ask, an answer that stands in for an empty one.
+/// One question: key, what to ask, the default answer.
 const QUESTIONS: [(&str, &str, Option<&str>); 7] = [
     ("name", "What is it called?", None),
     ("kind", "Does it pull (contractile) or push a rod (push)?", Some("contractile")),

@@ -63,7 +63,7 @@ fn chosen(plugged_in: &[String], is_controller: impl Fn(&str) -> bool) -> Result
     let controllers: Vec<&str> =
         plugged_in.iter().map(String::as_str).filter(|name| is_controller(name)).collect();
     let several = |count: usize, what: &str, names: String| {
-        Error::new(DataCode::CallInvalid, format!("no port is given, and there are {count} {what}"))
+        Error::new(DataCode::CallInvalid, format!("no port is given, and this machine has {count} {what}"))
             .help(format!("name one: --port {names}"))
     };
     match controllers[..] {

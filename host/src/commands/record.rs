@@ -1,4 +1,4 @@
-//! `host record` and `host recover`: what a controller measures, to a recording that outlives whatever goes wrong.
+//! `host record` and `host recover`: what a controller measures, to a recording that survives failures.
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -29,7 +29,7 @@ use pam_data::date::now_utc;
     host record --port /dev/ttyACM0\n  \
     host record --seconds 60 -o run.csv -o run.mcap\n  \
     host record --rate 100 --folder campaign\n\n\
-    It only watches: what the controller does, it goes on doing. Every 0.1 s goes to the disk; a program that is killed, a cable \
+    It only watches: it does not keep the run of another program alive. Every 0.1 s goes to the disk; a program that is killed, a cable \
     that is pulled or a disk that fills leaves everything until then. CSV and MCAP are read by `host fit` and all others; \
     MCAP opens in the viewers of robotics. OUT.json says which versions, table and settings the controller had.")]
 pub struct Arguments {
@@ -55,7 +55,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Silence of the telemetry after which the device is asked what is wrong.
+/// Silence of the telemetry after which the device's faults are read.
 const SILENCE: Duration = Duration::from_secs(2);
 
 /// How a recording ended.
@@ -106,7 +106,7 @@ impl Arguments {
         about["rows"] = json!(rows);
         about["files"] = json!(output.iter().map(|f| f.display().to_string()).collect::<Vec<_>>());
         let kept = end(recorder, &about, console);
-        // A device that is gone cannot be asked to be quiet; the recording is whole all the same.
+        // A device that is gone cannot stop its telemetry; the recording is complete nevertheless.
         let quiet = client.try_call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 });
         if let Err(error) = &watched
             && kept.is_ok()
@@ -148,8 +148,6 @@ fn watch(
     let (mut first, mut last) = (None, 0);
     let mut heard = Instant::now();
     while !stop() {
-        // A controller that moves a muscle vents when its host falls silent; to record is to be there.
-        client.keep_alive()?;
         match client.topic(Duration::from_millis(50))? {
             Some(Topic::Telemetry(sample)) => {
                 heard = Instant::now();
@@ -189,9 +187,9 @@ fn watch(
 #[command(
     arg_required_else_help = true,
     after_help = "Example:\n  host recover run.csv.part run.mcap.part\n\n\
-    A recording is named NAME.part while it grows. What is whole in it goes to a file of its own, also behind damage; what is \
-    missing is said in bytes and samples, and the original is then kept as NAME.part.original. The next recording of the same \
-    name does so by itself. A damaged recording of another name stays, and what is whole in it goes to NAME.rescued-N."
+    A recording is named NAME.part while it grows. Intact data, also after the damage, go to a new file. The program \
+    prints the missing bytes and samples, and keeps the original as NAME.part.original. The next recording of the same \
+    name recovers it automatically. A damaged recording of another name stays, and its intact data go to NAME.rescued-N."
 )]
 pub struct RecoverArguments {
     /// Recordings that were cut off or damaged.

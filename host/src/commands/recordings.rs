@@ -15,15 +15,34 @@ use pam_data::recording::{Campaign, Hashes, Import, Reader};
 /// Recordings on the command line.
 #[derive(Debug, Clone, Args)]
 pub struct Recordings {
-    /// Recordings of one muscle, in chronological order.
-    #[arg(required = true, value_name = "REC")]
+    /// Recordings of one muscle, in chronological order; `-` is standard input.
+    #[arg(required = true, value_name = "REC", value_parser = recording)]
     pub files: Vec<PathBuf>,
     /// How to read files that are not in the usual form: an import description.
     #[arg(long, value_name = "IMPORT.toml")]
     pub import: Option<PathBuf>,
-    /// Take only rows where a column has this value; may be given several times.
+    /// Take only rows where a column has this value, one of several (COLUMN=A,B), or not this value (COLUMN!=VALUE); may be given several
+    /// times.
     #[arg(long = "where", value_name = "COLUMN=VALUE")]
     pub filters: Vec<String>,
+}
+
+/// A recording on the command line. Standard input is a file like any other pipe.
+pub(super) fn recording(text: &str) -> std::result::Result<PathBuf, std::convert::Infallible> {
+    Ok(PathBuf::from(if cfg!(unix) && text == "-" { "/dev/stdin" } else { text }))
+}
+
+/// The column and the value of a filter.
+///
+/// # Errors
+/// A filter without `=`.
+pub(super) fn filter(text: &str) -> Result<(String, String)> {
+    let (column, value) = text.split_once('=').ok_or_else(|| {
+        Error::new(DataCode::CallInvalid, "a filter without `=`")
+            .value(text)
+            .help("write --where column=value, such as --where run=8")
+    })?;
+    Ok((column.trim().to_owned(), value.trim().to_owned()))
 }
 
 impl Recordings {
@@ -34,13 +53,8 @@ impl Recordings {
     pub fn read(&self, reader: Reader<'_>) -> Result<Campaign> {
         let import = self.import.as_ref().map(Import::read).transpose()?;
         let mut reader = reader.import(import.as_ref());
-        for filter in &self.filters {
-            let (column, value) = filter.split_once('=').ok_or_else(|| {
-                Error::new(DataCode::CallInvalid, "a filter without `=`")
-                    .value(filter)
-                    .help("write --where column=value, such as --where run=8")
-            })?;
-            reader.filters.push((column.trim().to_owned(), value.trim().to_owned()));
+        for text in &self.filters {
+            reader.filters.push(filter(text)?);
         }
         reader.campaign(&self.files)
     }
@@ -56,7 +70,7 @@ impl Recordings {
         Ok((campaign, hashes.of(&self.files)?))
     }
 
-    /// As [`Recordings::read`], with a bar where somebody watches the console.
+    /// As [`Recordings::read`], with a progress bar on an interactive console.
     ///
     /// # Errors
     /// As [`Recordings::read`].

@@ -22,19 +22,19 @@ pub struct Reports {
 }
 
 impl Reports {
-    /// Whether anything is wanted.
+    /// Whether anything is requested.
     #[must_use]
     pub fn wanted(&self) -> bool {
         self.report.is_some() || self.figures.is_some()
     }
 
-    /// Where the report goes, if it is wanted.
+    /// Where the report goes, if it is requested.
     #[must_use]
     pub fn file(&self) -> Option<&Path> {
         self.report.as_deref()
     }
 
-    /// Writes what is wanted; `page` is called only then.
+    /// Writes what is requested; `page` is called only then.
     ///
     /// # Errors
     /// A file that cannot be written.

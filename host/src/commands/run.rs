@@ -116,7 +116,7 @@ enum Source {
 }
 
 impl Arguments {
-    /// Does what was asked.
+    /// Does what was requested.
     ///
     /// # Errors
     /// A wrong setpoint profile, a device that is silent or refuses, the fault that stopped it, a recording that cannot be written.
@@ -145,7 +145,12 @@ impl Arguments {
         let saturated_before = client.call::<GetStatus>(&())?.saturated_ticks;
         let progress = ProgressLine::new(console, "run");
         progress.total(self.seconds.map_or(0, |s| (s * 1e3) as u64));
-        let mut reached = if quantity == Quantity::Pressure { None } else { Reachability::of(&mut client)? };
+        let reachable = Reachability::of(&mut client)?;
+        // Before anything moves, not after ten seconds at the highest pressure.
+        if let Some(words) = reachable.as_ref().and_then(|r| r.beyond(quantity, &plan.profile)) {
+            console.warning(words);
+        }
+        let mut reached = reachable.filter(|_| quantity != Quantity::Pressure);
         let mut start = None;
         let outcome = run(
             &mut client,
@@ -222,7 +227,7 @@ impl Arguments {
     }
 }
 
-/// In its first second a vented muscle fills, whatever is asked, µs.
+/// In its first second a vented muscle fills, at any setpoint, µs.
 const FILLING: u64 = 1_000_000;
 
 /// Errors squared and summed.
@@ -243,7 +248,7 @@ impl Squares {
     }
 }
 
-/// How far what was measured stayed from what was asked: all the time, and after the muscle had filled.
+/// Deviation of the measurement from the setpoint: over all the time, and after the muscle had filled.
 #[derive(Debug)]
 struct Errors {
     joint: Joint,
@@ -268,7 +273,7 @@ impl Errors {
                 None => return,
             },
         };
-        let error = f64::from(measured - sample.asked);
+        let error = f64::from(measured - sample.setpoint);
         if error.is_finite() {
             let begun = *self.begun.get_or_insert(sample.time_us);
             self.all.add(error);

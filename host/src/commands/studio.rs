@@ -17,7 +17,7 @@ use pam_data::error::{DataCode, Error, Result};
     The page is for this machine only. Escape vents. When the last page closes, the controller is vented and disarmed."
 )]
 pub struct Arguments {
-    /// Connect to this device at once, unless an emulated one is asked for.
+    /// Connect to this device immediately, unless an emulated one is requested.
     #[arg(short, long, value_name = "PORT", env = "PAM_PORT")]
     port: Option<String>,
     /// Start an emulated controller with this muscle of the virtual bench: mini (where none is named), contractile, push or

@@ -3,14 +3,15 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
-use model_core::muscle::Muscle;
 
 use crate::console::{Console, name};
 use crate::documents::{table as document, text};
-use pam_data::error::Result;
+use pam_data::error::{Error, Result};
 use pam_data::output::{printed, to_standard_output, write_whole};
 use pam_data::pluralise::pluralise;
+use pam_fit::error::FitCode;
 use pam_fit::table_export::{self, Format};
+use pam_fit::table_faults::table_faults;
 use pam_fit::table_file::TableFile;
 
 /// The forms of an exported table, as the command line names them.
@@ -94,7 +95,7 @@ impl Arguments {
     /// Runs the command.
     ///
     /// # Errors
-    /// A file that cannot be read or is no valid table.
+    /// A file that cannot be read or is not a valid table.
     pub fn run(self, console: &Console) -> Result<()> {
         match self.action {
             Action::Show(file) => {
@@ -104,15 +105,25 @@ impl Arguments {
             Action::Check(file) => {
                 let table = TableFile::read(&file.table)?;
                 let remarks = remarks(&table);
+                let faults = table_faults(&table.table, table.about.uncertainty.as_ref(), &table.about.fit);
+                let valid = faults.is_empty();
+                let refused = Error::new(FitCode::FitImplausible, "the table is useless for control")
+                    .file(&file.table)
+                    .help("fit it anew from better recordings or with other dimensions");
                 if file.json {
-                    let check = document::Check { schema: "pam-check/1", valid: true, remarks };
+                    let check = document::Check { schema: "pam-check/1", valid, remarks, faults };
                     console.result(text(&check)?);
                 } else {
-                    console.result(format!("{}: valid", file.table.display()));
+                    let verdict = if valid { "valid" } else { "not usable" };
+                    console.result(format!("{}: {verdict}", file.table.display()));
+                    for fault in faults {
+                        console.result(format!("  fault: {fault}"));
+                    }
                     for remark in remarks {
                         console.result(format!("  note: {remark}"));
                     }
                 }
+                return if valid { Ok(()) } else { Err(refused) };
             }
             Action::Export(export) => {
                 to_standard_output(&[("-o", Some(&export.output)), ("--json", printed(export.json))])
@@ -150,30 +161,6 @@ fn remarks(file: &TableFile) -> Vec<String> {
     }
     if table.friction.iter().all(|k| *k == 0.0) {
         remarks.push("no friction: the recordings have no hysteresis, or one direction only".to_owned());
-    }
-    if table.friction.iter().any(|k| *k < 0.0) {
-        remarks.push("negative k_F: not physical".to_owned());
-    }
-    if let Ok(muscle) = Muscle::<f64>::build(table) {
-        let (low, high) = (table.tested.contraction_low, table.tested.contraction_high);
-        let l0 = f64::from(table.geometry.rest_length.metres());
-        let mut falling = false;
-        for i in 0..=20 {
-            let contraction = f64::from(low) + f64::from(high - low) * f64::from(i) / 20.0;
-            let held = muscle.held(model_core::units::Length::from_metres(contraction * l0));
-            let (p0, p1) = (table.tested.pressure_low.pascals(), table.tested.pressure_high.pascals());
-            for j in 0..=20 {
-                let p = f64::from(p0) + f64::from(p1 - p0) * f64::from(j) / 20.0;
-                let parts = muscle.parts(&held, model_core::units::Pressure::from_pascals(p));
-                falling |= parts.quasi() > 0.0 && parts.pressure_slope < 0.0;
-            }
-        }
-        if falling {
-            remarks.push(
-                "the force falls with rising pressure in a part of the tested range: the inverse may not find a pressure there"
-                    .to_owned(),
-            );
-        }
     }
     remarks
 }

@@ -18,7 +18,7 @@ pub struct Story<'a> {
     pub campaign: &'a Campaign,
     /// The fit of it.
     pub fit: &'a Fit,
-    /// Where the firmware ran, in words.
+    /// Description of where the firmware ran.
     pub controller: &'a str,
     /// The device's release and check sum of its table.
     pub device: String,
@@ -138,7 +138,7 @@ fn curves(track: &Track) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     for sample in &track.samples {
         let Some(side) = sample.sides.first() else { continue };
         out.0.push(sample.time_us.saturating_sub(start) as f64 * 1e-6);
-        out.1.push(f64::from(sample.asked));
+        out.1.push(f64::from(sample.setpoint));
         out.2.push(f64::from(side.force_n));
     }
     out
@@ -163,7 +163,7 @@ fn force_figure(tracks: &[Track], task: Task) -> Figure {
     Figure::multiples(
         format!("tracking-{}", task.name()),
         title,
-        "The measured force should lie on the dashed line; what is left over is the law's error.",
+        "With a perfect law, the measured force lies on the dashed line; the deviation is the law's error.",
         panels,
     )
     .shared(true, true)
@@ -218,7 +218,7 @@ fn load_lines(campaign: &Campaign, fit: &Fit) -> Result<Figure> {
     Ok(Figure::new(
         "load-lines",
         "Load lines, measured and fitted",
-        "At each pressure the measured loop (grey) should lie between and on the two fitted lines: the lower one shortening, the \
+        "At each pressure the measured loop (grey) lies between and on the two fitted lines if the fit is good: the lower one shortening, the \
          upper one lengthening.",
         panel,
     ))

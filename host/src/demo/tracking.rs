@@ -1,4 +1,4 @@
-//! How well a controller's force follows what is asked while the muscle moves, under one control law after another.
+//! How well a controller's force follows the setpoint while the muscle moves, under one control law after another.
 
 use model_core::link::endpoints::{GetSettings, SetSettings};
 use model_core::link::messages::{Reference, Telemetry};
@@ -68,7 +68,7 @@ impl Law {
     }
 }
 
-/// What is asked of the force.
+/// The force setpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Task {
     /// A sine of 0.5 Hz.
@@ -174,7 +174,7 @@ pub fn track(
     let errors: Vec<f64> = samples
         .iter()
         .filter(|s| s.time_us.saturating_sub(start) as f64 * 1e-6 >= SETTLE)
-        .filter_map(|s| Some(f64::from(s.sides.first()?.force_n) - f64::from(s.asked)))
+        .filter_map(|s| Some(f64::from(s.sides.first()?.force_n) - f64::from(s.setpoint)))
         .collect();
     if errors.len() < 100 {
         return Err(Error::new(DeviceCode::DeviceSilent, format!("only {} samples came back", errors.len())));

@@ -19,7 +19,10 @@ pub(crate) struct Evaluate {
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub(crate) struct Muscle {
     pub muscle: String,
+    /// Friction-free, at rest length and the highest tested pressure, by the fit to all rows.
     pub blocked_force_N: f64,
+    /// The largest measured force; percentages refer to it.
+    pub largest_force_N: f64,
     pub unseen_runs: Option<HeldOut>,
     pub unseen_contractions: Option<HeldOut>,
     pub unseen_length: Option<OtherLength>,
@@ -33,6 +36,8 @@ pub(crate) struct HeldOut {
     /// Of the published formula on the same rows.
     pub published: Option<Score>,
     pub r#where: Vec<Spot>,
+    /// The errors of each recording when it was left out.
+    pub recordings: Value,
     /// Fitted dimensions and lengths of the fit to all rows.
     pub adjusted: Value,
 }
@@ -54,7 +59,7 @@ pub(crate) struct Score {
     /// Mean absolute error.
     pub mean_N: f64,
     pub rms_N: f64,
-    /// Percent of the blocked force.
+    /// Percent of the largest measured force.
     pub mean_pct: f64,
     pub rms_pct: f64,
     /// Mean error with its sign.

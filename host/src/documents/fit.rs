@@ -34,7 +34,12 @@ pub(super) struct Fit {
     physical: Option<Physical>,
     outliers: Vec<Outlier>,
     adjusted: Vec<Adjusted>,
+    recordings: Vec<RecordingResidual>,
+    /// The largest measured force: a scale that no fit enters.
+    largest_force_N: f64,
     warnings: Vec<String>,
+    /// What makes the table useless for control.
+    faults: Vec<String>,
 }
 
 /// The fit at one tested pressure.
@@ -114,6 +119,19 @@ struct Outlier {
     time_s: f64,
     force_N: f64,
     off_N: f64,
+}
+
+/// The residuals F − F_model of one recording.
+#[derive(JsonSchema)]
+#[schemars(deny_unknown_fields)]
+struct RecordingResidual {
+    recording: String,
+    mounting: String,
+    rows: usize,
+    mean_N: f64,
+    rms_N: f64,
+    /// Mean minus that of the other recordings of the mounting; null for the only one.
+    against_others_N: Option<f64>,
 }
 
 /// A fitted dimension or length.

@@ -102,8 +102,12 @@ pub(crate) struct Source<'a> {
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub(crate) struct Check {
     pub schema: &'static str,
+    /// Whether a controller can use it.
     pub valid: bool,
+    /// What limits its use.
     pub remarks: Vec<String>,
+    /// What makes it useless for control.
+    pub faults: Vec<String>,
 }
 
 /// What `host table export` wrote.

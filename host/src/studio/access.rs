@@ -1,4 +1,4 @@
-//! Who may use the page: this machine, under the page's own address, and for everything but the page itself whoever has the token.
+//! Who may use the page: this machine, under the page's own address, and for everything but the page itself, anyone who has the token.
 
 use std::sync::Arc;
 
@@ -6,6 +6,7 @@ use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use subtle::ConstantTimeEq;
 
 /// Under which names a server may be addressed, and from pages of which hosts.
 #[derive(Debug, Clone)]
@@ -14,26 +15,16 @@ pub(super) struct Access {
     pub origins: Arc<[String]>,
 }
 
-/// 128 random bits from the system.
+/// 128 random bits from the operating system, in hexadecimal.
 pub(super) fn token() -> std::io::Result<String> {
-    use std::io::Read;
     let mut bytes = [0_u8; 16];
-    if let Ok(mut source) = std::fs::File::open("/dev/urandom") {
-        source.read_exact(&mut bytes)?;
-    } else {
-        // Elsewhere the standard library's own seeds, which the system makes random, stand in.
-        use std::hash::{BuildHasher, Hasher};
-        for half in bytes.chunks_mut(8) {
-            let seed = std::collections::hash_map::RandomState::new().build_hasher().finish();
-            half.copy_from_slice(&seed.to_le_bytes());
-        }
-    }
+    getrandom::fill(&mut bytes)?;
     Ok(bytes.iter().map(|b| format!("{b:02x}")).collect())
 }
 
 /// Compares in a time that does not depend on where two texts differ.
 pub(super) fn same(a: &str, b: &str) -> bool {
-    a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |d, (x, y)| d | (x ^ y)) == 0
+    a.as_bytes().ct_eq(b.as_bytes()).into()
 }
 
 /// The one value of a header; `Err` where it is given twice or is no text, `Ok(None)` where it is not given.
@@ -69,7 +60,7 @@ fn allowed(access: &Access, request: &Request) -> Result<(), &'static str> {
     }
 }
 
-/// Refuses foreign hosts and origins, and forbids the browser to keep or embed anything.
+/// Refuses unknown hosts and origins, and forbids the browser to keep or embed anything.
 pub(super) async fn guard(State(access): State<Access>, request: Request, next: Next) -> Response {
     if let Err(why) = allowed(&access, &request) {
         return (StatusCode::FORBIDDEN, why).into_response();

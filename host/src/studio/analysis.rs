@@ -67,7 +67,7 @@ impl Analysis {
     /// [`DataCode::CallInvalid`] when nothing was fitted yet.
     pub fn table(&self) -> Result<PathBuf> {
         self.known().table.clone().ok_or_else(|| {
-            Error::new(DataCode::CallInvalid, "there is no table yet").help("fit recordings first")
+            Error::new(DataCode::CallInvalid, "no table exists yet").help("fit recordings first")
         })
     }
 
@@ -87,7 +87,7 @@ impl Analysis {
         Ok(table)
     }
 
-    /// A report by its name, which only whoever made it knows.
+    /// A report by its name, which only its creator knows.
     #[must_use]
     pub fn report(&self, name: &str) -> Option<Arc<str>> {
         self.known().reports.iter().find(|r| same(&r.0, name)).map(|r| Arc::clone(&r.1))
@@ -197,7 +197,7 @@ impl Analysis {
             .recordings
             .get(number)
             .cloned()
-            .ok_or_else(|| Error::new(DataCode::CallInvalid, "there is no such recording"))?;
+            .ok_or_else(|| Error::new(DataCode::CallInvalid, "this recording does not exist"))?;
         let mut all = Reader::new().file(&path)?;
         if all.is_empty() {
             return Err(Error::new(DataCode::RecordingEmpty, "the recording is empty").file(path));
@@ -246,7 +246,7 @@ impl Analysis {
     }
 
     /// Fits all recordings; the table is then what `flash` sends. Each fit has a table file and a report of its own, and both become
-    /// known at once.
+    /// known immediately.
     ///
     /// # Errors
     /// As [`fit`], and for a muscle description that is not right.
@@ -262,7 +262,7 @@ impl Analysis {
             fit: fitted.summary.quality(),
             uncertainty: Some(fitted.stored_uncertainty()),
             corrections: Vec::new(),
-            mountings: fitted.solution.problem.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
+            mountings: table_file::stored_mountings(&fitted.solution.problem),
         };
         let path = self.free("fitted", "pam");
         TableFile { table: fitted.table.clone(), about }.write(&path)?;

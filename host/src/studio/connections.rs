@@ -33,7 +33,7 @@ impl Default for Limits {
     }
 }
 
-/// Serves until the future is dropped. A connection beyond the limit is closed at once.
+/// Serves until the future is dropped. A connection beyond the limit is closed immediately.
 pub(super) async fn serve(listener: TcpListener, app: Router, limits: Limits) {
     let permits = Arc::new(Semaphore::new(limits.connections));
     loop {
@@ -92,7 +92,7 @@ mod tests {
 
     fn connect(address: std::net::SocketAddr) -> TcpStream {
         let stream = TcpStream::connect(address).unwrap();
-        // A server that keeps the connection fails the test instead of holding it up for ever.
+        // A server that keeps the connection fails the test instead of holding it up permanently.
         stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
         stream
     }

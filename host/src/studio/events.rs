@@ -1,4 +1,4 @@
-//! What the page receives by itself: samples, faults, and the ranges of the sensors.
+//! What the server sends to the page without a request: samples, faults, and the ranges of the sensors.
 
 use model_core::link::messages::{Mode, SideSample, State, Telemetry};
 use model_core::link::settings::Settings;
@@ -32,8 +32,8 @@ pub(super) fn credible(settings: &Settings) -> Value {
         .into()
 }
 
-/// Samples as columns: times in s, forces in N, pressures in kPa, strokes in mm. What is asked, and the table's force, are null while
-/// the controller does not drive: nobody asks for anything, and of a vented muscle, which hangs slack, a table says nothing.
+/// Samples as columns: times in s, forces in N, pressures in kPa, strokes in mm. The setpoint and the table's force are null while
+/// the controller does not drive: no setpoint exists, and a table does not describe a vented muscle, which is slack.
 pub(super) fn batch(samples: &[Telemetry]) -> String {
     let side = |pick: &dyn Fn(&SideSample) -> f64, digits: f64| -> Vec<f64> {
         let rounded = |v: f64| (v * digits).round() / digits;
@@ -56,7 +56,7 @@ pub(super) fn batch(samples: &[Telemetry]) -> String {
         "x": side(&|s| f64::from(s.stroke_m) * 1e3, 1e4),
         "c": side(&|s| f64::from(s.command_pa) * 1e-3, 1e2),
         "m": driven(&model),
-        "a": driven(&|s| f64::from(s.asked) * scale),
+        "a": driven(&|s| f64::from(s.setpoint) * scale),
         "mode": samples.last().map(|s| messages::mode(s.mode)),
     })
     .to_string()

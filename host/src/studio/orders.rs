@@ -48,7 +48,7 @@ impl Shared {
         self.order_since(order, self.vent.count()).await
     }
 
-    /// An order that belongs to the time when there had been so many vents.
+    /// An order, with the number of vents before it was sent.
     pub(super) async fn order_since(&self, order: Order, vents: u64) -> Result<Value> {
         let gone = || {
             Error::new(DeviceCode::DeviceSilent, "the thread of the controller has ended")

@@ -1,6 +1,6 @@
 "use strict";
-// Curves on a canvas: a ring of samples, drawn as one vertical stroke from least to greatest in each column of pixels, so that the
-// work of a picture depends on its width and on what is new, not on the window and the rate of samples.
+// Curves on a canvas: a ring of samples, drawn as one vertical stroke from least to greatest in each column of pixels. The
+// work of a picture depends on its width and on the new samples, not on the window and the rate of samples.
 
 // Colours of the page, asked once: asking makes the browser compute styles, sixty times a second and curve.
 const ink = new Map();

@@ -1,8 +1,8 @@
 //! The page's server: this machine only, and orders only from who holds the token.
 //!
 //! Every request must name this server as its host and, where a browser says from where it comes, as its origin; whatever reads or
-//! orders anything also needs the token, which is made anew at each start. A foreign page in the same browser can therefore neither
-//! read nor order anything, whatever it resolves its name to.
+//! orders anything also needs the token, which is made anew at each start. Another page in the same browser can therefore neither
+//! read nor order anything, regardless of what it resolves its name to.
 //!
 //! Nothing on the server's thread waits for a computation, a file or a controller.
 
@@ -70,7 +70,7 @@ pub enum First {
     Emulate(String),
 }
 
-/// Serves until `stop` completes; `ready` is told the address with the token. At the end the controller is vented.
+/// Serves until `stop` completes; `ready` receives the address with the token. At the end the controller is vented.
 ///
 /// # Errors
 /// [`DeviceCode::DevicePort`] when the port cannot be listened on, [`DataCode::FileUnwritable`] for the folder.
@@ -159,8 +159,8 @@ struct Token {
     token: Option<String>,
 }
 
-/// The page itself is the same for everybody and holds no secret: a reload finds it without the token, which stands in no address
-/// after the first visit. A wrong token is refused, so that an old address is noticed at once.
+/// The page itself is the same for everybody and holds no secret: a reload finds it without the token, which is in no address
+/// after the first visit. A wrong token is refused, so that an old address is noticed immediately.
 async fn page(State(shared): State<Shared>, Query(given): Query<Token>) -> Response {
     if given.token.is_some_and(|given| !same(&given, &shared.token)) {
         let why = "The token is old: open the address that `host studio` printed when it started.";
@@ -178,7 +178,7 @@ async fn page(State(shared): State<Shared>, Query(given): Query<Token>) -> Respo
     response
 }
 
-/// A report, by a random name that opens this report and nothing else: its address may stand in a history.
+/// A report, by a random name that opens this report and nothing else: its address may be in a history.
 async fn report(State(shared): State<Shared>, Path(name): Path<String>) -> Response {
     let Some(text) = shared.analysis.report(&name) else {
         return (StatusCode::NOT_FOUND, "there is no such report any more: fit or diagnose again")

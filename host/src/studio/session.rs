@@ -33,7 +33,7 @@ pub enum Order {
     Arm,
     /// Follow a setpoint profile.
     Follow(Quantity, SetpointProfile),
-    /// Faults in words.
+    /// Faults as text.
     Faults,
     /// Forget the latched fault.
     Clear,

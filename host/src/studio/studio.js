@@ -1,12 +1,12 @@
 "use strict";
 const $ = (id) => document.getElementById(id);
 
-// The token goes from the address into this page's memory, so that it stands in no history and no screenshot.
+// The token goes from the address into this page's memory, so that it is in no history and no screenshot.
 const token = new URLSearchParams(location.search).get("token") || sessionStorage.getItem("token") || "";
 sessionStorage.setItem("token", token);
 history.replaceState(null, "", location.pathname);
 
-let hideMessage = 0;
+let hideMessage = 0, failed = false;
 function message(text) {
   $("message").textContent = text; $("message").hidden = false;
   clearTimeout(hideMessage); hideMessage = setTimeout(() => { $("message").hidden = true; }, 9000);
@@ -18,7 +18,9 @@ async function send(path, body) {
   catch { message("The program on this machine does not answer. Is `host studio` still running?"); return null; }
   let value = null;
   try { value = await response.json(); } catch { /* a refusal is plain text */ }
-  if (response.ok) return value === null ? true : value;
+  // What went wrong before is over once something succeeds.
+  if (response.ok) { if (failed) $("message").hidden = true; failed = false; return value === null ? true : value; }
+  failed = true;
   message(value ? value.error + (value.at ? "\nat " + value.at : "") + (value.help ? "\n→ " + value.help : "") : "refused");
   return null;
 }
@@ -39,7 +41,7 @@ let shown = ring, fresh = false, mode = "", samples = 0, state = {};
 // How long the last pictures took to draw and how far apart they were, in ms: rings again, so that they cannot grow.
 const perf = { frames: 0, draw: new Float64Array(512), gap: new Float64Array(512), last: 0 };
 
-// Pictures are at least this far apart, ms: more than some thirty a second nobody sees, and where the processor paints they would take
+// Pictures are at least this far apart, ms: more than about thirty per second cannot be seen, and where the processor paints they would take
 // the time that the next one needs. Less than two frames of a screen of 60 Hz, so that every second one of these is drawn.
 const APART = 24;
 
@@ -107,7 +109,7 @@ function read() {
   return Math.min(shown.since(time), shown.length - 1);
 }
 
-// Behind each curve's name its value there, as often as a person can read it; what is asked belongs to one of the pictures.
+// Behind each curve's name its value there, as often as a user can read it; the setpoint belongs to one of the pictures.
 const DECIMALS = { F: 1, m: 1, P: 1, c: 1, x: 2, a: 1 };
 const keys = [...document.querySelectorAll("[data-of]")].map((place) => ({ place, word: place.textContent, ...place.dataset }));
 function readings() {
@@ -185,7 +187,7 @@ listen();
 
 // Controller.
 // Vents have a port of their own, whose requests no other request of this page or of another one can hold up; where it cannot be
-// reached, as through a tunnel, or does not answer at once, they go with the others, too.
+// reached, as through a tunnel, or does not answer immediately, they go with the others, too.
 let ventPath = null;
 order("vent-path").then((path) => { ventPath = path; });
 async function vent() {

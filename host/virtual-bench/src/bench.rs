@@ -120,7 +120,7 @@ impl Bench {
         self.force
     }
 
-    /// Carry out a protocol and give its files. The muscle keeps what happened to it: a second protocol goes on from there.
+    /// Carry out a protocol and give its files. The muscle keeps what happened to it: a second protocol continues from there.
     pub fn run(&mut self, protocol: &Protocol) -> Result<Vec<Recording>, ProtocolError> {
         protocol.check()?;
         self.files = Vec::new();

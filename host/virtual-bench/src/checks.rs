@@ -78,7 +78,7 @@ fn dead_weights(bench: &BenchSpec, force: f64, pressure: f64, clock: f64) -> Che
     Check { name: "dead_weights", csv }
 }
 
-/// A bar that does not give stands in the muscle's place, and the crosshead pulls and pushes at it: what is read as stroke is
+/// A bar that does not give is in the muscle's place, and the crosshead pulls and pushes at it: what is read as stroke is
 /// what the frame and its joints give.
 fn rigid_bar(bench: &BenchSpec, force: f64, clock: f64) -> Check {
     let (mut rig, mut cell, mut ruler) =

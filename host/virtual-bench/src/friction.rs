@@ -58,7 +58,7 @@ pub struct Braid {
 }
 
 impl Braid {
-    /// Bristles upright: nobody knows which way the muscle last moved.
+    /// Bristles upright: no one knows which way the muscle last moved.
     pub fn new(friction: &BraidFriction) -> Self {
         Self { z: vec![0.0; friction.bristles.len()], carried: 0.0 }
     }

@@ -16,8 +16,8 @@
 //! | 1 | 1 | flags: bit 0 [`Request::RESET`], bit 1 [`Request::VENT`], bit 2 [`Request::END`]; the rest zero |
 //! | 2 | 2 | `script` u16: with `RESET`, which motion script of the bench's list to start; otherwise ignored |
 //! | 4 | 4 | `tick` u32: the board's control tick, echoed in the answer; wraps |
-//! | 8 | 4 | `pressure_command` f32, Pa gauge, what the regulator is told for the coming period |
-//! | 12 | 4 | `setpoint` f32, N: the board's present force set-point; the bench only logs it |
+//! | 8 | 4 | `pressure_command` f32, Pa gauge, the regulator's setpoint for the coming period |
+//! | 12 | 4 | `setpoint` f32, N: the board's present force setpoint; the bench only logs it |
 //! | 16 | 2 | CRC-16 of bytes 0..16 |
 //!
 //! Answer, bench to board, 22 bytes:
@@ -43,9 +43,9 @@
 //! 2. Every further request holds its pressure command for one control period; the answer holds the readings at its end.
 //! 3. When the answer to a tick does not come, the board may repeat the request: a request whose tick equals the last
 //!    answered one, without `RESET`, is answered with the same bytes again and advances nothing.
-//! 4. `VENT` opens the dump valve: the command counts as zero whatever it says. A command that is not finite counts as
+//! 4. `VENT` opens the dump valve: the command counts as zero regardless of what it says. A command that is not finite counts as
 //!    zero and sets `BAD_COMMAND`.
-//! 5. `SCRIPT_DONE` tells that the motion script has ended (the plant then holds its last position). `END` tells the bench
+//! 5. `SCRIPT_DONE`: the motion script has ended (the plant then holds its last position). `END` asks the bench
 //!    that the board is finished; it is answered, then the bench closes the connection.
 
 use std::io::{self, Read, Write};
@@ -59,7 +59,7 @@ pub const REQUEST_SYNC: u8 = 0xA5;
 /// First byte of an answer.
 pub const ANSWER_SYNC: u8 = 0x5A;
 
-/// What the board tells the bench each control tick.
+/// What the board sends to the bench in each control tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Request {
     /// Bits [`Self::RESET`], [`Self::VENT`], [`Self::END`].
@@ -70,14 +70,14 @@ pub struct Request {
     pub tick: u32,
     /// Pressure command, Pa gauge.
     pub pressure_command: f32,
-    /// Present force set-point, N, for the bench's log.
+    /// Present force setpoint, N, for the bench's log.
     pub setpoint: f32,
 }
 
 impl Request {
     /// Start (again) from the initial state with script [`Request::script`].
     pub const RESET: u8 = 1;
-    /// Open the dump valve, whatever the command says.
+    /// Open the dump valve, regardless of the command.
     pub const VENT: u8 = 2;
     /// The board is finished.
     pub const END: u8 = 4;
@@ -194,7 +194,7 @@ pub fn crc16(bytes: &[u8]) -> u16 {
     crc
 }
 
-/// What stands behind the wire: a plant that is reset and advanced one control period at a time.
+/// What is behind the wire: a plant that is reset and advanced one control period at a time.
 pub trait Station {
     /// Go to the initial state of motion script `script` and give the readings there.
     fn reset(&mut self, script: u16) -> Answer;

@@ -17,7 +17,7 @@ pub enum Kind {
     Push,
 }
 
-/// Why the muscle does not pull at once.
+/// Why the muscle does not pull immediately.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Deadband {
     /// Radial gap between bladder and braid at rest, m: the bladder is stretched across it before the braid feels anything.
@@ -155,7 +155,7 @@ pub struct Truth {
     /// Young's modulus of the rubber at small strain, MPa.
     #[serde(rename = "young_modulus_MPa")]
     pub young_mpa: f64,
-    /// Per pressure asked for.
+    /// For each requested pressure.
     pub pressures: Vec<TruthAt>,
 }
 

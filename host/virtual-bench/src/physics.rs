@@ -27,7 +27,7 @@ pub struct Physics {
     /// Friction that rises with speed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub activated: Option<Activated>,
-    /// Memory of turning points.
+    /// Memory of reversals.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relays: Option<Relays>,
     /// Relaxation of the elastic force.
@@ -114,7 +114,7 @@ pub struct Fold {
     pub width: f64,
 }
 
-/// The rate-dependent part of LuGre's bristles (C. Canudas de Wit et al., doi 10.1109/9.376053): `c dz/dt`, a pulse at each turn.
+/// The rate-dependent part of LuGre's bristles (C. Canudas de Wit et al., doi 10.1109/9.376053): `c dz/dt`, a pulse at each reversal.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BristleDamping {
     /// Damping c per bristle deflection, N s.
@@ -215,7 +215,7 @@ impl PhysicsState {
         force
     }
 
-    /// The force with creep and what stands beside the muscle, N.
+    /// The force with creep and what is beside the muscle, N.
     pub fn whole(&mut self, force: f64, m: &Moment) -> f64 {
         let mut whole = force;
         if self.on.creep.is_some() {

@@ -285,7 +285,7 @@ pub struct LogRow {
     pub script: u16,
     /// What the board commanded, Pa.
     pub command: f64,
-    /// What the board said it aims at, N.
+    /// The board's reported setpoint, N.
     pub setpoint: f64,
     /// What was true.
     pub truth: Readings,

@@ -19,17 +19,17 @@ pub struct Pneumatics {
     pub lag: f64,
     /// Fastest change of the regulator's output, Pa/s.
     pub rate: f64,
-    /// Change of command that the regulator overlooks, Pa.
+    /// Change of command that the regulator ignores, Pa.
     pub deadband: f64,
     /// Amplitude of the ripple, Pa, and its frequency, Hz.
     pub ripple: (f64, f64),
-    /// Slow wander of the output: standard deviation, Pa, and correlation time, s.
+    /// Slow drift of the output: standard deviation, Pa, and correlation time, s.
     pub wander: (f64, f64),
     /// Time in which the line fills the muscle's rest volume, s.
     pub line: f64,
     /// Leak: share of the line's conductance.
     pub leak: f64,
-    /// The pressure sensor sits at the regulator, not at the muscle.
+    /// The pressure sensor is at the regulator, not at the muscle.
     pub sensor_at_regulator: bool,
 }
 
@@ -120,7 +120,7 @@ impl Air {
         self.muscle
     }
 
-    /// Put regulator and muscle at a pressure (Pa) at once.
+    /// Put regulator and muscle at a pressure (Pa) without a transient.
     pub fn settle(&mut self, pressure: f64) {
         (self.held, self.regulator, self.muscle) = (pressure, pressure, pressure);
     }

@@ -95,9 +95,9 @@ pub fn push() -> MuscleSpec {
     .with_free_contraction(414e3, 0.275)
 }
 
-/// A muscle that nobody has seen: geometry, rubber, deadband and friction drawn from `seed`.
+/// A random muscle: geometry, rubber, deadband and friction drawn from `seed`.
 ///
-/// A draw that hardly moves until close to its highest pressure is thrown away: nobody would build that muscle.
+/// A draw that hardly moves until close to its highest pressure is discarded: such a muscle has no use.
 pub fn random(seed: u64) -> MuscleSpec {
     let mut r = Rng::stream(seed, "muscle");
     let mut spec = drawn(seed, &mut r);

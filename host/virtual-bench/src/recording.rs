@@ -47,7 +47,7 @@ const POUND_FORCE: f64 = 4.448_221_615_260_5;
 pub const LOAD_CELL: f64 = 508.41;
 
 impl Recording {
-    /// CSV with `time_s,pressure_kPa,displacement_mm,force_N` and the optional columns asked for.
+    /// CSV with `time_s,pressure_kPa,displacement_mm,force_N` and the optional columns requested.
     pub fn csv(&self, columns: Columns) -> String {
         let mut out = String::with_capacity(48 * (self.rows.len() + 2));
         out.push_str("time_s,pressure_kPa,displacement_mm,force_N");
@@ -80,7 +80,7 @@ impl Recording {
     }
 
     /// The thesis's raw form: five header lines, tabs; column 2 the crosshead in inches, extension positive, with an arbitrary
-    /// zero; column 4 the load cell, in units of 508.41 lbf. The pressure stands in the header only.
+    /// zero; column 4 the load cell, in units of 508.41 lbf. The pressure is in the header only.
     pub fn thesis(&self, muscle: &str, pressure: f64, zero_in: f64) -> String {
         let mut out = format!(
             "Test\t{muscle}\nSpecimen pressure (psi)\t{:.1}\nFile\t{}\nTime\tDisplacement\tCommand\tLoad\nsec\tin\tin\tV\n",

@@ -42,7 +42,7 @@ pub struct RigState {
     /// Where the muscle's end was in the last step, m; and before, with the force that it then gave, N.
     muscle_at: f64,
     bore: Option<(f64, f64)>,
-    /// How stiff the muscle has shown itself of late, N/m.
+    /// Recent stiffness of the muscle, N/m.
     muscle_stiffness: f64,
     played: Option<f64>,
     last: Option<(f64, f64)>,
@@ -71,7 +71,7 @@ impl RigState {
         }
     }
 
-    /// Stroke of the muscle (m) when the crosshead stands at `crosshead` (m) under the force of the last step (N).
+    /// Stroke of the muscle (m) when the crosshead is at `crosshead` (m) under the force of the last step (N).
     pub fn stroke(&mut self, crosshead: f64, force: f64) -> f64 {
         let mut stroke = crosshead + self.with.offset;
         if self.with.stiffness > 0.0 {

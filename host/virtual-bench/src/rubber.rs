@@ -54,7 +54,7 @@ impl Branches {
         sum
     }
 
-    /// What is lost against a driving quantity that was there for ever: `Σ g_i (f − q_i)`, creep under load.
+    /// The loss against a driving quantity that has always been present: `Σ g_i (f − q_i)`, creep under load.
     pub fn lose(&mut self, f: f64, dt: f64) -> f64 {
         let whole: f64 = self.maxwell.iter().map(|b| b.0).sum();
         if self.last.is_none() {

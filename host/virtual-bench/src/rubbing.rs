@@ -1,4 +1,4 @@
-//! Friction besides the braid's own law: seals, strand contact, ageing contacts, speed, memory of turning points.
+//! Friction besides the braid's own law: seals, strand contact, ageing contacts, speed, memory of reversals.
 
 use serde::{Deserialize, Serialize};
 
@@ -67,7 +67,7 @@ pub struct Activated {
     pub speed: f64,
 }
 
-/// Memory of turning points: Preisach's relays over the stroke, `force = −a P Σ s(α, β)/n`, each relay switching to +1
+/// Memory of reversals: Preisach's relays over the stroke, `force = −a P Σ s(α, β)/n`, each relay switching to +1
 /// above α and to −1 below β.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Relays {

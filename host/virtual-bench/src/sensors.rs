@@ -1,4 +1,4 @@
-//! Instruments: what stands in a recording instead of the truth.
+//! Instruments: what they record instead of the truth.
 //!
 //! `reading = stuck(quantise(clip(anti-alias(low-pass(delay(bend((1 + gain) x) + offset + drift t − creep))) + coloured + white +
 //! outlier)))`

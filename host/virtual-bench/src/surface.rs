@@ -58,7 +58,7 @@ impl Surface {
         let l0 = geometry.rest_length;
         let longest = (l0 * 1.02).min(geometry.fibre() * 0.5 + l0 * 0.5);
         // Nodes are equally spaced in the braid's radius: against the length everything bends sharply near rest.
-        // Beyond a slight extension the braid would crush the bladder: the force goes on straight there.
+        // Beyond a slight extension the braid would crush the bladder: the force continues linearly there.
         let first = geometry.braid_radius(longest).max(0.85 * geometry.radius);
         let pitch =
             (geometry.braid_radius(l0 * shortest.clamp(0.5, 0.97)) - first) / (LENGTH_NODES - 1) as f64;
@@ -330,7 +330,7 @@ mod tests {
         };
         let cylinder = p * c.area + c.elastic;
         assert!((force(1e8) / cylinder - 1.0).abs() < 1e-3);
-        assert!(force(2e4) < 0.995 * cylinder, "soft fibres give way: {} {cylinder}", force(2e4));
+        assert!(force(2e4) < 0.995 * cylinder, "soft fibres yield: {} {cylinder}", force(2e4));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! What stands in the bench's recordings, as statements about a muscle on a test stand.
+//! What is in the bench's recordings, as statements about a muscle on a test stand.
 
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;

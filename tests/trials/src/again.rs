@@ -134,7 +134,7 @@ struct Case {
     proposed: Protocol,
 }
 
-/// Trials of a set in which a further recording is asked for.
+/// Trials of a set in which a further recording is requested.
 fn ambiguous(set: &Path, ledger: &Ledger, specs: Vec<Spec>) -> Result<Vec<Case>, Box<dyn Error>> {
     let mut cases = Vec::new();
     for spec in specs.into_iter().take(ledger.answers.len()) {
@@ -188,7 +188,7 @@ fn said(json: &Path) -> Vec<String> {
     answer.map_or(Vec::new(), |a| set_of(&a))
 }
 
-/// Run the second round of an answered set and write again.json. What an earlier run was told is kept; trials that are not begun
+/// Run the second round of an answered set and write again.json. The answers of an earlier run are kept; trials that are not begun
 /// `until` then are left out.
 pub fn run(
     set: &Path,
@@ -227,7 +227,7 @@ pub fn run(
     let all: Vec<Second> = done.into_iter().flatten().collect();
     if all.len() < cases.len() {
         println!(
-            "{} of {} ambiguous trials were asked again; the same command goes on",
+            "{} of {} ambiguous trials were diagnosed again; the same command continues",
             all.len(),
             cases.len()
         );

@@ -21,18 +21,18 @@ pub struct Answer {
     /// Noise as the tool sees it, N.
     #[serde(rename = "noise_N")]
     pub noise: Option<f64>,
-    /// Where the misfit sits.
+    /// Where the misfit is.
     #[serde(rename = "where")]
     pub regions: Vec<Region>,
     /// What is named.
     pub missing: Vec<Missing>,
-    /// What is left without a name.
+    /// The unexplained residual.
     pub unexplained: Unexplained,
     /// The proposed recording.
     pub next_experiment: Option<serde_json::Value>,
     /// What was weighed and not taken.
     pub considered: Vec<Considered>,
-    /// What else is said, in words.
+    /// Other remarks.
     pub remarks: Vec<String>,
 }
 
@@ -60,7 +60,7 @@ pub struct Missing {
     pub probability: Option<f64>,
     /// Its parameters.
     pub parameters: Vec<Value>,
-    /// What it cannot be told from.
+    /// Effects that it is confounded with.
     pub confusable_with: Vec<String>,
     /// Whether a check of the bench measured it.
     pub checked: bool,
@@ -80,7 +80,7 @@ pub struct Value {
     pub unit: String,
 }
 
-/// What is left.
+/// The residual.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(default)]
 pub struct Unexplained {
@@ -99,9 +99,9 @@ pub struct Considered {
     /// Up to which force it could be there unseen, N; absent where it cannot be seen at all.
     #[serde(rename = "hidden_up_to_N")]
     pub hidden_up_to: Option<f64>,
-    /// Whether a check of the bench said so.
+    /// Whether a check of the bench reported it.
     pub checked: bool,
-    /// Share of its trace that the base does not swallow.
+    /// Share of its trace that the base does not absorb.
     pub visible: Option<f64>,
 }
 
@@ -116,7 +116,7 @@ pub struct Asking {
     pub until: Option<Instant>,
 }
 
-/// A line of `frozen.jsonl`: an answer's hash, written as soon as the answer is there, so that a run that was broken off can go
+/// A line of `frozen.jsonl`: an answer's hash, written as soon as the answer is there, so that a run that was interrupted can go
 /// on without asking anything twice.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Frozen {
@@ -222,7 +222,7 @@ pub fn ask(set: &Path, how: &Asking) -> Result<bool, Box<dyn Error>> {
         progress.one();
         Ok(())
     };
-    // One at a time per core: the tool is threaded itself, and the time of an answer should mean something.
+    // One at a time per core: the tool is threaded itself, and the time of an answer must mean something.
     in_order(&open, one)?;
     let mut all = frozen_so_far(set);
     if all.len() < total {
@@ -236,7 +236,7 @@ pub fn ask(set: &Path, how: &Asking) -> Result<bool, Box<dyn Error>> {
     Ok(true)
 }
 
-/// End the answering of a set of which a part only was answered: the rest is left out for good. What is judged is the part of
+/// End the answering of a set of which a part only was answered: the rest is left out permanently. What is judged is the part of
 /// the numbers, in order, that is answered without a gap; trials are mixed, so that it is a stratified share.
 pub fn close(set: &Path) -> Result<usize, Box<dyn Error>> {
     let mut ledger: Ledger = read_ledger(set)?;

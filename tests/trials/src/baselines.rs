@@ -1,4 +1,4 @@
-//! Simpler ways to answer the same question, on the same recordings: a guess, the largest gain in BIC, and sparse regression
+//! Simpler ways to answer the same question, on the same recordings: a random choice, the largest gain in BIC, and sparse regression
 //! as PySINDy does it (sequentially thresholded least squares, doi 10.1073/pnas.1517384113).
 //!
 //! Both regressions take the residual of a flexible base (polynomial and friction factor per file) and explain it with

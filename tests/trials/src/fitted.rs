@@ -1,4 +1,4 @@
-//! How well tables predict recordings that nobody saw: run by `host fit` and `host predict` after the answers are frozen.
+//! How well tables predict held-out recordings: run by `host fit` and `host predict` after the answers are frozen.
 
 use crate::answer::{recordings, run_limited};
 use crate::generate::TrialTruth;

@@ -17,7 +17,7 @@ use virtual_bench::rng::Rng;
 use virtual_bench::sensors::Sensor;
 use virtual_bench::tube::Geometry;
 
-/// One injected effect, as it stands in the sealed truth.
+/// One injected effect, as it is in the sealed truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TrueEffect {
     /// Name in the catalogue, or of a mechanism outside it.
@@ -63,7 +63,7 @@ pub struct TrialTruth {
     pub blocked_force: f64,
     /// The muscle and its bench in full.
     pub bench: BenchSpec,
-    /// Salt, so that the hash cannot be guessed from a likely truth.
+    /// Salt, so that the hash cannot be found from a likely truth.
     pub salt: String,
 }
 
@@ -74,11 +74,11 @@ pub struct Trial {
     pub description: String,
     /// The campaign.
     pub recordings: Vec<Recording>,
-    /// Recordings that nobody sees before the answers are frozen; they follow the campaign.
+    /// Held-out recordings, sealed until the answers are frozen; they follow the campaign.
     pub held_out: Vec<Recording>,
     /// Campaign and held-out recordings of the twin muscle without the effect.
     pub twin: (Vec<Recording>, Vec<Recording>),
-    /// Where what is hidden sits, as a table.
+    /// Where what is hidden is, as a table.
     pub trace: String,
     /// Checks of the bench without its muscle, where the protocol has them.
     pub checks: Vec<Check>,
@@ -201,7 +201,7 @@ impl Base<'_> {
     }
 }
 
-/// What is left of a difference after a base is refitted, row by row and file by file; vented files are left out of the
+/// The residual of a difference after a base is refitted, row by row and file by file; vented files are left out of the
 /// fit and have nothing left.
 fn left(difference: &[f64], files: &[Vec<Row>], base: Base<'_>) -> Vec<Vec<f64>> {
     let (columns, flexible) = (base.columns(), base.flexible);
@@ -252,8 +252,8 @@ fn left(difference: &[f64], files: &[Vec<Row>], base: Base<'_>) -> Vec<Vec<f64>>
         .collect()
 }
 
-/// The lesser of what is left when friction follows the base's changes and when it does not: an effect that either
-/// reading swallows counts as swallowed.
+/// The lesser residual, when friction follows the base's changes and when it does not: an effect that either
+/// reading absorbs counts as absorbed.
 fn least_left(difference: &[f64], files: &[Vec<Row>], base: Base<'_>) -> Vec<Vec<f64>> {
     let (a, b) = (left(difference, files, base), left(difference, files, Base { rubs: false, ..base }));
     if rms(&a) < rms(&b) { a } else { b }
@@ -380,7 +380,7 @@ pub fn make(spec: &Spec, residuals: &Residuals) -> Trial {
         injection.apply(&mut b, &scale, s);
         let with = rows(&b, &protocol);
         let d = difference(&with, &without, &geometry);
-        // What shows for a few samples at each turn only is measured by them.
+        // What shows for a few samples at each reversal only is measured by them.
         let part = if injection.name == "inertia" { 0.9999 } else { 0.995 };
         (quantile(&d, part) / scale.force, d)
     };

@@ -1,4 +1,4 @@
-//! From an effect's name to physics of the bench, with one strength that is tuned until the effect has the wanted size.
+//! From an effect's name to physics of the bench, with one strength that is tuned until the effect has the requested size.
 
 use serde::{Deserialize, Serialize};
 use virtual_bench::bench::BenchSpec;
@@ -63,7 +63,7 @@ pub struct Parameter {
 pub struct Injection {
     /// Name in the catalogue, or of a mechanism outside it.
     pub name: &'static str,
-    /// Random numbers that fix the shape: always the same for one trial, whatever the strength.
+    /// Random numbers that fix the shape: always the same for one trial, regardless of the strength.
     seed: u64,
 }
 

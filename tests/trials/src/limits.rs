@@ -14,7 +14,7 @@ pub struct Limit {
     pub nine_tenths: (f64, f64, f64),
 }
 
-/// Sizes beyond this (percent) were never tried: what lies there is told as "more".
+/// Sizes beyond this (percent) were never tried: what lies there is reported as "more".
 pub const LARGEST: f64 = 8.0;
 
 /// Fit `1/(1 + exp(−a − b ln s))` to (size in percent, noticed); a weak prior keeps b finite where sizes separate.
@@ -59,7 +59,7 @@ pub fn limit(points: &[(f64, bool)]) -> Option<Limit> {
     Some(Limit { trials: points.len(), half: of(0.5), nine_tenths: of(0.9) })
 }
 
-/// A size in words.
+/// Description of a size.
 pub fn said(size: f64) -> String {
     if size > LARGEST { format!("> {LARGEST:.0}") } else { format!("{size:.2}") }
 }

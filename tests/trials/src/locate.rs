@@ -1,4 +1,4 @@
-//! Where an effect really sits, and whether a stated region sits there too.
+//! Where an effect is concentrated, and whether a stated region agrees.
 
 use crate::answer::Region;
 use crate::ledger::name;

@@ -22,6 +22,7 @@ mod report;
 mod residuals;
 mod score;
 mod semi;
+mod sensors;
 mod spec;
 mod tool;
 
@@ -49,7 +50,7 @@ struct Set {
     /// How many trials; the mixture of the final set is kept.
     #[arg(long, default_value_t = 330)]
     n: usize,
-    /// Make and judge the first so many only: a stratified share, where time is short.
+    /// Make and judge only this number of first trials: a stratified share, where time is short.
     #[arg(long)]
     take: Option<usize>,
     /// Seed instead of the set's own.
@@ -63,7 +64,7 @@ struct Set {
     output: PathBuf,
 }
 
-/// How the tool is asked.
+/// How the tool is called.
 #[derive(Args)]
 struct Tool {
     /// The tool.
@@ -72,7 +73,7 @@ struct Tool {
     /// Longest time for one answer, s.
     #[arg(long, default_value_t = 120)]
     limit: u64,
-    /// Begin no further trial after this many minutes; the same command goes on later.
+    /// Begin no further trial after this many minutes; the same command continues later.
     #[arg(long)]
     minutes: Option<f64>,
 }
@@ -87,7 +88,7 @@ impl Tool {
     }
 }
 
-/// What is asked about the real recordings of the 10 mm fluidic muscle.
+/// Options of the trials on the real recordings of the 10 mm fluidic muscle.
 #[derive(Args)]
 struct Real {
     /// Directory that holds aarl-festo-10mm-2021 and -2022.
@@ -105,7 +106,7 @@ struct Real {
 }
 
 impl Real {
-    /// Copies what was written to the page of the book, where one is wanted.
+    /// Copies what was written to the page of the book, where one is requested.
     fn copy_to_book(&self, written: &str) -> Result<(), Box<dyn Error>> {
         if let Some(page) = &self.page {
             std::fs::copy(self.output.join(written), page)?;
@@ -124,14 +125,14 @@ enum Command {
         #[command(flatten)]
         what: Set,
     },
-    /// Ask `host diagnose` about every trial of a set, once, and freeze the answers; goes on where it was broken off.
+    /// Ask `host diagnose` about every trial of a set, once, and freeze the answers; continues where it was interrupted.
     Answer {
         /// The set's directory.
         set: PathBuf,
         #[command(flatten)]
         tool: Tool,
     },
-    /// Tell the tool what is hidden in the muscles of an answered set, and see what the true structure, refitted, is worth on held-out
+    /// Give the tool the hidden effects of an answered set, and evaluate the true structure, refitted, on held-out
     /// recordings: what gains are measured against.
     Oracle {
         /// The set's directory.
@@ -149,7 +150,7 @@ enum Command {
         /// Leave the held-out recordings alone (quicker).
         #[arg(long)]
         no_held_out: bool,
-        /// End the answering of a set of which a part only is answered, for good, and judge that part.
+        /// End the answering of a set of which a part only is answered, permanently, and judge that part.
         #[arg(long)]
         close: bool,
         /// Write the report as this page of the book, too.
@@ -166,21 +167,23 @@ enum Command {
         /// Real recordings whose residuals half of the trials have as noise.
         #[arg(long, default_value = "../shared/data")]
         data: PathBuf,
-        /// Begin no further trial after this many minutes; the same command goes on later.
+        /// Begin no further trial after this many minutes; the same command continues later.
         #[arg(long)]
         minutes: Option<f64>,
     },
-    /// Put effects into the real recordings of the 10 mm fluidic muscle and ask what was put in.
+    /// Add effects to the real recordings of the 10 mm fluidic muscle and diagnose them.
     Semi(Real),
-    /// Ask about the real recordings of the 10 mm fluidic muscle as they are, and set the answers beside what is written about them.
+    /// Diagnose the real recordings of the 10 mm fluidic muscle as they are, and compare the answers with the published findings.
     Festo(Real),
     /// The same for settled points only: writes the section of the page on what the muscles remember.
     FestoHistory(Real),
-    /// Ask what has changed: changes put into later runs of real recordings, untouched pairs, a cylinder whose seal was swapped.
+    /// Spoil one recording of clean campaigns in every way that sensors and loggers fail, and count what is found.
+    Sensors(sensors::Sensors),
+    /// Diagnose changes: changes added to later runs of real recordings, untouched pairs, a cylinder whose seal was replaced.
     Reference(reference::Reference),
     /// Campaigns that choose their own steps, beside protocol C for the same time, a random menu, and the proposal of today.
     Campaign(campaign::Campaigns),
-    /// Generate, answer and score in one go; each goes on where an earlier run was broken off.
+    /// Generate, answer and score in one go; each continues where an earlier run was interrupted.
     Prove {
         /// dev or final.
         #[arg(long, default_value = "final")]
@@ -198,14 +201,14 @@ enum Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    // A second pool cannot be asked for: this is the only call.
+    // A second pool cannot be made: this is the only call.
     let _ = rayon::ThreadPoolBuilder::new().num_threads(cli.jobs.max(1)).build_global();
     let done = match cli.command {
         Command::Generate { set, what } => generate(&set, &what),
         Command::Answer { set, tool } => answer::ask(&set, &tool.asking()).map(|all| told(&set, all)),
         Command::Oracle { set, tool } => oracle::ask(&set, &tool.asking()).map(|all| {
             if !all {
-                println!("not every trial has its oracle; `oracle` goes on");
+                println!("not every trial has its oracle; `oracle` continues");
             }
         }),
         Command::Score { set, host, no_held_out, close, page } => {
@@ -230,6 +233,7 @@ fn main() -> ExitCode {
             festo::run_history(&real.data, &real.output, &real.host, real.page.as_deref())
         }
         Command::Campaign(what) => campaign::run(&what),
+        Command::Sensors(what) => sensors::run(&what),
         Command::Reference(what) => reference::run(&what),
         Command::Prove { set, what, tool, check } => prove(&set, &what, &tool, check),
     };
@@ -245,7 +249,7 @@ fn main() -> ExitCode {
 fn told(set: &Path, all: bool) {
     if !all {
         println!(
-            "not every trial is answered; `answer` goes on, `score --close {}` judges what there is",
+            "not every trial is answered; `answer` continues, `score --close {}` judges what there is",
             set.display()
         );
     }
@@ -276,12 +280,12 @@ fn write_page(set: &Path, page: &Path) -> Result<(), Box<dyn Error>> {
     let text = format!(
         "# The proof: sealed trials\n\n\
          Muscles of a bench that shares no equation with the model conceal one effect of the catalogue, two, none, or something that no \
-         name describes. Truths are sealed by their hashes before the tool is asked, answers are frozen by theirs before a seal is \
+         name describes. Truths are sealed by their hashes before the tool runs, answers are frozen by theirs before a seal is \
          opened; the seed of the final set comes from the operating system. Half of the trials carry noise resampled from residuals of \
-         real recordings, where these are. Protocol A is the classic one (ascending levels, one slow speed), D the enriched one \
-         (shuffled levels, one of them twice, three speeds, dwells, nested loops, tares), C the complete one (more of each, tares \
-         between levels, half an hour of rest, checks of the bench); `tests/trials/README.md` and `host/virtual-bench/src/campaigns.rs` say \
-         it in full.\n\n\
+         real recordings, where these are. Protocol A is the classic one (ascending levels, one slow speed), D the extended one \
+         (shuffled levels, one of them twice, three speeds, dwells, nested loops, tares). C is the complete one (more of each, tares \
+         between levels, half an hour of rest, checks of the bench); `tests/trials/README.md` and `host/virtual-bench/src/campaigns.rs` describe \
+         them in full.\n\n\
          ```text\n\
          cargo run --release -p trials -- prove -o DIR\n\
          cargo run --release -p trials -- oracle DIR\n\

@@ -1,5 +1,5 @@
-//! The oracle: the tool is told what is hidden and fits that, after the answers are frozen. What it then predicts of recordings that
-//! nobody saw is the most that a right name can be worth with these laws.
+//! The oracle: the tool receives the hidden effect and fits it, after the answers are frozen. What it then predicts of recordings that
+//! were held out is the upper bound for a right name with these laws.
 
 use crate::answer::{Asking, recordings};
 use crate::fitted::{predict, work};
@@ -28,11 +28,11 @@ pub fn applies(truth: &TrialTruth) -> bool {
     !truth.effects.is_empty() && truth.effects.iter().all(|e| owner(&e.name) == Some(Owner::Muscle))
 }
 
-/// Tell the tool the truth of every answered trial that has an oracle; goes on where it was broken off. True when all are done.
+/// Give the tool the truth of every answered trial that has an oracle; continues where it was interrupted. True when all are done.
 pub fn ask(set: &Path, how: &Asking) -> Result<bool, Box<dyn Error>> {
     let ledger: Ledger = ledger::read_ledger(set)?;
     if ledger.answers.is_empty() {
-        return Err("the set has not been answered: nothing is told before the answers are frozen".into());
+        return Err("the set has not been answered: no truth is opened before the answers are frozen".into());
     }
     if answer::version(&how.host) != ledger.tool {
         return Err(format!("the answers are another tool's ({}); its oracle is its own", ledger.tool).into());
@@ -59,7 +59,7 @@ pub fn ask(set: &Path, how: &Asking) -> Result<bool, Box<dyn Error>> {
     Ok(open.iter().all(|t| read(set, t.id).is_some()))
 }
 
-/// What the oracle of a trial said, where it was asked.
+/// What the oracle of a trial answered, where it ran.
 pub fn read(set: &Path, id: usize) -> Option<Oracle> {
     let bytes = std::fs::read(set.join("work").join(name(id)).join("oracle.json")).ok()?;
     serde_json::from_slice(&bytes).ok()

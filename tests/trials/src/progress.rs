@@ -1,4 +1,4 @@
-//! One line that tells how far a long command is, and when it will be done.
+//! A progress line with the estimated remaining time.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::sync::Mutex;

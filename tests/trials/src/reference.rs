@@ -4,7 +4,9 @@
 mod cylinder;
 mod injection;
 mod page;
+mod single_effects;
 mod staircases;
+mod tables;
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -60,6 +62,8 @@ pub struct Trial {
     pub size: f64,
     /// The answer.
     pub answer: Answer,
+    /// What the simpler method names; empty where it was not asked.
+    pub simple: String,
 }
 
 /// What is kept of an answer.
@@ -170,6 +174,7 @@ fn ask(job: &Job<'_>, slopes: &Slopes) -> Result<Trial, String> {
         let moment = 0.35 + 0.3 * ((job.number * 37 % 10) as f64 / 10.0);
         (after, size) = inject(&after, effect, percent, slopes, &job.muscle.name, b, moment);
     }
+    let simple = single_effects::name(&before, &after, slopes);
     let campaign =
         |runs: &[staircases::Run]| Campaign::new(runs.iter().map(staircases::Run::recording).collect());
     let (before, after) = (campaign(&before), campaign(&after));
@@ -185,6 +190,7 @@ fn ask(job: &Job<'_>, slopes: &Slopes) -> Result<Trial, String> {
         percent: job.put_in.map_or(0.0, |p| p.1),
         size,
         answer: Answer::of(&report, start.elapsed().as_secs_f64()),
+        simple: simple.into(),
     })
 }
 
@@ -202,17 +208,23 @@ pub fn run(what: &Reference) -> Result<(), Box<dyn Error>> {
     jobs.extend(injected(&muscles, what.short));
     let trials: Vec<Trial> =
         jobs.par_iter().map(|j| ask(j, &slopes[j.muscle.name.as_str()])).collect::<Result<_, _>>()?;
+    let against_tables = tables::run(&muscles, &slopes, what.short);
     let cylinder = cylinder::run(&what.data, what.short)?;
     let speed = page::speed(&muscles)?;
-    let text = page::page(&trials, &cylinder, speed, what.short);
-    write(&what.output, "reference.json", &serde_json::to_string_pretty(&(&trials, &cylinder))?)?;
+    let text = page::page(&trials, &against_tables, &cylinder, speed, what.short);
+    write(
+        &what.output,
+        "reference.json",
+        &serde_json::to_string_pretty(&(&trials, &cylinder, &against_tables))?,
+    )?;
     write(&what.output, "reference.md", &text)?;
     if let Some(page) = &what.page {
         std::fs::write(page, &text)?;
     }
     println!(
-        "{} trials and {} pairs of the cylinder in {:.0} s",
+        "{} trials, {} against tables, and {} pairs of the cylinder in {:.0} s",
         trials.len(),
+        against_tables.len(),
         cylinder.len(),
         start.elapsed().as_secs_f64()
     );

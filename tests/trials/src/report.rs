@@ -1,4 +1,4 @@
-//! The set's figures: rates with exact intervals, calibration, gains, and every failure by itself; Markdown and JSON.
+//! The set's figures: rates with exact intervals, calibration, gains, and a list of every failure; Markdown and JSON.
 
 use crate::clopper::interval;
 use crate::fitted::HeldOut;
@@ -119,7 +119,7 @@ pub struct Figures {
     pub outside_confident: Rate,
     /// Outside the library: nothing named.
     pub outside_silent: Rate,
-    /// Regions that sit where the effect is.
+    /// Regions that agree with the effect's.
     pub located: Rate,
     /// Regions whose overlap with the true one is more than half.
     pub overlapping: Rate,
@@ -162,7 +162,7 @@ pub struct Figures {
 /// One row per trial: what it showed, and its held-out errors where they could be had.
 pub type Scored = (Outcome, Option<HeldOut>);
 
-/// Single effects and decoys of 2 % and more that a stiff base does not swallow: what naming is judged on.
+/// Single effects and decoys of 2 % and more that a stiff base does not absorb: what naming is judged on.
 pub fn big_and_visible(o: &Outcome) -> bool {
     matches!(o.stratum, Stratum::Single | Stratum::Decoy) && o.visible && o.amplitude_pct >= 2.0
 }
@@ -298,7 +298,7 @@ const LINES: [Line; 34] = [
     ("Noticed in nine tenths from, %", "", |f| size(f.detection.map(|l| l.nine_tenths))),
     ("Class right in half of the trials from, %", "", |f| size(f.naming.map(|l| l.half))),
     ("Class right in nine tenths from, %", "", |f| size(f.naming.map(|l| l.nine_tenths))),
-    ("Region sits on the effect", "", |f| f.located.to_string()),
+    ("Region is on the effect", "", |f| f.located.to_string()),
     ("Region overlaps the true one by more than half", "", |f| f.overlapping.to_string()),
     ("Mean overlap of regions", "", |f| format!("{:.2}", f.overlap)),
     ("Parameter intervals that hold", "90–98 %", |f| f.parameters.to_string()),

@@ -1,7 +1,7 @@
 //! Noise from real recordings: residuals of settled points about a smooth curve, resampled in blocks.
 //!
 //! The recordings are the settled points of two sets of isometric pressure staircases (half a second apart). In each run and
-//! direction the force is fitted by a cubic in pressure; what is left is coloured, not normal, and nobody here made it.
+//! direction the force is fitted by a cubic in pressure; the residual is coloured, not normal, and not synthetic.
 
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
@@ -66,7 +66,7 @@ fn of_table(text: &str) -> Vec<Vec<f64>> {
     let head: Vec<&str> = lines.next().unwrap_or("").split(',').collect();
     let at = |name: &str| head.iter().position(|c| *c == name);
     let (Some(p), Some(f)) = (at("pressure_kPa"), at("force_N")) else { return Vec::new() };
-    // Whatever is not measured tells runs apart.
+    // Unmeasured quantities differ between runs.
     let keys: Vec<usize> = ["rest_length_mm", "mounted_length_mm", "contraction", "run", "direction"]
         .iter()
         .filter_map(|n| at(n))

@@ -1,8 +1,8 @@
-//! Semi-synthetic trials: effects put into real recordings, whose own physics nobody here made.
+//! Semi-synthetic trials: effects put into real recordings, whose own physics is not synthetic.
 //!
 //! The recordings are the isometric pressure staircases of the 10 mm fluidic muscle of November 2022 (six muscles, four
-//! mountings, three runs each). Only what needs no knowledge of the muscle is put in: it acts on the columns. Each muscle is
-//! asked about as it is and with each effect; what counts is what the answer says *because of* the effect.
+//! mountings, three runs each). Only effects that need no knowledge of the muscle are added: they act on the columns. Each muscle is
+//! diagnosed as it is and with each effect; only the change of the answer counts.
 
 use crate::answer::{Answer, run_limited};
 use crate::names::class;
@@ -212,9 +212,9 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
     let mut text = String::from(
         "# The proof on real recordings\n\nWritten by `cargo run --release -p trials -- semi -o DIR --page docs/src/proof-real.md`; nothing \
          here is typed by hand. Effects are put into the columns of real recordings (isometric pressure staircases of a commercial 10 mm \
-         muscle, six lengths, four mountings, three runs each, `../shared/data`), whose own physics nobody here made. \"New\" is what was not \
+         muscle, six lengths, four mountings, three runs each, `../shared/data`), whose own physics is not synthetic. \"New\" is what was not \
          said of the same recordings as they are. The muscle is never moved under pressure, so speed, viscous friction and strokes cannot be \
-         judged, and what the recordings hold by themselves (a gap between filling and emptying that grows with contraction, a first \
+         judged. The recordings' own misfit (a gap between filling and emptying that grows with contraction, a first \
          run below the others, mounting errors) is larger than most of what is put in.\n\n\
          | muscle | effect | size, % of largest force | verdict | named | new | class right | in the set |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );

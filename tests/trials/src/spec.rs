@@ -36,7 +36,7 @@ pub struct Spec {
     pub stratum: Stratum,
     /// `A`, `D` or `C`.
     pub protocol: &'static str,
-    /// What is hidden: the effect and its wanted size, in parts of the blocked force.
+    /// What is hidden: the effect and its requested size, in parts of the blocked force.
     pub effects: Vec<(Injection, f64)>,
     /// For a decoy, what it looks like.
     pub looks_like: Option<&'static str>,
@@ -74,14 +74,14 @@ pub struct Operator {
 }
 
 impl Operator {
-    /// Somebody careful, as most are: hardly late, and a clock that is off by some parts in a hundred thousand.
+    /// A careful user, the most frequent kind: small delays, and a clock that is off by some parts in a hundred thousand.
     fn careful(r: &mut Rng) -> Self {
         let late = if r.chance(0.25) { r.range(0.5, 6.0) } else { 0.0 };
         let swapped = r.chance(0.1).then(|| r.index(5));
         Self { late_s: late, swapped, clock_skew: r.range(-5e-5, 5e-5), ..Self::default() }
     }
 
-    /// Somebody who is not.
+    /// A careless user.
     fn careless(r: &mut Rng) -> Self {
         Self {
             late_s: if r.chance(0.7) { r.range(1.0, 25.0) } else { 0.0 },
@@ -158,7 +158,7 @@ const DECOYS: [(&str, &str); 5] = [
 
 /// Draw a set of trials. `family` sets its random numbers apart: no seed of the development set makes a trial of the final one.
 ///
-/// Strata are mixed, so that the first trials of a set are a stratified share of it, and a number tells nothing.
+/// Strata are mixed, so that the first trials of a set are a stratified share of it, and a number carries no information.
 pub fn draw(seed: u64, family: &str, composition: Composition) -> Vec<Spec> {
     let mut r = Rng::stream(seed, &format!("{family} set"));
     let mut singles: Vec<usize> = (0..SINGLES.len()).collect();

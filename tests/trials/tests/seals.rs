@@ -83,7 +83,7 @@ fn answering_goes_on_where_it_was_broken_off_and_a_part_can_be_judged() {
     assert!(trials(&["answer", &set_name, "--host", &silent]).status.success());
     let lines = std::fs::read_to_string(set.join("frozen.jsonl")).expect("frozen answers");
     assert_eq!(lines.lines().count(), 8);
-    // As if it had been broken off before the last three were asked.
+    // As if it had been interrupted before the last three.
     let ledger = std::fs::read_to_string(set.join("ledger.json")).expect("a ledger");
     let mut open: serde_json::Value = serde_json::from_str(&ledger).expect("JSON");
     (open["answers"], open["seconds"]) = (serde_json::json!([]), serde_json::json!([]));

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The tool beside this test's own program, built if it is not.
+/// The tool beside this test's own program, built if it is not: with the features of the whole workspace, as in its tests, because
+/// other features would compile most dependencies again.
 fn host() -> PathBuf {
     let built = Command::new(env!("CARGO"))
-        .args(["build", "--quiet", "--locked", "--package", "host", "--bin", "host"])
+        .args(["build", "--quiet", "--locked", "--workspace", "--bin", "host"])
         .args(if cfg!(debug_assertions) { &[][..] } else { &["--release"][..] })
         .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."))
         .status();

@@ -31,7 +31,7 @@ struct Table {
 
 pub(super) struct Job<'a> {
     pub path: &'a Path,
-    /// Fewer rows are no recording.
+    /// A recording has at least this many rows.
     pub min_rows: usize,
     /// L0 of the muscle that made it, m, where it is known.
     pub rest_length: Option<f64>,
@@ -50,7 +50,7 @@ pub(super) struct Job<'a> {
 pub(super) fn assemble(job: &Job<'_>, mut rows: Rows) -> Result<Vec<Recording>> {
     if rows.rows < job.min_rows {
         let cause = match rows.rows {
-            0 => "there is no row below the header".to_owned(),
+            0 => "the file has no row below the header".to_owned(),
             1 => "there is one row only".to_owned(),
             n => format!("there are {n} rows only"),
         };
@@ -264,22 +264,8 @@ fn keep(job: &Job<'_>, table: &Table, rows: usize) -> Result<Option<Vec<bool>>> 
     let mut keep = vec![true; rows];
     let mut rest_length = false;
     for ((name, value), words) in job.filters.iter().zip(&table.filters) {
-        let muscle_length = matches!(value, Value::Text(t) if t == "{rest_length_mm}");
-        rest_length |= muscle_length;
-        let fits = |word: &String| -> Result<bool> {
-            Ok(match value {
-                Value::Number(n) => {
-                    number(word.trim()).is_some_and(|w| (w - n).abs() <= 1e-9 * n.abs().max(1e-3))
-                }
-                Value::Text(t) if t == "{rest_length_mm}" => {
-                    let rest = job.rest_length.ok_or_else(|| needs_rest_length(name))? * 1e3;
-                    // A tape measure is good to half a per cent at best; muscles of one shelf differ by more.
-                    number(word.trim()).is_some_and(|w| (w - rest).abs() <= 5e-3 * rest)
-                }
-                Value::Text(t) if t == "{name}" => job.muscle_name.is_some_and(|n| is_called(n, word.trim())),
-                Value::Text(t) => same(t, word),
-            })
-        };
+        rest_length |= value.is_of_length();
+        let fits = |word: &String| passes(job, name, value, word);
         let verdicts: Vec<bool> = words.words.iter().map(fits).collect::<Result<_>>()?;
         for (kept, code) in keep.iter_mut().zip(&words.codes) {
             *kept &= verdicts[*code as usize];
@@ -302,6 +288,32 @@ fn keep(job: &Job<'_>, table: &Table, rows: usize) -> Result<Option<Vec<bool>>> 
     };
     Err(Error::new(DataCode::RecordingTooShort, format!("no row passes the filters{muscle}"))
         .help(format!("in the file, {}", has.join("; "))))
+}
+
+/// Whether a cell passes a filter.
+///
+/// # Errors
+/// A filter for the muscle's rest length without one.
+fn passes(job: &Job<'_>, name: &str, value: &Value, word: &str) -> Result<bool> {
+    Ok(match value {
+        Value::Number(n) => number(word.trim()).is_some_and(|w| (w - n).abs() <= 1e-9 * n.abs().max(1e-3)),
+        Value::Text(t) if t == "{rest_length_mm}" => {
+            let rest = job.rest_length.ok_or_else(|| needs_rest_length(name))? * 1e3;
+            // A tape measure is good to half a per cent at best; muscles of one shelf differ by more.
+            number(word.trim()).is_some_and(|w| (w - rest).abs() <= 5e-3 * rest)
+        }
+        Value::Text(t) if t == "{name}" => job.muscle_name.is_some_and(|n| is_called(n, word.trim())),
+        Value::Text(t) => same(t, word),
+        Value::AnyOf(values) => {
+            for value in values {
+                if passes(job, name, value, word)? {
+                    return Ok(true);
+                }
+            }
+            false
+        }
+        Value::Not { not } => !passes(job, name, not, word)?,
+    })
 }
 
 fn needs_rest_length(what: &str) -> Error {

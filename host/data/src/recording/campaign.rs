@@ -22,7 +22,7 @@ pub struct Campaign {
     pub recordings: Vec<Recording>,
     /// Whether times of different recordings can be compared.
     pub clock: Clock,
-    /// What a careful reader should know, such as files that were put into order.
+    /// Remarks on the data, such as files that were put into order.
     pub warnings: Vec<String>,
 }
 
@@ -77,7 +77,7 @@ impl Campaign {
     }
 
     /// The first reading's moment on the clock on which effects are timed, s: the bench's own where all recordings share it and it counts
-    /// from a beginning of its own; a clock of the world's says nothing of the muscle, and readings count from the first then.
+    /// from a beginning of its own; an absolute clock (time of day) does not start with the muscle, so that readings count from the first then.
     #[must_use]
     pub fn beginning(&self) -> f64 {
         let bench = if self.clock == Clock::Shared { self.first_time() } else { None };
@@ -97,6 +97,34 @@ impl Campaign {
         let before = self.recordings.get(index.checked_sub(1)?)?;
         Some(self.recordings.get(index)?.time.first()? - before.time.last()?)
     }
+}
+
+/// Of ten thousand readings one may be a spike.
+const SPIKES: f64 = 1e-4;
+
+/// The largest force that was measured in a campaign, N; its sign is kept, and the few largest readings do not count. A scale for errors
+/// that depends on no fit. 0 without force.
+///
+/// ```
+/// use pam_data::recording::{Campaign, Recording, largest_force};
+/// let recording = Recording { force: Some(vec![-1.0, 40.0, 130.5]), ..Recording::default() };
+/// assert_eq!(largest_force(&Campaign::new(vec![recording])), 130.5);
+/// ```
+#[must_use]
+pub fn largest_force(campaign: &Campaign) -> f64 {
+    let forces = || campaign.recordings.iter().filter_map(|r| r.force.as_deref()).flatten().copied();
+    // Only the upper end is sorted.
+    let kept = 1 + (SPIKES * forces().count() as f64) as usize;
+    let mut top: Vec<f64> = Vec::with_capacity(2 * kept);
+    for force in forces() {
+        top.push(force);
+        if top.len() == 2 * kept {
+            top.select_nth_unstable_by(kept - 1, |a, b| b.total_cmp(a));
+            top.truncate(kept);
+        }
+    }
+    top.sort_by(|a, b| b.total_cmp(a));
+    top.get(kept - 1).or(top.last()).copied().unwrap_or(0.0)
 }
 
 /// A warning about a recording whose time has another unit than that of the others: its sample interval is a thousand times theirs, or a

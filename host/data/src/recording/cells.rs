@@ -16,7 +16,7 @@ pub(super) struct Dialect {
     pub decimal_comma: bool,
 }
 
-/// What is wanted of one column.
+/// The requested form of one column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Want {
     /// A number: SI value = number · scale + offset.
@@ -25,7 +25,7 @@ pub(super) enum Want {
     Text,
 }
 
-/// A column that is wanted. A plan's columns are in ascending order of `index`.
+/// A column that is requested. A plan's columns are in ascending order of `index`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Wanted {
     pub index: usize,
@@ -116,12 +116,12 @@ impl LineMap {
     }
 }
 
-/// The wanted cells of a block.
+/// The requested cells of a block.
 #[derive(Debug, Default)]
 pub(super) struct Parsed {
-    /// One per wanted column; empty for texts.
+    /// One per requested column; empty for texts.
     pub numbers: Vec<Vec<f64>>,
-    /// One per wanted column; empty for numbers.
+    /// One per requested column; empty for numbers.
     pub texts: Vec<Words>,
     pub rows: usize,
     pub lines: u64,
@@ -194,7 +194,7 @@ pub(super) fn parse(
 struct Quick<'a> {
     delimiter: u8,
     comment: Option<u8>,
-    /// Per column of the file, which of the wanted ones it is.
+    /// Per column of the file, which of the requested ones it is.
     columns: Vec<Option<(usize, f64, f64)>>,
     wanted: &'a [Wanted],
 }
@@ -269,7 +269,7 @@ fn row(
     let mut index = 0;
     let mut next = 0;
     while let Some(target) = wanted.get(next) {
-        // Cells before the wanted one are passed over without looking into them.
+        // Cells before the requested one are passed over without looking into them.
         while index < target.index {
             cells.skip().map_err(|()| open_quote(line))?;
             index += 1;

@@ -35,7 +35,7 @@ pub(super) struct LookedUp {
 pub(super) struct ColumnPlan {
     /// In ascending order of index.
     pub wanted: Vec<Wanted>,
-    /// One per wanted column.
+    /// One per requested column.
     pub roles: Vec<Role>,
     /// From the lookup table.
     pub looked_up: Vec<LookedUp>,
@@ -268,9 +268,9 @@ fn unknown_unit(quantity: Quantity, name: &str) -> Error {
         None => format!("unknown unit of {}", quantity.name()),
     };
     let headers: Vec<_> = quantity.headers().collect();
-    // Only the spelling of a unit can be guessed, not another unit.
+    // The correction covers the spelling of a unit, not another unit.
     let near = headers.iter().find(|h| h.eq_ignore_ascii_case(&usual));
-    let mut help = format!("the unit stands behind the last underscore: {}", quantity.unit_list());
+    let mut help = format!("the unit follows the last underscore: {}", quantity.unit_list());
     match near {
         Some(near) => help = format!("did you mean `{near}`? {help}"),
         None => help += "; any other is a factor in an import description (--import)",

@@ -1,4 +1,4 @@
-//! Named columns as they stand in a container: not yet chosen, not yet in SI.
+//! Named columns as they are in a container: not yet chosen, not yet in SI.
 
 use super::blocks::Rows;
 use super::cells::{Want, Wanted, Words};
@@ -16,7 +16,7 @@ pub(super) enum Column {
     /// Only Parquet columns hold text.
     #[cfg_attr(not(feature = "parquet"), allow(dead_code))]
     Texts(Vec<String>),
-    /// What a recording has no use for, by what it is: told only where such a column is asked for.
+    /// What a recording has no use for, by what it is: reported only where such a column is requested.
     #[cfg_attr(not(any(feature = "parquet", feature = "hdf5")), allow(dead_code))]
     Other(String),
 }
@@ -59,7 +59,7 @@ pub(super) fn without_common_prefix(mut table: ColumnTable) -> ColumnTable {
     }
 }
 
-/// Takes the wanted columns, as numbers in SI or as words. Where text errors name a line, these name the row, counted from 1.
+/// Takes the requested columns, as numbers in SI or as words. Where text errors name a line, these name the row, counted from 1.
 pub(super) fn select(table: &ColumnTable, wanted: &[Wanted]) -> Result<Rows> {
     let mut rows = Rows::default();
     let mut length: Option<(usize, &str)> = None;

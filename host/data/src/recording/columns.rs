@@ -5,6 +5,9 @@ use std::path::PathBuf;
 use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;
 
+/// A stroke that stays within this, m, is held: a tape measure's tenth of a millimetre.
+pub const HELD: f64 = 1e-4;
+
 /// One file, or one group of a file's rows, in time order. All columns are equally long and hold finite numbers only.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Recording {
@@ -92,11 +95,37 @@ impl Recording {
         })
     }
 
-    /// The stroke in metres when it was held from the first row to the last, as in isometric tests.
+    /// The stroke in metres when it was held from the first row to the last, as in isometric tests: readings within [`HELD`] of the
+    /// first one.
     #[must_use]
     pub fn held_stroke(&self) -> Option<f64> {
         let first = *self.stroke.first()?;
-        self.stroke.iter().all(|s| (s - first).abs() <= 1e-9).then_some(first)
+        self.stroke.iter().all(|s| (s - first).abs() <= HELD).then_some(first)
+    }
+
+    /// What the file calls the mounting of this recording: its labels without the number of a run or a cycle. Empty where there is none.
+    #[must_use]
+    pub fn mounting(&self) -> String {
+        let repeats = |name: &str| {
+            let name = name.to_ascii_lowercase();
+            ["run", "cycle", "repeat", "trial"].iter().any(|word| name.starts_with(word))
+        };
+        let values: Vec<&str> =
+            self.labels.iter().filter(|(name, _)| !repeats(name)).map(|(_, value)| value.as_str()).collect();
+        values.join(" ")
+    }
+
+    /// The recording for a reader: its mounting and run where the file has labels, else its name.
+    #[must_use]
+    pub fn title(&self) -> String {
+        if self.labels.is_empty() {
+            return self.name.clone();
+        }
+        let part = |(name, value): &(String, String)| {
+            // A number needs its column's name, a word does not.
+            if value.parse::<f64>().is_ok() { format!("{name} {value}") } else { value.clone() }
+        };
+        self.labels.iter().map(part).collect::<Vec<_>>().join(", ")
     }
 
     /// The first row that breaks a promise of this type, for those who build recordings themselves.

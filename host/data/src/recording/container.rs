@@ -75,7 +75,7 @@ impl Container {
 
 /// The columns of a container.
 pub(super) fn columns(path: &Path, container: Container, source: &mut Source) -> Result<ColumnTable> {
-    // A damaged file must end in an error, also where the reader of a foreign format would rather panic.
+    // A damaged file must end in an error, also where the reader of another library would rather panic.
     let table = catch_unwind(AssertUnwindSafe(|| container.columns(path, source)))
         .unwrap_or_else(|_| Err(damaged("the file is damaged beyond what its reader expects")))
         .map_err(|e| {

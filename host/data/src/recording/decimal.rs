@@ -86,7 +86,7 @@ fn digit(bytes: &[u8], at: usize) -> Option<u64> {
 }
 
 /// As [`prefix`], for the plain numbers that recordings are full of, eight digits at a time; `None` says nothing: the number
-/// may be longer, have an exponent, or stand at the end of `bytes`.
+/// may be longer, have an exponent, or be at the end of `bytes`.
 #[inline]
 pub(super) fn plain(bytes: &[u8], at: usize) -> Option<(f64, usize)> {
     let negative = *bytes.get(at)? == b'-';

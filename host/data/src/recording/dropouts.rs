@@ -11,10 +11,11 @@ mod steps;
 use std::borrow::Cow;
 use std::ops::Range;
 
+use super::sensor_faults::{self, Kind, SensorFault, sensor_faults};
 use super::unit_check::{InconsistentRecording, inconsistent_recordings};
 use super::{Campaign, Recording};
 use crate::pluralise::pluralise;
-use expected_force::ExpectedForce;
+pub(super) use expected_force::ExpectedForce;
 use steps::{Scale, Stretch, edges, masked, stretches};
 
 /// A drop-out: consecutive readings that are not the muscle's pressure.
@@ -41,8 +42,10 @@ pub struct Screened<'a> {
     pub campaign: Cow<'a, Campaign>,
     /// Whole recordings with another unit, sign or zero than the others, in order.
     inconsistent: Vec<InconsistentRecording>,
-    /// The drop-outs, in order.
+    /// The drop-outs of the pressure sensor, in order.
     pub dropouts: Vec<Dropout>,
+    /// Other failures of sensors, in the order of recordings and rows.
+    pub faults: Vec<SensorFault>,
 }
 
 /// At most this many drop-outs or recordings are listed one by one.
@@ -69,18 +72,36 @@ impl<'a> Screened<'a> {
                 recording.pressure[d.rows.clone()].copy_from_slice(&bridge);
             }
         }
-        Self { campaign, inconsistent, dropouts }
+        let odd: Vec<bool> =
+            (0..campaign.recordings.len()).map(|i| inconsistent.iter().any(|a| a.recording == i)).collect();
+        let faults = sensor_faults(&campaign, &odd);
+        for fault in &faults {
+            fault.bridge(&mut campaign.to_mut().recordings[fault.recording]);
+        }
+        Self { campaign, inconsistent, dropouts, faults }
     }
 
-    /// Whether a whole recording has another unit, sign or zero than the others.
+    /// Whether a whole recording is of no use: another unit, sign or zero than the others, or a dead sensor.
     #[must_use]
     pub fn is_inconsistent(&self, index: usize) -> bool {
-        self.inconsistent.iter().any(|a| a.recording == index)
+        let dead = |f: &SensorFault| f.recording == index && f.kind == Kind::Dead;
+        self.inconsistent.iter().any(|a| a.recording == index) || self.faults.iter().any(dead)
     }
 
-    /// The drop-outs of one recording, in order.
-    pub fn of_recording(&self, index: usize) -> impl Iterator<Item = Range<usize>> + '_ {
-        self.dropouts.iter().filter(move |d| d.recording == index).map(|d| d.rows.clone())
+    /// The rows of one recording in which a sensor failed, in order and without overlap.
+    pub fn of_recording(&self, index: usize) -> impl Iterator<Item = Range<usize>> + use<> {
+        let dropped = self.dropouts.iter().filter(|d| d.recording == index).map(|d| d.rows.clone());
+        let failed = self.faults.iter().filter(|f| f.recording == index).map(|f| f.rows.clone());
+        let mut all: Vec<Range<usize>> = dropped.chain(failed).collect();
+        all.sort_by_key(|rows| rows.start);
+        let mut merged: Vec<Range<usize>> = Vec::with_capacity(all.len());
+        for rows in all {
+            match merged.last_mut() {
+                Some(last) if rows.start <= last.end => last.end = last.end.max(rows.end),
+                _ => merged.push(rows),
+            }
+        }
+        merged.into_iter()
     }
 
     /// For each row of a recording, whether it is free of drop-outs and consistent.
@@ -94,7 +115,7 @@ impl<'a> Screened<'a> {
         read
     }
 
-    /// The number of rows in drop-outs.
+    /// The number of rows in drop-outs of the pressure sensor.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.dropouts.iter().map(|d| d.rows.len()).sum()
@@ -109,7 +130,9 @@ impl<'a> Screened<'a> {
             .len()
             .checked_sub(LISTED + 1)
             .map(|n| format!("{} more recordings are inconsistent", n + 1));
-        let parts: Vec<String> = inconsistent.chain(more).chain(self.remark_on_dropouts()).collect();
+        let faults = sensor_faults::describe(&self.faults, &self.campaign);
+        let parts: Vec<String> =
+            inconsistent.chain(more).chain(self.remark_on_dropouts()).chain(faults).collect();
         (!parts.is_empty()).then(|| parts.join(". "))
     }
 

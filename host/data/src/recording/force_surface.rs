@@ -18,7 +18,7 @@ pub(super) struct ForceSurface(SVector<f64, TERMS>);
 
 impl ForceSurface {
     /// Least squares over rows of `[p, u]` and force (N). `ridge` holds each coefficient towards zero, per row, so that what the rows
-    /// leave open stays small. `None` where the equations are singular.
+    /// do not determine stays small. `None` where the equations are singular.
     pub(super) fn fit(rows: impl Iterator<Item = ([f64; 2], f64)>, ridge: &[f64; TERMS]) -> Option<Self> {
         let (mut matrix, mut right) = (SMatrix::<f64, TERMS, TERMS>::zeros(), SVector::<f64, TERMS>::zeros());
         let mut count = 0_usize;

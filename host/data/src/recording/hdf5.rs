@@ -13,7 +13,7 @@ use super::column_table::{Column, ColumnTable, damaged, matrix, without_common_p
 use crate::bounds::{Budget, WHOLE};
 use crate::error::{Error, Result};
 
-/// A group in a group in a group is no recording any more.
+/// A recording is at most this many groups deep.
 const DEEPEST: usize = 4;
 
 /// The columns of a file.

@@ -11,7 +11,7 @@ use crate::error::Result;
 
 const COMPRESSED: u32 = 15;
 const MATRIX: u32 = 14;
-/// A struct in a struct in a struct is no recording any more.
+/// A recording is at most this many structs deep.
 const DEEPEST: usize = 4;
 
 /// The vectors of a file. A matrix gives its columns as `name(:,k)`, a struct its fields as `name.field`, or as `field` alone
@@ -189,7 +189,7 @@ mod tests {
         out.resize(out.len().next_multiple_of(8), 0);
     }
 
-    /// An array `x` of so many numbers of one byte each.
+    /// An array `x` of this length, one byte for each number.
     fn bytes(count: usize) -> Vec<u8> {
         let mut out = Vec::new();
         element(&mut out, 6, &[9, 0, 0, 0, 0, 0, 0, 0]);

@@ -3,7 +3,7 @@
 use crate::statistics::{deviation_from_median, median};
 
 /// Standard deviation of the white noise in a column: from second differences, whose variance is 6 σ² for white noise and
-/// which smooth motion hardly enters; their median is deaf to turning points and jumps. Where the motion is sampled so
+/// which smooth motion hardly enters; their median is insensitive to reversals and jumps. Where the motion is sampled so
 /// coarsely that it bends between samples, fourth differences (70 σ²) see less of it, so the smaller of both counts. 0 for
 /// fewer than three samples.
 #[must_use]

@@ -60,7 +60,7 @@ const TEMPERATURE: &[Unit] = &[Unit { name: "C", scale: 1.0, offset: 273.15 }, u
 const NONE: &[Unit] = &[unit("", 1.0)];
 
 impl Quantity {
-    /// The quantities that a recording's header can name. Rest length and direction come in by import description only.
+    /// The quantities that a recording's header can name. Only an import description can provide rest length and direction.
     pub(crate) const IN_HEADERS: [Self; 9] = [
         Self::Time,
         Self::Pressure,
@@ -170,6 +170,8 @@ pub(super) fn usual_name(header: &str) -> String {
 /// assert_eq!(named("Temperature [°C]"), named("temperature_C"));
 /// assert_eq!(named("pressure_mmHg"), Named::UnknownUnit(Quantity::Pressure));
 /// assert_eq!(named("pressure_sd_kPa"), Named::Other);
+/// assert_eq!(named("t_s"), named("time_s"));
+/// assert_eq!(named("stroke_mm"), named("displacement_mm"));
 /// ```
 #[must_use]
 pub fn named(header: &str) -> Named {
@@ -183,6 +185,19 @@ pub fn named(header: &str) -> Named {
             Some((q, unit.strip_prefix('_').filter(|u| !u.contains('_'))?))
         }
     });
+    // The symbols of the quantities are names of theirs where a unit of theirs follows.
+    let symbols = [
+        ("t", Quantity::Time),
+        ("p", Quantity::Pressure),
+        ("f", Quantity::Force),
+        ("stroke", Quantity::Displacement),
+    ];
+    if let Some((symbol, unit)) = usual.split_once('_')
+        && let Some((_, quantity)) = symbols.iter().find(|(s, _)| *s == symbol)
+        && let Some(unit) = quantity.unit(unit)
+    {
+        return Named::Known(*quantity, unit);
+    }
     // The longest name: a bare `pressure_command` is no pressure in `command`.
     match known.max_by_key(|(q, _)| q.name().len()) {
         Some((quantity, unit)) => {

@@ -34,7 +34,7 @@ pub struct Reader<'a> {
     pub muscle_name: Option<&'a str>,
     /// For files that are not in our own form.
     pub import: Option<&'a Import>,
-    /// Further row filters: column and the text or number that it must have.
+    /// Further row filters: column and the text or number that it must have, as [`Value::of_option`] reads them.
     pub filters: Vec<(String, String)>,
     /// Files with fewer rows are refused.
     pub min_rows: usize,
@@ -66,7 +66,7 @@ impl Hashes {
 
 /// Lines below what was taken for the header among which the header itself is looked for.
 const LOOKED_BELOW: usize = 100;
-/// Fewer rows than this are no recording of a muscle, but a mistake.
+/// Fewer rows than this are not a recording of a muscle, but a mistake.
 const MIN_ROWS: usize = 10;
 
 impl<'a> Reader<'a> {
@@ -234,9 +234,12 @@ impl<'a> Reader<'a> {
         let mut filters: Vec<(String, Value)> =
             import.filters.iter().map(|(k, v)| (k.clone(), v.clone())).collect();
         for (name, text) in &self.filters {
-            // A filter of the call replaces that of the description.
-            filters.retain(|(n, _)| n != name);
-            filters.push((name.clone(), Value::Text(text.clone())));
+            let (name, value) = Value::of_option(name, text);
+            // A filter of the call replaces that of the description; what it excludes is excluded beside that.
+            if !matches!(value, Value::Not { .. }) {
+                filters.retain(|(n, _)| *n != name);
+            }
+            filters.push((name, value));
         }
         let context = Context {
             import,

@@ -65,7 +65,7 @@ pub(super) fn open(path: &Path, progress: Option<&Arc<dyn Progress>>, hashed: bo
     Ok(Source { reader, size, magic, again, bytes })
 }
 
-/// A file that tells how far it is read, and what its bytes were.
+/// A file that counts and hashes the bytes that are read.
 struct Counted {
     bytes: io::Chain<io::Cursor<Vec<u8>>, File>,
     hash: Option<Sha256>,
@@ -85,12 +85,12 @@ impl Read for Counted {
     }
 }
 
-/// The file itself, which a decompressor reads and whose hash is asked for in the end.
+/// The file itself, which a decompressor reads and whose hash is requested in the end.
 #[derive(Clone)]
 pub(super) struct Bytes(Arc<Mutex<Counted>>);
 
 impl Bytes {
-    /// SHA-256 of all bytes, those that nobody needed among them, in hexadecimal; `None` where it was not asked for.
+    /// SHA-256 of all bytes, including those that were not needed, in hexadecimal; `None` where it was not requested.
     pub(super) fn sha256(&self) -> io::Result<Option<String>> {
         let mut counted = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if counted.hash.is_none() {
@@ -116,7 +116,7 @@ struct Utf16 {
     half: Option<u8>,
     /// The first unit of a pair.
     high: Option<u16>,
-    /// What is decoded and was not asked for yet.
+    /// Decoded bytes that were not read yet.
     ready: io::Cursor<Vec<u8>>,
 }
 

@@ -26,7 +26,7 @@ pub(crate) struct InconsistentRecording {
 }
 
 impl InconsistentRecording {
-    /// The mistake and the remedy, in words.
+    /// Description of the mistake and the remedy.
     #[must_use]
     pub(crate) fn describe(&self) -> String {
         let or = self.or.map_or(String::new(), |m| format!("; or {}", m.describe()));

@@ -1,4 +1,4 @@
-//! What a baseline can express, and what remains of a column once it has been fitted.
+//! What a baseline can express, and the residual of a column once it has been fitted.
 
 use rayon::prelude::*;
 
@@ -30,7 +30,7 @@ impl PriorDeviations {
 /// What a baseline can express: fully (hard), within a prior (soft), and by effects fitted beside it.
 ///
 /// In the soft directions a misfit is partly the bladder's own: the whitened space shrinks them by `keep`, so that inner products
-/// there are those of generalised least squares with the prior integrated out.
+/// exist are those of generalised least squares with the prior integrated out.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Absorbable {
     /// Columns with free coefficients, weighted.
@@ -39,7 +39,7 @@ pub(crate) struct Absorbable {
     pub soft: Vec<Vec<f64>>,
     /// Whether a soft direction is friction's.
     pub of_friction: Vec<bool>,
-    /// What remains of each soft direction.
+    /// The residual of each soft direction.
     pub keep: Vec<f64>,
     /// The effects beside it, whitened.
     pub chosen: Basis,
@@ -81,7 +81,7 @@ pub(crate) fn projected(columns: &[Vec<f64>], root_weight: &[f64], span: &Absorb
         .collect()
 }
 
-/// What remains of each soft direction under a prior.
+/// The residual of each soft direction under a prior.
 pub(crate) fn keeps(prior: PriorDeviations, of_friction: &[bool], weight: f64) -> Vec<f64> {
     let friction = of_friction.iter().filter(|f| **f).count().max(1) as f64;
     let elastic = of_friction.iter().filter(|f| !**f).count().max(1) as f64;

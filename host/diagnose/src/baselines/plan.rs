@@ -43,7 +43,7 @@ pub(super) enum Part {
     Unsettled,
     /// Where in the gap between the branches friction rests over these rows: drift of the pressure moves it, and that is not measured.
     Rest(usize, usize),
-    /// How much further than at a turn of the stroke, or less far, friction turns while the pressure ramps at held length.
+    /// How far friction reverses while the pressure ramps at held length, relative to a reversal of the stroke.
     Ramping,
 }
 
@@ -130,7 +130,7 @@ impl Plan {
             }
         }
         // At a few held lengths a tenth of a degree in the braid's angle, or a millimetre in the mounting, cannot be distinguished from a
-        // scale of the effective area; where the muscle moves it shows in the shape and is held against the geometry.
+        // scale of the effective area; where the muscle moves it shows in the shape, so that the geometry is fitted from it.
         if rows.isometric {
             hard.extend([Part::Area, Part::AreaSlope]);
         }

@@ -20,7 +20,7 @@ criteria! {
     FRICTION_POWERS: usize = 3, "n_k", "1", Judgement;
     /// The powers are held constant this far beyond the tested range, in half-ranges.
     FRICTION_RANGE: f64 = 1.2, "u_max", "1", Judgement;
-    /// Free tables: prior deviation of elastic surface and friction, in blocked forces; so large that it does not bind.
+    /// Free tables: prior deviation of elastic surface and friction, in blocked forces; large enough that it does not bind.
     FREE_DEVIATION: f64 = 1e3, "V_free/F_b", "1", Derived("a thousand blocked forces bind nothing");
     /// Free tables: deviation of a row, in blocked forces.
     FREE_ROW: f64 = 1e-3, "s_free/F_b", "1", Judgement;

@@ -26,7 +26,7 @@ criteria! {
     SYSTEMATIC_ROWS: f64 = 100.0, "n_sys", "1", Judgement;
     /// An amplitude may exceed its known range by this factor; beyond, another cause has its name.
     AMPLITUDE_BEYOND: f64 = 10.0, "a/a_max", "1", Judgement;
-    /// Amplitudes of one law that are fitted at once, at most.
+    /// Amplitudes of one law that are fitted together, at most.
     MOST_AMPLITUDES: u32 = 6, "n_a", "1", Cost;
     /// The share of a column's energy outside the base from which it is judged at all.
     INVISIBLE: f64 = 1e-5, "q_vis", "1", Derived("below it the trace's root mean square outside the base is 0.3 % of its own, a tenth of a law's error");

@@ -22,6 +22,8 @@ criteria! {
     EXPLAINED: f64 = 0.8, "q_expl", "1", Convention("four fifths");
     /// ... and partly explained from this one on.
     PARTLY_EXPLAINED: f64 = 0.25, "q_part", "1", Convention("a quarter");
+    /// ... and only if the effects remove this share of the excess error on unseen rows, too.
+    EXPLAINED_UNSEEN: f64 = 0.5, "q_unseen", "1", Convention("half: more remains than is explained below it");
     /// p from which a line of the spectrum is real.
     LINE_ALPHA: f64 = 0.02, "p_line", "1", Convention("2 %, the second smallest p of 99 shuffles");
     /// ... that holds this share of the residual's energy.
@@ -40,7 +42,7 @@ criteria! {
     DETECTION: f64 = 3.5, "z_det", "1", Derived("sqrt of the least score, 12");
     /// Independent rows on which a detection is reckoned, at least.
     DETECTION_ROWS: f64 = 4.0, "n_det", "1", Judgement;
-    /// A hidden effect larger than this share of the blocked force would be noticed by whoever knows the muscle.
+    /// A hidden effect larger than this share of the blocked force would be noticed by a user who knows the muscle.
     ABSURD_SIZE: f64 = 0.5, "F_absurd/F_b", "1", Judgement;
     /// An effect that could be hidden with more than this share of the blocked force is not excluded.
     RELEVANT_SIZE: f64 = 0.01, "F_rel/F_b", "1", Judgement;

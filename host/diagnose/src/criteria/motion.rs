@@ -48,7 +48,7 @@ criteria! {
     RAMP_NOISE: f64 = 4.0, "n_ramp", "1", Convention("four deviations");
     /// A ramp is judged from this time after its reversal: a regulator's step response comes before.
     RAMP_SETTLES: f64 = 3.0, "t_ramp", "s", Judgement;
-    /// A ramp goes on while its rate exceeds this share of its mean rate since the reversal.
+    /// A ramp continues while its rate exceeds this share of its mean rate since the reversal.
     RAMP_STEADY: f64 = 0.3, "r_ramp", "1", Judgement;
     /// A series is quantised where more than one of this many successive readings are equal.
     QUANTISED_REPEATS: usize = 5, "1/q_equal", "1", Judgement;

@@ -6,7 +6,7 @@ criteria! {
     SAME_LENGTH: f64 = 1e-3, "d_eps", "1", Judgement;
     /// Load cells and gauges scatter by less than this share of the blocked force.
     INSTRUMENT_NOISE: f64 = 5e-3, "s_inst/F_b", "1", Measured("load cells and gauges, 0.02 to 0.5 % of full scale (catalogue, I3 and P1)");
-    /// What an instrument scatters by itself is over within this many readings.
+    /// The noise of an instrument alone is uncorrelated beyond this many readings.
     INSTRUMENT_MEMORY: f64 = 3.0, "t_inst/dt", "1", Judgement;
     /// Bins of contraction in which cycles are compared.
     REPEAT_BINS: f64 = 25.0, "n_eps", "1", Judgement;

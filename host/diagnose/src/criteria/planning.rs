@@ -14,9 +14,9 @@ criteria! {
     PROTOCOL_SAMPLES: usize = 400_000, "N_max", "1", Cost;
     /// Powers of pressure in the tables that a protocol is judged against.
     PLAN_POWERS: (i32) = 3, "n_plan", "1", Judgement;
-    /// Grid points of a rival's only shape.
+    /// Grid points of a competitor's only shape.
     RIVAL_GRID: usize = 5, "n_1", "1", Cost;
-    /// Grid points of each of several shapes of a rival.
+    /// Grid points of each of several shapes of a competitor.
     RIVAL_GRID_SEVERAL: usize = 3, "n_2", "1", Cost;
     /// Time of a slow half-stroke over the free stroke.
     SLOW_STROKE: f64 = 27.0, "t_slow", "s", Judgement;

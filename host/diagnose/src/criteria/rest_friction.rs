@@ -32,7 +32,7 @@ criteria! {
     STEP_NOISE: f64 = 6.0, "n_step", "1", Judgement;
     /// ... and this share of the gap between the branches.
     STEP_OF_GAP: f64 = 0.2, "dF/gap", "1", Judgement;
-    /// A step is sharp where this part of it happens within its rows; relaxation and drift go on.
+    /// A step is sharp where this part of it happens within its rows; relaxation and drift continue.
     STEP_SHARPNESS: f64 = 0.7, "q_sharp", "1", Derived("an exponential relaxation has 0.63 of its change within its time constant");
     /// Rows each way within which a step happens.
     STEP_ROWS: ([usize; 4]) = [1, 2, 4, 8], "m_step", "1", Derived("doubling widths");

@@ -32,7 +32,7 @@ criteria! {
     SAME_ZERO: f64 = 0.15, "dF_0/F_0", "1", Judgement;
     /// ... or by this many standard deviations of their means.
     SAME_ZERO_NOISE: f64 = 6.0, "n_zero", "1", Judgement;
-    /// Rows of a tare from which its drift can be told.
+    /// Rows of a tare from which its drift is identifiable.
     TARE_ROWS: usize = 6, "N_tare", "1", Judgement;
     /// A muscle is at its rest length to this part of it.
     AT_REST_LENGTH: f64 = 2e-3, "dL/L0", "1", Judgement;

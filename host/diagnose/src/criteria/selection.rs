@@ -56,23 +56,23 @@ criteria! {
     EXCHANGE_LEAVES: f64 = 0.8, "q_exchange", "1", Judgement;
     /// Excess error is at least this share of the error, so that shares of it stay finite.
     LEAST_EXCESS: f64 = 0.02, "q_excess", "1", Judgement;
-    /// A rival of this weight keeps the effect from being selected itself; an exchanged effect counts with it.
+    /// A competitor of this weight keeps the effect from being selected itself; an exchanged effect counts with it.
     CONFUSABLE: f64 = 0.1, "w_conf", "1", Trials("sets of names made with it held the truth, with 3.3 members on average");
-    /// A rival of this weight is reported beside the selected effect.
+    /// A competitor of this weight is reported beside the selected effect.
     REPORTED_RIVAL: f64 = 0.15, "w_rep", "1", Trials("of 62 larger effects of a sealed set 59 sets held the truth, with 1.6 members (docs/src/proof.md)");
-    /// Rivals reported at most.
+    /// Competitors reported at most.
     MOST_REPORTED: usize = 8, "n_rep", "1", Cost;
-    /// A rival of this weight explains what the selected effect explains.
+    /// A competitor of this weight explains what the selected effect explains.
     ALIKE: f64 = 0.5, "w_alike", "1", Judgement;
-    /// Rivals of less weight than this are dropped unless their traces are parallel.
+    /// Competitors of less weight than this are dropped unless their traces are parallel.
     NEGLIGIBLE_RIVAL: f64 = 0.01, "w_min", "1", Judgement;
-    /// With more rivals than this no effect is selected.
+    /// With more competitors than this no effect is selected.
     MOST_RIVALS: usize = 10, "n_rival", "1", Judgement;
-    /// A trace with this cosine to the selected one, once the base is refitted, is kept as a rival whatever its weight.
+    /// A trace with this cosine to the selected one, once the base is refitted, is kept as a competitor at any weight.
     PARALLEL: f64 = 0.95, "cos", "1", Convention("18 degrees");
-    /// How inexact a right law is, as a share of the excess error it explains, when rivals are compared.
+    /// How inexact a right law is, as a share of the excess error it explains, when competitors are compared.
     RIVAL_FLOOR: f64 = 0.05, "e_rival", "1", Judgement;
-    /// How fast the weight of a rival falls with the logarithm of what it leaves beyond that.
+    /// How fast the weight of a competitor falls with the logarithm of its residual beyond that.
     RIVAL_SHARPNESS: f64 = 7.0, "kappa", "1", Judgement;
     /// What each further free number costs in the logarithm of the weight.
     RIVAL_COST: f64 = 0.3, "c_number", "1", Judgement;

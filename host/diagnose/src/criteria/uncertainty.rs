@@ -36,8 +36,8 @@ criteria! {
     CHANGE_POINT_SCAN: usize = 250, "n_scan", "1", Cost;
     /// Standard deviations of an interval of 95 %.
     NORMAL_95: f64 = 1.96, "z", "1", Convention("normal quantile");
-    /// Calibration of a belief: logit p = A + B logit(belief) + C logit(explained).
-    CALIBRATION: ([f64; 3]) = [0.0, 1.0, 0.0], "A, B, C", "1", Trials("756 names of four opened sets: calibration error 0.047, 0.029 with learned constants; log score 0.337 against 0.333, too little to bend belief for. cargo run --release -p pam-diagnose --example calibrate_diagnosis -- SET...");
-    /// Beliefs and shares are kept this far from certainty.
+    /// Calibration of a model weight w: logit p = A + B logit(w) + C logit(explained).
+    CALIBRATION: ([f64; 3]) = [0.0, 1.0, 0.0], "A, B, C", "1", Trials("756 names of four opened sets. Calibration error 0.047, 0.029 with learned constants. Log score 0.337 against 0.333: no reason to change it. cargo run --release -p pam-diagnose --example calibrate_diagnosis -- SET...");
+    /// Model weights and shares are kept this far from certainty.
     CERTAINTY: f64 = 0.01, "p_edge", "1", Judgement;
 }

@@ -1,6 +1,6 @@
 //! How a campaign was made: mountings, the runs of each, and the clock that starts with a mounting.
 
-use super::criteria::{LEAST_POINTS, LEAST_RUNS, LEAST_SPAN, SAME_LENGTH};
+use super::criteria::{LEAST_POINTS, LEAST_RUNS, LEAST_SPAN, MEMORY_SAME_LENGTH};
 use super::staircase::{self, Point};
 use pam_data::recording::{Campaign, Clock, Recording};
 
@@ -99,12 +99,12 @@ impl Points {
 fn held(recording: &Recording) -> Option<f64> {
     let (low, high) =
         recording.stroke.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(*s), h.max(*s)));
-    (high - low <= SAME_LENGTH).then_some(0.5 * (low + high))
+    (high - low <= MEMORY_SAME_LENGTH).then_some(0.5 * (low + high))
 }
 
 /// Reads the structure of a campaign; `None` where it is no campaign of isometric staircases with repeated runs.
 ///
-/// A run is one recording. A mounting begins where the held length changes by more than [`SAME_LENGTH`], or where a label other than the last
+/// A run is one recording. A mounting begins where the held length changes by more than [`MEMORY_SAME_LENGTH`], or where a label other than the last
 /// of an import's `split_by` changes.
 pub(super) fn points(campaign: &Campaign, rest_length: f64) -> Option<Points> {
     let mut points = Points::default();
@@ -113,7 +113,7 @@ pub(super) fn points(campaign: &Campaign, rest_length: f64) -> Option<Points> {
         let stroke = held(recording)?;
         let force = recording.force.as_deref()?;
         let labels = recording.labels.split_last().map_or(&[][..], |(_, others)| others);
-        let same = before.is_some_and(|(s, l)| (s - stroke).abs() <= SAME_LENGTH && l == labels);
+        let same = before.is_some_and(|(s, l)| (s - stroke).abs() <= MEMORY_SAME_LENGTH && l == labels);
         before = Some((stroke, labels));
         if !same {
             let length = recording.rest_length.unwrap_or(rest_length);

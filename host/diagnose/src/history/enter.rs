@@ -2,7 +2,7 @@
 
 use model_core::braid::{Braid, Geometry};
 
-use super::criteria::LEAST_GAIN;
+use super::criteria::{ENTER_EXPLAINED, ENTER_REFUTES, ENTER_RESOLVED, ENTER_SURE, ENTER_UNSURE, LEAST_GAIN};
 use super::{Found, History, found};
 use crate::baselines::{self, Kind};
 use crate::diagnosis::diagnose as statically;
@@ -20,15 +20,6 @@ const RELAXED_SHARE: &str = "relaxed_share";
 const BALANCE_PRESSURE: &str = "balance_pressure";
 /// Names of the memory: one and the same to these recordings.
 const NAMES: [&str; 2] = ["log-creep", "stress-relaxation"];
-/// A single time constant is refuted when its unseen error (rms) is larger by this factor: a tenth of the squared error.
-const REFUTES: f64 = 1.054;
-/// How sure the name is then; and how sure where a single time constant does as well. Both are judgements, not calibrated on known truths.
-const SURE: f64 = 0.9;
-const UNSURE: f64 = 0.5;
-/// An unseen error below this share of the largest force is within what the sensors of such benches resolve (0.683 N of 450 N).
-const RESOLVED: f64 = 1.5e-3;
-/// The static search's own boundaries of a verdict.
-const EXPLAINED: f64 = 0.8;
 
 /// Whether an entry was found by the history layer: its parameters are not those of the catalogue's effect of that name.
 #[must_use]
@@ -92,14 +83,14 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
     let Found { answer, regions, peak, .. } = found;
     let unseen = &answer.unseen;
     let left = (1.0 - unseen.gain).clamp(0.0, 1.0);
-    let resolved = unseen.supported_with.rms_N <= RESOLVED * answer.largest_force_N;
+    let resolved = unseen.supported_with.rms_N <= ENTER_RESOLVED * answer.largest_force_N;
     // What the search calls a memory in recordings freed of it is the rest of the same.
     diagnosis.missing.retain(|m| !NAMES.contains(&m.effect.as_str()));
     diagnosis.missing.insert(0, memory(&answer, peak));
     let freed_misfit = diagnosis.misfit_rms_N;
     let rest_agrees =
         !diagnosis.judged() || matches!(diagnosis.verdict(), Verdict::Consistent | Verdict::Explained);
-    let well = unseen.gain >= EXPLAINED || resolved;
+    let well = unseen.gain >= ENTER_EXPLAINED || resolved;
     if !rest_agrees {
         diagnosis.remarks.insert(0, Remark::StaticMisfit(freed_misfit));
     }
@@ -126,8 +117,8 @@ fn chance(share: &super::answer::Estimate) -> f64 {
 
 /// The memory as an entry of what is missing.
 fn memory(history: &History, peak: f64) -> Missing {
-    let spectrum = history.law.one_time_constant_ratio >= REFUTES;
-    let probability = if spectrum { SURE } else { UNSURE };
+    let spectrum = history.law.one_time_constant_ratio >= ENTER_REFUTES;
+    let probability = if spectrum { ENTER_SURE } else { ENTER_UNSURE };
     let half_to_std = |e: &super::answer::Estimate, scale: f64| e.half().map(|h| scale * h / 1.96);
     let mut parameters = vec![
         ParameterValue {

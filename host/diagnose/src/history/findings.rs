@@ -3,8 +3,9 @@
 //! Units of uncertainty are mountings or runs, never rows: rows of one run are no independent measurements.
 
 use super::campaign::Points;
-use super::criteria::{NEIGHBOURS, PULLS, SHORTENED, t_quantile};
+use super::criteria::{NEIGHBOURS, PULLS, SHORTENED};
 use super::shift_fit::knot_step;
+use super::student::t_quantile;
 
 /// A mean over independent units with the half-width of its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,17 +6,13 @@ use super::answer::{
     UnseenRuns,
 };
 use super::campaign::Points;
-use super::criteria::{LEAST_GAIN, LEAST_SHARE, TIMES, t_quantile};
+use super::criteria::{JUDGE_LOADED_LONG, JUDGE_PICTURED, LEAST_GAIN, MEMORY_LEAST_SHARE, TIMES};
 use super::findings::{self, Contrast, Visits};
 use super::law::Law;
 use super::shift_fit::knot_step;
+use super::student::t_quantile;
 use super::unseen::{Sizes, Unseen};
 use pam_data::recording::Campaign;
-
-/// A muscle that had been loaded this long before the first run was not rested, s.
-const LOADED_LONG: f64 = 1e3;
-/// The pressure of the picture of force over time, as a share of the highest.
-const PICTURED: f64 = 0.75;
 
 /// Share by which the squared error falls.
 fn gain(before: Sizes, after: Sizes) -> f64 {
@@ -57,8 +53,8 @@ fn why_not(points: &Points, fits: &Fits<'_>, law: &Law, half: f64) -> Vec<String
     let (_, unseen) = fits.best();
     let after = unseen.sizes(points, counts);
     let mut why = Vec::new();
-    if !(share >= LEAST_SHARE) {
-        why.push(format!("the relaxed share is {share:.3}; {LEAST_SHARE} is the least that is named"));
+    if !(share >= MEMORY_LEAST_SHARE) {
+        why.push(format!("the relaxed share is {share:.3}; {MEMORY_LEAST_SHARE} is the least that is named"));
     }
     if !(share > half) {
         why.push(format!(
@@ -196,7 +192,7 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
         }
     }));
     let loaded = fits.best().0.choice.loaded;
-    if named && loaded >= LOADED_LONG {
+    if named && loaded >= JUDGE_LOADED_LONG {
         found.push(Finding {
             kind: FindingKind::LoadedBefore,
             found: true,
@@ -372,7 +368,7 @@ fn layers(points: &Points, fits: &Fits<'_>) -> Vec<LayerShare> {
 /// Force over time at one pressure, of each mounting that pulls there.
 fn courses(points: &Points, fits: &Fits<'_>, law: &Law, rest_length: f64) -> Vec<Course> {
     let step = knot_step(points.highest());
-    let pressure = (PICTURED * points.highest() / step).round() * step;
+    let pressure = (JUDGE_PICTURED * points.highest() / step).round() * step;
     let since = &fits.layer.clocks[law.choice.pause].1.since;
     let shift = |i: usize| -> f64 { law.columns.iter().zip(&law.fit.theta).map(|(q, t)| q[i] * t).sum() };
     (0..points.mountings.len())

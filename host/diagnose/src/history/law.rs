@@ -17,25 +17,13 @@ use rayon::prelude::*;
 
 use super::campaign::Points;
 use super::criteria::{
-    BALANCE_MOST, BALANCE_MOVES, BALANCE_START, DAMPING, ENGAGED, LOADED, NEAR_BALANCE, PAUSES, RAMP,
+    BALANCE_MOST, BALANCE_MOVES, BALANCE_START, DAMPING, ENGAGED, LAW_BALANCE_STEP, LAW_MOST_STEPS,
+    LAW_NO_SIGN, LAW_NUDGE, LAW_SETTLED_SHARE, LAW_TELLS_BALANCE, LOADED, NEAR_BALANCE, PAUSES, RAMP,
     THRESHOLD_FROM, THRESHOLD_TO,
 };
 use super::memory::Clockwork;
 use super::shift_fit::{self, ShiftFit};
 use super::spline::Spline;
-
-/// Below this the carried part has no sign of its own, kPa.
-const NO_SIGN: f64 = 1.0;
-/// Most steps of a fit.
-const MOST_STEPS: usize = 10;
-/// Below this relaxed share nothing tells the stress-free pressure.
-const TELLS_BALANCE: f64 = 0.05;
-/// Step of the numeric derivative in the stress-free pressure, kPa.
-const NUDGE: f64 = 1.0;
-/// Longest step of the stress-free pressure, kPa.
-const BALANCE_STEP: f64 = 30.0;
-/// The relaxed share has settled when it changes by less.
-const SETTLED_SHARE: f64 = 5e-4;
 
 /// What is assumed of times that nobody recorded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,7 +110,7 @@ impl<'a> Layer<'a> {
     /// `p_el`, kPa.
     pub(super) fn carried(&self, mounting: usize, balance: f64) -> f64 {
         let carried = self.thresholds[mounting] - balance;
-        if carried.abs() < NO_SIGN { NO_SIGN } else { carried }
+        if carried.abs() < LAW_NO_SIGN { LAW_NO_SIGN } else { carried }
     }
 
     /// Shift per unit of `c`, kPa.
@@ -150,17 +138,17 @@ impl<'a> Layer<'a> {
             theta = shift_fit::fit(p, &self.spline, use_point, &columns, &theta, 2).theta;
         }
         let mut curves: Option<Vec<Vec<f64>>> = None;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..LAW_MOST_STEPS {
             let shifts: Vec<f64> = (0..p.len()).map(|i| shift_fit::shift(&columns, &theta, i)).collect();
             let slopes = curves
                 .take()
                 .unwrap_or_else(|| shift_fit::solve(p, &self.spline, use_point, &shifts, &[], None).1);
             let share = theta[0];
-            let moves_balance = self.balance_is_free && share > TELLS_BALANCE;
+            let moves_balance = self.balance_is_free && share > LAW_TELLS_BALANCE;
             let mut derivatives = columns.clone();
             if moves_balance {
-                let [above, below] = [1.0, -1.0].map(|s| self.column(balance + s * NUDGE, choice));
-                let slope = above.iter().zip(&below).map(|(a, b)| share * (a - b) / (2.0 * NUDGE));
+                let [above, below] = [1.0, -1.0].map(|s| self.column(balance + s * LAW_NUDGE, choice));
+                let slope = above.iter().zip(&below).map(|(a, b)| share * (a - b) / (2.0 * LAW_NUDGE));
                 derivatives.push(slope.collect());
             }
             let (change, next) =
@@ -168,13 +156,14 @@ impl<'a> Layer<'a> {
             theta.iter_mut().zip(&change).for_each(|(t, c)| *t += DAMPING * c);
             let mut moved = 0.0;
             if let Some(c) = change.last().filter(|_| moves_balance) {
-                let to = (balance + DAMPING * c.clamp(-BALANCE_STEP, BALANCE_STEP)).clamp(0.0, BALANCE_MOST);
+                let to = (balance + DAMPING * c.clamp(-LAW_BALANCE_STEP, LAW_BALANCE_STEP))
+                    .clamp(0.0, BALANCE_MOST);
                 moved = to - balance;
                 balance = to;
                 columns[0] = self.column(balance, choice);
             }
             curves = Some(next);
-            if change[0].abs() < SETTLED_SHARE && moved.abs() < BALANCE_MOVES {
+            if change[0].abs() < LAW_SETTLED_SHARE && moved.abs() < BALANCE_MOVES {
                 break;
             }
         }

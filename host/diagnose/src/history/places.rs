@@ -3,16 +3,10 @@
 //! How likely a concentration is by chance comes from shuffling whole runs: within each mounting for the order, over all for the mounting.
 
 use super::campaign::Points;
+use super::criteria::{PLACES_CONCENTRATED, PLACES_SHUFFLES, PLACES_SURE};
 use super::unseen::Unseen;
 use crate::linear::Random;
 use crate::verdict::Region;
-
-/// Shuffles; the least p is one over this.
-const SHUFFLES: usize = 499;
-/// A place is told when it holds at least this much more of the error than of the points.
-const CONCENTRATED: f64 = 1.5;
-/// And when chance gives as much no more often than this.
-const SURE: f64 = 0.05;
 
 /// The places, the most telling first.
 pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Region> {
@@ -40,7 +34,7 @@ pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Re
         .collect();
     let p_first = chance(points, &energy, true, share(&first) * all, |e| first.iter().map(|r| e[*r]).sum());
     let rows = |runs: &[usize]| count(runs) / points.len() as f64;
-    let told = |runs: &[usize], p: f64| share(runs) >= CONCENTRATED * rows(runs) && p <= SURE;
+    let told = |runs: &[usize], p: f64| share(runs) >= PLACES_CONCENTRATED * rows(runs) && p <= PLACES_SURE;
     let mut found = Vec::new();
     if told(&first, p_first) {
         let (share, rows) = (share(&first), rows(&first));
@@ -52,6 +46,7 @@ pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Re
             rows,
             p: p_first,
             unit: unit.into(),
+            recordings: Vec::new(),
         };
         let ends = first.iter().map(|r| points.runs[*r].points.1.saturating_sub(1));
         let end = ends.map(|i| since[i]).fold(0.0, f64::max);
@@ -78,6 +73,7 @@ pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Re
                 rows,
                 p,
                 unit: String::new(),
+                recordings: Vec::new(),
             });
         }
     }
@@ -99,7 +95,7 @@ fn chance(
     } else {
         vec![(0..points.runs.len()).collect()]
     };
-    for _ in 0..SHUFFLES {
+    for _ in 0..PLACES_SHUFFLES {
         let mut shuffled = energy.to_vec();
         for group in &groups {
             for k in (1..group.len()).rev() {
@@ -109,5 +105,5 @@ fn chance(
         // Sums of the same numbers in another order differ by rounding.
         as_much += usize::from(statistic(&shuffled) >= measured * (1.0 - 1e-12));
     }
-    as_much as f64 / (SHUFFLES + 1) as f64
+    as_much as f64 / (PLACES_SHUFFLES + 1) as f64
 }

@@ -6,19 +6,15 @@
 
 use super::campaign::Points;
 use super::criteria::{
-    BAD_RUN_ERRORS, BAD_RUN_LEAST, BAD_RUN_NEXT, BAD_RUN_RUNS, SLIP_ERRORS, SLIP_GAIN, SLIP_LEAST, SLIP_RUNS,
-    SUPPORT, t_quantile,
+    BAD_RUN_ERRORS, BAD_RUN_LEAST, BAD_RUN_NEXT, BAD_RUN_RUNS, RUN_OFFSET_FLAT, RUN_OFFSET_LEAST,
+    SLIP_ERRORS, SLIP_GAIN, SLIP_LEAST, SLIP_RUNS, SUPPORT,
 };
 use super::law::{Law, Layer};
 use super::shift_fit;
 use super::spline::{Banded, Spline};
+use super::student::t_quantile;
 use super::unseen::{jackknife, shifted_curves};
 use crate::linear::median;
-
-/// Slopes below this say nothing about a shift, as a share of the largest.
-const FLAT: f64 = 0.03;
-/// Fewest points from which an offset is taken.
-const LEAST: usize = 5;
 
 /// What happened to a run, or from a run on.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,9 +68,9 @@ fn offset(points: &Points, spline: &Spline, shifted: &[f64], run: usize) -> Opti
         })
         .collect();
     let steepest = own.iter().map(|o| o.0).fold(0.0, f64::max);
-    let counts = own.iter().filter(|o| o.0 > FLAT * steepest);
+    let counts = own.iter().filter(|o| o.0 > RUN_OFFSET_FLAT * steepest);
     let (n, along, square) = counts.fold((0, 0.0, 0.0), |(n, a, q), (s, e)| (n + 1, a + s * e, q + s * s));
-    (n >= LEAST && square > 0.0).then(|| along / square)
+    (n >= RUN_OFFSET_LEAST && square > 0.0).then(|| along / square)
 }
 
 /// Robust deviation of all offsets about the median of their mounting, kPa.

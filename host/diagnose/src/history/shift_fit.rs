@@ -5,11 +5,8 @@
 //! curve would be lost. Bands of four and a border of `J` columns: `O(rows (4 + J)²)`.
 
 use super::campaign::Points;
-use super::criteria::{DAMPING, RIDGE, SMOOTHNESS, SMOOTHNESS_STATIC};
+use super::criteria::{DAMPING, RIDGE, SHIFT_FIT_PRIOR, SMOOTHNESS, SMOOTHNESS_STATIC};
 use super::spline::{Banded, Spline};
-
-/// Weak prior that keeps a coefficient finite which no row determines.
-const PRIOR: f64 = 1e-8;
 
 /// Coefficients of shifts, and of the curve of each mounting.
 #[derive(Clone, Debug, Default)]
@@ -115,7 +112,7 @@ fn border(blocks: Vec<Block>, mut gram: Vec<Vec<f64>>, mut right: Vec<f64>) -> (
         solved.push((alone, along));
     }
     for (j, row) in gram.iter_mut().enumerate() {
-        row[j] += PRIOR;
+        row[j] += SHIFT_FIT_PRIOR;
     }
     let chosen: Vec<usize> = (0..free).collect();
     let change = crate::linear::solve_symmetric(&gram, &right, &chosen).unwrap_or_else(|| vec![0.0; free]);

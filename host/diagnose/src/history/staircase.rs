@@ -1,6 +1,9 @@
 //! Isometric staircases: pulses of a valve, the settled point after each, and the direction of the drive.
 
-use super::criteria::{LEAST_PERIODICITY, SETTLED_INTERVAL, WINDOW_FROM, WINDOW_TO};
+use super::criteria::{
+    LEAST_PERIODICITY, SETTLED_INTERVAL, STAIRCASE_BINS, STAIRCASE_FINEST, STAIRCASE_LONGEST,
+    STAIRCASE_PERIODS, STAIRCASE_TURN, STAIRCASE_WITHOUT_PULSES, WINDOW_FROM, WINDOW_TO,
+};
 use pam_data::recording::Recording;
 
 /// The mean of the last part of a pulse period.
@@ -15,17 +18,6 @@ pub(super) struct Point {
     /// 1 filling, −1 emptying.
     pub direction: i8,
 }
-
-/// Shortest and longest pulse period looked for, s.
-const PERIODS: (f64, f64) = (0.2, 5.0);
-/// Averages over this time where no pulses are found, s: longer than the ring of a pulse.
-const WITHOUT_PULSES: f64 = 0.5;
-/// The grid on which the period is looked for is no finer than this, s.
-const FINEST: f64 = 0.01;
-/// Longest series whose period is looked for, in grid steps.
-const LONGEST: usize = 6_000;
-/// The pressure has turned when it has gone back by this share of the run's range: above a regulator's ripple.
-const TURN: f64 = 0.04;
 
 /// The settled points of a recording, and whether rows were averaged into them.
 pub(super) fn settled(recording: &Recording, force: &[f64]) -> (Vec<Point>, bool) {
@@ -55,7 +47,7 @@ fn averages(recording: &Recording, force: &[f64], directions: &[i8]) -> (Vec<Poi
     let first = recording.time.first().copied().unwrap_or(0.0);
     let (period, phase, window) = match pulses(recording, interval) {
         Some((period, phase)) => (period, phase, (WINDOW_FROM, WINDOW_TO)),
-        None => (WITHOUT_PULSES, 0.0, (0.0, 1.0)),
+        None => (STAIRCASE_WITHOUT_PULSES, 0.0, (0.0, 1.0)),
     };
     let mut points = Vec::new();
     let mut open: Option<(i64, Point, f64)> = None;
@@ -106,7 +98,7 @@ fn turns(points: &mut [Point]) {
     let range = points
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.pressure), h.max(p.pressure)));
-    let turn = TURN * (range.1 - range.0);
+    let turn = STAIRCASE_TURN * (range.1 - range.0);
     let (mut extreme, mut now) = (0, 0_i8);
     for i in 0..points.len() {
         let moved = points[i].pressure - points[extreme].pressure;
@@ -127,9 +119,9 @@ fn turns(points: &mut [Point]) {
 
 /// Period and phase (after the first row) of a valve's pulses, s, from the autocorrelation of |dP/dt|.
 fn pulses(recording: &Recording, interval: f64) -> Option<(f64, f64)> {
-    let step = interval.max(FINEST);
+    let step = interval.max(STAIRCASE_FINEST);
     let first = *recording.time.first()?;
-    let count = ((recording.duration() / step) as usize).min(LONGEST);
+    let count = ((recording.duration() / step) as usize).min(STAIRCASE_LONGEST);
     let mut at = 0;
     let even: Vec<f64> = (0..count)
         .map(|k| {
@@ -146,7 +138,7 @@ fn pulses(recording: &Recording, interval: f64) -> Option<(f64, f64)> {
     let mean = rate.iter().sum::<f64>() / rate.len().max(1) as f64;
     rate.iter_mut().for_each(|r| *r -= mean);
     let power: f64 = rate.iter().map(|r| r * r).sum();
-    let lags = ((PERIODS.0 / step).ceil() as usize).max(2)..(PERIODS.1 / step) as usize;
+    let lags = ((STAIRCASE_PERIODS.0 / step).ceil() as usize).max(2)..(STAIRCASE_PERIODS.1 / step) as usize;
     let correlation = |lag: usize| {
         let product: f64 = rate.iter().zip(rate.get(lag..).unwrap_or(&[])).map(|(a, b)| a * b).sum();
         product / power.max(f64::MIN_POSITIVE)
@@ -167,8 +159,7 @@ fn pulses(recording: &Recording, interval: f64) -> Option<(f64, f64)> {
 
 /// Folds |dP/dt| over a period: how unevenly it lies, and where it begins to rise.
 fn fold(rate: &[f64], step: f64, period: f64) -> (f64, f64) {
-    const BINS: usize = 20;
-    let bins = ((period / step) as usize).clamp(2, BINS);
+    let bins = ((period / step) as usize).clamp(2, STAIRCASE_BINS);
     let mut sums = vec![(0.0, 0.0); bins];
     for (k, r) in rate.iter().enumerate() {
         let turns = (k as f64 + 0.5) * step / period;

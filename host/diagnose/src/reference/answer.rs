@@ -267,6 +267,9 @@ pub struct ChangeReport {
     pub remarks: Vec<String>,
     /// What it was compared with.
     pub reference: Reference,
+    /// The size that each change would have if it were the only one.
+    #[serde(skip)]
+    pub alone: Vec<(String, Size)>,
     /// For pictures.
     #[serde(skip)]
     pub curves: Vec<Curve>,

@@ -20,12 +20,12 @@ pub(super) struct Contrast {
 }
 
 /// Log of the mean of exponentials.
-pub(super) fn log_mean(values: &[f64]) -> f64 {
+pub(crate) fn log_mean(values: &[f64]) -> f64 {
     log_sum(values) - (values.len().max(1) as f64).ln()
 }
 
 /// Log of the sum of exponentials; −∞ for none.
-pub(super) fn log_sum(values: &[f64]) -> f64 {
+pub(crate) fn log_sum(values: &[f64]) -> f64 {
     let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if top.is_finite() { top + values.iter().map(|v| (v - top).exp()).sum::<f64>().ln() } else { top }
 }

@@ -4,11 +4,8 @@ use nalgebra::DVector;
 
 use super::cells::Cell;
 use super::contrast::{Contrast, evidence};
-use super::criteria::{GATE, GATE_MOUNTINGS};
+use super::criteria::{GATE, GATE_MOUNTINGS, GATE_WORTH_ASKING};
 use super::shapes::Change;
-
-/// Log evidence that lies this much below none needs no gate.
-const WORTH_ASKING: f64 = -1.0;
 
 /// A named change with its evidence over none.
 pub(super) struct Asked<'a> {
@@ -24,7 +21,7 @@ pub(super) fn limit(cells: &[Cell], contrast: &Contrast, asked: &mut [Asked<'_>]
     let mut mountings: Vec<usize> = cells.iter().filter(|c| c.after).map(|c| c.mounting).collect();
     mountings.sort_unstable();
     mountings.dedup();
-    let candidates: Vec<usize> = (0..asked.len()).filter(|i| asked[*i].log > WORTH_ASKING).collect();
+    let candidates: Vec<usize> = (0..asked.len()).filter(|i| asked[*i].log > GATE_WORTH_ASKING).collect();
     if mountings.len() < GATE_MOUNTINGS || candidates.is_empty() {
         return;
     }

@@ -12,6 +12,8 @@ pub(super) struct Score {
     pub lag: f64,
     /// How much a lag would show: a slack mounting says nothing.
     pub weight: f64,
+    /// What the run's own noise leaves open, s²: large where two lags explain the force about as well.
+    pub variance: f64,
 }
 
 /// What AFTER's lags differ by.
@@ -88,17 +90,46 @@ impl<'a> Scorer<'a> {
 
     /// Sum of squares after the mean of each cell, clipped.
     fn cost(&self, force: &[f64], expected: &[f64]) -> f64 {
+        self.residuals(force, expected).iter().map(|e| e * e).sum()
+    }
+
+    /// Residuals after the mean of each cell, clipped.
+    fn residuals(&self, force: &[f64], expected: &[f64]) -> Vec<f64> {
         let mut sums = [(0.0_f64, 0.0_f64); 2 * CELLS];
         for (i, cell) in &self.rows {
             sums[*cell] = (sums[*cell].0 + force[*i] - expected[*i], sums[*cell].1 + 1.0);
         }
         let limit = LAG_CLIP * self.surface.largest;
-        let square = |(i, cell): &(usize, usize)| {
+        let of = |(i, cell): &(usize, usize)| {
             let e = force[*i] - expected[*i] - sums[*cell].0 / sums[*cell].1.max(1.0);
-            e.clamp(-limit, limit).powi(2)
+            e.clamp(-limit, limit)
         };
-        self.rows.iter().map(square).sum()
+        self.rows.iter().map(of).collect()
     }
+
+    /// Variance that one independent residual has, times two: residuals that follow each other are not independent, and by a correlation
+    /// `r` from row to row only a share `(1 − r)/(1 + r)` of them counts.
+    fn temperature(&self) -> f64 {
+        let e = self.residuals(&self.run.force, &self.forces(&self.run.pressure));
+        let square: f64 = e.iter().map(|v| v * v).sum();
+        let next: f64 = e.windows(2).map(|w| w[0] * w[1]).sum();
+        let correlation = if square > 0.0 { (next / square).clamp(0.0, 0.99) } else { 0.0 };
+        2.0 * square / e.len().max(1) as f64 * (1.0 + correlation) / (1.0 - correlation)
+    }
+}
+
+/// Mean square distance from `lag` of all lags that were tried, each with the probability that its cost leaves it.
+fn spread(tried: &[(f64, f64)], lag: f64, temperature: f64) -> f64 {
+    let least = tried.iter().map(|t| t.1).fold(f64::INFINITY, f64::min);
+    let (mut sum, mut all) = (0.0, f64::MIN_POSITIVE);
+    for i in 0..tried.len() {
+        // Lags are not tried at equal distances: each stands for the half-way to its neighbours.
+        let width = tried[(i + 1).min(tried.len() - 1)].0 - tried[i.saturating_sub(1)].0;
+        let p = width * (-(tried[i].1 - least) / temperature.max(f64::MIN_POSITIVE)).exp();
+        sum += p * (tried[i].0 - lag).powi(2);
+        all += p;
+    }
+    sum / all
 }
 
 /// Where a parabola through three points is lowest; the middle one where it opens downwards.
@@ -132,7 +163,7 @@ pub(super) fn score(run: &Run, surface: &Surface) -> Score {
     };
     let moved = later(0.05);
     let weight = 1e-9 + scorer.rows.iter().map(|(i, _)| (moved[*i] - expected[*i]).powi(2)).sum::<f64>();
-    Score { lag, weight }
+    Score { lag, weight, variance: spread(&tried, lag, scorer.temperature()) }
 }
 
 /// The value below which half of the weight lies.
@@ -186,7 +217,14 @@ pub(super) fn shift(runs: &Runs, scores: &[Score]) -> Shift {
     let spread = (LAG_RUNS * LAG_FLOOR * LAG_FLOOR + square) / (LAG_RUNS + freedom);
     let share =
         |after: bool| if alone && !after { 0.0 } else { 1.0 / (runs.side(after).count() as f64).max(1.0) };
-    let variance = MEDIAN_VARIANCE * spread * (share(true) + share(false)) + LAG_FLOOR * LAG_FLOOR;
+    // Of a slack mounting nothing is known, and nothing is taken: weighted as the medians are.
+    let own = |after: bool| {
+        let side = || runs.runs.iter().zip(scores).filter(move |(r, _)| r.after == after).map(|(_, s)| s);
+        let total: f64 = side().map(|s| s.weight).sum();
+        side().map(|s| s.weight * s.variance).sum::<f64>() / total.max(f64::MIN_POSITIVE)
+    };
+    let each = |after: bool| (spread + own(after)) * share(after);
+    let variance = MEDIAN_VARIANCE * (each(true) + each(false)) + LAG_FLOOR * LAG_FLOOR;
     let degrees = LAG_RUNS + freedom;
     let density = |v: f64| -0.5 * v.ln() - 0.5 * (degrees + 1.0) * (lag * lag / (v * degrees)).ln_1p();
     let each: Vec<f64> = LAG_SIZES.iter().map(|s| density(variance + s * s)).collect();

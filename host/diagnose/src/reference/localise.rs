@@ -5,13 +5,10 @@ use nalgebra::DVector;
 use super::answer::{Place, Since};
 use super::cells::Cell;
 use super::contrast::{Contrast, evidence};
-use super::criteria::{CELLS, COURSE_LEAD, SIZES};
+use super::criteria::{CELLS, COURSE_LEAD, LOCALISE_STANDS_OUT, SIZES};
 use super::isometric::{Accepted, Analysis};
 use super::shapes::Change;
 use super::slip::rms_after;
-
-/// A part of the cells is told where it holds this much more of the energy than of the cells.
-const STANDS_OUT: f64 = 1.2;
 
 /// Shares of the energy by mounting, pressure, direction and recording, those that stand out.
 pub(super) fn places(analysis: &Analysis, difference: &DVector<f64>, rest_length: Option<f64>) -> Vec<Place> {
@@ -27,7 +24,7 @@ pub(super) fn places(analysis: &Analysis, difference: &DVector<f64>, rest_length
     };
     let mut all = Vec::new();
     let mut add = |coordinate: &str, unit: &str, from: f64, to: f64, (share, part): (f64, f64)| {
-        if share > STANDS_OUT * part && part < 1.0 {
+        if share > LOCALISE_STANDS_OUT * part && part < 1.0 {
             all.push(Place { coordinate: coordinate.into(), from, to, unit: unit.into(), share, rows: part });
         }
     };

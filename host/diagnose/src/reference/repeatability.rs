@@ -3,10 +3,37 @@
 use nalgebra::DMatrix;
 
 use super::cells::Cell;
-use super::criteria::{REMOUNT, REPEATS, Repeats};
+use super::criteria::{REMOUNT, REPEATABILITY_PULLS, REPEATS};
 
-/// Below this share of the usual slope the elastic part is not told from slack.
-const PULLS: f64 = 0.05;
+/// What repeats: standard deviations in per cent of the largest force, learned by restricted maximum likelihood on untouched runs of the
+/// development half and rounded; floors as said.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Repeats {
+    /// Slope per unit ln(time since mounting), own to a mounting.
+    pub creep: f64,
+    /// The same, common to all mountings.
+    pub creep_common: f64,
+    /// Slope per unit ln(time in the run), own: also how fast the branch is filled.
+    pub within: f64,
+    /// The same, common.
+    pub within_common: f64,
+    /// A run differs from the others.
+    pub run: f64,
+    /// A run number differs in all mountings.
+    pub run_common: f64,
+    /// All later runs differ from all earlier ones, per mounting.
+    pub group: f64,
+    /// The same, common.
+    pub group_common: f64,
+    /// The load cell's zero per run (floor; the estimate was 0.015).
+    pub offset: f64,
+    /// What remains in one cell (floor; the estimate was 0.042).
+    pub cell: f64,
+    /// Correlation length in pressure, share of the range.
+    pub length: f64,
+    /// Correlation between the directions.
+    pub directions: f64,
+}
 
 fn centred(values: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
     let n = values.clone().count().max(1) as f64;
@@ -16,11 +43,14 @@ fn centred(values: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
 
 /// The elastic part of every cell, scaled to unit rms where the actuator pulls; zero elsewhere.
 fn elastic(cells: &[Cell]) -> Vec<f64> {
-    let pulls = |c: &&Cell| c.means.active > PULLS;
+    let pulls = |c: &&Cell| c.means.active > REPEATABILITY_PULLS;
     let count = cells.iter().filter(pulls).count();
     let square: f64 = cells.iter().filter(pulls).map(|c| c.means.elastic * c.means.elastic).sum();
     let rms = if count > 0 { (square / count as f64).sqrt().max(1e-9) } else { 1.0 };
-    cells.iter().map(|c| if c.means.active > PULLS { c.means.elastic / rms } else { 0.0 }).collect()
+    cells
+        .iter()
+        .map(|c| if c.means.active > REPEATABILITY_PULLS { c.means.elastic / rms } else { 0.0 })
+        .collect()
 }
 
 /// What the covariance depends on beside the cells.

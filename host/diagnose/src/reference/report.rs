@@ -1,7 +1,7 @@
 //! From two sides to the answer: which protocol, which reference, and what both kinds of answers share.
 
 use super::answer::{ChangeReport, Left, NotComparable, Place, Repeatability, Verdict};
-use super::criteria::{HELD, NAMED, OTHER_ACTUATOR, PRIOR_NONE};
+use super::criteria::{HELD, NAMED, OTHER_ACTUATOR, PRIOR_NONE, REPORT_REGULATED};
 use super::held_out::Unseen;
 use super::isometric;
 use super::runs::Runs;
@@ -46,9 +46,6 @@ enum Protocol {
     Stroked,
 }
 
-/// Share of the largest pressure within which a regulated one stays.
-const REGULATED: f64 = 0.3;
-
 /// The range of a column without its outermost hundredths, which a noisy sensor makes.
 fn usual_range(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
@@ -77,7 +74,7 @@ fn protocol(campaign: &Campaign, side: &str) -> Result<Protocol> {
         let mut sorted = r.pressure.clone();
         sorted.sort_by(f64::total_cmp);
         let at = |share: f64| sorted[(share * (sorted.len() - 1) as f64) as usize];
-        if !sorted.is_empty() && at(0.9) - at(0.1) > REGULATED * at(1.0).abs() {
+        if !sorted.is_empty() && at(0.9) - at(0.1) > REPORT_REGULATED * at(1.0).abs() {
             // Several levels in one file are levels still, as long as each stroke has one.
             let levels = super::strokes::levels(&[campaign]);
             if levels.len() < 2 {
@@ -93,6 +90,14 @@ fn protocol(campaign: &Campaign, side: &str) -> Result<Protocol> {
         }
     }
     Ok(Protocol::Stroked)
+}
+
+/// Whether all recordings of a campaign were made at held lengths; strokes otherwise.
+///
+/// # Errors
+/// A mixture of both, or length and pressure that move together.
+pub(crate) fn protocol_is_held(campaign: &Campaign) -> Result<bool> {
+    protocol(campaign, "the campaign").map(|kind| kind == Protocol::Held)
 }
 
 /// What has changed in AFTER.

@@ -4,10 +4,7 @@ use nalgebra::DVector;
 
 use super::cells::Cell;
 use super::contrast::{Contrast, evidence, log_mean};
-use super::criteria::STEP_STARTS;
-
-/// Moments outside this part of AFTER leave too little on one side.
-const PART: (f64, f64) = (0.1, 0.95);
+use super::criteria::{SLIP_PART, STEP_STARTS};
 
 /// The step that fits best.
 #[derive(Debug, Clone)]
@@ -39,7 +36,7 @@ fn starts(cells: &[Cell]) -> Vec<f64> {
             let first = t.iter().copied().fold(f64::INFINITY, f64::min);
             [first, t.iter().sum::<f64>() / t.len() as f64]
         })
-        .filter(|t| *t > PART.0 && *t < PART.1)
+        .filter(|t| *t > SLIP_PART.0 && *t < SLIP_PART.1)
         .collect();
     all.sort_by(f64::total_cmp);
     all.dedup();

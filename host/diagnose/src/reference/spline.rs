@@ -2,10 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::criteria::{GAP_PENALTY, GAP_RIDGE, GCV_PRICE, RUN_RIDGE, SPLINE_INTERVALS};
-
-/// Coefficients of one curve.
-const N: usize = SPLINE_INTERVALS + 3;
+use super::criteria::{GAP_PENALTY, GAP_RIDGE, GCV_PRICE, RUN_RIDGE, SPLINE_COEFFICIENTS, SPLINE_INTERVALS};
 
 /// A mean over settled rows of a run in one direction and pressure bin.
 #[derive(Debug, Clone, Copy)]
@@ -53,17 +50,17 @@ fn basis(x: f64, low: f64, high: f64, slope: bool) -> (usize, [f64; 4]) {
 /// The design: both curves and, where there are several runs, four effects of each.
 fn design(points: &[Point], runs: usize, low: f64, high: f64) -> DMatrix<f64> {
     let effects = if runs < 2 { 0 } else { 4 * runs };
-    let mut x = DMatrix::zeros(points.len(), 2 * N + effects);
+    let mut x = DMatrix::zeros(points.len(), 2 * SPLINE_COEFFICIENTS + effects);
     for (row, p) in points.iter().enumerate() {
         let (i, b) = basis(p.pressure, low, high, false);
         for (k, value) in b.iter().enumerate() {
             x[(row, i + k)] = *value;
-            x[(row, N + i + k)] = p.direction * value;
+            x[(row, SPLINE_COEFFICIENTS + i + k)] = p.direction * value;
         }
         if effects > 0 {
             let z = 2.0 * (p.pressure - low) / (high - low) - 1.0;
             for (k, value) in [1.0, z, p.direction, p.direction * z].into_iter().enumerate() {
-                x[(row, 2 * N + 4 * p.run + k)] = value;
+                x[(row, 2 * SPLINE_COEFFICIENTS + 4 * p.run + k)] = value;
             }
         }
     }
@@ -73,8 +70,8 @@ fn design(points: &[Point], runs: usize, low: f64, high: f64) -> DMatrix<f64> {
 /// Second differences, squared, for the curve and the gap; and what does not depend on λ.
 fn penalties(size: usize) -> (DMatrix<f64>, DMatrix<f64>) {
     let (mut smooth, mut fixed) = (DMatrix::zeros(size, size), DMatrix::zeros(size, size));
-    for (block, weight) in [(0, 1.0), (N, GAP_PENALTY)] {
-        for i in 0..N - 2 {
+    for (block, weight) in [(0, 1.0), (SPLINE_COEFFICIENTS, GAP_PENALTY)] {
+        for i in 0..SPLINE_COEFFICIENTS - 2 {
             for (a, da) in [1.0, -2.0, 1.0].into_iter().enumerate() {
                 for (b, db) in [1.0, -2.0, 1.0].into_iter().enumerate() {
                     smooth[(block + i + a, block + i + b)] += weight * da * db;
@@ -85,8 +82,8 @@ fn penalties(size: usize) -> (DMatrix<f64>, DMatrix<f64>) {
     for i in 0..size {
         fixed[(i, i)] = 1e-8
             + match i {
-                i if i >= 2 * N => RUN_RIDGE,
-                i if i >= N => GAP_RIDGE,
+                i if i >= 2 * SPLINE_COEFFICIENTS => RUN_RIDGE,
+                i if i >= SPLINE_COEFFICIENTS => GAP_RIDGE,
                 _ => 0.0,
             };
     }
@@ -116,10 +113,11 @@ impl Spline {
             let rss = (&f - &x * &c).norm_squared();
             let score = n * rss / (n - GCV_PRICE * freedom).max(1.0).powi(2);
             if best.as_ref().is_none_or(|(s, _)| score < *s) {
-                let inner = normal.view((0, 0), (2 * N, 2 * N)).into_owned();
+                let inner =
+                    normal.view((0, 0), (2 * SPLINE_COEFFICIENTS, 2 * SPLINE_COEFFICIENTS)).into_owned();
                 let Some(inverse) = inner.cholesky() else { continue };
                 let covariance = inverse.inverse() * (rss / (n - freedom).max(1.0));
-                let coefficients = c.rows(0, 2 * N).into_owned();
+                let coefficients = c.rows(0, 2 * SPLINE_COEFFICIENTS).into_owned();
                 best = Some((score, Self { low, high, coefficients, covariance }));
             }
         }
@@ -131,7 +129,7 @@ impl Spline {
         (0..4).map(|k| b[k] * self.coefficients[offset + i + k]).sum()
     }
 
-    /// Mean of both directions, N.
+    /// Mean of both directions, SPLINE_COEFFICIENTS.
     pub fn mean(&self, pressure: f64) -> f64 {
         self.sum(0, pressure, false)
     }
@@ -141,9 +139,9 @@ impl Spline {
         self.sum(0, pressure, true)
     }
 
-    /// Half the gap, filling minus mean, N.
+    /// Half the gap, filling minus mean, SPLINE_COEFFICIENTS.
     pub fn gap(&self, pressure: f64) -> f64 {
-        self.sum(N, pressure, false)
+        self.sum(SPLINE_COEFFICIENTS, pressure, false)
     }
 
     /// Variance of the surface, N².
@@ -152,7 +150,7 @@ impl Spline {
         let mut index = [(0, 0.0); 8];
         for k in 0..4 {
             index[k] = (i + k, b[k]);
-            index[4 + k] = (N + i + k, direction * b[k]);
+            index[4 + k] = (SPLINE_COEFFICIENTS + i + k, direction * b[k]);
         }
         let inner =
             |(r, x): (usize, f64)| index.iter().map(|(c, y)| x * y * self.covariance[(r, *c)]).sum::<f64>();

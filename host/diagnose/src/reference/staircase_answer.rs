@@ -4,11 +4,11 @@ use nalgebra::DVector;
 
 use super::answer::{
     ChangeReport, Changed, Considered, Curve, HeldOut, NotComparable, Probability, Reference, Repeatability,
-    Verdict, not_comparable, size,
+    Size, Verdict, not_comparable, size,
 };
 use super::criteria::{CELLS, FEWEST_CELLS, GATE, NAMED, PRIOR_NONE, SCALE_PRIOR, SIZES, SLOPE_ERROR};
 use super::held_out;
-use super::isometric::{Accepted, Analysis};
+use super::isometric::{Accepted, Analysis, Estimate};
 use super::posterior::Cause;
 use super::report::{Options, left, prior, verdict};
 use super::shapes::{CHANGES, Change};
@@ -78,6 +78,7 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
             mounted_anew: analysis.runs.remounted,
             not_comparable: not_comparable(&not),
         },
+        alone: alone(analysis),
         curves: curves(analysis, &difference),
         abscissa: ("pressure P", "kPa"),
     }
@@ -140,6 +141,16 @@ fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
         remedy: about.remedy.into(),
         rms_N: rms_after(&analysis.cells, &accepted.shape) * accepted.size.abs(),
     }
+}
+
+/// The size of each change as the only one.
+fn alone(analysis: &Analysis) -> Vec<(String, Size)> {
+    let freedom = SCALE_PRIOR + analysis.contrast.taught.min(analysis.contrast.free);
+    let one = |e: &Estimate| {
+        let about = e.change.about();
+        (about.name.to_owned(), size(about.parameter, e.size, e.std, freedom, SLOPE_ERROR))
+    };
+    analysis.first.estimates.iter().map(one).collect()
 }
 
 fn considered(analysis: &Analysis, options: &Options) -> Vec<Considered> {

@@ -87,6 +87,14 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
             mounted_anew: true,
             not_comparable: not_comparable(&compared.not_comparable),
         },
+        alone: weighed
+            .alone
+            .iter()
+            .map(|(c, (value, std))| {
+                let about = c.about();
+                (about.name.to_owned(), size(about.parameter, *value, *std, 1e6, 0.0))
+            })
+            .collect(),
         curves: stroke_curves(compared, &weighed, &named),
         abscissa: ("displacement", "mm"),
     })

@@ -6,19 +6,37 @@ use nalgebra::{DMatrix, DVector};
 
 use super::answer::NotComparable;
 use super::contrast::{log_mean, log_sum};
-use super::criteria::{SIZES, STROKE_BINS, STROKE_LENGTH, STROKE_REPEATS, StrokeRepeats};
+use super::criteria::{SIZES, STROKE_BINS, STROKE_LENGTH, STROKE_REPEATS, STROKED_FLOOR};
 use super::shapes::{Change, Class};
 use super::strokes::{Band, Key, bands, ends, levels};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
+
+/// What repeats between campaigns of strokes: shares of the largest force, or of friction. By principle; reshaped once after a first run
+/// on the cylinder's recordings (friction as a share of friction, not of force).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct StrokeRepeats {
+    /// Zero of the load cell, of the largest force.
+    pub zero: f64,
+    /// Gain of a reseated part.
+    pub gain: f64,
+    /// A level's own zero, of the largest force.
+    pub level: f64,
+    /// Along the stroke, of the largest force.
+    pub along: f64,
+    /// Friction in common, of friction.
+    pub friction: f64,
+    /// Friction of a recording, of friction.
+    pub friction_level: f64,
+    /// Friction along the stroke, of friction.
+    pub friction_along: f64,
+}
 
 /// The changes that strokes at regulated pressures are asked about.
 pub(super) const ASKED: [Change; 4] =
     [Change::ForceOffset, Change::ForceGain, Change::CoulombFriction, Change::PressureFriction];
 /// Sets of them that are weighed against each other, by index.
 const SETS: [&[usize]; 9] = [&[], &[0], &[1], &[2], &[3], &[2, 3], &[1, 2], &[1, 3], &[1, 2, 3]];
-/// Numerical floor of the diagonal, share of the largest force.
-const FLOOR: f64 = 1e-4;
 
 /// The differences of both campaigns.
 pub(super) struct Compared {
@@ -177,7 +195,7 @@ fn covariance(
             s[(n + i, n + j)] = share * friction[i] * friction[j] + reference_error * reference_error * along;
         }
         let error = before[i].error.hypot(after[i].error);
-        let floor = (FLOOR * largest).powi(2) + error * error;
+        let floor = (STROKED_FLOOR * largest).powi(2) + error * error;
         s[(i, i)] += floor + (r.along * largest).powi(2);
         s[(n + i, n + i)] += floor + (r.friction_along * friction[i]).powi(2);
     }

@@ -2,20 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use super::criteria::{LEVEL, STROKE_BINS, STROKE_ENDS, STROKE_SPEED, TURN};
+use super::criteria::{
+    LEVEL, STROKE_BINS, STROKE_ENDS, STROKE_SPEED, STROKES_ENDS, STROKES_FEWEST_ROWS, STROKES_RUN_IN,
+    STROKES_SPEED_OVER, TURN,
+};
 use super::motion::{range, turning};
 use super::surface::bin;
 use pam_data::error::Result;
 use pam_data::recording::{Campaign, Recording};
-
-/// Rows that a stroke must have in a cell.
-const FEWEST_ROWS: usize = 3;
-/// s: the speed is a mean over so long.
-const SPEED_OVER: f64 = 0.1;
-/// Percentiles of the stroke that count as its ends.
-const ENDS: (f64, f64) = (0.02, 0.98);
-/// With more strokes than this the first pair is left out: run-in of the seal at the level.
-const RUN_IN: usize = 4;
 
 /// Means of one stroke in one part of it.
 #[derive(Debug, Clone, Copy)]
@@ -31,7 +25,7 @@ struct Part {
 
 /// Both directions of one cell.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Band {
+pub(crate) struct Band {
     /// Mean of both directions, N.
     pub middle: f64,
     /// Half of (growing displacement minus shrinking) taken the other way: friction of a muscle makes it positive, N.
@@ -46,10 +40,10 @@ pub(super) struct Band {
 }
 
 /// Level and part of the stroke.
-pub(super) type Key = (usize, usize);
+pub(crate) type Key = (usize, usize);
 
 /// Levels of pressure, Pa, ascending, of recordings on both sides.
-pub(super) fn levels(campaigns: &[&Campaign]) -> Vec<f64> {
+pub(crate) fn levels(campaigns: &[&Campaign]) -> Vec<f64> {
     let mut means: Vec<f64> = campaigns
         .iter()
         .flat_map(|c| c.recordings.iter().flat_map(|r| strokes(r).into_iter().map(|s| s.1)))
@@ -90,7 +84,7 @@ fn speed(time: &[f64], stroke: &[f64]) -> Vec<f64> {
     }
     let middle = steps.len() / 2;
     let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let half = ((SPEED_OVER / usual) as usize).max(3).div_ceil(2);
+    let half = ((STROKES_SPEED_OVER / usual) as usize).max(3).div_ceil(2);
     (0..n)
         .map(|i| {
             let (a, b) = (i.saturating_sub(half), (i + half).min(n - 1));
@@ -107,9 +101,9 @@ fn percentile(values: &[f64], share: f64) -> f64 {
 }
 
 /// Ends of the stroke of a campaign, m.
-pub(super) fn ends(campaign: &Campaign) -> (f64, f64) {
+pub(crate) fn ends(campaign: &Campaign) -> (f64, f64) {
     let all: Vec<f64> = campaign.recordings.iter().flat_map(|r| r.stroke.iter().copied()).collect();
-    (percentile(&all, ENDS.0), percentile(&all, ENDS.1))
+    (percentile(&all, STROKES_ENDS.0), percentile(&all, STROKES_ENDS.1))
 }
 
 fn parts(
@@ -132,7 +126,7 @@ fn parts(
                 *s = (s.0 + recording.pressure[i], s.1 + x, s.2 + force[i], s.3 + 1);
             }
         }
-        for (bin, (p, x, f, n)) in sums.into_iter().enumerate().filter(|(_, s)| s.3 >= FEWEST_ROWS) {
+        for (bin, (p, x, f, n)) in sums.into_iter().enumerate().filter(|(_, s)| s.3 >= STROKES_FEWEST_ROWS) {
             let n = n as f64;
             let part = Part { direction, pressure: p / n, stroke: x / n, force: f / n, bin, number: *number };
             all.push((level, part));
@@ -146,7 +140,7 @@ fn parts(
 ///
 /// # Errors
 /// A recording without force.
-pub(super) fn bands(campaign: &Campaign, levels: &[f64], ends: (f64, f64)) -> Result<BTreeMap<Key, Band>> {
+pub(crate) fn bands(campaign: &Campaign, levels: &[f64], ends: (f64, f64)) -> Result<BTreeMap<Key, Band>> {
     let mut by_level: BTreeMap<usize, Vec<Part>> = BTreeMap::new();
     let mut number = 0;
     for recording in &campaign.recordings {
@@ -162,7 +156,7 @@ pub(super) fn bands(campaign: &Campaign, levels: &[f64], ends: (f64, f64)) -> Re
         let mut numbers: Vec<usize> = parts.iter().map(|p| p.number).collect();
         numbers.sort_unstable();
         numbers.dedup();
-        if numbers.len() > RUN_IN {
+        if numbers.len() > STROKES_RUN_IN {
             let last = numbers[1.min(numbers.len() - 3)];
             parts.retain(|p| p.number > last);
         }

@@ -3,14 +3,11 @@
 use model_core::muscle::Muscle;
 use model_core::units::{Length, Pressure};
 
-use super::criteria::GRID;
+use super::criteria::{GRID, TABLE_SURFACE_STEP};
 use super::runs::Runs;
 use super::surface::{Curves, Surface};
 use pam_data::error::{DataCode, Error, Result};
 use pam_fit::table_file::TableFile;
-
-/// Step of the slope over the length, m.
-const STEP: f64 = 1e-4;
 
 /// A table's surface at the mountings of AFTER, over the pressures that AFTER has and the table was made for.
 ///
@@ -55,7 +52,10 @@ pub(super) fn of(table: &TableFile, runs: &Runs) -> Result<Surface> {
                 .collect(),
             by_stroke: grid
                 .iter()
-                .map(|p| (mean(*p, x + STEP) - mean(*p, x - STEP)) / (2.0 * STEP))
+                .map(|p| {
+                    (mean(*p, x + TABLE_SURFACE_STEP) - mean(*p, x - TABLE_SURFACE_STEP))
+                        / (2.0 * TABLE_SURFACE_STEP)
+                })
                 .collect(),
             variance: [vec![0.0; GRID], vec![0.0; GRID]],
         })

@@ -4,12 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::cells::Cell;
 use super::contrast::{Contrast, log_mean};
-use super::criteria::{GATE_MOUNTINGS, SIZES};
-
-/// Correlation length over pressure, share of the range, and correlation between the directions of an unknown surface.
-const SMOOTH: (f64, f64) = (0.25, 0.5);
-/// Eigenvectors below this share of the largest are left out.
-const LEAST: f64 = 1e-2;
+use super::criteria::{GATE_MOUNTINGS, SIZES, UNKNOWN_LEAST, UNKNOWN_SMOOTH};
 
 /// What a free surface takes.
 #[derive(Debug, Clone, Copy)]
@@ -26,12 +21,12 @@ fn columns(cells: &[Cell], mounting: usize, range: f64) -> Option<DMatrix<f64>> 
         (0..cells.len()).filter(|i| cells[*i].after && cells[*i].mounting == mounting).collect();
     let covariance = |i: usize, j: usize| {
         let (a, b) = (&cells[own[i]], &cells[own[j]]);
-        let apart = (a.means.pressure - b.means.pressure) / range / SMOOTH.0;
-        (-0.5 * apart * apart).exp() * if a.direction * b.direction > 0.0 { 1.0 } else { SMOOTH.1 }
+        let apart = (a.means.pressure - b.means.pressure) / range / UNKNOWN_SMOOTH.0;
+        (-0.5 * apart * apart).exp() * if a.direction * b.direction > 0.0 { 1.0 } else { UNKNOWN_SMOOTH.1 }
     };
     let eigen = DMatrix::from_fn(own.len(), own.len(), covariance).try_symmetric_eigen(1e-12, 10_000)?;
     let top = eigen.eigenvalues.max();
-    let kept: Vec<usize> = (0..own.len()).filter(|i| eigen.eigenvalues[*i] > LEAST * top).collect();
+    let kept: Vec<usize> = (0..own.len()).filter(|i| eigen.eigenvalues[*i] > UNKNOWN_LEAST * top).collect();
     let mut all = DMatrix::zeros(cells.len(), kept.len());
     for (column, k) in kept.iter().enumerate() {
         for (row, cell) in own.iter().enumerate() {

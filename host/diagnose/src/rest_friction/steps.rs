@@ -1,4 +1,4 @@
-//! Slips of static friction at held length: the force steps, at once or in a burst of small slips.
+//! Slips of static friction at held length: the force steps, in one step or in a burst of small slips.
 
 use super::residual_at;
 use crate::baselines::Baseline;
@@ -49,15 +49,15 @@ pub(super) fn of(
     holds.iter().zip(directions).map(found).collect()
 }
 
-/// Moments of what is left in a hold, `within` rows of which each way it goes by more than the `least` step and most of the way that it goes
-/// from the time before to the time after; with how far it goes.
+/// Times in a hold at which the residual changes, within `within` rows on either side, by more than the `least` step and by most of the change
+/// from the time before to the time after; with the size of the change.
 fn sharp_steps(
     left: &[f64],
     within: usize,
     least: &impl Fn(usize) -> f64,
 ) -> impl Iterator<Item = (usize, f64)> {
     let beside = STEP_BESIDE.max(2 * within);
-    // At once is at once soon after a hold's beginning, too; a burst needs a time before it.
+    // A single step can follow the start of a hold directly; a burst needs a time before it.
     let begin = if within == STEP_ROWS[0] { STEP_BEFORE } else { within + beside };
     (begin..left.len().saturating_sub(within + beside - 1)).filter_map(move |i| {
         let middle = |part: &[f64]| median(&mut part.to_vec());

@@ -1,4 +1,4 @@
-//! Samples become rows: averages that end at every turn, hold and ramp.
+//! Samples become rows: averages that end at every reversal, hold and ramp.
 
 use model_core::braid::Braid;
 use model_core::effects::Context;
@@ -124,7 +124,7 @@ impl Gathering<'_> {
     /// A recording without force.
     fn add(&mut self, recording: &Recording, read: &[bool], pause: Option<f64>) -> Result<()> {
         let first = self.rows.names.is_empty();
-        self.rows.names.push(recording.name.clone());
+        self.rows.names.push(recording.title());
         let force = recording.require_force()?;
         if recording.is_empty() {
             return Ok(());
@@ -258,7 +258,7 @@ impl Gathering<'_> {
         });
         rows.shapes.push(sleeve::shape(braid, mean.stroke));
         rows.force.push(mean.force);
-        // Just after a turn of the pressure at held length the model only guesses how far friction has turned; where the muscle
+        // Just after a reversal of the pressure at held length the model only estimates how far friction has reversed; where the muscle
         // also moves, its strokes and what ramps are steady are what is judged.
         let on_ramp = k.on_ramp[i] && !self.isometric;
         let judged = k.sure[i] && (self.isometric || !k.ramped[i] || on_ramp);

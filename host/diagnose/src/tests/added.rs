@@ -42,7 +42,7 @@ fn an_effect_of_one_file_and_one_line_is_considered_and_found() {
     assert!((size - 3.0).abs() < 0.3 && (period - 4.0e-3).abs() < 1e-4, "{size} N over {period} m");
 }
 
-/// What an effect is stands in its file: no other production code of the diagnosis knows one by its name.
+/// An effect is defined in its file: no other production code of the diagnosis knows one by its name.
 #[test]
 fn no_effect_is_known_by_its_name() {
     let mut folders = vec![std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src")];

@@ -1,9 +1,9 @@
-//! Play between the stroke sensor and the muscle: after a turn the sensor moves and the muscle does not.
+//! Play between the stroke sensor and the muscle: after a reversal the sensor moves and the muscle does not.
 //!
 //! ```text
 //! F_add = κ · [∂F/∂x · (y − x) + k_F F_quasi (s − s_y)]        y = play_{b/2}(x)
 //! ```
-//! `b`, m, is the width of the play, `y` its output: it stands still until the stroke has gone back by `b`. `κ` (dimensionless) is 1 for a joint
+//! `b`, m, is the width of the play, `y` its output: it is constant until the stroke has gone back by `b`. `κ` (dimensionless) is 1 for a joint
 //! that is free over all of `b`, less if it is tight at times. A preloaded joint has none. The side on which the play begins is
 //! unknown until the first turn. While the joint is
 //! loose the muscle rests, and its friction keeps the direction `s_y` of its own last motion; once it is drawn along again, that turns

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::BenchName;
 
-/// An effect of the catalogue, whoever's it is.
+/// An effect of the catalogue, of the muscle or of the bench.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Candidate {
     /// Physics of the muscle: goes into the table and to the controller.

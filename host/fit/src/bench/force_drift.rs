@@ -1,4 +1,4 @@
-//! The load cell's zero wanders.
+//! The load cell's zero drifts.
 //!
 //! ```text
 //! F_add = r t + w (1 − e^(−t/τ)) + c LP_τ(F) + z θ

@@ -1,6 +1,6 @@
 //! The load cell does not read zero without load: `F_add = b`, N.
 //!
-//! Ten seconds of a vented, slack muscle at either end of a recording settle it; without them free tables swallow it.
+//! Ten seconds of a vented, slack muscle at either end of a recording settle it; without them free tables absorb it.
 
 use model_core::effects::{
     BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, Vented,

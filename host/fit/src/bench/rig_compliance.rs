@@ -4,9 +4,9 @@
 //! F_add = (1/K) · [∂F/∂x · F/(1 − c ∂F/∂x) + k_F F_quasi (s − z)/c]        dz = dx/(c k_F F_quasi), within ±1
 //! ```
 //! `x` is the contraction stroke, `∂F/∂x` negative, `F` the base model's force, N; `1/K`, m/N. The frame gives by the force that is left
-//! once it has given, hence the denominator. At a turn the friction has to change by `2 k_F F` before the strands slide back; a frame
+//! once it has given, hence the denominator. At a reversal the friction has to change by `2 k_F F` before the strands slide back; a frame
 //! that gives takes that change as travel, so that the jump becomes a ramp: `c`, m/N, is the give by which it does, the same `1/K` where
-//! nothing else gives. A stretching braid looks the same in free tables but for the turns: measure with a rigid bar in the muscle's
+//! nothing else gives. A stretching braid looks the same in free tables except at the reversals: measure with a rigid bar in the muscle's
 //! place.
 
 use model_core::effects::{
@@ -69,7 +69,7 @@ fn give<T: Scalar>(parameters: &[T]) -> T {
     parameters[1].max(T::from_f32(1.0e-10))
 }
 
-/// The frame that gives under load is the frame that gives at the turns; half-strokes that overlap leave a factor of 2.5 between them.
+/// The compliance under load is the compliance at the reversals; half-strokes that overlap leave a factor of 2.5 between them.
 fn gives_alike(amplitudes: &[f64], shapes: &[f64]) -> bool {
     !matches!((amplitudes, shapes), ([under_load], [at_turns]) if !(*under_load <= 2.5 * at_turns))
 }

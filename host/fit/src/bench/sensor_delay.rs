@@ -3,9 +3,9 @@
 //! ```text
 //! F_add = −δ (∂F/∂x v + g (1 − s k_F) dP/dt)    or    F_add = −κ (F − LP_τ(F))    or    F_add = −κ_d (F − D_τ(F)),  D_τ = LP⁴_{τ/4}
 //! ```
-//! `δ`, s, a skew between the channels, to first order and away from turns (negative: the stroke is the late one); or a first-order filter
-//! of time constant `τ`, s, in the force channel, `κ = 1` for the whole, which also rounds the jumps at turns; or a delay by `τ` behind a
-//! converter's filter: four equal filters in a row, which bring a jump late and not at once. `F`, N, is the base model's force. Laws to
+//! `δ`, s, a skew between the channels, to first order and away from reversals (negative: the stroke is the late one); or a first-order filter
+//! of time constant `τ`, s, in the force channel, `κ = 1` for the whole, which also rounds the jumps at reversals; or a delay by `τ` behind a
+//! converter's filter: four equal filters in a row, which bring a jump late and not immediately. `F`, N, is the base model's force. Laws to
 //! choose from.
 
 use model_core::effects::{
@@ -16,7 +16,7 @@ use model_core::scalar::Scalar;
 type Filter = Fading<1, 1>;
 /// Filters in a row behind a delay.
 const ROW: usize = 4;
-/// A step goes through the row in pieces, at most so many, as what one filter gives the next bends within it.
+/// A step goes through the row in pieces, at most this many, as the input of each filter bends within the step.
 const PIECES: usize = 12;
 /// Where they begin in the memory: whether anything was seen, the force, what each filter gives.
 const SEEN: usize = Filter::SLOTS;
@@ -54,7 +54,7 @@ impl Effect for SensorDelay {
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         let time = parameters[3];
         if context.dt >= (time * T::from_f64(20.0)).max(T::ONE) {
-            // Nobody knows how the force went over a pause; the reading has caught up with it since.
+            // The force during a pause is unknown; the reading has caught up with it since.
             memory.fill(T::ZERO);
         }
         match turn(context, memory) {
@@ -88,7 +88,7 @@ struct Turn<T> {
     after: T,
 }
 
-/// The turn since the last moment, if there was one: where the strokes before and after it, each going on at its speed, meet.
+/// The reversal since the last sample, if any: where the strokes before and after it meet, each extrapolated at its speed.
 fn turn<T: Scalar>(context: &Context<T>, memory: &Memory<T>) -> Option<Turn<T>> {
     let came = memory[WAY];
     let (speed, dt) = (memory[SPEED], context.dt);
@@ -160,7 +160,7 @@ mod tests {
         }
     }
 
-    /// What a law adds at moments `every` so many milliseconds.
+    /// What a law adds at moments `every` milliseconds apart.
     fn added(parameters: &[f64], every: usize) -> Vec<f64> {
         let mut memory = [0.0; model_core::effects::MEMORY];
         let dt = 1e-3 * every as f64;
@@ -179,7 +179,7 @@ mod tests {
             let fine = added(&law, 1);
             for (i, coarse) in added(&law, 100).iter().enumerate() {
                 let off = coarse - fine[100 * i];
-                // The jump at a turn is up to 160 N; the rest are the slopes on either side of it, over a part of a sample.
+                // The jump at a reversal is up to 160 N; the rest are the slopes on either side of it, over a part of a sample.
                 assert!(off.abs() < 1.5, "{law:?}, {i}: {coarse} and {}", fine[100 * i]);
             }
         }

@@ -30,7 +30,7 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
     if let Some(p) = pressure {
         columns.push(p.to_vec());
     }
-    // A zero that wanders on meanwhile must not pass for what the line does.
+    // A zero that drifts on meanwhile must not pass for what the line does.
     if let Some(t) = table.find(Quantity::Time) {
         let middle = 0.5 * (t.first().unwrap_or(&0.0) + t.last().unwrap_or(&0.0));
         columns.push(t.iter().map(|t| t - middle).collect());

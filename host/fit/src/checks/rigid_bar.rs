@@ -37,7 +37,7 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
     let (give, give_std) = (found.values[0].max(0.0), found.deviations[0]);
     let mut measured = vec![Measured {
         fault: BenchName::RigCompliance,
-        // What gives under load gives at the turns as well.
+        // The compliance under load is also the compliance at the reversals.
         parameters: vec![give, give],
         deviations: vec![Some(give_std), None],
         words: format!("the frame gives {:.2} ± {:.2} µm per newton", 1e6 * found.values[0], 2e6 * give_std),

@@ -61,7 +61,7 @@ impl Table {
                 let Some(value) = value else {
                     return Err(Error::new(
                         DataCode::CheckInvalid,
-                        format!("line {line}: `{}` is no number for `{}`", &row[*at], &header[*at]),
+                        format!("line {line}: `{}` is not a number for `{}`", &row[*at], &header[*at]),
                     )
                     .file(file));
                 };

@@ -1,7 +1,7 @@
 //! Chunks of a loop: what the thesis averages over to draw a mid-line through the two branches of hysteresis.
 //!
 //! The thesis cuts the stroke into chunks, 500 per unit of contraction, and averages in each over both branches and all cycles. So here,
-//! but each branch is averaged first by itself: a branch that the recording dwelled on does not pull the mid-line to its side. Chunks
+//! but each branch is first averaged separately: a branch that the recording dwelled on does not pull the mid-line to its side. Chunks
 //! are cut in pressure too where pressure moves. One that holds less than a tenth of the rows of the median chunk of its group is no
 //! mid-line: the noise of the stroke puts a row or two beyond rest length, and these are no mean of a loop.
 
@@ -42,7 +42,7 @@ pub(crate) struct Chunk<const N: usize> {
 }
 
 impl<const N: usize> Chunk<N> {
-    /// The means of all branches that are there, each counting alike.
+    /// The means of all branches that are there, each with the same weight.
     #[must_use]
     pub(crate) fn mean(&self) -> [f64; N] {
         let present = self.branches.iter().flatten();

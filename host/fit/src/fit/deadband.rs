@@ -21,7 +21,7 @@ pub(super) struct Deadband {
 /// pressure, or where the strokes determine no higher order.
 ///
 /// At rest length no elastic term acts, so `P0` is the intercept of the blocked force. Away from it `P0` and the `E_k` are correlated,
-/// and what a low order cannot describe of the bladder would enter `P0`: with M = 4 on a hyperelastic wall it is off by up to 1 kPa,
+/// and the part of the bladder that a low order cannot describe would enter `P0`: with M = 4 on a hyperelastic wall it is off by up to 1 kPa,
 /// with M = 6 by a fifth of that. Where no row is near rest length the curve is extrapolated, and a low order misses `P0` by many times
 /// its scatter (by 8 kPa from 0.8 % of contraction on, with M = 4). Then the change that the last order made indicates how far the
 /// next ones might go, and half of it joins the standard deviation.
@@ -66,7 +66,7 @@ fn reaches_rest(problem: &Problem) -> bool {
     problem.points.stroke.low <= 0.02 * problem.points.stroke.high
 }
 
-/// `P0` by a fit of this order, from a start `near`, Pa; `None` where the strokes do not determine so many coefficients.
+/// `P0` by a fit of this order, from a start `near`, Pa; `None` where the strokes do not determine as many coefficients.
 fn by_order(
     problem: &Problem,
     screen: &Screen,

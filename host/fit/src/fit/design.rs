@@ -1,4 +1,4 @@
-//! The problem of all pressures at once: points, unknowns, and the model at each point.
+//! The problem of all pressures together: points, unknowns, and the model at each point.
 //!
 //! ```text
 //! r = F − G q − Σ_m a_m z_m       q = (P − P0) g(L) + Σ_k ẽ_k(P) c̃_k(L)      G = 1 − s k_F(P)

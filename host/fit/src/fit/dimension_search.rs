@@ -1,7 +1,7 @@
 //! Effective dimensions, and the length of each mounting: what a tape measure and a data sheet leave uncertain.
 //!
 //! Each such unknown enters as one more column of the joint problem, `∂F/∂p` at the present solution, with a prior as wide as the
-//! uncertainty of the measurement that it stands for. The columns are computed anew at every step (Gauss–Newton), and a step goes only
+//! uncertainty of the measurement that it represents. The columns are computed anew at every step (Gauss–Newton), and a step goes only
 //! as far as it lowers the objective of a table solved anew at its end. Values stay within stated bounds. Each is reported with the
 //! share of the prior's variance that the recordings removed.
 
@@ -10,7 +10,7 @@ use model_core::braid::Geometry;
 use super::Options;
 use super::basis::columns;
 use super::dimensions::{Mounting, Unknown, describe, moved};
-use super::points::Points;
+use super::points::{HeldMounting, Points};
 use super::problem::Problem;
 use super::screen::Screen;
 use super::smoothing::Smoothing;
@@ -18,41 +18,30 @@ use super::uncertainty::jackknife;
 use super::weights::Weights;
 use crate::numerics::symmetric::dot;
 
-/// The strokes at which recordings were held, m, and for each point the index of its own among them.
-fn mountings(points: &Points) -> (Vec<f64>, Vec<Option<usize>>) {
-    let list = &points.list;
-    let recordings = list.iter().map(|p| p.recording as usize + 1).max().unwrap_or(0);
-    let mut held: Vec<Option<f64>> = vec![None; recordings];
-    let mut moved = vec![false; recordings];
-    for p in list {
-        let r = p.recording as usize;
-        match held[r] {
-            None => held[r] = Some(p.stroke),
-            // A tape measure's tenth of a millimetre.
-            Some(s) => moved[r] |= (s - p.stroke).abs() > 1e-4,
-        }
-    }
-    let mut strokes: Vec<f64> = Vec::new();
-    let of: Vec<Option<usize>> = held
+/// The mountings in which recordings were held at one length, and for each point the index of its own among them.
+fn mountings(points: &Points) -> (Vec<HeldMounting>, Vec<Option<usize>>) {
+    let mut distinct: Vec<HeldMounting> = Vec::new();
+    let of: Vec<Option<usize>> = points
+        .mountings
         .iter()
-        .zip(&moved)
-        .map(|(s, moved)| {
-            let s = s.filter(|_| !moved)?;
-            Some(strokes.iter().position(|k| (k - s).abs() <= 1e-4).unwrap_or_else(|| {
-                strokes.push(s);
-                strokes.len() - 1
+        .map(|held| {
+            let held = held.as_ref()?;
+            Some(distinct.iter().position(|d| d.is(held)).unwrap_or_else(|| {
+                distinct.push(held.clone());
+                distinct.len() - 1
             }))
         })
         .collect();
-    (strokes, list.iter().map(|p| of[p.recording as usize]).collect())
+    let of_point = |recording: u32| of.get(recording as usize).copied().flatten();
+    (distinct, points.list.iter().map(|p| of_point(p.recording)).collect())
 }
 
 /// The unknown dimensions, and what does not change while they are searched for.
 struct Unknowns {
     list: Vec<Unknown>,
     nominal: Geometry,
-    /// The strokes at which recordings were held, m.
-    strokes: Vec<f64>,
+    /// The mountings in which recordings were held.
+    held: Vec<HeldMounting>,
     /// The index among them of each point's own.
     mounting: Vec<Option<usize>>,
     /// The measured force of every point, N.
@@ -60,18 +49,18 @@ struct Unknowns {
 }
 
 impl Unknowns {
-    /// What `options` leaves open.
+    /// The dimensions that `options` leaves free.
     fn of(problem: &Problem, options: &Options) -> Self {
-        let (strokes, mounting) = mountings(&problem.points);
+        let (held, mounting) = mountings(&problem.points);
         let mut list = Vec::new();
         if options.fit_geometry {
             list.extend([Unknown::Angle, Unknown::Diameter, Unknown::Wall]);
         }
         if options.fit_lengths {
-            list.extend((0..strokes.len()).map(Unknown::Offset));
+            list.extend((0..held.len()).map(Unknown::Offset));
         }
         let forces = problem.design.rows.iter().map(|r| r.force).collect();
-        Self { list, nominal: problem.nominal, strokes, mounting, forces }
+        Self { list, nominal: problem.nominal, held, mounting, forces }
     }
 
     /// The priors' part of the objective at a place; `excess` scales them as the misfit.
@@ -117,7 +106,7 @@ pub(super) fn lacks_mountings(problem: &Problem, options: &Options) -> bool {
     options.fit_lengths && mountings(&problem.points).0.is_empty()
 }
 
-/// Finds the dimensions that `options` leaves open: the problem with these dimensions, and the table's parameters there. Both are as
+/// Finds the dimensions that `options` leaves free: the problem with these dimensions, and the table's parameters there. Both are as
 /// they were where nothing is open.
 pub(super) fn adjust(
     problem: &Problem,
@@ -307,12 +296,15 @@ impl Search<'_> {
         let found = || unknowns.list.iter().zip(&at).enumerate();
         problem.adjusted = found()
             .map(|(m, (u, value))| {
-                describe(&unknowns.nominal, *u, *value, root.std(size + m), &unknowns.strokes)
+                describe(&unknowns.nominal, *u, *value, root.std(size + m), &unknowns.held)
             })
             .collect();
         problem.mountings = found()
             .filter_map(|(_, (u, v))| match u {
-                Unknown::Offset(m) => Some(Mounting { stroke: unknowns.strokes[*m], offset: *v }),
+                Unknown::Offset(m) => {
+                    let held = &unknowns.held[*m];
+                    Some(Mounting { label: held.label.clone(), stroke: held.stroke, offset: *v })
+                }
                 _ => None,
             })
             .collect();

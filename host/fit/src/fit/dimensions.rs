@@ -14,6 +14,8 @@ use model_core::braid::Geometry;
 use model_core::units::{Angle, Length};
 use serde::Serialize;
 
+use super::points::HeldMounting;
+
 /// A dimension or a mounting length that was fitted together with the table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Adjusted {
@@ -38,8 +40,10 @@ pub struct Adjusted {
 }
 
 /// A stroke at which whole recordings were held, with its correction.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Mounting {
+    /// What the file calls the mounting; empty where it has no label.
+    pub label: String,
     /// The stroke as recorded, m.
     pub stroke: f64,
     /// The correction to add to it, m.
@@ -102,7 +106,7 @@ pub(super) fn describe(
     unknown: Unknown,
     value: f64,
     std: f64,
-    strokes: &[f64],
+    mountings: &[HeldMounting],
 ) -> Adjusted {
     let (sigma, bound) = unknown.prior();
     let scaled = |name: &str, unit, nominal: f64| Adjusted {
@@ -134,8 +138,13 @@ pub(super) fn describe(
         Unknown::Diameter => scaled("bladder_outer_diameter", "mm", nominal.outer_diameter.millimetres()),
         Unknown::Wall => scaled("bladder_wall", "mm", nominal.wall.millimetres()),
         Unknown::Offset(m) => {
-            let name = format!("stroke_of_mounting_{}", m + 1);
-            shifted(name, "mm", strokes[m] * 1e3, 1e3)
+            let held = &mountings[m];
+            let name = if held.label.is_empty() {
+                format!("stroke_of_mounting_{}", m + 1)
+            } else {
+                format!("stroke_of_mounting_{} ({})", m + 1, held.label)
+            };
+            shifted(name, "mm", held.stroke * 1e3, 1e3)
         }
     };
     a.determined = (1.0 - (std / sigma).powi(2)).clamp(0.0, 1.0);

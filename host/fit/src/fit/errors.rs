@@ -9,7 +9,7 @@
 //! Chunks are those of the mid-line ([`super::chunks`]); in each the residual `F − F_model` (each sample with its own pressure and
 //! direction) is averaged per branch, and the branches are averaged. Where both branches are there, the friction of either cancels in
 //! the model as in the measurement, so that this is eq. 24 on loops at constant pressure. It also holds where pressure moves and where
-//! only one branch was recorded (then the model's friction stands in for the missing branch). Samples just after a turn lie between
+//! only one branch was recorded (then the model's friction replaces the missing branch). Samples just after a reversal lie between
 //! the branches and belong to neither: they count in no mid-line.
 
 use super::chunks::{Place, cut};

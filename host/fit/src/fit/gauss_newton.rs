@@ -1,4 +1,4 @@
-//! All pressures at once: `P0`, every `E_kj` and `k_F,j`, by Gauss–Newton on sufficient statistics.
+//! All pressures together: `P0`, every `E_kj` and `k_F,j`, by Gauss–Newton on sufficient statistics.
 //!
 //! The model ([`super::design`]) is linear in `(P0, ẽ, a)` at a given `k_F` and the reverse: from any sensible start a few steps
 //! converge quadratically.

@@ -55,7 +55,7 @@ pub struct NotDetermined {
     pub pressures_kPa: Vec<f64>,
     /// Whether that is every tested pressure.
     pub everywhere: bool,
-    /// The reason, in words.
+    /// Description of the reason.
     pub reason: String,
 }
 
@@ -90,6 +90,9 @@ pub(crate) fn not_determined(solution: &Solution, root: &CovarianceRoot) -> Vec<
             moduli
         })
         .collect();
+    // Only who moves the muscle can record a longer stroke.
+    let held = !solution.problem.points.held_lengths().is_empty();
+    let more = if held { "more lengths" } else { "a longer stroke" };
     let contraction = 100.0 * solution.problem.points.stroke.span() / solution.problem.braid.rest_length();
     let kinds = order + usize::from(solution.problem.design.friction);
     let mut all = Vec::new();
@@ -105,7 +108,7 @@ pub(crate) fn not_determined(solution: &Solution, root: &CovarianceRoot) -> Vec<
         let reason = match partner {
             _ if dropped => "too few different lengths; it is set to zero".to_owned(),
             Some((name, c)) if c.abs() > CORRELATED && k < order => format!(
-                "over a contraction of {contraction:.1} % it is correlated with {name} ({c:.3}); record a longer stroke or use a lower order"
+                "over a contraction of {contraction:.1} % it is correlated with {name} ({c:.3}); record {more} or use a lower order"
             ),
             _ if k == order => "the hysteresis loop is no wider than the noise".to_owned(),
             _ => format!(

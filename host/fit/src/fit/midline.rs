@@ -1,6 +1,6 @@
 //! F_AVG: the mid-line of the hysteresis loop, chunk by chunk.
 //!
-//! In each chunk ([`super::chunks`]) force and stroke are averaged over both branches and all cycles, each branch first by itself. A
+//! In each chunk ([`super::chunks`]) force and stroke are averaged over both branches and all cycles, each branch first separately. A
 //! chunk with one branch only has that branch's force with the fitted friction taken off.
 
 use super::chunks::cut;

@@ -5,8 +5,8 @@
 //! | `gaylord` | `P g(L)` | nothing |
 //! | `gaylord-corrected` | `(P − P0) g(L′)` | P0 |
 //! | `linear` | `(P − P0) g + E c_1`, E of the material | P0 |
-//! | `m1-linear-part`, `m2-linear-part` | M = 1, 2 at each pressure by itself | on the straight part of each load line |
-//! | `m2`, `m3`, `m4` | M = 2, 3, 4 at each pressure by itself | on the whole |
+//! | `m1-linear-part`, `m2-linear-part` | M = 1, 2 at each pressure alone | on the straight part of each load line |
+//! | `m2`, `m3`, `m4` | M = 2, 3, 4 at each pressure alone | on the whole |
 //! | `m4-tip` | M = 4 with `L′` in place of `L` | on the whole |
 //! | `m4-friction` | M = 4 and k_F at each pressure, judged on both branches instead of the mid-line | on the whole |
 //! | `yeoh` | `(P − P0) g − dU/dΔL`, one hyperelastic wall for all pressures | P0, C_1, C_2, C_3 |
@@ -116,7 +116,7 @@ fn judge(name: &'static str, mid: &[MidPoint], force: Vec<f64>, constants: Vec<C
     Model { name, force, constants, mean_error, max_error }
 }
 
-/// M moduli at each pressure by itself, least squares on the mid-points that `part` picks of each group (all where `None`).
+/// M moduli at each pressure alone, least squares on the mid-points that `part` picks of each group (all where `None`).
 fn separate(
     solution: &Solution,
     mid: &[MidPoint],

@@ -1,7 +1,7 @@
 //! NormalEquations equations, summed bin by bin.
 //!
-//! Points of nearly one pressure share their `φ_j`. Their normal equations are summed as a small matrix in the columns
-//! `(c̃_1 … c̃_M, −s q, g, z)` and spread over the nodes only once per such bin, so that the work per point does not grow
+//! Points of nearly one pressure share their `φ_j`. Their normal equations are a small matrix in the columns
+//! `(c̃_1 … c̃_M, −s q, g, z)`. It is spread over the nodes only once per such bin, so that the work per point does not grow
 //! with the number of nodes.
 
 use std::ops::Range;
@@ -160,7 +160,7 @@ impl Design {
         normal
     }
 
-    /// The normal equations of each group by itself.
+    /// The normal equations of each group alone.
     #[must_use]
     pub(crate) fn normal_by_group(&self, parameters: &[f64], weights: &[f64]) -> Vec<NormalEquations> {
         let mut normals = vec![NormalEquations::zeros(self.layout().len()); self.groups];

@@ -1,4 +1,4 @@
-//! What is asked of the curves beside describing the points: that they bend no more than the points say.
+//! The penalty on the curvature of the curves: they bend no more than the points require.
 
 use super::design::{Design, Layout};
 use super::normal_equations::NormalEquations;

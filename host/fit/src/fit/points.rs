@@ -7,7 +7,7 @@
 use crate::numerics::median;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::segment::Motion;
-use pam_data::recording::{Campaign, Recording, white_noise};
+use pam_data::recording::{Campaign, HELD, Recording, white_noise};
 
 /// A mean over consecutive rows of one recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,6 +84,31 @@ pub struct Points {
     pub row_noise: f64,
     /// Standard deviation of a single reading of the stroke, m.
     pub stroke_noise: f64,
+    /// The mounting of each recording of the campaign where its length was held.
+    pub mountings: Vec<Option<HeldMounting>>,
+}
+
+/// A length at which whole recordings were held.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldMounting {
+    /// What the file calls it; empty where it has no label.
+    pub label: String,
+    /// The stroke as recorded, m.
+    pub stroke: f64,
+}
+
+impl HeldMounting {
+    /// The mounting of a recording that was held at one length.
+    #[must_use]
+    pub fn of(recording: &Recording) -> Option<Self> {
+        Some(Self { label: recording.mounting(), stroke: recording.held_stroke()? })
+    }
+
+    /// Whether two recordings were made in one mounting: one label, and one stroke. Two mountings may have equal lengths.
+    #[must_use]
+    pub fn is(&self, other: &Self) -> bool {
+        self.label == other.label && (self.stroke - other.stroke).abs() <= HELD
+    }
 }
 
 impl Points {
@@ -97,7 +122,25 @@ impl Points {
         median(&mut self.list.iter().filter(|p| p.rows >= 4).map(deviation).collect::<Vec<_>>())
     }
 
-    /// Whether a turn of the motion lies just before and just after a point.
+    /// The mountings, where every recording was held at one length and there are at least two: isometric tests. Empty otherwise.
+    #[must_use]
+    pub fn held_lengths(&self) -> Vec<HeldMounting> {
+        let mut distinct: Vec<HeldMounting> = Vec::new();
+        let mut taken = vec![false; self.mountings.len()];
+        for p in &self.list {
+            taken[p.recording as usize] = true;
+        }
+        for (held, _) in self.mountings.iter().zip(&taken).filter(|(_, taken)| **taken) {
+            let Some(held) = held else { return Vec::new() };
+            if !distinct.iter().any(|d| d.is(held)) {
+                distinct.push(held.clone());
+            }
+        }
+        let first = distinct.first().map_or(0.0, |d| d.stroke);
+        if distinct.iter().all(|d| (d.stroke - first).abs() <= HELD) { Vec::new() } else { distinct }
+    }
+
+    /// Whether a reversal of the motion lies just before and just after a point.
     #[must_use]
     pub(crate) fn beside_turn(&self, i: usize) -> (bool, bool) {
         let here = &self.list[i];
@@ -192,7 +235,8 @@ pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
         block += 1;
     }
     let row_noise = row_noise(campaign, rows);
-    Points { list, rows, blocks: block, pressure, stroke, force, row_noise, stroke_noise }
+    let mountings = campaign.recordings.iter().map(HeldMounting::of).collect();
+    Points { list, rows, blocks: block, pressure, stroke, force, row_noise, stroke_noise, mountings }
 }
 
 /// From the median size of second differences of the force, of at most some 40,000 rows spread evenly: trends drop out, and

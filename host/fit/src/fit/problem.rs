@@ -32,7 +32,7 @@ pub struct Problem {
     pub adjusted: Vec<Adjusted>,
     /// Mountings with their correction.
     pub mountings: Vec<Mounting>,
-    /// The lower and the upper end of the force sensor's range, where rows stand at them.
+    /// The lower and the upper end of the force sensor's range, where rows are at them.
     pub clips: (Option<Clip>, Option<Clip>),
     /// The linear problem; one row per point, in the same order.
     pub design: Design,

@@ -5,6 +5,7 @@ use model_core::table::{Kind as TableKind, MuscleTable, Tested};
 use model_core::units::{Force, Length, Pressure};
 
 use crate::error::FitCode;
+use crate::table_faults::table_faults;
 use crate::table_file::Uncertainty;
 use pam_data::error::{Error, Result};
 use pam_data::muscle_description::{Kind, MuscleDescription};
@@ -83,7 +84,10 @@ impl Fit {
                 max_error_pct: m.max_error,
             }),
         );
-        Ok(Self { table, solution, uncertain, table_root, chunks, midline, models, summary })
+        let mut fit = Self { table, solution, uncertain, table_root, chunks, midline, models, summary };
+        fit.summary.faults =
+            table_faults(&fit.table, Some(&fit.stored_uncertainty()), &fit.summary.quality());
+        Ok(fit)
     }
 }
 

@@ -38,12 +38,12 @@ pub struct Outlier {
     pub off: f64,
 }
 
-/// An end of the force sensor's range: many rows stand at exactly the smallest, or the largest, value.
+/// An end of the force sensor's range: many rows are at exactly the smallest, or the largest, value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clip {
     /// The reading at that end, N.
     pub force: f64,
-    /// How many rows stand at it.
+    /// How many rows are at it.
     pub rows: usize,
 }
 

@@ -7,7 +7,7 @@ use super::design::Design;
 use super::normal_equations::NormalEquations;
 use crate::numerics::symmetric::dot;
 
-/// Scores that differ by less than this share are alike.
+/// Scores that differ by less than this share are similar.
 const ALIKE: f64 = 0.01;
 
 /// Weights of the penalty on the curvature of the curves over pressure, relative to the data.
@@ -20,7 +20,7 @@ pub struct Smoothing {
 }
 
 impl Smoothing {
-    /// So stiff that the curves are straight lines.
+    /// Stiff enough for straight lines.
     pub(crate) const STRAIGHT: Self = Self { elastic: 1e4, friction: 1e4 };
     /// A start: flexible, yet bridges gaps between pressures.
     pub const START: Self = Self { elastic: 1e-3, friction: 1e-2 };
@@ -58,9 +58,9 @@ pub(crate) fn choose(design: &Design, parameters: &[f64], weights: &[f64]) -> (S
         trials.push(Trial { smoothing, score });
         score
     };
-    // Both together first, then friction by itself: two curves that hardly speak to each other.
+    // Both together first, then friction alone: two curves that hardly speak to each other.
     let grid = |from: i32, to: i32| (from..=to).map(|e| 10.0_f64.powf(f64::from(e) / 2.0));
-    // Of weights that score alike the stiffest: where the data do not care, curves stay calm.
+    // Of weights that score similar the stiffest: where the data do not care, curves stay calm.
     let best_of = |scored: Vec<(f64, f64)>, alike: f64| {
         let least = scored.iter().map(|(_, s)| *s).fold(f64::INFINITY, f64::min);
         scored.into_iter().filter(|(_, s)| *s <= (1.0 + alike) * least).map(|(w, _)| w).fold(0.0, f64::max)

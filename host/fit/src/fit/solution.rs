@@ -22,7 +22,7 @@ pub struct Solution {
     pub smoothing: Smoothing,
     /// Standard deviation of a `P0` that is held because a higher order determined it, Pa.
     pub deadband_std: Option<f64>,
-    /// What the user should know about the recordings and the search.
+    /// What the user must know about the recordings and the search.
     pub warnings: Vec<String>,
 }
 

@@ -27,7 +27,7 @@ use super::screen::{self, Screen};
 use super::smoothing::{self, Smoothing};
 use super::solution::Solution;
 use super::weights::{Weights, robust};
-use super::{deadband, dimension_search, monotonic_stress, outliers, reversals, slack};
+use super::{deadband, dimension_search, held_lengths, monotonic_stress, outliers, reversals, slack};
 
 /// Screens a campaign, builds its problem and solves it.
 ///
@@ -71,7 +71,14 @@ pub(super) fn solve(
                 .into(),
         );
     }
-    Ok(Solution { warnings, ..search(problem, screen, options, progress) })
+    let solution = search(problem.clone(), screen.clone(), options, progress);
+    let open = held_lengths::open(&solution, options);
+    let Some(open) = open.map(|options| search(problem, screen, &options, progress)) else {
+        return Ok(Solution { warnings, ..solution });
+    };
+    let choice = held_lengths::choose(solution, open);
+    warnings.push(choice.reason);
+    Ok(Solution { warnings, ..choice.solution })
 }
 
 /// # Errors
@@ -186,7 +193,7 @@ fn first(mut problem: Problem, screen: Screen, options: &Options) -> Stage {
     stage
 }
 
-/// The solution with the dimensions that `options` leaves open. With the right dimensions it shows better where the muscle is slack, so
+/// The solution with the dimensions that `options` leaves free. With the right dimensions it shows better where the muscle is slack, so
 /// they are found twice.
 fn with_dimensions(stage: Stage, options: &Options) -> Stage {
     let Stage { problem, screen, weights, parameters } = stage;

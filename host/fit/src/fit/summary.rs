@@ -5,8 +5,9 @@ use serde::Serialize;
 use crate::table_file::FitQuality;
 use model_core::table::MuscleTable;
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::recording::Campaign;
+use pam_data::recording::{Campaign, largest_force};
 
+use super::by_recording::{self, RecordingResidual, recording_table};
 use super::dimensions::Adjusted;
 use super::errors::{ChunkError, errors};
 use super::identifiability::{Correlations, NotDetermined, not_determined};
@@ -61,8 +62,14 @@ pub struct Summary {
     pub outliers: Vec<OutlierRow>,
     /// Fitted dimensions and mounting lengths.
     pub adjusted: Vec<Adjusted>,
-    /// What the user should know, one sentence or more each.
+    /// Residuals by recording and mounting.
+    pub recordings: Vec<RecordingResidual>,
+    /// The largest force that was measured, without readings that are no measurement, N: a scale that no fit enters.
+    pub largest_force_N: f64,
+    /// What the user must know, one sentence or more each.
     pub warnings: Vec<String>,
+    /// What makes the table useless for control; empty where nothing does ([`crate::table_faults`]).
+    pub faults: Vec<String>,
 }
 
 /// The fit at one tested pressure.
@@ -177,13 +184,16 @@ impl std::fmt::Display for Summary {
         let places = (1..4).find(|p| half >= 0.5 * 10.0_f64.powi(-p)).unwrap_or(4) as usize;
         writeln!(
             f,
-            "{}: {} rows, P0 {:.places$} ± {half:.places$} kPa, blocked force {:.1} N, rms {:.3} N",
+            "{}: {} rows, P0 {:.places$} ± {half:.places$} kPa, blocked force {:.1} N, rms {:.3} N (±: 95 % confidence interval)",
             self.muscle, self.samples, self.deadband_kPa, self.blocked_force_N, self.rms_N
         )?;
         write!(
             f,
-            "error of blocked force: {:.3} % mean, {:.3} % at most",
-            self.mean_error_pct, self.max_error_pct
+            "largest measured force {:.1} N; rms is {:.2} % of it\nerror of blocked force: {:.3} % mean, {:.3} % at most",
+            self.largest_force_N,
+            100.0 * self.rms_N / self.largest_force_N,
+            self.mean_error_pct,
+            self.max_error_pct
         )?;
         if let Some(left_out) = self.left_out_pressure_mean_error_pct {
             write!(f, "; {left_out:.3} % mean with each pressure left out in turn")?;
@@ -229,6 +239,10 @@ impl std::fmt::Display for Summary {
                 100.0 * a.determined,
                 if a.at_bound { ", at its bound" } else { "" }
             )?;
+        }
+        let residuals = recording_table(&self.recordings);
+        if !residuals.is_empty() {
+            write!(f, "\n{residuals}")?;
         }
         Ok(())
     }
@@ -282,6 +296,9 @@ pub(super) fn summarise(
         outliers: screen.outliers.iter().map(|o| outlier_row(o, campaign)).collect(),
         adjusted: problem.adjusted.clone(),
         warnings: super::warnings::warnings(solution, all.mean, left_out),
+        recordings: by_recording::of_fit(solution, campaign, residuals),
+        largest_force_N: largest_force(campaign),
+        faults: Vec::new(),
     }
 }
 

@@ -31,10 +31,15 @@ pub struct Uncertain {
     pub blocks: usize,
     /// Integrated autocorrelation time of the residuals, in points.
     pub correlation: f64,
+    /// Autocorrelation of the residuals within half-strokes, by lag in points, from lag 0.
+    pub autocorrelation: Vec<f64>,
 }
 
 /// At most this many blocks: more cost time and add nothing.
 const MOST_BLOCKS: usize = 240;
+
+/// Lags of the autocorrelation that reports show.
+const SHOWN_LAGS: usize = 60;
 
 /// Runs the jackknife. `deadband_std` is the standard deviation of a `P0` that is held, Pa.
 pub(super) fn jackknife(
@@ -45,13 +50,15 @@ pub(super) fn jackknife(
     penalty: &Symmetric,
     deadband_std: Option<f64>,
 ) -> Uncertain {
-    let correlation = correlation_time(problem, screen, weights, parameters);
+    let (standard, block) = standardised(problem, screen, weights, parameters);
+    let correlation = correlation_time(&standard, &block);
+    let shown = (0..=SHOWN_LAGS).map(|lag| autocorrelation(&standard, &block, lag)).collect();
     let blocks = blocks(problem, weights, correlation);
     let mut root = leave_out(&problem.design, parameters, weights, penalty, &blocks);
     if let Some(std) = deadband_std {
         root.append(&follow_deadband(&problem.design, weights, parameters, penalty, std));
     }
-    Uncertain { root, blocks: blocks.len(), correlation }
+    Uncertain { root, blocks: blocks.len(), correlation, autocorrelation: shown }
 }
 
 /// How all parameters follow when a held `P0` moves by `std`, Pa.
@@ -92,43 +99,45 @@ fn leave_out(
     covariance_root(&columns, design.layout().len())
 }
 
-/// `1 + 2 Σ ρ_l` of the weighted residuals within half-strokes, summed until `ρ` falls below a twentieth.
-fn correlation_time(problem: &Problem, screen: &Screen, weights: &[f64], parameters: &[f64]) -> f64 {
+/// The residuals in standard deviations of their group (NaN where a point does not take part), and the half-stroke of each.
+fn standardised(
+    problem: &Problem,
+    screen: &Screen,
+    weights: &[f64],
+    parameters: &[f64],
+) -> (Vec<f64>, Vec<u32>) {
     let residuals = problem.design.residuals(parameters);
     let scatter = scatter(problem, screen, &residuals);
     let list = &problem.points.list;
-    let standard: Vec<f64> = (0..list.len())
-        .map(|i| {
-            if weights[i] > 0.0 {
-                (residuals[i] / scatter[problem.group_of(i)]).clamp(-4.0, 4.0)
-            } else {
-                f64::NAN
-            }
-        })
-        .collect();
-    let product = |lag: usize| {
-        let (mut sum, mut n) = (0.0, 0.0);
-        for i in 0..list.len().saturating_sub(lag) {
-            let p = standard[i] * standard[i + lag];
-            if list[i].block == list[i + lag].block && p.is_finite() {
-                sum += p;
-                n += 1.0;
-            }
+    let standard = |i: usize| {
+        if weights[i] > 0.0 {
+            (residuals[i] / scatter[problem.group_of(i)]).clamp(-4.0, 4.0)
+        } else {
+            f64::NAN
         }
-        if n > 0.0 { sum / n } else { 0.0 }
     };
-    let variance = product(0);
-    let mut time = 1.0;
-    if variance > 0.0 {
-        for lag in 1..400 {
-            let rho = product(lag) / variance;
-            if rho < 0.05 {
-                break;
-            }
-            time += 2.0 * rho;
-        }
+    ((0..list.len()).map(standard).collect(), list.iter().map(|p| p.block).collect())
+}
+
+/// The autocorrelation at a lag of values that are correlated within blocks only; NaN is no value.
+///
+/// The sum of the products is divided by that of the squares of all values, not by its own count (the biased estimator: M. B. Priestley,
+/// Spectral Analysis and Time Series, Academic Press 1981, section 5.3.3). Divided by its count, a lag that only a few long blocks reach
+/// takes any value, also −1.
+fn autocorrelation(values: &[f64], block: &[u32], lag: usize) -> f64 {
+    let square: f64 = values.iter().filter(|v| v.is_finite()).map(|v| v * v).sum();
+    if !(square > 0.0) {
+        return if lag == 0 { 1.0 } else { 0.0 };
     }
-    time
+    let pairs = values.iter().zip(block).zip(values.iter().zip(block).skip(lag));
+    let products = pairs.filter(|((_, a), (_, b))| a == b).map(|((x, _), (y, _))| x * y);
+    products.filter(|p| p.is_finite()).sum::<f64>() / square
+}
+
+/// `1 + 2 Σ ρ_l`, summed until `ρ` falls below a twentieth.
+fn correlation_time(values: &[f64], block: &[u32]) -> f64 {
+    let lags = (1..400).map(|lag| autocorrelation(values, block, lag));
+    1.0 + 2.0 * lags.take_while(|rho| *rho >= 0.05).sum::<f64>()
 }
 
 /// Stretches of half-strokes, at least four correlation times long where the half-stroke is.
@@ -188,4 +197,47 @@ pub fn table_root(solution: &Solution, root: &CovarianceRoot, pressures: &[f64])
         rows.push(row);
     }
     root.transformed(&rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lag_that_one_block_reaches_says_little() {
+        // Forty short half-strokes and a long one whose ends differ in sign.
+        let mut values: Vec<f64> = (0..400).map(|i| if i % 3 == 0 { 1.0 } else { -0.5 }).collect();
+        let mut block: Vec<u32> = (0..400).map(|i| i / 10).collect();
+        values.extend((0..60).map(|i| {
+            if i < 10 {
+                2.0
+            } else if i < 50 {
+                0.0
+            } else {
+                -2.0
+            }
+        }));
+        block.extend([100; 60]);
+        let far = autocorrelation(&values, &block, 50);
+        assert!(far < 0.0 && far > -0.2, "{far}");
+        assert!((autocorrelation(&values, &block, 0) - 1.0).abs() < 1e-12);
+        assert!((0..70).all(|lag| autocorrelation(&values, &block, lag).abs() <= 1.0));
+    }
+
+    #[test]
+    fn independent_values_have_no_memory_and_a_constant_block_is_one_value() {
+        let mut state = 1_u32;
+        let mut draw = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 24) - 0.5
+        };
+        let white: Vec<f64> = (0..4000).map(|_| draw()).collect();
+        let one = vec![0; 4000];
+        assert!(correlation_time(&white, &one) < 1.3);
+        // Half-strokes of 20 points with one error each: a point is worth a twentieth.
+        let steps: Vec<f64> = (0..200).flat_map(|_| [draw(); 20]).collect();
+        let block: Vec<u32> = (0..200).flat_map(|b| [b; 20]).collect();
+        let time = correlation_time(&steps, &block);
+        assert!((18.0..21.0).contains(&time), "{time}");
+    }
 }

@@ -82,20 +82,22 @@ fn lengths(solution: &Solution, out: &mut Vec<String>) {
     let (low, high) = (points.stroke.low / l0, points.stroke.high / l0);
     let order = design.orthonormal.order;
     let one_length = design.orthonormal.rank <= 1;
+    let held = !points.held_lengths().is_empty();
+    let (slowly, more) =
+        if held { ("more lengths", "lengths further apart") } else { ("slow strokes", "a longer stroke") };
     if design.orthonormal.rank == 0 {
-        out.push(
+        out.push(format!(
             "every row is at rest length: the bladder's elasticity is not identifiable, the E_k are set to zero, and the table holds at this \
-             length only; record slow strokes"
-                .into(),
-        );
+             length only; record {slowly}"
+        ));
     } else if one_length {
         out.push(format!(
             "every row is at one length (contraction {low:.4}): P0 and elasticity cannot be separated, their intervals do not include this, \
-             and the table holds at this length only; record slow strokes"
+             and the table holds at this length only; record {slowly}"
         ));
     } else if high - low < 0.01 {
         out.push(format!(
-            "contraction covers only {low:.4} to {high:.4}: the elastic coefficients are poorly determined; record a longer stroke"
+            "contraction covers only {low:.4} to {high:.4}: the elastic coefficients are poorly determined; record {more}"
         ));
     }
     if low > 0.01 && !one_length {
@@ -111,7 +113,7 @@ fn lengths(solution: &Solution, out: &mut Vec<String>) {
     } else if design.orthonormal.rank == order && design.orthonormal.condition > 1e5 {
         out.push(format!(
             "the elastic columns have a condition number of {:.0}: single E_k are poorly determined, only their sum is well determined; \
-             use a lower order or record a longer stroke",
+             use a lower order or record {more}",
             design.orthonormal.condition
         ));
     }
@@ -140,9 +142,13 @@ fn friction(solution: &Solution, out: &mut Vec<String>) {
             out.push("no hysteresis above the noise: k_F is zero within its uncertainty".into());
         }
         if let Some((p, k)) = levels.iter().zip(&factors).find(|(_, k)| **k < -0.01) {
+            let check = if points.held_lengths().is_empty() {
+                "check the sign of the displacement, and whether force and displacement are synchronous"
+            } else {
+                "check the lengths, and whether force and pressure are synchronous"
+            };
             out.push(format!(
-                "k_F is {k:.3} at {:.0} kPa: negative friction is impossible; check the sign of the displacement, and whether force and \
-                 displacement are synchronous",
+                "k_F is {k:.3} at {:.0} kPa: negative friction is impossible; {check}",
                 p / 1e3
             ));
         }
@@ -225,9 +231,14 @@ fn reversals(solution: &Solution, out: &mut Vec<String>) {
     let points = &solution.problem.points;
     let aside = rows(solution, PointUse::NearReversal) as f64;
     if aside > 0.3 * points.rows as f64 {
+        let (short, longer) = if points.held_lengths().is_empty() {
+            ("strokes are", "longer strokes")
+        } else {
+            ("the changes of pressure are", "a larger range of pressure")
+        };
         out.push(format!(
-            "excluded: {:.0} % of the rows, just after reversals: strokes are short against the distance over which friction changes sign; \
-             record longer strokes",
+            "excluded: {:.0} % of the rows, just after reversals: {short} short against the distance over which friction changes sign; \
+             record {longer}",
             100.0 * aside / points.rows as f64
         ));
     }

@@ -29,7 +29,7 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// Every chunk of stroke at every pressure and direction counts alike, as far as its rows support it.
+    /// Every chunk of stroke at every pressure and direction has the same weight, as far as its rows support it.
     pub(super) fn of(problem: &Problem, screen: &Screen, parameters: &[f64]) -> Self {
         let points = &problem.points;
         let held = problem.pressures.held;

@@ -54,7 +54,7 @@ fn along(d: &Diagnosis, p: &Profile) -> Panel {
     panel.with("noise", Colour::Muted, Mark::Level(d.noise_N))
 }
 
-/// The chapter: in words, along each coordinate, over time.
+/// The chapter: a summary, along each coordinate, over time.
 pub(super) fn section(d: &Diagnosis) -> Section {
     let mut section = Section::new("Where the model is wrong").summarised();
     if !d.judged() {
@@ -68,7 +68,7 @@ pub(super) fn section(d: &Diagnosis) -> Section {
             d.r#where.iter().take(5).map(|r| format!("{} (p = {})", wording::region(r), figures(r.p, 2))),
         );
     }
-    // The coordinates where it sits come first, then those that also were looked at.
+    // The coordinates where the misfit is concentrated come first, then the others that were examined.
     let rank =
         |p: &Profile| d.r#where.iter().position(|r| r.coordinate == p.coordinate).unwrap_or(usize::MAX);
     let mut profiles: Vec<&Profile> = d.profiles.iter().filter(|p| p.at.len() > 1).collect();
@@ -105,7 +105,7 @@ pub(super) fn section(d: &Diagnosis) -> Section {
             if d.missing.is_empty() {
                 "Residual of the plain model. A band of even width around zero is noise."
             } else {
-                "Residual of the plain model, and with the named effects: the latter should be noise. The grey line is the force of the \
+                "Residual of the plain model, and with the named effects: of a complete model, only noise remains. The grey line is the force of the \
                  named effects; where it is larger than the residual, the tables had absorbed the rest."
             },
             panel,

@@ -167,7 +167,7 @@ pub struct DiagnosisDocument<'a> {
     schema: &'static str,
     muscle: &'a str,
     samples: usize,
-    /// False where there was nothing to judge: then nothing was fitted, and the first remark says why.
+    /// False where there was nothing to judge: then nothing was fitted, and the first remark gives the reason.
     judged: bool,
     verdict: VerdictName,
     noise_N: f64,
@@ -237,7 +237,7 @@ impl<'a> DiagnosisDocument<'a> {
 
 fn region(r: &Region) -> RegionDocument<'_> {
     let words = wording::region(r);
-    let Region { coordinate, from, to, share, rows, p, unit } = r;
+    let Region { coordinate, from, to, share, rows, p, unit, .. } = r;
     RegionDocument { coordinate, from: *from, to: *to, share: *share, rows: *rows, p: *p, unit, words }
 }
 

@@ -47,7 +47,7 @@ impl Place {
         let at: Vec<f64> =
             (0..STEPS).map(|i| low + (pressure.high - low) * i as f64 / (STEPS - 1) as f64).collect();
         let branches = ways.iter().map(|(direction, name)| {
-            // A pressure at which the muscle does not pull is the answer to no wanted force.
+            // A pressure at which the muscle does not pull produces no force.
             let pulls: Vec<f64> =
                 at.iter().copied().filter(|p| view.force(*p, x, *direction) > 0.0).collect();
             let force: Banded = pulls.iter().map(|p| view.banded_at(*p, x, *direction)).collect();

@@ -68,7 +68,7 @@ pub(super) fn load_lines(view: &View<'_>) -> Figure {
     Figure::new(
         "load-lines",
         "Force against pressure, one line per length",
-        "Dots are measured, lines are the table without friction. Each line should run through the middle of its dots.",
+        "Dots are measured, lines are the table without friction. In a good fit, each line runs through the middle of its dots.",
         panel,
     )
 }
@@ -104,12 +104,12 @@ pub(super) fn branches(view: &View<'_>) -> Figure {
     Figure::multiples(
         "loops",
         "Table against measurement, length by length",
-        "Each line should run through the middle of its branch's dots.",
+        "In a good fit, each line runs through the middle of its branch's dots.",
         panels.collect(),
     )
 }
 
-/// Every model by itself, all lengths in each panel.
+/// Each model separately, all lengths in each panel.
 pub(super) fn each_model(view: &View<'_>) -> Figure {
     let panels = view.fit.models.iter().map(|model| {
         let computed = within_reach(view, &model.force);

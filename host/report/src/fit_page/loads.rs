@@ -55,7 +55,7 @@ fn load_lines(view: &View<'_>) -> Figure {
     )
 }
 
-/// Points with a break wherever the course leaves the wanted ones, or goes over to another recording.
+/// Points with a break where the path leaves the selected ones, or another recording begins.
 pub(super) fn broken(points: impl Iterator<Item = Option<(f64, f64, u32)>>) -> (Vec<f64>, Vec<f64>) {
     let (mut x, mut y) = (Vec::new(), Vec::new());
     let mut last = None;
@@ -117,7 +117,7 @@ fn loops(view: &View<'_>) -> Figure {
         "loops",
         "Table against measurement, pressure by pressure",
         format!(
-            "Each line should run through the middle of its branch's dots. The band is the 95 % confidence interval of the table.{left}"
+            "In a good fit, each line runs through the middle of its branch's dots. The band is the 95 % confidence interval of the table.{left}"
         ),
         panels.collect(),
     )
@@ -164,7 +164,7 @@ fn repeats(view: &View<'_>) -> Vec<Repeat> {
 fn repeat(view: &View<'_>, group: usize, number: usize, branches: [(usize, usize); 2]) -> Repeat {
     let at = &view.fit.summary.pressures[group];
     let pressure = view.levels[group];
-    // The mid-line's distance from the table's, N, over points that `take` accepts: both branches count alike.
+    // The mid-line's distance from the table's, N, over points that `take` accepts: both branches have the same weight.
     let off = |take: &dyn Fn(f64) -> bool| -> Option<f64> {
         let mut sum = 0.0;
         for (from, to) in branches {

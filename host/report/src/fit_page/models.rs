@@ -63,7 +63,7 @@ fn what(model: &str) -> &'static str {
     }
 }
 
-/// Every model by itself, on the mid-lines of some pressures.
+/// Each model separately, on the mid-lines of some pressures.
 fn each(view: &View<'_>) -> Figure {
     let groups = view.some(PANELS);
     let mid = &view.fit.midline;

@@ -20,7 +20,7 @@ pub(super) fn section(view: &View<'_>) -> Section {
         header.push("k_{F}".into());
     }
     let mut table =
-        Table { caption: "Values ± half-width of the 95 % confidence interval; n. i.: not identifiable (interval includes zero)".into(), header, rows: Vec::new() };
+        Table { caption: "Values ± half-width of the 95 % confidence interval; n. i.: not identifiable (interval includes zero)".into(), header, rows: Vec::new(), links: Vec::new() };
     for p in &s.pressures {
         let mut row = vec![fixed(p.pressure_kPa, 0)];
         for (value, std) in p.E_MPa.iter().zip(&p.E_std_MPa) {

@@ -84,7 +84,7 @@ fn coordinates(view: &View<'_>) -> Figure {
     Figure::multiples(
         "residuals",
         "Residuals against each coordinate",
-        "The mean should stay at zero. Where it does not, the force depends on that coordinate in a way that the model lacks.",
+        "In a good fit, the mean stays at zero. Where it does not, the force depends on that coordinate in a way that the model lacks.",
         panels.collect(),
     )
     .shared(false, true)
@@ -144,29 +144,15 @@ fn time(view: &View<'_>) -> Figure {
 
 /// Autocorrelation of the residuals of points that follow each other within a half-stroke.
 fn memory(view: &View<'_>) -> Figure {
-    const LAGS: usize = 60;
     let points = view.points();
     let used: Vec<usize> = (0..points.len()).filter(|i| view.fitted(*i)).collect();
-    let mean = used.iter().map(|i| view.residual[*i]).sum::<f64>() / used.len().max(1) as f64;
-    let product = |lag: usize| {
-        let (mut sum, mut count) = (0.0, 0.0_f64);
-        for i in 0..points.len().saturating_sub(lag) {
-            if points[i].block == points[i + lag].block && view.fitted(i) && view.fitted(i + lag) {
-                sum += (view.residual[i] - mean) * (view.residual[i + lag] - mean);
-                count += 1.0;
-            }
-        }
-        if count > 20.0 { sum / count } else { f64::NAN }
-    };
-    let variance = product(0);
-    let lags: Vec<f64> = (0..=LAGS).map(|l| l as f64).collect();
-    let values: Vec<f64> =
-        (0..=LAGS).map(|l| if variance > 0.0 { product(l) / variance } else { f64::NAN }).collect();
+    let values = &view.fit.uncertain.autocorrelation;
+    let lags: Vec<f64> = (0..values.len()).map(|l| l as f64).collect();
     let bound = 1.96 / (used.len().max(1) as f64).sqrt();
     let correlation = view.fit.uncertain.correlation;
     let panel =
         Panel::new(Axis::new("lag in points", ""), Axis::new("autocorrelation", "").range(-1.0, 1.05))
-            .bars("residuals", Colour::Series(0), &lags, &values)
+            .bars("residuals", Colour::Series(0), &lags, values)
             .with("95 % limit for independent residuals", Colour::Alarm, Mark::Level(bound))
             .with("", Colour::Alarm, Mark::Level(-bound));
     Figure::new(

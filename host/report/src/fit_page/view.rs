@@ -173,7 +173,7 @@ impl<'a> View<'a> {
         self.band.as_ref().map_or(f64::NAN, |b| HALF_95 * b.reading_std(pressure, stroke, direction))
     }
 
-    /// Where the largest error is, in words.
+    /// Description of where the largest error is.
     pub fn worst_place(&self) -> String {
         let worst = self.fit.chunks.iter().max_by(|a, b| a.percent.abs().total_cmp(&b.percent.abs()));
         worst.map_or(String::new(), |c| {

@@ -1,4 +1,4 @@
-//! The judgement, what remains, and how rows were held out.
+//! The judgement, the residual, and how rows were held out.
 
 use pam_diagnose::verdict::{Diagnosis, Pattern, Split, Verdict};
 
@@ -13,10 +13,10 @@ pub fn verdict(d: &Diagnosis) -> String {
             "These recordings do not allow a judgement of the model.".to_owned()
         }
         Verdict::Consistent => {
-            "Model and recordings agree: no error stands above the noise and the model's stated inexactness.".to_owned()
+            "Model and recordings agree: no error exceeds the noise and the model's stated inexactness.".to_owned()
         }
         Verdict::Explained if d.missing.iter().any(|m| !m.supported) => {
-            "With the effects that were given, no error stands above the noise. The recordings do not support all of them.".to_owned()
+            "With the effects that were given, no error exceeds the noise. The recordings do not support all of them.".to_owned()
         }
         Verdict::Explained => format!("The model lacks {}. This explains its error above the noise.", list(&names)),
         Verdict::PartlyExplained => {

@@ -15,7 +15,11 @@ pub fn region(r: &Region) -> String {
     format!(
         "{:.0} % of the excess error is {}, in {:.0} % of the rows",
         100.0 * r.share,
-        place(&r.coordinate, r.from, r.to),
+        match &r.recordings[..] {
+            [] => place(&r.coordinate, r.from, r.to),
+            [one] => format!("in the recording \"{one}\""),
+            [first, .., last] => format!("in the recordings from \"{first}\" to \"{last}\""),
+        },
         100.0 * r.rows
     )
 }
@@ -75,6 +79,7 @@ mod tests {
             rows: 0.17,
             p: 0.01,
             unit: "N".into(),
+            recordings: Vec::new(),
         };
         assert_eq!(
             region(&force(-0.04)),

@@ -46,7 +46,7 @@ pub fn remark(remark: &Remark) -> String {
             slope * 1e-3
         ),
         Remark::StraightElasticity(change) => format!(
-            "E_1 {} linearly with pressure, by {:.0} % over the range. One bladder should not do this; possible causes: ends that are \
+            "E_1 {} linearly with pressure, by {:.0} % over the range. One bladder cannot do this; possible causes: ends that are \
              not cylindrical, a stretching braid, a gain error, or a slow change in the order of the tests",
             if *change > 0.0 { "rises" } else { "falls" },
             100.0 * change.abs()
@@ -103,7 +103,7 @@ fn friction_at_rest(law: RestFriction) -> String {
              keeps it open, so rows at rest are compared with a friction that decays"
         ),
         RestFriction::Follows { carries, over } => format!(
-            "while the length is held friction follows the wandering pressure (changes beyond ± {:.1} kPa, over about {:.1} kPa). The \
+            "while the length is held friction follows the drifting pressure (changes beyond ± {:.1} kPa, over about {:.1} kPa). The \
              model keeps it constant, so rows at rest are compared with a friction that follows",
             carries * 1e-3,
             over * 1e-3

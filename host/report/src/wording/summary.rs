@@ -1,4 +1,4 @@
-//! The answer for a person at a terminal who has never heard of the effect.
+//! The answer for a user at a terminal who does not know the effect.
 
 use std::fmt::Write;
 
@@ -78,9 +78,9 @@ fn header(s: &mut String, d: &Diagnosis) {
             Verdict::Consistent if !judged =>
                 "NOT JUDGED: these recordings do not allow a judgement of the model; see the remarks.",
             Verdict::Consistent =>
-                "CONSISTENT: no error stands above the noise and the model's stated inexactness.",
+                "CONSISTENT: no error exceeds the noise and the model's stated inexactness.",
             Verdict::Explained if d.missing.iter().any(|m| !m.supported) =>
-                "AS GIVEN: with the effects that were given, no error stands above the noise. The recordings do not support all of them.",
+                "AS GIVEN: with the effects that were given, no error exceeds the noise. The recordings do not support all of them.",
             Verdict::Explained => "EXPLAINED: the effects below explain the model's error above the noise.",
             Verdict::PartlyExplained =>
                 "PARTLY EXPLAINED: the effects below explain a part of the model's error above the noise.",

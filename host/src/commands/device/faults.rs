@@ -1,4 +1,4 @@
-//! `host device faults`: the latched fault, counts, and past faults; in words, with the remedy.
+//! `host device faults`: the latched fault, counts, and past faults, with the remedy.
 
 use model_core::link::endpoints::{ClearFault, GetFaults, GetPastFault};
 use model_core::link::messages::{FAULT_LOG, Fault, FaultReport, PastFault};

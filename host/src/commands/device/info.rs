@@ -12,7 +12,7 @@ use pam_data::pluralise::pluralise;
 use pam_device::{Client, Patience, Port, messages, recorder};
 
 pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()> {
-    // The versions are told even when they do not fit, and then the refusal.
+    // The versions are reported even when they do not fit, and the refusal follows.
     let greeted = Client::greet(Port::open(&port.address()?)?, Patience::default())?;
     let hello = *greeted.hello();
     drop(greeted);
@@ -40,7 +40,7 @@ pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()
         let settings = client.call::<GetSettings>(&())?;
         let about = recorder::about_device(&hello, &info, &settings);
         let mut device = about.as_object().cloned().unwrap_or_default();
-        // There it is the link's; here it names the document, and the link's stands beside it.
+        // There it is the link's; here it names the document, and the link's is beside it.
         device.remove("schema");
         console.result(text(&document::Info {
             schema: "pam-device/1",

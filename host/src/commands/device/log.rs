@@ -1,4 +1,4 @@
-//! `host device log`: what the device reports by itself, as it happens.
+//! `host device log`: the device's own reports, as they arrive.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let mut untold = 0_u64;
     while !stop.load(Ordering::Relaxed) && arguments.seconds.is_none_or(|s| begin.elapsed().as_secs_f64() < s)
     {
-        // Events tell at once; the question every second also notices a device that is gone.
+        // Events arrive immediately; the query every second also notices a device that is gone.
         if asked.is_none_or(|at| at.elapsed() >= Duration::from_secs(1)) {
             let status = client.call::<GetStatus>(&())?;
             asked = Some(Instant::now());

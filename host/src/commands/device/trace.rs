@@ -24,7 +24,7 @@ pub(super) struct Arguments {
     /// What to record, separated by commas.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', default_value = "pressure,force,asked,command")]
     variables: Vec<String>,
-    /// One record every so many ticks.
+    /// Ticks from one record to the next.
     #[arg(long, value_name = "TICKS", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     every: u16,
     /// When to begin.
@@ -46,7 +46,7 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Begin {
-    /// At once.
+    /// Immediately.
     Now,
     /// With the next start of a mode or reference.
     Start,
@@ -61,11 +61,11 @@ const VARIABLES: [(&str, Variable, &str); 19] = [
     ("force", Variable::Force, "N"),
     ("speed", Variable::Speed, "m_per_s"),
     ("direction", Variable::Direction, ""),
-    ("asked", Variable::Asked, ""),
-    ("wanted-force", Variable::WantedForce, "N"),
+    ("asked", Variable::Setpoint, ""),
+    ("wanted-force", Variable::ForceDemand, "N"),
     ("feed-forward", Variable::FeedForward, "Pa"),
     ("trim", Variable::Trim, "Pa"),
-    ("wanted-pressure", Variable::WantedPressure, "Pa"),
+    ("wanted-pressure", Variable::PressureDemand, "Pa"),
     ("command", Variable::Command, "Pa"),
     ("model-pressure", Variable::ModelPressure, "Pa"),
     ("model-force", Variable::ModelForce, "N"),

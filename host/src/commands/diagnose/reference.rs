@@ -55,7 +55,14 @@ impl Options {
 
 /// Reads recordings of an actuator that may not be described: a length needs no rest length, and without any column of displacement,
 /// length or contraction the length counts as held.
-fn read(recordings: &Recordings, muscle: Option<&MuscleDescription>, console: &Console) -> Result<Campaign> {
+///
+/// # Errors
+/// What is wrong with a file, or with an option.
+pub(crate) fn read(
+    recordings: &Recordings,
+    muscle: Option<&MuscleDescription>,
+    console: &Console,
+) -> Result<Campaign> {
     if let Some(muscle) = muscle {
         return recordings.read_watched(Reader::of(muscle), console);
     }
@@ -145,7 +152,7 @@ fn check(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Does what was asked. `taken`: standard output belongs to a file.
+/// Does what was requested. `taken`: standard output belongs to a file.
 ///
 /// # Errors
 /// Files that cannot be read or written, sides that cannot be compared.

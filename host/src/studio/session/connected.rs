@@ -23,6 +23,7 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::json_of;
 use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::error::DeviceCode;
+use pam_device::reachability::Reachability;
 use pam_device::recorder::{Recorder, about_losses, about_start, serial};
 use pam_device::run::{Plan, Steps, arm, vent};
 use pam_device::setpoint_profile::Quantity;
@@ -64,7 +65,7 @@ impl Connected {
         Self::new(address.clone(), Client::open(&address)?, None)
     }
 
-    /// Starts an emulated controller with a muscle of the bench, and connects to it. Also gives what it runs on, in words.
+    /// Starts an emulated controller with a muscle of the bench, and connects to it. Also returns a description of what it runs on.
     ///
     /// # Errors
     /// A muscle that the bench does not know, or as [`Emulated::start`] and [`Client::open`].
@@ -161,7 +162,14 @@ impl Connected {
 
     /// Takes what the controller sends for some milliseconds.
     pub(super) fn listen(&mut self, say: &broadcast::Sender<String>) -> Result<()> {
-        self.client.keep_alive()?;
+        match self.client.keep_alive() {
+            // Another program has started a mode; the page goes on showing what the controller does.
+            Err(error) if error.code() == DeviceCode::DeviceRefused => {
+                self.running = None;
+                tell(say, "bad", &error);
+            }
+            other => other?,
+        }
         let until = Instant::now() + Duration::from_millis(8);
         while let Some(topic) = self.client.topic(until.saturating_duration_since(Instant::now()))? {
             match topic {
@@ -237,10 +245,15 @@ impl Connected {
                     return Err(Error::new(DeviceCode::DeviceRefused, "the controller is disarmed")
                         .help("arm it first"));
                 }
+                let reachable = Reachability::of(&mut self.client)?;
+                if let Some(words) = reachable.and_then(|r| r.beyond(quantity, &profile)) {
+                    return Err(Error::new(DataCode::CallInvalid, words).help("ask for less"));
+                }
                 if self.status.state == State::Running && self.status.mode != quantity.mode() {
                     self.client.call::<Stop>(&())?;
                 }
-                self.status = self.client.call::<StartMode>(&Start { mode: quantity.mode() })?;
+                let session = self.client.session();
+                self.status = self.client.call::<StartMode>(&Start { mode: quantity.mode(), session })?;
                 let plan = Plan { quantity, profile, seconds: None, every_ticks: 1 };
                 self.running = Some((quantity, Steps::begin(&mut self.client, &plan)?, None));
             }
@@ -252,7 +265,7 @@ impl Connected {
                 let cleared = self.client.call_once::<ClearFault>(&());
                 self.status = self.client.call::<GetStatus>(&())?;
                 self.note_fault()?;
-                // What is wanted is that none is latched: one that is gone already is no failure.
+                // The purpose is that none is latched: one that is gone already is no failure.
                 if self.status.state == State::Fault {
                     cleared?;
                 }

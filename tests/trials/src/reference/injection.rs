@@ -121,7 +121,7 @@ fn monotone(x: &[f64], y: &[f64]) -> Vec<f64> {
 }
 
 /// Which way the pressure goes, for friction: turning points at a twentieth of the range.
-fn ways(pressure: &[f64]) -> Vec<f64> {
+pub fn ways(pressure: &[f64]) -> Vec<f64> {
     let top = pressure.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let bottom = pressure.iter().copied().fold(f64::INFINITY, f64::min);
     let limit = 0.05 * (top - bottom);
@@ -203,6 +203,22 @@ fn change(
             (each(&|i| slow[i] - run.pressure[i]), none)
         }
     }
+}
+
+/// What a change of unit size adds to the force of each row of each run, N, its pressure's share by the slope; lags of 0.1 s.
+pub fn added(runs: &[Run], effect: &str, slopes: &Slopes, moment: f64) -> Vec<Vec<f64>> {
+    let total: f64 = runs.iter().map(|r| r.time.last().copied().unwrap_or(0.0)).sum();
+    let a = if matches!(effect, "sensor-delay" | "pressure-sensor-lag") { 0.1 } else { 1.0 };
+    let mut elapsed = 0.0;
+    let mut all = Vec::new();
+    for run in runs {
+        let (dp, df) = change(effect, a, run, slopes, (elapsed, total, moment));
+        elapsed += run.time.last().copied().unwrap_or(0.0);
+        let by_pressure = &slopes.by_pressure[run.mounting];
+        let one = |i: usize| df[i] - dp[i] * Slopes::at(by_pressure, run.pressure[i]);
+        all.push((0..run.time.len()).map(one).collect());
+    }
+    all
 }
 
 /// Puts a change into runs: its force is `percent` of the largest rms. Gives the runs and the size, SI.

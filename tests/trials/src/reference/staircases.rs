@@ -64,6 +64,8 @@ pub struct Muscle {
     pub half: Half,
     /// Runs of a mounting.
     pub runs: usize,
+    /// mm.
+    pub rest_length_mm: f64,
     all: Vec<Run>,
 }
 
@@ -173,5 +175,8 @@ fn muscle(path: &Path, year: &str, list: &Sheet, rows: &[&Vec<String>]) -> Resul
     let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     let half = if DEVELOPMENT.iter().any(|d| stem.ends_with(d)) { Half::Development } else { Half::Final };
     let runs = all.iter().map(|r| r.run).max().unwrap_or(0);
-    Ok(Muscle { name: format!("{year} {}", stem.trim_start_matches("festo10_")), half, runs, all })
+    let name = format!("{year} {}", stem.trim_start_matches("festo10_"));
+    let rest = list.column("rest_length_mm")?;
+    let rest_length_mm = rows.first().ok_or("no runs")?[rest].parse()?;
+    Ok(Muscle { name, half, runs, rest_length_mm, all })
 }

@@ -105,7 +105,7 @@ fn damaged_containers_are_errors_or_their_own_rows() {
         let whole = std::fs::read(fixture(name)).unwrap();
         for k in 1..16 {
             let cut = whole.len() * k / 16;
-            // A cut may leave whole columns; then a required one is missing, or shorter than the others. What stands behind the
+            // A cut may leave whole columns; then a required one is missing, or shorter than the others. What is behind the
             // last column may be missing without harm.
             match reads(name, &whole[..cut]) {
                 Err(error) => assert_eq!(error.exit_status(), 1, "{name} cut at {cut}: {error}"),

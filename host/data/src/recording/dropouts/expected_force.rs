@@ -33,7 +33,7 @@ const CLIPPED: f64 = 1.0 / 300.0;
 
 /// Force over pressure and stroke, from the rows of a campaign away from pressure steps.
 #[derive(Debug, Clone)]
-pub(super) struct ExpectedForce {
+pub(in crate::recording) struct ExpectedForce {
     surface: ForceSurface,
     pressure: f64,
     stroke: (f64, f64),
@@ -46,7 +46,7 @@ pub(super) struct ExpectedForce {
 
 impl ExpectedForce {
     /// `None` where too few rows pull, or the force hardly changes.
-    pub(super) fn of(campaign: &Campaign, masks: &[Vec<Range<usize>>]) -> Option<Self> {
+    pub(in crate::recording) fn of(campaign: &Campaign, masks: &[Vec<Range<usize>>]) -> Option<Self> {
         let total = campaign.samples();
         let stride = (total / ROWS).max(1);
         let mut rows: Vec<[f64; 3]> = Vec::with_capacity(total / stride + 1);
@@ -110,6 +110,21 @@ impl ExpectedForce {
     /// The force of the surface, N, at a pressure in Pa and a stroke in m.
     fn force(&self, pressure: f64, stroke: f64) -> f64 {
         self.surface.force(self.scaled(pressure, stroke))
+    }
+
+    /// The force expected in a row of a recording, N: not below the lowest that was read.
+    pub(in crate::recording) fn at(&self, r: &Recording, row: usize) -> f64 {
+        self.force(r.pressure[row], r.stroke[row]).max(self.floor)
+    }
+
+    /// What the expected force leaves of the force that was read in a row, N.
+    pub(in crate::recording) fn residual(&self, r: &Recording, row: usize) -> f64 {
+        r.force.as_ref().map_or(0.0, |f| f[row]) - self.at(r, row)
+    }
+
+    /// The lowest force of the campaign, N.
+    pub(in crate::recording) fn floor(&self) -> f64 {
+        self.floor
     }
 
     /// Whether the force continues through a stretch, and for a while after, as if its pressure steps had not happened.

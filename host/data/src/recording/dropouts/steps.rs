@@ -62,7 +62,7 @@ pub(super) fn edges(campaign: &Campaign, scale: &Scale) -> Vec<Vec<usize>> {
     campaign.recordings.iter().map(|r| if r.force.is_some() { of(r) } else { Vec::new() }).collect()
 }
 
-/// Per recording the stretches that may be dropouts; `None` where there are none, or so many that they are normal for this bench.
+/// Per recording the stretches that may be dropouts; `None` where there are none, or where they are frequent enough to be normal for this bench.
 pub(super) fn masked(campaign: &Campaign, edges: &[Vec<usize>]) -> Option<Vec<Vec<Range<usize>>>> {
     let of = |(r, edges): (&Recording, &Vec<usize>)| -> Vec<Range<usize>> {
         stretches(edges, &r.time, &r.pressure).map(|s| s.rows).collect()

@@ -9,7 +9,7 @@ fn pull(pressure: f64, contraction: f64) -> f64 {
     ((pressure - 30e3) * 8e-4 * (1.0 - 3.0 * contraction).powi(2) - 600.0 * contraction).max(0.0)
 }
 
-/// A recording of strokes there and back over `most` contraction, at pressures of each row's time; the force is what `felt` makes of
+/// A recording of strokes back and forth over `most` contraction, at pressures of each row's time; the force is what `felt` makes of
 /// those.
 fn recorded(
     seconds: f64,
@@ -45,7 +45,7 @@ fn as_read(pressure: &[f64]) -> Vec<f64> {
     pressure.to_vec()
 }
 
-/// As a muscle behind a hose has it: by so many seconds later.
+/// As a muscle behind a hose has it: delayed by this time, s.
 fn behind_a_hose(seconds: f64) -> impl Fn(&[f64]) -> Vec<f64> {
     move |pressure| {
         let share = 1.0 - (-1.0 / (RATE * seconds)).exp();

@@ -116,7 +116,7 @@ impl Mistake {
 
 /// One standard atmosphere, Pa.
 pub(super) const ATMOSPHERE: f64 = 101_325.0;
-/// Ratios of units that are easily confused: the factor, and the pair of units.
+/// Ratios of units that are often confused: the factor, and the pair of units.
 const PRESSURES: [(f64, &str); 6] = [
     (6.894_757, "psi to kPa"),
     (10.0, "MPa to bar, or kPa to mbar"),
@@ -148,6 +148,7 @@ pub(super) fn mistakes(rows: &[Row]) -> impl Iterator<Item = Mistake> {
     let (low, high) =
         rows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), r| (l.min(r[1]), h.max(r[1])));
     let shifted = [
+        Mistake { column: Column::Stroke, wrong: MistakeKind::Sign },
         Mistake { column: Column::Force, wrong: MistakeKind::Sign },
         Mistake { column: Column::Stroke, wrong: MistakeKind::OtherEnd(low + high) },
         Mistake { column: Column::Pressure, wrong: MistakeKind::Absolute(ATMOSPHERE) },

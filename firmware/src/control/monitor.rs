@@ -1,0 +1,97 @@
+//! Faults of one tick, from what all watches see.
+
+use model_core::link::messages::{Fault, Mode, Side, State};
+use model_core::link::settings::Reaction;
+
+use super::Controller;
+use crate::board::Inputs;
+use crate::safety;
+use crate::watch::{Finding, Seen};
+
+/// Faults that were found in one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Found {
+    /// The first.
+    first: Option<(Side, Finding)>,
+    /// The first of those that vent under the present settings.
+    venting: Option<(Side, Finding)>,
+}
+
+impl Found {
+    /// The fault to act on: one that vents goes before one that may be held for.
+    pub(super) fn gravest(&self) -> Option<(Side, Finding)> {
+        self.venting.or(self.first)
+    }
+
+    /// The first that vents.
+    pub(super) fn venting(&self) -> Option<(Side, Finding)> {
+        self.venting
+    }
+}
+
+impl Controller {
+    /// What is a fault in the present state. A muscle that the running mode does not use is watched as if disarmed.
+    pub(super) fn watch(&mut self, inputs: &Inputs) -> Found {
+        let mut found = Found::default();
+        let (state, hold_on) = (self.machine.state(), self.settings.hold_on);
+        let mut note = |side, state, finding: Finding| {
+            if !safety::is_watched(finding.fault, state) {
+                return;
+            }
+            found.first = found.first.or(Some((side, finding)));
+            if safety::reaction(finding.fault, hold_on) == Reaction::Vent {
+                found.venting = found.venting.or(Some((side, finding)));
+            }
+        };
+        for side in Side::ALL {
+            let used = self.uses(side);
+            let readings = inputs.sides[side.index()];
+            if !used && readings.is_none() {
+                continue;
+            }
+            let actuator = &mut self.sides[side.index()];
+            let seen = Seen {
+                readings,
+                speed_m_per_s: actuator.motion.motion().speed,
+                command: actuator.command,
+                expected_pa: actuator.regulator.model_pa(),
+                model_n: actuator.model_n,
+            };
+            let state = if used { state } else { State::Disarmed };
+            actuator.watch.check(&seen, &self.settings, &mut |finding| note(side, state, finding));
+        }
+        let mut note = |fault, value, limit| {
+            note(Side::Agonist, state, Finding { fault, sensor: None, value, limit });
+        };
+        let watch = &self.settings.watch;
+        if inputs.supply_low {
+            note(Fault::BrownOut, 0.0, 0.0);
+        }
+        self.overruns = self.overruns.saturating_add(u32::from(inputs.missed_ticks));
+        self.missed_in_a_row = if inputs.missed_ticks > 0 {
+            self.missed_in_a_row.saturating_add(inputs.missed_ticks)
+        } else {
+            0
+        };
+        if self.missed_in_a_row >= watch.overrun_ticks.max(1) {
+            note(Fault::LoopOverrun, f32::from(self.missed_in_a_row), f32::from(watch.overrun_ticks));
+        }
+        self.owner_age = self.owner_age.saturating_add(1);
+        self.setpoint_age = self.setpoint_age.saturating_add(1);
+        let holds = self.sides.iter().any(|side| !side.command.vent);
+        let runs = state == State::Running && self.mode != Mode::Vent;
+        let (silence, held) = (watch.host_silence_ticks, state == State::Fault && holds);
+        if (runs || held) && !watch.autonomous && self.owner_age > silence {
+            note(Fault::HostSilence, self.owner_age as f32, silence as f32);
+        }
+        let silence = watch.silence_ticks;
+        if runs && silence > 0 && self.generator.is_set_point() && self.setpoint_age > silence {
+            note(Fault::SetPointSilence, self.setpoint_age as f32, silence as f32);
+        }
+        self.held_ticks = if held { self.held_ticks.saturating_add(1) } else { 0 };
+        if self.held_ticks > watch.hold_ticks {
+            note(Fault::HoldEnded, self.held_ticks as f32, watch.hold_ticks as f32);
+        }
+        found
+    }
+}

@@ -1,0 +1,277 @@
+//! Sensors that fail: a reading that stands still, stops at the end of its range, is dead, or drops out.
+//!
+//! A failing sensor is no physics of a muscle, but a model would name it as such. It is found from two properties together: the reading
+//! is constant (or steps away and back within one row each), and force, pressure and stroke of these rows contradict the surface of
+//! force over pressure and stroke that the other rows of the campaign have in common. A constant reading alone is no fault: a regulated
+//! pressure and a held length are constant.
+//!
+//! | fault | reading | contradiction | file |
+//! | --- | --- | --- | --- |
+//! | frozen, saturated | one exact value for many rows | the expected force, or the residual, changes meanwhile | [`constant_runs`] |
+//! | dead | one value through a recording | a force that this value excludes | [`dead_channels`] |
+//! | drop-out | a step away, and back | no other reading steps | [`jumps`] |
+//!
+//! Drop-outs of the pressure are those of [`super::dropouts`].
+
+mod constant_runs;
+mod dead_channels;
+mod jumps;
+#[cfg(test)]
+mod tests;
+
+use std::ops::Range;
+
+use super::dropouts::ExpectedForce;
+use super::{Campaign, Recording};
+use crate::pluralise::pluralise;
+use crate::statistics::{median, quantile};
+
+/// A column that a sensor reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Channel {
+    /// Gauge pressure.
+    Pressure,
+    /// Stroke.
+    Stroke,
+    /// Force.
+    Force,
+}
+
+impl Channel {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Pressure, Self::Stroke, Self::Force];
+
+    /// Its name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pressure => "pressure",
+            Self::Stroke => "stroke",
+            Self::Force => "force",
+        }
+    }
+
+    /// Its readings in a recording, SI.
+    #[must_use]
+    pub fn of(self, recording: &Recording) -> &[f64] {
+        match self {
+            Self::Pressure => &recording.pressure,
+            Self::Stroke => &recording.stroke,
+            Self::Force => recording.force.as_deref().unwrap_or(&[]),
+        }
+    }
+
+    fn of_mut(self, recording: &mut Recording) -> &mut [f64] {
+        match self {
+            Self::Pressure => &mut recording.pressure,
+            Self::Stroke => &mut recording.stroke,
+            Self::Force => recording.force.as_deref_mut().unwrap_or(&mut []),
+        }
+    }
+
+    /// A reading with its usual unit.
+    fn text(self, value: f64) -> String {
+        match self {
+            Self::Pressure => format!("{:.1} kPa", value / 1e3),
+            Self::Stroke => format!("{:.3} mm", value * 1e3),
+            Self::Force => format!("{value:.2} N"),
+        }
+    }
+}
+
+/// How a sensor fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// It repeats one value in the middle of its range.
+    Frozen,
+    /// It repeats the largest or smallest value of its recording.
+    Saturated,
+    /// It reads one value through a whole recording.
+    Dead,
+    /// It steps away and back.
+    DropOut,
+}
+
+/// Rows of a recording in which a sensor failed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorFault {
+    /// Index of the recording in the campaign.
+    pub recording: usize,
+    /// The rows in that recording, from 0.
+    pub rows: Range<usize>,
+    /// The sensor.
+    pub channel: Channel,
+    /// How it failed.
+    pub kind: Kind,
+    /// Its first reading there, SI.
+    pub value: f64,
+}
+
+/// What the campaign's other rows have in common.
+struct Usual {
+    expected: ExpectedForce,
+    /// Median size of the residual of a recording, N, taken at the median recording.
+    residual: f64,
+    /// Ranges of pressure, stroke and force without the few farthest values, SI.
+    spans: [f64; 3],
+    /// The largest usual pressure, Pa.
+    top_pressure: f64,
+}
+
+impl Usual {
+    fn of(campaign: &Campaign, skipped: &[bool]) -> Option<Self> {
+        let whole = |(r, skip): (&Recording, &bool)| if *skip { vec![0..r.len()] } else { Vec::new() };
+        let masks: Vec<Vec<Range<usize>>> = campaign.recordings.iter().zip(skipped).map(whole).collect();
+        let expected = ExpectedForce::of(campaign, &masks)?;
+        let taken = || campaign.recordings.iter().zip(skipped).filter(|(_, skip)| !**skip).map(|(r, _)| r);
+        let spans = Channel::ALL.map(|c| {
+            let mut some: Vec<f64> = taken().flat_map(|r| thinned(c.of(r))).collect();
+            quantile(&mut some, 0.998) - quantile(&mut some, 0.002)
+        });
+        let mut tops: Vec<f64> = taken().flat_map(|r| thinned(&r.pressure)).collect();
+        let top_pressure = quantile(&mut tops, 0.99);
+        let mut residuals: Vec<f64> = taken()
+            .filter(|r| r.force.is_some() && !r.is_empty())
+            .map(|r| {
+                let stride = stride(r.len());
+                let size = |i: usize| expected.residual(r, i).abs();
+                median(&mut (0..r.len()).step_by(stride).map(size).collect::<Vec<_>>())
+            })
+            .collect();
+        let residual = median(&mut residuals);
+        Some(Self { expected, residual, spans, top_pressure })
+    }
+
+    /// A change of the force, or of its residual, that the scatter of the other rows does not explain, N.
+    fn noticeable(&self, share: f64) -> f64 {
+        (share * self.spans[2]).max(CLEAR * self.residual)
+    }
+
+    /// The same for a reading that stands still in a way that is unknown of this bench, N.
+    fn noticeable_unusually(&self) -> f64 {
+        (UNUSUALLY.0 * self.spans[2]).max(UNUSUALLY.1 * self.residual)
+    }
+}
+
+/// Six times the usual residual: of a normal distribution next to nothing lies there, and friction (both branches, twice the residual
+/// that it leaves) stays below.
+const CLEAR: f64 = 6.0;
+/// For a reading that stands still in a way that is unknown of this bench: a share of the range of forces, and usual residuals (friction
+/// alone changes the residual by two).
+const UNUSUALLY: (f64, f64) = (0.05, 2.0);
+/// Some thousand rows of a recording are examined.
+const EXAMINED: usize = 4000;
+/// At most this many faults are listed one by one.
+const LISTED: usize = 4;
+
+fn stride(rows: usize) -> usize {
+    (rows / EXAMINED).max(1)
+}
+
+fn thinned(column: &[f64]) -> impl Iterator<Item = f64> + '_ {
+    column.iter().step_by(stride(column.len())).copied()
+}
+
+/// The failures of sensors in a campaign, in the order of recordings and rows. Recordings that are `skipped` (another unit, sign or zero
+/// than the others) are neither judged nor used as reference.
+pub(super) fn sensor_faults(campaign: &Campaign, skipped: &[bool]) -> Vec<SensorFault> {
+    // A dead recording bends the surface; it is found first, and the rest is judged without it.
+    let Some(usual) = Usual::of(campaign, skipped) else { return Vec::new() };
+    let mut faults = dead_channels::find(campaign, skipped, &usual);
+    let mut skipped = skipped.to_vec();
+    for fault in &faults {
+        skipped[fault.recording] = true;
+    }
+    let usual = if faults.is_empty() { Some(usual) } else { Usual::of(campaign, &skipped) };
+    let Some(usual) = usual else { return faults };
+    for (index, r) in campaign.recordings.iter().enumerate().filter(|(i, _)| !skipped[*i]) {
+        if r.force.is_none() {
+            continue;
+        }
+        let mut found = constant_runs::find(campaign, index, &usual);
+        for fault in jumps::find(campaign, index, &usual) {
+            let overlaps = |f: &SensorFault| f.rows.start < fault.rows.end && fault.rows.start < f.rows.end;
+            if !found.iter().any(overlaps) {
+                found.push(fault);
+            }
+        }
+        found.sort_by_key(|f| f.rows.start);
+        faults.extend(found);
+    }
+    faults.sort_by_key(|f| (f.recording, f.rows.start));
+    faults
+}
+
+impl SensorFault {
+    /// Replaces the failed readings by the line between those beside, good enough to follow the motion. Force stays as it was read: no
+    /// motion is derived from it.
+    pub(super) fn bridge(&self, recording: &mut Recording) {
+        if self.channel == Channel::Force || self.kind == Kind::Dead {
+            return;
+        }
+        let column = self.channel.of_mut(recording);
+        let Range { start, end } = self.rows;
+        let before = start.checked_sub(1).and_then(|i| column.get(i)).copied();
+        let after = column.get(end).copied();
+        let (Some(from), Some(to)) = (before.or(after), after.or(before)) else { return };
+        let steps = (end - start + 1) as f64;
+        for (k, v) in column[start..end].iter_mut().enumerate() {
+            *v = from + (to - from) * (k + 1) as f64 / steps;
+        }
+    }
+
+    fn place(&self, campaign: &Campaign) -> String {
+        let r = &campaign.recordings[self.recording];
+        let row = |i: usize| 1 + r.rows.as_ref().map_or(i, |rows| rows[i] as usize);
+        let value = self.channel.text(self.value);
+        if self.kind == Kind::Dead {
+            return format!("`{}`, all {}, at {value}", r.name, pluralise(r.len(), "row"));
+        }
+        let (first, last) = (self.rows.start, self.rows.end - 1);
+        format!(
+            "`{}` rows {} to {} ({:.2} to {:.2} s) at {value}",
+            r.name,
+            row(first),
+            row(last),
+            r.time[first],
+            r.time[last]
+        )
+    }
+}
+
+/// One sentence for each sensor and kind of failure: places, rows and the remedy.
+pub(super) fn describe(faults: &[SensorFault], campaign: &Campaign) -> Vec<String> {
+    let kinds = [Kind::Dead, Kind::Frozen, Kind::Saturated, Kind::DropOut];
+    let pairs = Channel::ALL.into_iter().flat_map(|c| kinds.into_iter().map(move |k| (c, k)));
+    let sentence = |(channel, kind): (Channel, Kind)| {
+        let of: Vec<&SensorFault> =
+            faults.iter().filter(|f| f.channel == channel && f.kind == kind).collect();
+        if of.is_empty() {
+            return None;
+        }
+        let (what, remedy) = match kind {
+            Kind::Dead => {
+                ("reads one value, which its other readings exclude", "check connector, supply and range")
+            }
+            Kind::Frozen => {
+                ("repeats one value while the other readings move", "check the logger and the sensor")
+            }
+            Kind::Saturated => {
+                ("stops at the end of its range", "use a sensor or an amplifier of a larger range")
+            }
+            Kind::DropOut => ("steps away and back within one row each", "check connector and cable"),
+        };
+        let name = channel.name();
+        let mut places: Vec<String> = of.iter().take(LISTED).map(|f| f.place(campaign)).collect();
+        if of.len() > LISTED {
+            places.push(format!("and {} more places", of.len() - LISTED));
+        }
+        let rows: usize = of.iter().map(|f| f.rows.len()).sum();
+        Some(format!(
+            "failed sensor: the {name} {what}; {} excluded: {}; {remedy} of the {name}",
+            pluralise(rows, "row"),
+            places.join("; ")
+        ))
+    };
+    pairs.filter_map(sentence).collect()
+}

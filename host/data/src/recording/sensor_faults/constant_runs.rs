@@ -1,0 +1,164 @@
+//! Readings that repeat one exact value while the other readings move: a frozen or a saturated sensor.
+
+use std::ops::Range;
+
+use super::{Campaign, Channel, Kind, Recording, SensorFault, Usual};
+use crate::statistics::quantile;
+
+/// Shorter runs are left to the outliers of the fit.
+const SHORTEST: usize = 10;
+/// While a reading stands still, the force changes by this share of its range beyond what the reading allows (the expected force where the
+/// force stands still, else the residual), and by this many usual residuals: friction alone changes it by two.
+const MOVES: (f64, f64) = (0.15, 6.0);
+/// Constant readings are unknown of a column whose neighbours are rarely equal in the other recordings, with no run there a tenth as long.
+const RARE: f64 = 0.2;
+const LONGER: usize = 10;
+/// Where constant readings are usual: more than this share of neighbours are equal in the other recordings.
+const MOVES_MUCH: (f64, f64) = (0.30, 6.0);
+const USUAL: f64 = 0.5;
+/// A saturated force: the expected force lies above it by this share of the range of forces.
+const ABOVE: f64 = 0.10;
+/// A reading below this share of the range of forces may be a slack muscle.
+const SLACK: f64 = 0.05;
+/// A saturated sensor reaches its end in this many rows at least, and other recordings go beyond it by this share of the range.
+const SATURATED: (usize, f64) = (10, 0.03);
+
+/// Frozen and saturated stretches of a recording.
+pub(super) fn find(campaign: &Campaign, index: usize, usual: &Usual) -> Vec<SensorFault> {
+    let r = &campaign.recordings[index];
+    let mut found = saturated_force(campaign, index, usual);
+    for channel in Channel::ALL {
+        let column = channel.of(r);
+        let habit = Habit::of(campaign, index, channel);
+        let (low, high) = ends(column);
+        for rows in runs(column) {
+            let value = column[rows.start];
+            let known =
+                |f: &SensorFault| f.channel == channel && f.rows.start < rows.end && rows.start < f.rows.end;
+            if found.iter().any(known)
+                || !contradicted(r, &rows, channel, habit.bound(rows.len(), usual), usual)
+            {
+                continue;
+            }
+            let at_end = (value == low || value == high) && low < high;
+            let kind = if at_end { Kind::Saturated } else { Kind::Frozen };
+            found.push(SensorFault { recording: index, rows, channel, kind, value });
+        }
+    }
+    found
+}
+
+/// Stretches of one exact value.
+fn runs(column: &[f64]) -> Vec<Range<usize>> {
+    let mut runs = Vec::new();
+    let mut start = 0;
+    for i in 1..=column.len() {
+        if i == column.len() || column[i] != column[start] {
+            if i - start >= SHORTEST {
+                runs.push(start..i);
+            }
+            start = i;
+        }
+    }
+    runs
+}
+
+/// How a column repeats its readings in the other recordings, or in this one where there are no others.
+struct Habit {
+    /// The share of neighbours that are equal.
+    equal: f64,
+    /// The longest run; `None` without other recordings.
+    longest: Option<usize>,
+}
+
+impl Habit {
+    fn of(campaign: &Campaign, index: usize, channel: Channel) -> Self {
+        let others: Vec<&Recording> =
+            campaign.recordings.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, r)| r).collect();
+        let alone = [&campaign.recordings[index]];
+        let (mut equal, mut all, mut longest) = (0_usize, 0_usize, 1);
+        for r in if others.is_empty() { &alone[..] } else { &others } {
+            let column = channel.of(r);
+            let mut run = 1;
+            for pair in column.windows(2) {
+                run = if pair[0] == pair[1] { run + 1 } else { 1 };
+                equal += usize::from(run > 1);
+                longest = longest.max(run);
+            }
+            all += column.len().saturating_sub(1);
+        }
+        let share = equal as f64 / all.max(1) as f64;
+        Self { equal: share, longest: (!others.is_empty()).then_some(longest) }
+    }
+
+    /// How far the force must move during a run of this many rows, N.
+    fn bound(&self, rows: usize, usual: &Usual) -> f64 {
+        let unknown = self.longest.is_some_and(|longest| rows >= LONGER * longest);
+        if self.equal < RARE && unknown {
+            return usual.noticeable_unusually();
+        }
+        let (share, residuals) = if self.equal > USUAL { MOVES_MUCH } else { MOVES };
+        (share * usual.spans[2]).max(residuals * usual.residual)
+    }
+}
+
+/// Whether the other readings exclude that this one stood still.
+fn contradicted(r: &Recording, rows: &Range<usize>, channel: Channel, bound: f64, usual: &Usual) -> bool {
+    let stride = super::stride(rows.len());
+    let spread = |of: &dyn Fn(usize) -> f64| {
+        let mut values: Vec<f64> = rows.clone().step_by(stride).map(of).collect();
+        quantile(&mut values, 0.95) - quantile(&mut values, 0.05)
+    };
+    match channel {
+        Channel::Force => {
+            let value = r.force.as_ref().map_or(0.0, |f| f[rows.start]);
+            // A slack muscle makes one force, whatever its pressure; so does a load cell that cannot read below zero.
+            value > usual.expected.floor() + SLACK * usual.spans[2]
+                && spread(&|i| usual.expected.at(r, i)) > bound
+        }
+        Channel::Pressure | Channel::Stroke => spread(&|i| usual.expected.residual(r, i)) > bound,
+    }
+}
+
+fn ends(column: &[f64]) -> (f64, f64) {
+    column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)))
+}
+
+/// Rows at the largest force of a recording that other recordings exceed: the force sensor, or the range that was set for it, ends
+/// there. A sensor that ends at one value in all recordings is found by the fit.
+fn saturated_force(campaign: &Campaign, index: usize, usual: &Usual) -> Vec<SensorFault> {
+    let r = &campaign.recordings[index];
+    let Some(force) = r.force.as_deref() else { return Vec::new() };
+    let (_, high) = ends(force);
+    let at: Vec<usize> = (0..force.len()).filter(|i| force[*i] == high).collect();
+    let next = force.iter().copied().filter(|f| *f < high).fold(f64::NEG_INFINITY, f64::max);
+    let neighbours = force.iter().filter(|f| **f == next).count();
+    let beyond = campaign
+        .recordings
+        .iter()
+        .filter_map(|o| o.force.as_deref())
+        .any(|f| f.iter().any(|f| *f > high + SATURATED.1 * usual.spans[2]));
+    // Readings of a free sensor at its largest value are about as frequent as those next to it.
+    if at.len() < SATURATED.0 || at.len() <= 3 * neighbours || !beyond {
+        return Vec::new();
+    }
+    let mut above: Vec<f64> = at.iter().map(|i| usual.expected.at(r, *i) - high).collect();
+    if !(quantile(&mut above, 0.75) > usual.noticeable(ABOVE).min(0.25 * usual.spans[2])) {
+        return Vec::new();
+    }
+    let mut stretches: Vec<Range<usize>> = Vec::new();
+    for i in at {
+        match stretches.last_mut() {
+            Some(last) if last.end == i => last.end = i + 1,
+            _ => stretches.push(i..i + 1),
+        }
+    }
+    let fault = |rows| SensorFault {
+        recording: index,
+        rows,
+        channel: Channel::Force,
+        kind: Kind::Saturated,
+        value: high,
+    };
+    stretches.into_iter().map(fault).collect()
+}

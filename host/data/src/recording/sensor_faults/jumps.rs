@@ -1,0 +1,102 @@
+//! Drop-outs of force and stroke: the reading steps away within one row and back within one row, and no other reading steps.
+
+use super::{Campaign, Channel, Kind, Recording, SensorFault, Usual};
+use crate::recording::white_noise;
+
+/// A step is at least this share of the column's range, and this many standard deviations of a reading.
+const STEP: (f64, f64) = (0.06, 12.0);
+/// The row after differs from the row before by less than this share of the step, beyond what was to be expected.
+const BACK: f64 = 0.25;
+/// Within a drop-out the reading changes by less than this share of the step from its first value.
+const STEADY: f64 = 0.25;
+/// The other columns change by less than this share of their range over the row of a step.
+const OTHERS: f64 = 0.05;
+/// Shorter drop-outs are spikes, which the outliers of the fit find.
+const SHORTEST: usize = 4;
+/// What lasts longer, s, is how the bench was driven.
+const LONGEST: f64 = 10.0;
+
+/// The drop-outs of force and stroke in a recording, in order.
+pub(super) fn find(campaign: &Campaign, index: usize, usual: &Usual) -> Vec<SensorFault> {
+    let r = &campaign.recordings[index];
+    let of = |channel: Channel| drop_outs(r, index, channel, usual);
+    [Channel::Stroke, Channel::Force].into_iter().flat_map(of).collect()
+}
+
+fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Vec<SensorFault> {
+    let column = channel.of(r);
+    let step = (STEP.0 * usual.spans[channel as usize]).max(STEP.1 * white_noise(column));
+    if !(step > 0.0) {
+        return Vec::new();
+    }
+    let others = Channel::ALL.into_iter().filter(|c| *c != channel);
+    let others: Vec<(&[f64], f64)> = others.map(|c| (c.of(r), OTHERS * usual.spans[c as usize])).collect();
+    // At constant pressure or length a column has no range, and whatever it does is noise.
+    let quiet = |i: usize| others.iter().all(|(c, most)| *most <= 0.0 || (c[i] - c[i - 1]).abs() <= *most);
+    let edge = |i: usize| (column[i] - column[i - 1]).abs() > step;
+    let mut found = Vec::new();
+    let mut i = 1;
+    while i < column.len() {
+        let end = if edge(i) && quiet(i) { end_of(r, column, i, edge) } else { None };
+        match end.filter(|end| quiet(*end) && returns(r, channel, column, i..*end, usual)) {
+            Some(end) => {
+                found.push(SensorFault {
+                    recording: index,
+                    rows: i..end,
+                    channel,
+                    kind: Kind::DropOut,
+                    value: column[i],
+                });
+                i = end + 1;
+            }
+            None => i += 1,
+        }
+    }
+    found
+}
+
+/// The row that steps back, if the reading keeps still until then.
+fn end_of(r: &Recording, column: &[f64], start: usize, edge: impl Fn(usize) -> bool) -> Option<usize> {
+    let size = column[start] - column[start - 1];
+    for i in start + 1..column.len() {
+        if r.time[i] - r.time[start] > LONGEST {
+            return None;
+        }
+        if edge(i) && (column[i] - column[i - 1]) * size < 0.0 {
+            return (i - start >= SHORTEST).then_some(i);
+        }
+        if (column[i] - column[start]).abs() > STEADY * size.abs() {
+            return None;
+        }
+    }
+    None
+}
+
+/// Whether the reading after continues the one before.
+fn returns(
+    r: &Recording,
+    channel: Channel,
+    column: &[f64],
+    rows: std::ops::Range<usize>,
+    usual: &Usual,
+) -> bool {
+    let (before, after) = (rows.start - 1, rows.end);
+    let size = (column[rows.start] - column[before]).abs();
+    let expected = match channel {
+        Channel::Force => usual.expected.at(r, after) - usual.expected.at(r, before),
+        _ => 0.0,
+    };
+    let change = column[after] - column[before];
+    // A muscle moves meanwhile: by no more than it did in as many rows before and after, if that is known.
+    let drift = |a: usize, b: usize| (column[b] - column[a]).abs();
+    let n = rows.len() + 1;
+    let around = match channel {
+        Channel::Stroke => {
+            let earlier = before.checked_sub(n).map_or(0.0, |a| drift(a, before));
+            let later = if after + n < column.len() { drift(after, after + n) } else { 0.0 };
+            1.5 * earlier.max(later)
+        }
+        _ => expected.abs() + 2.0 * usual.residual,
+    };
+    change.abs() <= BACK * size + around
+}

@@ -1,0 +1,115 @@
+use super::*;
+use crate::recording::dropouts::Screened;
+
+/// A bench of six files of loops at one pressure each, with readings of a converter of 12 bits.
+fn campaign(seed: u32) -> Campaign {
+    let mut state = seed.wrapping_mul(2_654_435_761).wrapping_add(12_345);
+    let mut noise = move |size: f64| {
+        let mut draw = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 24)
+        };
+        size * (draw() + draw() + draw() - 1.5)
+    };
+    let one = |file: usize, noise: &mut dyn FnMut(f64) -> f64| {
+        let rows = 1600;
+        let time: Vec<f64> = (0..rows).map(|i| i as f64 * 0.025).collect();
+        let phase = |t: f64| (t / 10.0).fract();
+        let travel: Vec<f64> = time.iter().map(|t| 3e-3 * (1.0 - (1.0 - 2.0 * phase(*t)).abs())).collect();
+        let level = 207e3 + 69e3 * file as f64;
+        let pressure: Vec<f64> = time.iter().map(|t| level + 1.5e3 * (t * 2.0).sin()).collect();
+        let force = (0..rows).map(|i| {
+            let contraction = travel[i] / 0.039;
+            let friction = if phase(time[i]) < 0.5 { 0.93 } else { 1.07 };
+            let f =
+                friction * ((pressure[i] - 70e3) * 2.9e-4 * (1.0 - 5.0 * contraction) - 150.0 * contraction);
+            ((f.max(0.0) + noise(0.4)) / 0.05).round() * 0.05
+        });
+        let force = force.collect();
+        Recording {
+            name: format!("loop{file}"),
+            pressure: pressure.iter().map(|p| ((p + noise(300.0)) / 50.0).round() * 50.0).collect(),
+            stroke: travel.iter().map(|x| ((x + noise(4e-6)) / 1e-6).round() * 1e-6).collect(),
+            force: Some(force),
+            time,
+            ..Recording::default()
+        }
+    };
+    Campaign::new((0..6).map(|file| one(file, &mut noise)).collect())
+}
+
+fn faults(campaign: &Campaign) -> Vec<SensorFault> {
+    Screened::of(campaign).faults
+}
+
+/// Spoils a channel of the third file.
+fn spoiled(seed: u32, channel: Channel, how: impl Fn(&mut [f64])) -> Campaign {
+    let mut campaign = campaign(seed);
+    how(channel.of_mut(&mut campaign.recordings[2]));
+    campaign
+}
+
+#[test]
+fn clean_readings_have_no_faults() {
+    for seed in 0..40 {
+        assert_eq!(faults(&campaign(seed)), Vec::new(), "seed {seed}");
+    }
+}
+
+#[test]
+fn a_frozen_reading_is_found_where_it_is() {
+    for (seed, channel) in [(1, Channel::Force), (2, Channel::Stroke)] {
+        let found = faults(&spoiled(seed, channel, |c| {
+            let value = c[450];
+            c[450..700].fill(value);
+        }));
+        assert_eq!(found.len(), 1, "{channel:?}: {found:?}");
+        assert_eq!((found[0].recording, found[0].channel, found[0].kind), (2, channel, Kind::Frozen));
+        assert!(found[0].rows.start.abs_diff(450) < 3 && found[0].rows.end.abs_diff(700) < 3, "{found:?}");
+    }
+}
+
+#[test]
+fn a_force_that_is_cut_in_one_file_is_found() {
+    let found = faults(&spoiled(3, Channel::Force, |c| c.iter_mut().for_each(|f| *f = f.min(40.0))));
+    assert!(!found.is_empty());
+    assert!(
+        found.iter().all(|f| f.recording == 2 && f.kind == Kind::Saturated && f.value == 40.0),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn a_dead_sensor_is_found_in_every_channel() {
+    for channel in Channel::ALL {
+        let found = faults(&spoiled(4, channel, |c| c.fill(0.0)));
+        assert_eq!(found.len(), 1, "{channel:?}: {found:?}");
+        assert_eq!((found[0].recording, found[0].channel, found[0].kind), (2, channel, Kind::Dead));
+    }
+}
+
+#[test]
+fn a_drop_out_of_force_or_stroke_is_found_and_told_with_its_rows() {
+    for channel in [Channel::Force, Channel::Stroke] {
+        let campaign = spoiled(5, channel, |c| {
+            let away = if channel == Channel::Force { -5.0 } else { 20e-3 };
+            c[620..640].fill(away);
+        });
+        let screened = Screened::of(&campaign);
+        let found = &screened.faults;
+        assert_eq!(found.len(), 1, "{channel:?}: {found:?}");
+        assert_eq!((found[0].rows.clone(), found[0].kind), (620..640, Kind::DropOut));
+        assert!(screened.remark().is_some_and(|told| told.contains("`loop2` rows 621 to 640")));
+        assert!(!screened.read(2)[620..640].contains(&true) && screened.read(2)[640]);
+    }
+}
+
+#[test]
+fn a_regulated_pressure_and_a_held_length_are_no_faults() {
+    let mut campaign = campaign(6);
+    for r in &mut campaign.recordings {
+        let level = (r.pressure[0] / 1e3).round() * 1e3;
+        r.pressure.fill(level);
+    }
+    assert_eq!(faults(&campaign), Vec::new());
+}

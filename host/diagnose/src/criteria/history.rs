@@ -1,0 +1,146 @@
+//! What a muscle remembers over a campaign of isometric staircases.
+//!
+//! "Eleven muscles" stands for the two public sets of isometric pressure staircases of a 10 mm fluidic muscle (eleven lengths). Law,
+//! spectrum and clock were chosen on six of them and then run once on the other five.
+
+criteria! {
+    "History of a campaign":
+    /// Largest change of a held length within one mounting.
+    MEMORY_SAME_LENGTH: f64 = 0.5e-3, "ΔL_m", "m", Derived("half of a tape measure's ±1 mm");
+    /// Rows at least this far apart are settled points already.
+    SETTLED_INTERVAL: f64 = 0.25, "Δt_s", "s", Derived("valve pulses ring for 0.2 to 0.3 s (20 Hz, damping 0.5)");
+    /// A settled point begins at this share of the pulse period.
+    WINDOW_FROM: f64 = 0.70, "w_1", "1", Derived("after the ring of a pulse of 0.5 s");
+    /// A settled point ends at this share of the pulse period.
+    WINDOW_TO: f64 = 0.94, "w_2", "1", Derived("before the next pulse");
+    /// Least autocorrelation of |dP/dt| at a pulse period.
+    LEAST_PERIODICITY: f64 = 0.15, "r_p", "1", Derived("well above 2/√n of the shortest run");
+    /// Least number of settled points of a campaign.
+    LEAST_POINTS: f64 = 40.0, "n_p", "1", Derived("some ten per spline of a mounting");
+    /// Least number of runs of a campaign.
+    LEAST_RUNS: f64 = 4.0, "n_r", "1", Derived("three degrees of freedom of the jackknife over runs");
+    /// Least share of the campaign's pressure range that a run covers to count as a staircase.
+    LEAST_SPAN: f64 = 0.3, "s_P", "1", Derived("definition of the protocol");
+    /// Weight of squared second differences of spline coefficients.
+    SMOOTHNESS: f64 = 0.02, "λ", "1", Measured("chosen on six muscles; flat optimum");
+    /// The same for the static comparison.
+    SMOOTHNESS_STATIC: f64 = 0.01, "λ_s", "1", Measured("chosen on six muscles; flat optimum");
+    /// Weight of squared spline coefficients.
+    RIDGE: f64 = 1e-6, "λ_0", "1", Derived("numerical rank only");
+    /// The tangent of the threshold starts at this share of the highest pressure.
+    THRESHOLD_FROM: f64 = 0.84, "p_1", "1", Derived("the straight part of the pull");
+    /// The tangent of the threshold ends at this share of the highest pressure.
+    THRESHOLD_TO: f64 = 0.94, "p_2", "1", Derived("below the sparse last points");
+    /// Pressure from which the bladder carries its part.
+    ENGAGED: f64 = 60.0, "P_e", "kPa", Measured("on the 29 cm muscle the squared residual is 3377 N² with it, 4396 N² with P_b in its place");
+    /// Least pressure over which the bladder's carried part builds up.
+    RAMP: f64 = 60.0, "ΔP_r", "kPa", Derived("width of the knee at full length");
+    /// Start value of the stress-free pressure, and its value where it is not identifiable.
+    BALANCE_START: f64 = 115.0, "P_b0", "kPa", Measured("best common value of eleven muscles");
+    /// Largest stress-free pressure.
+    BALANCE_MOST: f64 = 200.0, "P_b,max", "kPa", Measured("above it no muscle of the kind begins to pull");
+    /// The search for the stress-free pressure ends at smaller steps.
+    BALANCE_MOVES: f64 = 0.2, "ΔP_b", "kPa", Derived("a tenth of its usual standard error");
+    /// P_b is identifiable when a mounting pulls from less than this times P_b.
+    NEAR_BALANCE: f64 = 1.5, "r_b", "1", Derived("the sign of p_el must be seen");
+    /// Share of each Gauss-Newton step that is taken.
+    DAMPING: f64 = 0.9, "d", "1", Derived("steps across the knee overshoot");
+    /// Time after the last row until a muscle counts as vented.
+    VENT_TIME: f64 = 2.0, "t_v", "s", Derived("emptying of the last pulse");
+    /// Vented time between an earlier load and the first run.
+    VENTED_BEFORE: f64 = 30.0, "t_0", "s", Derived("change of a mounting; weakly known");
+    /// Below this number of runs pause and earlier load are chosen anew in every fold; with more runs one run does not decide them.
+    NESTED_RUNS: f64 = 20.0, "n_n", "1", Cost;
+    /// Of more runs, every so many-th is left out together (delete-a-group jackknife); a standard error by 40 groups is itself known to 11 %.
+    MOST_FOLDS: f64 = 40.0, "n_f", "1", Cost;
+    /// A row is supported when another run of the mounting reaches its pressure less this.
+    SUPPORT: f64 = 10.0, "ΔP_s", "kPa", Derived("half a pulse");
+    /// Least relaxed share that is named (2 % a decade).
+    MEMORY_LEAST_SHARE: f64 = 0.1, "c_min", "1", Measured("largest of 144 nulls 0.040; below what filled rubbers relax");
+    /// Least share of the squared unseen error that the memory must remove.
+    LEAST_GAIN: f64 = 0.15, "g_min", "1", Measured("largest of 60 nulls with ten runs 0.10");
+    /// Least number of runs of a mounting in which a lasting slip is looked for.
+    SLIP_RUNS: f64 = 6.0, "n_s", "1", Derived("two levels and their scatter");
+    /// A slip is at least this many standard errors.
+    SLIP_ERRORS: f64 = 4.0, "t_s", "1", Measured("chosen on six muscles");
+    /// Least shift of pressure that counts as a slip.
+    SLIP_LEAST: f64 = 5.0, "Δp_s", "kPa", Derived("about 0.3 mm of length; changes of pulse width make up to 4 kPa");
+    /// A slip lowers the mounting's unseen error (rms) at least by this share.
+    SLIP_GAIN: f64 = 0.2, "g_s", "1", Measured("chosen on six muscles");
+    /// Least number of runs of a mounting in which a single bad run is looked for.
+    BAD_RUN_RUNS: f64 = 5.0, "n_b", "1", Derived("median and scatter of four others");
+    /// A bad run is off by at least this many deviations of all runs.
+    BAD_RUN_ERRORS: f64 = 4.0, "t_b", "1", Measured("none named on eleven muscles as recorded");
+    /// Least offset of a bad run.
+    BAD_RUN_LEAST: f64 = 3.0, "Δp_b", "kPa", Derived("about 0.2 mm of length");
+    /// A bad run is off by this many times the next largest offset.
+    BAD_RUN_NEXT: f64 = 2.0, "r_n", "1", Derived("one run, not a drift");
+    /// A further effect is kept when the squared unseen error falls by this share.
+    MEMORY_KEPT_GAIN: f64 = 0.1, "g_k", "1", Measured("chosen on six muscles");
+    /// And when its coefficient is this many standard errors.
+    KEPT_ERRORS: f64 = 3.0, "t_k", "1", Measured("chosen on six muscles");
+    /// A settled point pulls above this share of the largest force.
+    PULLS: f64 = 0.0125, "f_p", "1", Derived("5 N of 400 N, above the offset of a load cell between sessions");
+    /// Contrasts interpolate between points at most this many knots apart.
+    NEIGHBOURS: f64 = 2.6, "Δk", "1", Derived("wider steps cut the knee");
+    /// A mounting counts as shortened above this contraction.
+    SHORTENED: f64 = 5e-3, "ε_s", "1", Derived("1 mm of 200 mm");
+    /// Time constants of the memory, one a decade. The upper end is not identifiable beyond 1000 s.
+    TIMES: ([f64; 5]) = [1.0, 10.0, 100.0, 1e3, 1e4], "tau_k", "s", Measured("one state alone is worse: 0.485 against 0.312 % of the largest force, mean of eleven muscles");
+    /// Pauses between runs that are tried where the clock does not tell them.
+    PAUSES: ([f64; 4]) = [2.5, 5.0, 12.0, 30.0], "t_p", "s", Judgement;
+    /// Times for which the muscle may have been loaded before the first run; longer ones trade against the relaxed share.
+    LOADED: ([f64; 3]) = [0.0, 100.0, 1e3], "T_0", "s", Judgement;
+    /// A single time constant is refuted when its unseen error (rms) is larger by this factor: a tenth of the squared error.
+    ENTER_REFUTES: f64 = 1.054, "enter_refutes", "1", Judgement;
+    /// How sure the name is then; and how sure where a single time constant does as well. Both are judgements, not calibrated on known truths.
+    ENTER_SURE: f64 = 0.9, "enter_sure", "1", Judgement;
+    /// Probability of a name that the unseen runs support and another name shares.
+    ENTER_UNSURE: f64 = 0.5, "enter_unsure", "1", Judgement;
+    /// An unseen error below this share of the largest force is within what the sensors of such benches resolve (0.683 N of 450 N).
+    ENTER_RESOLVED: f64 = 1.5e-3, "enter_resolved", "1", Judgement;
+    /// The static search's own boundaries of a verdict.
+    ENTER_EXPLAINED: f64 = 0.8, "enter_explained", "1", Judgement;
+    /// A muscle that had been loaded this long before the first run was not rested, s.
+    JUDGE_LOADED_LONG: f64 = 1e3, "judge_loaded_long", "s", Judgement;
+    /// The pressure of the picture of force over time, as a share of the highest.
+    JUDGE_PICTURED: f64 = 0.75, "judge_pictured", "1", Judgement;
+    /// Below this the carried part has no sign of its own, kPa.
+    LAW_NO_SIGN: f64 = 1.0, "law_no_sign", "kPa", Judgement;
+    /// Most steps of a fit.
+    LAW_MOST_STEPS: usize = 10, "law_most_steps", "1", Judgement;
+    /// Below this relaxed share nothing tells the stress-free pressure.
+    LAW_TELLS_BALANCE: f64 = 0.05, "law_tells_balance", "1", Judgement;
+    /// Step of the numeric derivative in the stress-free pressure, kPa.
+    LAW_NUDGE: f64 = 1.0, "law_nudge", "kPa", Judgement;
+    /// Longest step of the stress-free pressure, kPa.
+    LAW_BALANCE_STEP: f64 = 30.0, "law_balance_step", "kPa", Judgement;
+    /// The relaxed share has settled when it changes by less.
+    LAW_SETTLED_SHARE: f64 = 5e-4, "law_settled_share", "1", Judgement;
+    /// Shuffles; the least p is one over this.
+    PLACES_SHUFFLES: usize = 499, "places_shuffles", "1", Judgement;
+    /// A place is told when it holds at least this much more of the error than of the points.
+    PLACES_CONCENTRATED: f64 = 1.5, "places_concentrated", "1", Judgement;
+    /// And when chance gives as much no more often than this.
+    PLACES_SURE: f64 = 0.05, "places_sure", "1", Judgement;
+    /// Slopes below this say nothing about a shift, as a share of the largest.
+    RUN_OFFSET_FLAT: f64 = 0.03, "run_offset_flat", "1", Judgement;
+    /// Fewest points from which an offset is taken.
+    RUN_OFFSET_LEAST: usize = 5, "run_offset_least", "1", Judgement;
+    /// Weak prior that keeps a coefficient finite which no row determines.
+    SHIFT_FIT_PRIOR: f64 = 1e-8, "shift_fit_prior", "1", Judgement;
+    /// Shortest and longest pulse period looked for, s.
+    STAIRCASE_PERIODS: ((f64, f64)) = (0.2, 5.0), "staircase_periods", "s", Judgement;
+    /// Averages over this time where no pulses are found, s: longer than the ring of a pulse.
+    STAIRCASE_WITHOUT_PULSES: f64 = 0.5, "staircase_without_pulses", "s", Judgement;
+    /// The grid on which the period is looked for is no finer than this, s.
+    STAIRCASE_FINEST: f64 = 0.01, "staircase_finest", "s", Judgement;
+    /// Longest series whose period is looked for, in grid steps.
+    STAIRCASE_LONGEST: usize = 6_000, "staircase_longest", "1", Judgement;
+    /// The pressure has turned when it has gone back by this share of the run's range: above a regulator's ripple.
+    STAIRCASE_TURN: f64 = 0.04, "staircase_turn", "1", Judgement;
+    /// Bins of the pressure range of a staircase.
+    STAIRCASE_BINS: usize = 20, "staircase_bins", "1", Judgement;
+    /// Single time constants that the spectrum is tried against.
+    MEMORY_SINGLE_TIMES: ([f64; 2]) = [30.0, 300.0], "tau_1", "s", Judgement;
+}

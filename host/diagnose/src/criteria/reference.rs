@@ -1,0 +1,170 @@
+//! The comparison of recordings with a reference of the same actuator.
+//!
+//! "Development half" are the recordings of six 10 mm fluidic muscles (three of 2021, three of 2022) on which constants were chosen; what
+//! is claimed is measured on the other five. "By principle" means that no data chose it.
+
+use crate::reference::repeatability::Repeats;
+use crate::reference::stroked::StrokeRepeats;
+
+criteria! {
+    "Comparison with a reference":
+    /// A row is fast where the pressure moved by more than this share of its range within `FAST_WITHIN`. Ringing of valve pulses.
+    FAST_SHARE: f64 = 0.015, "fast_share", "1", Measured("ringing of valve pulses");
+    /// Time within which a fast row has moved.
+    FAST_WITHIN: f64 = 0.1, "fast_within", "s", Judgement;
+    /// Time since the last fast row until a row counts as settled: valve pulses ring at about 20 Hz for 0.2 to 0.3 s.
+    SETTLE: f64 = 0.25, "settle", "s", Measured("ringing of valve pulses");
+    /// With a smaller share of settled rows all rows count as settled: the pressure never rests.
+    FEWEST_SETTLED: f64 = 0.1, "fewest_settled", "1", Judgement;
+    /// Share of the range by which pressure or stroke must come back before it has turned: above ringing and ripple.
+    TURN: f64 = 0.05, "turn", "1", Judgement;
+    /// The turn stands after the last row within this share of the range of the extremum, so that a hold keeps its direction.
+    TURN_HOLD: f64 = 0.01, "turn_hold", "1", Judgement;
+    /// Pressure bins of a point: finer than any curve needs, coarser than rows.
+    POINT_BINS: usize = 64, "point_bins", "1", Judgement;
+    /// Intervals of the reference spline over the pressure range.
+    SPLINE_INTERVALS: usize = 14, "spline_intervals", "1", Judgement;
+    /// Factor of the penalty on the gap between the directions: it is smoother than the curve.
+    GAP_PENALTY: f64 = 10.0, "gap_penalty", "1", Judgement;
+    /// Ridge on the gap, which decides where one direction has no data.
+    GAP_RIDGE: f64 = 1e-3, "gap_ridge", "1", Judgement;
+    /// (Noise of a point / size of a run effect)²: run effects are about five times the noise of a point.
+    RUN_RIDGE: f64 = 0.04, "run_ridge", "1", Judgement;
+    /// Price of a degree of freedom in the generalised cross-validation, above 1 against undersmoothing (Kim and Gu 2004).
+    GCV_PRICE: f64 = 1.4, "gcv_price", "1", Published("Kim and Gu 2004");
+    /// Pressures of the tabulated surface.
+    GRID: usize = 101, "grid", "1", Cost;
+    /// AFTER may reach this share of the range beyond BEFORE's pressures; the rest is not comparable.
+    BEYOND: f64 = 0.05, "beyond", "1", Judgement;
+    /// Residual cells per direction.
+    CELLS: usize = 6, "cells", "1", Judgement;
+    /// Strokes nearer than this are one mounting (tape measure).
+    SAME_STROKE: f64 = 1e-3, "same_stroke", "m", Convention("tape measure, 1 mm");
+    /// Fewer common cells and a mounting is not comparable.
+    FEWEST_CELLS: usize = 4, "fewest_cells", "1", Judgement;
+    /// More cells are joined in pairs of runs, so that the covariance stays quick.
+    MOST_CELLS: usize = 840, "most_cells", "1", Cost;
+    /// Unknown pauses between runs.
+    PAUSE: f64 = 12.0, "pause", "s", Judgement;
+    /// Where the logarithmic clocks of creep begin.
+    CREEP_START: f64 = 1.0, "creep_start", "s", Judgement;
+    /// A longer pause on a shared clock, and the actuator counts as mounted anew.
+    NEW_VISIT: f64 = 3600.0, "new_visit", "s", Judgement;
+    /// First-order lags and delays that are tried on the rows of a run.
+    LAGS: ([f64; 13]) = [0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.17, 0.23, 0.3, 0.4, 0.55, 0.75], "lags", "s", Judgement;
+    /// A row further than this many median intervals from the one before says nothing about lags.
+    LAG_GAP: f64 = 3.0, "lag_gap", "1", Judgement;
+    /// Residuals of the lag score are clipped at this share of the largest force.
+    LAG_CLIP: f64 = 0.1, "lag_clip", "1", Judgement;
+    /// Spread of the lag score between runs that is always allowed: what valve timing does.
+    LAG_FLOOR: f64 = 0.010, "lag_floor", "s", Judgement;
+    /// Runs that `LAG_FLOOR` is worth.
+    LAG_RUNS: f64 = 4.0, "lag_runs", "1", Judgement;
+    /// The sizes of lags that are equally likely beforehand.
+    LAG_SIZES: ([f64; 5]) = [0.02, 0.05, 0.1, 0.2, 0.4], "lag_sizes", "s", Judgement;
+    /// Variance of a median over that of a mean.
+    MEDIAN_VARIANCE: f64 = 1.57, "median_variance", "1", Derived("pi/2");
+    /// The values for fluidic muscles; for another actuator they are a prior, and the common scale adapts.
+    REPEATS: (Repeats) = Repeats {
+        creep: 0.386,
+        creep_common: 0.273,
+        within: 2.073,
+        within_common: 1.976,
+        run: 0.202,
+        run_common: 0.159,
+        group: 0.224,
+        group_common: 0.069,
+        offset: 0.10,
+        cell: 0.10,
+        length: 0.277,
+        directions: 0.566,
+    }, "repeats", "1", Measured("restricted maximum likelihood on untouched runs of the development half, rounded; floors as said");
+    /// A mounting made anew by tape measure.
+    REMOUNT: f64 = 1e-3, "remount", "m", Convention("tape measure, 1 mm");
+    /// Observations that the prior scale is worth.
+    SCALE_PRIOR: f64 = 10.0, "scale_prior", "1", Judgement;
+    /// Independent directions that a run can teach.
+    DIRECTIONS_PER_RUN: f64 = 4.0, "directions_per_run", "1", Judgement;
+    /// Never believe that this actuator repeats more than √2 better than its class.
+    LEAST_SCALE: f64 = 0.5, "least_scale", "1", Judgement;
+    /// Sizes of a change that are equally likely beforehand, share of the largest force rms: heavy-tailed and scale-free over what is of interest; below 1 % nobody asks.
+    SIZES: ([f64; 4]) = [0.01, 0.02, 0.04, 0.08], "sizes", "1", Judgement;
+    /// Prior probability that nothing changed: four of five pairs of campaigns.
+    PRIOR_NONE: f64 = 0.80, "prior_none", "1", Judgement;
+    /// Prior probability of a change without a name.
+    PRIOR_UNKNOWN: f64 = 0.05, "prior_unknown", "1", Judgement;
+    /// Bayes factor that must be left when any one mounting is set aside: "strong evidence" (Kass and Raftery 1995).
+    GATE: f64 = 20.0, "gate", "1", Published("Kass and Raftery 1995");
+    /// Mountings from which on the gate can ask.
+    GATE_MOUNTINGS: usize = 3, "gate_mountings", "1", Judgement;
+    /// A probability from which on something is named.
+    NAMED: f64 = 0.5, "named", "1", Convention("more probable than not");
+    /// The set of names holds so much probability.
+    SET: f64 = 0.95, "set", "1", Convention("95 %");
+    /// Error of the slopes ∂F/∂P and ∂F/∂x, share of the size: by principle, they are estimated from the same recordings.
+    SLOPE_ERROR: f64 = 0.05, "slope_error", "1", Judgement;
+    /// Start points of a step that are tried, at most.
+    STEP_STARTS: usize = 24, "step_starts", "1", Cost;
+    /// Log evidence by which one course in time must lead the other to be told: e³ = 20.
+    COURSE_LEAD: f64 = 3.0, "course_lead", "1", Convention("e^3 = 20");
+    /// Names in one answer, at most.
+    MOST_CHANGES: usize = 3, "most_changes", "1", Cost;
+    /// Residual rms as a share of the largest force from which on another actuator is suspected.
+    OTHER_ACTUATOR: f64 = 0.25, "other_actuator", "1", Judgement;
+    /// Force ratios within this range do not raise the suspicion.
+    FORCE_RATIO: ((f64, f64)) = (0.7, 1.4), "force_ratio", "1", Judgement;
+    /// How near a ratio must be to a factor between units to be taken for one.
+    UNIT_NEAR: f64 = 0.05, "unit_near", "1", Judgement;
+    /// Strokes: bins over the middle of the stroke.
+    STROKE_BINS: usize = 6, "stroke_bins", "1", Judgement;
+    /// Share of the stroke left out at either end.
+    STROKE_ENDS: f64 = 0.15, "stroke_ends", "1", Judgement;
+    /// Rows slower than this share of the 70th percentile of speed are left out: turns and holds.
+    STROKE_SPEED: f64 = 0.3, "stroke_speed", "1", Judgement;
+    /// Neighbouring mean pressures that differ by less than this share of the largest are one level.
+    LEVEL: f64 = 0.04, "level", "1", Judgement;
+    /// A recording whose stroke stays within this is held.
+    HELD: f64 = 1e-3, "held", "m", Judgement;
+    /// What repeats between campaigns of strokes: shares of the largest force, or of friction.
+    STROKE_REPEATS: (StrokeRepeats) = StrokeRepeats {
+        zero: 0.002,
+        gain: 0.005,
+        level: 0.002,
+        along: 0.002,
+        friction: 0.05,
+        friction_level: 0.10,
+        friction_along: 0.10,
+    }, "stroke_repeats", "1", Judgement;
+    /// Correlation length along the stroke, share of its range.
+    STROKE_LENGTH: f64 = 0.3, "stroke_length", "1", Judgement;
+    /// Prior probability of no change for strokes, where nothing of the spread between campaigns is learned.
+    STROKE_PRIOR_NONE: f64 = 0.5, "stroke_prior_none", "1", Judgement;
+    /// Log evidence that lies this much below none needs no gate.
+    GATE_WORTH_ASKING: f64 = -1.0, "gate_worth_asking", "1", Judgement;
+    /// A part of the cells is told where it holds this much more of the energy than of the cells.
+    LOCALISE_STANDS_OUT: f64 = 1.2, "localise_stands_out", "1", Judgement;
+    /// Below this share of the usual slope the elastic part is not told from slack.
+    REPEATABILITY_PULLS: f64 = 0.05, "repeatability_pulls", "1", Judgement;
+    /// Share of the largest pressure within which a regulated one stays.
+    REPORT_REGULATED: f64 = 0.3, "report_regulated", "1", Judgement;
+    /// Moments outside this part of AFTER leave too little on one side.
+    SLIP_PART: ((f64, f64)) = (0.1, 0.95), "slip_part", "1", Judgement;
+    /// Coefficients of one curve.
+    SPLINE_COEFFICIENTS: (usize) = SPLINE_INTERVALS + 3, "spline_coefficients", "1", Derived("cubic splines");
+    /// Numerical floor of the diagonal, share of the largest force.
+    STROKED_FLOOR: f64 = 1e-4, "stroked_floor", "1", Judgement;
+    /// Rows that a stroke must have in a cell.
+    STROKES_FEWEST_ROWS: usize = 3, "strokes_fewest_rows", "1", Judgement;
+    /// The speed is a mean over so long.
+    STROKES_SPEED_OVER: f64 = 0.1, "strokes_speed_over", "s", Judgement;
+    /// Percentiles of the stroke that count as its ends.
+    STROKES_ENDS: ((f64, f64)) = (0.02, 0.98), "strokes_ends", "1", Judgement;
+    /// With more strokes than this the first pair is left out: run-in of the seal at the level.
+    STROKES_RUN_IN: usize = 4, "strokes_run_in", "1", Judgement;
+    /// Step of the slope over the length, m.
+    TABLE_SURFACE_STEP: f64 = 1e-4, "table_surface_step", "1", Judgement;
+    /// Correlation length over pressure, share of the range, and correlation between the directions of an unknown surface.
+    UNKNOWN_SMOOTH: ((f64, f64)) = (0.25, 0.5), "unknown_smooth", "1", Judgement;
+    /// Eigenvectors below this share of the largest are left out.
+    UNKNOWN_LEAST: f64 = 1e-2, "unknown_least", "1", Judgement;
+}

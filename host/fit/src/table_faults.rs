@@ -1,0 +1,174 @@
+//! What makes a table useless for control: values that no muscle has, a force that the recordings contradict, pressures that the inverse
+//! cannot find. `host fit` and `host table check` use this one list.
+
+use model_core::muscle::Muscle;
+use model_core::table::MuscleTable;
+use model_core::units::{Length, Pressure};
+
+use crate::confidence_band::HALF_95;
+use crate::table_file::{FitQuality, Uncertainty};
+
+/// Values this close to zero, as a share of the highest tested pressure or of the blocked force, count as zero: an ordinary gauge or load
+/// cell is no better.
+const NEAR_ZERO: f64 = 0.01;
+/// Creep between filling and emptying looks like a small negative friction. Its force, as a share of the blocked force, is no more than
+/// the drift of a polymer bladder over one staircase, some per cent; below this the sign or the timing of a column is wrong.
+const CREEP: f64 = 0.03;
+/// A mean error above this, percent of blocked force, is no description of the recordings: a wrong unit, sign or dimension is more likely
+/// than physics that the model lacks.
+pub const WORST_MEAN_ERROR: f64 = 10.0;
+/// The inverse may fail at this share of the tested places (pressure and contraction) at most: the corners of the range.
+const LOST_PLACES: f64 = 0.02;
+/// Places over the ranges of pressure and contraction at which the inverse is examined.
+const STEPS: usize = 20;
+
+/// What is wrong with a table, a sentence each, with the remedy; empty where nothing is.
+///
+/// ```
+/// use pam_fit::table_faults::table_faults;
+/// use pam_fit::table_file::FitQuality;
+/// use model_core::units::Pressure;
+///
+/// let mut table = model_core::table::example();
+/// assert!(table_faults(&table, None, &FitQuality::default()).is_empty());
+/// table.deadband = Pressure::from_pascals(-14e3);
+/// assert!(table_faults(&table, None, &FitQuality::default())[0].contains("P0 is -14.0 kPa"));
+/// ```
+#[must_use]
+pub fn table_faults(
+    table: &MuscleTable,
+    uncertainty: Option<&Uncertainty>,
+    quality: &FitQuality,
+) -> Vec<String> {
+    let faults = [deadband(table, uncertainty), friction(table, uncertainty), error(quality), inverse(table)];
+    faults.into_iter().flatten().collect()
+}
+
+/// Half of the 95 % confidence interval of a number of the table; zero where nothing was estimated.
+fn half_interval(uncertainty: Option<&Uncertainty>, row: usize) -> f64 {
+    let Some(u) = uncertainty else { return 0.0 };
+    let columns = u.columns as usize;
+    let root = u.root.get(row * columns..(row + 1) * columns).unwrap_or(&[]);
+    HALF_95 * root.iter().map(|s| s * s).sum::<f64>().sqrt()
+}
+
+/// A deadband below zero beyond its uncertainty.
+fn deadband(table: &MuscleTable, uncertainty: Option<&Uncertainty>) -> Option<String> {
+    let p0 = f64::from(table.deadband.pascals());
+    let half = half_interval(uncertainty, 0);
+    let least = -NEAR_ZERO * f64::from(table.tested.pressure_high.pascals());
+    (p0 < least && p0 + half < 0.0).then(|| {
+        format!(
+            "the deadband pressure P0 is {:.1} kPa: a muscle cannot pull without pressure; check the zero of the pressure sensor and the \
+             dimensions of the muscle (--fit-geometry, --fit-lengths)",
+            p0 / 1e3
+        )
+    })
+}
+
+/// A force of friction noticeably below zero, beyond its uncertainty, at a node inside the tested pressures.
+fn friction(table: &MuscleTable, uncertainty: Option<&Uncertainty>) -> Option<String> {
+    let nodes = table.nodes.len();
+    let tested = table.tested.pressure_low.pascals()..=table.tested.pressure_high.pascals();
+    let p0 = table.deadband.pascals();
+    let negative = |i: &usize| {
+        let k = f64::from(table.friction[*i]);
+        // Without elasticity the force at rest length is proportional to `P − P0`.
+        let share = f64::from((table.nodes[*i] - p0) / (table.tested.pressure_high.pascals() - p0));
+        let half = half_interval(uncertainty, 1 + table.order() * nodes + i);
+        tested.contains(&table.nodes[*i]) && k * share.clamp(0.0, 1.0) < -CREEP && k + half < 0.0
+    };
+    let worst =
+        (0..nodes).filter(negative).min_by(|a, b| table.friction[*a].total_cmp(&table.friction[*b]))?;
+    Some(format!(
+        "k_F is {:.3} at {:.0} kPa: negative friction is impossible; check the sign of the displacement, whether the readings are \
+         synchronous, and whether several pressures were tested",
+        table.friction[worst],
+        table.nodes[worst] / 1e3
+    ))
+}
+
+/// A force that the recordings contradict.
+fn error(quality: &FitQuality) -> Option<String> {
+    // A table of unknown origin has no figures.
+    let bad = quality.samples > 0 && !(quality.mean_error_percent <= WORST_MEAN_ERROR);
+    bad.then(|| {
+        format!(
+            "the table does not describe its recordings: the mean error is {:.0} % of the blocked force (bound: {WORST_MEAN_ERROR:.0} %); \
+             check units, signs and the dimensions of the muscle",
+            quality.mean_error_percent
+        )
+    })
+}
+
+/// Places in the tested range where the force falls with rising pressure, so that the inverse may not find a pressure.
+fn inverse(table: &MuscleTable) -> Option<String> {
+    let muscle = Muscle::<f64>::build(table).ok()?;
+    let l0 = f64::from(table.geometry.rest_length.metres());
+    let between =
+        |low: f32, high: f32, i: usize| f64::from(low) + f64::from(high - low) * i as f64 / STEPS as f64;
+    let (t, blocked) = (&table.tested, table.blocked_force.newtons());
+    let (mut pulling, mut lost) = (0_usize, Vec::new());
+    for i in 0..=STEPS {
+        let contraction = between(t.contraction_low, t.contraction_high, i);
+        let held = muscle.held(Length::from_metres(contraction * l0));
+        for j in 0..=STEPS {
+            let pressure = between(t.pressure_low.pascals(), t.pressure_high.pascals(), j);
+            let parts = muscle.parts(&held, Pressure::from_pascals(pressure));
+            if parts.quasi() > NEAR_ZERO * f64::from(blocked) {
+                pulling += 1;
+                if !(parts.pressure_slope >= 0.0) {
+                    lost.push((pressure, contraction));
+                }
+            }
+        }
+    }
+    let (pressure, contraction) = *lost.get(lost.len() / 2)?;
+    (lost.len() as f64 > LOST_PLACES * pulling as f64).then(|| {
+        format!(
+            "the force falls with rising pressure in {:.0} % of the tested range (about {:.0} kPa, contraction {contraction:.3}): the inverse \
+             may not find a pressure there; record more pressures and lengths, or use a lower order",
+            100.0 * lost.len() as f64 / pulling as f64,
+            pressure / 1e3
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn faults(table: &MuscleTable, uncertainty: Option<&Uncertainty>) -> Vec<String> {
+        table_faults(table, uncertainty, &FitQuality::default())
+    }
+
+    #[test]
+    fn a_value_that_its_uncertainty_explains_is_no_fault() {
+        let mut table = model_core::table::example();
+        table.friction[1] = -0.2;
+        assert!(faults(&table, None).iter().any(|f| f.contains("k_F is -0.200")));
+        let rows = 1 + table.nodes.len() * (table.order() + 1);
+        let wide =
+            Uncertainty { rows: rows as u32, columns: 1, root: vec![0.15; rows], residual_newtons: 1.0 };
+        assert!(faults(&table, Some(&wide)).is_empty());
+    }
+
+    #[test]
+    fn an_error_without_a_number_is_a_fault() {
+        let table = model_core::table::example();
+        let of = |mean_error_percent| {
+            let quality = FitQuality { samples: 10, mean_error_percent, ..FitQuality::default() };
+            table_faults(&table, None, &quality).len()
+        };
+        assert_eq!([of(3.0), of(11.0), of(f64::NAN)], [0, 1, 1]);
+    }
+
+    #[test]
+    fn a_force_that_falls_with_pressure_is_a_fault() {
+        let mut table = model_core::table::example();
+        let last = table.nodes.len() - 1;
+        table.elastic[0][last] -= 3e7;
+        let told = faults(&table, None).join(" ");
+        assert!(told.contains("may not find a pressure"), "{told}");
+    }
+}

@@ -1,0 +1,125 @@
+//! Folders and files to campaigns in the order of their dates.
+
+use std::path::{Path, PathBuf};
+
+use super::super::diagnose::reference::read as read_campaign;
+use super::super::recordings::Recordings;
+use crate::console::Console;
+use pam_data::date::{self, DateSource};
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::muscle_description::MuscleDescription;
+use pam_diagnose::timeline::Visit;
+
+/// Endings of files that are taken from a folder; others are notes, tables and pictures.
+const ENDINGS: [&str; 12] =
+    ["csv", "tsv", "txt", "dat", "gz", "zst", "mat", "h5", "hdf5", "parquet", "mcap", "log"];
+/// s of a day: recordings of one day are one campaign where the names say no more.
+const DAY: f64 = 86_400.0;
+
+/// What is to be read, and how.
+pub(super) struct Request<'a> {
+    pub paths: &'a [PathBuf],
+    pub muscle: Option<&'a MuscleDescription>,
+    pub import: Option<&'a PathBuf>,
+    pub filters: &'a [String],
+}
+
+/// A campaign and the paths of the call that make it.
+pub(super) struct Found {
+    pub visit: Visit,
+    paths: Vec<PathBuf>,
+}
+
+/// Index of the campaign that a path of the call belongs to.
+pub(super) fn position(all: &[Found], path: &Path) -> Option<usize> {
+    let same = |a: &Path| a == path || std::fs::canonicalize(a).ok() == std::fs::canonicalize(path).ok();
+    all.iter().position(|f| f.paths.iter().any(|p| same(p)))
+}
+
+/// Files of one campaign.
+struct Group {
+    name: String,
+    paths: Vec<PathBuf>,
+    files: Vec<PathBuf>,
+    /// Day of the name, by which files are joined.
+    day: Option<f64>,
+}
+
+fn name_of(path: &Path) -> String {
+    let whole = if path.is_dir() { path.file_name() } else { path.file_stem() };
+    whole.map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
+}
+
+fn recordings_in(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::unreadable(folder, &e))?;
+    let taken = |p: &PathBuf| {
+        let ending = p.extension().map(|e| e.to_string_lossy().to_lowercase());
+        p.is_file() && ending.is_some_and(|e| ENDINGS.contains(&e.as_str()))
+    };
+    let mut files: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(taken).collect();
+    files.sort();
+    if files.is_empty() {
+        return Err(Error::new(DataCode::RecordingEmpty, "the folder holds no recordings")
+            .file(folder)
+            .help("a campaign is a folder with recordings in it (CSV, Parquet, MATLAB, HDF5, MCAP); folders within it are not entered"));
+    }
+    Ok(files)
+}
+
+fn groups(paths: &[PathBuf]) -> Result<Vec<Group>> {
+    let mut all: Vec<Group> = Vec::new();
+    for path in paths {
+        let name = name_of(path);
+        if path.is_dir() {
+            all.push(Group { name, paths: vec![path.clone()], files: recordings_in(path)?, day: None });
+            continue;
+        }
+        let day = date::in_text(&name).map(|d| (d / DAY).floor());
+        match all.iter_mut().find(|g| day.is_some() && g.day == day) {
+            Some(group) => {
+                group.paths.push(path.clone());
+                group.files.push(path.clone());
+            }
+            None => all.push(Group { name, paths: vec![path.clone()], files: vec![path.clone()], day }),
+        }
+    }
+    for group in &mut all {
+        if let (Some(day), true) = (group.day, group.files.len() > 1) {
+            group.name = date::day(day * DAY);
+        }
+    }
+    Ok(all)
+}
+
+/// Reads all campaigns and puts them into the order of their dates.
+///
+/// # Errors
+/// Empty folders, files that cannot be read, a single campaign.
+pub(super) fn read(request: &Request<'_>, console: &Console) -> Result<Vec<Found>> {
+    // A history of one campaign is refused before anything is read.
+    let groups = groups(request.paths)?;
+    if groups.len() < 2 {
+        return Err(Error::new(DataCode::CallInvalid, "a history needs two campaigns or more").help(
+            "give a folder or a file for each campaign; files whose names carry the same date are one campaign",
+        ));
+    }
+    let mut all = Vec::new();
+    for group in groups {
+        let recordings = Recordings {
+            files: group.files.clone(),
+            import: request.import.cloned(),
+            filters: request.filters.to_vec(),
+        };
+        let campaign = read_campaign(&recordings, request.muscle, console)?;
+        let dated =
+            |r: &pam_data::recording::Recording| date::of_recording(&r.source, r.time.first().copied());
+        // The first recording's date is the campaign's; the least sure source of all is told.
+        let dates: Vec<(f64, DateSource)> = campaign.recordings.iter().filter_map(dated).collect();
+        let when = dates.iter().map(|d| d.0).fold(f64::INFINITY, f64::min);
+        let dated_by = dates.iter().map(|d| d.1).max().unwrap_or(DateSource::Modified);
+        let date = if when.is_finite() { when } else { 0.0 };
+        all.push(Found { visit: Visit { name: group.name, date, dated_by, campaign }, paths: group.paths });
+    }
+    all.sort_by(|a, b| a.visit.date.total_cmp(&b.visit.date));
+    Ok(all)
+}

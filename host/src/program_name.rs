@@ -1,0 +1,78 @@
+//! The two names of the program: `host`, and `pam` where a system has another `host`. Help, completions and manual pages use the name
+//! that was called.
+
+use std::ffi::OsStr;
+use std::path::Path;
+use std::sync::OnceLock;
+
+/// The name in the sources of all texts.
+const WRITTEN: &str = "host";
+/// The second name.
+const SECOND: &str = "pam";
+
+/// The name by which the program was called: `pam` or `host`.
+#[must_use]
+pub(crate) fn called() -> &'static str {
+    static NAME: OnceLock<&str> = OnceLock::new();
+    NAME.get_or_init(|| of(std::env::args_os().next().as_deref()))
+}
+
+fn of(argument: Option<&OsStr>) -> &'static str {
+    let stem = argument.and_then(|a| Path::new(a).file_stem());
+    if stem == Some(OsStr::new(SECOND)) { SECOND } else { WRITTEN }
+}
+
+/// The command line with the called name in its examples.
+#[must_use]
+pub(crate) fn renamed(command: clap::Command) -> clap::Command {
+    let name = called();
+    if name == WRITTEN { command } else { with_name(command.name(name), name) }
+}
+
+fn with_name(command: clap::Command, name: &str) -> clap::Command {
+    let help = command.get_after_help().map(|help| in_text(&help.to_string(), name));
+    let command = match help {
+        Some(help) => command.after_help(help),
+        None => command,
+    };
+    command.mut_subcommands(|sub| with_name(sub, name))
+}
+
+/// `text` with the program called `name` where it stands as a command: at the start of a line or of a shell command, or in backquotes.
+fn in_text(text: &str, name: &str) -> String {
+    let mut renamed = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find(WRITTEN) {
+        let (before, from) = rest.split_at(at);
+        let after = &from[WRITTEN.len()..];
+        let line = before.rsplit('\n').next().unwrap_or(before).trim_end();
+        let begins = line.is_empty() && (before.is_empty() || before.ends_with([' ', '\n']));
+        let command =
+            (begins || line.ends_with(['`', '|', '&', ':', ';', '('])) && after.starts_with([' ', '-', '`']);
+        renamed += before;
+        renamed += if command { name } else { WRITTEN };
+        rest = after;
+    }
+    renamed + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_is_that_of_the_file_that_was_called() {
+        let of = |path: &str| of(Some(OsStr::new(path)));
+        assert_eq!(
+            [of("/usr/bin/pam"), of("pam.exe"), of("host"), of("./renamed")],
+            ["pam", "pam", "host", "host"]
+        );
+    }
+
+    #[test]
+    fn only_commands_take_the_called_name() {
+        let text = "Examples:\n  host fit a.csv && host flash b\n  host man | man -l -   # then: host-fit\nthe host program, `host vent`";
+        let said = "Examples:\n  pam fit a.csv && pam flash b\n  pam man | man -l -   # then: pam-fit\nthe host program, `pam vent`";
+        assert_eq!(in_text(text, "pam"), said);
+    }
+}

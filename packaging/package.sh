@@ -1,0 +1,90 @@
+#!/usr/bin/env bash
+# Packages of the host program: a static Linux binary in an archive, a Debian package, a Homebrew formula, or the archive of a binary that
+# was built elsewhere. Each contains both names of the program, shell completions, manual pages, and the licences.
+#
+#   packaging/package.sh [--binary FILE] [--platform NAME] [--output FOLDER] [--no-deb]
+#
+# Without --binary a static binary is built for this machine: with the musl target where it is installed, else with a static glibc.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+binary="" platform="" output="dist" deb=yes
+while [ $# -gt 0 ]; do
+    case "$1" in
+        --binary) binary="$2"; shift 2 ;;
+        --platform) platform="$2"; shift 2 ;;
+        --output) output="$2"; shift 2 ;;
+        --no-deb) deb=no; shift ;;
+        *) echo "unknown option: $1" >&2; exit 2 ;;
+    esac
+done
+
+version=$(sed -n '/^\[workspace.package\]/,/^\[/s/^version = "\(.*\)"/\1/p' Cargo.toml)
+machine=$(uname -m)
+
+if [ -z "$binary" ]; then
+    target="$machine-unknown-linux-musl"
+    if ! ls "$(rustc --print sysroot)/lib/rustlib" | grep -qx "$target"; then
+        target="$machine-unknown-linux-gnu"
+        export RUSTFLAGS="${RUSTFLAGS:-} -C target-feature=+crt-static"
+    fi
+    cargo build --release --locked -p host --bin host --target "$target" >&2
+    binary="${CARGO_TARGET_DIR:-target}/$target/release/host"
+fi
+platform=${platform:-linux-$machine}
+case "$platform" in windows*) suffix=.exe ;; *) suffix="" ;; esac
+
+# The tree of the package. A binary of another platform cannot print its own completions; then that of this machine does.
+tool="$binary"
+if ! "$tool" --version > /dev/null 2>&1; then tool=${PAM_TOOL:?"set PAM_TOOL to a program that runs on this machine"}; fi
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+name="pam-$version-$platform"
+tree="$work/$name"
+mkdir -p "$tree/bin" "$tree/share/man/man1" "$tree/share/bash-completion/completions" "$tree/share/zsh/site-functions" \
+    "$tree/share/fish/vendor_completions.d" "$tree/share/doc/pam"
+install -m 755 "$binary" "$tree/bin/host$suffix"
+# One file under two names: the program looks at the name by which it was called.
+if [ -z "$suffix" ]; then ln "$tree/bin/host" "$tree/bin/pam"; else cp "$tree/bin/host$suffix" "$tree/bin/pam$suffix"; fi
+for called in host pam; do
+    ln -sf "$(realpath "$tool")" "$work/$called"
+    "$work/$called" completions bash > "$tree/share/bash-completion/completions/$called"
+    "$work/$called" completions zsh > "$tree/share/zsh/site-functions/_$called"
+    "$work/$called" completions fish > "$tree/share/fish/vendor_completions.d/$called.fish"
+done
+"$work/pam" --quiet man -o "$tree/share/man/man1"
+cp LICENSE-APACHE LICENSE-MIT README.md CHANGELOG.md "$tree/share/doc/pam/"
+echo "$version" > "$tree/share/doc/pam/VERSION"
+
+mkdir -p "$output"
+tar -C "$work" --owner=0 --group=0 --sort=name -czf "$output/$name.tar.gz" "$name"
+sum=$(sha256sum "$output/$name.tar.gz" | cut -d' ' -f1)
+
+if [ "$deb" = yes ] && [ -z "$suffix" ] && [ "${platform%%-*}" = linux ]; then
+    # `host` belongs to another Debian package (bind9-host): only `pam` is installed beside it.
+    root="$work/deb"
+    mkdir -p "$root/DEBIAN" "$root/usr/bin"
+    cp "$tree/bin/pam" "$root/usr/bin/pam"
+    cp -r "$tree/share" "$root/usr/share"
+    rm "$root/usr/share/bash-completion/completions/host" "$root/usr/share/zsh/site-functions/_host" \
+        "$root/usr/share/fish/vendor_completions.d/host.fish"
+    gzip -9n "$root"/usr/share/man/man1/*.1
+    cat LICENSE-MIT LICENSE-APACHE > "$root/usr/share/doc/pam/copyright"
+    case "$machine" in x86_64) arch=amd64 ;; aarch64) arch=arm64 ;; *) arch=$machine ;; esac
+    cat > "$root/DEBIAN/control" <<CONTROL
+Package: pam
+Version: $version
+Architecture: $arch
+Maintainer: The authors of the program <maintainers@localhost>
+Section: science
+Priority: optional
+Description: tables, control and diagnosis of pneumatic artificial muscles
+ Fits the table of a pneumatic artificial muscle to recordings, sends it to a
+ controller, and finds what the model leaves out.
+CONTROL
+    chmod -R u=rwX,go=rX "$root"
+    dpkg-deb --root-owner-group --build "$root" "$output/pam_${version}_$arch.deb" > /dev/null
+fi
+
+sed -e "s/@VERSION@/$version/g" -e "s/@SHA256@/$sum/g" -e "s/@ARCHIVE@/$name.tar.gz/g" packaging/pam.rb.in > "$output/pam.rb"
+echo "$output/$name.tar.gz"

@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# Packs a binary, unpacks every package, and runs the program from it.
+#   packaging/test.sh [BINARY]     without one, a static binary is built
+set -euo pipefail
+cd "$(dirname "$0")/.."
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+packaging/package.sh ${1:+--binary "$1"} --output "$work/dist"
+fail() { echo "packaging: $1" >&2; exit 1; }
+
+mkdir "$work/archive" "$work/deb"
+tar -C "$work/archive" --strip-components=1 -xzf "$work"/dist/pam-*.tar.gz
+for called in pam host; do
+    "$work/archive/bin/$called" --version | grep -q "^$called " || fail "$called does not run from the archive"
+done
+grep -q pam "$work/archive/share/bash-completion/completions/pam" || fail "no completions for bash"
+for file in LICENSE-MIT LICENSE-APACHE VERSION; do
+    test -s "$work/archive/share/doc/pam/$file" || fail "$file is missing in the archive"
+done
+if [ -z "${1:-}" ] && command -v ldd > /dev/null; then
+    ldd "$work/archive/bin/pam" 2>&1 | grep -Eq "not a dynamic executable|statically linked" || fail "the binary is not static"
+fi
+
+if command -v dpkg-deb > /dev/null; then
+    dpkg-deb -x "$work"/dist/pam_*.deb "$work/deb"
+    "$work/deb/usr/bin/pam" --version | grep -q "^pam " || fail "pam does not run from the Debian package"
+    test ! -e "$work/deb/usr/bin/host" || fail "the Debian package would replace another package's host"
+    test -s "$work/deb/usr/share/doc/pam/copyright" || fail "the Debian package lacks its licences"
+    test -s "$work/deb/usr/share/man/man1/pam-fit.1.gz" || fail "the Debian package lacks manual pages"
+fi
+grep -q "sha256 \"[0-9a-f]\{64\}\"" "$work/dist/pam.rb" || fail "the formula has no check sum"
+echo "packaging: archive, Debian package and formula are complete"

@@ -1,0 +1,49 @@
+//! The JSON Schemas in `docs/schema`, for tests of what the program prints.
+//!
+//! ```
+//! let schemas = published_schemas::Schemas::read().unwrap();
+//! let document = serde_json::json!({ "schema": "pam-fit/1" });
+//! let errors = schemas.check(&document).unwrap();
+//! assert!(errors.iter().any(|e| e.contains("required")));
+//! ```
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde_json::Value;
+
+/// All published schemas by name, such as `pam-fit/1`.
+pub struct Schemas(BTreeMap<String, Value>);
+
+impl Schemas {
+    /// Reads `docs/schema`, where `pam-fit/1` is `pam-fit-1.json`.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is not JSON.
+    pub fn read() -> std::io::Result<Self> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/schema");
+        let mut all = BTreeMap::new();
+        for file in std::fs::read_dir(folder)? {
+            let path = file?.path();
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            all.insert(stem, serde_json::from_slice(&std::fs::read(&path)?)?);
+        }
+        Ok(Self(all))
+    }
+
+    /// The names in the form of the files, such as `pam-fit-1`.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.0.keys().map(String::as_str)
+    }
+
+    /// The violations of a document's own schema, each with its place; empty for a valid document.
+    ///
+    /// # Errors
+    /// The document does not name a published schema, or the schema itself is invalid.
+    pub fn check(&self, document: &Value) -> Result<Vec<String>, String> {
+        let name = document["schema"].as_str().ok_or("the document names no schema")?.replace('/', "-");
+        let schema = self.0.get(&name).ok_or_else(|| format!("schema {name} is not published"))?;
+        let validator = jsonschema::validator_for(schema).map_err(|e| e.to_string())?;
+        Ok(validator.iter_errors(document).map(|e| format!("{e} at {}", e.instance_path())).collect())
+    }
+}
