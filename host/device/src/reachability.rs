@@ -89,9 +89,9 @@ impl Reachability {
         let inside = side.pressure_pa <= 1.02 * tested.pressure_high.pascals()
             && (tested.contraction_low - slack..=tested.contraction_high + slack).contains(&contraction);
         self.outside_tested += u64::from(!inside);
-        if quantity == Quantity::Force && sample.asked.is_finite() {
+        if quantity == Quantity::Force && sample.setpoint.is_finite() {
             let held = self.muscle.held(Length::from_metres(side.stroke_m));
-            let force = Force::from_newtons(sample.asked);
+            let force = Force::from_newtons(sample.setpoint);
             let found = self.muscle.pressure_for(force, &held, 0.0, self.guess, &self.muscle.search());
             self.guess = found.pressure;
             match found.reach {
@@ -103,7 +103,7 @@ impl Reachability {
         }
     }
 
-    /// The seconds of each, for so many samples in a second.
+    /// The seconds of each, for n samples in a second.
     #[must_use]
     pub fn to_json(&self, per_s: f64) -> Value {
         let seconds = |samples: u64| samples as f64 / per_s;
@@ -145,5 +145,41 @@ impl Reachability {
                 tested.contraction_high
             )
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model_core::link::messages::Reference;
+
+    fn of_example() -> Reachability {
+        let table = model_core::table::example();
+        let muscle = Muscle::build(&table).expect("the example is valid");
+        Reachability {
+            table,
+            muscle,
+            guess: Pressure::ZERO,
+            samples: 0,
+            beyond_blocked_force: 0,
+            below_deadband: 0,
+            not_rising: 0,
+            outside_tested: 0,
+        }
+    }
+
+    #[test]
+    fn what_the_muscle_cannot_do_is_known_before_it_moves() {
+        let reach = of_example();
+        let constant = |value| SetpointProfile::Constant(value);
+        let said = reach.beyond(Quantity::Pressure, &constant(9000e3)).expect("beyond");
+        assert!(said.contains("9000 kPa") && said.contains("600 kPa"), "{said}");
+        let said = reach.beyond(Quantity::Force, &constant(500.0)).expect("beyond");
+        assert!(said.starts_with("500 N is asked for, and the muscle pulls at most 1"), "{said}");
+        let sine =
+            SetpointProfile::Wave(Reference::Sine { mean: 100.0, amplitude: 150.0, frequency_hz: 1.0 });
+        assert!(reach.beyond(Quantity::Force, &sine).is_some());
+        assert_eq!(reach.beyond(Quantity::Force, &constant(100.0)), None);
+        assert_eq!(reach.beyond(Quantity::Pressure, &constant(600e3)), None);
     }
 }
