@@ -131,7 +131,7 @@ pub fn run(what: &Campaigns) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(&folder)?;
     let mut specs = specs(what.muscles);
     if what.short {
-        specs.truncate(4);
+        specs.truncate(2);
     }
     let begun = Instant::now();
     let over = || what.minutes.is_some_and(|m| begun.elapsed().as_secs_f64() > 60.0 * m);

@@ -13,7 +13,8 @@ pub fn page(all: &[Trial], drawn: usize) -> String {
          wrote this page; nothing on it is typed by hand. Muscles of the virtual bench conceal one effect, two, or none, of 1 to 6 % of the \
          blocked force (seed {SEED}). Each method has {:.0} minutes of bench time, and the same diagnosis reads what it recorded. The \
          bounds and the seed were committed before the first scored run. Rates have exact 95 % intervals. {} of {drawn} muscles of the \
-         set were tried.\n\n## Diagnosis\n\n",
+         set were tried.\n\n## Diagnosis\n\nOne name left and right: at least one effect is named, every name stands without competitors, and every \
+         name is hidden; of two hidden effects one may be missing.\n\n",
         BENCH_S / 60.0,
         all.len()
     );
