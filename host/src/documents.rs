@@ -6,8 +6,8 @@ pub(crate) mod effects;
 pub(crate) mod evaluate;
 #[cfg(test)]
 mod fit;
-pub(crate) mod history;
 pub(crate) mod fleet;
+pub(crate) mod history;
 pub(crate) mod predict;
 pub(crate) mod table;
 
