@@ -15,12 +15,12 @@ pub struct Readings {
     pub force_n: f32,
 }
 
-/// What one regulator and its dump valve are told.
+/// What one regulator and its dump valve are reported.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Command {
-    /// Gauge pressure that the regulator is asked for, Pa; above zero beside an open dump valve in the test of that valve only.
+    /// Gauge pressure that the regulator is requested, Pa; above zero beside an open dump valve in the test of that valve only.
     pub pressure_pa: f32,
-    /// Open the dump valve, whatever the pressure says.
+    /// Open the dump valve, regardless of the pressure says.
     pub vent: bool,
 }
 
@@ -47,13 +47,13 @@ pub struct Inputs {
 pub struct Outputs {
     /// Command to each regulator.
     pub sides: [Command; 2],
-    /// What is asked for, for a plant that logs it.
-    pub asked: f32,
+    /// the setpoint, for a plant that logs it.
+    pub setpoint: f32,
 }
 
 impl Outputs {
     /// Every muscle vented: what a board does before the first step.
-    pub const VENT: Self = Self { sides: [Command::VENT; 2], asked: 0.0 };
+    pub const VENT: Self = Self { sides: [Command::VENT; 2], setpoint: 0.0 };
 }
 
 /// The sensors and regulators of a board, which also keep its time: one return is one control tick.
@@ -71,7 +71,7 @@ pub struct Span {
     pub high: f32,
 }
 
-/// What a board's converters and regulator can do, whatever the settings say. A watch or a limit outside a span could never trip,
+/// What a board's converters and regulator can do, regardless of the settings say. A watch or a limit outside a span could never trip,
 /// so settings are refused there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hardware {

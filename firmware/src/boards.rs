@@ -1,4 +1,4 @@
-//! One file per board. Nothing outside this folder asks which board it is.
+//! One file per board. Nothing outside this folder queries which board it is.
 
 #[cfg(feature = "mps2-an386")]
 mod mps2_an386;

@@ -1,13 +1,13 @@
-//! The control step: readings and what was asked for, to commands. One pure function of its state, each millisecond.
+//! The control step: readings and the setpoint, to commands. One pure function of its state, each millisecond.
 //!
 //! ```text
-//! set-point ─► mode ─► wanted force ─► inverse of the table ─► + trim ─► limits, slew ─► regulator ─► command
+//! setpoint ─► mode ─► demanded force ─► inverse of the table ─► + trim ─► limits, slew ─► regulator ─► command
 //!                          ▲                  ▲                   ▲
 //!                       stroke            stroke, direction    load cell
 //! ```
 //! Watches look at every tick before the command is made, so a fault changes the command of the tick it is noticed in.
 
-use model_core::link::messages::{Fault, FaultReport, Mode, Side, State};
+use model_core::link::messages::{Fault, FaultReport, Mode, Session, Side, State};
 use model_core::link::settings::{Reaction, Settings};
 use model_core::motion::{MotionSettings, MotionTracker};
 use model_core::single;
@@ -27,7 +27,7 @@ mod actuator;
 mod arming;
 mod check;
 mod drive;
-mod look_out;
+mod monitor;
 mod record;
 mod requests;
 
@@ -44,9 +44,9 @@ fn motion_settings(settings: &Settings) -> MotionSettings<f32> {
     }
 }
 
-/// What the host is to hear of; the report of a fault is the latched one.
+/// What the host is to receive; the report of a fault is the latched one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum News {
+enum Notice {
     Fault,
     State(State),
     TraceFull,
@@ -59,18 +59,20 @@ pub struct Controller {
     hardware: &'static Hardware,
     machine: Machine,
     arming: Arming,
-    /// Whether somebody has to send settings before the device can be armed.
+    /// Whether someone has to send settings before the device can be armed.
     unconfirmed: bool,
     mode: Mode,
     generator: Generator,
-    asked: f32,
-    asked_second: f32,
-    /// What will be asked when a command of this tick has come to act, as far as it is known, and how it came there in this tick.
-    coming: f32,
-    coming_step: f32,
-    asked_age: u32,
-    /// Ticks since a host's last frame.
-    host_age: u32,
+    setpoint: f32,
+    setpoint_second: f32,
+    /// What will be queried when a command of this tick has come to act, as far as it is known, and how it came there in this tick.
+    lookahead: f32,
+    lookahead_step: f32,
+    setpoint_age: u32,
+    /// The session that armed the device or started its mode.
+    owner: Session,
+    /// Ticks since the owner's last keep-alive request.
+    owner_age: u32,
     /// Ticks for which a fault has held the last command.
     held_ticks: u32,
     sides: [Actuator; 2],
@@ -83,9 +85,9 @@ pub struct Controller {
     telemetry_countdown: u16,
     telemetry_number: u16,
     trace: Trace,
-    /// A finding of the last tick: what would stand in the way of clearing.
+    /// A finding of the last tick: what would be in the way of clearing.
     present: Option<Fault>,
-    news: Option<News>,
+    notice: Option<Notice>,
     step_us: f32,
 }
 
@@ -106,12 +108,13 @@ impl Controller {
             machine: Machine::default(),
             mode: Mode::Vent,
             generator: Generator::default(),
-            asked: 0.0,
-            asked_second: 0.0,
-            coming: 0.0,
-            coming_step: 0.0,
-            asked_age: 0,
-            host_age: 0,
+            setpoint: 0.0,
+            setpoint_second: 0.0,
+            lookahead: 0.0,
+            lookahead_step: 0.0,
+            setpoint_age: 0,
+            owner: Session::default(),
+            owner_age: 0,
             sides: [Actuator::new(settings, first), Actuator::new(settings, second)],
             settings: *settings,
             pair: PairState::default(),
@@ -124,7 +127,7 @@ impl Controller {
             telemetry_number: 0,
             trace: Trace::default(),
             present: None,
-            news: None,
+            notice: None,
             step_us: 0.0,
         }
     }
@@ -164,7 +167,7 @@ impl Controller {
         self.overruns
     }
 
-    /// Ticks in which a wish was out of reach.
+    /// Ticks in which a demand was saturated.
     pub fn saturated_ticks(&self) -> u32 {
         self.saturated_ticks
     }
@@ -198,14 +201,14 @@ impl Controller {
         }
     }
 
-    /// The kept settings could not be trusted: nothing can be armed until somebody has sent settings.
+    /// The kept settings could not be trusted: nothing can be armed until someone has sent settings.
     pub fn distrust_settings(&mut self) {
         self.unconfirmed = true;
         let finding = Finding { fault: Fault::SettingsInvalid, sensor: None, value: 0.0, limit: 0.0 };
         self.raise(Side::Agonist, &finding);
     }
 
-    /// Settings were sent by somebody who has seen them.
+    /// Settings were sent by someone who has seen them.
     pub fn confirm_settings(&mut self) {
         self.unconfirmed = false;
     }
@@ -240,12 +243,7 @@ impl Controller {
         self.sides[side.index()].model.clear();
     }
 
-    /// A whole frame of a host has come.
-    pub fn heard(&mut self) {
-        self.host_age = 0;
-    }
-
-    /// One telemetry sample every so many ticks, 0 for none.
+    /// One telemetry sample every n ticks, 0 for none.
     pub fn set_telemetry(&mut self, every_ticks: u16) {
         self.telemetry_every = every_ticks;
         self.telemetry_countdown = 0;
@@ -261,7 +259,7 @@ impl Controller {
         if !self.machine.fault(&report) {
             return;
         }
-        self.news = Some(News::Fault);
+        self.notice = Some(Notice::Fault);
         self.trace.on_fault();
         self.held_ticks = 0;
         // A fault of a start that never ran leaves nothing pressurised.
@@ -285,7 +283,7 @@ impl Controller {
         self.machine.ended_hold(&report);
         self.vent_now();
         // The link's task keeps the report, now that nothing is held.
-        self.news = Some(News::State(State::Fault));
+        self.notice = Some(Notice::State(State::Fault));
     }
 
     fn report(&self, side: Side, finding: &Finding) -> FaultReport {
@@ -325,20 +323,23 @@ impl Controller {
                 self.drive();
             }
             (State::Disarmed, Arming::Filling(_) | Arming::Dumping(_)) => self.test_valves(inputs),
-            _ => self.rest(),
+            _ => {
+                self.disarm_when_silent();
+                self.rest();
+            }
         }
         self.record()
     }
 
-    /// Brings what is asked to this tick. A wave of the device's own is known ahead of its time, a host's set-points are not.
+    /// Brings the setpoint to this tick. A wave of the device's own is known ahead of its time, a host's setpoints are not.
     fn ask(&mut self) {
         match self.generator.step_ahead(regulator::ahead(&self.settings.regulator)) {
             Some((now, coming)) => {
-                self.asked = now;
-                self.coming_step = coming - self.coming;
-                self.coming = coming;
+                self.setpoint = now;
+                self.lookahead_step = coming - self.lookahead;
+                self.lookahead = coming;
             }
-            None => (self.coming, self.coming_step) = (self.asked, 0.0),
+            None => (self.lookahead, self.lookahead_step) = (self.setpoint, 0.0),
         }
     }
 
@@ -350,7 +351,7 @@ impl Controller {
         actuator.sample.stroke_m = stroke_m;
         actuator.sample.force_n = force_n;
         actuator.sample.model_n = 0.0;
-        // A reading that is no number must not get into what is remembered.
+        // A reading that is not a number must not get into what is remembered.
         if !(pressure_pa.is_finite() && stroke_m.is_finite()) {
             return None;
         }

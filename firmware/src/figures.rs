@@ -25,7 +25,7 @@ use firmware::control::Controller;
 use firmware::modes::Model;
 use model_core::effects::{EffectName, FittedEffect, MAX_PARAMETERS};
 use model_core::image;
-use model_core::link::messages::{Mode, Reference, Side};
+use model_core::link::messages::{Mode, Reference, Session, Side};
 use model_core::link::settings::Settings;
 use model_core::motion::Motion;
 use model_core::muscle::Muscle;
@@ -85,7 +85,7 @@ impl Sweep {
     }
 }
 
-/// The formulas as they stand in the thesis, with libm's `powf` and `sqrtf`: what the run-time form is compared with.
+/// The formulas as they be in the thesis, with libm's `powf` and `sqrtf`: what the run-time form is compared with.
 struct Direct {
     rest_length: f32,
     fibre: f32,
@@ -192,8 +192,9 @@ fn whole_step(table: &MuscleTable) {
     // Empty, as it must be to be armed.
     controller.step(&inputs(0.0, 0.9e-3, 0.0));
     let wave = Reference::Sine { mean: 45.0, amplitude: 20.0, frequency_hz: 2.0 };
-    let began = controller.arm().is_ok()
-        && controller.start(Mode::Force).is_ok()
+    let owner = Session::default();
+    let began = controller.arm(owner).is_ok()
+        && controller.start(Mode::Force, owner).is_ok()
         && controller.reference(wave).is_ok();
     controller.set_telemetry(10);
     let mut sweep = Sweep::default();
@@ -203,7 +204,8 @@ fn whole_step(table: &MuscleTable) {
         let triangle = if phase < 0.5 { phase } else { 1.0 - phase };
         let readings = inputs(pressure, 0.3e-3 + 2.4e-3 * triangle, 45.0 + phase);
         let mut wanted = 0.0;
-        controller.heard();
+        // It is the owner, so this is not refused.
+        let _ = controller.keep_alive(owner);
         let spent = ticks(|| {
             wanted = black_box(controller.step(black_box(&readings))).sides[0].pressure_pa;
             black_box((controller.take_event(), controller.take_sample()));

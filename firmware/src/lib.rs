@@ -10,12 +10,12 @@
 //! | sine, trapezoid, chirp, table | [`mod@reference`] |
 //! | lag, limits and scaling of the pressure regulator | [`regulator`] |
 //! | the record of every loop variable | [`trace`] |
-//! | a number in three bytes | [`brief`] |
+//! | a number in three bytes | [`compact_float`] |
 //! | tables and settings in flash | [`store`] |
 //! | answers to the host | [`server`] |
 //! | what the tasks share | [`shared`] |
 //! | what waits to be said to the host | [`spoken`] |
-//! | places for what is large | [`room`], [`common_room`] |
+//! | places for what is large | [`room`], [`shared_buffer`] |
 //! | the tasks that a board starts | [`tasks`] |
 //! | the length of a tick | [`tick`] |
 //! | what a board must give | [`board`] |
@@ -27,22 +27,22 @@
 #![cfg_attr(not(any(test, feature = "std")), no_std)]
 
 pub mod board;
-pub mod brief;
-pub mod common_room;
+pub mod compact_float;
 pub mod control;
 #[cfg(feature = "log")]
 pub mod log;
 pub mod modes;
 #[cfg(feature = "native")]
 pub mod native;
+pub mod outbox;
 pub mod pair;
+pub mod placement;
 pub mod reference;
 pub mod regulator;
-pub mod room;
 pub mod safety;
 pub mod server;
 pub mod shared;
-pub mod spoken;
+pub mod shared_buffer;
 pub mod store;
 pub mod tasks;
 pub mod tick;

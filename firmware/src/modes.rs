@@ -1,18 +1,18 @@
-//! Which pressure a mode wants: the mathematics between a set-point and the regulator.
+//! Which pressure a mode wants: the mathematics between a setpoint and the regulator.
 
 use model_core::effects::{Chain, EffectName};
 use model_core::inverse::{Reach, Search};
 use model_core::link::messages::Mode;
 use model_core::link::settings::{FeedForward, ForceLoop, Settings, StrokeLoop};
 use model_core::motion::{Motion, Slide};
-use model_core::muscle::{Held, Moment, Muscle};
+use model_core::muscle::{AtStroke, Moment, Muscle};
 use model_core::scalar::Scalar;
 use model_core::single;
 use model_core::table::{MuscleTable, TableError};
 use model_core::units::{Force, Length, Pressure};
 
+use crate::placement::{Placed, placed};
 use crate::regulator::Air;
-use crate::room::{Room, room};
 use crate::tick::TICK_S;
 
 /// A muscle's table in use: the form that is evaluated, its effects with what they remember, and the present tick.
@@ -33,8 +33,8 @@ pub struct Model {
     /// Travel that has not left the play, in distances.
     held_back: f32,
     /// The force that was last asked of the table, and whether it was since the last tick.
-    wish: Wish,
-    asked: bool,
+    demand: Demand,
+    demanded: bool,
     /// `∂F/∂P` where the last search ended, N/Pa.
     slope: f32,
     /// Least force at which the muscle surely pulls, N.
@@ -50,29 +50,29 @@ const SLIDE: f32 = 2.0e-3;
 /// middle of the virtual bench's. It is less than half of what [`model_core::effects::BraidTravel`] takes: friction that goes over with the
 /// pressure asks for more pressure, and must not ask for more than what turned it.
 const SLIP: f32 = 0.019;
-/// Play of the travel that turns friction, in distances: what noise of the stroke sensor passes is little beside a wish that moves.
+/// Play of the travel that turns friction, in distances: what noise of the stroke sensor passes is little beside a demand that moves.
 const PLAY: f32 = 0.05;
-/// The same play once a wish has stood still for [`CALM_S`]: no noise passes. What moves a muscle then is its load, however far, and
+/// The same play once a demand has stood still for [`CALM_S`]: no noise passes. What moves a muscle then is its load, however far, and
 /// its friction turns with it. Pressure no longer counts as travel: it would move only because friction has been compensated, and
 /// turn friction by that again.
 const PLAY_CALM: f32 = 0.2;
 /// The same where a trim answers for what the table leaves. Two that answer for one friction hunt: each swing of a mass on a spring
 /// turns the one before the other has undone it. So friction rests until the muscle is moved far, and the trim does the rest. So it
-/// does in a joint, where each muscle is the other's load and a push should meet the stiffness that was asked for, not less.
+/// does in a joint, where each muscle is the other's load and a push should meet the stiffness that was requested, not less.
 const PLAY_RESTING: f32 = 20.0;
-/// Part of friction that is made good in a joint. Of two muscles that pull against each other each is the other's load: with all of
+/// Part of friction that is corrected in a joint. Of two muscles that pull against each other each is the other's load: with all of
 /// its friction taken away, nothing holds the joint where it stands. It creeps, the friction turns, and it jumps to the other end of
-/// what friction would have held, some hundredths of a radian to and fro. What a push meets is then a matter of where it was. A
-/// quarter of the friction that stays holds it, at the cost of some stiffness more than was asked for.
+/// what friction would have held, some hundredths of a radian back and forth. What a push meets is then a matter of where it was. A
+/// quarter of the friction that stays holds it, at the cost of some stiffness more than was requested.
 const JOINT_SHARE: f32 = 0.75;
-/// How long the same force is wanted until a wish stands still, s.
+/// How long the same force is demanded until a demand does not move, s.
 const CALM_S: f32 = 0.2;
 /// Part of blocked force at which a muscle surely pulls, whatever its table leaves out.
 const TAUT: f32 = 0.02;
 
-/// A force that is asked of a table.
+/// A force that is queried of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Wish {
+struct Demand {
     force_n: f32,
     /// For how long it has been the same, s.
     still_s: f32,
@@ -100,8 +100,8 @@ impl Model {
             per_pascal: 0.0,
             last: None,
             held_back: 0.0,
-            wish: Wish { force_n: 0.0, still_s: 0.0, rests: false },
-            asked: false,
+            demand: Demand { force_n: 0.0, still_s: 0.0, rests: false },
+            demanded: false,
             slope: 0.0,
             inv_rest_volume: 0.0,
             taut_n: 0.0,
@@ -133,7 +133,7 @@ impl Model {
         self.per_pascal = slip / distance_m;
         self.last = None;
         self.held_back = 0.0;
-        self.asked = false;
+        self.demanded = false;
         self.slope = area;
         self.inv_rest_volume = 1.0 / self.muscle.braid().gas_volume(&self.now.held.posture).at_least(1.0e-12);
         self.taut_n = TAUT * table.blocked_force.newtons().abs();
@@ -146,10 +146,10 @@ impl Model {
         let (stroke, pressure) = self.last.replace(now).unwrap_or(now);
         let by_stroke = (motion.stroke - stroke) * self.per_metre;
         let by_pressure = (pressure_pa - pressure) * self.per_pascal;
-        if !core::mem::take(&mut self.asked) {
-            self.wish.still_s = 0.0;
+        if !core::mem::take(&mut self.demanded) {
+            self.demand.still_s = 0.0;
         }
-        let (travel, play) = match (self.wish.still_s >= CALM_S, self.wish.rests) {
+        let (travel, play) = match (self.demand.still_s >= CALM_S, self.demand.rests) {
             (false, _) => (by_stroke + by_pressure, PLAY),
             (true, false) => (by_stroke, PLAY_CALM),
             (true, true) => (by_stroke + by_pressure, PLAY_RESTING),
@@ -184,7 +184,7 @@ impl Model {
     }
 
     /// The muscle at this tick's stroke.
-    pub fn held(&self) -> &Held<f32> {
+    pub fn held(&self) -> &AtStroke<f32> {
         &self.now.held
     }
 
@@ -202,12 +202,12 @@ impl Model {
         self.taut_n
     }
 
-    /// The pressure for a wanted force in this tick, and whether it can be had; `rests` where friction is not to turn while the same
-    /// force is wanted, `share` of it made good.
+    /// The pressure for a demanded force in this tick, and whether it can be had; `rests` where friction is not to turn while the same
+    /// force is demanded, `share` of it corrected.
     pub fn pressure_for(&mut self, force_n: f32, guess_pa: f32, rests: bool, share: f32) -> (f32, bool) {
-        let still_s = if self.wish.force_n == force_n { self.wish.still_s + TICK_S } else { 0.0 };
-        self.wish = Wish { force_n, still_s, rests };
-        self.asked = true;
+        let still_s = if self.demand.force_n == force_n { self.demand.still_s + TICK_S } else { 0.0 };
+        self.demand = Demand { force_n, still_s, rests };
+        self.demanded = true;
         let search = Search { tolerance: Pressure::from_pascals(20.0), ..self.muscle.search() };
         let force = Force::from_newtons(force_n);
         let guess = Pressure::from_pascals(guess_pa);
@@ -245,20 +245,20 @@ impl Model {
 /// The place of one muscle's table.
 #[derive(Debug)]
 pub struct Seat {
-    model: Option<Room<Model>>,
+    model: Option<Placed<Model>>,
     taken: bool,
 }
 
 impl Seat {
     /// Empty ones of a board that drives two muscles.
     pub fn pair() -> [Self; 2] {
-        [room!(Model, Model::blank()), room!(Model, Model::blank())]
+        [placed!(Model, Model::blank()), placed!(Model, Model::blank())]
             .map(|model| Self { model: Some(model), taken: false })
     }
 
     /// The same where there is no second muscle, and no memory for its table.
     pub fn single() -> [Self; 2] {
-        let first = room!(Model, Model::blank());
+        let first = placed!(Model, Model::blank());
         [Some(first), None].map(|model| Self { model, taken: false })
     }
 
@@ -299,7 +299,7 @@ impl Seat {
     }
 }
 
-/// The feed-forward pressure of a wanted force, Pa; without a table there is none.
+/// The feed-forward pressure of a demanded force, Pa; without a table there is none.
 pub fn feed_forward(
     settings: &Settings,
     mode: Mode,
@@ -318,7 +318,7 @@ pub fn feed_forward(
     }
 }
 
-/// An integrator that stops where going on would only push further against a limit.
+/// An integrator that stops where continuing would only push further against a limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Integral(f32);
 
@@ -333,32 +333,32 @@ impl Integral {
         self.0 = 0.0;
     }
 
-    /// One tick of `rate`, unless `cut` (last tick's command was limited) and the error points the way of the limit
+    /// One tick of `rate`, unless `saturation` (last tick's command was limited) and the error points the way of the limit
     /// (`toward`: the sign of what was cut off).
-    pub(crate) fn step(&mut self, rate: f32, limit: f32, cut: f32) {
-        if cut * rate <= 0.0 {
+    pub(crate) fn step(&mut self, rate: f32, limit: f32, saturation: f32) {
+        if saturation * rate <= 0.0 {
             self.0 = (self.0 + rate * TICK_S).within(-limit, limit);
         }
     }
 }
 
-/// Trim of force on the load cell, Pa. `cut` is the sign of what the last command's limits took away.
+/// Trim of force on the load cell, Pa. `saturation` is the sign of what the last command's limits took away.
 ///
-/// Without a table the error is that of the wanted force, and the loop `L(s) = g (K_p + K_i/s)` with `g = ∂F/∂P` crosses over
+/// Without a table the error is that of the demanded force, and the loop `L(s) = g (K_p + K_i/s)` with `g = ∂F/∂P` crosses over
 /// near `g K_i` rad/s; the regulator's lag asks for a good deal less than `1/lag`. With one it is that of the force which the
 /// table gives at the measured pressure, less what the trim has added: an observer of what the table leaves out. The
 /// regulator's lag is not in that loop, which has to wait for nothing but its own filter of `g K_i` rad/s, and the trim does not
 /// answer a wave with a wave of its own.
-pub fn trim(force_loop: &ForceLoop, integral: &mut Integral, error_n: f32, cut: f32) -> f32 {
+pub fn trim(force_loop: &ForceLoop, integral: &mut Integral, error_n: f32, saturation: f32) -> f32 {
     let limit = force_loop.trim_limit_pa;
     if limit <= 0.0 {
         return 0.0;
     }
-    integral.step(force_loop.integral_pa_per_n_s * error_n, limit, cut);
+    integral.step(force_loop.integral_pa_per_n_s * error_n, limit, saturation);
     (force_loop.proportional_pa_per_n * error_n + integral.value()).within(-limit, limit)
 }
 
-/// Wanted force of the stroke loop, N, for the stroke wanted now and the one that will be when a command acts. `cut` as in [`trim`]; the
+/// Demanded force of the stroke loop, N, for the stroke demanded now and the one that will be when a command acts. `saturation` as in [`trim`]; the
 /// loop's own limits hold its integral as well.
 pub fn stroke_force(
     stroke_loop: &StrokeLoop,
@@ -366,7 +366,7 @@ pub fn stroke_force(
     [wanted_m, coming_m]: [f32; 2],
     stroke_m: f32,
     speed_m_per_s: f32,
-    cut: f32,
+    saturation: f32,
 ) -> f32 {
     let error = wanted_m - stroke_m;
     let force = stroke_loop.load_n
@@ -375,7 +375,7 @@ pub fn stroke_force(
         + integral.value()
         - stroke_loop.damping_n_s_per_m * speed_m_per_s;
     let limited = force.within(0.0, stroke_loop.force_limit_n);
-    let cut = if force == limited { cut } else { force - limited };
-    integral.step(stroke_loop.integral_n_per_m_s * error, stroke_loop.force_limit_n, cut);
+    let saturation = if force == limited { saturation } else { force - limited };
+    integral.step(stroke_loop.integral_n_per_m_s * error, stroke_loop.force_limit_n, saturation);
     limited
 }

@@ -6,7 +6,7 @@
 //! use firmware::native::{Device, Options};
 //! use std::io::{Read, Write};
 //!
-//! // A plant that follows its command at once.
+//! // A plant that follows its command immediately.
 //! let plant = |outputs: &Outputs| {
 //!     let pressure_pa = outputs.sides[0].pressure_pa;
 //!     let readings = Readings { pressure_pa, ..Readings::default() };
@@ -127,7 +127,7 @@ impl Drop for Device {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         for thread in self.threads.drain(..) {
-            // A thread that panicked has said so itself.
+            // A thread that panicked has reported it itself.
             let _ = thread.join();
         }
     }
@@ -167,12 +167,12 @@ fn serve(
         match listener.accept() {
             Ok((stream, _)) => {
                 connected.store(true, Ordering::Relaxed);
-                // A connection that breaks is the peer's affair; the device goes on and waits for the next.
+                // A connection that breaks is the peer's affair; the device continues and waits for the next.
                 let _ = talk(stream, &mut server, shared, stop);
                 connected.store(false, Ordering::Relaxed);
             }
             Err(_) => {
-                while shared.next_spoken(&mut spoken).is_some() {}
+                while shared.next_outgoing(&mut spoken).is_some() {}
                 thread::sleep(Duration::from_millis(2));
             }
         }
@@ -200,7 +200,7 @@ fn talk(
     let mut bytes = [0; 1024];
     let mut out = [0; MAX_TOPIC];
     while !stop.load(Ordering::Relaxed) {
-        while let Some(length) = shared.next_spoken(&mut out) {
+        while let Some(length) = shared.next_outgoing(&mut out) {
             stream.write_all(&out[..length])?;
         }
         let count = match stream.read(&mut bytes) {

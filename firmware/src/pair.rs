@@ -5,13 +5,13 @@
 //! F₁ = T + τ/2r,      F₂ = T − τ/2r            tension T that both share, torque τ
 //! K  = r² Σ −∂F_i/∂x  at held pressures, without friction
 //! ```
-//! `K` is what the joint resists by itself, quicker than any loop: its air and its braid. It rises with the tension. Both muscles
+//! `K` is what the joint resists without a request, quicker than any loop: its air and its braid. It rises with the tension. Both muscles
 //! must pull, since a slack one resists nothing, and neither may need more than its highest pressure: so at each angle `K` has
 //! a least and a greatest value.
 
 use model_core::link::messages::Refusal;
 use model_core::link::settings::Joint;
-use model_core::muscle::Held;
+use model_core::muscle::AtStroke;
 use model_core::scalar::Scalar;
 use model_core::single;
 use model_core::units::{Force, Length, Pressure};
@@ -34,7 +34,7 @@ const HALVINGS: usize = 12;
 pub struct Arm<'a> {
     /// Its table, brought to this tick.
     pub model: &'a Model,
-    /// Pressure that the last wish came to, Pa.
+    /// Pressure that the last demand came to, Pa.
     pub pressure_pa: f32,
     /// The highest that may be commanded, Pa.
     pub high_pa: f32,
@@ -50,9 +50,9 @@ pub struct PairState {
 /// What the joint is doing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Posed {
-    /// Wanted angle, rad.
+    /// Demanded angle, rad.
     pub angle_rad: f32,
-    /// Wanted stiffness, N·m/rad.
+    /// Demanded stiffness, N·m/rad.
     pub stiffness_nm_per_rad: f32,
     /// Measured angle, rad.
     pub measured_rad: f32,
@@ -79,11 +79,11 @@ impl PairState {
         *self = Self { integral: Integral::default(), tension_n: quasi[0].min(quasi[1]) };
     }
 
-    /// Wanted forces of both muscles.
+    /// Demanded forces of both muscles.
     ///
-    /// One Newton step a tick moves the tension to where the stiffness is the wanted one. The torque is `K (θ* − θ)`, by which
-    /// pressures stay what they are when the joint is pushed, and the angle's loop for what is left.
-    pub fn forces(&mut self, joint: &Joint, posed: &Posed, arms: [Arm<'_>; 2], cut: f32) -> Pull {
+    /// One Newton step a tick moves the tension to where the stiffness is the demanded one. The torque is `K (θ* − θ)`, by which
+    /// pressures stay what they are when the joint is pushed, and the angle's loop for the rest.
+    pub fn forces(&mut self, joint: &Joint, posed: &Posed, arms: [Arm<'_>; 2], saturation: f32) -> Pull {
         let r = joint.radius_m;
         let (mut stiffness, mut gain, mut quickest) = (0.0, 0.0, f32::MAX);
         let most_n = arms.map(|arm| {
@@ -99,7 +99,7 @@ impl PairState {
             single::parts(muscle, held, Pressure::from_pascals(arm.high_pa)).force(arm.model.direction())
         });
         let error = posed.angle_rad - posed.measured_rad;
-        self.integral.step(joint.integral_nm_per_rad_s * error, joint.torque_limit_nm, cut);
+        self.integral.step(joint.integral_nm_per_rad_s * error, joint.torque_limit_nm, saturation);
         let torque = ((stiffness + joint.proportional_nm_per_rad) * error + self.integral.value()
             - joint.damping_nm_s_per_rad * posed.rate_rad_per_s)
             .within(-joint.torque_limit_nm, joint.torque_limit_nm);
@@ -126,8 +126,8 @@ fn taut(arms: [Arm<'_>; 2]) -> f32 {
 }
 
 /// What depends on a muscle's length alone, where the pulley has turned by `turn`, m, of its circumference.
-fn held_at(joint: &Joint, arm: Arm<'_>, turn: f32) -> Held<f32> {
-    let mut held = Held::NONE;
+fn held_at(joint: &Joint, arm: Arm<'_>, turn: f32) -> AtStroke<f32> {
+    let mut held = AtStroke::NONE;
     single::hold(&arm.model.muscle, &mut held, Length::from_metres(joint.rest_stroke_m + turn));
     held
 }

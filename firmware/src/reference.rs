@@ -8,11 +8,11 @@ use heapless::Vec;
 use micromath::F32Ext;
 use model_core::link::messages::{Field, REFERENCE_PIECE, Reference, ReferencePoints, Refusal};
 
-use crate::brief::Brief;
-use crate::room::{Room, room};
+use crate::compact_float::CompactFloat;
+use crate::placement::{Placed, placed};
 use crate::tick::{TICK_S, TICKS_PER_S};
 
-/// Points that a reference table holds, three bytes each ([`Brief`]).
+/// Points that a reference table holds, three bytes each ([`CompactFloat`]).
 pub const CAPACITY: usize = 256;
 
 /// Ticks that a wave can be looked at ahead of its time.
@@ -27,10 +27,10 @@ pub struct Generator {
     /// Ticks since it began.
     ticks: u32,
     phase: u32,
-    points: Room<Vec<Brief, CAPACITY>>,
+    points: Placed<Vec<CompactFloat, CAPACITY>>,
     last: f32,
     /// The last values made, at their number; how many were made, and how many of these have had their time.
-    coming: [f32; AHEAD],
+    lookahead: [f32; AHEAD],
     made: u32,
     given: u32,
 }
@@ -41,9 +41,9 @@ impl Default for Generator {
             reference: Reference::SetPoint,
             ticks: 0,
             phase: 0,
-            points: room!(Vec<Brief, CAPACITY>, Vec::new()),
+            points: placed!(Vec<CompactFloat, CAPACITY>, Vec::new()),
             last: 0.0,
-            coming: [0.0; AHEAD],
+            lookahead: [0.0; AHEAD],
             made: 0,
             given: 0,
         }
@@ -69,7 +69,7 @@ impl Generator {
         self.reference
     }
 
-    /// Whether set-points come from the host.
+    /// Whether setpoints come from the host.
     pub fn is_set_point(&self) -> bool {
         matches!(self.reference, Reference::SetPoint)
     }
@@ -149,33 +149,33 @@ impl Generator {
             return Err(Refusal::Range);
         }
         for point in &piece.points {
-            self.points.push(Brief::of(*point)).map_err(|_| Refusal::Range)?;
+            self.points.push(CompactFloat::of(*point)).map_err(|_| Refusal::Range)?;
         }
         Ok(self.points.len() as u16)
     }
 
-    /// Makes the values of this tick and so many later ones, as far as they are not there yet: one each tick, and the first of them
-    /// when a wave begins. `None` when set-points come from the host.
+    /// Makes the values of this tick and n later ones, as far as they are not there yet: one each tick, and the first of them
+    /// when a wave begins. `None` when setpoints come from the host.
     pub fn look_ahead(&mut self, ticks: usize) -> Option<()> {
         let ticks = ticks.min(AHEAD - 1) as u32;
         while self.made.wrapping_sub(self.given) <= ticks {
             let value = self.step()?;
-            self.coming[self.made as usize % AHEAD] = value;
+            self.lookahead[self.made as usize % AHEAD] = value;
             self.made = self.made.wrapping_add(1);
         }
         Some(())
     }
 
-    /// The value of this tick and that of so many ticks later (at most 15); `None` when set-points come from the host. Moves on
+    /// The value of this tick and that of n ticks later (at most 15); `None` when setpoints come from the host. Moves on
     /// by one tick.
     pub fn step_ahead(&mut self, ticks: usize) -> Option<(f32, f32)> {
         self.look_ahead(ticks)?;
-        let now = self.coming[self.given as usize % AHEAD];
+        let now = self.lookahead[self.given as usize % AHEAD];
         self.given = self.given.wrapping_add(1);
         Some((now, self.last))
     }
 
-    /// The value of this tick; `None` when set-points come from the host. Moves on by one tick.
+    /// The value of this tick; `None` when setpoints come from the host. Moves on by one tick.
     fn step(&mut self) -> Option<f32> {
         let value = match self.reference {
             Reference::SetPoint => return None,

@@ -1,4 +1,4 @@
-//! The pressure regulator: what it and its line will do with a command, and which command makes the muscle have what is wanted.
+//! The pressure regulator: what it and its line will do with a command, and which command makes the muscle have what is demanded.
 //!
 //! ```text
 //! target  = gain · (command + offset)
@@ -8,8 +8,8 @@
 //! The line fills a muscle of volume `V`, which the braid gives at every stroke: a muscle that is wide takes longer, and one
 //! that widens draws air through the line. Gain and offset are inverted exactly; line and lag by lead as far as the settings
 //! ask, each by a rate that is smoothed over a seventh of the lag, so that a sensor's noise is not made ten times as large or
-//! more. What that smoothing and the loop itself are late by is led too, or wished for ahead of time where what comes is known
-//! ([`Wish::foreseen_pa`]). A rate limit and a deadband cannot be inverted; they are only predicted, so that the watch on
+//! more. What that smoothing and the loop itself are late by is led too, or demanded for ahead of time where what comes is known
+//! ([`Demand::lookahead_pa`]). A rate limit and a deadband cannot be inverted; they are only predicted, so that the watch on
 //! pressure knows what to expect. What the measured pressure lacks of the predicted is added slowly
 //! ([`RegulatorState::observe`]).
 
@@ -45,24 +45,24 @@ impl Default for Air {
     }
 }
 
-/// What is wanted of the regulator in a tick.
+/// What is demanded of the regulator in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Wish {
+pub struct Demand {
     /// Pressure in the muscle, Pa.
     pub pressure_pa: f32,
-    /// What of the last change of that was known ahead of time, Pa; it is wished for [`ahead`] ticks before its time.
-    pub foreseen_pa: f32,
+    /// What of the last change of that was known ahead of time, Pa; it is demanded for [`ahead`] ticks before its time.
+    pub lookahead_pa: f32,
 }
 
-/// Ticks before its time that what is known should be wished for.
+/// Ticks before its time that what is known should be demanded for.
 pub fn ahead(regulator: &Regulator) -> usize {
     if regulator.lead > 0.0 { ((LOOP_S + SMOOTHING * regulator.lag_s) / TICK_S) as usize } else { 0 }
 }
 
-/// Keeps the regulator's model and the last wanted pressure.
+/// Keeps the regulator's model and the last demanded pressure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RegulatorState {
-    wanted_pa: f32,
+    pressure_demand_pa: f32,
     rate_pa_per_s: f32,
     /// What the regulator's outlet should have, smoothed, and what of its rate was known.
     outlet_pa: f32,
@@ -78,11 +78,11 @@ pub struct RegulatorState {
 /// What [`RegulatorState::step`] decided.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Driven {
-    /// Wanted pressure after slew and limits, Pa.
-    pub wanted_pa: f32,
+    /// Demanded pressure after slew and limits, Pa.
+    pub pressure_demand_pa: f32,
     /// Command, Pa.
     pub command_pa: f32,
-    /// Whether a limit cut the wish: an integrator behind it must not go on.
+    /// Whether a limit cut the demand: an integrator behind it must not continue.
     pub saturated: bool,
 }
 
@@ -91,7 +91,7 @@ impl RegulatorState {
     pub fn begin(&mut self, pressure_pa: f32) {
         let pressure_pa = if pressure_pa.is_finite() { pressure_pa.at_least(0.0) } else { 0.0 };
         *self = Self {
-            wanted_pa: pressure_pa,
+            pressure_demand_pa: pressure_pa,
             outlet_pa: pressure_pa,
             supplied_pa: pressure_pa,
             model_pa: pressure_pa,
@@ -120,11 +120,11 @@ impl RegulatorState {
         self.command_pa
     }
 
-    /// One tick of `dt` seconds towards a wanted pressure, which is limited to `high_pa`.
+    /// One tick of `dt` seconds towards a demanded pressure, which is limited to `high_pa`.
     pub fn step(
         &mut self,
         dt: f32,
-        wish: Wish,
+        demand: Demand,
         high_pa: f32,
         air: &Air,
         regulator: &Regulator,
@@ -132,13 +132,16 @@ impl RegulatorState {
     ) -> Driven {
         let slew = limits.slew_pa_per_s * dt;
         let high = high_pa.at_least(0.0);
-        let wanted = wish.pressure_pa.within(0.0, high).within(self.wanted_pa - slew, self.wanted_pa + slew);
+        let wanted = demand
+            .pressure_pa
+            .within(0.0, high)
+            .within(self.pressure_demand_pa - slew, self.pressure_demand_pa + slew);
         let smoothing = SMOOTHING * regulator.lag_s;
         let share = dt / (dt + smoothing);
-        self.rate_pa_per_s += ((wanted - self.wanted_pa) / dt - self.rate_pa_per_s) * share;
-        let foreseen = wish.foreseen_pa.within(-slew, slew) / dt;
+        self.rate_pa_per_s += ((wanted - self.pressure_demand_pa) / dt - self.rate_pa_per_s) * share;
+        let foreseen = demand.lookahead_pa.within(-slew, slew) / dt;
         self.foreseen_pa_per_s += (foreseen - self.foreseen_pa_per_s) * share;
-        self.wanted_pa = wanted;
+        self.pressure_demand_pa = wanted;
         let line = regulator.line_s * air.fill;
         let draught = (wanted + ATMOSPHERE_PA) * air.widening_per_s;
         let outlet_rate =
@@ -156,19 +159,19 @@ impl RegulatorState {
         self.predict(dt, modelled, air, regulator);
         self.command_pa = command;
         Driven {
-            wanted_pa: wanted,
+            pressure_demand_pa: wanted,
             command_pa: command,
-            saturated: wanted != wish.pressure_pa || command != free,
+            saturated: wanted != demand.pressure_pa || command != free,
         }
     }
 
-    /// Zero pressure at once. Nothing of what was wanted is left, only what is still in line and muscle.
+    /// Zero pressure immediately. Nothing of what was demanded is left, only what is still in line and muscle.
     pub fn vent(&mut self, dt: f32, air: &Air, regulator: &Regulator) {
         *self = Self { supplied_pa: self.supplied_pa, model_pa: self.model_pa, ..Self::default() };
         self.predict(dt, 0.0, air, regulator);
     }
 
-    /// A command of somebody else's: only the model follows it.
+    /// A command of someone else's: only the model follows it.
     pub fn expect(&mut self, command_pa: f32, regulator: &Regulator) {
         self.predict(TICK_S, command_pa, &Air::default(), regulator);
     }
@@ -200,8 +203,8 @@ mod tests {
     use super::*;
     use model_core::link::settings::Settings;
 
-    fn plain(pressure_pa: f32) -> Wish {
-        Wish { pressure_pa, foreseen_pa: 0.0 }
+    fn plain(pressure_pa: f32) -> Demand {
+        Demand { pressure_pa, lookahead_pa: 0.0 }
     }
 
     #[test]
@@ -257,7 +260,7 @@ mod tests {
         let settings = Settings::default();
         let regulator = Regulator { line_s: 5e-3, ..settings.regulator };
         let step = |state: &mut RegulatorState, wanted: f32| {
-            let foreseen = Wish { pressure_pa: wanted, foreseen_pa: 100.0 };
+            let foreseen = Demand { pressure_pa: wanted, lookahead_pa: 100.0 };
             state.step(1e-3, foreseen, 600e3, &Air::default(), &regulator, &settings.limits)
         };
         let mut vented = RegulatorState::default();

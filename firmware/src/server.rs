@@ -1,6 +1,6 @@
 //! Answers the host: reads a frame, asks the controller or the store, writes a frame. No allocation.
 
-mod session;
+mod answers;
 mod upload;
 mod wear;
 
@@ -15,13 +15,13 @@ use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 use model_core::table::{MuscleTable, TableError};
 
 use crate::board::Identity;
-use crate::control::{self, Controller};
+use crate::control;
 use crate::modes::Model;
 use crate::shared::Shared;
 use crate::store::{self, Kept, Store};
 use crate::watch::Finding;
 
-use self::session::Session;
+use self::answers::Answers;
 use self::upload::Upload;
 use self::wear::Wear;
 
@@ -53,7 +53,7 @@ pub fn table_fault(error: ImageError) -> TableFault {
 
 impl<F: NorFlash> Server<F> {
     /// Opens the store, counts the start, and gives the controller its settings and tables. A damaged store is made anew,
-    /// a damaged table is not used; both latch a fault, so that somebody looks before anything moves.
+    /// a damaged table is not used; both latch a fault, so that someone looks before anything moves.
     ///
     /// # Errors
     /// The flash cannot hold a store at all.
@@ -136,7 +136,7 @@ impl<F: NorFlash> Server<F> {
         });
     }
 
-    /// Keeps what must not be lost and is not asked for: new faults, memories of effects. Called now and then by the link's
+    /// Keeps what must not be lost and is not requested: new faults, memories of effects. Called now and then by the link's
     /// task, and never while a muscle is not vented: a flash may stop the processor while it erases.
     pub fn keep(&mut self, shared: &Shared) {
         if !shared.with(|controller| controller.is_vented()) {
@@ -191,7 +191,7 @@ impl<F: NorFlash> Server<F> {
         moved || kept != Ok(count)
     }
 
-    /// Starts again on the same flash, as after a restart that was asked for.
+    /// Starts again on the same flash, as after a restart that was requested.
     ///
     /// # Errors
     /// As [`Server::start`].
@@ -200,7 +200,7 @@ impl<F: NorFlash> Server<F> {
         Self::start(identity, self.store.close(), shared)
     }
 
-    /// Whether the host asked for a restart, once the answer is out.
+    /// Whether the host requested a restart, once the answer is out.
     pub fn wants_restart(&self) -> bool {
         self.restart
     }
@@ -217,14 +217,13 @@ impl<F: NorFlash> Server<F> {
         if header.kind != Kind::Request {
             return &[];
         }
-        shared.with(Controller::heard);
         let answered = if header.id == hello::ID {
             let hello = self.hello().to_bytes();
             frame::encode_bytes(Header { kind: Kind::Response, ..header }, &hello, exchange.room())
                 .map_err(|_| Refusal::Range)
         } else {
-            let mut session = Session { server: self, shared };
-            endpoints::answer(&mut session, &mut exchange)
+            let mut answers = Answers { server: self, shared };
+            endpoints::answer(&mut answers, &mut exchange)
                 .or_else(|mut refusal| exchange.answer(Kind::Refusal, &mut refusal))
         };
         exchange.written(answered.unwrap_or(0))
@@ -255,7 +254,7 @@ impl<F: NorFlash> Server<F> {
 }
 
 /// Has the controller use the kept settings. What is damaged or of another layout is taken over as far as it can be, and latches a
-/// fault: the device cannot be armed until somebody has looked at the settings in force and sent them.
+/// fault: the device cannot be armed until someone has looked at the settings in force and sent them.
 #[inline(never)]
 fn use_settings<F: NorFlash>(store: &mut Store<F>, damaged: bool, shared: &Shared) -> Result<(), StoreFault> {
     let hardware = shared.with(|controller| controller.hardware());

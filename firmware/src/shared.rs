@@ -19,8 +19,8 @@ use crate::board::Outputs;
 use crate::control::Controller;
 #[cfg(feature = "board")]
 use crate::modes::Seat;
-use crate::room::{Room, room};
-use crate::spoken::Spoken;
+use crate::outbox::Outgoing;
+use crate::placement::{Placed, placed};
 
 /// Samples that wait for the link: twice as many as come in the 5.2 ms that a longest answer takes at 1 Mbaud.
 const WAITING: usize = 11;
@@ -56,16 +56,16 @@ impl Drop for Entered<'_> {
 }
 
 /// That a task has left the controller: for a board that lets its loop interrupt at that very moment, when whatever should have been
-/// taken out of it at once and was not shows.
+/// taken out of it immediately and was not shows.
 #[cfg(feature = "preempting")]
 pub static LEFT: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
-type Waiting = Channel<CriticalSectionRawMutex, Spoken, WAITING>;
+type Waiting = Channel<CriticalSectionRawMutex, Outgoing, WAITING>;
 
 /// What the tasks share: the controller, entered for short and never across an await, and what waits to be sent.
 pub struct Shared {
     controller: Mutex<RefCell<Controller>>,
-    spoken: Room<Waiting>,
+    outbox: Placed<Waiting>,
     dropped: AtomicU32,
     /// Times that the receiver lost bytes.
     line_errors: AtomicU32,
@@ -83,14 +83,14 @@ impl Shared {
     fn around(controller: Controller) -> Self {
         Self {
             controller: Mutex::new(RefCell::new(controller)),
-            spoken: room!(Waiting, Channel::new()),
+            outbox: placed!(Waiting, Channel::new()),
             dropped: AtomicU32::new(0),
             line_errors: AtomicU32::new(0),
             changed: Signal::new(),
         }
     }
 
-    /// The one of a board: a static of its own, made in its place and apart from what goes on to use it.
+    /// The one of a board: a static of its own, made in its place and apart from what continues to use it.
     #[cfg(feature = "board")]
     #[inline(never)]
     pub fn take(hardware: &'static Hardware, seats: [Seat; 2]) -> &'static Self {
@@ -134,19 +134,19 @@ impl Shared {
         crate::log::tell(self.with(|controller| controller.ticks()), event.as_ref());
         if let Some(event) = event {
             self.changed.signal(());
-            // The host must hear of it, whatever else waits: the oldest sample makes room.
-            if self.spoken.is_full() && self.spoken.try_receive().is_ok() {
+            // The host must receive it, whatever else waits: the oldest sample makes room.
+            if self.outbox.is_full() && self.outbox.try_receive().is_ok() {
                 self.drop_one();
             }
-            self.say(Spoken::Event(event));
+            self.say(Outgoing::Event(event));
         }
         if let Some(sample) = self.with(Controller::take_sample) {
-            self.say(Spoken::Sample(sample));
+            self.say(Outgoing::Sample(sample));
         }
     }
 
-    fn say(&self, spoken: Spoken) {
-        if self.spoken.try_send(spoken).is_err() {
+    fn say(&self, spoken: Outgoing) {
+        if self.outbox.try_send(spoken).is_err() {
             self.drop_one();
         }
     }
@@ -165,29 +165,29 @@ impl Shared {
         self.changed.try_take().is_some()
     }
 
-    /// Room for what the next step may say.
+    /// Placed for what the next step may say.
     pub fn has_room(&self) -> bool {
-        self.spoken.free_capacity() >= 2
+        self.outbox.free_capacity() >= 2
     }
 
     /// The next frame to send without being asked, when there is one. Written where it is taken: nothing of it is kept over a wait.
     pub(crate) async fn next(&self, out: &mut [u8; MAX_TOPIC]) -> usize {
         loop {
             #[cfg(feature = "log")]
-            if let Either::Second(line) = select(self.spoken.ready_to_receive(), crate::log::next()).await {
-                return Spoken::Log(line).encode(out);
+            if let Either::Second(line) = select(self.outbox.ready_to_receive(), crate::log::next()).await {
+                return Outgoing::Log(line).encode(out);
             }
             #[cfg(not(feature = "log"))]
-            self.spoken.ready_to_receive().await;
-            if let Some(length) = self.next_spoken(out) {
+            self.outbox.ready_to_receive().await;
+            if let Some(length) = self.next_outgoing(out) {
                 return length;
             }
         }
     }
 
     /// The next frame to send without being asked, if there is one.
-    pub fn next_spoken(&self, out: &mut [u8; MAX_TOPIC]) -> Option<usize> {
-        self.spoken.try_receive().ok().map(|mut spoken| spoken.encode(out))
+    pub fn next_outgoing(&self, out: &mut [u8; MAX_TOPIC]) -> Option<usize> {
+        self.outbox.try_receive().ok().map(|mut spoken| spoken.encode(out))
     }
 }
 
@@ -196,6 +196,7 @@ mod tests {
     use super::*;
     use crate::board::{Inputs, Readings};
     use model_core::link::frame::Accumulator;
+    use model_core::link::messages::Session;
 
     #[test]
     fn a_change_of_state_wakes_the_link_to_keep_what_must_not_be_lost() {
@@ -203,7 +204,7 @@ mod tests {
         let inputs = Inputs { sides: [Some(Readings::default()), None], ..Inputs::default() };
         shared.step(&inputs);
         assert!(!shared.has_changed());
-        assert_eq!(shared.with(Controller::arm), Ok(()));
+        assert_eq!(shared.with(|controller| controller.arm(Session::default())), Ok(()));
         shared.step(&inputs);
         assert!(shared.has_changed());
         assert!(!shared.has_changed(), "once for each change");
@@ -220,7 +221,7 @@ mod tests {
         let mut out = [0; MAX_TOPIC];
         let mut accumulator = Accumulator::new();
         let mut number = |shared: &Shared| {
-            let length = shared.next_spoken(&mut out)?;
+            let length = shared.next_outgoing(&mut out)?;
             out[..length].iter().find_map(|&byte| Some(accumulator.push(byte)?.ok()?.header.sequence))
         };
         assert_eq!(number(&shared), Some(0));

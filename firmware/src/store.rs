@@ -9,7 +9,7 @@
 //! | --- | --- |
 //! | 0x10 + side | which slot holds the table in use: [`Selected`], postcard |
 //! | 0x20 + 2·side + slot | image of a table |
-//! | 0x33, 0x34 | [`Settings`](model_core::link::settings::Settings), postcard, and the sum to expect of them (`store/settings.rs`); 0x31 and 0x32 held those of the layouts 2 and 3 |
+//! | 0x35, 0x34 | [`Settings`](model_core::link::settings::Settings), postcard, and the sum to expect of them (`store/settings.rs`); 0x31 to 0x33 held those of the layouts 2 to 4 |
 //! | 0x3F | number of the layout, `u16` |
 //! | 0x40 + side | generation of a table, and what its effects remember if it must survive a power cycle: a new table brings its own; postcard |
 //! | 0x50 + n | past fault n of a ring, postcard; 0x5F its next place |
@@ -34,7 +34,7 @@ use sequential_storage::Error;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage, SerializationError, Value};
 
-use crate::room::{Room, room};
+use crate::placement::{Placed, placed};
 
 mod settings;
 
@@ -42,7 +42,7 @@ pub use settings::Kept;
 
 /// Version of the layout. It moves whenever anything that is kept has other fields: postcard's bytes do not say what they are,
 /// so a value of another layout would be read as if it were of this one. Its key moves with it.
-pub const FORMAT: u16 = 4;
+pub const FORMAT: u16 = 5;
 /// Longest item with its key, rounded up to words of a flash of at most 16 bytes.
 const BUFFER: usize = image::MAX_LEN + 16;
 
@@ -72,7 +72,7 @@ fields!(Selected { slot, table, previous });
 fields!(Described { length, crc, generation });
 
 impl Selected {
-    /// As the host is told.
+    /// As the host is reported.
     pub fn info(&self) -> TableInfo {
         TableInfo {
             length: u32::from(self.table.length),
@@ -98,7 +98,7 @@ impl Value<'_> for Written<'_> {
     }
 }
 
-/// Memories on their way into the store, asked for one at a time: all of them are half a kilobyte. Only ever written.
+/// Memories on their way into the store, requested one at a time: all of them are half a kilobyte. Only ever written.
 struct Remembered<'m> {
     generation: u32,
     count: usize,
@@ -140,10 +140,10 @@ fn fault_of<E>(error: Error<E>) -> StoreFault {
     }
 }
 
-/// The store over a flash. Its flash is one that answers at once (it blocks, or it is a file), so that no task waits on it.
+/// The store over a flash. Its flash is one that answers immediately (it blocks, or it is a file), so that no task waits on it.
 pub struct Store<F: NorFlash> {
     map: MapStorage<u8, F, NoCache>,
-    buffer: Room<[u8; BUFFER]>,
+    buffer: Placed<[u8; BUFFER]>,
 }
 
 impl<F: NorFlash> Store<F> {
@@ -156,7 +156,7 @@ impl<F: NorFlash> Store<F> {
         let config = MapConfig::try_new(0..end).map_err(|_| StoreFault::Full)?;
         Ok(Self {
             map: MapStorage::new(flash, config, Cache::new_uncached()),
-            buffer: room!([u8; BUFFER], [0; BUFFER]),
+            buffer: placed!([u8; BUFFER], [0; BUFFER]),
         })
     }
 
@@ -280,7 +280,7 @@ impl<F: NorFlash> Store<F> {
         Ok(kept.map_or(0, |bytes| each_kept(bytes, generation, act)))
     }
 
-    /// Keeps what so many effects remember, by their places in the table; none forgets.
+    /// Keeps what n effects remember, by their places in the table; none forgets.
     ///
     /// # Errors
     /// As the medium fails.
@@ -363,4 +363,10 @@ fn fits(image: &[u8], described: &Described) -> bool {
 }
 
 #[cfg(test)]
-pub(crate) mod tests;
+mod format_tests;
+#[cfg(test)]
+pub(crate) mod mock_flash;
+#[cfg(test)]
+mod protection_tests;
+#[cfg(test)]
+mod tests;

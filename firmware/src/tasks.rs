@@ -11,7 +11,7 @@ use crate::board::{Outputs, Plant};
 use crate::server::Server;
 use crate::shared::Shared;
 
-/// The control loop, for ever, in the plant's time.
+/// The control loop, without end, in the plant's time.
 pub async fn control(plant: &mut impl Plant, shared: &Shared) -> ! {
     let mut outputs = Outputs::VENT;
     loop {
@@ -20,7 +20,7 @@ pub async fn control(plant: &mut impl Plant, shared: &Shared) -> ! {
     }
 }
 
-/// The link: reads requests, writes answers; returns when the host has asked for a restart and has been answered, or
+/// The link: reads requests, writes answers; returns when the host has requested a restart and has been answered, or
 /// when the port is gone.
 pub async fn link<R: Read, W: Write, F: NorFlash>(
     receiver: &mut R,
@@ -50,7 +50,7 @@ pub async fn link<R: Read, W: Write, F: NorFlash>(
     }
 }
 
-/// Telemetry and events, for ever; returns when the port is gone.
+/// Telemetry and events, without end; returns when the port is gone.
 pub async fn telemetry<W: Write>(sender: &Gate<CriticalSectionRawMutex, W>, shared: &Shared) {
     let mut out = [0; MAX_TOPIC];
     loop {

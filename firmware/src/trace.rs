@@ -5,8 +5,8 @@ use model_core::link::messages::{
     Field, Refusal, TRACE_PIECE, TRACE_VARIABLES, TraceArm, TraceInfo, TracePiece, Trigger, Variable,
 };
 
-use crate::brief::Brief;
-use crate::common_room::{CommonRoom, TRACE_CAPACITY};
+use crate::compact_float::CompactFloat;
+use crate::shared_buffer::{SharedBuffer, TRACE_CAPACITY};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
@@ -27,7 +27,7 @@ pub struct Trace {
     trigger: Trigger,
     countdown: u16,
     /// None while a table has it.
-    values: Option<CommonRoom>,
+    values: Option<SharedBuffer>,
     /// Records that fit.
     room: usize,
     records: usize,
@@ -44,7 +44,7 @@ impl Default for Trace {
             every_ticks: 1,
             trigger: Trigger::Now,
             countdown: 0,
-            values: Some(CommonRoom::new()),
+            values: Some(SharedBuffer::new()),
             room: 0,
             records: 0,
             next: 0,
@@ -80,14 +80,14 @@ impl Trace {
     }
 
     /// Gives its room away, if it has it; what was recorded is lost, and nothing is recorded until it is armed again.
-    pub fn lend(&mut self) -> Option<CommonRoom> {
+    pub fn lend(&mut self) -> Option<SharedBuffer> {
         self.phase = Phase::Off;
         self.records = 0;
         self.values.take()
     }
 
     /// Takes the room back.
-    pub fn take_back(&mut self, room: CommonRoom) {
+    pub fn take_back(&mut self, room: SharedBuffer) {
         self.values = Some(room);
     }
 
@@ -117,10 +117,10 @@ impl Trace {
             return false;
         }
         self.countdown = self.every_ticks - 1;
-        let Some(values) = self.values.as_mut().and_then(CommonRoom::trace) else { return false };
+        let Some(values) = self.values.as_mut().and_then(SharedBuffer::trace) else { return false };
         let first = self.next * self.variables.len();
         for (place, variable) in (first..).zip(&self.variables) {
-            let now = Brief::of(value(*variable));
+            let now = CompactFloat::of(value(*variable));
             match values.get_mut(place) {
                 Some(old) => *old = now,
                 // As many records are made as the room has places for.
@@ -164,7 +164,7 @@ impl Trace {
         if self.phase != Phase::Complete || from >= self.records {
             return Err(Refusal::Range);
         }
-        let values = self.values.as_ref().map_or(&[][..], CommonRoom::values);
+        let values = self.values.as_ref().map_or(&[][..], SharedBuffer::values);
         let width = self.variables.len();
         let oldest = if self.records == self.room { self.next } else { 0 };
         for at in from..self.records.min(from + TRACE_PIECE / width) {

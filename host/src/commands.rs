@@ -1,6 +1,7 @@
 //! The sub-commands, one file each: arguments in, library calls, results out.
 
 pub mod batch;
+pub mod campaign;
 pub mod compare;
 pub mod completions;
 pub mod demo;

@@ -81,8 +81,8 @@ fn mcap() -> Vec<u8> {
                 tick: i,
                 state: State::Running,
                 mode: Mode::Force,
-                asked: 1.0,
-                asked_second: 0.0,
+                setpoint: 1.0,
+                setpoint_second: 0.0,
                 sides: [side].into_iter().collect(),
             })
             .unwrap();

@@ -27,17 +27,17 @@
 //! let mut tracker = MotionTracker::new(MotionSettings::default());
 //! let mut moment = muscle.moment();
 //! let mut command = Pressure::from_kilopascals(300.0);
-//! let wanted = Force::from_newtons(30.0);
+//! let demanded = Force::from_newtons(30.0);
 //! for tick in 0..=1000 {
 //!     let stroke = 1.0e-6 * tick as f32; // 1 mm in a second
 //!     let motion = tracker.step(1.0e-3, stroke, command.pascals());
 //!     muscle.update(&mut moment, motion, command);
 //!     chain.step(&moment.context);
-//!     command = muscle.pressure_with(wanted, &chain, &moment, command, &muscle.search()).pressure;
+//!     command = muscle.pressure_with(demanded, &chain, &moment, command, &muscle.search()).pressure;
 //! }
 //! // A tenth of the time constant has gone by: most of the over-stress is still there, and costs pressure.
 //! let held = muscle.held(Length::from_metres(1.0e-3_f32));
-//! let settled = muscle.pressure_for(wanted, &held, 1.0, command, &muscle.search());
+//! let settled = muscle.pressure_for(demanded, &held, 1.0, command, &muscle.search());
 //! let more = command.pascals() - settled.pressure.pascals();
 //! assert!(more > 1.0e3 && more < 30.0e3, "{more} Pa");
 //! ```
@@ -135,9 +135,9 @@ crate::effect_list! {
     BreakawayFriction = breakaway_friction;
     /// Friction falls with speed.
     StribeckFriction = stribeck_friction;
-    /// Friction builds up over a distance after a turn.
+    /// Friction builds up over a distance after a reversal.
     PreslidingHysteresis = presliding_hysteresis;
-    /// Small loops remember where the muscle turned.
+    /// Small loops remember at the reversal.
     MinorLoopMemory = minor_loop_memory;
     /// Friction proportional to a power of speed.
     RatePower = rate_power;
@@ -237,11 +237,11 @@ pub enum Start {
     /// Nothing is remembered, or what is remembered begins known.
     Known,
     /// Zeros mean that the muscle has long been at rest in the state of the first reading. If it had not, an over-stress was
-    /// left, which fades by itself: the slots of [`Info::fading`] hold it, and its trace is linear in them.
+    /// left, which fades without a request: the slots of [`Info::fading`] hold it, and its trace is linear in them.
     Settled,
-    /// Zeros are a guess in the middle; the memory finds itself once the muscle has travelled far enough one way.
+    /// Zeros are an estimate in the middle; the memory finds itself once the muscle has travelled far enough one way.
     Branch,
-    /// Zeros mean a new specimen. One that has been worked before begins with a memory nobody recorded.
+    /// Zeros mean a new specimen. One that has been worked before begins with a memory no one recorded.
     Virgin,
 }
 

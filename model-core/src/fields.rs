@@ -37,7 +37,7 @@ impl Way for &[u8] {
     }
 }
 
-/// Room to write.
+/// Placed to write.
 impl Way for &mut [u8] {
     fn reads(&self) -> bool {
         false
@@ -87,7 +87,7 @@ impl<'a> Walk<'a> {
         one[0]
     }
 
-    /// A number in at most so many bytes, of which the last may have so many bits.
+    /// A number in at most n bytes, of which the last may have n bits.
     #[inline(never)]
     fn number(&mut self, number: u64, most: usize, bits: u32) -> u64 {
         let mut bytes = [0_u8; 10];
@@ -223,7 +223,7 @@ macro_rules! choices {
 }
 
 /// As [`choices`], for what a controller says and never reads.
-macro_rules! told {
+macro_rules! one_of {
     ($name:ty { $($number:literal $variant:ident { $($field:tt: $binding:ident),* }),* $(,)? }) => {
         impl $crate::fields::Fields for $name {
             fn walk(&mut self, walk: &mut $crate::fields::Walk<'_>) {
@@ -238,7 +238,7 @@ macro_rules! told {
     };
 }
 
-pub(crate) use {choices, codes, fields, told};
+pub(crate) use {choices, codes, fields, one_of};
 
 impl Fields for () {
     fn walk(&mut self, _: &mut Walk<'_>) {}

@@ -134,7 +134,7 @@ fn body(bytes: &[u8]) -> Result<&[u8], ImageError> {
     Ok(&content[HEADER..])
 }
 
-/// The checksum that stands at an image's end, as a short name for a table.
+/// The checksum that is at an image's end, as a short name for a table.
 pub fn checksum(image: &[u8]) -> Option<u32> {
     let tail = image.get(image.len().checked_sub(CHECKSUM)?..)?;
     Some(u32::from_le_bytes(tail.try_into().ok()?))

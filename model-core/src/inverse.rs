@@ -1,10 +1,10 @@
-//! The pressure that makes the muscle exert a wanted force at a measured stroke.
+//! The pressure that makes the muscle exert a demanded force at a measured stroke.
 //!
 //! At one stroke and within one segment of the table, `F_G + F_NLFB` and `1 − k_F s` are cubics in pressure. They are put
 //! together once, and Newton's method runs on them; a bracket keeps it from leaving, so that it ends for every table.
 
 use crate::effects::{Chain, Context};
-use crate::muscle::{COMMON_ORDER, Held, HeldSlopes, Moment, Muscle, Piece};
+use crate::muscle::{AtStroke, COMMON_ORDER, Moment, Muscle, Piece, StrokeSlopes};
 use crate::scalar::Scalar;
 use crate::spline::{self, Cubic};
 use crate::units::{Force, Pressure};
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// Whether the force can be had, and if not, why.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reach {
-    /// The pressure gives the wanted force.
+    /// The pressure gives the demanded force.
     Reached,
     /// The muscle cannot pull that hard at this stroke: the pressure is the highest allowed.
     BeyondBlockedForce,
@@ -67,7 +67,7 @@ struct Bracket<T> {
 }
 
 impl<T: Scalar> Bracket<T> {
-    /// Where to go instead of a step that leaves the bracket or is no number.
+    /// Where to go instead of a step that leaves the bracket or is not a number.
     #[cold]
     #[inline(never)]
     fn instead(&self, lowest: T, highest: T) -> T {
@@ -84,7 +84,7 @@ impl<T: Scalar> Bracket<T> {
 /// Newton's method within a bracket, which ends for every curve.
 ///
 /// It ends with a step below the tolerance. It also ends when the step `s` and the one before it, `s₀`, both on one piece,
-/// foretell that the next would be: steps of Newton's method shrink by a ratio that shrinks itself, so that it would be less
+/// predict that the next would be: steps of Newton's method shrink by a ratio that shrinks itself, so that it would be less
 /// than `s²/s₀`.
 #[inline(always)]
 fn solve<T: Scalar>(
@@ -127,7 +127,7 @@ fn solve<T: Scalar>(
             if size * size <= tolerance * before {
                 break 'search (miss, slope);
             }
-            // A jump foretells nothing.
+            // A jump predicts nothing.
             before = if jumps { T::ZERO } else { size };
         }
     };
@@ -157,7 +157,7 @@ fn judge<T: Scalar>(miss: T, slope: T, tolerance: T) -> Reach {
 /// The base model at one stroke and direction: one product of two cubics in each piece.
 struct Base<'a, T> {
     muscle: &'a Muscle<T>,
-    held: &'a Held<T>,
+    held: &'a AtStroke<T>,
     direction: T,
     quasi: Cubic<T>,
     grip: Cubic<T>,
@@ -171,7 +171,7 @@ struct Base<'a, T> {
 impl<'a, T: Scalar> Base<'a, T> {
     /// Without cubics yet; they are put together where the search enters.
     #[inline(always)]
-    fn new(muscle: &'a Muscle<T>, held: &'a Held<T>, direction: T) -> Self {
+    fn new(muscle: &'a Muscle<T>, held: &'a AtStroke<T>, direction: T) -> Self {
         let (quasi, grip) = ([T::ZERO; 4], [T::ZERO; 4]);
         Self { muscle, held, direction, quasi, grip, origin: T::ZERO, from: T::ZERO, to: T::ZERO }
     }
@@ -214,8 +214,8 @@ impl<T: Scalar> Curve<T> for Base<'_, T> {
 /// The base model and effects that change with pressure.
 struct Whole<'a, T> {
     muscle: &'a Muscle<T>,
-    held: &'a Held<T>,
-    slopes: &'a HeldSlopes<T>,
+    held: &'a AtStroke<T>,
+    slopes: &'a StrokeSlopes<T>,
     chain: &'a Chain<T>,
     /// The present moment, moved to the pressures that are tried.
     context: Context<T>,
@@ -228,7 +228,7 @@ struct Whole<'a, T> {
 impl<T: Scalar> Curve<T> for Whole<'_, T> {
     fn enter(&mut self, _: T) {}
 
-    /// Never: effects may bend anywhere, so that no step foretells the next.
+    /// Never: effects may bend anywhere, so that no step predicts the next.
     fn holds(&self, _: T) -> bool {
         false
     }
@@ -258,14 +258,14 @@ impl<T: Scalar> Muscle<T> {
         }
     }
 
-    /// The pressure for a wanted force of the base model, starting from a guess (best: the last tick's answer).
+    /// The pressure for a demanded force of the base model, starting from an estimate (best: the last tick's answer).
     ///
-    /// `direction` as in [`Muscle::force`]. A force out of reach gives the nearest allowed pressure, and says so.
+    /// `direction` as in [`Muscle::force`]. A force saturated gives the nearest allowed pressure, and says so.
     #[inline(always)]
     pub fn pressure_for(
         &self,
         force: Force<T>,
-        held: &Held<T>,
+        held: &AtStroke<T>,
         direction: T,
         guess: Pressure<T>,
         search: &Search<T>,
@@ -273,7 +273,7 @@ impl<T: Scalar> Muscle<T> {
         solve(&mut Base::new(self, held, direction), force.si(), guess, search)
     }
 
-    /// The pressure for a wanted force with effects, at a moment to which `chain` has been stepped.
+    /// The pressure for a demanded force with effects, at a moment to which `chain` has been stepped.
     ///
     /// What the effects add regardless of pressure is subtracted exactly. Where an effect's force depends on the pressure the
     /// whole force is solved for, by Newton's method with the base model's slope and a secant for that of the effects, within

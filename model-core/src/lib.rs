@@ -10,7 +10,7 @@
 //! | what a fit finds and a file keeps | [`table`], [`image`], [`check`] |
 //! | values as bytes, as a small device reads and writes them | [`mod@fields`] |
 //! | force and its slope | [`muscle`] |
-//! | pressure for a wanted force | [`inverse`] |
+//! | pressure for a demanded force | [`inverse`] |
 //! | which way friction points | [`motion`] |
 //! | physics beyond the base model | [`effects`] |
 //! | all of it as a controller calls it | [`single`] |

@@ -7,7 +7,7 @@
 //! | messages | [`messages`], [`settings`] | the bodies, as postcard writes them; closed enums, never text |
 //! | endpoints | [`endpoints`] | ONE table: number, name, request, response; and the hash of all of it |
 //!
-//! A conversation begins with `hello`. The host compares [`endpoints::SCHEMA_HASH`] with the peer's and goes on only
+//! A conversation begins with `hello`. The host compares [`endpoints::SCHEMA_HASH`] with the peer's and continues only
 //! when they are equal, because from there on nothing in a body says what it is.
 
 pub mod endpoints;
@@ -21,4 +21,4 @@ pub use frame::{Accumulator, Exchange, Frame, FrameError, Header, Kind};
 pub use hello::Hello;
 
 /// Number of the message set. It moves when the meaning of a message changes; the hash beside it moves with any change.
-pub const LINK_VERSION: u16 = 3;
+pub const LINK_VERSION: u16 = 4;

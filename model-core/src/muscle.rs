@@ -15,9 +15,9 @@ use crate::spline::{self, Cubic, MAX_NODES, MAX_PIECES, Nodes};
 use crate::table::{Kind, MAX_ORDER, MuscleTable, TableError};
 use crate::units::{Force, Length, Pressure};
 
-mod held;
+mod at_stroke;
 
-pub use held::{Held, HeldSlopes, Moment, Parts};
+pub use at_stroke::{AtStroke, Moment, Parts, StrokeSlopes};
 
 /// A muscle ready to be evaluated, built once from its [`MuscleTable`].
 #[derive(Clone, Debug, PartialEq)]
@@ -126,7 +126,7 @@ impl<T: Scalar> Muscle<T> {
 
     /// The muscle at one contraction stroke.
     #[inline(always)]
-    pub fn held(&self, stroke: Length<T>) -> Held<T> {
+    pub fn held(&self, stroke: Length<T>) -> AtStroke<T> {
         let posture = self.braid.posture(stroke);
         let (z, x) = (posture.axial_strain, posture.radial_strain);
         let (a1, h1) = (posture.axial_area * z, posture.hoop_area * x);
@@ -139,7 +139,7 @@ impl<T: Scalar> Muscle<T> {
             columns[4] = a5 - h5;
             columns[5] = a5 * z - h5 * x;
         }
-        Held { posture, columns }
+        AtStroke { posture, columns }
     }
 
     /// The curves around a pressure, and the pressure above the one that they count from.
@@ -151,16 +151,16 @@ impl<T: Scalar> Muscle<T> {
 
     /// The parts of the force at a held stroke and a pressure.
     #[inline]
-    pub fn parts(&self, held: &Held<T>, pressure: Pressure<T>) -> Parts<T> {
-        self.parts_and_stiffness(held, &HeldSlopes::default(), pressure).0
+    pub fn parts(&self, held: &AtStroke<T>, pressure: Pressure<T>) -> Parts<T> {
+        self.parts_and_stiffness(held, &StrokeSlopes::default(), pressure).0
     }
 
     /// The same, and `∂F_quasi/∂x`, N/m, from how the coefficients change with stroke.
     #[inline(always)]
     fn parts_and_stiffness(
         &self,
-        held: &Held<T>,
-        slopes: &HeldSlopes<T>,
+        held: &AtStroke<T>,
+        slopes: &StrokeSlopes<T>,
         pressure: Pressure<T>,
     ) -> (Parts<T>, T) {
         let p = pressure.si();
@@ -189,7 +189,7 @@ impl<T: Scalar> Muscle<T> {
     }
 
     /// `∂F_quasi/∂x` at a held stroke and a pressure, N/m; below zero, since a muscle pulls less the shorter it is.
-    pub fn stroke_slope(&self, held: &Held<T>, slopes: &HeldSlopes<T>, pressure: Pressure<T>) -> T {
+    pub fn stroke_slope(&self, held: &AtStroke<T>, slopes: &StrokeSlopes<T>, pressure: Pressure<T>) -> T {
         self.parts_and_stiffness(held, slopes, pressure).1
     }
 
@@ -307,8 +307,8 @@ impl<T: Scalar> Muscle<T> {
     pub fn move_to(
         &self,
         context: &mut Context<T>,
-        held: &Held<T>,
-        slopes: &HeldSlopes<T>,
+        held: &AtStroke<T>,
+        slopes: &StrokeSlopes<T>,
         pressure: Pressure<T>,
     ) -> Parts<T> {
         let (parts, stiffness) = self.parts_and_stiffness(held, slopes, pressure);
@@ -325,7 +325,7 @@ impl<T: Scalar> Muscle<T> {
 
     /// How the coefficients of pressure and of the `E_k` change with stroke.
     #[inline(always)]
-    pub fn slopes(&self, held: &Held<T>) -> HeldSlopes<T> {
+    pub fn slopes(&self, held: &AtStroke<T>) -> StrokeSlopes<T> {
         let posture = &held.posture;
         let slopes = self.braid.slopes(posture);
         let mut columns = [T::ZERO; MAX_ORDER];
@@ -349,7 +349,7 @@ impl<T: Scalar> Muscle<T> {
             next(4);
             next(5);
         }
-        HeldSlopes { area: slopes.area, columns }
+        StrokeSlopes { area: slopes.area, columns }
     }
 
     /// The force with the effects of `chain` at a moment that the chain has been stepped to.

@@ -7,7 +7,7 @@
 use crate::effects::{Chain, Context};
 use crate::inverse::{Search, Solution};
 use crate::motion::{Motion, MotionTracker};
-use crate::muscle::{Held, HeldSlopes, Moment, Muscle, Parts};
+use crate::muscle::{AtStroke, Moment, Muscle, Parts, StrokeSlopes};
 use crate::units::{Force, Length, Pressure};
 
 /// [`Muscle::force`].
@@ -23,7 +23,7 @@ pub fn force(
 
 /// [`Muscle::held`], into its place.
 #[inline(never)]
-pub fn hold(muscle: &Muscle<f32>, held: &mut Held<f32>, stroke: Length<f32>) {
+pub fn hold(muscle: &Muscle<f32>, held: &mut AtStroke<f32>, stroke: Length<f32>) {
     *held = muscle.held(stroke);
 }
 
@@ -31,7 +31,7 @@ pub fn hold(muscle: &Muscle<f32>, held: &mut Held<f32>, stroke: Length<f32>) {
 #[inline(never)]
 pub fn pose(
     muscle: &Muscle<f32>,
-    held: &mut Held<f32>,
+    held: &mut AtStroke<f32>,
     stroke: Length<f32>,
     pressure: Pressure<f32>,
     direction: f32,
@@ -42,20 +42,20 @@ pub fn pose(
 
 /// [`Muscle::slopes`], into their place.
 #[inline(never)]
-fn lean(muscle: &Muscle<f32>, held: &Held<f32>, slopes: &mut HeldSlopes<f32>) {
+fn lean(muscle: &Muscle<f32>, held: &AtStroke<f32>, slopes: &mut StrokeSlopes<f32>) {
     *slopes = muscle.slopes(held);
 }
 
 /// [`Muscle::parts`].
 #[inline(never)]
-pub fn parts(muscle: &Muscle<f32>, held: &Held<f32>, pressure: Pressure<f32>) -> Parts<f32> {
+pub fn parts(muscle: &Muscle<f32>, held: &AtStroke<f32>, pressure: Pressure<f32>) -> Parts<f32> {
     muscle.parts(held, pressure)
 }
 
 /// [`Muscle::stroke_slope`].
 #[inline(never)]
-pub fn stroke_slope(muscle: &Muscle<f32>, held: &Held<f32>, pressure: Pressure<f32>) -> f32 {
-    let mut slopes = HeldSlopes::default();
+pub fn stroke_slope(muscle: &Muscle<f32>, held: &AtStroke<f32>, pressure: Pressure<f32>) -> f32 {
+    let mut slopes = StrokeSlopes::default();
     lean(muscle, held, &mut slopes);
     muscle.stroke_slope(held, &slopes, pressure)
 }
@@ -64,7 +64,7 @@ pub fn stroke_slope(muscle: &Muscle<f32>, held: &Held<f32>, pressure: Pressure<f
 #[inline(never)]
 pub fn pressure_for(
     muscle: &Muscle<f32>,
-    held: &Held<f32>,
+    held: &AtStroke<f32>,
     direction: f32,
     force: Force<f32>,
     guess: Pressure<f32>,
@@ -73,7 +73,7 @@ pub fn pressure_for(
     muscle.pressure_for(force, held, direction, guess, search)
 }
 
-/// The same for a stroke that nothing else is asked about.
+/// The same for a stroke that nothing else is queried about.
 #[inline(never)]
 pub fn pressure_at(
     muscle: &Muscle<f32>,

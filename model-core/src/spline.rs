@@ -1,7 +1,7 @@
 //! Natural cubic splines over pressure, several curves on one set of nodes.
 //!
 //! A curve is given by its values at the nodes (that is what a fit finds and a table stores) and turned once into one
-//! cubic per segment. Outside the nodes each curve keeps its value at the nearest one: whoever wants a trend beyond the
+//! cubic per segment. Outside the nodes each curve keeps its value at the nearest one: anyone who wants a trend beyond the
 //! tested pressures puts a node there.
 
 use crate::scalar::Scalar;
@@ -121,7 +121,7 @@ impl<T: Scalar> Nodes<T> {
         (self.edges[piece], self.edges[piece + 1])
     }
 
-    /// The piece that `p` lies in: how many nodes lie at or below it. A pressure that is no number lies below the first.
+    /// The piece that `p` lies in: how many nodes lie at or below it. A pressure that is not a number lies below the first.
     ///
     /// Written out by fours, so that every index is a constant and needs no check.
     #[inline(always)]

@@ -217,7 +217,7 @@ fn all_finite(values: &[f32]) -> bool {
     is_curve(values, values.len(), f32::MIN, f32::MAX)
 }
 
-/// Whether there are so many values, all between two limits.
+/// Whether there are n values, all between two limits.
 #[inline]
 fn is_curve(values: &[f32], count: usize, low: f32, high: f32) -> bool {
     values.len() == count && values.iter().all(|value| *value >= low && *value <= high)

@@ -331,7 +331,7 @@ proptest! {
         }
     }
 
-    /// Whatever a table holds, in single precision and for a force out of reach: it ends within the limits and says so.
+    /// Whatever a table holds, in single precision and for a force saturated: it ends within the limits and says so.
     #[test]
     fn the_inverse_ends_for_every_table(
         stroke in -2.0e-3..20.0e-3_f64,

@@ -187,7 +187,7 @@ fn after_a_turn_the_friction_is_the_virgin_curve_doubled() {
 fn once_all_strands_slide_presliding_adds_nothing() {
     let mut alone = Alone::new("presliding-hysteresis", &[1.0, 4.0, 2e-3]);
     close(travelled(&mut alone, 0.0, 5e-3, 1.0), 0.0, 1e-9);
-    // Just after the turn all of the jump is taken back: 2 (0.1 · 100 + 4) N.
+    // Just after the reversal all of the jump is taken back: 2 (0.1 · 100 + 4) N.
     close(travelled(&mut alone, 5e-3, 5e-3 - 1e-9, -1.0), -28.0, 1e-3);
     close(travelled(&mut alone, 5e-3, 2.9e-3, -1.0), 0.0, 1e-9);
 }
@@ -270,7 +270,7 @@ fn after_a_rest_it_sticks_the_longer_the_rest_and_lets_go_over_its_distance() {
     close(stuck(1e4, 0.2e-3), aged(1e4 * (-1.0_f64).exp()), 1e-3);
     assert!(stuck(1.0, 0.0).abs() < stuck(10.0, 0.0).abs());
     assert!(stuck(100.0, 5e-3).abs() < 1e-6);
-    // Back where it stood, but after a turn without a rest, nothing holds it.
+    // Back where it stood, but after a reversal without a rest, nothing holds it.
     let mut alone = Alone::new("breakaway-friction", &[5.0, 0.0, 0.0, 0.2e-3, 10.0]);
     let moving = |stroke: f64, hold_time: f64, direction: f64| Context {
         stroke,
@@ -333,7 +333,7 @@ fn speed_and_pressure_laws() {
 fn work_warms_and_rest_cools() {
     let mut thermal = Alone::new("thermal-softening", &[1.0, 0.0, 0.0, 0.0, 600.0]);
     let mut time = 0.0;
-    // 100 N over 10 mm to and fro at 10 mm/s: 1 W.
+    // 100 N over 10 mm back and forth at 10 mm/s: 1 W.
     for i in 0..20_000_i32 {
         let phase = (i % 200) as f64 / 100.0;
         let (stroke, direction) = if phase <= 1.0 { (phase, 1.0) } else { (2.0 - phase, -1.0) };

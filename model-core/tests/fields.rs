@@ -15,7 +15,7 @@ use serde::de::DeserializeOwned;
 
 const ROOM: usize = 2 * MAX_BODY;
 
-/// Both write a value alike, and into as much room as it takes.
+/// Both write a value similar, and into as much room as it takes.
 fn written_alike<V: Fields + Serialize>(value: &mut V) -> Result<(), TestCaseError> {
     let (mut theirs, mut ours) = ([0; ROOM], [0; ROOM]);
     let theirs = postcard::to_slice(value, &mut theirs).expect("room").to_vec();

@@ -60,6 +60,8 @@ class Chip:
         self.now, self.instructions = 0.0, 0
         self.crystal_dead, self.erase_s = False, 1.0
         self.restarts, self.erased = [], []
+        # Words that the flash still programs before power fails; none for all.
+        self.words_left, self.words_written = None, 0
         self.outputs = []
         self.reset_flags = 1 << 27 | 1 << 26
         self._begin()
@@ -102,7 +104,7 @@ class Chip:
         heapq.heappush(self.events, (when, next(self._order), act))
 
     def stall(self, seconds):
-        """The processor stands still; everything else goes on."""
+        """The processor does not move; everything else continues."""
         end = self.now + seconds
         while self.events and self.events[0][0] <= end and not self._restart:
             when, _, act = heapq.heappop(self.events)
@@ -293,7 +295,7 @@ class Chip:
             self._leave()
 
     def _stopped(self):
-        """Unicorn stopped by itself: asleep, back from an interrupt, or somewhere without memory."""
+        """Unicorn stopped without a request: asleep, back from an interrupt, or somewhere without memory."""
         pc = self.uc.reg_read(UC_ARM_REG_PC) & ~1
         if self.active and (self._returns or pc >= 0xFFFFFF00):
             return

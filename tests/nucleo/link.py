@@ -5,10 +5,12 @@ import zlib
 
 HELLO, INFO, STATUS, ARM, START, STOP, DISARM, SET_POINT = 0, 1, 2, 3, 4, 5, 6, 7
 FAULTS, CLEAR_FAULT, SETTINGS, SET_SETTINGS = 11, 13, 14, 15
-TABLE_BEGIN, TABLE_PIECE, TABLE_COMMIT, TABLE_READ, RESTART = 16, 17, 18, 19, 26
+TABLE_BEGIN, TABLE_PIECE, TABLE_COMMIT, TABLE_READ, RESTART, KEEP_ALIVE = 16, 17, 18, 19, 26, 27
 REQUEST, RESPONSE, REFUSAL = 0, 1, 2
 STATES = ("disarmed", "armed", "running", "fault")
 PRESSURE_MODE, FORCE_MODE = 1, 2
+# The session of these tests, and the time between its keep-alive requests.
+SESSION, HEARTBEAT_S = 300, 0.1
 FAULT_NAMES = (
     "sensor-range sensor-stuck sensor-noisy sensors-disagree sensors-silent pressure-not-rising pressure-not-falling over-pressure "
     "over-stroke over-speed over-force set-point-silence loop-overrun table-missing table-invalid brown-out watchdog not-a-number "
@@ -84,6 +86,7 @@ class Link:
     def __init__(self, chip):
         self.chip, self.sequence, self.read = chip, 0, 0
         self.uart = None
+        self.controls, self.kept_alive = False, 0.0
 
     def frames(self):
         if self.uart is not self.chip.uart2:
@@ -97,6 +100,7 @@ class Link:
 
     def ask(self, number, body=b"", wait=0.05):
         """The answer's body, or none."""
+        self.keep_alive()
         self.sequence += 1
         found = []
 
@@ -105,14 +109,29 @@ class Link:
             return bool(found)
 
         self.chip.uart2.send(frame(REQUEST, number, self.sequence, body))
-        end = self.chip.now + wait
-        while self.chip.now < end and not answered():
+        end, restarts = self.chip.now + wait, len(self.chip.restarts)
+        # A chip that restarts does not answer.
+        while self.chip.now < end and not answered() and len(self.chip.restarts) == restarts:
             self.chip.run(0.0005)
         if not found:
             return None
         if found[0][0] == REFUSAL:
             raise Refused(found[0][3])
         return found[0][3]
+
+    def keep_alive(self):
+        """Keeps a run going, without waiting for the answer."""
+        if self.controls and self.chip.now - self.kept_alive > HEARTBEAT_S:
+            self.kept_alive = self.chip.now
+            self.sequence += 1
+            self.chip.uart2.send(frame(REQUEST, KEEP_ALIVE, self.sequence, varint(SESSION)))
+
+    def arm(self):
+        self.ask(ARM, varint(SESSION))
+        self.controls = True
+
+    def start(self, mode):
+        return self.ask(START, bytes([mode]) + varint(SESSION))
 
     def status(self):
         reader = Reader(self.ask(STATUS))

@@ -80,7 +80,7 @@ class Rcc(Registers):
         return self.apb1() * (1 if self.get(0x08) >> 10 & 7 < 4 else 2)
 
     def lose_crystal(self):
-        """The crystal stops. With the clock security on (CSSON) the processor goes on with its own oscillator and takes an NMI."""
+        """The crystal stops. With the clock security on (CSSON) the processor continues with its own oscillator and takes an NMI."""
         self.chip.crystal_dead = True
         control = self.get(0x00)
         if control >> 19 & 1:
@@ -121,7 +121,7 @@ class Exti(Registers):
 
 
 class Flash(Registers):
-    """Flash (chapter 3): one bank, so that the processor stands still while it programs or erases. Bits are only ever cleared."""
+    """Flash (chapter 3): one bank, so that the processor does not move while it programs or erases. Bits are only ever cleared."""
 
     STARTS = [0, 0x4000, 0x8000, 0xC000, 0x10000, 0x20000, 0x40000, 0x60000]
     SIZES = [0x4000] * 4 + [0x10000] + [0x20000] * 3
@@ -135,6 +135,7 @@ class Flash(Registers):
         self.pending = []
         self.errors = 0
         self.stale = False
+        self.cut = False
 
     def read(self, offset):
         self.settle()
@@ -165,6 +166,8 @@ class Flash(Registers):
 
     def erase(self, sector):
         chip = self.chip
+        if self.cut:
+            return
         chip.erased.append((sector, chip.now))
         chip.stall(chip.erase_s)
         chip.uc.mem_write(0x08000000 + self.STARTS[sector], b"\xff" * self.SIZES[sector])
@@ -174,12 +177,24 @@ class Flash(Registers):
         """The processor writes to the flash; the emulated memory takes the raw value first."""
         old = int.from_bytes(self.chip.uc.mem_read(address, size), "little")
         programs = self.get(0x10) & 1 and size == 4 and address % 4 == 0
-        self.pending.append((address, size, old & value if programs else old))
+        self.pending.append((address, size, old & value if programs else old, old))
         if not programs:
             self.errors |= 1 << 7
 
     def settle(self):
-        for address, size, value in self.pending:
+        for address, size, value, old in self.pending:
+            if self.cut:
+                # The emulated memory took the raw value; without power nothing is written.
+                self.chip.uc.mem_write(address, old.to_bytes(size, "little"))
+                continue
+            if self.chip.words_left == 0:
+                # Power fails while this word is programmed: half of its bits are cleared.
+                self.cut, value = True, value | old & 0xFFFF0000
+                self.chip.words_left = None
+                self.chip.restart("power", 1 << 27 | 1 << 26)
+            elif self.chip.words_left is not None:
+                self.chip.words_left -= 1
+            self.chip.words_written += 1
             self.chip.uc.mem_write(address, value.to_bytes(size, "little"))
             self.chip.stall(self.WORD_S)
             self.stale = True

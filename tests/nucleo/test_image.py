@@ -8,7 +8,7 @@ import unittest
 
 from board import TABLE, Board
 from link import (
-    ARM, CLEAR_FAULT, FORCE_MODE, INFO, PRESSURE_MODE, RESTART, SET_SETTINGS, SETTINGS, STATUS, STOP, TABLE_PIECE, TABLE_READ, Reader,
+    CLEAR_FAULT, FORCE_MODE, INFO, PRESSURE_MODE, RESTART, SET_SETTINGS, SETTINGS, STATUS, STOP, TABLE_PIECE, TABLE_READ, Reader,
     Refused, frame, varint,
 )
 
@@ -177,7 +177,7 @@ class Store(unittest.TestCase):
         board.restarted()
         self.assertEqual(board.link.status()["fault"], "settings-invalid")
         with self.assertRaises(Refused):
-            board.link.ask(ARM)
+            board.link.arm()
         with self.assertRaises(Refused):
             board.link.ask(CLEAR_FAULT)
         board.link.ask(SET_SETTINGS, settings, wait=5.0)
@@ -262,7 +262,17 @@ class Failures(unittest.TestCase):
 
     def test_a_host_that_is_gone_leaves_a_vented_muscle(self):
         board = self.running()
+        board.link.controls = False
         self.assert_vented_within(board, 1.2)
+        self.assertEqual(board.link.status()["fault"], "host-silence")
+
+    def test_a_watcher_does_not_keep_the_run_of_a_program_that_is_gone(self):
+        board = self.running()
+        board.link.controls = False
+        for _ in range(13):
+            board.run(0.1)
+            board.link.status()
+        self.assertTrue(board.chip.valve_open)
         self.assertEqual(board.link.status()["fault"], "host-silence")
 
     def test_half_a_frame_and_then_a_whole_one(self):

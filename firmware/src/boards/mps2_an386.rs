@@ -78,8 +78,8 @@ extern "C" fn second_sent() {
 
 /// Everything runs on an interrupt that no device uses, below all that do, and the main program sleeps: in QEMU only an
 /// interrupt wait lets the host's processor rest (an event wait, the thread executor's, spins). The control loop is not above the rest
-/// as on a real board, except in the image that is built to try that: the bench keeps its time, and would go on while the link waits
-/// for the file that stands for the flash.
+/// as on a real board, except in the image that is built to try that: the bench keeps its time, and would continue while the link waits
+/// for the file that is the flash.
 static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 const EXECUTOR_LINE: Line = Line(10);
 
@@ -214,7 +214,7 @@ fn main() -> ! {
     }
 }
 
-/// Says so and ends the emulator. The place is told by the image with logs only: it would keep the names of all source files in
+/// Says so and ends the emulator. The place is reported by the image with logs only: it would keep the names of all source files in
 /// flash.
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {

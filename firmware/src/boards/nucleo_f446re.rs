@@ -167,7 +167,7 @@ async fn link(
     shared: &'static Shared,
     server: &'static mut Server<StoreFlash>,
 ) {
-    // It returns when the host has asked for a restart: neither end of this line fails.
+    // It returns when the host has requested a restart: neither end of this line fails.
     tasks::link(&mut receiver, port, server, shared).await;
     Timer::after_millis(20).await;
     dump();
@@ -255,7 +255,7 @@ fn main() -> ! {
     };
     EXECUTOR.init_with(Executor::new).run(|spawner| {
         if spawn(spawner, &start).is_none() {
-            // Without a store there is nobody to tell; the board stays vented, and the watchdog tries again.
+            // Without a store there is no one to tell; the board stays vented, and the watchdog tries again.
             dump();
         }
     })

@@ -21,11 +21,11 @@ pub(super) struct Actuator {
     pub(super) trim: Integral,
     pub(super) stroke_loop: Integral,
     pub(super) guess_pa: f32,
-    /// Sign of what the limits took from the last wish.
-    pub(super) cut: f32,
+    /// Sign of what the limits took from the last demand.
+    pub(super) saturation: f32,
     pub(super) sample: SideSample,
     pub(super) command: Command,
-    pub(super) wanted_n: f32,
+    pub(super) force_demand_n: f32,
     pub(super) forward_pa: f32,
     pub(super) trim_pa: f32,
     /// Force by the table at this tick's readings, N; none without a table or without readings that are numbers.
@@ -43,22 +43,22 @@ impl Actuator {
             trim: Integral::default(),
             stroke_loop: Integral::default(),
             guess_pa: 0.0,
-            cut: 0.0,
+            saturation: 0.0,
             sample: SideSample::default(),
             command: Command::VENT,
-            wanted_n: 0.0,
+            force_demand_n: 0.0,
             forward_pa: 0.0,
             trim_pa: 0.0,
             model_n: None,
         }
     }
 
-    /// Lets the air out, and nothing of what was wanted stays.
+    /// Lets the air out, and nothing of what was demanded stays.
     pub(super) fn vent(&mut self, regulator: &Regulator) {
         let air = self.air();
         self.regulator.vent(TICK_S, &air, regulator);
         self.command = Command::VENT;
-        self.sample.wanted_pa = 0.0;
+        self.sample.pressure_demand_pa = 0.0;
     }
 
     /// The air in the muscle, as far as a table tells.

@@ -6,7 +6,7 @@
 //! ```
 //! The test is best made below the deadband, where the muscle does not move. The device is disarmed while it lasts.
 
-use model_core::link::messages::{Fault, Refusal, Side, State};
+use model_core::link::messages::{Fault, Refusal, Session, Side, State};
 use model_core::scalar::Scalar;
 
 use super::Controller;
@@ -32,19 +32,19 @@ const PATIENCE_TICKS: u16 = 1_000;
 const PART: f32 = 0.5;
 
 impl Controller {
-    /// Arms, or begins the test that arms when it has passed.
+    /// Arms for a session, or begins the test that arms when it has passed.
     ///
     /// # Errors
     /// As [`Machine::request`](crate::safety::Machine::request); [`Refusal::StillFaulty`] where a muscle is not empty or the
     /// settings have not been confirmed.
-    pub fn arm(&mut self) -> Result<(), Refusal> {
+    pub fn arm(&mut self, session: Session) -> Result<(), Refusal> {
         self.machine.allows(Cause::Arm)?;
         if self.machine.state() == State::Disarmed {
             if self.unconfirmed {
                 return Err(Refusal::StillFaulty(Fault::SettingsInvalid));
             }
             let watch = &self.settings.watch;
-            // `!(…)` so that a pressure that is no number counts as one that stands.
+            // `!(…)` so that a pressure that is not a number counts as one that stands.
             let stands = |pressure_pa: f32| !(pressure_pa <= watch.vented_pa);
             if self.settings.pressure.fitted && self.sides.iter().any(|side| stands(side.sample.pressure_pa))
             {
@@ -54,10 +54,21 @@ impl Controller {
                 if self.arming == Arming::Idle {
                     self.arming = Arming::Filling(0);
                 }
+                self.own(session);
                 return Ok(());
             }
         }
-        self.arm_now()
+        self.arm_now()?;
+        self.own(session);
+        Ok(())
+    }
+
+    /// Disarms a device whose owner has been silent: the program that armed it has ended, and no other may find it ready.
+    pub(super) fn disarm_when_silent(&mut self) {
+        if self.machine.state() == State::Armed && self.owner_age > self.settings.watch.armed_silence_ticks {
+            // Allowed from `Armed`.
+            let _ = self.disarm();
+        }
     }
 
     fn arm_now(&mut self) -> Result<(), Refusal> {

@@ -12,7 +12,8 @@ use crate::board::Hardware;
 type Bound = (f32, f32, f32);
 
 /// Longest times of the watches, ticks. A reading that is out of range does harm within some tens of milliseconds; a regulator answers
-/// within some tenths of a second; a person who takes a cable away is noticed within a minute.
+/// within some tenths of a second; a user who takes a cable away is noticed within a minute. An armed device is vented, so it may
+/// wait for an hour; a host that keeps it alive every tenth of a second must not be disarmed by a few lost frames.
 const MOST_DEBOUNCE: u16 = 20;
 const MOST_JUMPS: u16 = 64;
 const MOST_FOLLOW: u16 = 2_000;
@@ -20,6 +21,8 @@ const MOST_STUCK: u16 = 10_000;
 const MOST_OVERRUN: u16 = 50;
 const MOST_SILENCE: u32 = 60_000;
 const MOST_HOLD: u32 = 600_000;
+const LEAST_ARMED: u32 = 1_000;
+const MOST_ARMED: u32 = 3_600_000;
 const MOST_VENT: u32 = 30_000;
 /// Largest gains, in the units of the loops: a thousand times what moves a muscle by its whole range at the smallest error that a
 /// sensor resolves.
@@ -181,6 +184,7 @@ fn watch(w: &Watch, hardware: &Hardware) -> bool {
         && (1..=MOST_FOLLOW).contains(&w.follow_ticks)
         && w.silence_ticks <= MOST_SILENCE
         && (1..=MOST_SILENCE).contains(&w.host_silence_ticks)
+        && (LEAST_ARMED..=MOST_ARMED).contains(&w.armed_silence_ticks)
         && (1..=MOST_OVERRUN).contains(&w.overrun_ticks)
         && w.hold_ticks <= MOST_HOLD
         && (100..=MOST_VENT).contains(&w.vent_ticks)
@@ -259,7 +263,7 @@ mod tests {
     #[test]
     fn no_message_may_make_a_watch_blind_or_wait_for_days() {
         type Change = fn(&mut Settings);
-        let blind: [Change; 11] = [
+        let blind: [Change; 13] = [
             |s| s.watch.debounce_ticks = 65_535,
             |s| s.watch.debounce_ticks = 0,
             |s| s.watch.noisy_jumps = 65_535,
@@ -268,6 +272,8 @@ mod tests {
             |s| s.watch.silence_ticks = u32::MAX,
             |s| s.watch.host_silence_ticks = u32::MAX,
             |s| s.watch.host_silence_ticks = 0,
+            |s| s.watch.armed_silence_ticks = LEAST_ARMED - 1,
+            |s| s.watch.armed_silence_ticks = MOST_ARMED + 1,
             |s| s.watch.overrun_ticks = 65_535,
             |s| s.watch.hold_ticks = u32::MAX,
             |s| s.watch.vent_ticks = u32::MAX,

@@ -1,4 +1,4 @@
-//! Commands: from what is asked, by way of force and feed-forward, to what the regulators are told.
+//! Commands: from the setpoint, by way of force and feed-forward, to what the regulators are reported.
 
 use model_core::link::messages::{Fault, Mode, Side, State};
 use model_core::link::settings::FeedForward;
@@ -8,39 +8,42 @@ use super::Controller;
 use crate::board::Command;
 use crate::modes;
 use crate::pair::{self, Posed, Pull};
-use crate::regulator::Wish;
+use crate::regulator::Demand;
 use crate::tick::TICK_S;
 use crate::watch::Finding;
 
 impl Controller {
     /// Makes the commands of the running mode.
     pub(super) fn drive(&mut self) {
-        let mut wishes = [(Wish::default(), true); 2];
+        let mut demands = [(Demand::default(), true); 2];
         match self.mode {
             Mode::Vent => return self.rest(),
             Mode::Pressure => {
-                wishes[0] = (Wish { pressure_pa: self.coming, foreseen_pa: self.coming_step }, true);
+                demands[0] =
+                    (Demand { pressure_pa: self.lookahead, lookahead_pa: self.lookahead_step }, true);
             }
-            Mode::Force => wishes[0] = self.force_wish(0, [self.asked, self.coming], self.coming_step),
+            Mode::Force => {
+                demands[0] = self.demand_for_force(0, [self.setpoint, self.lookahead], self.lookahead_step)
+            }
             Mode::Stroke => {
                 let side = &mut self.sides[0];
                 let speed = side.motion.motion().speed;
                 let force = modes::stroke_force(
                     &self.settings.stroke_loop,
                     &mut side.stroke_loop,
-                    [self.asked, self.coming],
+                    [self.setpoint, self.lookahead],
                     side.sample.stroke_m,
                     speed,
-                    side.cut,
+                    side.saturation,
                 );
-                let step = self.settings.stroke_loop.load_stiffness_n_per_m * self.coming_step;
-                wishes[0] = self.force_wish(0, [force; 2], step);
+                let step = self.settings.stroke_loop.load_stiffness_n_per_m * self.lookahead_step;
+                demands[0] = self.demand_for_force(0, [force; 2], step);
             }
             Mode::Pair => {
                 let Pull { forces_n, reached } = self.pair_forces();
-                for (at, wish) in wishes.iter_mut().enumerate() {
-                    let (pressure, force_reached) = self.force_wish(at, [forces_n[at]; 2], 0.0);
-                    *wish = (pressure, force_reached && reached);
+                for (at, demand) in demands.iter_mut().enumerate() {
+                    let (pressure, force_reached) = self.demand_for_force(at, [forces_n[at]; 2], 0.0);
+                    *demand = (pressure, force_reached && reached);
                 }
             }
         }
@@ -49,7 +52,7 @@ impl Controller {
             let used = self.uses(side);
             let Self { settings, sides, hardware, .. } = self;
             let actuator = &mut sides[side.index()];
-            let (wish, reached) = wishes[side.index()];
+            let (demand, reached) = demands[side.index()];
             if !used {
                 // Its regulator's model is kept up for the watch on what stays in it, where there is a second muscle at all.
                 if pair::SUPPORTED {
@@ -57,32 +60,32 @@ impl Controller {
                 }
                 continue;
             }
-            if !wish.pressure_pa.is_finite() {
-                bad = Some((side, wish.pressure_pa));
+            if !demand.pressure_pa.is_finite() {
+                bad = Some((side, demand.pressure_pa));
                 continue;
             }
             let most =
                 actuator.model.as_ref().map_or(f32::MAX, |model| model.muscle.max_pressure().pascals());
             let high = most.at_most(settings.limits.pressure_pa).at_most(hardware.command_ceiling_pa);
-            // Without lead a command is what was asked for, as whoever measures the regulator itself wants it.
+            // Without lead a command is the setpoint, as anyone who measures the regulator itself wants it.
             if settings.pressure.fitted && settings.regulator.lead > 0.0 {
                 actuator.regulator.observe(TICK_S, actuator.sample.pressure_pa, &settings.regulator);
             }
             let air = actuator.air();
             let driven =
-                actuator.regulator.step(TICK_S, wish, high, &air, &settings.regulator, &settings.limits);
-            actuator.cut = if !reached {
+                actuator.regulator.step(TICK_S, demand, high, &air, &settings.regulator, &settings.limits);
+            actuator.saturation = if !reached {
                 // The inverse has gone to the highest pressure, or to the lowest.
-                wish.pressure_pa - 0.5 * high
+                demand.pressure_pa - 0.5 * high
             } else if driven.saturated {
-                wish.pressure_pa - driven.wanted_pa
+                demand.pressure_pa - driven.pressure_demand_pa
             } else {
                 0.0
             };
             if !reached || driven.saturated {
                 self.saturated_ticks = self.saturated_ticks.saturating_add(1);
             }
-            // What is sent is judged, not only what was wished for: the regulator's model comes between.
+            // What is sent is judged, not only what was demanded for: the regulator's model comes between.
             let sent = driven.command_pa;
             if !(sent >= 0.0
                 && sent <= hardware.command_ceiling_pa
@@ -92,19 +95,24 @@ impl Controller {
                 continue;
             }
             actuator.command = Command { pressure_pa: sent, vent: false };
-            actuator.sample.wanted_pa = driven.wanted_pa;
+            actuator.sample.pressure_demand_pa = driven.pressure_demand_pa;
         }
         if let Some((side, value)) = bad {
             self.raise(side, &Finding { fault: Fault::NotANumber, sensor: None, value, limit: 0.0 });
         }
     }
 
-    /// Feed-forward for the force that will be wanted when a command acts, and trim for the one that is wanted now. `foreseen_n` of
+    /// Feed-forward for the force that will be demanded when a command acts, and trim for the one that is demanded now. `foreseen_n` of
     /// the last change of the former was known ahead of time.
-    fn force_wish(&mut self, at: usize, [force_n, coming_n]: [f32; 2], foreseen_n: f32) -> (Wish, bool) {
+    fn demand_for_force(
+        &mut self,
+        at: usize,
+        [force_n, coming_n]: [f32; 2],
+        foreseen_n: f32,
+    ) -> (Demand, bool) {
         let settings = &self.settings;
         let actuator = &mut self.sides[at];
-        actuator.wanted_n = force_n;
+        actuator.force_demand_n = force_n;
         let model_n = actuator.model_n;
         let model = actuator.model.as_mut().filter(|_| model_n.is_some());
         let (forward, reached) = modes::feed_forward(settings, self.mode, model, coming_n, actuator.guess_pa);
@@ -119,7 +127,7 @@ impl Controller {
                 _ => force_n,
             };
             let error = expected_n - actuator.sample.force_n;
-            modes::trim(&settings.force_loop, &mut actuator.trim, error, actuator.cut)
+            modes::trim(&settings.force_loop, &mut actuator.trim, error, actuator.saturation)
         } else {
             0.0
         };
@@ -128,8 +136,8 @@ impl Controller {
             (FeedForward::Gaylord, Some(model)) => model.held().posture.area,
             _ => 0.0,
         };
-        let foreseen_pa = if slope > 0.0 { foreseen_n / slope } else { 0.0 };
-        (Wish { pressure_pa: forward + actuator.trim_pa, foreseen_pa }, reached)
+        let lookahead_pa = if slope > 0.0 { foreseen_n / slope } else { 0.0 };
+        (Demand { pressure_pa: forward + actuator.trim_pa, lookahead_pa }, reached)
     }
 
     // Apart from the rest of a step, so that the stack does not hold a joint's forces while an inverse is looked for.
@@ -143,13 +151,13 @@ impl Controller {
         };
         let speeds = first.motion.motion().speed - second.motion.motion().speed;
         let posed = Posed {
-            angle_rad: self.asked,
-            stiffness_nm_per_rad: self.asked_second,
+            angle_rad: self.setpoint,
+            stiffness_nm_per_rad: self.setpoint_second,
             measured_rad: (first.sample.stroke_m - second.sample.stroke_m) / (2.0 * joint.radius_m),
             rate_rad_per_s: speeds / (2.0 * joint.radius_m),
         };
         let mut pair = self.pair;
-        let pull = pair.forces(&joint, &posed, arms, first.cut - second.cut);
+        let pull = pair.forces(&joint, &posed, arms, first.saturation - second.saturation);
         self.pair = pair;
         pull
     }

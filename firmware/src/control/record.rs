@@ -3,38 +3,38 @@
 use model_core::link::messages::{Event, Mode, Side, State, Variable};
 
 use super::actuator::Actuator;
-use super::{Controller, News};
+use super::{Controller, Notice};
 use crate::board::Outputs;
-use crate::spoken::{SIDES, Sample};
+use crate::outbox::{SIDES, Sample};
 
 impl Controller {
     pub(super) fn record(&mut self) -> Outputs {
         for side in &mut self.sides {
             side.sample.command_pa = if side.command.vent { 0.0 } else { side.command.pressure_pa };
         }
-        let Self { trace, sides, machine, tick, asked, step_us, .. } = self;
+        let Self { trace, sides, machine, tick, setpoint, step_us, .. } = self;
         let state = machine.state();
-        let full = trace.sample(*tick, |variable| value_of(variable, sides, state, *asked, *step_us));
+        let full = trace.sample(*tick, |variable| value_of(variable, sides, state, *setpoint, *step_us));
         if full {
-            self.news = self.news.or(Some(News::TraceFull));
+            self.notice = self.notice.or(Some(Notice::TraceFull));
         }
         Outputs {
             sides: [self.sides[0].command, self.sides[1].command],
-            asked: if self.mode == Mode::Force { self.asked } else { self.sides[0].wanted_n },
+            setpoint: if self.mode == Mode::Force { self.setpoint } else { self.sides[0].force_demand_n },
         }
     }
 
-    /// Something to tell the host, once.
+    /// Something to report the host, once.
     #[inline(never)]
     pub fn take_event(&mut self) -> Option<Event> {
-        match self.news.take()? {
-            News::Fault => self.faults().latched.map(Event::Fault),
-            News::State(state) => Some(Event::State(state)),
-            News::TraceFull => Some(Event::TraceFull),
+        match self.notice.take()? {
+            Notice::Fault => self.faults().latched.map(Event::Fault),
+            Notice::State(state) => Some(Event::State(state)),
+            Notice::TraceFull => Some(Event::TraceFull),
         }
     }
 
-    /// The sample of this tick, if one is due; to be asked for once in each.
+    /// The sample of this tick, if one is due; to be setpoint for once in each.
     #[inline(never)]
     pub fn take_sample(&mut self) -> Option<Sample> {
         if self.telemetry_every == 0 {
@@ -53,15 +53,15 @@ impl Controller {
             tick: self.tick,
             state: self.machine.state(),
             mode: self.mode,
-            asked: self.asked,
-            asked_second: self.asked_second,
+            setpoint: self.setpoint,
+            setpoint_second: self.setpoint_second,
             used,
             all: core::array::from_fn(|at| self.sides[at].sample),
         })
     }
 }
 
-fn value_of(variable: Variable, sides: &[Actuator; 2], state: State, asked: f32, step_us: f32) -> f32 {
+fn value_of(variable: Variable, sides: &[Actuator; 2], state: State, setpoint: f32, step_us: f32) -> f32 {
     let [first, second] = sides;
     match variable {
         Variable::Pressure => first.sample.pressure_pa,
@@ -69,11 +69,11 @@ fn value_of(variable: Variable, sides: &[Actuator; 2], state: State, asked: f32,
         Variable::Force => first.sample.force_n,
         Variable::Speed => first.motion.motion().speed,
         Variable::Direction => first.motion.motion().direction,
-        Variable::Asked => asked,
-        Variable::WantedForce => first.wanted_n,
+        Variable::Setpoint => setpoint,
+        Variable::ForceDemand => first.force_demand_n,
         Variable::FeedForward => first.forward_pa,
         Variable::Trim => first.trim_pa,
-        Variable::WantedPressure => first.sample.wanted_pa,
+        Variable::PressureDemand => first.sample.pressure_demand_pa,
         Variable::Command => first.sample.command_pa,
         Variable::ModelPressure => first.regulator.model_pa(),
         Variable::ModelForce => first.sample.model_n,

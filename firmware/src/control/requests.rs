@@ -1,11 +1,11 @@
-//! What a host asks of the controller: states, modes, set-points, references.
+//! What a host asks of the controller: states, modes, setpoints, references.
 
-use model_core::link::messages::{Fault, Field, Mode, Reference, Refusal, SetPoint, Side, State};
+use model_core::link::messages::{Fault, Field, Mode, Reference, Refusal, Session, SetPoint, Side, State};
 use model_core::link::settings::{FeedForward, Settings};
 
 use super::actuator::Actuator;
 use super::arming::Arming;
-use super::{Controller, News};
+use super::{Controller, Notice};
 use crate::board::Command;
 use crate::pair::{self, Arm};
 use crate::regulator;
@@ -17,7 +17,7 @@ impl Controller {
         let before = self.machine.state();
         let state = self.machine.request(cause)?;
         if state != before {
-            self.news = Some(News::State(state));
+            self.notice = Some(Notice::State(state));
         }
         self.arming = Arming::Idle;
         if state != State::Running {
@@ -27,12 +27,12 @@ impl Controller {
         Ok(())
     }
 
-    /// Starts a mode at what is measured now.
+    /// Starts a mode at what is measured now, for a session that has to keep it alive.
     ///
     /// # Errors
     /// As [`Machine::request`](crate::safety::Machine::request); [`Refusal::NoTable`], with the fault latched, where the mode needs
     /// a table.
-    pub fn start(&mut self, mode: Mode) -> Result<(), Refusal> {
+    pub fn start(&mut self, mode: Mode, session: Session) -> Result<(), Refusal> {
         self.machine.allows(Cause::Start)?;
         let needs: &[Side] = match mode {
             Mode::Vent | Mode::Pressure => &[],
@@ -46,25 +46,26 @@ impl Controller {
             return Err(Refusal::NoTable(side));
         }
         self.change(Cause::Start)?;
+        self.own(session);
         self.mode = mode;
         self.generator.begin(Reference::SetPoint)?;
         let first = self.sides[0].sample;
         let joint = self.settings.joint;
-        self.asked_second = 0.0;
-        self.asked = match mode {
+        self.setpoint_second = 0.0;
+        self.setpoint = match mode {
             Mode::Vent => 0.0,
             Mode::Pressure => first.pressure_pa.max(0.0),
             Mode::Force => first.force_n.max(0.0),
             Mode::Stroke => first.stroke_m,
             Mode::Pair => (first.stroke_m - self.sides[1].sample.stroke_m) / (2.0 * joint.radius_m),
         };
-        self.asked_age = 0;
+        self.setpoint_age = 0;
         for side in &mut self.sides {
             side.regulator.begin(side.sample.pressure_pa);
             side.trim.reset();
             side.stroke_loop.reset();
             side.guess_pa = side.sample.pressure_pa;
-            side.cut = 0.0;
+            side.saturation = 0.0;
             side.watch.restart();
         }
         if mode == Mode::Pair
@@ -96,6 +97,28 @@ impl Controller {
         self.change(Cause::Disarm)
     }
 
+    /// The session that asks is the one that owns the device from now on.
+    pub(super) fn own(&mut self, session: Session) {
+        self.owner = session;
+        self.owner_age = 0;
+    }
+
+    /// The owner's program is alive.
+    ///
+    /// # Errors
+    /// [`Refusal::OtherSession`] where another session owns what is armed or running. A device that is neither has no owner.
+    pub fn keep_alive(&mut self, session: Session) -> Result<(), Refusal> {
+        let owned = self.arming != Arming::Idle
+            || matches!(self.machine.state(), State::Armed | State::Running)
+            || !self.is_vented();
+        if session == self.owner {
+            self.owner_age = 0;
+        } else if owned {
+            return Err(Refusal::OtherSession);
+        }
+        Ok(())
+    }
+
     pub(super) fn vent_now(&mut self) {
         self.arming = Arming::Idle;
         // In `Fault` with a held command this is the way to let go of it.
@@ -121,10 +144,10 @@ impl Controller {
         self.change(Cause::Clear)
     }
 
-    /// A new set-point; ends a reference.
+    /// A new setpoint; ends a reference.
     ///
     /// # Errors
-    /// [`Refusal::WrongMode`] where it is not the running mode's, [`Refusal::Value`] where it is no finite number,
+    /// [`Refusal::WrongMode`] where it is not the running mode's, [`Refusal::Value`] where it is not a finite number,
     /// [`Refusal::Angle`] or [`Refusal::Stiffness`] where a joint cannot have it.
     pub fn set_point(&mut self, set_point: SetPoint) -> Result<(), Refusal> {
         let (mode, asked, second) = match set_point {
@@ -146,8 +169,8 @@ impl Controller {
             self.can_pose(asked, second)?;
         }
         self.generator.begin(Reference::SetPoint)?;
-        (self.asked, self.asked_second) = (asked, second);
-        self.asked_age = 0;
+        (self.setpoint, self.setpoint_second) = (asked, second);
+        self.setpoint_age = 0;
         Ok(())
     }
 
@@ -186,13 +209,13 @@ impl Controller {
         }
         if self.mode == Mode::Pair {
             let (low, high) = self.generator.range(reference);
-            self.can_pose(low, self.asked_second)?;
-            self.can_pose(high, self.asked_second)?;
+            self.can_pose(low, self.setpoint_second)?;
+            self.can_pose(high, self.setpoint_second)?;
         }
         self.generator.begin(reference)?;
         // Here, so that no tick has all of it to do.
         self.generator.look_ahead(regulator::ahead(&self.settings.regulator));
-        self.asked_age = 0;
+        self.setpoint_age = 0;
         self.trace.on_start();
         Ok(())
     }
@@ -211,7 +234,7 @@ mod tests {
     use super::*;
     use crate::board::{Inputs, Readings};
 
-    /// So many ticks of a muscle that follows its command within 30 ms.
+    /// N ticks of a muscle that follows its command within 30 ms.
     fn run(controller: &mut Controller, pressure_pa: &mut f32, ticks: u32) {
         for tick in 0..ticks {
             // Live sensors never read the same twice.
@@ -224,7 +247,7 @@ mod tests {
             let command = controller.step(&Inputs { sides: [Some(now), None], ..Inputs::default() }).sides[0];
             let target = if command.vent { 0.0 } else { command.pressure_pa };
             *pressure_pa += (target - *pressure_pa) / 31.0;
-            controller.heard();
+            assert_eq!(controller.keep_alive(Session::default()), Ok(()));
         }
     }
 
@@ -235,12 +258,12 @@ mod tests {
         let mut controller = Controller::new(&settings);
         let mut pressure = 0.0;
         run(&mut controller, &mut pressure, 10);
-        assert_eq!(controller.arm(), Ok(()));
-        assert_eq!(controller.start(Mode::Pressure), Ok(()));
+        assert_eq!(controller.arm(Session::default()), Ok(()));
+        assert_eq!(controller.start(Mode::Pressure, Session::default()), Ok(()));
         assert_eq!(controller.set_point(SetPoint::Pressure(300e3)), Ok(()));
         run(&mut controller, &mut pressure, 1000);
         assert!((pressure - 300e3).abs() < 1e3, "{pressure}");
-        assert_eq!(controller.start(Mode::Vent), Ok(()));
+        assert_eq!(controller.start(Mode::Vent, Session::default()), Ok(()));
         run(&mut controller, &mut pressure, 1000);
         assert_eq!((controller.state(), controller.faults().latched), (State::Running, None));
         assert!(pressure < 1e3, "{pressure}");

@@ -1,10 +1,14 @@
 //! What the controller does when something goes wrong, as physical statements on a muscle that follows its command within 30 ms.
 
-use model_core::link::messages::{Fault, Mode, Refusal, SetPoint, State};
+use model_core::link::messages::{Event, Fault, Mode, Refusal, Session, SetPoint, Side, State};
 use model_core::link::settings::Settings;
 
 use super::Controller;
 use crate::board::{Inputs, Outputs, Readings};
+use crate::watch::Finding;
+
+/// The session that arms and starts in these tests.
+const OWNER: Session = Session { id: 7 };
 
 /// A muscle, its regulator and its dump valve.
 struct Bench {
@@ -35,7 +39,7 @@ impl Bench {
         }
     }
 
-    /// So many ticks, whose readings and supply are changed on their way.
+    /// N ticks, whose readings and supply are changed on their way.
     fn pass_with(&mut self, ticks: u32, change: impl Fn(&mut Readings, &mut Inputs)) {
         for _ in 0..ticks {
             self.tick += 1;
@@ -51,7 +55,7 @@ impl Bench {
             inputs.sides[0] = Some(now);
             self.last = self.controller.step(&inputs);
             if self.hears_host {
-                self.controller.heard();
+                assert_eq!(self.controller.keep_alive(OWNER), Ok(()));
             }
             let command = self.last.sides[0];
             let target = if command.vent && self.valve_works {
@@ -73,15 +77,15 @@ impl Bench {
     fn running(change: impl FnOnce(&mut Settings)) -> Self {
         let mut bench = Self::new(change);
         bench.pass(10);
-        assert_eq!(bench.controller.arm(), Ok(()));
-        assert_eq!(bench.controller.start(Mode::Pressure), Ok(()));
+        assert_eq!(bench.controller.arm(OWNER), Ok(()));
+        assert_eq!(bench.controller.start(Mode::Pressure, OWNER), Ok(()));
         assert_eq!(bench.controller.set_point(SetPoint::Pressure(400e3)), Ok(()));
         bench.pass(1000);
         assert_eq!(bench.controller.state(), State::Running);
         bench
     }
 
-    /// Holding 400 kPa after a silence of set-points.
+    /// Holding 400 kPa after a silence of setpoints.
     fn holding() -> Self {
         Self::holding_for(Fault::SetPointSilence)
     }
@@ -163,7 +167,7 @@ fn pressure_that_stays_in_a_vented_muscle_is_a_fault_in_every_state() {
     let jammed = |bench: &mut Bench| (bench.regulator_works, bench.valve_works) = (false, false);
     let mut running = Bench::running(|_| ());
     jammed(&mut running);
-    assert_eq!(running.controller.start(Mode::Vent), Ok(()));
+    assert_eq!(running.controller.start(Mode::Vent, OWNER), Ok(()));
     running.pass(3_000);
     assert_eq!(running.latched(), Some(Fault::PressureNotFalling), "in a mode that vents");
 
@@ -204,12 +208,12 @@ fn only_an_empty_muscle_is_armed() {
     let mut bench = Bench::new(|_| ());
     bench.pressure_pa = 100e3;
     bench.pass(1);
-    assert_eq!(bench.controller.arm(), Err(Refusal::StillFaulty(Fault::NotVented)));
+    assert_eq!(bench.controller.arm(OWNER), Err(Refusal::StillFaulty(Fault::NotVented)));
     bench.pass(200);
     bench.pass_with(1, |now, _| now.pressure_pa = f32::NAN);
-    assert_eq!(bench.controller.arm(), Err(Refusal::StillFaulty(Fault::NotVented)));
+    assert_eq!(bench.controller.arm(OWNER), Err(Refusal::StillFaulty(Fault::NotVented)));
     bench.pass(1);
-    assert_eq!(bench.controller.arm(), Ok(()));
+    assert_eq!(bench.controller.arm(OWNER), Ok(()));
 }
 
 #[test]
@@ -217,10 +221,10 @@ fn regulator_and_dump_valve_are_tried_before_arming() {
     let tested = |settings: &mut Settings| settings.watch.valve_test_pa = 40e3;
     let mut bench = Bench::new(tested);
     bench.pass(10);
-    assert_eq!(bench.controller.arm(), Ok(()));
+    assert_eq!(bench.controller.arm(OWNER), Ok(()));
     assert_eq!(bench.controller.state(), State::Disarmed, "not yet");
     assert!(!bench.controller.is_vented(), "no flash is written meanwhile");
-    assert_eq!(bench.controller.start(Mode::Pressure), Err(Refusal::WrongState(State::Disarmed)));
+    assert_eq!(bench.controller.start(Mode::Pressure, OWNER), Err(Refusal::WrongState(State::Disarmed)));
     bench.pass(20);
     assert!(bench.pressure_pa > 10e3, "the regulator is tried");
     bench.pass(180);
@@ -231,14 +235,14 @@ fn regulator_and_dump_valve_are_tried_before_arming() {
         let mut broken = Bench::new(tested);
         (broken.regulator_works, broken.valve_works) = (regulator_works, valve_works);
         broken.pass(10);
-        assert_eq!(broken.controller.arm(), Ok(()));
+        assert_eq!(broken.controller.arm(OWNER), Ok(()));
         broken.pass(2_100);
         assert_eq!((broken.controller.state(), broken.latched()), (State::Fault, Some(Fault::ValveTest)));
         assert!(broken.is_vented());
     }
     let mut stopped = Bench::new(tested);
     stopped.pass(10);
-    assert_eq!(stopped.controller.arm(), Ok(()));
+    assert_eq!(stopped.controller.arm(OWNER), Ok(()));
     stopped.pass(5);
     assert_eq!(stopped.controller.disarm(), Ok(()));
     stopped.pass(300);
@@ -255,8 +259,8 @@ fn a_command_that_is_no_number_is_never_sent() {
     ] {
         let mut bench = Bench::new(change);
         bench.pass(10);
-        assert_eq!(bench.controller.arm(), Ok(()));
-        assert_eq!(bench.controller.start(Mode::Pressure), Ok(()));
+        assert_eq!(bench.controller.arm(OWNER), Ok(()));
+        assert_eq!(bench.controller.start(Mode::Pressure, OWNER), Ok(()));
         for set_point in [400e3, 0.0, 3e38, 100e3] {
             let _ = bench.controller.set_point(SetPoint::Pressure(set_point));
             for _ in 0..100 {
@@ -274,9 +278,115 @@ fn nothing_is_armed_until_settings_that_could_not_be_trusted_are_confirmed() {
     bench.controller.distrust_settings();
     bench.pass(10);
     let untrusted = Fault::SettingsInvalid;
-    assert_eq!(bench.controller.arm(), Err(Refusal::Latched(untrusted)));
+    assert_eq!(bench.controller.arm(OWNER), Err(Refusal::Latched(untrusted)));
     assert_eq!(bench.controller.clear(), Err(Refusal::StillFaulty(untrusted)));
     bench.controller.confirm_settings();
     assert_eq!(bench.controller.clear(), Ok(()));
-    assert_eq!(bench.controller.arm(), Ok(()));
+    assert_eq!(bench.controller.arm(OWNER), Ok(()));
+}
+
+#[test]
+fn only_the_session_that_started_the_mode_keeps_it_going() {
+    let mut bench = Bench::running(|_| ());
+    bench.hears_host = false;
+    let watcher = Session { id: OWNER.id + 1 };
+    let mut refused = 0;
+    for _ in 0..20 {
+        bench.pass(100);
+        refused += u32::from(bench.controller.keep_alive(watcher) == Err(Refusal::OtherSession));
+    }
+    assert_eq!(bench.latched(), Some(Fault::HostSilence));
+    assert!(bench.is_vented());
+    assert!(
+        (10..=11).contains(&refused),
+        "refused {refused} times while it ran: nothing is owned in a vented fault"
+    );
+}
+
+#[test]
+fn a_session_that_takes_over_is_the_one_that_counts() {
+    let mut bench = Bench::running(|_| ());
+    bench.hears_host = false;
+    let second = Session { id: OWNER.id + 1 };
+    bench.pass(900);
+    assert_eq!(bench.controller.start(Mode::Pressure, second), Ok(()));
+    assert_eq!(bench.controller.keep_alive(OWNER), Err(Refusal::OtherSession));
+    bench.pass(900);
+    assert_eq!(bench.controller.keep_alive(second), Ok(()));
+    bench.pass(900);
+    assert_eq!(bench.controller.state(), State::Running);
+    bench.pass(200);
+    assert_eq!(bench.latched(), Some(Fault::HostSilence));
+}
+
+#[test]
+fn a_held_command_is_let_go_when_its_owner_is_silent_whoever_else_asks() {
+    let mut bench = Bench::holding();
+    bench.hears_host = false;
+    bench.pass(500);
+    assert_eq!(bench.controller.keep_alive(Session { id: 99 }), Err(Refusal::OtherSession));
+    assert!(!bench.is_vented());
+    bench.pass(600);
+    assert!(bench.is_vented());
+}
+
+#[test]
+fn an_armed_device_whose_owner_is_silent_disarms_itself() {
+    let mut bench = Bench::new(|settings| settings.watch.armed_silence_ticks = 2_000);
+    bench.pass(10);
+    assert_eq!(bench.controller.arm(OWNER), Ok(()));
+    bench.pass(5_000);
+    assert_eq!(bench.controller.state(), State::Armed, "its owner keeps it alive");
+    bench.hears_host = false;
+    bench.pass(1_999);
+    assert_eq!(bench.controller.keep_alive(Session { id: 99 }), Err(Refusal::OtherSession));
+    let _ = bench.controller.take_event();
+    assert_eq!(bench.controller.state(), State::Armed);
+    bench.pass(2);
+    assert_eq!(bench.controller.state(), State::Disarmed);
+    assert_eq!(bench.controller.take_event(), Some(Event::State(State::Disarmed)));
+    assert!(bench.is_vented());
+    assert_eq!(bench.latched(), None);
+    assert_eq!(bench.controller.start(Mode::Pressure, OWNER), Err(Refusal::WrongState(State::Disarmed)));
+}
+
+#[test]
+fn a_fault_before_anything_runs_vents_even_where_the_settings_would_hold() {
+    // The valve test is the only time before a run at which the command is not to vent.
+    let mut bench = Bench::new(|settings| {
+        settings.watch.valve_test_pa = 40e3;
+        settings.hold_on = u32::MAX;
+    });
+    bench.pass(10);
+    assert_eq!(bench.controller.arm(OWNER), Ok(()));
+    bench.pass(5);
+    assert!(!bench.is_vented());
+    let finding = Finding { fault: Fault::SensorRange, sensor: None, value: 0.0, limit: 0.0 };
+    bench.controller.raise(Side::Agonist, &finding);
+    bench.pass(1);
+    assert!(bench.is_vented() && bench.controller.is_vented());
+    assert_eq!((bench.controller.state(), bench.latched()), (State::Fault, Some(Fault::SensorRange)));
+}
+
+#[test]
+fn a_fault_that_is_not_held_for_vents_in_the_tick_in_which_it_is_found() {
+    let mut bench = Bench::running(|_| ());
+    let finding = Finding { fault: Fault::SensorRange, sensor: None, value: 0.0, limit: 0.0 };
+    bench.controller.raise(Side::Agonist, &finding);
+    assert!(bench.controller.is_vented());
+    let mut never = Bench::running(|settings| {
+        settings.hold_on = u32::MAX;
+        settings.watch.hold_ticks = 0;
+    });
+    never.controller.raise(Side::Agonist, &finding);
+    assert!(never.controller.is_vented(), "a hold of no time is none");
+}
+
+#[test]
+fn settings_that_were_not_confirmed_are_refused_even_without_a_latched_fault() {
+    let mut bench = Bench::new(|_| ());
+    bench.pass(10);
+    bench.controller.unconfirmed = true;
+    assert_eq!(bench.controller.arm(OWNER), Err(Refusal::StillFaulty(Fault::SettingsInvalid)));
+    assert_eq!(bench.controller.state(), State::Disarmed);
 }

@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 use crate::tick::TICKS_PER_S;
 
-/// What a process that waited for a busy machine makes up for at once.
+/// What a process that waited for a busy machine makes up for immediately.
 const AT_ONCE: Duration = Duration::from_millis(100);
-/// The most that it makes up for at all: after a longer pause device time goes on from now.
+/// The most that it makes up for at all: after a longer pause device time continues from now.
 const AT_ALL: Duration = Duration::from_secs(1);
 
 /// Keeps device time in step with the clock on the wall.
@@ -20,7 +20,7 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// So many device seconds in a second; infinite: as fast as it goes.
+    /// N device seconds in a second; infinite: as fast as it goes.
     #[must_use]
     pub fn new(speed: f64) -> Self {
         let seconds = 1.0 / (f64::from(TICKS_PER_S) * speed);
@@ -28,7 +28,7 @@ impl Pace {
         Self { tick, next: Instant::now(), behind: Duration::ZERO }
     }
 
-    /// Waits for the next tick. Sleeps are coarse, so ticks come in small bunches. A pause of up to 100 ms is made up for at once, one
+    /// Waits for the next tick. Sleeps are coarse, so ticks come in small bunches. A pause of up to 100 ms is made up for immediately, one
     /// of up to a second at twice the speed: a host that was held up as well has its say before a watch counts its silence.
     pub fn wait(&mut self) {
         let pause = self.pause(Instant::now());
@@ -69,7 +69,7 @@ mod tests {
         (0..1_000_000).for_each(|_| unbound.wait());
     }
 
-    /// Milliseconds that so many ticks take where a sleep is as long as it should be, to the bunch of one.
+    /// Milliseconds that n ticks take where a sleep is as long as it should be, to the bunch of one.
     fn milliseconds(pace: &mut Pace, now: &mut Instant, ticks: u32) -> i32 {
         let began = *now;
         (0..ticks).for_each(|_| *now += pace.pause(*now));

@@ -5,14 +5,14 @@ use model_core::image;
 use model_core::link::messages::{Refusal, Side, TableBegin, TableFault, TablePiece};
 
 use super::{read_table, table_refusal};
-use crate::common_room::{CommonRoom, Incoming};
 use crate::shared::Shared;
+use crate::shared_buffer::{Incoming, SharedBuffer};
 
 /// What an upload has gathered, in the room of the trace: the upload ends and forgets that.
 #[derive(Default)]
 pub(super) struct Upload {
     begun: Option<TableBegin>,
-    room: Option<CommonRoom>,
+    room: Option<SharedBuffer>,
 }
 
 impl Upload {
@@ -37,7 +37,7 @@ impl Upload {
                 room.clear_for_table();
             }
         }
-        self.room.as_mut().and_then(CommonRoom::table).ok_or(Refusal::NotSupported)
+        self.room.as_mut().and_then(SharedBuffer::table).ok_or(Refusal::NotSupported)
     }
 
     /// Forgets what is there, and gives the room back.
@@ -50,7 +50,7 @@ impl Upload {
 
     /// What was begun, and what has come of it.
     fn begun(&mut self) -> Result<(&TableBegin, &mut Incoming), Refusal> {
-        let begun = self.begun.as_ref().zip(self.room.as_mut().and_then(CommonRoom::table));
+        let begun = self.begun.as_ref().zip(self.room.as_mut().and_then(SharedBuffer::table));
         begun.ok_or(Refusal::Table(TableFault::NotBegun))
     }
 

@@ -1,4 +1,4 @@
-//! How often flash may be written for what nobody asked to be kept.
+//! How often flash may be written for what no one asked to be kept.
 //!
 //! A muscle's remembered history moves a little with every run. A page of the emulated board takes some fifty records of it
 //! before it is erased, one of the Nucleo over a thousand, and a page stands 10,000 erasures at least: written at most once in
@@ -7,7 +7,7 @@
 
 use model_core::effects::Memory;
 
-/// Writes that may follow each other at once.
+/// Writes that may follow each other immediately.
 const BURST: u8 = 16;
 /// Ticks after which one more is allowed: a minute.
 const REFILL_TICKS: u32 = 60_000;

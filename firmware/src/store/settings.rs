@@ -14,10 +14,11 @@ use model_core::link::settings::Settings;
 
 use super::{FORMAT, Store};
 
-/// Key of the settings; 0x30 and 0x31 held those of the layouts 1 and 2, 0x32 those of 3.
-const SETTINGS: u8 = 0x33;
+/// Key of the settings; 0x30 to 0x33 held those of the layouts 1 to 4.
+const SETTINGS: u8 = 0x35;
 const SEAL: u8 = 0x34;
 const LAYOUT: u8 = 0x3F;
+const SETTINGS_4: u8 = 0x33;
 const SETTINGS_3: u8 = 0x32;
 const SETTINGS_2: u8 = 0x31;
 const SETTINGS_1: u8 = 0x30;
@@ -56,8 +57,8 @@ fn sum_of(bytes: Option<&[u8]>) -> u32 {
 /// Settings of an older layout.
 struct Older<'s> {
     settings: &'s mut Settings,
-    /// Whether the regulator has a line.
-    has_line: bool,
+    /// Number of the layout: the regulator has a line since 3, a hold and a vent have their watches since 4.
+    layout: u16,
 }
 
 impl Fields for Older<'_> {
@@ -84,7 +85,7 @@ impl Fields for Older<'_> {
         regulator.gain.walk(walk);
         regulator.offset_pa.walk(walk);
         regulator.lag_s.walk(walk);
-        if self.has_line {
+        if self.layout >= 3 {
             regulator.line_s.walk(walk);
         }
         regulator.rate_pa_per_s.walk(walk);
@@ -105,6 +106,12 @@ impl Fields for Older<'_> {
         watch.host_silence_ticks.walk(walk);
         watch.autonomous.walk(walk);
         watch.overrun_ticks.walk(walk);
+        if self.layout >= 4 {
+            watch.hold_ticks.walk(walk);
+            watch.vented_pa.walk(walk);
+            watch.vent_ticks.walk(walk);
+            watch.valve_test_pa.walk(walk);
+        }
         hold_on.walk(walk);
         motion_band_m.walk(walk);
         pressure_band_pa.walk(walk);
@@ -120,22 +127,33 @@ impl<F: NorFlash> Store<F> {
         let layout = self.value::<u16>(LAYOUT)?;
         let seal = self.value::<Seal>(SEAL)?;
         let own = *settings;
-        let bytes = self.bytes(SETTINGS)?;
-        let sum = sum_of(bytes);
-        let sealed = seal.is_some_and(|seal| sum == seal.current || Some(sum) == seal.previous);
-        if let Some(bytes) = bytes {
-            if sealed && layout.is_none_or(|layout| layout <= FORMAT) && fields::read(bytes, settings) {
+        let sealed = |bytes: Option<&[u8]>| {
+            let sum = sum_of(bytes);
+            seal.is_some_and(|seal| sum == seal.current || Some(sum) == seal.previous)
+        };
+        if let Some(bytes) = self.bytes(SETTINGS)? {
+            if sealed(Some(bytes))
+                && layout.is_none_or(|layout| layout <= FORMAT)
+                && fields::read(bytes, settings)
+            {
                 return Ok(Kept::Whole);
             }
             *settings = own;
             return Ok(Kept::Untrusted);
         }
-        if layout.is_some() || (seal.is_some() && !sealed) {
+        if layout.is_some_and(|layout| layout >= FORMAT) {
             return Ok(Kept::Untrusted);
         }
-        for (key, has_line) in [(SETTINGS_3, true), (SETTINGS_2, false)] {
+        let fourth = self.bytes(SETTINGS_4)?;
+        if fourth.is_none() && (layout.is_some() || (seal.is_some() && !sealed(None))) {
+            return Ok(Kept::Untrusted);
+        }
+        if fourth.is_some_and(|bytes| !sealed(Some(bytes))) {
+            return Ok(Kept::Untrusted);
+        }
+        for (key, layout) in [(SETTINGS_4, 4), (SETTINGS_3, 3), (SETTINGS_2, 2)] {
             if let Some(bytes) = self.bytes(key)? {
-                if fields::read(bytes, &mut Older { settings, has_line }) {
+                if fields::read(bytes, &mut Older { settings, layout }) {
                     return Ok(Kept::Older);
                 }
                 *settings = own;
@@ -153,7 +171,10 @@ impl<F: NorFlash> Store<F> {
         let mut room = [0; ROOM];
         let length = fields::write(settings, &mut room).ok_or(StoreFault::Full)?;
         let bytes = &room[..length];
-        let before = sum_of(self.bytes(SETTINGS)?);
+        let before = match self.bytes(SETTINGS)? {
+            Some(bytes) => sum_of(Some(bytes)),
+            None => sum_of(self.bytes(SETTINGS_4)?),
+        };
         let current = sum_of(Some(bytes));
         self.put_value(SEAL, &mut Seal { current, previous: Some(before) })?;
         self.put_bytes(SETTINGS, bytes)?;

@@ -1,13 +1,14 @@
 //! A conversation with a controller: hello, typed calls, topics, and what was lost on the way.
 
 use std::collections::VecDeque;
+use std::hash::{BuildHasher, RandomState};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use model_core::link::endpoints::{EVENT, Endpoint, GetStatus, LOG, TELEMETRY};
+use model_core::link::endpoints::{Arm, Disarm, EVENT, Endpoint, KeepAlive, LOG, StartMode, TELEMETRY};
 use model_core::link::frame::{Accumulator, Header, Kind, MAX_BODY, MAX_WIRE, encode, encode_bytes};
 use model_core::link::hello::{self, Hello};
-use model_core::link::messages::{Event, Refusal, Telemetry};
+use model_core::link::messages::{Event, Refusal, Session, Telemetry};
 use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 
 use super::line_activity::{LineActivity, lost, version_error};
@@ -15,11 +16,11 @@ use super::{Address, Port, VentLine, messages};
 use crate::error::DeviceCode;
 use pam_data::error::{DataCode, Error, Result};
 
-/// Telemetry that nobody fetches is kept up to this many samples: a minute at 1 kHz.
+/// Telemetry that no one fetches is kept up to this many samples: a minute at 1 kHz.
 const BACKLOG: usize = 60_000;
 
-/// A running controller hears from its host at least this often; it stops by itself after `watch.host_silence_ticks`, a
-/// second unless set otherwise.
+/// Time between two keep-alive requests of the session that armed the controller. Without them, the controller vents after
+/// `watch.host_silence_ticks` (1 s by default).
 const HEARTBEAT: Duration = Duration::from_millis(100);
 
 /// How long to wait for answers.
@@ -29,7 +30,7 @@ pub struct Patience {
     pub answer: Duration,
     /// Time for an answer that waits for flash memory to be erased.
     pub slow_answer: Duration,
-    /// Times that a question is asked, when asking twice does no harm and the line is silent.
+    /// Times that a question is queried, when asking twice does no harm and the line is silent.
     pub tries: u32,
     /// The same on a line that is not silent but noisy: frames arrive and fail their check.
     pub noisy_tries: u32,
@@ -46,7 +47,7 @@ impl Default for Patience {
     }
 }
 
-/// What a device says by itself.
+/// What a device says without a request.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Topic {
     /// A sample.
@@ -66,7 +67,7 @@ pub struct Losses {
     pub gaps: u64,
     /// Frames whose check failed, and bytes between frames that were none.
     pub bad_frames: u64,
-    /// Questions that had to be asked again.
+    /// Questions that had to be queried again.
     pub repeats: u64,
     /// Samples that arrived and were never fetched.
     pub unread: u64,
@@ -87,7 +88,12 @@ pub struct Client {
     expected: Option<u16>,
     losses: Losses,
     patience: Patience,
-    spoke: Instant,
+    session: Session,
+    /// Whether this session armed the controller or started its mode, and has not disarmed it since.
+    controls: bool,
+    /// The refusal of a keep-alive request, until [`Client::keep_alive`] reports it.
+    displaced: Option<Refusal>,
+    kept_alive: Instant,
     /// Held while a frame is written, so that those of a [`VentLine`] do not fall into its middle.
     writing: Arc<Mutex<()>>,
 }
@@ -146,7 +152,10 @@ impl Client {
             expected: None,
             losses: Losses::default(),
             patience,
-            spoke: Instant::now(),
+            session: Session { id: random_id() },
+            controls: false,
+            displaced: None,
+            kept_alive: Instant::now(),
             writing: Arc::default(),
         };
         let mut heard = LineActivity::default();
@@ -207,10 +216,10 @@ impl Client {
         Losses { bad_frames: u64::from(self.accumulator.counts().bad), ..self.losses }
     }
 
-    /// Asks once more when no answer comes: for questions that may be asked twice.
+    /// Asks once more when no answer comes: for questions that may be queried twice.
     ///
     /// # Errors
-    /// [`DeviceCode::DeviceSilent`], or [`DeviceCode::DeviceRefused`] with the device's reason in words.
+    /// [`DeviceCode::DeviceSilent`], or [`DeviceCode::DeviceRefused`] with the device's reason as text.
     pub fn call<E: Endpoint>(&mut self, request: &E::Request) -> Result<E::Response> {
         match self.ask::<E>(request, self.patience.answer, self.patience.tries)? {
             Ok(response) => Ok(response),
@@ -237,17 +246,48 @@ impl Client {
         self.ask::<E>(request, self.patience.answer, self.patience.tries)
     }
 
-    /// Lets the device know that its host is alive, if nothing was sent for a while (a tenth of a second). Nothing is waited for:
-    /// the answer is passed over when it comes.
+    /// The identifier of this session, for the requests that arm the controller and start a mode.
+    #[must_use]
+    pub fn session(&self) -> Session {
+        self.session
+    }
+
+    /// Sends a keep-alive request if this session controls the device and the last one is 0.1 s old. Does not wait for the response.
+    /// A session that only reads sends nothing, so it never keeps the run of another program alive.
     ///
     /// # Errors
-    /// [`DeviceCode::DeviceSilent`] when the line is gone.
+    /// [`DeviceCode::DeviceSilent`] when the line is gone; once, [`DeviceCode::DeviceRefused`] when another session has taken over.
     pub fn keep_alive(&mut self) -> Result<()> {
-        if self.spoke.elapsed() < HEARTBEAT {
+        if let Some(refusal) = self.displaced.take() {
+            self.controls = false;
+            return Err(messages::refused(KeepAlive::NAME, refusal));
+        }
+        self.heartbeat()
+    }
+
+    fn heartbeat(&mut self) -> Result<()> {
+        if !self.controls || self.kept_alive.elapsed() < HEARTBEAT {
             return Ok(());
         }
-        let header = Header { kind: Kind::Request, id: GetStatus::ID, sequence: self.next_sequence() };
-        self.transmit(header, &[])
+        self.kept_alive = Instant::now();
+        let header = Header { kind: Kind::Request, id: KeepAlive::ID, sequence: self.next_sequence() };
+        let mut wire = [0; MAX_WIRE];
+        let length = encode(header, &self.session, &mut wire)
+            .map_err(|e| Error::new(DataCode::CallInvalid, format!("the request cannot be sent: {e}")))?;
+        self.send(&wire[..length])
+    }
+
+    /// Notes whether this session controls the device, from a request that was granted.
+    fn note_control(&mut self, endpoint: u8) {
+        match endpoint {
+            Arm::ID | StartMode::ID => {
+                self.controls = true;
+                self.displaced = None;
+                self.kept_alive = Instant::now();
+            }
+            Disarm::ID => self.controls = false,
+            _ => {}
+        }
     }
 
     /// As [`Self::try_call`], asked once: for what is repeated only after looking what became of it.
@@ -258,7 +298,7 @@ impl Client {
         self.ask::<E>(request, self.patience.answer, 1)
     }
 
-    /// The next thing the device said by itself, waiting at most `patience` for one.
+    /// The next thing the device said without a request, waiting at most `patience` for one.
     ///
     /// # Errors
     /// [`DeviceCode::DeviceSilent`] when the line is gone.
@@ -286,6 +326,7 @@ impl Client {
             Error::new(DeviceCode::DeviceForeign, format!("the answer to `{}` cannot be decoded", E::NAME))
                 .help("the device and this program use the same schema, so this is a defect in one of them: report it")
         };
+        self.heartbeat()?;
         let mut wire = [0; MAX_WIRE];
         let bad = self.accumulator.counts().bad;
         let mut attempt = 0;
@@ -304,7 +345,10 @@ impl Client {
             };
             return match answer.header.kind {
                 Kind::Refusal => postcard::from_bytes(&answer.body).map(Err).map_err(|_| unreadable()),
-                _ => postcard::from_bytes(&answer.body).map(Ok).map_err(|_| unreadable()),
+                _ => {
+                    self.note_control(E::ID);
+                    postcard::from_bytes(&answer.body).map(Ok).map_err(|_| unreadable())
+                }
             };
         }
         Err(Error::new(DeviceCode::DeviceSilent, format!("the device no longer answers `{}`", E::NAME))
@@ -312,7 +356,7 @@ impl Client {
             .help("check the cable and the supply; a running controller without its host vents by itself"))
     }
 
-    /// How often a question may be asked, when so many frames were bad before it was asked first.
+    /// How often a question may be queried, when n frames were bad before it was queried first.
     fn allowed(&self, tries: u32, bad_before: u32) -> u32 {
         if tries > 1 && self.accumulator.counts().bad != bad_before {
             self.patience.noisy_tries
@@ -335,7 +379,6 @@ impl Client {
     }
 
     fn send(&mut self, bytes: &[u8]) -> Result<()> {
-        self.spoke = Instant::now();
         let _turn = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         self.port.write_all(bytes).map_err(|e| lost(&self.port, &e))
     }
@@ -368,7 +411,7 @@ impl Client {
         let count = match self.port.read(&mut buffer, patience) {
             Ok(count) => count,
             Err(e) => {
-                // A foreign peer often hangs up on bytes it does not understand; what it said until then is the better news.
+                // A other peer often hangs up on bytes it does not understand; what it said until then is the better news.
                 return Err(if heard.bytes > 0 { heard.error(&self.port) } else { lost(&self.port, &e) });
             }
         };
@@ -378,6 +421,9 @@ impl Client {
             let Some(Ok(frame)) = self.accumulator.push(byte) else { continue };
             heard.frames += 1;
             match frame.header.kind {
+                Kind::Refusal if frame.header.id == KeepAlive::ID => {
+                    self.displaced = postcard::from_bytes(frame.body).ok();
+                }
                 Kind::Response | Kind::Refusal => {
                     answers.push(Answer { header: frame.header, body: frame.body.to_vec() });
                 }
@@ -410,4 +456,9 @@ impl Client {
         }
         Ok(answers)
     }
+}
+
+/// A number that two programs are unlikely to share: the standard library seeds each hasher at random.
+fn random_id() -> u32 {
+    RandomState::new().hash_one(std::process::id()) as u32
 }

@@ -14,11 +14,13 @@ use crate::Address;
 use crate::error::DeviceCode;
 use pam_data::error::{Error, Result};
 
+mod axis;
 mod guard;
 pub mod qemu;
 pub mod relay;
 pub mod wire;
 
+pub use axis::Axis;
 use qemu::Qemu;
 pub use qemu::image;
 
@@ -41,7 +43,7 @@ pub enum Mishap {
     LoadCell = 1,
     /// The supply air is closed: no pressure follows.
     Supply = 2,
-    /// The pressure sensor reads the same for ever.
+    /// The pressure sensor reads the same without end.
     StuckGauge = 3,
 }
 
@@ -66,6 +68,7 @@ pub struct Stand {
     plant: Plant,
     mishap: Arc<AtomicU8>,
     stuck: Option<f32>,
+    axis: Option<Axis>,
 }
 
 /// One control tick, s.
@@ -76,7 +79,13 @@ impl Stand {
     #[must_use]
     pub fn new(spec: BenchSpec, motion: Motion) -> Self {
         let plant = Plant::new(&spec, &motion);
-        Self { spec, motion, plant, mishap: Arc::default(), stuck: None }
+        Self { spec, motion, plant, mishap: Arc::default(), stuck: None, axis: None }
+    }
+
+    /// A muscle whose free end an axis moves as it is commanded.
+    #[must_use]
+    pub fn commanded(spec: BenchSpec, axis: Axis) -> Self {
+        Self { axis: Some(axis), ..Self::new(spec, Motion::Held { stroke_mm: 0.0 }) }
     }
 
     /// A muscle that swings slowly around a fifth of its free stroke at nine tenths of its largest pressure.
@@ -124,6 +133,10 @@ impl Station for Stand {
     }
 
     fn step(&mut self, pressure_command: f32, _setpoint: f32) -> Answer {
+        if let Some(axis) = &self.axis {
+            axis.until_due();
+            self.plant.drive_to(axis.advance(TICK), TICK);
+        }
         let supply = Mishap::from_code(self.mishap.load(Ordering::Relaxed)) != Mishap::Supply;
         self.plant.step(TICK, if supply { f64::from(pressure_command) } else { 0.0 });
         self.answer()
@@ -180,7 +193,7 @@ impl Emulated {
         stand.reset(0);
         let plant = move |outputs: &Outputs| {
             let side = &outputs.sides[0];
-            let readings = stand.step(if side.vent { 0.0 } else { side.pressure_pa }, outputs.asked);
+            let readings = stand.step(if side.vent { 0.0 } else { side.pressure_pa }, outputs.setpoint);
             let now = Readings {
                 pressure_pa: readings.pressure,
                 stroke_m: readings.stroke,
@@ -218,7 +231,7 @@ impl Emulated {
         self.why_native.as_deref()
     }
 
-    /// In words, for people.
+    /// As text, for people.
     #[must_use]
     pub fn words(&self) -> String {
         match (self.kind, &self.why_native) {

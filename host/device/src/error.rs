@@ -17,7 +17,7 @@ error_codes! {
         /// The device speaks another version.
         DeviceVersion = "device::version", Input,
             "build and flash program and firmware from the same release";
-        /// The device refused what was asked.
+        /// The device refused the setpoint.
         DeviceRefused = "device::refused", Input,
             "`host device info` shows what it is doing, `host device settings` what it allows";
         /// What the device keeps is not what it was sent.

@@ -10,7 +10,7 @@
 //! | a run from start to vent | [`mod@run`] |
 //! | venting while the conversation waits for something else | [`VentLine`] |
 //! | the pressure regulator, found from steps | [`regulator`] |
-//! | log lines of the firmware in words | [`log_table`] |
+//! | log lines of the firmware as text | [`log_table`] |
 //! | telemetry to a recording | [`recorder`] |
 //! | messages about refusals and faults, with their remedy | [`messages`] |
 //! | what changes from one table to another | [`table_diff`] |

@@ -8,7 +8,7 @@ use crate::error::DeviceCode;
 use pam_data::error::Error;
 use pam_data::pluralise::pluralise;
 
-/// What came before any hello, to tell a silent line from a foreign peer.
+/// What came before any hello, to tell a silent line from a other peer.
 #[derive(Default)]
 pub(super) struct LineActivity {
     /// Everything that arrived.
@@ -28,7 +28,7 @@ impl LineActivity {
         self.first.extend_from_slice(&bytes[..bytes.len().min(room)]);
     }
 
-    /// Why there is no controller at this port, as far as one can hear.
+    /// Why there is no controller at this port, as far as one can receive.
     pub fn error(&self, port: &Port) -> Error {
         if self.bytes == 0 {
             return Error::new(DeviceCode::DeviceSilent, "nothing answers on this port")

@@ -1,4 +1,4 @@
-//! Log frames of the firmware in words.
+//! Log frames of the firmware as text.
 //!
 //! The device sends what `defmt` made of a log line: the number of its format string and the arguments' bytes. The strings
 //! themselves are names of symbols in the section `.defmt` of the image, a JSON object each, at the address that is their

@@ -354,6 +354,10 @@ pub fn refused(request: &str, refusal: Refusal) -> Error {
             "choose an angle in this range; a smaller radius or another rest stroke of the joint moves them (the settings' `joint`)"
                 .to_owned(),
         ),
+        Refusal::OtherSession => (
+            "another program controls it".to_owned(),
+            "close the other program, or vent and start again here".to_owned(),
+        ),
     };
     Error::new(DeviceCode::DeviceRefused, format!("the device refuses `{request}`: {why}")).help(help)
 }

@@ -90,7 +90,7 @@ impl Port {
     /// # Errors
     /// When the line is gone; the end of a TCP stream is [`io::ErrorKind::UnexpectedEof`].
     pub fn read(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
-        // A time-out of zero means "for ever" to TCP and "invalid" to some serial drivers.
+        // A time-out of zero means "without end" to TCP and "invalid" to some serial drivers.
         let patience = patience.max(Duration::from_millis(1));
         let outcome = match &mut self.line {
             Line::Serial(line) => {

@@ -89,9 +89,9 @@ impl Reachability {
         let inside = side.pressure_pa <= 1.02 * tested.pressure_high.pascals()
             && (tested.contraction_low - slack..=tested.contraction_high + slack).contains(&contraction);
         self.outside_tested += u64::from(!inside);
-        if quantity == Quantity::Force && sample.asked.is_finite() {
+        if quantity == Quantity::Force && sample.setpoint.is_finite() {
             let held = self.muscle.held(Length::from_metres(side.stroke_m));
-            let force = Force::from_newtons(sample.asked);
+            let force = Force::from_newtons(sample.setpoint);
             let found = self.muscle.pressure_for(force, &held, 0.0, self.guess, &self.muscle.search());
             self.guess = found.pressure;
             match found.reach {
@@ -103,7 +103,7 @@ impl Reachability {
         }
     }
 
-    /// The seconds of each, for so many samples in a second.
+    /// The seconds of each, for n samples in a second.
     #[must_use]
     pub fn to_json(&self, per_s: f64) -> Value {
         let seconds = |samples: u64| samples as f64 / per_s;

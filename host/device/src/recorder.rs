@@ -2,7 +2,7 @@
 //! file about how it was made.
 //!
 //! Rows go to `NAME.part` while they arrive, piece by piece, and the file gets its name when it has ended. A program that is
-//! killed leaves the `.part` with every piece until then, and what was known at the start in `NAME.part.json`; a disk that is
+//! stopped leaves the `.part` with every piece until then, and what was known at the start in `NAME.part.json`; a disk that is
 //! full ends the file after the last piece that fitted. [`recover()`] makes a whole recording of a `.part`, and the next recording
 //! of the same name does so before it begins.
 
@@ -28,7 +28,7 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::write_whole;
 use pam_data::pluralise::pluralise;
 
-/// Time between two pieces: what a killed program may lose.
+/// Time between two pieces: what a stopped program may lose.
 const PIECE: Duration = Duration::from_millis(100);
 /// Events that the side file lists; more are in the MCAP only.
 const EVENTS: usize = 1_000;
@@ -75,7 +75,7 @@ pub struct Recorder {
 
 impl Recorder {
     /// Begins a recording in all `paths`: a name that ends in `.mcap` becomes MCAP, any other CSV. `about` is what is known
-    /// now, and all that a program which is killed leaves of it.
+    /// now, and all that a program which is stopped leaves of it.
     ///
     /// # Errors
     /// [`DataCode::FileUnwritable`], [`DataCode::CallInvalid`] without a path or with one given twice.
@@ -116,7 +116,7 @@ impl Recorder {
         Ok(begun)
     }
 
-    /// Adds one sample. Samples that are not later than the one before, and readings of the first muscle that are no numbers,
+    /// Adds one sample. Samples that are not later than the one before, and readings of the first muscle that are not numbers,
     /// are counted and left out: a recording has neither.
     ///
     /// # Errors
@@ -149,7 +149,7 @@ impl Recorder {
         if self.flushed.elapsed() >= PIECE { self.flush() } else { Ok(()) }
     }
 
-    /// Adds something that the device reported by itself.
+    /// Adds something that the device reported without a request.
     ///
     /// # Errors
     /// As [`Self::push`].
@@ -231,7 +231,7 @@ impl Recorder {
                 Err(e) => trouble = trouble.or(Some(e.file(path))),
             }
         }
-        // What was known at the start stands in for what cannot be written at the end.
+        // What was known at the start is in for what cannot be written at the end.
         let early = paths.first().map(|p| side_file(&part_of(p)));
         match write_side(&self.side, &about) {
             Ok(()) => early.map(std::fs::remove_file),
@@ -309,8 +309,8 @@ mod tests {
             tick: time_us / 1000,
             state: State::Running,
             mode: Mode::Force,
-            asked: 1.0,
-            asked_second: 0.0,
+            setpoint: 1.0,
+            setpoint_second: 0.0,
             sides: [side].into_iter().collect(),
         }
     }

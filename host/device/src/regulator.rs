@@ -7,7 +7,7 @@
 //! Gain and offset come from where the steps settle; lag, line and rate from the shape of the steps between: those whose simulated
 //! pressure lies nearest to the measured one. The muscle's volume at the stroke that it had, `V/V₀`, is that of the device's table;
 //! without a table the muscle counts as at rest length. The deadband is what small squares of command show: a regulator that
-//! overlooks them does not answer in step with them.
+//! misses them does not answer in step with them.
 
 mod squares;
 
@@ -55,7 +55,7 @@ const LINE_EXPLAINS: f64 = 0.97;
 const SETTLED: f64 = 0.3;
 
 /// Steps a device's pressure between two values (Pa) and finds its regulator, all but the deadband. The steps are commands of the
-/// regulator itself, not those that an earlier model of it makes of a wish; the device's settings are as before afterwards, whatever
+/// regulator itself, not those that an earlier model of it makes of a demand; the device's settings are as before afterwards, whatever
 /// happens. [`Found::keep`] uses what was found.
 ///
 /// # Errors
@@ -81,7 +81,7 @@ pub fn identify_whole(
     })
 }
 
-/// Measures while the device commands what it is asked for and corrects nothing.
+/// Measures while the device commands what it is requested and corrects nothing.
 fn with_plain_commands(
     client: &mut Client,
     measure: impl FnOnce(&mut Client) -> Result<Found>,
@@ -299,7 +299,7 @@ fn simulate(samples: &[(f64, f64, f64)], &[gain, offset, lag, line, rate]: &[f64
 }
 
 impl Found {
-    /// The settings with this regulator, its lag inverted, and no faster a wish than the regulator can follow.
+    /// The settings with this regulator, its lag inverted, and no faster a demand than the regulator can follow.
     #[must_use]
     pub fn settings(&self, base: Settings) -> Settings {
         let mut settings = base;

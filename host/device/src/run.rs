@@ -1,4 +1,4 @@
-//! A run: start, follow a setpoint profile, pass on every sample, and leave the muscle vented whatever happens.
+//! A run: start, follow a setpoint profile, pass on every sample, and leave the muscle vented in all cases.
 
 use std::time::{Duration, Instant};
 
@@ -25,7 +25,7 @@ pub struct Plan {
     pub profile: SetpointProfile,
     /// Device time from the start until the end, s; `None` until `stop` says so.
     pub seconds: Option<f64>,
-    /// One sample every so many ticks.
+    /// One sample every n ticks.
     pub every_ticks: u16,
 }
 
@@ -34,7 +34,7 @@ pub struct Plan {
 pub enum Ending {
     /// The time elapsed.
     Done,
-    /// `stop` said so.
+    /// `stop` reported it.
     Stopped,
 }
 
@@ -58,12 +58,12 @@ pub fn vent(client: &mut Client) -> Result<Status> {
     }
 }
 
-/// Carries out a plan. `sample` is handed every sample from the start on; `stop` is asked between samples.
+/// Carries out a plan. `sample` is handed every sample from the start on; `stop` is queried between samples.
 ///
-/// Whatever the outcome, the device is vented and disarmed at the end, and its telemetry stopped.
+/// Regardless of the outcome, the device is vented and disarmed at the end, and its telemetry stopped.
 ///
 /// # Errors
-/// Refusals, silence, the fault that stopped the device in words, or what `sample` returns.
+/// Refusals, silence, the fault that stopped the device as text, or what `sample` returns.
 pub fn run(
     client: &mut Client,
     plan: &Plan,
@@ -73,7 +73,7 @@ pub fn run(
     run_asking(client, plan, sample, stop, |_| None)
 }
 
-/// The same; besides, `next` is asked after each sample, with the time since the start in s, whether another value is wanted from
+/// The same; besides, `next` is queried after each sample, with the time since the start in s, whether another value is demanded from
 /// now on.
 ///
 /// # Errors
@@ -102,7 +102,7 @@ pub fn arm(client: &mut Client) -> Result<()> {
     let deadline = Instant::now() + ARMING;
     let empty = Refusal::StillFaulty(Fault::NotVented);
     loop {
-        let now = match client.try_call::<Arm>(&())? {
+        let now = match client.try_call::<Arm>(&client.session())? {
             Ok(status) => status.state,
             Err(refusal) if refusal == empty && Instant::now() < deadline => State::Disarmed,
             Err(refusal) => return Err(messages::refused(Arm::NAME, refusal)),
@@ -141,7 +141,7 @@ fn follow(
         send_points(client, values)?;
     }
     client.call::<SetTelemetry>(&TelemetryRate { every_ticks: plan.every_ticks })?;
-    client.call::<StartMode>(&Start { mode: plan.quantity.mode() })?;
+    client.call::<StartMode>(&Start { mode: plan.quantity.mode(), session: client.session() })?;
     let mut steps = Steps::begin(client, plan)?;
     let mut begun = None;
     let mut heard = Instant::now();
@@ -248,7 +248,7 @@ impl Steps {
         if let (Quantity::Angle { .. }, SetpointProfile::Wave(_) | SetpointProfile::Points { .. }) =
             (plan.quantity, &plan.profile)
         {
-            // A wave has one value; the stiffness is the last set-point's.
+            // A wave has one value; the stiffness is the last setpoint's.
             let angle = begins_at(&plan.profile);
             client.call::<SetTo>(&plan.quantity.set_point(angle))?;
         }

@@ -161,7 +161,7 @@ impl<'a> Words<'a> {
 }
 
 impl SetpointProfile {
-    /// The largest value that it asks for, SI.
+    /// The largest setpoint, SI.
     #[must_use]
     pub fn highest(&self) -> f32 {
         let largest = |values: &[f32]| values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
@@ -177,7 +177,7 @@ impl SetpointProfile {
         }
     }
 
-    /// Reads what a person wrote, in the quantity's unit.
+    /// Reads what a user wrote, in the quantity's unit.
     ///
     /// # Errors
     /// [`DataCode::CallInvalid`] naming the word at fault; for `@FILE` also [`DataCode::FileUnreadable`] and the line at fault.

@@ -12,7 +12,7 @@ use pam_data::error::{DataCode, Error, Result};
 
 /// Shortest piece that is tried on a noisy line, bytes.
 const SMALLEST: usize = 32;
-/// Times that a commit is asked for when its answers are lost.
+/// Times that a commit is requested when its answers are lost.
 const COMMITS: u32 = 20;
 
 /// The image that a device keeps for a muscle; `None` when it has none.
@@ -49,7 +49,7 @@ pub fn read(client: &mut Client, side: Side) -> Result<Option<Vec<u8>>> {
 }
 
 /// Has an upload committed. The answer may be lost while the device was busy with its flash, and asking twice would be refused;
-/// so the device is asked what it has instead.
+/// so the device is queried what it has instead.
 fn commit(client: &mut Client, side: Side, crc: u32, before: Option<TableInfo>) -> Result<TableInfo> {
     let mut last = None;
     for _ in 0..COMMITS {
@@ -72,12 +72,12 @@ fn commit(client: &mut Client, side: Side, crc: u32, before: Option<TableInfo>) 
     Err(last.unwrap_or_else(|| messages::refused("table_commit", Refusal::Table(TableFault::NotBegun))))
 }
 
-/// Sends an image, has it committed, reads it back and compares every byte. `progress` is told the bytes sent.
+/// Sends an image, has it committed, reads it back and compares every byte. `progress` is reported the bytes sent.
 ///
 /// A piece whose answer was lost is not sent twice: the device says how much it has.
 ///
 /// # Errors
-/// Refusals in words (the device keeps the table before), silence, or [`DeviceCode::DeviceVerify`].
+/// Refusals as text (the device keeps the table before), silence, or [`DeviceCode::DeviceVerify`].
 pub fn write(
     client: &mut Client,
     side: Side,

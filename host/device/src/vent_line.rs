@@ -1,4 +1,4 @@
-//! Venting beside the conversation with a controller: the frames are written at once and no answer is waited for, so that a
+//! Venting beside the conversation with a controller: the frames are written immediately and no answer is waited for, so that a
 //! conversation that waits for an answer, a file or a flash memory does not delay them.
 
 use std::io;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use clap::Args;
+use clap::{Args, FromArgMatches};
 use model_core::muscle::Muscle;
 
 use super::effects;
@@ -72,6 +72,18 @@ pub struct Arguments {
 }
 
 impl Arguments {
+    /// The arguments of a call that another command makes.
+    ///
+    /// # Errors
+    /// [`DataCode::CallInvalid`] for words that the command does not take.
+    pub(super) fn of(words: Vec<std::ffi::OsString>) -> Result<Self> {
+        let command = Self::augment_args(clap::Command::new("diagnose"));
+        let matches = command.try_get_matches_from(words);
+        matches
+            .and_then(|m| Self::from_arg_matches(&m))
+            .map_err(|e| Error::new(DataCode::CallInvalid, e.to_string()))
+    }
+
     /// Runs the command.
     ///
     /// # Errors

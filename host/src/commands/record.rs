@@ -29,7 +29,7 @@ use pam_data::date::now_utc;
     host record --port /dev/ttyACM0\n  \
     host record --seconds 60 -o run.csv -o run.mcap\n  \
     host record --rate 100 --folder campaign\n\n\
-    It only watches: what the controller does, it goes on doing. Every 0.1 s goes to the disk; a program that is killed, a cable \
+    It only watches: it does not keep the run of another program alive. Every 0.1 s goes to the disk; a program that is killed, a cable \
     that is pulled or a disk that fills leaves everything until then. CSV and MCAP are read by `host fit` and all others; \
     MCAP opens in the viewers of robotics. OUT.json says which versions, table and settings the controller had.")]
 pub struct Arguments {
@@ -148,8 +148,6 @@ fn watch(
     let (mut first, mut last) = (None, 0);
     let mut heard = Instant::now();
     while !stop() {
-        // A controller that moves a muscle vents when its host falls silent; to record is to be there.
-        client.keep_alive()?;
         match client.topic(Duration::from_millis(50))? {
             Some(Topic::Telemetry(sample)) => {
                 heard = Instant::now();

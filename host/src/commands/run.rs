@@ -273,7 +273,7 @@ impl Errors {
                 None => return,
             },
         };
-        let error = f64::from(measured - sample.asked);
+        let error = f64::from(measured - sample.setpoint);
         if error.is_finite() {
             let begun = *self.begun.get_or_insert(sample.time_us);
             self.all.add(error);

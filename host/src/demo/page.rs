@@ -138,7 +138,7 @@ fn curves(track: &Track) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     for sample in &track.samples {
         let Some(side) = sample.sides.first() else { continue };
         out.0.push(sample.time_us.saturating_sub(start) as f64 * 1e-6);
-        out.1.push(f64::from(sample.asked));
+        out.1.push(f64::from(sample.setpoint));
         out.2.push(f64::from(side.force_n));
     }
     out

@@ -174,7 +174,7 @@ pub fn track(
     let errors: Vec<f64> = samples
         .iter()
         .filter(|s| s.time_us.saturating_sub(start) as f64 * 1e-6 >= SETTLE)
-        .filter_map(|s| Some(f64::from(s.sides.first()?.force_n) - f64::from(s.asked)))
+        .filter_map(|s| Some(f64::from(s.sides.first()?.force_n) - f64::from(s.setpoint)))
         .collect();
     if errors.len() < 100 {
         return Err(Error::new(DeviceCode::DeviceSilent, format!("only {} samples came back", errors.len())));

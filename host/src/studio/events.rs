@@ -56,7 +56,7 @@ pub(super) fn batch(samples: &[Telemetry]) -> String {
         "x": side(&|s| f64::from(s.stroke_m) * 1e3, 1e4),
         "c": side(&|s| f64::from(s.command_pa) * 1e-3, 1e2),
         "m": driven(&model),
-        "a": driven(&|s| f64::from(s.asked) * scale),
+        "a": driven(&|s| f64::from(s.setpoint) * scale),
         "mode": samples.last().map(|s| messages::mode(s.mode)),
     })
     .to_string()

@@ -13,7 +13,7 @@ pub struct Chain<T> {
 #[derive(Clone, Debug, PartialEq)]
 struct Running<T> {
     effect: EffectName,
-    /// Those that the effect does not have are zero: of so many no effect asks beyond the end, and none is looked for there.
+    /// Those that the effect does not have are zero: of n no effect asks beyond the end, and none is looked for there.
     parameters: [T; MAX_PARAMETERS],
     memory: Memory<T>,
 }

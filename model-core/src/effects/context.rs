@@ -2,7 +2,7 @@
 
 use crate::scalar::Scalar;
 
-/// All that an effect may look at in one moment, in SI units. A plain value: whoever calls decides how speed and
+/// All that an effect may look at in one moment, in SI units. A plain value: anyone who calls decides how speed and
 /// direction were found (causally on the controller, from both sides on the host).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Context<T> {
@@ -32,9 +32,9 @@ pub struct Context<T> {
     pub acceleration: T,
     /// `s`: +1 shortening, −1 lengthening, 0 unknown.
     pub direction: T,
-    /// Travel since the last turning point, m, ≥ 0.
+    /// Travel since the last reversal, m, ≥ 0.
     pub travel: T,
-    /// Time since the last turning point, s.
+    /// Time since the last reversal, s.
     pub since_reversal: T,
     /// How long the muscle rested before its present motion, or has been resting, s.
     pub hold_time: T,

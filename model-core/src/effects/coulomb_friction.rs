@@ -2,10 +2,10 @@
 //!
 //! `s_x` is the direction in which the stroke last went (a change of pressure at held length does not turn it: what rubs is a guide or
 //! a fitting), `F_c` the friction force, N. Where the strands of the braid rub, `F_s`, N, their direction `s` follows filling and
-//! emptying as well; only rests with a change of pressure tell the two apart. It differs from the table's own friction, which is
+//! emptying as well; only rests with a change of pressure report the two apart. It differs from the table's own friction, which is
 //! proportional to the muscle's force: it is still there where the force is zero, and shows in the tables as
 //! `k_F(P) ≈ a + b/P`. McKibben muscles have been reported with a hysteresis of 5–10 N that does not depend on speed.
-//! Holds while the muscle slides; within the first tenths of a millimetre after a turn see `presliding-hysteresis`. Until the
+//! Holds while the muscle slides; within the first tenths of a millimetre after a reversal see `presliding-hysteresis`. Until the
 //! muscle first moves `s` is unknown and nothing is added.
 
 use super::{

@@ -8,8 +8,8 @@
 //! The step is exact for a drive that runs straight between two readings, whatever their distance:
 //! `q ← q − q (1−a) + Δu (1−a) τ/dt`, `1 − a = 1 − e^(−dt/τ)`.
 //!
-//! At 1 kHz and `τ` of minutes `1 − a` is so small that single precision would swallow it. Steps shorter than a fiftieth of the
-//! shortest `τ` therefore take in the drive's change at once and let the fading pend until a fiftieth is full; a change that
+//! At 1 kHz and `τ` of minutes `1 − a` is so small that single precision would absorb it. Steps shorter than a fiftieth of the
+//! shortest `τ` therefore take in the drive's change immediately and let the fading pend until a fiftieth is full; a change that
 //! comes in late is scaled up by what it must not fade. Both use the exponential's series, which at `dt/τ < 0.04` is exact to
 //! 10⁻⁶: a controller with a steady tick never computes an exponential.
 
@@ -19,7 +19,7 @@ use crate::scalar::Scalar;
 /// `N` time constants for each of `D` drives, kept in an effect's memory.
 ///
 /// Layout: seen, pending time, step that the shares hold for, `N` shares `1 − a`, `D` last drives, `N × D` over-stresses, `D` sums
-/// of what is left of them. The sums are taken once a step, so that a search for pressure asks for them at no cost.
+/// of the rest of them. The sums are taken once a step, so that a search for pressure asks for them at no cost.
 pub struct Fading<const N: usize, const D: usize>;
 
 const SEEN: usize = 0;
@@ -72,7 +72,7 @@ impl<const N: usize, const D: usize> Fading<N, D> {
         }
     }
 
-    /// A step after which the fading still pends: the drives' change is taken in at once.
+    /// A step after which the fading still pends: the drives' change is taken in immediately.
     #[inline(always)]
     fn step_short<T: Scalar>(memory: &mut Memory<T>, dt: T, times: &[T; N], drives: &[T; D]) {
         let middle = memory[PENDING] + dt * T::from_f32(0.5);

@@ -2,7 +2,7 @@
 //!
 //! `λ` (dimensionless) is the part of the gauge pressure lost between sensor and muscle. It holds for a laminar leak behind a
 //! laminar line at a regulated pressure; a closed muscle that leaks shows it in the measured pressure itself, and nothing is
-//! missing. From force alone it cannot be told from a wrong gain of the gauge: close the valve for a minute and watch.
+//! missing. From force alone it cannot be reported from a wrong gain of the gauge: close the valve for a minute and watch.
 
 use super::{BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
 use crate::scalar::Scalar;

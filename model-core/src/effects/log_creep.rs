@@ -1,4 +1,4 @@
-//! Creep that goes on with the logarithm of time: five fading branches, one per decade.
+//! Creep that continues with the logarithm of time: five fading branches, one per decade.
 //!
 //! ```text
 //! dq_i/dt = du/dt − q_i/τ_i,  τ_i = τ_0 · (1, 10, … 10⁴)
@@ -13,11 +13,11 @@
 //! | amplitude | drive `u` | tells |
 //! | --- | --- | --- |
 //! | `relaxing_part_per_decade` | [`F_b`](Context::bladder) where the muscle pulls, N | stress fades in proportion to the bladder's stress |
-//! | `strain_modulus_per_decade`, Pa | `c_1 = (V_B/L) ε_z − t L² ε_x/(2πN²R)`, m² | stress fades in proportion to strain, whatever the pressure |
+//! | `strain_modulus_per_decade`, Pa | `c_1 = (V_B/L) ε_z − t L² ε_x/(2πN²R)`, m² | stress fades in proportion to strain, regardless of the pressure |
 //! | `yielding_part_per_decade` | `F_quasi` where the muscle pulls, N | the pull itself yields: braid, ends and wall give under load, also at constant length |
 //!
 //! The stress of a bladder is known from the tests that its coefficients come from, when it had long settled; what the gas pulls with is
-//! known at once. So the pull is counted from the fresh load, and the muscle hung unloaded before the first moment; of the bladder the
+//! known immediately. So the pull is counted from the fresh load, and the muscle hung unloaded before the first moment; of the bladder the
 //! memory begins settled, and over-stresses left from before fade on their own.
 
 use super::{Context, Effect, Experiment, Fading, Info, Link, Memory, Parameter, Start, Traits};

@@ -1,4 +1,4 @@
-//! Loops within loops that remember where the muscle turned: six play operators (Prandtl and Ishlinskii).
+//! Loops within loops that remember at the reversal: six play operators (Prandtl and Ishlinskii).
 //!
 //! ```text
 //! y_i = play of half-width r_i of the strands' travel ξ        r_i = r · i/6,  i = 1…6

@@ -6,7 +6,7 @@
 //! `F_b` is the bladder's part of the pull ([`Context::bladder`]), `a = 1/r` its largest loss; `W` the neo-Hookean strain energy in units of
 //! half the shear modulus, `W_m` the largest so far, `m` and `β` how soon the softening sets in. On a first stretch (`W = W_m`) nothing is
 //! added; on the way back and on every later stroke below `W_m` the bladder resists less. Return to a lower strain softens no further. The
-//! memory must outlive a power cycle, and a muscle worked before the recording has a `W_m` nobody recorded. Rest heals little of it, and
+//! memory must outlive a power cycle, and a muscle worked before the recording has a `W_m` no one recorded. Rest heals little of it, and
 //! this law nothing.
 //! The error function is Abramowitz and Stegun's 7.1.27, within 5·10⁻⁴.
 
@@ -50,7 +50,7 @@ impl Effect for MullinsSoftening {
     }
 }
 
-/// `W`, bounded so that a stroke far outside the model does not become the muscle's memory for ever.
+/// `W`, bounded so that a stroke far outside the model does not become the muscle's memory without end.
 fn energy<T: Scalar>(context: &Context<T>) -> T {
     let low = T::from_f32(0.2);
     let x = (T::ONE + context.radial_strain).clamp(low, T::from_f32(8.0));

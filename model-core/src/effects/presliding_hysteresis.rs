@@ -1,13 +1,13 @@
-//! Friction that builds up over a distance after a turn: four Maxwell elements that stick, stretch and slip.
+//! Friction that builds up over a distance after a reversal: four Maxwell elements that stick, stretch and slip.
 //!
 //! ```text
 //! dz_i = dξ/d_i, held within ±1        d_i = (δ/2) · (1, 1/2, 1/4, 1/8)
 //! F_add = (a · k_F |F_quasi| + F_d) (s − ¼ Σ z_i)
 //! ```
-//! `ξ` is the strands' travel (the stroke, or at held length what the pressure would have moved), m; `δ` the travel after a turn
+//! `ξ` is the strands' travel (the stroke, or at held length what the pressure would have moved), m; `δ` the travel after a reversal
 //! until all slide, m; `a` the part of the table's own friction that builds up so, `F_d`, N, a dry friction that does. Once all
-//! slide nothing is added: the base model's jump at the turn is what is taken back. Memory is bounded by one per element, and
-//! it has the loops' own memory: return to a turning point closes its loop.
+//! slide nothing is added: the base model's jump at the reversal is what is taken back. Memory is bounded by one per element, and
+//! it has the loops' own memory: return to a reversal closes its loop.
 //! Before the first full travel the elements' state is unknown; they begin in the middle.
 
 use super::{BraidTravel, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};

@@ -8,7 +8,7 @@
 //! | amplitude | drive `u` | tells |
 //! | --- | --- | --- |
 //! | `relaxing_part` | [`F_b`](Context::bladder) where the muscle pulls, N | stress fades in proportion to the bladder's stress |
-//! | `strain_modulus`, Pa | `c_1 = (V_B/L) ε_z − t L² ε_x/(2πN²R)`, m² | stress fades in proportion to strain, whatever the pressure |
+//! | `strain_modulus`, Pa | `c_1 = (V_B/L) ε_z − t L² ε_x/(2πN²R)`, m² | stress fades in proportion to strain, regardless of the pressure |
 //! | `settling_part` | `−F_G(P′, L)` where the muscle pulls, N | the pull follows the pressure late: braid and wall settle under load, also at constant length |
 //!
 //! `q` is the over-stress of a drive. For a spectrum over decades see `log-creep`. The memory begins settled: at rest for long in the

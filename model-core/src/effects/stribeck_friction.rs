@@ -1,7 +1,7 @@
 //! Friction that falls as the muscle gets faster: `F_add = −s (ΔF + κ |F_quasi|) e^(−|v|/v_s)`.
 //!
 //! `ΔF`, N, and `κ` (dimensionless, for strands that the muscle's own force presses together) are the excess at rest over that at
-//! speed, `v_s`, m/s, the speed of the fall. Tondu and Lopez give the braid's friction this form. At one speed it cannot be told
+//! speed, `v_s`, m/s, the speed of the fall. Tondu and Lopez give the braid's friction this form. At one speed it cannot be reported
 //! from dry friction; four speeds over two decades are needed, the slowest below 0.3 mm/s.
 
 use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, decay};

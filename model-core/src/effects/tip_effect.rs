@@ -7,7 +7,7 @@
 //! effective length is shorter than `L` by about `2 k_t R`, so the pressure pulls less, in proportion to `R/L` and to the contraction
 //! `ε = ΔL/L0`. In the second the tapers enclose less air than the cylinder, by `k_v π R (R − R0)²`: as wide as the muscle, as deep and as
 //! long as it has swollen; the pressure pulls less by the slope of that volume. `P′`, Pa; `R`, `L`, m; `k_t`, `k_v` dimensionless. First order in
-//! `R/L`: for muscles shorter than about five diameters both are a trend only. Tables that are free at each pressure swallow them
+//! `R/L`: for muscles shorter than about five diameters both are a trend only. Tables that are free at each pressure absorb them
 //! whole; they show as `E_k` that rise in proportion to pressure.
 
 use super::{

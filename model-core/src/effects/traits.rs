@@ -67,7 +67,7 @@ pub enum Vented {
     FirstLaw,
     /// What it adds at any time.
     Everything,
-    /// A constant, so that a tare shows the effect by itself.
+    /// A constant, so that a tare shows the effect without a request.
     Constant,
 }
 

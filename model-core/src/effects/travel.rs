@@ -7,7 +7,7 @@ use crate::scalar::Scalar;
 ///
 /// While the muscle moves they slide with the stroke. While its length is held and the pressure changes, they creep the way
 /// the pressure drives them, by a small part of what the muscle would have moved had it been free to:
-/// `Δξ = Δx + σ ΔP g/|∂F/∂x|`, `σ = 1/20`. How large that part is nobody has measured; it has to be small, or the ripple of a regulator
+/// `Δξ = Δx + σ ΔP g/|∂F/∂x|`, `σ = 1/20`. How large that part is no one has measured; it has to be small, or the ripple of a regulator
 /// would stir the strands of a moving muscle, and not zero, as pressure alone turns the friction of isometric recordings round.
 pub struct BraidTravel;
 

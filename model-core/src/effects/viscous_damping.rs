@@ -3,7 +3,7 @@
 //! `v` is the speed of shortening, m/s; `c` the damping, N·s/m; `c_P` a damping that grows with pressure, N·s/m per Pa. For a
 //! large muscle 2.9 N·s/mm were found on inflation, and on deflation 1.57 N·s/mm up to 372 kPa and 0.311 + 0.00338 P/kPa above.
 //! Holds at the speeds of one decade or two; rubber's own damping rises more slowly than speed (see `rate-power`). At rest it
-//! vanishes at once, unlike a lag of pressure.
+//! vanishes immediately, unlike a lag of pressure.
 
 use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
 use crate::scalar::Scalar;

@@ -27,7 +27,7 @@ pub(super) fn work<T: Scalar>(context: &Context<T>, memory: &mut Memory<T>) {
         memory[PATH] = (memory[PATH] + pending).max(T::ZERO);
         memory[PENDING_PATH] = T::ZERO;
     }
-    // Over a pause nobody read the force; a slack muscle's is small.
+    // Over a pause no one read the force; a slack muscle's is small.
     memory[PENDING_IMPULSE] += context.quasi.abs() * context.dt.clamp(T::ZERO, T::from_f32(10.0));
     if memory[PENDING_IMPULSE] > T::from_f32(10.0) {
         memory[IMPULSE] += memory[PENDING_IMPULSE];

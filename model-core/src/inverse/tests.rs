@@ -56,7 +56,7 @@ proptest! {
         let found = m.pressure_for(Force::from_newtons(wanted), &held, s, Pressure::from_pascals(guess), &search);
         let miss = at(found.pressure) - wanted;
         match found.reach {
-            // The slope that is told is that of the last step; on a bend it differs from the one at the answer.
+            // The slope that is reported is that of the last step; on a bend it differs from the one at the answer.
             Reach::Reached => {
                 let slope = m.parts(&held, found.pressure).slope(s).abs().max(found.slope.abs());
                 prop_assert!(miss.abs() <= 2.0 * slope + 1e-6, "{found:?} misses by {miss} N");
@@ -97,7 +97,7 @@ fn what_is_out_of_reach_is_said() {
     assert!(nan.pressure.is_finite());
 }
 
-/// A wish that rises evenly through a pressure of the table is answered without a step and without a kink.
+/// A demand that rises evenly through a pressure of the table is answered without a step and without a kink.
 #[test]
 fn the_pressure_is_smooth_where_one_piece_of_the_table_ends() {
     let m = muscle();

@@ -3,7 +3,7 @@
 use super::frame::{Exchange, Kind};
 use super::messages::{
     DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, PastFault, Reference,
-    ReferencePoints, Refusal, RollBack, SetPoint, Start, Status, TableBegin, TableInfo, TablePiece,
+    ReferencePoints, Refusal, RollBack, Session, SetPoint, Start, Status, TableBegin, TableInfo, TablePiece,
     TableRead, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead,
 };
 use super::messages::{Event, Telemetry};
@@ -31,7 +31,7 @@ pub struct Row {
     pub id: u8,
     /// Name.
     pub name: &'static str,
-    /// Type of what is asked, one of [`messages`](super::messages) or [`settings`](super::settings).
+    /// Type of the setpoint, one of [`messages`](super::messages) or [`settings`](super::settings).
     pub request: &'static str,
     /// Type of what is answered.
     pub response: &'static str,
@@ -134,15 +134,15 @@ endpoints! {
     1 info GetInfo: () => DeviceInfo;
     /// What the device is doing.
     2 status GetStatus: () => Status;
-    /// `Disarmed` → `Armed`, at once or after a test of the dump valve (`watch.valve_test_pa`); refused while pressure stands in a muscle.
-    3 arm Arm: () => Status;
-    /// `Armed` → `Running`, or another mode while running. The first set-point is what is measured.
+    /// `Disarmed` → `Armed`, immediately or after a test of the dump valve (`watch.valve_test_pa`); refused while pressure is in a muscle. The session owns the device.
+    3 arm Arm: Session => Status;
+    /// `Armed` → `Running`, or another mode while running. The first setpoint is what is measured. The session owns the mode.
     4 start StartMode: Start => Status;
     /// Vents and goes to `Armed`; allowed always except in `Fault`, where it vents and stays.
     5 stop Stop: () => Status;
     /// Vents and goes to `Disarmed`; in `Fault` it vents and stays.
     6 disarm Disarm: () => Status;
-    /// What is wanted from now on; ends a reference.
+    /// What is demanded from now on; ends a reference.
     7 set_point SetTo: SetPoint => Status;
     /// Starts a reference generator.
     8 reference SetReference: Reference => Status;
@@ -182,6 +182,8 @@ endpoints! {
     25 forget_memory Forget: ForgetMemory => ();
     /// Restarts the device after this answer; only while disarmed or in a fault, vented.
     26 restart Restart: () => ();
+    /// Keeps an armed device or a running mode going; refused to a session that does not own it. No other request does so.
+    27 keep_alive KeepAlive: Session => ();
 }
 
 /// Topic of [`Telemetry`].
@@ -229,7 +231,7 @@ mod tests {
     /// and write the new hash here.
     #[test]
     fn the_schema_changes_only_on_purpose() {
-        assert_eq!(SCHEMA_HASH, 0xb510_199d_7f2b_7f4e, "{SCHEMA_HASH:#018x}");
+        assert_eq!(SCHEMA_HASH, 0xabbb_052f_4136_0911, "{SCHEMA_HASH:#018x}");
     }
 
     #[test]
@@ -253,8 +255,8 @@ mod tests {
             tick: u64::MAX / 1000,
             state: State::Running,
             mode: Mode::Pair,
-            asked: 1.0,
-            asked_second: 1.0,
+            setpoint: 1.0,
+            setpoint_second: 1.0,
             sides: heapless::Vec::from_slice(&[sample; 2]).expect("fits"),
         };
         // A byte takes ten bits at 1 Mbaud: 100 bytes a millisecond, frame included, keep 1 kHz without loss.

@@ -33,7 +33,7 @@ pub const MAX_RAW: usize = HEADER + MAX_BODY + CHECK;
 /// Largest frame on the wire, its closing zero included: COBS adds one byte for each 254 begun.
 pub const MAX_WIRE: usize = MAX_RAW + MAX_RAW.div_ceil(254) + 1;
 
-/// Largest frame on the wire of what the device says by itself: it is short, so that its sender needs little room.
+/// Largest frame on the wire of what the device says without a request: it is short, so that its sender needs little room.
 pub const MAX_TOPIC: usize = 112;
 
 /// What a frame is.
@@ -46,7 +46,7 @@ pub enum Kind {
     Response = 1,
     /// The device refuses; the body is a [`Refusal`].
     Refusal = 2,
-    /// The device speaks by itself: telemetry and events.
+    /// The device speaks without a request: telemetry and events.
     Topic = 3,
 }
 
@@ -86,7 +86,7 @@ pub struct Frame<'a> {
 /// Why bytes are not a frame, or a message does not fit one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
-    /// More bytes than the longest frame came without a zero.
+    /// The frame is longer than the longest one.
     TooLong,
     /// Fewer bytes than a header and a check sum.
     TooShort,
@@ -103,7 +103,7 @@ pub enum FrameError {
 impl core::fmt::Display for FrameError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            Self::TooLong => "more bytes than the longest frame came without an end",
+            Self::TooLong => "the frame is longer than the longest one",
             Self::TooShort => "the frame is shorter than a header and a check sum",
             Self::Stuffing => "the byte stuffing is broken",
             Self::Check => "the check sum is wrong",
@@ -225,6 +225,10 @@ fn unstuff(stuffed: &mut [u8]) -> Result<(Header, usize), FrameError> {
     if raw.len() < HEADER + CHECK {
         return Err(FrameError::TooShort);
     }
+    // One byte more than the longest frame fits the buffer, because the stuffing of both is equally long.
+    if raw.len() > MAX_RAW {
+        return Err(FrameError::TooLong);
+    }
     let (checked, check) = raw.split_at(raw.len() - CHECK);
     if check != crc32(checked).to_le_bytes() {
         return Err(FrameError::Check);
@@ -254,7 +258,7 @@ impl<'a> Exchange<'a> {
         &self.bytes[HEADER..HEADER + self.body]
     }
 
-    /// Room for an answer; what has come is overwritten.
+    /// Placed for an answer; what has come is overwritten.
     pub fn room(&mut self) -> &mut [u8; MAX_WIRE] {
         self.bytes
     }
@@ -307,6 +311,24 @@ mod tests {
         }
         assert_eq!(encode_bytes(header, &[1; MAX_BODY + 1], &mut wire), Err(FrameError::Space));
         assert_eq!(encode_bytes(header, &[1; 100], &mut [0; 60]), Err(FrameError::Space));
+    }
+
+    #[test]
+    fn a_body_is_read_up_to_its_longest_and_refused_beyond() {
+        for (length, expected) in [(511, Ok(511)), (512, Ok(512)), (513, Err(FrameError::TooLong))] {
+            let mut raw = vec![Kind::Request as u8, 9, 1, 0];
+            raw.resize(HEADER + length, 7);
+            raw.extend_from_slice(&crc32(&raw).to_le_bytes());
+            let mut wire = vec![0; 2 * MAX_WIRE];
+            let stuffed = cobs::encode(&raw, &mut wire);
+            let mut accumulator = Accumulator::new();
+            let mut seen = None;
+            for &byte in &wire[..=stuffed] {
+                seen = seen.or(accumulator.push(byte).map(|frame| frame.map(|frame| frame.body.len())));
+            }
+            assert_eq!(seen, Some(expected), "{length} bytes");
+            assert_eq!(decode(&mut wire[..stuffed]).map(|frame| frame.body.len()), expected);
+        }
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! The bodies of requests, answers and topics. SI units, named in the fields; closed enums, never text.
 
-mod asked;
 mod device;
 mod refusal;
+mod requests;
 mod safety;
 mod table;
 mod telemetry;
@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::fields::codes;
 
-pub use self::asked::{REFERENCE_PIECE, Reference, ReferencePoints, SetPoint, Start};
 pub use self::device::{DeviceInfo, StartedBy, Status};
 pub use self::refusal::{Field, Refusal, StoreFault, TableFault};
+pub use self::requests::{REFERENCE_PIECE, Reference, ReferencePoints, Session, SetPoint, Start};
 pub use self::safety::{FAULT_LOG, Fault, FaultReport, Faults, PastFault, Sensor, State};
 pub use self::table::{
     Evaluate, Evaluated, ForgetMemory, PIECE, POINTS, Point, RollBack, TableBegin, TableInfo, TablePiece,

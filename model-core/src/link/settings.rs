@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::fields::{codes, fields};
 
 codes! {
-    /// Where the pressure for a wanted force comes from before any trim.
+    /// Where the pressure for a demanded force comes from before any trim.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
     pub enum FeedForward {
         /// The inverse of the muscle's table.
@@ -23,7 +23,7 @@ codes! {
     /// What a fault does to the regulator. Either way the fault is latched and the state is `Fault`.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
     pub enum Reaction {
-        /// Command zero pressure at once.
+        /// Command zero pressure immediately.
         #[default]
         Vent,
         /// Keep the last command, for loads that must not fall; over-pressure never allows it.
@@ -57,7 +57,7 @@ pub struct StrokeLoop {
     pub damping_n_s_per_m: f32,
     /// Load that the muscle is known to carry, N.
     pub load_n: f32,
-    /// Stiffness of the load, N/m: force grows by it with the wanted stroke.
+    /// Stiffness of the load, N/m: force grows by it with the demanded stroke.
     pub load_stiffness_n_per_m: f32,
     /// Largest force that the loop may ask for, N.
     pub force_limit_n: f32,
@@ -135,7 +135,7 @@ pub struct Limits {
     pub speed_m_per_s: f32,
     /// Largest measured force, N.
     pub force_n: f32,
-    /// Fastest change of the wanted pressure, Pa/s.
+    /// Fastest change of the demanded pressure, Pa/s.
     pub slew_pa_per_s: f32,
 }
 
@@ -173,11 +173,11 @@ pub struct Watch {
     pub follow_pa: f32,
     /// How long pressure may stay away, ticks.
     pub follow_ticks: u16,
-    /// How long a streamed set-point stays good, ticks; 0 for ever. References of the device are not set-points.
+    /// How long a streamed setpoint stays good, ticks; 0 without end. References of the device are not setpoints.
     pub silence_ticks: u32,
-    /// How long a running mode goes on without any whole frame of a host, ticks; above zero.
+    /// How long a running mode continues without a keep-alive request of the session that owns it, ticks; above zero.
     pub host_silence_ticks: u32,
-    /// Whether a running mode may go on without a host for ever. Off unless somebody asks for it.
+    /// Whether a running mode may continue without a host without end. Off unless someone asks for it.
     pub autonomous: bool,
     /// Ticks missed in a row before the fault.
     pub overrun_ticks: u16,
@@ -189,6 +189,8 @@ pub struct Watch {
     pub vent_ticks: u32,
     /// Pressure of the test of regulator and dump valve before arming, Pa; zero for none. Best below the muscle's deadband.
     pub valve_test_pa: f32,
+    /// How long the device stays armed without a keep-alive request of the session that armed it, ticks; then it is disarmed.
+    pub armed_silence_ticks: u32,
 }
 
 fields!(Watch {
@@ -205,7 +207,8 @@ fields!(Watch {
     hold_ticks,
     vented_pa,
     vent_ticks,
-    valve_test_pa
+    valve_test_pa,
+    armed_silence_ticks
 });
 
 /// Everything a user may choose. One for the device; both muscles of a pair share it.
@@ -314,6 +317,8 @@ impl Settings {
             // From 7 bar to 20 kPa are 3.6 time constants: enough for a line of half a second.
             vent_ticks: 2_000,
             valve_test_pa: 0.0,
+            // Time to look at the muscle between arming and starting; nothing is under pressure meanwhile.
+            armed_silence_ticks: 60_000,
         },
         hold_on: 0,
         motion_band_m: 20e-6,

@@ -1,4 +1,4 @@
-//! How quick a force can be asked for: the frequency at which a small wave comes through with half its power.
+//! How quick a force can be requested: the frequency at which a small wave comes through with half its power.
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
@@ -11,23 +11,24 @@ use crate::sweep::{Law, Load, Subject};
 
 /// Frequencies that are tried, Hz.
 const FREQUENCIES: [f64; 12] = [0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0, 56.0];
-/// Amplitude as a part of blocked force: the regulator's fastest change is not asked for below some tens of hertz.
+/// Amplitude as a part of blocked force: the regulator's fastest change is not requested below some tens of hertz.
 const AMPLITUDE: f64 = 0.02;
 
 /// Where a law's waves fade.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bandwidth {
-    /// The true force's amplitude is 1/√2 of what is asked for at this frequency, Hz; the highest tried where it never is.
+    /// The true force's amplitude is 1/√2 of the setpoint at this frequency, Hz; the highest tried where it never is.
     pub hz: f64,
-    /// The largest amplitude below it, as a part of what is asked for.
+    /// The largest amplitude below it, as a part of the setpoint.
     pub peak: f64,
 }
 
-/// The true force's amplitude as a part of what is asked for, of a sine that a host sends tick by tick.
+/// The true force's amplitude as a part of the setpoint, of a sine that a host sends tick by tick.
 fn gain(subject: &Subject, law: Law, hz: f64) -> f64 {
     let bench = BenchSpec::laboratory(subject.spec.clone(), 11);
-    let settings = subject.settings(law, Load::Held);
-    let mut control = Loop::start(&bench, &subject.motion(Load::Held), &subject.table, settings, Mode::Force);
+    let settings = subject.settings(law, Load::AtStroke);
+    let mut control =
+        Loop::start(&bench, &subject.motion(Load::AtStroke), &subject.table, settings, Mode::Force);
     let (mean, _) = subject.wish(Mode::Force);
     let amplitude = AMPLITUDE * subject.blocked();
     control.point(SetPoint::Force(mean));

@@ -3,10 +3,10 @@
 
 use firmware::board::{Inputs, Outputs, Readings};
 use firmware::control::Controller;
+use firmware::outbox::Sample;
 use firmware::regulator::SMOOTHING;
-use firmware::spoken::Sample;
 use firmware::tick::TICK_S;
-use model_core::link::messages::{Mode, Reference, SetPoint, Side, State};
+use model_core::link::messages::{Mode, Reference, Session, SetPoint, Side, State};
 use model_core::link::settings::{FeedForward, Settings};
 use model_core::table::MuscleTable;
 use model_core::units::Length;
@@ -25,8 +25,8 @@ pub struct Loop {
 /// What one tick was like.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tick {
-    /// What was asked for.
-    pub asked: f64,
+    /// the setpoint.
+    pub setpoint: f64,
     /// True force, N.
     pub force: f64,
     /// True stroke, m.
@@ -49,14 +49,14 @@ impl Loop {
         mut settings: Settings,
         mode: Mode,
     ) -> Self {
-        // There is no link here, and so no host to hear from.
+        // There is no link here, and so no host to receive from.
         settings.watch.autonomous = true;
         let mut controller = Controller::new(&settings);
         controller.use_table(Side::Agonist, table).expect("a valid table");
         let mut this = Self { controller, plant: Plant::new(bench, motion), outputs: Outputs::VENT };
         this.tick();
-        this.controller.arm().expect("it arms");
-        this.controller.start(mode).expect("it starts");
+        this.controller.arm(Session::default()).expect("it arms");
+        this.controller.start(mode, Session::default()).expect("it starts");
         this
     }
 
@@ -72,7 +72,7 @@ impl Loop {
         self.controller.take_sample()
     }
 
-    /// Goes on for some ticks and tells what was true in each.
+    /// Goes on for some ticks and returns what was true in each.
     ///
     /// # Panics
     /// When a fault stops the controller.
@@ -85,7 +85,7 @@ impl Loop {
                 assert!(self.controller.state() == State::Running, "stopped by {latched:?}");
                 let truth = self.plant.truth();
                 Tick {
-                    asked: f64::from(sample.map_or(f32::NAN, |sample| sample.asked)),
+                    setpoint: f64::from(sample.map_or(f32::NAN, |sample| sample.setpoint)),
                     force: truth.force,
                     stroke: truth.stroke,
                     pressure: truth.pressure,
@@ -117,9 +117,9 @@ impl Loop {
     }
 }
 
-/// Root mean square of what was asked for less `value`.
+/// Root mean square of the setpoint less `value`.
 pub fn rms(ticks: &[Tick], value: impl Fn(&Tick) -> f64) -> f64 {
-    let sum: f64 = ticks.iter().map(|tick| (tick.asked - value(tick)).powi(2)).sum();
+    let sum: f64 = ticks.iter().map(|tick| (tick.setpoint - value(tick)).powi(2)).sum();
     (sum / ticks.len().max(1) as f64).sqrt()
 }
 

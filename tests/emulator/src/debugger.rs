@@ -7,7 +7,7 @@ use std::net::TcpStream;
 
 use crate::machine::HOPELESS;
 
-/// A connection to QEMU's stub. The processor stands still while it is open.
+/// A connection to QEMU's stub. The processor does not move while it is open.
 #[derive(Debug)]
 pub struct Debugger(TcpStream);
 
@@ -31,7 +31,7 @@ impl Debugger {
         self.0.write_all(format!("${data}#{sum:02x}").as_bytes()).expect("QEMU listens");
         loop {
             let answer = self.packet();
-            // That it has stopped may be told once more, whenever it likes.
+            // That it has stopped may be reported once more, whenever it likes.
             if data == "?" || !answer.starts_with(['T', 'S']) {
                 return answer;
             }
@@ -72,7 +72,7 @@ impl Debugger {
         assert_eq!(answer, "OK");
     }
 
-    /// Lets the processor go on.
+    /// Lets the processor continue.
     pub fn detach(mut self) {
         self.ask("D");
     }

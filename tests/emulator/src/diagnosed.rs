@@ -26,7 +26,7 @@ use crate::{Watched, upload};
 pub struct Case {
     /// What is concealed, by its name in the catalogue.
     pub effect: &'static str,
-    /// What it is in words, with its size.
+    /// What it is as text, with its size.
     pub words: String,
     /// The muscle without it.
     pub plain: MuscleSpec,
@@ -34,8 +34,8 @@ pub struct Case {
     pub spec: MuscleSpec,
     /// How its free end is moved while the controller works.
     pub motion: Motion,
-    /// What is asked of the force meanwhile.
-    pub asked: Vec<Stretch>,
+    /// The setpoint of the force meanwhile.
+    pub setpoint: Vec<Stretch>,
     /// Blocked force at the highest level, N.
     pub blocked: f64,
 }
@@ -53,7 +53,7 @@ fn swing(x: f64, frequency_hz: f64) -> Motion {
     Motion::Sine { mean_mm: 0.2e3 * x, amplitude_mm: 0.1e3 * x, frequency_hz }
 }
 
-/// Rests a second and a half, goes on by two hundredths of the free stroke `x` (m) within a second, and so on to and fro, as a gripper
+/// Rests a second and a half, continues by two hundredths of the free stroke `x` (m) within a second, and so on back and forth, as a gripper
 /// that feels its way: what grows during a rest and is lost over the first bit of motion has its say in each move.
 fn inching(x: f64) -> Motion {
     const MOVES: [f64; 8] = [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0];
@@ -66,7 +66,7 @@ fn inching(x: f64) -> Motion {
     Motion::Path { points }
 }
 
-/// A muscle that nobody has seen, whose braid gives too little before it slides for any sample to see: its plain law of friction is
+/// A muscle that no one has seen, whose braid gives too little before it slides for any sample to see: its plain law of friction is
 /// the model's own, and nothing else is left out.
 fn simple(seed: u64) -> MuscleSpec {
     let mut spec = presets::random(seed);
@@ -76,7 +76,7 @@ fn simple(seed: u64) -> MuscleSpec {
     spec
 }
 
-/// Puts physics into a muscle of this blocked force (N), free stroke (m) and slow speed (m/s); gives it in words.
+/// Puts physics into a muscle of this blocked force (N), free stroke (m) and slow speed (m/s); gives it as text.
 type Conceal = fn(&mut MuscleSpec, f64, f64, f64) -> String;
 
 /// The muscles of the comparison.
@@ -118,7 +118,7 @@ pub fn cases() -> Vec<Case> {
         let (blocked, x, v) = sizes(&plain);
         let mut spec = plain.clone();
         let words = conceal(&mut spec, blocked, x, v);
-        Case { effect, words, plain, spec, motion: motion(x), asked: asked(blocked), blocked }
+        Case { effect, words, plain, spec, motion: motion(x), setpoint: asked(blocked), blocked }
     })
     .to_vec()
 }
@@ -215,7 +215,7 @@ pub fn here(spec: &MuscleSpec, case: &Case, table: &MuscleTable) -> f64 {
     let with = closed_loop::forward(settings(&bench, table, case.blocked), FeedForward::Table);
     let mut control = Loop::start(&bench, &case.motion, table, with, Mode::Force);
     let mut judged = Vec::new();
-    for stretch in &case.asked {
+    for stretch in &case.setpoint {
         match stretch.wanted {
             Wanted::Wave(wave) => control.wave(wave),
             Wanted::Point(point) => control.point(point),
@@ -255,7 +255,7 @@ pub fn in_emulator(spec: &MuscleSpec, case: &Case, tables: &[&MuscleTable]) -> R
             });
             // Motion and course begin together, on a muscle that has not waited, however long all this took.
             station.with(|bench| *bench.plant() = start);
-            let samples = tracking::run(&mut client, Mode::Force, &case.asked);
+            let samples = tracking::run(&mut client, Mode::Force, &case.setpoint);
             Ok(100.0 * tracking::rms(&samples, tracking::force) / case.blocked)
         })
         .collect()

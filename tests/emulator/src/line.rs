@@ -1,7 +1,7 @@
 //! The cable between programs and an emulated board: a TCP port or a serial device at the program's end, the board's UART at
 //! the other, and what happens to bytes on the way.
 //!
-//! As on a real cable, what the board says while nobody listens is lost, and a program that is killed leaves it open.
+//! As on a real cable, what the board says while no one listens is lost, and a program that is stopped leaves it open.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Write};
@@ -137,7 +137,7 @@ impl Line {
                 let mut passed = bytes[..count].to_vec();
                 passage(&mut passed);
                 if let Some(near) = to.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
-                    // A program that is gone hears nothing more.
+                    // A program that is gone receives nothing more.
                     let _ = near.write_all(&passed);
                 }
             }

@@ -166,7 +166,7 @@ impl Folder {
 
 impl Drop for Folder {
     fn drop(&mut self) {
-        // What is left of a temporary folder does no harm.
+        // The rest of a temporary folder does no harm.
         let _ = std::fs::remove_dir_all(&self.0);
     }
 }
@@ -184,7 +184,7 @@ pub struct Options {
     pub speed: Option<f64>,
 }
 
-/// How long a test waits for an answer: a machine that is busy may take longer than a person would wait, and a board that is dead never
+/// How long a test waits for an answer: a machine that is busy may take longer than a user would wait, and a board that is dead never
 /// answers.
 pub const PATIENCE: Patience = Patience {
     answer: Duration::from_secs(5),

@@ -2,7 +2,7 @@
 
 use firmware::board::{Inputs, Outputs, Readings};
 use firmware::control::Controller;
-use model_core::link::messages::{Mode, Refusal, SetPoint, Side, State};
+use model_core::link::messages::{Mode, Refusal, Session, SetPoint, Side, State};
 use model_core::link::settings::Settings;
 use model_core::table::MuscleTable;
 
@@ -22,7 +22,7 @@ pub fn elbow(muscle: &MuscleSpec) -> Joint {
     Joint::new(&bench, RADIUS, REST).moving(0.05, 1.0)
 }
 
-/// Its settings: an integral slow beside its least stiffness, and no proportional part, so that it stays as soft as was asked.
+/// Its settings: an integral slow beside its least stiffness, and no proportional part, so that it stays as soft as was queried.
 pub fn adjust(settings: &mut Settings) {
     let joint = &mut settings.joint;
     joint.radius_m = RADIUS as f32;
@@ -64,7 +64,7 @@ impl PairLoop {
     /// # Panics
     /// When the controller refuses.
     pub fn start(joint: Joint, table: &MuscleTable, mut settings: Settings) -> Self {
-        // There is no link here, and so no host to hear from.
+        // There is no link here, and so no host to receive from.
         settings.watch.autonomous = true;
         let mut controller = Controller::new(&settings);
         for side in Side::ALL {
@@ -72,8 +72,8 @@ impl PairLoop {
         }
         let mut this = Self { controller, joint, outputs: Outputs::VENT };
         this.tick();
-        this.controller.arm().expect("it arms");
-        this.controller.start(Mode::Pair).expect("it starts");
+        this.controller.arm(Session::default()).expect("it arms");
+        this.controller.start(Mode::Pair, Session::default()).expect("it starts");
         this
     }
 

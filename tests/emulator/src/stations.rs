@@ -15,7 +15,7 @@ pub type Disturbance = Box<dyn FnMut(u64, &mut Answer) + Send>;
 pub struct Exchange {
     /// Pressure command, Pa; zero where the dump valve was open.
     pub command: f32,
-    /// What the board was told.
+    /// What the board was reported.
     pub answer: Answer,
 }
 
@@ -64,10 +64,10 @@ impl<S> Watched<S> {
         self.inner().exchanges.get(period..).unwrap_or_default().to_vec()
     }
 
-    /// Lets the bench go on until something is so of its periods, however long the machine takes for them.
+    /// Lets the bench continue until something is so of its periods, however long the machine takes for them.
     ///
     /// # Panics
-    /// When the bench stands still: then it never will be.
+    /// When the bench does not move: then it never will be.
     pub fn until(&self, what: &str, so: impl Fn(usize) -> bool) {
         let mut last = (self.periods(), Instant::now());
         loop {
@@ -83,10 +83,10 @@ impl<S> Watched<S> {
         }
     }
 
-    /// Lets the bench go on for some periods.
+    /// Lets the bench continue for some periods.
     ///
     /// # Panics
-    /// When it stands still.
+    /// When it does not move.
     pub fn pass(&self, periods: usize) {
         let until = self.periods() + periods;
         self.until("some periods", |now| now >= until);

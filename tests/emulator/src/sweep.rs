@@ -1,4 +1,4 @@
-//! How well force and stroke follow what is asked: each muscle on several loads, under several control laws, against what the
+//! How well force and stroke follow what is setpoint: each muscle on several loads, under several control laws, against what the
 //! regulator alone would allow.
 //!
 //! The controller is the firmware's own library on the bench's plant, a tick after the other and as fast as this machine goes.
@@ -24,17 +24,17 @@ use crate::{fitting, upload};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Load {
     /// Its length is held.
-    Held,
+    AtStroke,
     /// Its free end is moved at 0.3 Hz over a quarter of the free stroke.
     Moved,
     /// It pulls a mass against a spring.
     Spring,
 }
 
-/// What is asked for, around a mean by an amplitude.
+/// the setpoint, around a mean by an amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Course {
-    /// Up and down at once, a second at each.
+    /// Up and down immediately, a second at each.
     Steps,
     /// Up and down in a second each, half a second at each end.
     Ramps,
@@ -70,10 +70,10 @@ pub const COURSES: [Course; 8] = [
 ];
 
 impl Load {
-    /// In words.
+    /// As text.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Held => "held",
+            Self::AtStroke => "held",
             Self::Moved => "moved",
             Self::Spring => "mass and spring",
         }
@@ -81,7 +81,7 @@ impl Load {
 }
 
 impl Course {
-    /// In words.
+    /// As text.
     pub fn name(self) -> String {
         match self {
             Self::Steps => "steps".into(),
@@ -118,7 +118,7 @@ impl Course {
 pub struct Still {
     /// Error, rms in % of blocked force.
     pub error: f64,
-    /// What of it goes to and fro about its own mean.
+    /// What of it goes back and forth about its own mean.
     pub swing: f64,
     /// How much the command changes from tick to tick, rms in Pa.
     pub jump: f64,
@@ -168,12 +168,12 @@ impl Subject {
     pub(crate) fn motion(&self, load: Load) -> Motion {
         let free_mm = self.free_stroke() * 1e3;
         match load {
-            Load::Held => Motion::Held { stroke_mm: 0.2 * free_mm },
+            Load::AtStroke => Motion::Held { stroke_mm: 0.2 * free_mm },
             Load::Moved => {
                 Motion::Sine { mean_mm: 0.22 * free_mm, amplitude_mm: 0.12 * free_mm, frequency_hz: 0.3 }
             }
             Load::Spring => {
-                // Half of blocked force at three tenths of the free stroke, which is the most that is wished for and within reach of
+                // Half of blocked force at three tenths of the free stroke, which is the most that is demanded for and within reach of
                 // the highest pressure; a natural frequency of 10 Hz and some damping.
                 let spring = 1.5 * self.blocked() / free_mm;
                 let mass = spring * 1e3 / (2.0 * std::f64::consts::PI * 10.0_f64).powi(2);
@@ -227,7 +227,7 @@ impl Subject {
         self.settings(Law::Feedback, load).force_loop.integral_pa_per_n_s * self.slope(load)
     }
 
-    /// Mean and amplitude of what is asked for, N or m.
+    /// Mean and amplitude of the setpoint, N or m.
     pub(crate) fn wish(&self, mode: Mode) -> (f32, f32) {
         match mode {
             Mode::Stroke => (0.2 * self.free_stroke() as f32, 0.1 * self.free_stroke() as f32),
@@ -281,7 +281,7 @@ impl Subject {
         }
     }
 
-    /// The error of a sine where a host sends each tick's set-point and the device knows nothing of the next.
+    /// The error of a sine where a host sends each tick's setpoint and the device knows nothing of the next.
     pub fn streamed_error(&self, load: Load, hz: f32, law: Law) -> f64 {
         let bench = BenchSpec::laboratory(self.spec.clone(), 11);
         let settings = self.settings(law, load);
@@ -298,8 +298,8 @@ impl Subject {
         100.0 * closed_loop::rms(&ticks[1_000..], |tick| tick.force) / self.blocked()
     }
 
-    /// What the regulator itself leaves, rms in %: its fastest change of pressure, for a controller that begins when it is asked and
-    /// inverts lag and line, and its ripple and wander at a command that stands still.
+    /// What the regulator itself leaves, rms in %: its fastest change of pressure, for a controller that begins when it is queried and
+    /// inverts lag and line, and its ripple and drift at a command that does not move.
     pub fn limit(&self, mode: Mode, load: Load, course: Course) -> f64 {
         let ticks = self.run(mode, load, course, Law::Table);
         let bench = BenchSpec::laboratory(self.spec.clone(), 11);
@@ -310,11 +310,11 @@ impl Subject {
             per_pascal /= 2.0 * spring * 1e3;
         }
         let most = bench.pneumatics.rate * per_pascal * f64::from(TICK_S);
-        let mut reached = ticks[0].asked;
+        let mut reached = ticks[0].setpoint;
         let mut squares = 0.0;
         for tick in &ticks {
-            reached += (tick.asked - reached).clamp(-most, most);
-            squares += (tick.asked - reached).powi(2);
+            reached += (tick.setpoint - reached).clamp(-most, most);
+            squares += (tick.setpoint - reached).powi(2);
         }
         let late = squares / ticks.len() as f64;
         let held = Motion::Held { stroke_mm: self.middle(load) * 1e3 };

@@ -17,7 +17,7 @@ use crate::machine::HOPELESS;
 /// Waits for the event of a fault.
 ///
 /// # Panics
-/// When none is told.
+/// When none is reported.
 pub fn stopped(client: &mut Client) -> FaultReport {
     let deadline = Instant::now() + HOPELESS;
     while Instant::now() < deadline {
@@ -30,10 +30,10 @@ pub fn stopped(client: &mut Client) -> FaultReport {
     panic!("no fault was told");
 }
 
-/// What is asked for.
+/// the setpoint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wanted {
-    /// A set-point.
+    /// A setpoint.
     Point(SetPoint),
     /// A wave of the device.
     Wave(Reference),
@@ -42,7 +42,7 @@ pub enum Wanted {
 /// A stretch of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stretch {
-    /// What is asked for.
+    /// the setpoint.
     pub wanted: Wanted,
     /// For how many ticks.
     pub ticks: u64,
@@ -87,7 +87,7 @@ pub fn sample(client: &mut Client) -> Result<Telemetry, Event> {
     }
 }
 
-/// Brings a device to `Running` from wherever it is, at full telemetry. It goes on by itself however long this process has to wait for a
+/// Brings a device to `Running` from wherever it is, at full telemetry. It continues without a request however long this process has to wait for a
 /// busy machine, on a bench that may answer three times as fast as a watch goes.
 ///
 /// # Panics
@@ -104,7 +104,7 @@ pub fn start(client: &mut Client, mode: Mode) {
         sample(client).expect("no fault while disarmed");
     }
     pam_device::run::arm(client).expect("it arms");
-    client.call::<StartMode>(&Start { mode }).expect("it starts");
+    client.call::<StartMode>(&Start { mode, session: client.session() }).expect("it starts");
 }
 
 /// Runs stretches of one mode and gives the samples that are judged; ends disarmed.
@@ -138,7 +138,7 @@ pub fn run(client: &mut Client, mode: Mode, stretches: &[Stretch]) -> Vec<Teleme
 
 /// Root mean square of `asked − value`.
 pub fn rms(samples: &[Telemetry], value: impl Fn(&Telemetry) -> f32) -> f64 {
-    let sum: f64 = samples.iter().map(|s| f64::from(s.asked - value(s)).powi(2)).sum();
+    let sum: f64 = samples.iter().map(|s| f64::from(s.setpoint - value(s)).powi(2)).sum();
     (sum / samples.len().max(1) as f64).sqrt()
 }
 

@@ -34,7 +34,7 @@ fn command(station: &Station) -> f32 {
     station.periods().checked_sub(1).map_or(0.0, |last| station.since(last)[0].command)
 }
 
-/// A program that lets the device make a wave, killed without a word after some hundred ticks of it.
+/// A program that lets the device make a wave, stopped without a word after some hundred ticks of it.
 fn killed_in_a_wave(station: &Station, line: &Line, folder: &Folder) {
     let wave = ["run", "--pressure", "sine mean=250 amplitude=50 frequency=1"];
     let mut child: Child = program::start(line, folder.path(), &wave);
@@ -65,7 +65,7 @@ fn a_host_that_is_killed_during_a_wave_of_the_devices_own_stops_it() {
     let last_heard = heard.load(Ordering::Relaxed);
     let after = station.since(last_heard);
     let vented = after.iter().position(|exchange| exchange.command == 0.0);
-    // The board's own count, which is told below, begins when the frame is there: a busy machine takes its time to bring it.
+    // The board's own count, which is reported below, begins when the frame is there: a busy machine takes its time to bring it.
     assert!(
         vented.is_some_and(|n| (1_000..2_000).contains(&n)),
         "vents {vented:?} ticks after the last frame"
@@ -120,7 +120,7 @@ fn a_device_that_was_told_to_go_on_alone_does_and_holds_where_it_was_told_to_hol
     assert_eq!(command(&station), 0.0);
 }
 
-/// A way for the air to break, and the pressure asked for after it broke.
+/// A way for the air to break, and the pressure requested after it broke.
 struct Break {
     name: &'static str,
     fault: Fault,
@@ -188,7 +188,7 @@ fn a_burst_a_leak_a_closed_supply_and_a_jammed_valve_are_noticed_on_the_plant_it
 
 /// The vector of the interrupt that runs the tasks: the eleventh behind the sixteen of the core.
 const TASKS_VECTOR: u32 = (16 + 10) * 4;
-/// `b .`: for ever here.
+/// `b .`: without end here.
 const HANG: u16 = 0xE7FE;
 
 #[test]
@@ -217,13 +217,18 @@ fn a_program_that_hangs_is_restarted_vented_and_says_so() {
     let faults = client.call::<GetFaults>(&()).expect("its faults");
     assert_eq!(faults.latched.map(|report| report.fault), Some(Fault::Watchdog));
     assert_eq!(faults.counts[usize::from(Fault::Watchdog.code())], 1);
-    // Nothing starts by itself, and nothing can be started before somebody has looked.
-    assert_eq!(client.try_call::<Arm>(&()).expect("an answer"), Err(Refusal::Latched(Fault::Watchdog)));
+    // Nothing starts without a request, and nothing can be started before someone has looked.
+    assert_eq!(
+        client.try_call::<Arm>(&client.session()).expect("an answer"),
+        Err(Refusal::Latched(Fault::Watchdog))
+    );
     let begun = station.periods();
     station.until("it stays vented", |now| now > begun + 500);
     assert!(station.since(0).iter().all(|exchange| exchange.command == 0.0));
     client.call::<ClearFault>(&()).expect("it clears");
-    client.call::<Arm>(&()).expect("it arms");
-    client.call::<StartMode>(&Start { mode: Mode::Pressure }).expect("it runs again");
+    client.call::<Arm>(&client.session()).expect("it arms");
+    client
+        .call::<StartMode>(&Start { mode: Mode::Pressure, session: client.session() })
+        .expect("it runs again");
     assert_eq!(client.call::<GetStatus>(&()).expect("a status").state, State::Running);
 }

@@ -91,7 +91,7 @@ fn the_table_beats_the_ideal_braid_and_with_a_trim_pi_of_the_same_margin_by_far(
                 "{name} at {hz} Hz: table {table:.2} %, with trim {trimmed:.2} %, Gaylord {gaylord:.2} %, PI {pi:.2} %"
             );
             // PI has the same phase margin, and does not know what comes. At the largest stroke and force the larger muscles need more
-            // than the regulator's highest command for a moment, whatever the law.
+            // than the regulator's highest command for a moment, regardless of the law.
             if !(table < 1.0 && trimmed < 0.8 && pi > 2.5 * trimmed && gaylord > 10.0 * table) {
                 failures.push((name.clone(), hz, table, trimmed, gaylord, pi));
             }
@@ -132,9 +132,12 @@ fn stroke_is_reached_against_a_spring_without_a_lasting_error() {
     }
 }
 
-/// Ticks until what is wanted is within a part of `scale` for good.
+/// Ticks until what is demanded is within a part of `scale` permanently.
 fn settled(ticks: &[Tick], scale: f64, value: impl Fn(&Tick) -> f64) -> usize {
-    ticks.iter().rposition(|tick| (value(tick) - tick.asked).abs() > 0.03 * scale).map_or(0, |last| last + 1)
+    ticks
+        .iter()
+        .rposition(|tick| (value(tick) - tick.setpoint).abs() > 0.03 * scale)
+        .map_or(0, |last| last + 1)
 }
 
 #[test]
@@ -161,7 +164,7 @@ fn what_was_out_of_reach_for_long_winds_no_integrator_up() {
         let ((after_limit, limited), (after_reach, _)) = (back(2.0 * blocked), back(0.7 * blocked));
         eprintln!("{name}: back in {after_limit} ticks from the limit, {after_reach} from within reach");
         assert!(limited > 2500, "{limited} ticks out of reach");
-        // With an integrator that went on PI would need 346 and 439.
+        // With an integrator that continued PI would need 346 and 439.
         assert!(after_limit < most && after_reach < 200, "{name}: {after_limit} and {after_reach} ticks");
     }
     let load = Motion::Load { mass: 0.5, spring: 10.0, preload: 5.0, damper: 0.05 };
@@ -230,7 +233,7 @@ fn a_wish_that_stands_still_is_held_without_swinging_while_a_load_moves_the_musc
     use emulator_tests::sweep::{Law, Load, Subject};
     for spec in [presets::miniature(), presets::contractile(), presets::push()] {
         let subject = Subject::of(spec);
-        for load in [Load::Held, Load::Moved, Load::Spring] {
+        for load in [Load::AtStroke, Load::Moved, Load::Spring] {
             let [table, trimmed] = [Law::Table, Law::Trimmed].map(|law| subject.still(load, law));
             eprintln!(
                 "{} {load:?}: {table:.3?} with the table, {trimmed:.3?} with a trim",
@@ -240,7 +243,7 @@ fn a_wish_that_stands_still_is_held_without_swinging_while_a_load_moves_the_musc
             let error = if load == Load::Moved { 1.0 } else { 2.0 };
             assert!(table.error < error && trimmed.error < 0.7, "{load:?} {table:?} {trimmed:?}");
             if load != Load::Moved {
-                // A mass on a spring whose friction is taken away follows the regulator's wander.
+                // A mass on a spring whose friction is taken away follows the regulator's drift.
                 assert!(table.swing < 0.45 && trimmed.swing < 0.1, "{load:?} {table:?} {trimmed:?}");
                 // Three times what the lead makes of sensor noise: a compensation that chatters makes ten of it.
                 assert!(table.jump < 4e3 && trimmed.jump < 4e3, "{load:?} {table:?} {trimmed:?}");
@@ -255,7 +258,7 @@ fn force_with_table_and_trim_follows_within_a_percent_and_a_stiffer_bladder_does
     use emulator_tests::sweep::{Course, Law, Load, Subject};
     let subject = Subject::of(presets::miniature());
     let cases = [
-        (Load::Held, Course::Sine(1.0)),
+        (Load::AtStroke, Course::Sine(1.0)),
         (Load::Moved, Course::Ramps),
         (Load::Moved, Course::Sine(1.0)),
         (Load::Spring, Course::Ramps),

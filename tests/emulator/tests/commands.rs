@@ -316,7 +316,7 @@ fn the_log_of_the_image_is_decoded_beside_events() {
     program::interrupt(&log);
     let status = log.wait().expect("it ends");
     assert!(status.success(), "ended by the key for it: {status:?}");
-    // An image without log lines is refused in words.
+    // An image without log lines is refused as text.
     let Ok(silent) = machine::image() else { return };
     let silent = silent.to_string_lossy().into_owned();
     let refused = program::run(&stand.line, stand.folder.path(), &["device", "log", "--elf", &silent]);
@@ -324,13 +324,13 @@ fn the_log_of_the_image_is_decoded_beside_events() {
     assert!(refused.status.code() == Some(1) && said.contains("built without logs"), "{said}");
 }
 
-/// What the bench does with the muscle: it holds it, and, when asked for the second, stretches it, which its bladder remembers.
+/// What the bench does with the muscle: it holds it, and, when requested the second, stretches it, which its bladder remembers.
 fn held_and_stretched() -> Vec<Motion> {
     let stretched = Motion::Path { points: vec![(0.0, 0.4), (2.0, 0.4), (2.5, 3.0), (3.0, 0.4)] };
     vec![Motion::Held { stroke_mm: 0.4 }, stretched]
 }
 
-/// How much stronger the device thinks the muscle than its table without memory, N, in the last of so many samples.
+/// How much stronger the device thinks the muscle than its table without memory, N, in the last of n samples.
 fn softening(client: &mut pam_device::Client, muscle: &Muscle<f32>, samples: usize) -> f32 {
     let (mut sum, mut count) = (0.0, 0);
     for n in 0..samples {

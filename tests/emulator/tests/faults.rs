@@ -146,10 +146,13 @@ fn every_fault_of_the_plant_is_noticed_in_time_and_latched() {
             "{fault:?} (case {number}) vents after {vented:?} periods"
         );
         // It stays vented and says no to everything but being cleared.
-        assert_eq!(client.try_call::<Arm>(&()).expect("an answer"), Err(Refusal::Latched(fault)));
+        assert_eq!(
+            client.try_call::<Arm>(&client.session()).expect("an answer"),
+            Err(Refusal::Latched(fault))
+        );
         assert_eq!(client.call::<GetStatus>(&()).expect("a status").state, State::Fault);
         let faults = client.call::<GetFaults>(&()).expect("its faults");
-        // Compared as text: a reading that is no number is not equal to itself.
+        // Compared as text: a reading that is not a number is not equal to itself.
         assert_eq!(format!("{:?}", faults.latched), format!("{:?}", Some(report)));
         assert!(faults.counts[usize::from(fault.code())] >= 1);
         let past = client.call::<GetPastFault>(&PastFault { back: 0 }).expect("the log");
@@ -182,7 +185,7 @@ fn a_fault_whose_cause_is_still_there_is_not_cleared() {
 fn a_host_that_falls_silent_and_a_hold_that_was_asked_for() {
     let folder = Folder::new();
     let station = station();
-    // No faster than a real board: the first set-point must come before its silence is noticed.
+    // No faster than a real board: the first setpoint must come before its silence is noticed.
     let options = Options { first: Some(Box::new(station.clone())), speed: Some(1.0), ..Options::default() };
     let Ok(machine) = Machine::start(folder.path(), options) else { return };
     let mut client = machine.client();
@@ -197,11 +200,11 @@ fn a_host_that_falls_silent_and_a_hold_that_was_asked_for() {
     assert_eq!((report.fault, report.value, report.limit), (Fault::SetPointSilence, 2_001.0, 2_000.0));
     station.pass(100);
     let held = station.since(station.periods() - 50);
-    // The command is the wish and what the drift of this regulator asks for; held, it no longer moves.
+    // The command is the demand and what the drift of this regulator asks for; held, it no longer moves.
     let first = held[0].command;
     assert!((first - 300e3).abs() < 10e3, "it holds {first} Pa");
     assert!(held.iter().all(|exchange| exchange.command == first), "it stays at {first} Pa");
-    // Held pressure can still be let go of without leaving the fault.
+    // AtStroke pressure can still be let go of without leaving the fault.
     assert_eq!(client.call::<Stop>(&()).expect("it vents").state, State::Fault);
     station.pass(5);
     assert_eq!(station.since(station.periods() - 1)[0].command, 0.0);
@@ -214,13 +217,15 @@ fn a_mode_without_its_table_is_a_fault_and_nothing_starts_by_itself() {
     let Some(machine) = board(&folder, &station) else { return };
     let mut client = machine.client();
     station.pass(50);
-    client.call::<Arm>(&()).expect("it arms");
-    let refused = client.try_call::<StartMode>(&Start { mode: Mode::Force }).expect("an answer");
+    client.call::<Arm>(&client.session()).expect("it arms");
+    let refused = client
+        .try_call::<StartMode>(&Start { mode: Mode::Force, session: client.session() })
+        .expect("an answer");
     assert_eq!(refused, Err(Refusal::NoTable(Side::Agonist)));
     let latched = client.call::<GetFaults>(&()).expect("its faults").latched.map(|report| report.fault);
     assert_eq!(latched, Some(Fault::TableMissing));
     client.call::<ClearFault>(&()).expect("it clears");
-    // A set-point to a device that does not run moves nothing.
+    // A setpoint to a device that does not run moves nothing.
     let refused = client.try_call::<SetTo>(&SetPoint::Pressure(300e3)).expect("an answer");
     assert_eq!(refused, Err(Refusal::WrongState(State::Disarmed)));
     station.pass(50);
@@ -244,7 +249,7 @@ fn a_calculation_that_fails_vents_and_is_told_with_its_result() {
     let commands = station.since(0);
     assert!(commands.iter().all(|exchange| exchange.command.is_finite()));
     assert_eq!(commands.last().map(|exchange| exchange.command), Some(0.0));
-    let latched = client.try_call::<Arm>(&()).expect("an answer");
+    let latched = client.try_call::<Arm>(&client.session()).expect("an answer");
     assert_eq!(latched, Err(Refusal::Latched(Fault::NotANumber)));
     // The air takes some lags of the regulator to leave.
     station.pass(300);
@@ -291,12 +296,15 @@ fn settings_of_which_a_bit_is_wrong_stop_the_device_until_they_are_confirmed() {
     let latched = client.call::<GetFaults>(&()).expect("its faults").latched.map(|report| report.fault);
     assert_eq!(latched, Some(untrusted));
     station.pass(10);
-    assert_eq!(client.try_call::<Arm>(&()).expect("an answer"), Err(Refusal::Latched(untrusted)));
+    assert_eq!(
+        client.try_call::<Arm>(&client.session()).expect("an answer"),
+        Err(Refusal::Latched(untrusted))
+    );
     let refused = client.try_call::<ClearFault>(&()).expect("an answer");
     assert_eq!(refused, Err(Refusal::StillFaulty(untrusted)));
     tracking::set(&mut client, |settings| settings.limits.pressure_pa = 250e3);
     client.call::<ClearFault>(&()).expect("they are confirmed");
-    client.call::<Arm>(&()).expect("it arms");
+    client.call::<Arm>(&client.session()).expect("it arms");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The plug is pulled at random moments of an upload: the old table or the new one is there, whole, every time.
+//! The power is cut at random moments of an upload: the old table or the new one is there, whole, every time.
 
 use std::io::Write;
 use std::time::Duration;
@@ -39,10 +39,10 @@ fn requests(image: &[u8]) -> Vec<u8> {
     wire
 }
 
-/// The plug is pulled within these times of the upload's first byte, in turn, µs.
+/// The power is cut within these times of the upload's first byte, in turn, µs.
 const LONGEST_US: [u64; 4] = [3_000, 12_000, 60_000, 250_000];
 
-/// `PAM_LONG=1` pulls the plug three hundred times.
+/// `PAM_LONG=1` cuts the power three hundred times.
 #[test]
 fn a_plug_pulled_at_any_moment_leaves_a_whole_table() {
     let kills = if std::env::var_os("PAM_LONG").is_some() { 300 } else { 15 };

@@ -126,7 +126,7 @@ fn garbage_on_the_line_costs_nothing_but_itself() {
     let mut rest = [0; 4096];
     while link.read(&mut rest).is_ok_and(|count| count > 0) {}
     let port = Port::from_tcp(link).expect("a port");
-    // A machine that emulates many boards at once takes its time over twenty thousand bytes.
+    // A machine that emulates many boards immediately takes its time over twenty thousand bytes.
     let mut client = Client::connect(port, PATIENCE).expect("it says hello after garbage");
     let status = client.call::<GetStatus>(&()).expect("a status");
     assert_eq!(status.state, State::Disarmed);

@@ -45,7 +45,7 @@ fn flipped_bits_cost_repeats_and_nothing_else() {
     let station = station();
     let options = Options { first: Some(Box::new(station.clone())), ..Options::default() };
     let Ok(machine) = Machine::start(folder.path(), options) else { return };
-    // Without lead a command is what was asked for.
+    // Without lead a command is the setpoint.
     tracking::set(&mut machine.client(), |settings| {
         settings.regulator.lead = 0.0;
         settings.watch.autonomous = true;
@@ -61,18 +61,18 @@ fn flipped_bits_cost_repeats_and_nothing_else() {
         let began = Instant::now();
         let mut kept = tables::write(&mut client, Side::Agonist, &image, |_| ());
         for _ in 0..5 {
-            // A person would say it again.
+            // A user would say it again.
             kept = kept.or_else(|_| tables::write(&mut client, Side::Agonist, &image, |_| ()));
         }
         kept.unwrap_or_else(|error| panic!("at {rate}: {error}"));
         let took = began.elapsed();
-        // Set-points by the hundred: those that get through are those that were sent.
+        // Setpoints by the hundred: those that get through are those that were sent.
         let patient = |client: &mut Client, act: &dyn Fn(&mut Client) -> bool| {
             assert!((0..50).any(|_| act(client)), "fifty tries at {rate}");
         };
         patient(&mut client, &|client| {
-            let _ = client.try_call::<model_core::link::endpoints::Arm>(&());
-            let start = model_core::link::messages::Start { mode: Mode::Pressure };
+            let _ = client.try_call::<model_core::link::endpoints::Arm>(&client.session());
+            let start = model_core::link::messages::Start { mode: Mode::Pressure, session: client.session() };
             let _ = client.try_call::<model_core::link::endpoints::StartMode>(&start);
             client.try_call::<GetStatus>(&()).is_ok_and(|s| s.is_ok_and(|s| s.state == State::Running))
         });
@@ -112,8 +112,8 @@ fn flipped_bits_cost_repeats_and_nothing_else() {
         let mut clean = machine.client();
         assert_eq!(tables::read(&mut clean, Side::Agonist).expect("it reads"), Some(image));
     }
-    // No command reached the plant that nobody sent; a start begins at what is measured, which lies above what was asked by ripple,
-    // wander and noise: 250 Pa, three times 300 Pa and three times 220 Pa at most, of some 150 kPa.
+    // No command reached the plant that no one sent; a start begins at what is measured, which lies above the setpoint by ripple,
+    // drift and noise: 250 Pa, three times 300 Pa and three times 220 Pa at most, of some 150 kPa.
     let commands: Vec<f32> = station.since(0).iter().map(|exchange| exchange.command).collect();
     let highest = commands.iter().copied().fold(0.0, f32::max);
     let most = sent.iter().copied().fold(0.0, f32::max);
@@ -142,7 +142,7 @@ fn half_frames_and_more_than_the_board_can_take_are_got_over() {
     }
     let after = status(&machine);
     assert!(after.frames_good >= before.frames_good + whole.len() as u32 - 2, "{before:?} {after:?}");
-    // Requests in one go, twenty times what the receiver holds, while nobody reads an answer.
+    // Requests in one go, twenty times what the receiver holds, while no one reads an answer.
     let flood: Vec<u8> = (10_000..13_000).flat_map(|n| frame::<GetStatus>(&(), n)).collect();
     machine.link().write_all(&flood).expect("the line takes it");
     std::thread::sleep(Duration::from_millis(300));
@@ -216,7 +216,7 @@ fn telemetry_of_two_muscles_at_1_khz_and_commands_beside_it_fit_a_line_of_1_mbau
                 assert_eq!(sample.sides.len(), 2);
                 samples += 1;
                 last_tick = sample.tick;
-                // A set-point fifty times a second, as a program that controls the joint would send.
+                // A setpoint fifty times a second, as a program that controls the joint would send.
                 if sample.tick % 20 == 0 {
                     let angle_rad = 0.03 * (samples as f32 * 1e-3).sin();
                     client

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use emulator_tests::machine::{self, Folder, HOPELESS};
 use emulator_tests::program;
 
-/// Whether QEMU still has the link's line open: without waiting, a named pipe that nobody reads cannot be opened for writing.
+/// Whether QEMU still has the link's line open: without waiting, a named pipe that no one reads cannot be opened for writing.
 fn is_read(pipe: &Path) -> bool {
     let nonblocking = rustix::fs::OFlags::NONBLOCK.bits() as i32;
     OpenOptions::new().write(true).custom_flags(nonblocking).open(pipe).is_ok()

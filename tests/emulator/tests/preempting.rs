@@ -26,7 +26,7 @@ fn answers_are_whole_while_control_steps_interrupt_their_making() {
     let folder = Folder::new();
     let bench = BenchSpec::laboratory(presets::miniature(), 3);
     let station = PlantStation::new(bench, vec![Motion::Held { stroke_mm: 0.8 }], 1e-3);
-    // A bench that answers at once would leave the tasks below the loop no time at all.
+    // A bench that answers immediately would leave the tasks below the loop no time at all.
     let options =
         Options { first: Some(Box::new(station)), debugged: true, speed: Some(1.0), ..Options::default() };
     let Ok(mut machine) = Machine::start_preempting(folder.path(), options) else { return };
@@ -88,7 +88,7 @@ fn answers_are_whole_while_control_steps_interrupt_their_making() {
             match topic {
                 Topic::Telemetry(sample) => {
                     assert_eq!(sample.time_us, 1000 * sample.tick, "round {round}: {sample:?}");
-                    let asked = sample.asked;
+                    let asked = sample.setpoint;
                     assert!((24.9..65.1).contains(&asked) || sample.tick <= began.ticks + 1, "{sample:?}");
                 }
                 // That it was armed and started.

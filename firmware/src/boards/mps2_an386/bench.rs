@@ -25,7 +25,7 @@ const SUPPLY_LOW: u8 = 8;
 const LOOK_EVERY: u8 = 100;
 
 /// How long an answer may take before the tick goes by without one. The bench is another process of a machine that may be
-/// busy, and time stands still with it; so only a bench that is gone is silent.
+/// busy, and time does not move with it; so only a bench that is gone is silent.
 const PATIENCE: Duration = Duration::from_secs(3);
 /// The same before the bench has answered at all: it may have been started later than the board.
 const FIRST_PATIENCE: Duration = Duration::from_millis(100);
@@ -67,7 +67,7 @@ impl Bench {
         Self { uart, tick: 0, started: false, buffer: [0; ANSWER], held: 0 }
     }
 
-    fn request(&self, command: &Command, asked: f32) -> [u8; REQUEST] {
+    fn request(&self, command: &Command, setpoint: f32) -> [u8; REQUEST] {
         let mut bytes = [0; REQUEST];
         bytes[0] = REQUEST_SYNC;
         bytes[1] = if self.started { 0 } else { RESET } | if command.vent { VENT } else { 0 };
@@ -137,11 +137,11 @@ impl Bench {
     }
 
     /// One exchange.
-    async fn exchange(&mut self, command: &Command, asked: f32) -> Option<Said> {
+    async fn exchange(&mut self, command: &Command, setpoint: f32) -> Option<Said> {
         watchdog::feed();
         let request = self.request(command, asked);
         let Ok(()) = Sender(self.uart).write_all(&request).await;
-        // A quick bench has answered by now, and the loop would go on without end: the other tasks have their turn in every tick.
+        // A quick bench has answered by now, and the loop would continue without end: the other tasks have their turn in every tick.
         yield_now().await;
         let patience = if self.started { PATIENCE } else { FIRST_PATIENCE };
         match select(self.wait(), Timer::after(patience)).await {
@@ -151,7 +151,7 @@ impl Bench {
                 Some(said)
             }
             Either::Second(()) => {
-                // The same tick is asked for again: if only the answer was lost, nothing advances twice.
+                // The same tick is requested again: if only the answer was lost, nothing advances twice.
                 self.uart.discard();
                 self.held = 0;
                 None
@@ -165,7 +165,7 @@ impl Bench {
 pub struct Benches {
     first: Bench,
     second: Bench,
-    /// Ticks until the second is asked again whether it is there.
+    /// Ticks until the second is queried again whether it is there.
     until_asked: u8,
     stepped_at: Instant,
 }
@@ -180,7 +180,7 @@ impl Benches {
 impl Plant for Benches {
     async fn exchange(&mut self, outputs: &Outputs) -> Inputs {
         let step_us = self.stepped_at.elapsed().as_micros() as u32 as f32;
-        let first = self.first.exchange(&outputs.sides[0], outputs.asked).await;
+        let first = self.first.exchange(&outputs.sides[0], outputs.setpoint).await;
         let mut second = None;
         if self.second.started || self.second.look() {
             second = self.second.exchange(&outputs.sides[1], 0.0).await;

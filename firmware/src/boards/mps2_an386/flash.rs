@@ -1,4 +1,4 @@
-//! This board has no flash: a file of the host, through semihosting, behaves like one and outlives a killed emulator.
+//! This board has no flash: a file of the host, through semihosting, behaves like one and outlives a stopped emulator.
 
 use embedded_storage_async::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,

@@ -77,7 +77,7 @@ impl Clock {
 
 impl Driver for Clock {
     fn now(&self) -> u64 {
-        // In words: a division of 64 bits would be the only one of the image, and a kilobyte.
+        // As text: a division of 64 bits would be the only one of the image, and a kilobyte.
         let (wraps, clocks) = self.clocks();
         let rest = (clocks % CLOCKS_PER_TICK + wraps * WRAP.1) / CLOCKS_PER_TICK;
         u64::from(wraps) * WRAP.0 + u64::from(clocks / CLOCKS_PER_TICK) + u64::from(rest)

@@ -1,7 +1,7 @@
 //! CMSDK UARTs as asynchronous byte streams: interrupts on both sides of two pipes.
 //!
 //! The hardware holds one byte each way. QEMU keeps further bytes back until the one is read: a byte that finds its pipe full stays
-//! where it is until the pipe is read, and nothing is ever lost. A real line would go on sending; what a real board needs is in
+//! where it is until the pipe is read, and nothing is ever lost. A real line would continue sending; what a real board needs is in
 //! `nucleo_f446re.rs`.
 
 use core::convert::Infallible;
@@ -26,7 +26,7 @@ const ALL_ON: u32 = 0b1111;
 /// 25 MHz / 25 = 1 Mbaud.
 const DIVIDER: u32 = 25;
 
-/// What waits in a pipe keeps the rest waiting at the emulator, so these are as short as the tasks' own buffers allow; and alike for
+/// What waits in a pipe keeps the rest waiting at the emulator, so these are as short as the tasks' own buffers allow; and similar for
 /// all lines, whose code is there once then.
 const RECEIVED: usize = 64;
 const SENDING: usize = 128;

@@ -19,12 +19,12 @@ const KEY: u32 = 0x1ACC_E551;
 const ON: u32 = 0b11;
 const CLOCK_HZ: u32 = 25_000_000;
 
-/// How long the control loop may stand still, s: longer than it waits for a bench that is gone.
+/// How long the control loop may do not move, s: longer than it waits for a bench that is gone.
 const PATIENCE_S: u32 = 5;
 
 /// Where the note is left.
 const NOTE: Register = Register::at(0x203F_FFF0);
-/// "The watchdog" and "somebody asked", as words that do not arise by chance.
+/// "The watchdog" and "someone asked", as words that do not arise by chance.
 const BY_WATCHDOG: u32 = 0x7A3C_5D01;
 const BY_REQUEST: u32 = 0x7A3C_5D02;
 
@@ -56,7 +56,7 @@ fn restart(note: u32) -> ! {
     SCB::sys_reset()
 }
 
-/// Restarts because somebody asked.
+/// Restarts because someone asked.
 pub fn restart_on_request() -> ! {
     restart(BY_REQUEST)
 }

@@ -28,7 +28,7 @@ pub fn start() {
     DAC_CR.write(1 << 1 | 1 << 0);
 }
 
-/// Opens the dump valve and asks the regulator for no pressure, which would go on filling against it, whatever state the program is in.
+/// Opens the dump valve and asks the regulator for no pressure, which would continue filling against it, whatever state the program is in.
 pub fn dump() {
     GPIOB_BSRR.write(1 << (16 + VALVE));
     DAC_DHR12R1.write(0);

@@ -121,7 +121,7 @@ pub fn flush_caches() {
     FLASH_ACR.write(on);
 }
 
-/// Watches the crystal: should it fail, the processor goes on with its own oscillator and the most urgent interrupt there is.
+/// Watches the crystal: should it fail, the processor continues with its own oscillator and the most urgent interrupt there is.
 pub fn watch_crystal() {
     RCC_CR.set(CLOCK_SECURITY);
 }

@@ -99,7 +99,7 @@ pub fn start() {
 
 /// Starts the stream and the converter from the first sensor on.
 fn start_scans() {
-    // Without its requests the converter stands at its first channel.
+    // Without its requests the converter is at its first channel.
     ADC_CR2.write(1);
     S0CR.write(0);
     while S0CR.read() & 1 != 0 {}

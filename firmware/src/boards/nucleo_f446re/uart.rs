@@ -206,7 +206,7 @@ impl Sender {
     }
 }
 
-/// A transfer on its way; whoever gives it up stops it, so that the stream never reads what is no longer there.
+/// A transfer on its way; anyone who gives it up stops it, so that the stream never reads what is no longer there.
 struct Transfer;
 
 impl Drop for Transfer {

@@ -1,7 +1,7 @@
 //! The independent watchdog, fed by a control tick that has done its work and by nothing else.
 //!
-//! It counts its own oscillator of 32 kHz (17 to 47) divided by 64. While the flash erases, the processor stands still for up to two
-//! seconds, so whoever erases asks for patience and waits until a tick has granted it.
+//! It counts its own oscillator of 32 kHz (17 to 47) divided by 64. While the flash erases, the processor does not move for up to two
+//! seconds, so anyone who erases asks for patience and waits until a tick has granted it.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -21,7 +21,7 @@ const DIVIDED_BY_64: u32 = 4;
 const SHORT: u32 = 10;
 /// 8.2 s at 32 kHz, at least 5.5: two erasures.
 const LONG: u32 = 4095;
-/// How long a tick may take to grant what was asked for, µs: two ticks, and nothing where the loop stands still.
+/// How long a tick may take to grant the setpoint, µs: two ticks, and nothing where the loop does not move.
 const GRANTED_US: u32 = 10_000;
 
 /// Before the first tick everything has the long time: the store is opened then.

@@ -1,7 +1,7 @@
 //! A program that does not outlive this one, however this one ends.
 //!
-//! A destructor ends a child of a program that ends in order. One that is killed by `SIGKILL`, or by a machine without memory, runs
-//! none, and a child that waits for nobody would go on for ever. So the child is started by a shell that holds the reading end of a
+//! A destructor ends a child of a program that ends in order. One that is stopped by `SIGKILL`, or by a machine without memory, runs
+//! none, and a child that waits for no one would continue without end. So the child is started by a shell that holds the reading end of a
 //! pipe, whose other end only this process has: when that closes, for whatever reason, the shell kills the child.
 
 use std::process::{Command, Stdio};
@@ -21,9 +21,9 @@ exit "$status"
 "#;
 
 /// A command for a program that ends with this process, to be given its arguments. Its [`Child`](std::process::Child) ends it when it
-/// is waited for or dropped; where there is no such shell, as on Windows, it must be killed too, and then only this process can do it.
+/// is waited for or dropped; where there is no such shell, as on Windows, it must be stopped too, and then only this process can do it.
 ///
-/// Whether the program is there is asked first: the error of a shell would be another.
+/// Whether the program is there is queried first: the error of a shell would be another.
 ///
 /// # Errors
 /// The program cannot be started.

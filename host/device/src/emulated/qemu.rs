@@ -66,14 +66,14 @@ pub fn end(child: &mut Child) {
 }
 
 /// The bench's end of its line, which is not read before the next tick is due. What the board asks byte by byte has come by then, and
-/// wakes nobody eighteen times.
+/// wakes no one eighteen times.
 pub struct Paced {
     ends: Ends,
     pace: Pace,
 }
 
 impl Paced {
-    /// So many device seconds in a second at most; infinite: as fast as it goes.
+    /// N device seconds in a second at most; infinite: as fast as it goes.
     #[must_use]
     pub fn new(ends: Ends, speed: f64) -> Self {
         Self { ends, pace: Pace::new(speed) }
@@ -111,13 +111,13 @@ impl Drop for Qemu {
     fn drop(&mut self) {
         end(&mut self.child);
         drop(self.relay.take());
-        // What is left of a temporary folder does no harm.
+        // The rest of a temporary folder does no harm.
         let _ = std::fs::remove_dir_all(&self.folder);
     }
 }
 
 impl Qemu {
-    /// Starts it, `speed` device seconds in a second at most, and gives its link's address; the reason in words where that cannot be.
+    /// Starts it, `speed` device seconds in a second at most, and gives its link's address; the reason as text where that cannot be.
     pub(super) fn start(mut stand: Stand, speed: f64) -> Result<(Self, Address), String> {
         let image = image().ok_or("the firmware's image is not built (firmware/build)")?;
         let relay = Relay::listen().map_err(|e| format!("no port can be opened ({e})"))?;

@@ -30,10 +30,10 @@ impl Connection {
         stream.as_ref().and_then(|stream| stream.try_clone().ok())
     }
 
-    /// Ends it, so that whoever reads from it or writes to it goes on.
+    /// Ends it, so that anyone who reads from it or writes to it continues.
     fn close(&self) {
         if let Some(stream) = self.now() {
-            // It may have ended by itself.
+            // It may have ended without a request.
             let _ = stream.shutdown(Shutdown::Both);
         }
     }
@@ -95,7 +95,7 @@ fn end(connection: &Connection, port: u16) {
     }
 }
 
-/// Until the line ends. What comes while nobody is connected is lost, as on a wire.
+/// Until the line ends. What comes while no one is connected is lost, as on a wire.
 fn from_board(mut line: impl Read, connection: &Connection) {
     let mut bytes = [0; 4096];
     while let Ok(count @ 1..) = line.read(&mut bytes) {

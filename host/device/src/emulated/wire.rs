@@ -1,7 +1,7 @@
 //! A serial line between QEMU and this process.
 //!
 //! The board sends byte by byte, and each byte is a call of the system: into a named pipe it costs a tenth of what it costs into a TCP
-//! connection, and a pipe that nobody reads for a while holds a second of telemetry where a connection, which spends most of its
+//! connection, and a pipe that no one reads for a while holds a second of telemetry where a connection, which spends most of its
 //! room on the edges of one-byte pieces, holds some tens of milliseconds. Where there are no named pipes it is TCP.
 
 use std::io::{self, Read, Write};
@@ -67,7 +67,7 @@ pub fn listener() -> io::Result<(TcpListener, u16)> {
 /// Waits for QEMU to connect.
 ///
 /// # Errors
-/// In words: it has ended, does not connect within 20 s, or the port is broken.
+/// As text: it has ended, does not connect within 20 s, or the port is broken.
 #[cfg(not(unix))]
 fn accept(listener: &TcpListener, child: &mut Child) -> Result<std::net::TcpStream, String> {
     let stream = until_there(child, || {
@@ -118,7 +118,7 @@ impl Wire {
     /// Waits for QEMU to open it.
     ///
     /// # Errors
-    /// In words: QEMU has ended, does not open it within 20 s, or the pipes are broken.
+    /// As text: QEMU has ended, does not open it within 20 s, or the pipes are broken.
     pub fn open(self, child: &mut Child) -> Result<Ends, String> {
         use std::fs::OpenOptions;
         use std::os::unix::fs::OpenOptionsExt;
@@ -160,7 +160,7 @@ impl Wire {
     /// Waits for QEMU to open it.
     ///
     /// # Errors
-    /// In words: QEMU has ended, does not open it within 20 s, or the port is broken.
+    /// As text: QEMU has ended, does not open it within 20 s, or the port is broken.
     pub fn open(self, child: &mut Child) -> Result<Ends, String> {
         let stream = accept(&self.listener.0, child)?;
         let reader = stream.try_clone().map_err(|e| format!("QEMU cannot be reached ({e})"))?;

@@ -48,8 +48,8 @@ fn blank() -> Telemetry {
         tick: 0,
         state: State::Disarmed,
         mode: Mode::Vent,
-        asked: 0.0,
-        asked_second: 0.0,
+        setpoint: 0.0,
+        setpoint_second: 0.0,
         sides: heapless::Vec::new(),
     }
 }
@@ -82,10 +82,11 @@ pub(super) const COLUMNS: &[Column] = &[
     column!("displacement_m", "measured stroke, m", |s| side(s, 0, |x| x.stroke_m)),
     column!("force_N", "measured force, N", |s| side(s, 0, |x| x.force_n)),
     column!("pressure_command_Pa", "command to the regulator, Pa", |s| side(s, 0, |x| x.command_pa)),
-    column!("wanted_Pa", "wanted pressure: feed-forward and trim, Pa", |s| side(s, 0, |x| x.wanted_pa)),
+    column!("wanted_Pa", "wanted pressure: feed-forward and trim, Pa", |s| side(s, 0, |x| x
+        .pressure_demand_pa)),
     column!("table_N", "force by the table at the measured pressure and stroke, N", |s| side(s, 0, |x| x
         .model_n)),
-    column!("asked", "what was asked for, in the SI unit of the mode", |s| Cell::Number(s.asked)),
+    column!("asked", "what was asked for, in the SI unit of the mode", |s| Cell::Number(s.setpoint)),
     column!("state", "disarmed, armed, running or fault", |s| Cell::Word(messages::state(s.state))),
     column!("mode", "what is controlled", |s| Cell::Word(messages::mode(s.mode))),
     column!("tick", "number of the control loop's tick", |s| Cell::Count(s.tick)),
@@ -99,7 +100,7 @@ pub(super) const SECOND: &[Column] = &[
     column!("second_force_N", "second muscle: measured force, N", |s| side(s, 1, |x| x.force_n)),
     column!("second_command_Pa", "second muscle: command to the regulator, Pa", |s| side(s, 1, |x| x
         .command_pa)),
-    column!("second_asked", "a pair's second value", |s| Cell::Number(s.asked_second)),
+    column!("second_asked", "a pair's second value", |s| Cell::Number(s.setpoint_second)),
 ];
 
 /// The columns of a sample.

@@ -3,7 +3,7 @@
 //! | in the file | what |
 //! | --- | --- |
 //! | topic `/telemetry` | one message a sample; its schema names every field with its unit |
-//! | topic `/events` | states and faults, in words |
+//! | topic `/events` | states and faults, as text |
 //! | metadata `recording` | versions of host and device, check sums of the tables, settings, date: there from the first byte on |
 //! | attachment `about.json` | the side file, once the recording has ended |
 //!

@@ -42,7 +42,7 @@ pub struct Recovered {
 }
 
 impl Recovered {
-    /// What was lost, in words; `None` for nothing.
+    /// What was lost, as text; `None` for nothing.
     #[must_use]
     pub fn loss(&self) -> Option<String> {
         let original = self.original.as_ref()?;
@@ -130,7 +130,7 @@ pub fn recover(path: &Path) -> Result<Recovered> {
         }
         (None, _) => Some(path.to_owned()),
     };
-    // What was known when the recording began stands beside it.
+    // What was known when the recording began is beside it.
     let side = side_file(path);
     if part.is_some() && side.exists() {
         std::fs::rename(&side, side_file(&recording)).map_err(|e| Error::unwritable(&side, &e))?;

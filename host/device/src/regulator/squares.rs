@@ -1,4 +1,4 @@
-//! The deadband of a regulator, by squares of command around a pressure: halving between sizes that are overlooked and sizes
+//! The deadband of a regulator, by squares of command around a pressure: halving between sizes that are missed and sizes
 //! that are answered.
 
 /// Sizes of squares, Pa from top to bottom.
@@ -8,7 +8,7 @@ const LEVEL: f64 = 0.2;
 const COUNT: usize = 4;
 /// How long a command that a limit keeps from being reached is waited for, s.
 const PATIENCE: f64 = 1.0;
-/// Each size begins from the middle, come to from so far below that no regulator overlooks it, Pa: one that holds what it last
+/// Each size begins from the middle, come to from so far below that no regulator misses it, Pa: one that holds what it last
 /// answered to would take part of the square before.
 const FROM: f64 = 20e3;
 /// Levels of a size with the two before.
@@ -19,11 +19,11 @@ const LEVELS: usize = 2 + 2 * COUNT;
 pub(super) struct Search {
     middle: f64,
     gain: f64,
-    /// Sizes below this are overlooked, from `high` on they are answered.
+    /// Sizes below this are missed, from `high` on they are answered.
     low: usize,
     high: usize,
-    /// How many levels of this size were asked for, the last of them, Pa, and when, s.
-    asked: usize,
+    /// How many levels of this size were requested, the last of them, Pa, and when, s.
+    setpoint: usize,
     wanted: f64,
     since: f64,
     /// When the device's command came to it, s, and its last command, Pa.
@@ -41,7 +41,7 @@ impl Search {
             gain,
             low: 0,
             high: SIZES.len(),
-            asked: 0,
+            setpoint: 0,
             wanted: middle,
             since: 0.0,
             seen: None,
@@ -54,7 +54,7 @@ impl Search {
     pub(super) fn found(&self) -> Option<Option<f64>> {
         (self.low == self.high).then(|| match self.high {
             0 => Some(0.0),
-            // Between a square that is overlooked and one that is answered: halfway, by ratio.
+            // Between a square that is missed and one that is answered: halfway, by ratio.
             high => SIZES.get(high).map(|size| 0.5 * (SIZES[high - 1] * size).sqrt()),
         })
     }
@@ -65,45 +65,45 @@ impl Search {
         self.samples.push((command, pressure));
     }
 
-    /// The command that is wanted from a time (s) on, when it changes, Pa. A level lasts from when the device is seen to command it: samples
+    /// The command that is demanded from a time (s) on, when it changes, Pa. A level lasts from when the device is seen to command it: samples
     /// that come late and together do not shorten it.
     pub(super) fn next(&mut self, time: f64) -> Option<f64> {
         if self.found().is_some() {
             return None;
         }
-        if self.asked > 0 {
+        if self.setpoint > 0 {
             let there = (self.command - self.wanted).abs() < 1.0 || time - self.since > PATIENCE;
             self.seen = self.seen.or(there.then_some(time));
             if self.seen.is_none_or(|seen| time - seen < LEVEL) {
                 return None;
             }
         }
-        if self.asked == LEVELS {
+        if self.setpoint == LEVELS {
             let middle = (self.low + self.high) / 2;
             if self.answer(SIZES[middle]) > 0.5 * self.gain * SIZES[middle] {
                 self.high = middle;
             } else {
                 self.low = middle + 1;
             }
-            self.asked = 0;
+            self.setpoint = 0;
             self.samples.clear();
             if self.found().is_some() {
                 return None;
             }
         }
         let size = SIZES[(self.low + self.high) / 2];
-        self.wanted = match self.asked {
+        self.wanted = match self.setpoint {
             0 => self.middle - FROM,
             1 => self.middle,
             n if n % 2 == 0 => self.middle + 0.5 * size,
             _ => self.middle - 0.5 * size,
         };
-        self.asked += 1;
+        self.setpoint += 1;
         (self.since, self.seen) = (time, None);
         Some(self.wanted)
     }
 
-    /// How far the pressure goes with squares of a size, Pa from top to bottom. Slow wander of the supply is taken out of each
+    /// How far the pressure goes with squares of a size, Pa from top to bottom. Slow drift of the supply is taken out of each
     /// level by the one before and the one after.
     fn answer(&self, size: f64) -> f64 {
         // Levels as they were commanded, each by its second half: mean pressure.
@@ -127,7 +127,7 @@ mod tests {
     use super::*;
 
     /// A regulator of a deadband, its noise and its ripple, until the search has found something; `late` ticks come together, and what
-    /// is asked on them is commanded after them.
+    /// is queried on them is commanded after them.
     fn searched(band: f64, late: usize) -> (Option<f64>, f64) {
         let (gain, lag) = (1.02, 0.03);
         let mut seed = 7_u32;

@@ -215,8 +215,8 @@ fn sample(tick: u64) -> Telemetry {
         tick,
         state: State::Disarmed,
         mode: Mode::Vent,
-        asked: 0.0,
-        asked_second: 0.0,
+        setpoint: 0.0,
+        setpoint_second: 0.0,
         sides: [SideSample::default()].into_iter().collect(),
     }
 }

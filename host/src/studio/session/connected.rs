@@ -162,7 +162,14 @@ impl Connected {
 
     /// Takes what the controller sends for some milliseconds.
     pub(super) fn listen(&mut self, say: &broadcast::Sender<String>) -> Result<()> {
-        self.client.keep_alive()?;
+        match self.client.keep_alive() {
+            // Another program has started a mode; the page goes on showing what the controller does.
+            Err(error) if error.code() == DeviceCode::DeviceRefused => {
+                self.running = None;
+                tell(say, "bad", &error);
+            }
+            other => other?,
+        }
         let until = Instant::now() + Duration::from_millis(8);
         while let Some(topic) = self.client.topic(until.saturating_duration_since(Instant::now()))? {
             match topic {
@@ -245,7 +252,8 @@ impl Connected {
                 if self.status.state == State::Running && self.status.mode != quantity.mode() {
                     self.client.call::<Stop>(&())?;
                 }
-                self.status = self.client.call::<StartMode>(&Start { mode: quantity.mode() })?;
+                let session = self.client.session();
+                self.status = self.client.call::<StartMode>(&Start { mode: quantity.mode(), session })?;
                 let plan = Plan { quantity, profile, seconds: None, every_ticks: 1 };
                 self.running = Some((quantity, Steps::begin(&mut self.client, &plan)?, None));
             }

@@ -61,7 +61,7 @@ impl Accumulator {
         Some(frame.map(|(header, body)| Frame { header, body: &self.buffer[HEADER..HEADER + body] }))
     }
 
-    /// The same for whoever answers in the place of what has come.
+    /// The same for anyone who answers in the place of what has come.
     pub fn push_to_answer(&mut self, byte: u8) -> Option<Result<Exchange<'_>, FrameError>> {
         let frame = self.take(byte)?;
         Some(frame.map(|(header, body)| Exchange { header, body, bytes: &mut self.buffer }))

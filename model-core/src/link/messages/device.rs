@@ -42,7 +42,7 @@ codes! {
         /// Power came on.
         #[default]
         Power,
-        /// The host or a person asked.
+        /// The host or a user asked.
         Request,
         /// The watchdog.
         Watchdog,
@@ -72,7 +72,7 @@ pub struct Status {
     pub frames_bad: u32,
     /// Telemetry that found no room.
     pub telemetry_dropped: u32,
-    /// Wanted forces that the table could not give, and were limited.
+    /// Demanded forces that the table could not give, and were limited.
     pub saturated_ticks: u32,
     /// Times that received bytes were lost: the receiver was not read in time, or the line was disturbed.
     pub line_errors: u32,

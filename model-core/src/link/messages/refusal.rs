@@ -4,12 +4,12 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use super::{Fault, Mode, Side, State};
-use crate::fields::told;
+use crate::fields::one_of;
 
 /// Why a device refuses a request.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Refusal {
-    /// The number is no endpoint of this schema.
+    /// The number is not an endpoint of this schema.
     UnknownEndpoint,
     /// The body is not the endpoint's request.
     Malformed,
@@ -21,7 +21,7 @@ pub enum Refusal {
     StillFaulty(Fault),
     /// The muscle has no table.
     NoTable(Side),
-    /// The set-point or reference does not belong to the running mode.
+    /// The setpoint or reference does not belong to the running mode.
     WrongMode(Mode),
     /// A value is not finite or out of range.
     Value(Field),
@@ -47,9 +47,11 @@ pub enum Refusal {
         /// The greatest, rad.
         high_rad: f32,
     },
+    /// Another session armed the device or started its mode.
+    OtherSession,
 }
 
-told!(Refusal {
+one_of!(Refusal {
     0 UnknownEndpoint {},
     1 Malformed {},
     2 WrongState { 0: state },
@@ -64,12 +66,13 @@ told!(Refusal {
     11 NotSupported {},
     12 Stiffness { low_nm_per_rad: low, high_nm_per_rad: high },
     13 Angle { low_rad: low, high_rad: high },
+    14 OtherSession {},
 });
 
 /// The setting or value that a refusal is about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Field {
-    /// A set-point.
+    /// A setpoint.
     #[default]
     SetPoint,
     /// A reference generator's parameter.
@@ -94,7 +97,7 @@ pub enum Field {
     Rate,
 }
 
-told!(Field { 0 SetPoint {}, 1 Reference {}, 2 ForceLoop {}, 3 StrokeLoop {}, 4 Joint {}, 5 Regulator {}, 6 Limits {}, 7 SensorWatch {}, 8 Watch {}, 9 Bands {}, 10 Rate {} });
+one_of!(Field { 0 SetPoint {}, 1 Reference {}, 2 ForceLoop {}, 3 StrokeLoop {}, 4 Joint {}, 5 Regulator {}, 6 Limits {}, 7 SensorWatch {}, 8 Watch {}, 9 Bands {}, 10 Rate {} });
 
 /// Why a table is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
@@ -116,7 +119,7 @@ pub enum TableFault {
         /// Version that the device reads.
         known: u16,
     },
-    /// The bytes are no table.
+    /// The bytes are not a table.
     Malformed,
     /// A number is not finite.
     NotFinite,
@@ -128,7 +131,7 @@ pub enum TableFault {
     UnknownEffect,
 }
 
-told!(TableFault {
+one_of!(TableFault {
     0 NotBegun {},
     1 Gap { 0: offset },
     2 TooLong { 0: length },
@@ -156,4 +159,4 @@ pub enum StoreFault {
     Verify,
 }
 
-told!(StoreFault { 0 Medium {}, 1 Full {}, 2 NoPrevious {}, 3 Verify {} });
+one_of!(StoreFault { 0 Medium {}, 1 Full {}, 2 NoPrevious {}, 3 Verify {} });

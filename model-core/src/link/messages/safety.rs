@@ -1,4 +1,4 @@
-//! States of safety, faults, and what is told of them.
+//! States of safety, faults, and what is reported of them.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -52,7 +52,7 @@ codes! {
         OverSpeed,
         /// More force than allowed.
         OverForce,
-        /// No new set-point for too long.
+        /// No new setpoint for too long.
         SetPointSilence,
         /// Ticks were missed.
         LoopOverrun,
@@ -64,13 +64,13 @@ codes! {
         BrownOut,
         /// The watchdog restarted the device.
         Watchdog,
-        /// A calculation gave something that is no number.
+        /// A calculation gave something that is not a number.
         NotANumber,
-        /// No frame of a host for too long while running: the program that was in charge is gone.
+        /// No keep-alive request of the session that started the mode: its program has ended or its line is cut.
         HostSilence,
         /// The kept settings are damaged, or another firmware wrote them: look at them and send them again.
         SettingsInvalid,
-        /// Pressure stands in a muscle that has been vented for long enough to be empty.
+        /// Pressure is in a muscle that has been vented for long enough to be empty.
         NotVented,
         /// A command was held for as long as the settings allow, and was vented.
         HoldEnded,

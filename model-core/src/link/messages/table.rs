@@ -98,7 +98,7 @@ pub struct Evaluate {
 
 fields!(Evaluate { side, direction, points });
 
-/// What the table says at the points asked for.
+/// What the table says at the points requested.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Evaluated {
     /// Force and pressure at each point.

@@ -1,16 +1,16 @@
-//! What a device says by itself.
+//! What a device says without a request.
 
 use heapless::Vec;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use super::{FaultReport, Mode, State};
-use crate::fields::{fields, told};
+use crate::fields::{fields, one_of};
 
 /// Sets the stream of telemetry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct TelemetryRate {
-    /// One sample every so many ticks; 0 stops.
+    /// One sample every n ticks; 0 stops.
     pub every_ticks: u16,
 }
 
@@ -25,15 +25,15 @@ pub struct SideSample {
     pub stroke_m: f32,
     /// Measured force, N.
     pub force_n: f32,
-    /// Wanted pressure, Pa: feed-forward and trim.
-    pub wanted_pa: f32,
+    /// Demanded pressure, Pa: feed-forward and trim.
+    pub pressure_demand_pa: f32,
     /// Command to the regulator, Pa.
     pub command_pa: f32,
     /// Force by the table at the measured pressure and stroke, N; 0 without a table.
     pub model_n: f32,
 }
 
-fields!(SideSample { pressure_pa, stroke_m, force_n, wanted_pa, command_pa, model_n });
+fields!(SideSample { pressure_pa, stroke_m, force_n, pressure_demand_pa, command_pa, model_n });
 
 /// One tick as the device saw it. The frame's sequence number counts samples: a gap is a loss on the way.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
@@ -46,15 +46,15 @@ pub struct Telemetry {
     pub state: State,
     /// Mode.
     pub mode: Mode,
-    /// What was asked for, in the unit of the mode.
-    pub asked: f32,
+    /// the setpoint, in the unit of the mode.
+    pub setpoint: f32,
     /// A pair's second value.
-    pub asked_second: f32,
+    pub setpoint_second: f32,
     /// The muscles in use.
     pub sides: Vec<SideSample, 2>,
 }
 
-fields!(Telemetry { time_us, tick, state, mode, asked, asked_second, sides });
+fields!(Telemetry { time_us, tick, state, mode, setpoint, setpoint_second, sides });
 
 /// Something that happened, told without being asked.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -67,4 +67,4 @@ pub enum Event {
     TraceFull,
 }
 
-told!(Event { 0 Fault { 0: report }, 1 State { 0: state }, 2 TraceFull {} });
+one_of!(Event { 0 Fault { 0: report }, 1 State { 0: state }, 2 TraceFull {} });

@@ -27,16 +27,16 @@ codes! {
         Speed,
         /// Direction of friction, −1 to 1.
         Direction,
-        /// First value asked for.
-        Asked,
-        /// Wanted force, N.
-        WantedForce,
+        /// First value requested.
+        Setpoint,
+        /// Demanded force, N.
+        ForceDemand,
         /// Feed-forward pressure, Pa.
         FeedForward,
         /// Trim, Pa.
         Trim,
-        /// Wanted pressure after its limits, Pa.
-        WantedPressure,
+        /// Demanded pressure after its limits, Pa.
+        PressureDemand,
         /// Command to the regulator, Pa.
         Command,
         /// Pressure of the regulator's model, Pa.
@@ -77,7 +77,7 @@ codes! {
 pub struct TraceArm {
     /// What to record.
     pub variables: Vec<Variable, TRACE_VARIABLES>,
-    /// One record every so many ticks, at least 1.
+    /// One record every n ticks, at least 1.
     pub every_ticks: u16,
     /// When.
     pub trigger: Trigger,

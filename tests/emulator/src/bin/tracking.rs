@@ -13,7 +13,7 @@ use virtual_bench::presets;
 const HEAD: &str = "| load | asked | table | table + trim | Gaylord | PI alone | regulator's limit | PI : table + trim |\n\
                     | --- | --- | --- | --- | --- | --- | --- | --- |\n";
 
-/// What was asked, and the error of each law and the regulator's limit.
+/// What was queried, and the error of each law and the regulator's limit.
 type Row = (Course, [f64; 5]);
 
 fn rows(text: &mut String, subject: &Subject, mode: Mode, load: Load) -> Vec<Row> {
@@ -88,7 +88,7 @@ fn main() -> io::Result<()> {
     let subjects = [presets::miniature(), presets::contractile(), presets::push()].map(Subject::of);
     for subject in &subjects {
         let _ = write!(text, "\n## {}: force\n\n{HEAD}", subject.spec.name);
-        for load in [Load::Held, Load::Moved, Load::Spring] {
+        for load in [Load::AtStroke, Load::Moved, Load::Spring] {
             let rows = rows(&mut text, subject, Mode::Force, load);
             let [table, trimmed, times, times_trimmed] = against_the_aim(&rows);
             let _ = writeln!(
@@ -118,7 +118,7 @@ fn main() -> io::Result<()> {
          | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for subject in &subjects {
-        for load in [Load::Held, Load::Moved, Load::Spring] {
+        for load in [Load::AtStroke, Load::Moved, Load::Spring] {
             let [table, trimmed] = [Law::Table, Law::Trimmed].map(|law| {
                 let Still { error, swing, jump } = subject.still(load, law);
                 format!("{error:.2} | {swing:.2} | {:.1}", 1e-3 * jump)

@@ -165,7 +165,7 @@ fn of_a_joint() -> Result<u32, Skipped> {
 /// [`Skipped`] when the emulator is left out.
 ///
 /// # Panics
-/// When the board does not do what it is asked.
+/// When the board does not do what it is queried.
 pub fn stack() -> Result<u32, Skipped> {
     Ok(of_one_muscle()?.max(of_a_joint()?))
 }

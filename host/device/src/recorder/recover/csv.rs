@@ -10,7 +10,7 @@ use super::window::Window;
 /// No row of a recording is longer.
 const LONGEST: usize = 1 << 16;
 
-/// A row that waits for the next one, which tells whether its time is right.
+/// A row that waits for the next one, which returns whether its time is right.
 struct Row {
     time: f64,
     line: Vec<u8>,

@@ -15,7 +15,7 @@ use pam_data::mcap_records::{Chunk, HEAD, LARGEST, MAGIC, head, kind, message, p
 /// Largest record beside chunks that is taken over: the header, metadata, the attached side file.
 const LARGEST_OTHER: u64 = 4 << 20;
 
-/// What stands at a position of the file.
+/// What is at a position of the file.
 enum Found {
     /// A record that goes over, with its length in all.
     Keep(usize),
@@ -157,7 +157,7 @@ fn look<R: Read>(source: &mut Window<R>) -> io::Result<Found> {
         kind::CHUNK if Chunk::parse(body).is_some_and(|c| c.intact() == Some(true)) => Found::Keep(whole),
         kind::DATA_END if length == 4 && followed => Found::End,
         kind::MESSAGE_INDEX if followed && index(body) => Found::Pass(whole),
-        // Messages and channels stand in chunks; beside them nothing would show that they are damaged chunks.
+        // Messages and channels be in chunks; beside them nothing would show that they are damaged chunks.
         kind::HEADER | kind::METADATA | kind::ATTACHMENT if followed && plausible(kind, body) => {
             Found::Keep(whole)
         }

@@ -75,7 +75,7 @@ fn one_flipped_bit_costs_at_most_its_chunk_and_is_counted() {
         if tally.samples < ALL {
             assert!(tally.bytes_lost > 0 && tally.gaps >= 1, "byte {at}: {tally:?}");
         }
-        // Behind the last chunk no number tells what is missing, only its own lengths do.
+        // Behind the last chunk no number returns what is missing, only its own lengths do.
         let inside = tally.samples + tally.samples_lost;
         assert!(inside <= ALL && (inside == ALL || at > data.len() / 2), "byte {at}: {tally:?}");
     }

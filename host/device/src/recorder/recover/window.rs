@@ -5,7 +5,7 @@ use std::io::{self, Read};
 /// Read at a time.
 const STEP: usize = 1 << 16;
 
-/// The bytes from the present position on, as far as they were asked for.
+/// The bytes from the present position on, as far as they were requested.
 pub(super) struct Window<R> {
     reader: R,
     bytes: Vec<u8>,
@@ -34,7 +34,7 @@ impl<R: Read> Window<R> {
         Ok(&self.bytes[self.at..end])
     }
 
-    /// Goes on by so many bytes that were seen.
+    /// Goes on by n bytes that were seen.
     pub fn skip(&mut self, count: usize) {
         self.at = self.bytes.len().min(self.at + count);
     }

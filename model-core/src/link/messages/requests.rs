@@ -15,11 +15,23 @@ pub const REFERENCE_PIECE: usize = 32;
 pub struct Start {
     /// What to control.
     pub mode: Mode,
+    /// The session that owns the mode from now on.
+    pub session: Session,
 }
 
-fields!(Start { mode });
+fields!(Start { mode, session });
 
-/// What is wanted, in the terms of a mode.
+/// The session of one program, from when it opens the link until it ends: a number that the program draws at random. The session that
+/// armed the device or started its mode owns it, and only its keep-alive requests count for the watch of host silence.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Session {
+    /// The number.
+    pub id: u32,
+}
+
+fields!(Session { id });
+
+/// What is demanded, in the terms of a mode.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum SetPoint {
     /// Pressure, Pa.
@@ -51,14 +63,14 @@ choices!(SetPoint {
     3 Pair { angle_rad: angle, stiffness_nm_per_rad: stiffness },
 });
 
-/// A wave that the device makes itself, in the unit of the mode's first value (Pa, N, m, rad); it begins at once and
-/// holds its last value at its end. A pair's stiffness is the last set-point's.
+/// A wave that the device makes itself, in the unit of the mode's first value (Pa, N, m, rad); it begins immediately and
+/// holds its last value at its end. A pair's stiffness is the last setpoint's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Reference {
-    /// None: set-points of the host.
+    /// None: setpoints of the host.
     #[default]
     SetPoint,
-    /// `mean + amplitude · sin(2π f t)`, for ever.
+    /// `mean + amplitude · sin(2π f t)`, without end.
     Sine {
         /// Mean.
         mean: f32,

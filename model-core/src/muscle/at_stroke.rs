@@ -7,16 +7,16 @@ use crate::table::MAX_ORDER;
 
 /// The muscle held at one stroke: what remains is a function of pressure alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Held<T> {
+pub struct AtStroke<T> {
     /// The shape at this stroke.
     pub posture: Posture<T>,
     /// `c_k`, m².
     pub columns: [T; MAX_ORDER],
 }
 
-/// How a [`Held`] muscle's coefficients change with stroke `x`.
+/// How a [`AtStroke`] muscle's coefficients change with stroke `x`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct HeldSlopes<T> {
+pub struct StrokeSlopes<T> {
     /// `dg/dx`, m.
     pub area: T,
     /// `dc_k/dx`, m.
@@ -27,14 +27,14 @@ pub struct HeldSlopes<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment<T> {
     /// The muscle at the measured stroke.
-    pub held: Held<T>,
+    pub held: AtStroke<T>,
     /// How that changes with stroke.
-    pub slopes: HeldSlopes<T>,
+    pub slopes: StrokeSlopes<T>,
     /// What effects look at.
     pub context: Context<T>,
 }
 
-impl<T: Scalar> Held<T> {
+impl<T: Scalar> AtStroke<T> {
     /// All zeros, for a place that is not filled yet.
     pub const NONE: Self = Self { posture: Posture::NONE, columns: [T::ZERO; MAX_ORDER] };
 }
@@ -42,8 +42,8 @@ impl<T: Scalar> Held<T> {
 impl<T: Scalar> Moment<T> {
     /// All zeros, for a place that is not filled yet.
     pub const NONE: Self = Self {
-        held: Held::NONE,
-        slopes: HeldSlopes { area: T::ZERO, columns: [T::ZERO; MAX_ORDER] },
+        held: AtStroke::NONE,
+        slopes: StrokeSlopes { area: T::ZERO, columns: [T::ZERO; MAX_ORDER] },
         context: Context::NONE,
     };
 }

@@ -76,17 +76,17 @@ impl Controller {
         if self.missed_in_a_row >= watch.overrun_ticks.max(1) {
             note(Fault::LoopOverrun, f32::from(self.missed_in_a_row), f32::from(watch.overrun_ticks));
         }
-        self.host_age = self.host_age.saturating_add(1);
-        self.asked_age = self.asked_age.saturating_add(1);
+        self.owner_age = self.owner_age.saturating_add(1);
+        self.setpoint_age = self.setpoint_age.saturating_add(1);
         let holds = self.sides.iter().any(|side| !side.command.vent);
         let runs = state == State::Running && self.mode != Mode::Vent;
         let (silence, held) = (watch.host_silence_ticks, state == State::Fault && holds);
-        if (runs || held) && !watch.autonomous && self.host_age > silence {
-            note(Fault::HostSilence, self.host_age as f32, silence as f32);
+        if (runs || held) && !watch.autonomous && self.owner_age > silence {
+            note(Fault::HostSilence, self.owner_age as f32, silence as f32);
         }
         let silence = watch.silence_ticks;
-        if runs && silence > 0 && self.generator.is_set_point() && self.asked_age > silence {
-            note(Fault::SetPointSilence, self.asked_age as f32, silence as f32);
+        if runs && silence > 0 && self.generator.is_set_point() && self.setpoint_age > silence {
+            note(Fault::SetPointSilence, self.setpoint_age as f32, silence as f32);
         }
         self.held_ticks = if held { self.held_ticks.saturating_add(1) } else { 0 };
         if self.held_ticks > watch.hold_ticks {

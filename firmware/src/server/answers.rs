@@ -6,29 +6,29 @@ use model_core::image::{self, ImageError};
 use model_core::link::endpoints::Service;
 use model_core::link::messages::{
     DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, PIECE, PastFault, Reference,
-    ReferencePoints, Refusal, RollBack, SetPoint, Side, Start, State, Status, TableBegin, TableInfo,
+    ReferencePoints, Refusal, RollBack, Session, SetPoint, Side, Start, State, Status, TableBegin, TableInfo,
     TablePiece, TableRead, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead, Value,
 };
 use model_core::link::settings::Settings;
-use model_core::muscle::Held;
+use model_core::muscle::AtStroke;
 use model_core::single;
 use model_core::units::{Length, Pressure};
 
 use super::{Server, table_refusal};
-use crate::common_room::{Incoming, TRACE_CAPACITY};
 use crate::control::{self, Controller};
 use crate::reference;
 use crate::shared::Shared;
+use crate::shared_buffer::{Incoming, TRACE_CAPACITY};
 use crate::tick::TICKS_PER_S;
 
-/// A server and the controller it asks.
-pub(super) struct Session<'a, F: NorFlash> {
+/// A server and the controller that it asks.
+pub(super) struct Answers<'a, F: NorFlash> {
     pub(super) server: &'a mut Server<F>,
     pub(super) shared: &'a Shared,
 }
 
-impl<F: NorFlash> Session<'_, F> {
-    /// The status, if what was asked for could be done.
+impl<F: NorFlash> Answers<'_, F> {
+    /// The status, if the setpoint could be done.
     #[inline(never)]
     fn status_after(&self, done: Result<(), Refusal>, answer: &mut Status) -> Result<(), Refusal> {
         done?;
@@ -64,7 +64,7 @@ impl<F: NorFlash> Session<'_, F> {
     }
 }
 
-impl<F: NorFlash> Service for Session<'_, F> {
+impl<F: NorFlash> Service for Answers<'_, F> {
     fn info(&mut self, (): &(), answer: &mut DeviceInfo) -> Result<(), Refusal> {
         *answer = DeviceInfo {
             ticks_per_s: TICKS_PER_S,
@@ -82,12 +82,15 @@ impl<F: NorFlash> Service for Session<'_, F> {
         self.status_after(Ok(()), answer)
     }
 
-    fn arm(&mut self, (): &(), answer: &mut Status) -> Result<(), Refusal> {
-        self.status_after(self.shared.with(Controller::arm), answer)
+    fn arm(&mut self, request: &Session, answer: &mut Status) -> Result<(), Refusal> {
+        self.status_after(self.shared.with(|controller| controller.arm(*request)), answer)
     }
 
     fn start(&mut self, request: &Start, answer: &mut Status) -> Result<(), Refusal> {
-        self.status_after(self.shared.with(|controller| controller.start(request.mode)), answer)
+        self.status_after(
+            self.shared.with(|controller| controller.start(request.mode, request.session)),
+            answer,
+        )
     }
 
     fn stop(&mut self, (): &(), answer: &mut Status) -> Result<(), Refusal> {
@@ -206,7 +209,7 @@ impl<F: NorFlash> Service for Session<'_, F> {
             let value = self.shared.with(|controller| {
                 let muscle = &controller.model(request.side)?.muscle;
                 // As the control step does it, so that no other form of either is in the image.
-                let mut held = Held::NONE;
+                let mut held = AtStroke::NONE;
                 let force = single::pose(muscle, &mut held, stroke, pressure, direction);
                 let found = single::pressure_for(muscle, &held, direction, force, pressure, &muscle.search());
                 Some(Value { force_n: force.newtons(), pressure_pa: found.pressure.pascals() })
@@ -252,5 +255,9 @@ impl<F: NorFlash> Service for Session<'_, F> {
                 Ok(())
             }
         }
+    }
+
+    fn keep_alive(&mut self, request: &Session, (): &mut ()) -> Result<(), Refusal> {
+        self.shared.with(|controller| controller.keep_alive(*request))
     }
 }

@@ -1,4 +1,4 @@
-//! What the device says by itself, as it waits for the link.
+//! What the device says without a request, as it waits for the link.
 
 use model_core::fields::{Fields, Walk};
 use model_core::link::endpoints::{EVENT, TELEMETRY};
@@ -12,7 +12,7 @@ use crate::tick::TICK_US;
 pub(crate) const SIDES: usize = if pair::SUPPORTED { 2 } else { 1 };
 
 /// One tick. On the wire it is a [`Telemetry`](model_core::link::messages::Telemetry); here it is as small as it can be, since many
-/// wait at once.
+/// wait immediately.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Number of the sample: a gap is a loss on the way.
@@ -23,10 +23,10 @@ pub struct Sample {
     pub state: State,
     /// Mode.
     pub mode: Mode,
-    /// What was asked for, in the unit of the mode.
-    pub asked: f32,
+    /// the setpoint, in the unit of the mode.
+    pub setpoint: f32,
     /// A pair's second value.
-    pub asked_second: f32,
+    pub setpoint_second: f32,
     /// How many muscles are in use.
     pub(crate) used: u8,
     /// All that the image can drive.
@@ -52,8 +52,8 @@ impl Fields for Sample {
         self.tick.walk(walk);
         self.state.walk(walk);
         self.mode.walk(walk);
-        self.asked.walk(walk);
-        self.asked_second.walk(walk);
+        self.setpoint.walk(walk);
+        self.setpoint_second.walk(walk);
         // A list is its length and its elements.
         u32::from(self.used).walk(walk);
         for side in self.all.iter_mut().take(usize::from(self.used)) {
@@ -62,16 +62,16 @@ impl Fields for Sample {
     }
 }
 
-/// What the device says by itself.
+/// What the device says without a request.
 #[derive(Clone, Debug)]
-pub(crate) enum Spoken {
+pub(crate) enum Outgoing {
     Sample(Sample),
     Event(Event),
     #[cfg(feature = "log")]
     Log(crate::log::Frame),
 }
 
-impl Spoken {
+impl Outgoing {
     /// Writes its frame; gives the length.
     pub(crate) fn encode(&mut self, out: &mut [u8; MAX_TOPIC]) -> usize {
         let header = |id, sequence| Header { kind: Kind::Topic, id, sequence };
@@ -101,8 +101,8 @@ mod tests {
                 tick: 1 << 40,
                 state: State::Running,
                 mode: Mode::Pair,
-                asked: 0.5,
-                asked_second: 150.0,
+                setpoint: 0.5,
+                setpoint_second: 150.0,
                 used: count,
                 all: [side(1.0), side(2.0)],
             };
@@ -111,21 +111,21 @@ mod tests {
                 tick: 1 << 40,
                 state: State::Running,
                 mode: Mode::Pair,
-                asked: 0.5,
-                asked_second: 150.0,
+                setpoint: 0.5,
+                setpoint_second: 150.0,
                 sides: sample.sides().iter().copied().collect(),
             };
             assert_eq!(message.sides.len(), usize::from(count));
             let (mut here, mut there) = ([0; MAX_TOPIC], [0; MAX_TOPIC]);
             let header = Header { kind: Kind::Topic, id: TELEMETRY, sequence: 7 };
             let length = frame::encode(header, &message, &mut there).expect("it fits");
-            assert_eq!(Spoken::Sample(sample).encode(&mut here), length);
+            assert_eq!(Outgoing::Sample(sample).encode(&mut here), length);
             assert_eq!(here[..length], there[..length]);
         }
     }
 
     #[test]
     fn what_waits_is_small() {
-        assert!(size_of::<Spoken>() <= 80, "{}", size_of::<Spoken>());
+        assert!(size_of::<Outgoing>() <= 80, "{}", size_of::<Outgoing>());
     }
 }

@@ -5,24 +5,24 @@
 
 /// A place of one's own.
 #[cfg(any(test, feature = "std"))]
-pub type Room<T> = std::boxed::Box<T>;
+pub type Placed<T> = std::boxed::Box<T>;
 /// A place of one's own.
 #[cfg(not(any(test, feature = "std")))]
-pub type Room<T> = &'static mut T;
+pub type Placed<T> = &'static mut T;
 
 /// The room for a value. On a board each use of this macro is one static, which is taken once: there is one controller, one
 /// server.
 #[cfg(any(test, feature = "std"))]
-macro_rules! room {
+macro_rules! placed {
     ($type:ty, $empty:expr) => {
         std::boxed::Box::<$type>::new($empty)
     };
 }
 #[cfg(not(any(test, feature = "std")))]
-macro_rules! room {
+macro_rules! placed {
     ($type:ty, $empty:expr) => {{
         static PLACE: static_cell::ConstStaticCell<$type> = static_cell::ConstStaticCell::new($empty);
         PLACE.take()
     }};
 }
-pub(crate) use room;
+pub(crate) use placed;

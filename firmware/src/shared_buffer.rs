@@ -1,12 +1,12 @@
-//! One room for what is never needed at once: a trace, or a table on its way into use. A small chip has no memory for both.
+//! One room for what is never needed immediately: a trace, or a table on its way into use. A small chip has no memory for both.
 
 use heapless::Vec;
 use model_core::image;
 use model_core::table::MuscleTable;
 
-use crate::brief::Brief;
+use crate::compact_float::CompactFloat;
 use crate::pair;
-use crate::room::{Room, room};
+use crate::placement::{Placed, placed};
 
 /// Values that a trace holds, three bytes each: the largest single part of the memory of a board for one muscle, and a free choice.
 /// It may be as large as the chip allows; a host asks the device how many there are. A second muscle's table takes as much again,
@@ -27,22 +27,22 @@ pub struct Incoming {
 #[derive(Debug)]
 #[allow(clippy::large_enum_variant, reason = "it is never moved: the one lends its room to the other")]
 enum Content {
-    Trace(Vec<Brief, TRACE_CAPACITY>),
+    Trace(Vec<CompactFloat, TRACE_CAPACITY>),
     Table(Incoming),
 }
 
-/// The room. Whoever has it uses it for one of the two; what was in it for the other is lost.
+/// The room. Anyone who has it uses it for one of the two; what was in it for the other is lost.
 #[derive(Debug)]
-pub struct CommonRoom(Room<Content>);
+pub struct SharedBuffer(Placed<Content>);
 
-impl CommonRoom {
+impl SharedBuffer {
     /// The only one of a controller, empty.
     pub fn new() -> Self {
-        Self(room!(Content, Content::Trace(Vec::new())))
+        Self(placed!(Content, Content::Trace(Vec::new())))
     }
 
     /// The values of a trace that is in it.
-    pub fn values(&self) -> &[Brief] {
+    pub fn values(&self) -> &[CompactFloat] {
         match &*self.0 {
             Content::Trace(values) => values,
             Content::Table(_) => &[],
@@ -55,7 +55,7 @@ impl CommonRoom {
     }
 
     /// The values of the trace that is in it, if it is a trace's.
-    pub fn trace(&mut self) -> Option<&mut Vec<Brief, TRACE_CAPACITY>> {
+    pub fn trace(&mut self) -> Option<&mut Vec<CompactFloat, TRACE_CAPACITY>> {
         match &mut *self.0 {
             Content::Trace(values) => Some(values),
             Content::Table(_) => None,
@@ -77,7 +77,7 @@ impl CommonRoom {
     }
 }
 
-impl Default for CommonRoom {
+impl Default for SharedBuffer {
     fn default() -> Self {
         Self::new()
     }
