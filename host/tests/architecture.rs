@@ -40,7 +40,11 @@ const ALLOWED: &[(&str, &str, &[&str])] = &[
             "virtual-bench",
         ],
     ),
-    ("pamtools", "host/python", &["model-core", "pam-data", "pam-fit", "pam-diagnose", "pam-report"]),
+    (
+        "pamtools",
+        "host/python",
+        &["model-core", "pam-data", "pam-fit", "pam-evaluate", "pam-diagnose", "pam-report"],
+    ),
 ];
 
 /// Libraries that only the named crates may use: the command line, the web server, the serial port.

@@ -282,9 +282,16 @@ fn a_stroke_of_the_other_sign_is_told_with_its_place() {
     for r in &mut recordings {
         r.source = format!("{}.csv", r.name).into();
     }
-    recordings[2].stroke.iter_mut().for_each(|x| *x = -*x);
+    // One file among others is known by its disagreement, and left out.
+    let mut one = recordings.clone();
+    one[2].stroke.iter_mut().for_each(|x| *x = -*x);
+    let told =
+        fit(&Campaign::new(one), &description(), &Options::default()).unwrap().summary.warnings.join("; ");
+    assert!(told.contains("its stroke agrees with theirs with the opposite sign"), "{told}");
+    recordings.truncate(1);
+    recordings[0].stroke.iter_mut().for_each(|x| *x = -*x);
     let error = fit(&Campaign::new(recordings.clone()), &description(), &Options::default()).unwrap_err();
-    let place = format!("{}.csv", recordings[2].name);
+    let place = format!("{}.csv", recordings[0].name);
     assert!(error.to_string().contains(&place) && error.to_string().contains(" mm at "), "{error}");
     assert!(error.advice().unwrap().contains("positive = \"extension\""), "{error:?}");
 }

@@ -18,7 +18,7 @@ const CREEP: f64 = 0.03;
 /// than physics that the model lacks.
 pub const WORST_MEAN_ERROR: f64 = 10.0;
 /// The inverse may fail at this share of the tested places (pressure and contraction) at most: the corners of the range.
-const LOST_PLACES: f64 = 0.02;
+const LOST_PLACES: f64 = 0.05;
 /// Places over the ranges of pressure and contraction at which the inverse is examined.
 const STEPS: usize = 20;
 

@@ -27,7 +27,7 @@ const LISTED: usize = 6;
 #[command(
     after_help = "Examples:\n  host compare before.csv after.csv\n  host compare a.csv b.csv --report difference.html --json\n  \
     host compare --muscle mini.toml --import bench.toml a.txt b.txt\n  \
-    host compare --import runs.toml all.csv all.csv --where-a run=1 --where-b run=2"
+    host compare --import r.toml a.csv a.csv --where-a run=1 --where-b run=2"
 )]
 pub struct Arguments {
     /// The first recording.

@@ -33,7 +33,8 @@ impl Arguments {
 fn files_for_paths_only(command: &mut clap::Command) {
     let taken = std::mem::take(command);
     let hinted = taken.mut_args(|arg| {
-        if arg.get_value_hint() == ValueHint::Unknown { arg.value_hint(ValueHint::Other) } else { arg }
+        let unknown = arg.get_action().takes_values() && arg.get_value_hint() == ValueHint::Unknown;
+        if unknown { arg.value_hint(ValueHint::Other) } else { arg }
     });
     *command = hinted;
     for sub in command.get_subcommands_mut() {

@@ -16,6 +16,8 @@ const LONGER: usize = 10;
 /// Where constant readings are usual: more than this share of neighbours are equal in the other recordings.
 const MOVES_MUCH: (f64, f64) = (0.30, 6.0);
 const USUAL: f64 = 0.5;
+/// Where constant readings are the rule.
+const ALWAYS: f64 = 0.95;
 /// A saturated force: the expected force lies above it by this share of the range of forces.
 const ABOVE: f64 = 0.10;
 /// A reading below this share of the range of forces may be a slack muscle.
@@ -31,6 +33,10 @@ pub(super) fn find(campaign: &Campaign, index: usize, usual: &Usual) -> Vec<Sens
         let column = channel.of(r);
         let habit = Habit::of(campaign, index, channel);
         let (low, high) = ends(column);
+        // A column that is always constant, such as a held length, says nothing by being so.
+        if habit.equal > ALWAYS {
+            continue;
+        }
         for rows in runs(column) {
             let value = column[rows.start];
             let known =
