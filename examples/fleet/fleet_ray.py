@@ -13,7 +13,7 @@ import job
 def main(manifest, folder, address=None):
     ray.init(address=address, include_dashboard=False, log_to_driver=False, runtime_env={"py_modules": [job]} if address else None)
     analyse = ray.remote(job.analyse)
-    # So many at a time that the manifest's length costs no memory.
+    # A limited number of tasks at a time: the length of the manifest costs no memory.
     waiting, rows = [], []
     for item in job.muscles(manifest):
         waiting.append(analyse.remote(item))

@@ -154,7 +154,7 @@ fn work(entries: &Mutex<Receiver<Entry>>, shared: &Shared<'_>, threads: usize) {
     loop {
         let next = entries.lock().unwrap_or_else(PoisonError::into_inner).recv();
         let Ok(entry) = next else { return };
-        // After a failure to write the queue is emptied, or the reader of the manifest would wait for ever.
+        // After a failure to write the queue is emptied, or the reader of the manifest would never end.
         if shared.is_broken() {
             continue;
         }

@@ -11,7 +11,7 @@ error_codes! {
         /// A folder holds no results of `host batch`, or damaged ones.
         FleetInvalid = "fleet::invalid", Input,
             "run `host batch MANIFEST -o FOLDER`; delete the folder of a damaged muscle first, and it is computed anew";
-        /// Some muscles of a batch failed, and the call asked for an exit status that says so.
+        /// Some muscles of a batch failed, and the call requires an exit status that says so.
         FleetFailed = "fleet::failed", Input,
             "read the table `failures`, which names cause, place and remedy of each";
         /// The computation of one muscle ended abnormally; the others are not affected.

@@ -1,4 +1,4 @@
-//! Many muscles at once.
+//! Fleets of muscles.
 //!
 //! | what | where |
 //! | --- | --- |

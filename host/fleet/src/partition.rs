@@ -5,7 +5,7 @@
 //! OUT/.partial/RUN/NAME/…       while the results of a muscle are written
 //! ```
 //! The files are written and synchronised under `.partial`, and the folder is renamed then. A reader sees the old folder, or the new one, or
-//! none. What a killed run leaves under `.partial` the next run removes.
+//! none. The next run removes what an interrupted run leaves under `.partial`.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -87,12 +87,12 @@ pub fn muscles(output: &Path) -> Result<Vec<(String, PathBuf)>> {
 pub struct Output {
     root: PathBuf,
     run: PathBuf,
-    /// Held for as long as this run lives; the operating system releases it when the process is killed.
+    /// Held for as long as this run lives; the operating system releases it when the process ends.
     _lock: File,
 }
 
 impl Output {
-    /// Opens the output, creates it where needed, and removes what killed runs left.
+    /// Opens the output, creates it where needed, and removes what interrupted runs left.
     ///
     /// # Errors
     /// A folder that cannot be written.
@@ -152,7 +152,7 @@ impl Drop for Output {
     }
 }
 
-/// Removes the folders of runs that ended without removing them: nobody holds their lock.
+/// Removes the folders of runs that ended without removing them: no process holds their lock.
 fn remove_leftovers(partial: &Path) {
     for entry in fs::read_dir(partial).into_iter().flatten().flatten() {
         let path = entry.path();
@@ -161,7 +161,7 @@ fn remove_leftovers(partial: &Path) {
                 let _ = fs::remove_dir_all(&path);
             }
             Ok(_) => {}
-            // Killed before its lock was there.
+            // Interrupted before its lock was there.
             Err(_) => {
                 let _ = fs::remove_dir(&path);
             }
@@ -192,7 +192,7 @@ fn sync_folder(_: &Path) -> io::Result<()> {
 fn replace(fresh: &Path, target: &Path) -> io::Result<()> {
     match fs::rename(fresh, target) {
         Ok(()) => Ok(()),
-        // A folder with files stands there: results for other inputs.
+        // There is a folder with files: results for other inputs.
         Err(e) if target.is_dir() => {
             exchange(fresh, target).or_else(|_| move_aside(fresh, target)).map_err(|_| e)
         }
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_killed_run_left_goes_and_a_living_run_keeps_its_place() {
+    fn what_an_interrupted_run_left_goes_and_a_living_run_keeps_its_place() {
         let root = tempfile::tempdir().expect("a folder");
         let dead = root.path().join(PARTIAL).join("run-dead");
         fs::create_dir_all(dead.join("muscle=a")).expect("made");

@@ -4,8 +4,8 @@
 //! z = (x − median) / s,   s = 1.4826 · median |x − median|
 //! ```
 //! `s` estimates the standard deviation of normal values and is hardly moved by outlying ones (F. R. Hampel, J. Am. Stat. Assoc. 69, 1974,
-//! 383). The threshold for the largest `|z|` of a fleet is found by simulation of normal fleets of the same size, because median and `s` are
-//! uncertain themselves in small fleets: for one quantity of 10 muscles it is 4.0, where the normal distribution would give 2.8.
+//! 383). The threshold for the largest `|z|` of a fleet is found by simulation of normal fleets of the same size: median and `s` are
+//! uncertain themselves in small fleets. For one quantity of 10 muscles it is 4.0, where the normal distribution would give 2.8.
 
 use pam_data::statistics::{deviation_from_median, median};
 

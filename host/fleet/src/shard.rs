@@ -1,4 +1,4 @@
-//! A share of the muscles, by the hash of their names: the same on every machine, whatever the order of the manifest.
+//! A share of the muscles, by the hash of their names: the same on every machine, regardless of the order of the manifest.
 
 use pam_data::error::{DataCode, Error};
 use sha2::{Digest, Sha256};

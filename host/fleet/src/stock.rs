@@ -54,7 +54,7 @@ struct Prior {
 /// A table that a stock supports.
 #[derive(Debug, Clone)]
 pub struct StockFit {
-    /// The table; its uncertainty contains what the stock leaves open.
+    /// The table; its uncertainty contains the variation of the stock.
     pub table: MuscleTable,
     /// Its uncertainty.
     pub uncertainty: Uncertainty,
@@ -168,7 +168,7 @@ fn deviation(prior: &Prior, theta: &DVector<f64>, root: &DMatrix<f64>, place: &P
     root.tr_mul(&DVector::from_vec(slopes)).norm()
 }
 
-/// How much wider the bands must be so that they hold for the kin: each is predicted from the others by its forces at the places of the
+/// How much wider the bands must be so that they hold for the kin. Each is predicted from the others by its forces at the places of the
 /// recordings, and compared over all pressures and strokes. The root mean square of the standardised errors, at least 1.
 fn widening(
     kin: &[&TableFile],

@@ -21,7 +21,7 @@ pub struct WorkItem {
     pub muscle: String,
     /// The folder that paths are relative to.
     pub folder: PathBuf,
-    /// The muscle's description; absent where only changes are asked for.
+    /// The muscle's description; absent where only changes are reported.
     pub description: Option<String>,
     /// Recordings: paths and patterns.
     pub files: Vec<String>,
