@@ -18,8 +18,8 @@ STEP = 1 if os.environ.get("PAM_LONG") else 9
 
 
 def with_deadband(image, pascals):
-    """The same table with another deadband, which lies behind the header and four numbers."""
-    content = image[:0x18] + struct.pack("<f", pascals) + image[0x1C:-4]
+    """The same table with another deadband, which lies behind the header, a byte and four numbers."""
+    content = image[:0x19] + struct.pack("<f", pascals) + image[0x1D:-4]
     return content + struct.pack("<I", zlib.crc32(content))
 
 
