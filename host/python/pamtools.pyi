@@ -134,6 +134,16 @@ class Table:
     def force(self, pressure: ArrayLike, stroke: ArrayLike, direction: ArrayLike | None = None) -> Any:
         """Force (N) of the base model. The direction is 1 for shortening, -1 for lengthening, and 0 or None for the mid-line. Arrays
         are broadcast; numbers give a number. Raises PamError for an impossible length, and warns outside the fitted range."""
+    def pressure(self, force: ArrayLike, stroke: ArrayLike, direction: ArrayLike | None = None) -> Any:
+        """The pressure (Pa) at which the base model pulls with this force (N) at this stroke (m), as the controller computes it. NaN where
+        no permitted pressure does."""
+    def faults(self) -> list[str]:
+        """What makes the table useless for control, one sentence each; empty for a usable table."""
+    @staticmethod
+    def from_bytes(bytes: bytes) -> Table:
+        """A table from the bytes of a .pam file."""
+    def to_bytes(self) -> bytes:
+        """The bytes of the .pam file. Tables can be pickled and copied."""
     def force_band(self, pressure: ArrayLike, stroke: ArrayLike, direction: ArrayLike | None = None) -> Any:
         """Half the width of the 95 % confidence band of that force, N; None if the table contains no uncertainty."""
     def predict(self, campaign: Campaign) -> list[_Array]:
@@ -152,7 +162,7 @@ class Fit:
     def report(self, path: _Path) -> None:
         """Writes the report, one HTML file."""
 
-def read(paths: _Path | Sequence[_Path], muscle: Muscle | None = None, import_description: _Path | None = None) -> Campaign:
+def read(paths: _Path | Sequence[_Path], muscle: Muscle | None = None, import_description: _Path | None = None, filters: dict[str, str] | None = None) -> Campaign:
     """Reads a file, or several in chronological order; import_description is a TOML file that describes another format."""
 
 def fit(
@@ -167,5 +177,8 @@ def fit(
 ) -> Fit:
     """Fits a muscle's table to recordings."""
 
+def evaluate(campaign: Campaign, muscle: Muscle, *, order: int = 4, leave_out: str = "runs") -> dict[str, Any]:
+    """The error of a fit on recordings that it has not seen: each run (or each of the "contractions") is left out in turn. Percentages
+    refer to the largest measured force."""
 def diagnose(campaign: Campaign, muscle: Muscle, report: _Path | None = None) -> dict[str, Any]:
     """Reports the effects that the model lacks, as the JSON of `host diagnose` (schema pam-diagnose/1); report is an HTML file to write."""

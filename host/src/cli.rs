@@ -89,6 +89,8 @@ enum Command {
     Effects(commands::effects::Arguments),
     /// Say before recording what a planned protocol can and cannot distinguish.
     Plan(commands::plan::Arguments),
+    /// Record, judge, fit and diagnose by itself: the program chooses each step of the campaign.
+    Campaign(commands::campaign::Arguments),
     /// Two recordings, in numbers and in a picture.
     Compare(commands::compare::Arguments),
     /// Show, check or export a table.
@@ -132,6 +134,7 @@ impl Command {
             Self::Stock(a) => a.run(console),
             Self::Effects(a) => a.run(console),
             Self::Plan(a) => a.run(console),
+            Self::Campaign(a) => a.run(console),
             Self::Compare(a) => a.run(console),
             Self::Table(a) => a.run(console),
             Self::Flash(a) => a.run(console),

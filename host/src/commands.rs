@@ -1,6 +1,7 @@
 //! The sub-commands, one file each: arguments in, library calls, results out.
 
 pub mod batch;
+pub mod campaign;
 pub mod compare;
 pub mod completions;
 pub mod demo;
@@ -11,8 +12,8 @@ pub mod emulate;
 pub mod evaluate;
 pub mod fit;
 pub mod flash;
-pub mod history;
 pub mod fleet;
+pub mod history;
 pub mod man;
 pub mod new;
 pub mod plan;

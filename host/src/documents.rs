@@ -1,13 +1,14 @@
 //! The JSON that commands print, one struct per document. `docs/schema` holds the JSON Schema of each, generated from these types.
 
 pub(crate) mod bench;
+pub(crate) mod campaign;
 pub(crate) mod device;
 pub(crate) mod effects;
 pub(crate) mod evaluate;
 #[cfg(test)]
 mod fit;
-pub(crate) mod history;
 pub(crate) mod fleet;
+pub(crate) mod history;
 pub(crate) mod predict;
 pub(crate) mod table;
 
@@ -49,6 +50,7 @@ mod tests {
 
     #[test]
     fn every_published_schema_is_that_of_the_types() {
+        published::<super::campaign::Campaign>("pam-campaign-1");
         published::<super::fleet::Batch<'_>>("pam-batch-1");
         published::<super::bench::Compare<'_>>("pam-compare-1");
         published::<super::bench::Demo<'_>>("pam-demo-1");

@@ -1,5 +1,6 @@
 //! The program `host`: its commands, the live view, the demo, settings.
 
+mod campaign;
 pub mod cli;
 pub mod commands;
 pub mod console;

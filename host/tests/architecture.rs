@@ -19,6 +19,11 @@ const ALLOWED: &[(&str, &str, &[&str])] = &[
     ("pam-fleet", "host/fleet", &["model-core", "pam-data", "pam-fit", "pam-diagnose", "pam-report"]),
     ("pam-device", "host/device", &["model-core", "pam-data", "firmware", "virtual-bench"]),
     (
+        "pam-campaign",
+        "host/campaign",
+        &["model-core", "pam-data", "pam-fit", "pam-diagnose", "pam-device", "pam-protocol", "virtual-bench"],
+    ),
+    (
         "host",
         "host",
         &[
@@ -30,6 +35,7 @@ const ALLOWED: &[(&str, &str, &[&str])] = &[
             "pam-report",
             "pam-fleet",
             "pam-device",
+            "pam-campaign",
             "pam-protocol",
             "virtual-bench",
         ],

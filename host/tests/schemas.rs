@@ -84,11 +84,21 @@ fn results_of_recordings_and_tables_are_valid() {
         own("settings --json", false),
         own("device list --json", false),
     ];
+    // Two campaigns are enough for a history: the same levels, once more.
+    for (day, seed) in [("2026-01-05", 5), ("2026-02-05", 6)] {
+        std::fs::create_dir(folder.join(day)).unwrap();
+        let levels = &presets::miniature_pressures()[1..4];
+        for file in bench_campaign::files(&presets::miniature(), levels, seed, 10.0) {
+            let path = folder.join(day).join(format!("{}.csv", file.name));
+            std::fs::write(path, file.csv(Columns::default())).unwrap();
+        }
+    }
+    seen.push(own("history --quiet 2026-01-05 2026-02-05 --muscle m.toml --json -", false));
     let (a, b) = (&recordings[0], &recordings[1]);
     seen.push(valid(&all, "compare", &host(folder, &["compare", "--quiet", a, b, "--json"])));
     seen.sort();
     seen.dedup();
-    assert_eq!(seen.len(), 13, "{seen:?}");
+    assert_eq!(seen.len(), 14, "{seen:?}");
 }
 
 #[test]

@@ -111,7 +111,8 @@ def collected(outcomes):
 def page():
     """Writes the page of the book."""
     removed_checks = json.loads((RESULTS / "removed.json").read_text())
-    mutants = json.loads((RESULTS / "generated.json").read_text())
+    kept = RESULTS / "generated.json"
+    mutants = json.loads(kept.read_text()) if kept.exists() else []
     accepted = tomllib.loads((HERE / "equivalent.toml").read_text()).get("mutant", [])
     reason = {(one["file"], one["change"]): one["reason"] for one in accepted}
     text = [
@@ -123,6 +124,11 @@ def page():
         "| check | file | outcome |", "| --- | --- | --- |",
     ]
     text += [f"| {one['name']} | `{one['file']}` | {one['outcome']} |" for one in removed_checks]
+    caught = sum(one["outcome"] == "caught" for one in removed_checks)
+    text += ["", f"{caught} of {len(removed_checks)} removed checks are caught."]
+    if not mutants:
+        PAGE.write_text("\n".join(text) + "\n")
+        return
     text += [
         "", "## Generated changes", "",
         "cargo-mutants replaces operators and return values. Changes that do not compile are left out.", "",

@@ -60,6 +60,8 @@ class Chip:
         self.now, self.instructions = 0.0, 0
         self.crystal_dead, self.erase_s = False, 1.0
         self.restarts, self.erased = [], []
+        # Words that the flash still programs before power fails; none for all.
+        self.words_left, self.words_written = None, 0
         self.outputs = []
         self.reset_flags = 1 << 27 | 1 << 26
         self._begin()

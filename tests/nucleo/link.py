@@ -109,8 +109,9 @@ class Link:
             return bool(found)
 
         self.chip.uart2.send(frame(REQUEST, number, self.sequence, body))
-        end = self.chip.now + wait
-        while self.chip.now < end and not answered():
+        end, restarts = self.chip.now + wait, len(self.chip.restarts)
+        # A chip that restarts does not answer.
+        while self.chip.now < end and not answered() and len(self.chip.restarts) == restarts:
             self.chip.run(0.0005)
         if not found:
             return None

@@ -135,6 +135,7 @@ class Flash(Registers):
         self.pending = []
         self.errors = 0
         self.stale = False
+        self.cut = False
 
     def read(self, offset):
         self.settle()
@@ -165,6 +166,8 @@ class Flash(Registers):
 
     def erase(self, sector):
         chip = self.chip
+        if self.cut:
+            return
         chip.erased.append((sector, chip.now))
         chip.stall(chip.erase_s)
         chip.uc.mem_write(0x08000000 + self.STARTS[sector], b"\xff" * self.SIZES[sector])
@@ -174,12 +177,24 @@ class Flash(Registers):
         """The processor writes to the flash; the emulated memory takes the raw value first."""
         old = int.from_bytes(self.chip.uc.mem_read(address, size), "little")
         programs = self.get(0x10) & 1 and size == 4 and address % 4 == 0
-        self.pending.append((address, size, old & value if programs else old))
+        self.pending.append((address, size, old & value if programs else old, old))
         if not programs:
             self.errors |= 1 << 7
 
     def settle(self):
-        for address, size, value in self.pending:
+        for address, size, value, old in self.pending:
+            if self.cut:
+                # The emulated memory took the raw value; without power nothing is written.
+                self.chip.uc.mem_write(address, old.to_bytes(size, "little"))
+                continue
+            if self.chip.words_left == 0:
+                # Power fails while this word is programmed: half of its bits are cleared.
+                self.cut, value = True, value | old & 0xFFFF0000
+                self.chip.words_left = None
+                self.chip.restart("power", 1 << 27 | 1 << 26)
+            elif self.chip.words_left is not None:
+                self.chip.words_left -= 1
+            self.chip.words_written += 1
             self.chip.uc.mem_write(address, value.to_bytes(size, "little"))
             self.chip.stall(self.WORD_S)
             self.stale = True

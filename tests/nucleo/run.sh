@@ -16,4 +16,5 @@ if ! "$place/bin/python" -c 'import unicorn, elftools' 2>/dev/null; then
     "$place/bin/python" -m pip install --quiet --disable-pip-version-check -r tests/nucleo/requirements.txt
 fi
 cd tests/nucleo
-PYTHONDONTWRITEBYTECODE=1 exec "../../$place/bin/python" -m unittest "${@:-test_image}"
+[ $# -gt 0 ] || set -- test_image test_power_cuts
+PYTHONDONTWRITEBYTECODE=1 exec "../../$place/bin/python" -m unittest "$@"

@@ -262,7 +262,17 @@ class Failures(unittest.TestCase):
 
     def test_a_host_that_is_gone_leaves_a_vented_muscle(self):
         board = self.running()
+        board.link.controls = False
         self.assert_vented_within(board, 1.2)
+        self.assertEqual(board.link.status()["fault"], "host-silence")
+
+    def test_a_watcher_does_not_keep_the_run_of_a_program_that_is_gone(self):
+        board = self.running()
+        board.link.controls = False
+        for _ in range(13):
+            board.run(0.1)
+            board.link.status()
+        self.assertTrue(board.chip.valve_open)
         self.assertEqual(board.link.status()["fault"], "host-silence")
 
     def test_half_a_frame_and_then_a_whole_one(self):

@@ -14,11 +14,13 @@ use crate::Address;
 use crate::error::DeviceCode;
 use pam_data::error::{Error, Result};
 
+mod axis;
 mod guard;
 pub mod qemu;
 pub mod relay;
 pub mod wire;
 
+pub use axis::Axis;
 use qemu::Qemu;
 pub use qemu::image;
 
@@ -66,6 +68,7 @@ pub struct Stand {
     plant: Plant,
     mishap: Arc<AtomicU8>,
     stuck: Option<f32>,
+    axis: Option<Axis>,
 }
 
 /// One control tick, s.
@@ -76,7 +79,13 @@ impl Stand {
     #[must_use]
     pub fn new(spec: BenchSpec, motion: Motion) -> Self {
         let plant = Plant::new(&spec, &motion);
-        Self { spec, motion, plant, mishap: Arc::default(), stuck: None }
+        Self { spec, motion, plant, mishap: Arc::default(), stuck: None, axis: None }
+    }
+
+    /// A muscle whose free end an axis moves as it is commanded.
+    #[must_use]
+    pub fn commanded(spec: BenchSpec, axis: Axis) -> Self {
+        Self { axis: Some(axis), ..Self::new(spec, Motion::Held { stroke_mm: 0.0 }) }
     }
 
     /// A muscle that swings slowly around a fifth of its free stroke at nine tenths of its largest pressure.
@@ -124,6 +133,10 @@ impl Station for Stand {
     }
 
     fn step(&mut self, pressure_command: f32, _setpoint: f32) -> Answer {
+        if let Some(axis) = &self.axis {
+            axis.until_due();
+            self.plant.drive_to(axis.advance(TICK), TICK);
+        }
         let supply = Mishap::from_code(self.mishap.load(Ordering::Relaxed)) != Mishap::Supply;
         self.plant.step(TICK, if supply { f64::from(pressure_command) } else { 0.0 });
         self.answer()

@@ -147,3 +147,39 @@ impl Reachability {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model_core::link::messages::Reference;
+
+    fn of_example() -> Reachability {
+        let table = model_core::table::example();
+        let muscle = Muscle::build(&table).expect("the example is valid");
+        Reachability {
+            table,
+            muscle,
+            guess: Pressure::ZERO,
+            samples: 0,
+            beyond_blocked_force: 0,
+            below_deadband: 0,
+            not_rising: 0,
+            outside_tested: 0,
+        }
+    }
+
+    #[test]
+    fn what_the_muscle_cannot_do_is_known_before_it_moves() {
+        let reach = of_example();
+        let constant = |value| SetpointProfile::Constant(value);
+        let said = reach.beyond(Quantity::Pressure, &constant(9000e3)).expect("beyond");
+        assert!(said.contains("9000 kPa") && said.contains("600 kPa"), "{said}");
+        let said = reach.beyond(Quantity::Force, &constant(500.0)).expect("beyond");
+        assert!(said.starts_with("500 N is asked for, and the muscle pulls at most 1"), "{said}");
+        let sine =
+            SetpointProfile::Wave(Reference::Sine { mean: 100.0, amplitude: 150.0, frequency_hz: 1.0 });
+        assert!(reach.beyond(Quantity::Force, &sine).is_some());
+        assert_eq!(reach.beyond(Quantity::Force, &constant(100.0)), None);
+        assert_eq!(reach.beyond(Quantity::Pressure, &constant(600e3)), None);
+    }
+}

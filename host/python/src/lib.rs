@@ -2,11 +2,13 @@
 //!
 //! Everything is in SI units inside arrays (s, Pa, m, N, K), regardless of the units in the files.
 
+use std::collections::BTreeMap;
 use std::ffi::CString;
 use std::path::PathBuf;
 
+use model_core::inverse::Reach;
 use model_core::muscle::Muscle as Model;
-use model_core::units::{Length, Pressure};
+use model_core::units::{Force, Length, Pressure};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pam_data::date;
 use pam_data::error::{DataCode, Error};
@@ -15,16 +17,18 @@ use pam_data::physical_limits::{self, Contractions};
 use pam_data::pluralise::pluralise;
 use pam_data::recording::{Campaign as HostCampaign, Import, Reader, Recording as HostRecording};
 use pam_diagnose as diagnosis;
+use pam_evaluate::cross_validation::{Split, cross_validate};
 use pam_fit::Fit as HostFit;
 use pam_fit::Options;
 use pam_fit::confidence_band::{ConfidenceBand, HALF_95};
 use pam_fit::predict::{Predicted, beyond, predict as host_predict, predict_with_bands};
+use pam_fit::table_faults::table_faults;
 use pam_fit::table_file::{self, About, TableFile};
 use pam_report::{Page, diagnose_page, fit_page};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyIndexError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyModule, PyTuple};
+use pyo3::types::{PyBytes, PyModule, PyTuple};
 
 create_exception!(
     pamtools,
@@ -299,13 +303,16 @@ enum Paths {
 }
 
 /// Reads a file, or several in chronological order; `import_description` is the TOML file for other formats.
+///
+/// `filters` maps columns to the text that rows must have, as `--where` of `host fit`: `{"run": "1,2", "condition!": "Kinked69mm"}`.
 #[pyfunction]
-#[pyo3(signature = (paths, muscle = None, import_description = None))]
+#[pyo3(signature = (paths, muscle = None, import_description = None, filters = None))]
 fn read(
     py: Python<'_>,
     paths: Paths,
     muscle: Option<PyRef<'_, Muscle>>,
     import_description: Option<PathBuf>,
+    filters: Option<BTreeMap<String, String>>,
 ) -> PyResult<Campaign> {
     let muscle = muscle.map(|m| m.0.clone());
     let paths = match paths {
@@ -314,8 +321,9 @@ fn read(
     };
     py.detach(|| {
         let import = import_description.as_ref().map(Import::read).transpose()?;
-        let reader = muscle.as_ref().map_or_else(Reader::new, Reader::of);
-        reader.import(import.as_ref()).campaign(&paths)
+        let mut reader = muscle.as_ref().map_or_else(Reader::new, Reader::of).import(import.as_ref());
+        reader.filters.extend(filters.unwrap_or_default());
+        reader.campaign(&paths)
     })
     .map(Campaign)
     .map_err(raised)
@@ -425,6 +433,53 @@ impl Table {
         })
     }
 
+    /// The pressure (Pa) at which the base model pulls with a force (N) at a stroke (m), as the controller computes it; `direction` as for
+    /// `force`. NaN where no pressure up to the highest allowed one does.
+    #[pyo3(signature = (force, stroke, direction = None))]
+    fn pressure<'py>(
+        &self,
+        force: &Bound<'py, PyAny>,
+        stroke: &Bound<'py, PyAny>,
+        direction: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let model = Model::<f64>::build(&self.0.table).map_err(|e| wrong(e.to_string()))?;
+        let search = model.search();
+        let solve = |f: f64, x: f64, s: f64| {
+            let held = model.held(Length::from_metres(x));
+            let found = model.pressure_for(Force::from_newtons(f), &held, s, Pressure::ZERO, &search);
+            if found.reach == Reach::Reached { found.pressure.pascals() } else { f64::NAN }
+        };
+        let check = |places: &[(f64, f64)]| {
+            let contractions = Contractions::of(model.braid());
+            places.iter().try_for_each(|(f, x)| {
+                physical_limits::force(*f).and_then(|()| contractions.check(x / model.braid().rest_length()))
+            })
+        };
+        broadcast(["force", "stroke", "direction"], force, stroke, direction, check, solve)
+            .map(|(array, _)| array)
+    }
+
+    /// What makes the table useless for control, a sentence each; empty where nothing does.
+    fn faults(&self) -> Vec<String> {
+        table_faults(&self.0.table, self.0.about.uncertainty.as_ref(), &self.0.about.fit)
+    }
+
+    /// A table from the bytes of a .pam file.
+    #[staticmethod]
+    fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
+        TableFile::from_bytes(bytes).map(Self).map_err(raised)
+    }
+
+    /// The bytes of the .pam file.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &self.0.to_bytes().map_err(raised)?))
+    }
+
+    /// For pickle and copy.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        Ok((py.get_type::<Self>().getattr("from_bytes")?, (self.to_bytes(py)?,)))
+    }
+
     /// Half the width of the 95 % interval of that force (N), at the same places: the uncertainty of the table's numbers. None where
     /// the table holds no uncertainty.
     #[pyo3(signature = (pressure, stroke, direction = None))]
@@ -489,38 +544,56 @@ fn over<'py>(
     of: impl Fn(f64, f64, f64) -> f64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = pressure.py();
+    let contractions = Contractions::of(model.braid());
+    let check = |places: &[(f64, f64)]| {
+        places.iter().try_for_each(|(p, x)| {
+            physical_limits::pressure(*p).and_then(|()| contractions.check(x / model.braid().rest_length()))
+        })
+    };
+    let names = ["pressure", "stroke", "direction"];
+    let (array, places) = broadcast(names, pressure, stroke, direction, check, of)?;
+    warn(py, &beyond(&table.table, &places))?;
+    Ok(array)
+}
+
+/// A function of two quantities and the direction over arrays, as numpy broadcasts them, and the places that it was taken at.
+fn broadcast<'py>(
+    names: [&str; 3],
+    first: &Bound<'py, PyAny>,
+    second: &Bound<'py, PyAny>,
+    direction: Option<&Bound<'py, PyAny>>,
+    check: impl Fn(&[(f64, f64)]) -> Result<(), Error>,
+    of: impl Fn(f64, f64, f64) -> f64,
+) -> PyResult<(Bound<'py, PyAny>, Vec<(f64, f64)>)> {
+    let py = first.py();
     let numpy = PyModule::import(py, "numpy")?;
-    let pressure = numbers("pressure", pressure)?;
-    let stroke = numbers("stroke", stroke)?;
+    let first = numbers(names[0], first)?;
+    let second = numbers(names[1], second)?;
     let direction = match direction {
-        Some(given) => numbers("direction", given)?,
+        Some(given) => numbers(names[2], given)?,
         None => numpy.call_method1("zeros", ((),))?,
     };
-    let same = numpy.call_method1("broadcast_arrays", (pressure, stroke, direction)).map_err(|e| {
+    let same = numpy.call_method1("broadcast_arrays", (first, second, direction)).map_err(|e| {
         raised(
             Error::new(DataCode::CallInvalid, format!("the arrays do not fit each other: {}", e.value(py)))
-                .help("pressure, stroke and direction are numbers or arrays of one shape"),
+                .help(format!("{} are numbers or arrays of one shape", names.join(", "))),
         )
     })?;
     let part = |i: usize| -> PyResult<PyReadonlyArrayDyn<'py, f64>> { Ok(same.get_item(i)?.extract()?) };
-    let (p, x, s) = (part(0)?, part(1)?, part(2)?);
+    let (a, x, s) = (part(0)?, part(1)?, part(2)?);
     if let Some(wrong_way) = s.as_array().iter().find(|s| !(-1.0..=1.0).contains(*s)) {
         return Err(wrong(format!(
             "`direction` is {wrong_way}; it is 1 shortening, -1 lengthening, 0 the mid-line"
         )));
     }
-    let places: Vec<(f64, f64)> = p.as_array().iter().copied().zip(x.as_array().iter().copied()).collect();
-    let contractions = Contractions::of(model.braid());
-    for (p, x) in &places {
-        physical_limits::pressure(*p).map_err(raised)?;
-        contractions.check(x / model.braid().rest_length()).map_err(raised)?;
-    }
-    warn(py, &beyond(&table.table, &places))?;
-    let values: Vec<f64> = places.iter().zip(s.as_array()).map(|((p, x), s)| of(*p, *x, *s)).collect();
-    let shape = p.as_array().shape().to_vec();
+    let places: Vec<(f64, f64)> = a.as_array().iter().copied().zip(x.as_array().iter().copied()).collect();
+    check(&places).map_err(raised)?;
+    let values: Vec<f64> = places.iter().zip(s.as_array()).map(|((a, x), s)| of(*a, *x, *s)).collect();
+    let shape = a.as_array().shape().to_vec();
     let array = values.into_pyarray(py).call_method1("reshape", (shape,))?;
     // One number for one place.
-    array.get_item(PyTuple::empty(py)).or(Ok(array))
+    let array = array.get_item(PyTuple::empty(py)).or(Ok::<_, PyErr>(array))?;
+    Ok((array, places))
 }
 
 /// A finished fit.
@@ -549,7 +622,7 @@ impl Fit {
             tool: format!("pamtools {}", env!("CARGO_PKG_VERSION")),
             fit: self.fit.summary.quality(),
             uncertainty: Some(self.fit.stored_uncertainty()),
-            mountings: self.fit.solution.problem.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
+            mountings: table_file::stored_mountings(&self.fit.solution.problem),
             ..About::default()
         };
         Table(TableFile { table: self.fit.table.clone(), about })
@@ -603,6 +676,37 @@ fn fit(
     Ok(Fit { fit, campaign, options })
 }
 
+/// Scores a fit on recordings that it has not seen: each run is left out in turn. Returns mean and rms error and bias in N, the percentage
+/// of the largest measured force, and the errors by recording.
+#[pyfunction]
+#[pyo3(signature = (campaign, muscle, *, order = 4, leave_out = "runs"))]
+fn evaluate<'py>(
+    py: Python<'py>,
+    campaign: PyRef<'py, Campaign>,
+    muscle: PyRef<'py, Muscle>,
+    order: usize,
+    leave_out: &str,
+) -> PyResult<Bound<'py, PyAny>> {
+    let split = match leave_out {
+        "runs" => Split::Run,
+        "contractions" => Split::Contraction,
+        other => return Err(wrong(format!("`leave_out` is {other:?}; it is \"runs\" or \"contractions\""))),
+    };
+    let options = Options { order, ..Options::default() };
+    let (campaign, muscle) = (campaign.0.clone(), muscle.0.clone());
+    let held = py.detach(|| cross_validate(&campaign, &muscle, &options, split, None)).map_err(raised)?;
+    let text = serde_json::json!({
+        "rows": held.table.rows,
+        "mean_N": held.table.mean(),
+        "rms_N": held.table.rms(),
+        "bias_N": held.table.bias(),
+        "mean_pct": 100.0 * held.table.mean() / held.largest,
+        "largest_force_N": held.largest,
+        "recordings": held.recordings,
+    });
+    loads(py, &text.to_string())
+}
+
 /// Finds out what the model leaves out. Returns the JSON of `host diagnose` as a dict; `report` names an HTML file to write.
 #[pyfunction]
 #[pyo3(signature = (campaign, muscle, report = None))]
@@ -615,7 +719,11 @@ fn diagnose<'py>(
     let (campaign, muscle) = (campaign.0.clone(), muscle.0.clone());
     let geometry = muscle.geometry();
     let options = diagnosis::Options { muscle: muscle.name.clone(), ..Default::default() };
-    let answer = py.detach(|| diagnosis::diagnose(&campaign, &geometry, &options)).map_err(raised)?;
+    let mut answer = py.detach(|| diagnosis::diagnose(&campaign, &geometry, &options)).map_err(raised)?;
+    // One blocked force for one campaign: that of `fit`.
+    if let Ok(plain) = py.detach(|| pam_fit::fit(&campaign, &muscle, &Options::default())) {
+        answer.blocked_force_N = plain.summary.blocked_force_N;
+    }
     if let Some(path) = &report {
         write_report(&diagnose_page::page(&answer, &geometry, &campaign), path)?;
     }
@@ -635,5 +743,6 @@ fn pamtools(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Fit>()?;
     module.add_function(wrap_pyfunction!(read, module)?)?;
     module.add_function(wrap_pyfunction!(fit, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluate, module)?)?;
     module.add_function(wrap_pyfunction!(diagnose, module)?)
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use clap::Args;
+use clap::{Args, FromArgMatches};
 use model_core::muscle::Muscle;
 
 use super::effects;
@@ -23,6 +23,7 @@ use pam_diagnose::remark::Remark;
 use pam_diagnose::{Options, next_experiment::next_experiment, refitted_table};
 use pam_fit::checks::Checks;
 use pam_fit::predict::predict;
+use pam_fit::recording_table;
 
 use crate::progress::ProgressLine;
 use pam_data::recording::Reader;
@@ -71,6 +72,18 @@ pub struct Arguments {
 }
 
 impl Arguments {
+    /// The arguments of a call that another command makes.
+    ///
+    /// # Errors
+    /// [`DataCode::CallInvalid`] for words that the command does not take.
+    pub(super) fn of(words: Vec<std::ffi::OsString>) -> Result<Self> {
+        let command = Self::augment_args(clap::Command::new("diagnose"));
+        let matches = command.try_get_matches_from(words);
+        matches
+            .and_then(|m| Self::from_arg_matches(&m))
+            .map_err(|e| Error::new(DataCode::CallInvalid, e.to_string()))
+    }
+
     /// Runs the command.
     ///
     /// # Errors
@@ -105,6 +118,15 @@ impl Arguments {
         let options = Options { muscle: muscle.name.clone(), checks, given, progress };
         let mut answer = pam_diagnose::history::diagnose(&campaign, &geometry, &options)?;
         let diagnosed = start.elapsed();
+        // One blocked force for one campaign: that of `host fit`, whose residuals by recording are shown, too.
+        let plain = if answer.judged() {
+            pam_fit::fit(&campaign, &muscle, &pam_fit::Options::default()).ok()
+        } else {
+            None
+        };
+        if let Some(plain) = &plain {
+            answer.blocked_force_N = plain.summary.blocked_force_N;
+        }
         if let Some(table) = &table {
             let predicted = predict(table, &campaign)?;
             if let Some(rms) = predicted.rms {
@@ -145,7 +167,11 @@ impl Arguments {
         self.reports.write(console, || diagnose_page::page(&answer, &geometry, &campaign))?;
         if self.json.as_deref() != Some(std::path::Path::new("-")) {
             let history = answer.history.as_ref().map(|h| format!("\n{}", history_text::text(h)));
-            let words = wording::summary(&answer) + &history.unwrap_or_default();
+            let residuals =
+                plain.map(|plain| recording_table(&plain.summary.recordings)).filter(|t| !t.is_empty());
+            let residuals = residuals.map(|table| format!("\nOf the table without effects: {table}\n"));
+            let words =
+                wording::summary(&answer) + &residuals.unwrap_or_default() + &history.unwrap_or_default();
             if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
         }
         console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));

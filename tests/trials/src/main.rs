@@ -3,6 +3,7 @@
 mod again;
 mod answer;
 mod baselines;
+mod campaign;
 mod clopper;
 mod festo;
 mod festo_history;
@@ -180,6 +181,8 @@ enum Command {
     Sensors(sensors::Sensors),
     /// Diagnose changes: changes added to later runs of real recordings, untouched pairs, a cylinder whose seal was replaced.
     Reference(reference::Reference),
+    /// Campaigns that choose their own steps, beside protocol C for the same time, a random menu, and the proposal of today.
+    Campaign(campaign::Campaigns),
     /// Generate, answer and score in one go; each continues where an earlier run was interrupted.
     Prove {
         /// dev or final.
@@ -229,6 +232,7 @@ fn main() -> ExitCode {
         Command::FestoHistory(real) => {
             festo::run_history(&real.data, &real.output, &real.host, real.page.as_deref())
         }
+        Command::Campaign(what) => campaign::run(&what),
         Command::Sensors(what) => sensors::run(&what),
         Command::Reference(what) => reference::run(&what),
         Command::Prove { set, what, tool, check } => prove(&set, &what, &tool, check),

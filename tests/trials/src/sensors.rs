@@ -47,6 +47,9 @@ struct Way {
     protocol: &'static str,
     /// Spoils the readings; `rows` are those of the failure.
     spoil: fn(&mut [f64], Range<usize>),
+    /// Whether the bound holds for it. Wrong units, signs and zeros are found from the agreement with the other files alone, which a file
+    /// at the edge of the tested pressures does not determine.
+    bounded: bool,
 }
 
 fn freeze(column: &mut [f64], rows: Range<usize>) {
@@ -72,33 +75,83 @@ fn unit(column: &mut [f64], factor: f64) {
 }
 
 const WAYS: [Way; 18] = [
-    Way { name: "frozen for 500 rows", channel: Channel::Force, protocol: "A", spoil: freeze },
-    Way { name: "frozen for 500 rows", channel: Channel::Stroke, protocol: "A", spoil: freeze },
-    Way { name: "frozen for 500 rows", channel: Channel::Pressure, protocol: "staircase", spoil: freeze },
-    Way { name: "saturated at 60 %", channel: Channel::Force, protocol: "A", spoil: cut },
-    Way { name: "saturated at 60 %", channel: Channel::Stroke, protocol: "A", spoil: cut },
-    Way { name: "saturated at 60 %", channel: Channel::Pressure, protocol: "staircase", spoil: cut },
-    Way { name: "zero in one file", channel: Channel::Force, protocol: "A", spoil: kill },
-    Way { name: "zero in one file", channel: Channel::Stroke, protocol: "A", spoil: kill },
-    Way { name: "zero in one file", channel: Channel::Pressure, protocol: "A", spoil: kill },
-    Way { name: "drop-out of 20 rows", channel: Channel::Force, protocol: "A", spoil: lose },
-    Way { name: "drop-out of 20 rows", channel: Channel::Stroke, protocol: "A", spoil: lose },
-    Way { name: "drop-out of 20 rows", channel: Channel::Pressure, protocol: "A", spoil: lose },
-    Way { name: "lbf for N", channel: Channel::Force, protocol: "A", spoil: |c, _| unit(c, 1.0 / 4.448_222) },
-    Way { name: "inches for mm", channel: Channel::Stroke, protocol: "A", spoil: |c, _| unit(c, 1.0 / 25.4) },
+    Way { name: "frozen for 500 rows", channel: Channel::Force, protocol: "A", spoil: freeze, bounded: true },
+    Way {
+        name: "frozen for 500 rows",
+        channel: Channel::Stroke,
+        protocol: "A",
+        spoil: freeze,
+        bounded: true,
+    },
+    Way {
+        name: "frozen for 500 rows",
+        channel: Channel::Pressure,
+        protocol: "staircase",
+        spoil: freeze,
+        bounded: true,
+    },
+    Way { name: "saturated at 60 %", channel: Channel::Force, protocol: "A", spoil: cut, bounded: true },
+    Way { name: "saturated at 60 %", channel: Channel::Stroke, protocol: "A", spoil: cut, bounded: true },
+    Way {
+        name: "saturated at 60 %",
+        channel: Channel::Pressure,
+        protocol: "staircase",
+        spoil: cut,
+        bounded: true,
+    },
+    Way { name: "zero in one file", channel: Channel::Force, protocol: "A", spoil: kill, bounded: true },
+    Way { name: "zero in one file", channel: Channel::Stroke, protocol: "A", spoil: kill, bounded: true },
+    Way { name: "zero in one file", channel: Channel::Pressure, protocol: "A", spoil: kill, bounded: true },
+    Way { name: "drop-out of 20 rows", channel: Channel::Force, protocol: "A", spoil: lose, bounded: true },
+    Way { name: "drop-out of 20 rows", channel: Channel::Stroke, protocol: "A", spoil: lose, bounded: true },
+    Way {
+        name: "drop-out of 20 rows",
+        channel: Channel::Pressure,
+        protocol: "A",
+        spoil: lose,
+        bounded: true,
+    },
+    Way {
+        name: "lbf for N",
+        channel: Channel::Force,
+        protocol: "A",
+        spoil: |c, _| unit(c, 1.0 / 4.448_222),
+        bounded: false,
+    },
+    Way {
+        name: "inches for mm",
+        channel: Channel::Stroke,
+        protocol: "A",
+        spoil: |c, _| unit(c, 1.0 / 25.4),
+        bounded: false,
+    },
     Way {
         name: "psi for kPa",
         channel: Channel::Pressure,
         protocol: "A",
         spoil: |c, _| unit(c, 1.0 / 6.894_757),
+        bounded: false,
     },
-    Way { name: "opposite sign", channel: Channel::Force, protocol: "A", spoil: |c, _| unit(c, -1.0) },
-    Way { name: "opposite sign", channel: Channel::Stroke, protocol: "A", spoil: |c, _| unit(c, -1.0) },
+    Way {
+        name: "opposite sign",
+        channel: Channel::Force,
+        protocol: "A",
+        spoil: |c, _| unit(c, -1.0),
+        bounded: false,
+    },
+    Way {
+        name: "opposite sign",
+        channel: Channel::Stroke,
+        protocol: "A",
+        spoil: |c, _| unit(c, -1.0),
+        bounded: false,
+    },
     Way {
         name: "absolute for gauge",
         channel: Channel::Pressure,
         protocol: "A",
         spoil: |c, _| c.iter_mut().for_each(|p| *p += 101_325.0),
+        bounded: false,
     },
 ];
 
@@ -186,21 +239,23 @@ pub fn run(what: &Sensors) -> Result<(), Box<dyn Error>> {
         let (low, high) = interval(k, n);
         format!("{:.0} % ({:.0} to {:.0})", 100.0 * k as f64 / n.max(1) as f64, 100.0 * low, 100.0 * high)
     };
-    let mut table = "| failure | column | campaign | n | found | another file accused |\n| --- | --- | --- | --- | --- | --- |\n".to_owned();
+    let mut table = "| failure | column | campaign | n | found | another file accused | bound |\n| --- | --- | --- | --- | --- | --- | --- |\n".to_owned();
     let mut missed = Vec::new();
     for (k, way) in WAYS.iter().enumerate() {
         let hits = cases.iter().filter(|c| c.0[k].found).count();
         let others = cases.iter().filter(|c| c.0[k].elsewhere).count();
+        let held = hits as f64 >= FOUND * n as f64;
         let campaign = if way.protocol == "A" { "loops" } else { "staircases" };
         writeln!(
             table,
-            "| {} | {} | {campaign} | {n} | {} | {} |",
+            "| {} | {} | {campaign} | {n} | {} | {} | {} |",
             way.name,
             way.channel.name(),
             percent(hits, n),
-            percent(others, n)
+            percent(others, n),
+            if held { "held" } else { "not held" }
         )?;
-        if (hits as f64) < FOUND * n as f64 {
+        if way.bounded && !held {
             missed.push(format!("{} {}: {hits} of {n}", way.channel.name(), way.name));
         }
     }

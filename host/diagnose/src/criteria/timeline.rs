@@ -16,6 +16,8 @@ criteria! {
     COURSE_PRIOR_NONE: f64 = 0.8, "p_0", "1", Convention("four of five pairs of campaigns, as in the comparison of two");
     /// Observations that the standard errors are worth as a prior of the scatter between campaigns: few, because remounting is not in them.
     COURSE_SCALE_PRIOR: f64 = 1.0, "nu_0", "1", Judgement;
+    /// The same for effects against the reference campaign: their intervals hold what repeats between campaigns, remounting included.
+    COURSE_EFFECT_PRIOR: f64 = 10.0, "nu_e", "1", Derived("SCALE_PRIOR of the comparison of two campaigns");
     /// Sizes of a change that are equally likely beforehand, in units of the scatter.
     COURSE_SIZES: ([f64; 4]) = [1.0, 3.0, 10.0, 30.0], "delta/s", "1", Judgement;
     /// Probability of a change from which on it is named: several series are asked about at once.

@@ -11,10 +11,10 @@
 //! (the marginal likelihood of the conjugate model, see A. O'Hagan and J. Forster, Bayesian Inference, 2004, ch. 11). After a change
 //! is accepted the next is looked for beside it.
 
-use super::series::Series;
+use super::series::{Kind, Series};
 use crate::criteria::timeline::{
-    AT_ONCE, COURSE_CHANGED, COURSE_MOST_CHANGES, COURSE_PRIOR_NONE, COURSE_SCALE_PRIOR, COURSE_SIZES,
-    FEWEST_POINTS, SMALLEST_ERROR,
+    AT_ONCE, COURSE_CHANGED, COURSE_EFFECT_PRIOR, COURSE_MOST_CHANGES, COURSE_PRIOR_NONE, COURSE_SCALE_PRIOR,
+    COURSE_SIZES, FEWEST_POINTS, SMALLEST_ERROR,
 };
 use crate::reference::{log_mean, log_sum};
 
@@ -61,6 +61,8 @@ pub struct Course {
 
 /// The known points of a series: campaign, date, value, standard error.
 struct Known {
+    /// Observations that the standard errors are worth.
+    worth: f64,
     campaign: Vec<usize>,
     date: Vec<f64>,
     value: Vec<f64>,
@@ -69,7 +71,9 @@ struct Known {
 
 impl Known {
     fn of(dates: &[f64], series: &Series) -> Self {
-        let mut all = Self { campaign: Vec::new(), date: Vec::new(), value: Vec::new(), error: Vec::new() };
+        let worth = if series.kind == Kind::Effect { COURSE_EFFECT_PRIOR } else { COURSE_SCALE_PRIOR };
+        let mut all =
+            Self { worth, campaign: Vec::new(), date: Vec::new(), value: Vec::new(), error: Vec::new() };
         for (i, (date, point)) in dates.iter().zip(&series.points).enumerate() {
             if let Some(p) = point {
                 all.campaign.push(i);
@@ -147,7 +151,7 @@ impl Basis {
 }
 
 /// ln Bayes factor of a further change of shape `x`.
-fn evidence(x: &[f64], residual: &[f64], freedom: f64) -> f64 {
+fn evidence(x: &[f64], residual: &[f64], freedom: f64, worth: f64) -> f64 {
     let (a, b, q) = (dot(x, x), dot(x, residual), dot(residual, residual));
     if !(a > 1e-9) {
         return f64::NEG_INFINITY;
@@ -157,10 +161,7 @@ fn evidence(x: &[f64], residual: &[f64], freedom: f64) -> f64 {
         .map(|size| {
             let s2 = size * size;
             let left = (q - b * b / (a + 1.0 / s2)).max(0.0);
-            -0.5 * (s2 * a).ln_1p()
-                - 0.5
-                    * (COURSE_SCALE_PRIOR + freedom)
-                    * ((COURSE_SCALE_PRIOR + left) / (COURSE_SCALE_PRIOR + q)).ln()
+            -0.5 * (s2 * a).ln_1p() - 0.5 * (worth + freedom) * ((worth + left) / (worth + q)).ln()
         })
         .collect();
     log_mean(&each)
@@ -199,7 +200,7 @@ pub fn find(dates: &[f64], series: &Series) -> Course {
     }
     let left = basis.rest(&y);
     let freedom = n as f64 - basis.0.len() as f64;
-    let scale = (COURSE_SCALE_PRIOR + dot(&left, &left)) / (COURSE_SCALE_PRIOR + freedom);
+    let scale = (known.worth + dot(&left, &left)) / (known.worth + freedom);
     course.scatter = (freedom >= 1.0).then(|| (dot(&left, &left) / freedom).sqrt());
     for i in 0..shapes.len() {
         let mut others = Basis::default();
@@ -236,7 +237,8 @@ struct Candidate {
 impl Candidate {
     fn best(known: &Known, basis: &Basis, residual: &[f64], freedom: f64) -> Option<Self> {
         let n = known.value.len();
-        let log = |shape: &[f64]| evidence(&basis.rest(&known.weighted(shape)), residual, freedom);
+        let log =
+            |shape: &[f64]| evidence(&basis.rest(&known.weighted(shape)), residual, freedom, known.worth);
         let steps: Vec<(Shape, f64)> = (1..n).map(|k| (Shape::Step(k), log(&known.step(k)))).collect();
         let excursions: Vec<(Shape, f64)> = (1..n)
             .flat_map(|k| (k + 1..n).map(move |l| (k, l)))

@@ -158,6 +158,11 @@ const PRESSURE_STEP: f64 = 1.0 / 100.0;
 /// Or after this many standard deviations of a single reading, where that is more: otherwise noise would end a piece after every row.
 const NOISE_STEP: f64 = 6.0;
 
+/// More points than this make pieces longer, as long as they stay below [`COARSEST`].
+const MOST: usize = 300_000;
+/// The longest piece, as a share of the range of stroke or pressure: the zone in which friction changes sign is about as long.
+const COARSEST: f64 = 0.05;
+
 /// Cuts a campaign into points; a dropout of the gauge shares none with what is beside it. `motions` are those of its recordings;
 /// recordings without a force, and those in another unit than the rest, are passed over.
 #[must_use]
@@ -176,7 +181,59 @@ pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
     let pressure_step = (pressure.span() * PRESSURE_STEP).max(NOISE_STEP * noise(|r| &r.pressure));
     let per_stroke = if stroke.span() > 0.0 { 1.0 / stroke.span() } else { 0.0 };
     let per_pressure = if pressure.span() > 0.0 { 1.0 / pressure.span() } else { 0.0 };
-    let mut list: Vec<Point> = Vec::with_capacity(rows.min(2 * AIM));
+    let mut steps =
+        Steps { stroke: stroke_step, pressure: pressure_step, rows: most_rows, per_stroke, per_pressure };
+    // Many short strokes make many points, of which no more is known of the force: then pieces are longer.
+    let (list, block) = loop {
+        match cut(screened, motions, &taken, &steps) {
+            Some(cut) => break cut,
+            None => steps = steps.longer(),
+        }
+    };
+    let row_noise = row_noise(campaign, rows);
+    let mountings = campaign.recordings.iter().map(HeldMounting::of).collect();
+    Points { list, rows, blocks: block, pressure, stroke, force, row_noise, stroke_noise, mountings }
+}
+
+/// When a piece ends.
+struct Steps {
+    /// m.
+    stroke: f64,
+    /// Pa.
+    pressure: f64,
+    rows: u32,
+    /// One over the ranges of stroke and pressure, 1/m and 1/Pa.
+    per_stroke: f64,
+    per_pressure: f64,
+}
+
+impl Steps {
+    /// Twice as long pieces.
+    fn longer(self) -> Self {
+        Self {
+            stroke: 2.0 * self.stroke,
+            pressure: 2.0 * self.pressure,
+            rows: self.rows.saturating_mul(2),
+            ..self
+        }
+    }
+
+    /// Whether longer pieces still resolve a stroke.
+    fn can_grow(&self) -> bool {
+        let share = (self.stroke * self.per_stroke).max(self.pressure * self.per_pressure);
+        2.0 * share <= COARSEST && self.rows < u32::MAX / 2
+    }
+}
+
+/// The points of a campaign and the number of half-strokes; `None` where there are more than [`MOST`] and longer pieces are possible.
+fn cut(
+    screened: &Screened<'_>,
+    motions: &[Motion],
+    taken: &dyn Fn(usize) -> bool,
+    steps: &Steps,
+) -> Option<(Vec<Point>, u32)> {
+    let campaign = screened.campaign.as_ref();
+    let mut list: Vec<Point> = Vec::new();
     let mut block = 0_u32;
     for (index, recording) in campaign.recordings.iter().enumerate() {
         let force = recording.force.as_ref().filter(|_| taken(index));
@@ -189,6 +246,9 @@ pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
         let mut start = 0;
         let mut dropouts = screened.of_recording(index).peekable();
         while start < n {
+            if list.len() >= MOST && steps.can_grow() {
+                return None;
+            }
             while dropouts.next_if(|d| d.end <= start).is_some() {}
             let dropout = dropouts.peek().is_some_and(|d| d.start <= start);
             let limit = dropouts.peek().map_or(n, |d| if dropout { d.end } else { d.start }).min(n);
@@ -198,9 +258,9 @@ pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
             let mut end = start;
             while end < limit
                 && directions[end] == direction
-                && ((end - start) as u32) < most_rows
-                && (x[end] - x[start]).abs() <= stroke_step
-                && (p[end] - p[start]).abs() <= pressure_step
+                && ((end - start) as u32) < steps.rows
+                && (x[end] - x[start]).abs() <= steps.stroke
+                && (p[end] - p[start]).abs() <= steps.pressure
             {
                 for (sum, v) in sums.iter_mut().zip([t[end], p[end], x[end], f[end]]) {
                     *sum += v;
@@ -211,7 +271,7 @@ pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
             let count = (end - start) as f64;
             let [time, pressure, stroke, force] = sums.map(|s| s / count);
             let since_turn =
-                (stroke - x[turn]).abs() * per_stroke + (pressure - p[turn]).abs() * per_pressure;
+                (stroke - x[turn]).abs() * steps.per_stroke + (pressure - p[turn]).abs() * steps.per_pressure;
             list.push(Point {
                 recording: index as u32,
                 first_row: start as u32,
@@ -234,9 +294,7 @@ pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
         }
         block += 1;
     }
-    let row_noise = row_noise(campaign, rows);
-    let mountings = campaign.recordings.iter().map(HeldMounting::of).collect();
-    Points { list, rows, blocks: block, pressure, stroke, force, row_noise, stroke_noise, mountings }
+    Some((list, block))
 }
 
 /// From the median size of second differences of the force, of at most some 40,000 rows spread evenly: trends drop out, and

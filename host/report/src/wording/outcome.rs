@@ -22,9 +22,23 @@ pub fn verdict(d: &Diagnosis) -> String {
         Verdict::PartlyExplained => {
             format!("The model lacks {}. This explains a part of its error above the noise.", list(&names))
         }
+        Verdict::Unexplained if matches!(d.unexplained.pattern, Pattern::NotRepeatable(_)) => {
+            noise(&d.unexplained.pattern)
+        }
         Verdict::Unexplained => {
             "The model lacks something, but no effect of the library explains it well enough to be named.".to_owned()
         }
+    }
+}
+
+/// An error that does not repeat is noise, whatever its size: no law of the muscle makes it.
+fn noise(pattern: &Pattern) -> String {
+    match pattern {
+        Pattern::NotRepeatable(s) => format!(
+            "The error is noise with a memory of about {:.1} s: it does not repeat under the same conditions, and no effect fits.",
+            s.memory
+        ),
+        _ => String::new(),
     }
 }
 
@@ -60,4 +74,16 @@ pub fn split(split: Split) -> String {
         Split::StrokeParts => "every fourth part of the stroke predicted from the others, in turn",
     };
     text.to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pam_diagnose::remark::Scatter;
+
+    #[test]
+    fn noise_with_a_memory_is_called_so() {
+        let said = noise(&Pattern::NotRepeatable(Scatter { sigma: 0.4, share: 0.003, memory: 6.2 }));
+        assert!(said.contains("noise with a memory of about 6.2 s") && said.contains("no effect fits"), "{said}");
+    }
 }

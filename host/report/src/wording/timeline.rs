@@ -68,12 +68,16 @@ pub fn usual_unit(unit: &str) -> (f64, &'static str) {
         "m²" => (1e6, "mm²"),
         "m/N" => (1e6, "µm/N"),
         "N" => (1.0, "N"),
-        _ => (1.0, ""),
+        _ => (100.0, "%"),
     }
 }
 
 /// A value with the digits that its half interval leaves, in the usual unit.
 fn with_interval(value: f64, half: Option<f64>, unit: &str) -> String {
+    // The reference does not differ from itself.
+    if value == 0.0 && half == Some(0.0) {
+        return "0".to_owned();
+    }
     let (scale, name) = usual_unit(unit);
     let (value, half) = (scale * value, half.map(|h| scale * h));
     let digits = match half {

@@ -1,4 +1,5 @@
-//! Drop-outs of force and stroke: the reading steps away within one row and back within one row, and no other reading steps.
+//! Drop-outs: the reading steps away within one row and back within one row, and no other reading steps. A step of the pressure must change
+//! the expected force, which does not follow ([`super::super::dropouts`] finds most of them from less).
 
 use super::{Campaign, Channel, Kind, Recording, SensorFault, Usual};
 use crate::recording::white_noise;
@@ -16,11 +17,14 @@ const SHORTEST: usize = 4;
 /// What lasts longer, s, is how the bench was driven.
 const LONGEST: f64 = 10.0;
 
-/// The drop-outs of force and stroke in a recording, in order.
+/// A drop-out of the pressure changes the expected force by this share of the range of forces, and the force by this share of that at most.
+const UNFELT: (f64, f64) = (0.1, 0.3);
+
+/// The drop-outs in a recording, by channel.
 pub(super) fn find(campaign: &Campaign, index: usize, usual: &Usual) -> Vec<SensorFault> {
     let r = &campaign.recordings[index];
     let of = |channel: Channel| drop_outs(r, index, channel, usual);
-    [Channel::Stroke, Channel::Force].into_iter().flat_map(of).collect()
+    Channel::ALL.into_iter().flat_map(of).collect()
 }
 
 fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Vec<SensorFault> {
@@ -39,7 +43,7 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
     while i < column.len() {
         let end = if edge(i) && quiet(i) { end_of(r, column, i, edge) } else { None };
         match end.filter(|end| quiet(*end) && returns(r, channel, column, i..*end, usual)) {
-            Some(end) => {
+            Some(end) if channel != Channel::Pressure || is_unfelt(r, i..end, usual) => {
                 found.push(SensorFault {
                     recording: index,
                     rows: i..end,
@@ -49,10 +53,20 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
                 });
                 i = end + 1;
             }
-            None => i += 1,
+            _ => i += 1,
         }
     }
     found
+}
+
+/// Whether the force stays while the pressure reading is away.
+fn is_unfelt(r: &Recording, rows: std::ops::Range<usize>, usual: &Usual) -> bool {
+    let made = (usual.expected.at(r, rows.start) - usual.expected.at(r, rows.start - 1)).abs();
+    let force = r.force.as_deref().unwrap_or(&[]);
+    let (low, high) = force[rows.start - 1..=rows.end]
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), f| (l.min(*f), h.max(*f)));
+    made > UNFELT.0 * usual.spans[2] && high - low <= UNFELT.1 * made
 }
 
 /// The row that steps back, if the reading keeps still until then.
@@ -96,7 +110,8 @@ fn returns(
             let later = if after + n < column.len() { drift(after, after + n) } else { 0.0 };
             1.5 * earlier.max(later)
         }
-        _ => expected.abs() + 2.0 * usual.residual,
+        Channel::Force => expected.abs() + 2.0 * usual.residual,
+        Channel::Pressure => 0.0,
     };
     change.abs() <= BACK * size + around
 }

@@ -1,0 +1,454 @@
+//! The course of a campaign: choose, record, judge, learn, until there is nothing more to do.
+
+use std::path::{Path, PathBuf};
+
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::output::write_whole;
+use pam_data::recording::{Reader, Recording};
+
+use crate::actuation::{Actuation, Ending, Reading};
+use crate::bench::VirtualBench;
+use crate::course::Course;
+use crate::criteria::{REPEATS, TOP_SHARE};
+use crate::engine::{Decision, Engine};
+use crate::journal::{Chosen, Event, Journal, unix_seconds};
+use crate::step::{CheckKind, Step};
+use crate::watch::{Limits, Spoiled, Watch};
+
+/// One step of the course, as it went.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Done {
+    /// Why it was chosen.
+    pub chosen: Chosen,
+    /// Its recording or table; empty where nothing was recorded.
+    pub file: String,
+    /// Rows.
+    pub rows: u64,
+    /// Clock at its beginning and end, s.
+    pub clock_s: (f64, f64),
+    /// Attempts that were spoiled, and why.
+    pub spoiled: Vec<Spoiled>,
+    /// What it told.
+    pub told: String,
+}
+
+/// Who watches a campaign.
+pub trait Observer {
+    /// A step was chosen.
+    fn chosen(&mut self, _chosen: &Chosen) {}
+    /// A reading came.
+    fn reading(&mut self, _reading: &Reading) {}
+    /// A recording was spoiled and is repeated or left out.
+    fn spoiled(&mut self, _step: &Step, _reason: Spoiled) {}
+    /// A step is done.
+    fn done(&mut self, _done: &Done) {}
+    /// Whether the campaign is to be interrupted.
+    fn stop(&self) -> bool {
+        false
+    }
+}
+
+/// Nobody watches.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Alone;
+
+impl Observer for Alone {}
+
+/// How a campaign ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// It is complete; why, in one sentence.
+    Complete(String),
+    /// It was interrupted; the same call goes on.
+    Interrupted,
+}
+
+/// Bench time that must be left for an ended campaign to continue, s: less fits no step.
+const LEAST_MORE_S: f64 = 60.0;
+
+/// Where rows and events go.
+trait Sink {
+    fn begin(&mut self, number: u32, name: &str) -> Result<()>;
+    fn row(&mut self, reading: &Reading) -> Result<()>;
+    fn finish(&mut self, suffix: &str, rows: &[Reading]) -> Result<(String, u64)>;
+    fn event(&mut self, event: Event) -> Result<()>;
+    fn recording(&self, file: &str, rows: &[Reading]) -> Result<Recording>;
+    fn table(&mut self, name: &str, csv: &str) -> Result<Option<PathBuf>>;
+}
+
+/// Rows and events on the disk.
+struct OnDisk<'a> {
+    journal: &'a mut Journal,
+    muscle: MuscleDescription,
+}
+
+impl Sink for OnDisk<'_> {
+    fn begin(&mut self, number: u32, name: &str) -> Result<()> {
+        self.journal.begin(number, name)
+    }
+
+    fn row(&mut self, reading: &Reading) -> Result<()> {
+        self.journal.row(reading)
+    }
+
+    fn finish(&mut self, suffix: &str, _rows: &[Reading]) -> Result<(String, u64)> {
+        self.journal.finish(suffix)
+    }
+
+    fn event(&mut self, event: Event) -> Result<()> {
+        self.journal.write(event)
+    }
+
+    fn recording(&self, file: &str, _rows: &[Reading]) -> Result<Recording> {
+        read(&self.journal.folder().join(file), &self.muscle)
+    }
+
+    fn table(&mut self, name: &str, csv: &str) -> Result<Option<PathBuf>> {
+        let path = self.journal.folder().join(name);
+        write_whole(&path, csv.as_bytes())?;
+        Ok(Some(path))
+    }
+}
+
+/// Rows in memory, checks in a folder where there is one.
+struct InMemory<'a> {
+    checks: Option<&'a Path>,
+}
+
+impl Sink for InMemory<'_> {
+    fn begin(&mut self, _number: u32, _name: &str) -> Result<()> {
+        Ok(())
+    }
+
+    fn row(&mut self, _reading: &Reading) -> Result<()> {
+        Ok(())
+    }
+
+    fn finish(&mut self, suffix: &str, rows: &[Reading]) -> Result<(String, u64)> {
+        Ok((suffix.to_owned(), rows.len() as u64))
+    }
+
+    fn event(&mut self, _event: Event) -> Result<()> {
+        Ok(())
+    }
+
+    fn recording(&self, file: &str, rows: &[Reading]) -> Result<Recording> {
+        Ok(recording(file, rows))
+    }
+
+    fn table(&mut self, name: &str, csv: &str) -> Result<Option<PathBuf>> {
+        let Some(folder) = self.checks else { return Ok(None) };
+        let path = folder.join(name);
+        write_whole(&path, csv.as_bytes())?;
+        Ok(Some(path))
+    }
+}
+
+/// Readings as a recording.
+#[must_use]
+pub fn recording(name: &str, rows: &[Reading]) -> Recording {
+    let column = |of: fn(&Reading) -> f64| rows.iter().map(of).collect::<Vec<f64>>();
+    Recording {
+        name: name.to_owned(),
+        time: column(|r| r.time),
+        pressure: column(|r| r.pressure),
+        stroke: column(|r| r.stroke),
+        force: Some(column(|r| r.force)),
+        pressure_command: Some(column(|r| r.command)),
+        ..Recording::default()
+    }
+}
+
+fn read(path: &Path, muscle: &MuscleDescription) -> Result<Recording> {
+    let read = Reader::of(muscle).file(path)?;
+    read.into_iter()
+        .next()
+        .ok_or_else(|| Error::new(DataCode::RecordingEmpty, "the recording holds no rows").file(path))
+}
+
+/// Carries out a whole campaign on the virtual bench, without files; checks of the bench need a folder.
+///
+/// # Errors
+/// What a diagnosis fails with.
+pub fn simulate(engine: &mut Engine, bench: &mut VirtualBench, checks: Option<&Path>) -> Result<Vec<Done>> {
+    let mut course = Vec::new();
+    let mut sink = InMemory { checks };
+    go(engine, bench, &mut sink, &mut Alone, 0.0, &mut course)?;
+    Ok(course)
+}
+
+/// Carries out a campaign in a folder, or goes on with the one that is there.
+///
+/// # Errors
+/// What the device or the disk fails with; the muscle is vented then, and the same call goes on.
+pub fn run(
+    engine: &mut Engine,
+    actuation: &mut dyn Actuation,
+    journal: &mut Journal,
+    observer: &mut dyn Observer,
+) -> Result<(Outcome, Vec<Done>)> {
+    let muscle = engine.muscle().clone();
+    let (mut course, spent) = resume(engine, journal, &muscle)?;
+    if let Some(clock) = journal.clock() {
+        // How long the program was away; less than a second is none.
+        let last = journal.events().iter().rev().find_map(|e| match e {
+            Event::Begin { unix_s, .. } => Some(*unix_s),
+            _ => None,
+        });
+        let away = last.map_or(1.0, |at| (unix_seconds().saturating_sub(at) as f64 - spent).max(1.0));
+        actuation.set_clock(clock.max(last_time(engine)) + away);
+    }
+    // One that ended at its limit continues where the limit is higher now.
+    let more = engine.budget() - spent > LEAST_MORE_S;
+    if let Some(Event::Ended { reason, .. }) = journal.events().last()
+        && !(more && reason.starts_with(crate::words::TIME_IS_OVER))
+    {
+        return Ok((Outcome::Complete(reason.clone()), course));
+    }
+    journal.write(Event::Begin {
+        schema: "pam-campaign-journal/1".into(),
+        muscle: muscle.name.clone(),
+        unix_s: unix_seconds(),
+        clock_s: actuation.clock(),
+    })?;
+    let mut sink = OnDisk { journal, muscle };
+    let outcome = go(engine, actuation, &mut sink, observer, spent, &mut course)?;
+    Ok((outcome, course))
+}
+
+fn last_time(engine: &Engine) -> f64 {
+    engine.recordings().iter().filter_map(|r| r.time.last()).copied().fold(0.0, f64::max)
+}
+
+/// Teaches an engine what the log of an earlier program holds; gives the course and the bench time so far.
+fn resume(engine: &mut Engine, journal: &Journal, muscle: &MuscleDescription) -> Result<(Vec<Done>, f64)> {
+    let mut chosen: Option<Chosen> = None;
+    let mut course: Vec<Done> = Vec::new();
+    let mut spoiled = Vec::new();
+    let mut spent = 0.0;
+    for event in journal.events() {
+        match event {
+            Event::Chosen(c) => (chosen, spoiled) = (Some(c.clone()), Vec::new()),
+            Event::Spoiled { reason, .. } => spoiled.push(*reason),
+            Event::Cut { file, rows, .. } => {
+                // Fewer rows than this are no recording.
+                if *rows >= 20 {
+                    engine.add_rows(read(&journal.folder().join(file), muscle)?);
+                }
+            }
+            Event::Recorded { file, rows, begin_s, end_s, .. } => {
+                let Some(chosen) = chosen.take() else { continue };
+                engine.add(chosen.step, Some(read(&journal.folder().join(file), muscle)?));
+                spent += end_s - begin_s;
+                course.push(Done {
+                    chosen,
+                    file: file.clone(),
+                    rows: *rows,
+                    clock_s: (*begin_s, *end_s),
+                    spoiled: std::mem::take(&mut spoiled),
+                    told: String::new(),
+                });
+            }
+            Event::Checked { check, file, end_s, .. } => {
+                let Some(chosen) = chosen.take() else { continue };
+                engine.add_check(*check, journal.folder().join(file));
+                spent += chosen.expected_s;
+                let clock_s = (end_s - chosen.expected_s, *end_s);
+                let spoiled = Vec::new();
+                course.push(Done {
+                    chosen,
+                    file: file.clone(),
+                    rows: 0,
+                    clock_s,
+                    spoiled,
+                    told: String::new(),
+                });
+            }
+            Event::Told { words, .. } => {
+                if let Some(last) = course.last_mut() {
+                    last.told.clone_from(words);
+                }
+            }
+            Event::Begin { .. } | Event::Ended { .. } => {}
+        }
+    }
+    if !course.is_empty() {
+        engine.fit();
+    }
+    Ok((course, spent))
+}
+
+fn go(
+    engine: &mut Engine,
+    actuation: &mut dyn Actuation,
+    sink: &mut dyn Sink,
+    observer: &mut dyn Observer,
+    mut spent: f64,
+    course: &mut Vec<Done>,
+) -> Result<Outcome> {
+    loop {
+        if observer.stop() {
+            return Ok(Outcome::Interrupted);
+        }
+        actuation.compute(true);
+        let decision = engine.next(spent);
+        actuation.compute(false);
+        let chosen = match decision? {
+            Decision::Stop(reason) => {
+                sink.event(Event::Ended { reason: reason.clone(), clock_s: actuation.clock() })?;
+                return Ok(Outcome::Complete(reason));
+            }
+            Decision::Step(chosen) => chosen,
+        };
+        observer.chosen(&chosen);
+        sink.event(Event::Chosen(chosen.clone()))?;
+        let begin = actuation.clock();
+        let done = match chosen.step {
+            Step::Check { check } => one_check(engine, actuation, sink, &chosen, check)?,
+            _ => match one_step(engine, actuation, sink, observer, &chosen)? {
+                Some(done) => done,
+                None => return Ok(Outcome::Interrupted),
+            },
+        };
+        spent += actuation.clock() - begin;
+        let mut done = Done { clock_s: (begin, actuation.clock()), ..done };
+        actuation.compute(true);
+        let told = engine.learn(spent);
+        actuation.compute(false);
+        done.told = told?;
+        sink.event(Event::Told { number: done.chosen.number, words: done.told.clone() })?;
+        observer.done(&done);
+        course.push(done);
+    }
+}
+
+fn one_check(
+    engine: &mut Engine,
+    actuation: &mut dyn Actuation,
+    sink: &mut dyn Sink,
+    chosen: &Chosen,
+    check: CheckKind,
+) -> Result<Done> {
+    let (force, top) = (engine.places().blocked, engine.places().top);
+    let name = format!("{:02}_{}.csv", chosen.number, check.file());
+    let table = actuation.check(check, force, top)?;
+    let path = table.map(|csv| sink.table(&name, &csv)).transpose()?.flatten();
+    let end_s = actuation.clock();
+    match path {
+        Some(path) => {
+            sink.event(Event::Checked { number: chosen.number, check, file: name.clone(), end_s })?;
+            engine.add_check(check, path);
+        }
+        None => engine.leave_out(chosen.step),
+    }
+    let clock_s = (end_s, end_s);
+    Ok(Done {
+        chosen: chosen.clone(),
+        file: name,
+        rows: 0,
+        clock_s,
+        spoiled: Vec::new(),
+        told: String::new(),
+    })
+}
+
+/// How one attempt ended.
+enum Attempt {
+    /// The course is complete.
+    Whole,
+    /// Somebody asked to stop.
+    Stopped,
+}
+
+/// Records a step, repeated while it is spoiled; `None` where it was interrupted.
+fn one_step(
+    engine: &mut Engine,
+    actuation: &mut dyn Actuation,
+    sink: &mut dyn Sink,
+    observer: &mut dyn Observer,
+    chosen: &Chosen,
+) -> Result<Option<Done>> {
+    let course = chosen.step.course(engine.places());
+    let (top, blocked) = (engine.places().top, engine.places().blocked);
+    let limits = Limits {
+        pressure: top / TOP_SHARE,
+        force: engine.rig().force_max.unwrap_or(f64::MAX),
+        stroke: engine.places().stroke_max,
+    };
+    let begin_s = actuation.clock();
+    let mut spoiled = Vec::new();
+    loop {
+        let mut watch = Watch::new(limits, top, blocked);
+        sink.begin(chosen.number, &chosen.step.name())?;
+        let attempt = attempt(actuation, sink, observer, &course, &mut watch);
+        let end_s = actuation.clock();
+        if !matches!(attempt, Ok(Attempt::Whole)) {
+            let (file, rows) = sink.finish("_cut", watch.rows())?;
+            sink.event(Event::Cut { number: chosen.number, file, rows })?;
+            return attempt.map(|_| None);
+        }
+        match watch.judge(&chosen.step) {
+            None => {
+                let (file, rows) = sink.finish("", watch.rows())?;
+                sink.event(Event::Recorded {
+                    number: chosen.number,
+                    file: file.clone(),
+                    rows,
+                    begin_s,
+                    end_s,
+                })?;
+                let recorded = sink.recording(&file, watch.rows())?;
+                engine.add(chosen.step, Some(Recording { name: chosen.step.name(), ..recorded }));
+                let clock_s = (begin_s, end_s);
+                let told = String::new();
+                return Ok(Some(Done { chosen: chosen.clone(), file, rows, clock_s, spoiled, told }));
+            }
+            Some(reason) => {
+                let (file, rows) = sink.finish("_spoiled", watch.rows())?;
+                sink.event(Event::Spoiled {
+                    number: chosen.number,
+                    file: file.clone(),
+                    rows,
+                    reason,
+                    end_s,
+                })?;
+                observer.spoiled(&chosen.step, reason);
+                spoiled.push(reason);
+                if spoiled.len() as u32 > REPEATS {
+                    engine.leave_out(chosen.step);
+                    let clock_s = (begin_s, end_s);
+                    let told = format!("Left out: {reason}.");
+                    return Ok(Some(Done { chosen: chosen.clone(), file, rows, clock_s, spoiled, told }));
+                }
+            }
+        }
+    }
+}
+
+fn attempt(
+    actuation: &mut dyn Actuation,
+    sink: &mut dyn Sink,
+    observer: &mut dyn Observer,
+    course: &Course,
+    watch: &mut Watch,
+) -> Result<Attempt> {
+    let mut danger = None;
+    let ending = actuation.perform(course, &mut |reading| {
+        observer.reading(reading);
+        // The journal first: what the watch says of a row must not cost the row.
+        if reading.recorded {
+            sink.row(reading)?;
+        }
+        danger = watch.add(reading);
+        Ok(danger.is_none() && !observer.stop())
+    })?;
+    match (danger, ending) {
+        (Some(danger), _) => {
+            Err(Error::new(DataCode::RecordingOutOfRange, format!("the muscle was vented: {danger}"))
+                .help("find the cause; the same call goes on with the campaign"))
+        }
+        (None, Ending::Ended) => Ok(Attempt::Stopped),
+        (None, Ending::Whole) => Ok(Attempt::Whole),
+    }
+}

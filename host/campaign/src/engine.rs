@@ -1,0 +1,357 @@
+//! Chooses the next step from what is known, and learns from what was recorded.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use pam_data::error::Result;
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::Recording;
+use pam_diagnose::Diagnosis;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::analysis::{Findings, diagnosed, fitted, names, sets};
+use crate::criteria::{
+    DIAGNOSE_EVERY, DIAGNOSE_FROM, FIT_FROM, INDEPENDENT_S, INEXACTNESS, NAMED, SURE, WANTED_ERROR,
+    WORTHWHILE_NATS,
+};
+use crate::information::{Design, Gain, Knowledge};
+use crate::journal::Chosen;
+use crate::menu::{menu, opening};
+use crate::places::Places;
+use crate::rig::Rig;
+use crate::step::{CheckKind, Step};
+use crate::words;
+
+/// What a campaign is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Purpose {
+    /// The force table.
+    Fit,
+    /// What the model leaves out.
+    Diagnosis,
+    /// Both.
+    #[default]
+    Both,
+}
+
+/// What to do next.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Decision {
+    /// Carry out this step.
+    Step(Chosen),
+    /// The campaign is complete; why, in one sentence.
+    Stop(String),
+}
+
+/// The last tare of a campaign: without it a drift of the zero cannot be seen.
+pub const CLOSING: Step = Step::Tare { seconds: 10.0 };
+
+/// Everything that a decision depends on.
+#[derive(Debug)]
+pub struct Engine {
+    muscle: MuscleDescription,
+    rig: Rig,
+    purpose: Purpose,
+    budget_s: f64,
+    places: Places,
+    steps: Vec<Step>,
+    left_out: Vec<Step>,
+    recordings: Vec<Recording>,
+    checks: Vec<(CheckKind, PathBuf)>,
+    findings: Option<Findings>,
+    diagnosis: Option<Diagnosis>,
+    since_diagnosis: usize,
+    error: Option<f64>,
+}
+
+impl Engine {
+    /// Nothing recorded yet.
+    ///
+    /// # Errors
+    /// See [`Places::new`].
+    pub fn new(muscle: MuscleDescription, rig: Rig, purpose: Purpose, budget_s: f64) -> Result<Self> {
+        let places = Places::new(&muscle, &rig)?;
+        Ok(Self {
+            muscle,
+            rig,
+            purpose,
+            budget_s,
+            places,
+            steps: Vec::new(),
+            left_out: Vec::new(),
+            recordings: Vec::new(),
+            checks: Vec::new(),
+            findings: None,
+            diagnosis: None,
+            since_diagnosis: 0,
+            error: None,
+        })
+    }
+
+    /// The muscle's range as it is known now.
+    #[must_use]
+    pub fn places(&self) -> &Places {
+        &self.places
+    }
+
+    /// The rig.
+    #[must_use]
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// The muscle's description.
+    #[must_use]
+    pub fn muscle(&self) -> &MuscleDescription {
+        &self.muscle
+    }
+
+    /// Everything recorded so far.
+    #[must_use]
+    pub fn recordings(&self) -> &[Recording] {
+        &self.recordings
+    }
+
+    /// The fit of it, as soon as there is one.
+    #[must_use]
+    pub fn findings(&self) -> Option<&Findings> {
+        self.findings.as_ref()
+    }
+
+    /// The last diagnosis.
+    #[must_use]
+    pub fn diagnosis(&self) -> Option<&Diagnosis> {
+        self.diagnosis.as_ref()
+    }
+
+    /// Predicted standard error of the table on unseen pressures and strokes, N, as of the last choice.
+    #[must_use]
+    pub fn predicted_error(&self) -> Option<f64> {
+        self.error
+    }
+
+    /// Budget of bench time, s.
+    #[must_use]
+    pub fn budget(&self) -> f64 {
+        self.budget_s
+    }
+
+    /// What to do next, after so much bench time.
+    ///
+    /// # Errors
+    /// What a diagnosis fails with.
+    pub fn next(&mut self, spent_s: f64) -> Result<Decision> {
+        let begun = Instant::now();
+        let closing = CLOSING.seconds(&self.places);
+        let left = self.budget_s - spent_s - closing;
+        let number = self.steps.len() as u32 + self.left_out.len() as u32 + 1;
+        let chosen = |step: Step, why: String, gain: Gain, expected_s: f64| {
+            Decision::Step(Chosen {
+                number,
+                step,
+                why,
+                table_nats: gain.table,
+                effect_nats: gain.set,
+                unseen_nats: gain.unseen,
+                predicted_error: gain.error_before,
+                expected_s,
+                choosing_s: begun.elapsed().as_secs_f64(),
+            })
+        };
+        for (step, why) in opening(&self.places, &self.rig) {
+            let kind = |s: &Step| s.name();
+            let done = self.steps.iter().chain(&self.left_out).any(|s| kind(s) == kind(&step));
+            // How long it takes is known only when the free stroke is; without these steps nothing else can be chosen.
+            if !done && left > 0.0 {
+                let seconds = step.seconds(&self.places);
+                return Ok(chosen(step, why.to_owned(), Gain::default(), seconds));
+            }
+        }
+        let (best, settled) = self.weigh(left);
+        let closed = matches!(self.steps.last(), Some(Step::Tare { .. }));
+        let close = |reason: String| {
+            if closed || left < 0.0 {
+                Decision::Stop(reason)
+            } else {
+                chosen(CLOSING, words::CLOSING.to_owned(), Gain::default(), closing)
+            }
+        };
+        if settled {
+            return Ok(close(words::settled(self.diagnosis.as_ref(), self.purpose)));
+        }
+        Ok(match best {
+            Some((step, gain, seconds)) if self.findings.is_none() => {
+                chosen(step, words::NO_TABLE.to_owned(), gain, seconds)
+            }
+            Some((step, gain, seconds)) => {
+                let why = words::why(&gain, self.diagnosis.as_ref(), &step);
+                chosen(step, why, gain, seconds)
+            }
+            None if left < self.shortest() => close(words::time_is_over(self.budget_s)),
+            None => close(words::NOTHING_MORE.to_owned()),
+        })
+    }
+
+    /// The shortest step of the menu, s.
+    fn shortest(&self) -> f64 {
+        let steps = menu(&self.places, &self.rig).into_iter().map(|s| s.seconds(&self.places));
+        steps.fold(f64::INFINITY, f64::min)
+    }
+
+    /// The step of the menu that tells most per second within the time left, and whether everything asked for is known.
+    fn weigh(&mut self, left_s: f64) -> (Option<(Step, Gain, f64)>, bool) {
+        let Some(findings) = &self.findings else {
+            let next = menu(&self.places, &self.rig)
+                .into_iter()
+                .find(|s| !self.steps.contains(s) && self.may_follow(s) && s.seconds(&self.places) <= left_s);
+            return (next.map(|s| (s, Gain::default(), s.seconds(&self.places))), false);
+        };
+        let sets = match (&self.diagnosis, self.purpose) {
+            (_, Purpose::Fit) | (None, _) => Vec::new(),
+            (Some(d), _) => sets(d),
+        };
+        let blocked = self.places.blocked.max(1e-9);
+        let (noise, memory) = self.diagnosis.as_ref().map_or((0.0, 0.0), |d| (d.noise_N, d.noise_memory_s));
+        let noise = noise.max(findings.fit.summary.rms_N.min(0.01 * blocked));
+        let levels = self.places.levels();
+        let checked: Vec<CheckKind> = self.checks.iter().map(|c| c.0).collect();
+        let knowledge = Knowledge {
+            model: &findings.model,
+            past: &self.recordings,
+            levels: &levels,
+            sigma: noise.hypot(INEXACTNESS * blocked),
+            independent_s: INDEPENDENT_S.max(memory),
+            blocked,
+            sets: &sets,
+            checked: &checked,
+        };
+        let design = Design::new(knowledge, &self.places);
+        let (error, doubts) = design.now();
+        self.error = Some(error);
+        let table_known = error <= WANTED_ERROR * blocked;
+        let all_seen = doubts.iter().all(|d| *d < NAMED);
+        let one_name = self.diagnosis.as_ref().is_some_and(|d| {
+            d.judged() && d.missing.iter().all(|m| m.confusable_with.is_empty() && m.probability >= SURE)
+        });
+        let settled = match self.purpose {
+            Purpose::Fit => table_known,
+            Purpose::Diagnosis => one_name && all_seen,
+            Purpose::Both => table_known && one_name && all_seen,
+        };
+        let steps: Vec<Step> = menu(&self.places, &self.rig)
+            .into_iter()
+            .filter(|s| self.may_follow(s) && s.seconds(&self.places) <= left_s)
+            .collect();
+        let weighed: Vec<(Step, Gain, f64)> = steps
+            .par_iter()
+            .map(|s| {
+                let mut gain = design.gain(s, &self.places);
+                match self.purpose {
+                    Purpose::Fit => (gain.set, gain.unseen) = (0.0, 0.0),
+                    Purpose::Diagnosis => gain.table = 0.0,
+                    Purpose::Both => {}
+                }
+                // A repeat averages noise, and leaves the inexactness of the model as it is.
+                let repeats = self.steps.iter().filter(|done| *done == s).count() as f64;
+                if !matches!(s, Step::Tare { .. }) {
+                    gain = gain.divided(1.0 + repeats);
+                }
+                (*s, gain, s.seconds(&self.places))
+            })
+            .collect();
+        let rate = |w: &(Step, Gain, f64)| w.1.total() / w.2.max(1.0);
+        let mut best: Option<&(Step, Gain, f64)> = None;
+        for w in weighed.iter().filter(|w| w.1.total() >= WORTHWHILE_NATS) {
+            // The first of equals: the menu's order is fixed.
+            if best.is_none_or(|b| rate(w) > rate(b)) {
+                best = Some(w);
+            }
+        }
+        (best.copied(), settled)
+    }
+
+    fn may_follow(&self, step: &Step) -> bool {
+        if self.left_out.contains(step) {
+            return false;
+        }
+        match step {
+            Step::Check { check } => !self.checks.iter().any(|c| c.0 == *check),
+            Step::Tare { .. } => !matches!(self.steps.last(), Some(Step::Tare { .. })),
+            _ => true,
+        }
+    }
+
+    /// Takes what a step recorded.
+    pub fn add(&mut self, step: Step, recording: Option<Recording>) {
+        self.steps.push(step);
+        self.since_diagnosis += 1;
+        let Some(recording) = recording else { return };
+        match step {
+            Step::BlockedRamp | Step::Staircase { .. } => self.places.learn_ramp(&recording),
+            Step::Loops { .. } => self.places.learn_strokes(&recording),
+            _ => {}
+        }
+        self.recordings.push(recording);
+    }
+
+    /// Takes rows of an interrupted step: they are recordings like others, and the step is still to do.
+    pub fn add_rows(&mut self, recording: Recording) {
+        self.recordings.push(recording);
+    }
+
+    /// Takes a check of the bench.
+    pub fn add_check(&mut self, check: CheckKind, file: PathBuf) {
+        self.steps.push(Step::Check { check });
+        self.checks.push((check, file));
+        // It may settle everything.
+        self.since_diagnosis = DIAGNOSE_EVERY;
+    }
+
+    /// Leaves a step out for good.
+    pub fn leave_out(&mut self, step: Step) {
+        self.left_out.push(step);
+    }
+
+    /// Fits and, from time to time, diagnoses; says in words what the last step told.
+    ///
+    /// # Errors
+    /// What a diagnosis fails with.
+    pub fn learn(&mut self, spent_s: f64) -> Result<String> {
+        let before = self.findings.as_ref().map(|f| f.fit.summary.deadband_kPa);
+        self.fit();
+        let mut told = words::table(before, self.findings.as_ref());
+        let due = self.since_diagnosis >= DIAGNOSE_EVERY && spent_s >= DIAGNOSE_FROM;
+        if due && self.purpose != Purpose::Fit && self.findings.is_some() {
+            let earlier = self.diagnosis.as_ref().map(names);
+            self.diagnose()?;
+            if let Some(d) = &self.diagnosis {
+                told += &words::diagnosis(earlier.as_deref(), d);
+            }
+        }
+        Ok(told)
+    }
+
+    /// Fits the table to everything recorded.
+    pub fn fit(&mut self) {
+        if self.recordings.len() < FIT_FROM {
+            return;
+        }
+        if let Some(findings) = fitted(&self.recordings, &self.muscle) {
+            self.places.learn_model(findings.model.clone());
+            self.findings = Some(findings);
+        }
+    }
+
+    /// Diagnoses everything recorded.
+    ///
+    /// # Errors
+    /// Checks that cannot be read; recordings without rows.
+    pub fn diagnose(&mut self) -> Result<()> {
+        let files: Vec<PathBuf> = self.checks.iter().map(|c| c.1.clone()).collect();
+        self.diagnosis = Some(diagnosed(&self.recordings, &self.muscle, &files)?);
+        self.since_diagnosis = 0;
+        Ok(())
+    }
+}

@@ -1,0 +1,44 @@
+//! A test campaign that chooses its own steps: what to record next, whether it is good, when it is enough.
+//!
+//! | question | module |
+//! | --- | --- |
+//! | what can the rig do | [`rig`], [`menu`], [`step`], [`course`] |
+//! | what is known of the muscle's range | [`places`] |
+//! | what is a step expected to tell | [`information`] |
+//! | what to do next, and when to stop | [`engine`] |
+//! | is the recording good | [`watch`] |
+//! | who carries it out | [`actuation`]: [`bench`], [`controller`] |
+//! | what was done, also after an interruption | [`journal`], [`campaign`] |
+//!
+//! ```
+//! use pam_campaign::{bench::VirtualBench, campaign, engine::{Engine, Purpose}, rig::Rig};
+//! use pam_data::muscle_description::MuscleDescription;
+//! use virtual_bench::{bench::BenchSpec, presets};
+//!
+//! let spec = BenchSpec::laboratory(presets::miniature(), 1);
+//! let muscle = MuscleDescription::parse(&spec.muscle.description())?;
+//! // Three minutes: the first steps of every campaign.
+//! let mut engine = Engine::new(muscle, Rig::commanded(), Purpose::Fit, 180.0)?;
+//! let course = campaign::simulate(&mut engine, &mut VirtualBench::new(&spec), None)?;
+//! assert!(course.iter().any(|s| s.rows > 100));
+//! # Ok::<(), pam_data::error::Error>(())
+//! ```
+
+pub mod actuation;
+pub mod analysis;
+pub mod bench;
+pub mod campaign;
+mod columns;
+pub mod controller;
+pub mod course;
+pub mod criteria;
+pub mod engine;
+pub mod information;
+pub mod journal;
+pub mod menu;
+pub mod places;
+pub mod rig;
+pub mod step;
+pub mod stroke_axis;
+pub mod watch;
+pub mod words;

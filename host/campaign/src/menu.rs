@@ -1,0 +1,74 @@
+//! Which steps a rig can do, and the first ones of every campaign.
+
+use crate::places::Places;
+use crate::rig::{Axis, Rig};
+use crate::step::{CheckKind, Step};
+
+/// Every step that the rig can do, in a fixed order.
+#[must_use]
+pub fn menu(places: &Places, rig: &Rig) -> Vec<Step> {
+    let levels = places.levels();
+    let middle = levels.get(levels.len() / 2).copied().unwrap_or(places.top);
+    let mut steps = Vec::new();
+    if rig.axis.moves() {
+        for &level in &levels {
+            steps.extend([
+                Step::Loops { level, times: 1.0, count: 2 },
+                Step::Loops { level, times: 8.0, count: 3 },
+                Step::Speeds { level },
+                Step::Dwells { level, seconds: 30.0 },
+                Step::Dwells { level, seconds: 90.0 },
+                Step::Nested { level, times: 4.0 },
+            ]);
+        }
+        steps.push(Step::Rest { seconds: 300.0, level: middle });
+    }
+    let parts: &[f64] = if rig.axis.positions() { &[0.0, 0.3, 0.6] } else { &[0.0] };
+    steps.extend(parts.iter().map(|part| Step::Ramps { part: *part }));
+    if !rig.axis.moves() {
+        let seconds = [4.0, 20.0];
+        steps.extend(
+            parts.iter().flat_map(|part| seconds.map(|seconds| Step::Staircase { part: *part, seconds })),
+        );
+    }
+    steps.push(Step::Tare { seconds: 10.0 });
+    if rig.checks {
+        steps.extend(CheckKind::ALL.map(|check| Step::Check { check }));
+    }
+    steps
+}
+
+/// The first steps of a campaign with the reason of each: before there is a table, nothing can be weighed.
+#[must_use]
+pub fn opening(places: &Places, rig: &Rig) -> Vec<(Step, &'static str)> {
+    let levels = places.levels();
+    let at = |i: usize| levels.get(i).copied().unwrap_or(places.top);
+    let mut steps = vec![
+        (Step::Tare { seconds: 10.0 }, "The zeros of the instruments are needed before anything else."),
+        (
+            Step::BlockedRamp,
+            "It shows the deadband and the blocked force, from which the pressure levels follow.",
+        ),
+    ];
+    if rig.axis.moves() {
+        let loops = |level: f64| Step::Loops { level, times: 1.0, count: 2 };
+        steps.extend([
+            (loops(places.top), "It shows the free stroke and the friction at the highest level."),
+            (loops(at(0)), "The lowest level limits the table on the other side."),
+            (loops(at(3)), "A table needs a third level before the next step can be weighed."),
+        ]);
+    } else {
+        steps.push((
+            Step::Staircase { part: 0.0, seconds: 4.0 },
+            "It shows the force at rest length over all pressures.",
+        ));
+        if rig.axis == Axis::Prompt {
+            let held = |part: f64| Step::Staircase { part, seconds: 4.0 };
+            steps.extend([
+                (held(0.3), "A second length is needed for the elasticity of the bladder."),
+                (held(0.6), "A third length limits the table on the other side."),
+            ]);
+        }
+    }
+    steps
+}

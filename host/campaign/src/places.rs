@@ -1,0 +1,191 @@
+//! What is known of the muscle's range: pressures, free strokes, speeds. Estimates at first, the table's own as soon as there is one.
+
+use model_core::muscle::Muscle;
+use model_core::units::{Length, Pressure};
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::Recording;
+
+use crate::criteria::{
+    BOTTOM_DEADBANDS, BOTTOM_SHARE, BOTTOM_STROKE, FREE_FORCE, LARGEST_CONTRACTION, LEVELS, SLOW_STROKE,
+    TOP_SHARE,
+};
+use crate::rig::{Axis, Rig};
+
+/// The muscle's range on this rig.
+#[derive(Debug, Clone)]
+pub struct Places {
+    /// Highest level, Pa.
+    pub top: f64,
+    /// Largest stroke that is allowed, m.
+    pub stroke_max: f64,
+    /// Largest speed that is allowed, m/s.
+    pub speed_max: f64,
+    /// Whether a person sets strokes.
+    pub by_hand: bool,
+    /// Blocked force at the highest level, N; zero until it is measured.
+    pub blocked: f64,
+    /// Pressure at which the muscle begins to pull at rest length, Pa; zero until it is measured.
+    pub deadband: f64,
+    /// Free stroke at the highest level, m; zero until it is measured.
+    pub free: f64,
+    /// The fitted model.
+    pub model: Option<Box<Muscle<f64>>>,
+    /// Levels that were decided on: they stay, so that recordings at one level can be compared.
+    decided: Option<Vec<f64>>,
+}
+
+impl Places {
+    /// Before anything is recorded.
+    ///
+    /// # Errors
+    /// [`DataCode::MuscleInvalid`] where neither the muscle's description nor the rig's says how much pressure is allowed.
+    pub fn new(muscle: &MuscleDescription, rig: &Rig) -> Result<Self> {
+        let rated = [muscle.max_pressure(), rig.pressure_max_kpa.map(|kpa| kpa * 1e3 / TOP_SHARE)];
+        let highest = rated.into_iter().flatten().fold(f64::INFINITY, f64::min);
+        if !(highest > 0.0 && highest.is_finite()) {
+            return Err(Error::new(
+                DataCode::MuscleInvalid,
+                "neither the muscle's description nor the rig's says how much pressure is allowed",
+            )
+            .help("add max_pressure_kPa to the muscle's description, or pressure_max_kPa to rig.toml"));
+        }
+        let stroke_max = (LARGEST_CONTRACTION * muscle.rest_length())
+            .min(rig.stroke_max_mm.map_or(f64::INFINITY, |mm| mm * 1e-3));
+        Ok(Self {
+            // Whole kilopascals, as a person would set them.
+            top: (TOP_SHARE * highest * 1e-3).floor() * 1e3,
+            stroke_max,
+            speed_max: rig.speed_max_mm_s.map_or(f64::INFINITY, |v| v * 1e-3),
+            by_hand: rig.axis == Axis::Prompt,
+            blocked: 0.0,
+            deadband: 0.0,
+            free: 0.0,
+            model: None,
+            decided: None,
+        })
+    }
+
+    /// Takes blocked force and deadband from a recorded pressure ramp at rest length.
+    pub fn learn_ramp(&mut self, recording: &Recording) {
+        let Some(force) = &recording.force else { return };
+        let highest = force.iter().copied().fold(0.0, f64::max);
+        if !(highest > 0.0) {
+            return;
+        }
+        self.blocked = self.blocked.max(highest);
+        // A straight line through the upper half of the force: it meets zero at the deadband.
+        let upper: Vec<(f64, f64)> = recording
+            .pressure
+            .iter()
+            .zip(force)
+            .filter(|(_, f)| **f > 0.4 * highest)
+            .map(|(p, f)| (*p, *f))
+            .collect();
+        let n = upper.len() as f64;
+        let mean = |of: fn(&(f64, f64)) -> f64| upper.iter().map(of).sum::<f64>() / n;
+        let (p, f) = (mean(|u| u.0), mean(|u| u.1));
+        let slope = upper.iter().map(|u| (u.0 - p) * (u.1 - f)).sum::<f64>()
+            / upper.iter().map(|u| (u.0 - p).powi(2)).sum::<f64>();
+        let zero = p - f / slope;
+        if slope > 0.0 && zero.is_finite() {
+            self.deadband = zero.clamp(0.0, 0.5 * self.top);
+        }
+    }
+
+    /// Takes the free stroke from recorded strokes at the highest level.
+    pub fn learn_strokes(&mut self, recording: &Recording) {
+        let longest = recording.stroke.iter().copied().fold(0.0, f64::max);
+        let pressure = recording.pressure.iter().sum::<f64>() / recording.len().max(1) as f64;
+        if pressure > 0.95 * self.top && longest > 0.0 {
+            self.free = self.free.max(longest.min(self.stroke_max));
+        }
+        let highest = recording.force.iter().flatten().copied().fold(0.0, f64::max);
+        self.blocked = self.blocked.max(highest);
+    }
+
+    /// Takes a fitted model.
+    pub fn learn_model(&mut self, model: Muscle<f64>) {
+        let deadband = model.deadband().pascals();
+        if deadband > 0.0 {
+            self.deadband = deadband.min(0.5 * self.top);
+        }
+        self.model = Some(Box::new(model));
+        if self.decided.is_none() && self.free > 0.0 {
+            self.decided = Some(self.levels());
+        }
+    }
+
+    /// The pressures of the campaign, Pa, rising.
+    #[must_use]
+    pub fn levels(&self) -> Vec<f64> {
+        if let Some(levels) = &self.decided {
+            return levels.clone();
+        }
+        let moves = match &self.model {
+            Some(_) => self.pressure_that_reaches(BOTTOM_STROKE * self.free_stroke(self.top)),
+            None => 0.0,
+        };
+        let bottom =
+            (BOTTOM_SHARE * self.top).max(BOTTOM_DEADBANDS * self.deadband).max(moves).min(0.7 * self.top);
+        let last = (LEVELS - 1) as f64;
+        (0..LEVELS).map(|i| ((bottom + (self.top - bottom) * i as f64 / last) * 1e-3).round() * 1e3).collect()
+    }
+
+    /// The slow speed, m/s.
+    #[must_use]
+    pub fn slow_speed(&self) -> f64 {
+        // A quarter of the longest stroke before it is known: a tenth of the rest length.
+        let free = if self.free > 0.0 { self.free } else { 0.25 * self.stroke_max };
+        (free / SLOW_STROKE).max(1e-6)
+    }
+
+    /// Force at which a stroke turns, N.
+    #[must_use]
+    pub fn free_force(&self) -> f64 {
+        FREE_FORCE * self.blocked
+    }
+
+    /// Stroke at which the muscle is free at a pressure, m; a little more where it is not known yet, as the force ends a stroke.
+    #[must_use]
+    pub fn free_stroke(&self, pressure: f64) -> f64 {
+        let limit = self.stroke_max;
+        if self.free > 0.0
+            && let Some(model) = &self.model
+        {
+            return (1.02 * pam_diagnose::protocol_simulation::free_stroke(model, pressure)).min(limit);
+        }
+        if self.free > 0.0 {
+            let share = (pressure - self.deadband) / (self.top - self.deadband).max(1.0);
+            return (1.2 * self.free * share.clamp(0.05, 1.0)).min(limit);
+        }
+        limit
+    }
+
+    /// Least pressure at which the free stroke is at least this, Pa; zero for none.
+    #[must_use]
+    pub fn pressure_that_reaches(&self, stroke: f64) -> f64 {
+        if stroke <= 0.0 {
+            return 0.0;
+        }
+        let (mut low, mut high) = (0.0, self.top);
+        for _ in 0..30 {
+            let middle = 0.5 * (low + high);
+            if self.free_stroke(middle) < stroke { low = middle } else { high = middle }
+        }
+        // A ramp without width shows nothing.
+        high.min(0.8 * self.top)
+    }
+
+    /// Force by the model, N; by the blocked force alone before there is one.
+    #[must_use]
+    pub fn force(&self, pressure: f64, stroke: f64) -> f64 {
+        match &self.model {
+            Some(m) => m.force(Pressure::from_pascals(pressure), Length::from_metres(stroke), 0.0).newtons(),
+            None => {
+                let share = (pressure - self.deadband) / (self.top - self.deadband).max(1.0);
+                self.blocked * share.max(0.0)
+            }
+        }
+    }
+}

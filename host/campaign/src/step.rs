@@ -1,0 +1,329 @@
+//! The menu of steps: what can be done with the muscle, as plain data.
+
+use model_core::effects::BenchCheck;
+use serde::{Deserialize, Serialize};
+
+use crate::course::{Course, Segment, VENT_S};
+use crate::criteria::{HANDLING_S, RAMP_SHARE, SLOW_RAMP_SHARE};
+use crate::places::Places;
+
+/// What a step does.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "do", rename_all = "kebab-case")]
+pub enum Step {
+    /// Vented at rest length: the zeros of the instruments.
+    Tare {
+        /// How long, s.
+        seconds: f64,
+    },
+    /// Pressure up and down at rest length: deadband, and blocked force.
+    BlockedRamp,
+    /// Strokes from blocked to free and back.
+    Loops {
+        /// Pressure, Pa.
+        level: f64,
+        /// Speed, in slow speeds.
+        times: f64,
+        /// How many.
+        count: u32,
+    },
+    /// One slow stroke, two at four times its speed, three at sixteen times.
+    Speeds {
+        /// Pressure, Pa.
+        level: f64,
+    },
+    /// Two holds at the same place, reached from either side.
+    Dwells {
+        /// Pressure, Pa.
+        level: f64,
+        /// How long each, s.
+        seconds: f64,
+    },
+    /// Small strokes inside large ones.
+    Nested {
+        /// Pressure, Pa.
+        level: f64,
+        /// Speed, in slow speeds.
+        times: f64,
+    },
+    /// Slow pressure ramps at a held length, down and up twice.
+    Ramps {
+        /// Stroke, share of the free stroke at the highest level.
+        part: f64,
+    },
+    /// A pressure staircase up and down at a held length.
+    Staircase {
+        /// Stroke, share of the free stroke at the highest level.
+        part: f64,
+        /// How long each stair, s.
+        seconds: f64,
+    },
+    /// Vented rest, then one slow stroke.
+    Rest {
+        /// How long, s.
+        seconds: f64,
+        /// Pressure of the stroke, Pa.
+        level: f64,
+    },
+    /// A check of the bench without the muscle.
+    Check {
+        /// Which.
+        check: CheckKind,
+    },
+}
+
+/// Checks that a campaign can ask for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CheckKind {
+    /// Known weights on the load cell.
+    DeadWeights,
+    /// A rigid bar in the muscle's place.
+    RigidBar,
+    /// A better gauge beside the bench's own.
+    ReferenceGauge,
+}
+
+impl CheckKind {
+    /// All.
+    pub const ALL: [Self; 3] = [Self::DeadWeights, Self::RigidBar, Self::ReferenceGauge];
+
+    /// The check of an effect's traits, where it is one of these.
+    #[must_use]
+    pub const fn of(check: BenchCheck) -> Option<Self> {
+        match check {
+            BenchCheck::DeadWeights => Some(Self::DeadWeights),
+            BenchCheck::RigidBar => Some(Self::RigidBar),
+            BenchCheck::ReferenceGauge => Some(Self::ReferenceGauge),
+            _ => None,
+        }
+    }
+
+    /// Name of its file, without extension.
+    #[must_use]
+    pub const fn file(self) -> &'static str {
+        match self {
+            Self::DeadWeights => "dead_weights",
+            Self::RigidBar => "rigid_bar",
+            Self::ReferenceGauge => "gauge_check",
+        }
+    }
+
+    /// Its recording, s, as the virtual bench makes it; handling comes on top.
+    #[must_use]
+    pub const fn seconds(self) -> f64 {
+        match self {
+            Self::DeadWeights => 84.0,
+            Self::RigidBar => 120.0,
+            Self::ReferenceGauge => 60.0,
+        }
+    }
+}
+
+impl Step {
+    /// A short name for files.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let kpa = |p: f64| format!("{:03.0}kPa", p * 1e-3);
+        match *self {
+            Self::Tare { .. } => "tare".into(),
+            Self::BlockedRamp => "blocked_ramp".into(),
+            Self::Loops { level, times, .. } if times > 1.0 => format!("fast_{}", kpa(level)),
+            Self::Loops { level, .. } => format!("loops_{}", kpa(level)),
+            Self::Speeds { level } => format!("speeds_{}", kpa(level)),
+            Self::Dwells { level, .. } => format!("dwells_{}", kpa(level)),
+            Self::Nested { level, .. } => format!("nested_{}", kpa(level)),
+            Self::Ramps { part } => format!("ramps_{:02.0}percent", 100.0 * part),
+            Self::Staircase { part, .. } => format!("staircase_{:02.0}percent", 100.0 * part),
+            Self::Rest { level, .. } => format!("rested_{}", kpa(level)),
+            Self::Check { check } => check.file().into(),
+        }
+    }
+
+    /// In words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let kpa = |p: f64| format!("{:.0} kPa", p * 1e-3);
+        match *self {
+            Self::Tare { seconds } => format!("vented at rest length for {seconds:.0} s"),
+            Self::BlockedRamp => "a slow pressure ramp up and down at rest length".into(),
+            Self::Loops { level, times, count } => {
+                format!("{count} strokes at {}, {times:.3} × the slow speed", kpa(level))
+            }
+            Self::Speeds { level } => format!("strokes at three speeds at {}", kpa(level)),
+            Self::Dwells { level, seconds } => {
+                format!(
+                    "two holds of {seconds:.0} s at the same place, reached from either side, at {}",
+                    kpa(level)
+                )
+            }
+            Self::Nested { level, .. } => format!("small strokes inside large ones at {}", kpa(level)),
+            Self::Ramps { part } => {
+                format!("slow pressure ramps, the length held at {:.0} % of the free stroke", 100.0 * part)
+            }
+            Self::Staircase { part, .. } => {
+                format!("a pressure staircase, the length held at {:.0} % of the free stroke", 100.0 * part)
+            }
+            Self::Rest { seconds, level } => {
+                format!("a vented rest of {:.0} s, then a slow stroke at {}", seconds, kpa(level))
+            }
+            Self::Check { check } => match check {
+                CheckKind::DeadWeights => "a check of the load cell with dead weights".into(),
+                CheckKind::RigidBar => "a check of the frame with a rigid bar".into(),
+                CheckKind::ReferenceGauge => "a check of the pressure sensor with a reference gauge".into(),
+            },
+        }
+    }
+
+    /// Its course on a muscle; empty for a check, which has no muscle.
+    #[must_use]
+    pub fn course(&self, places: &Places) -> Course {
+        let mut builder = Builder { places, course: Course::default(), level: 0.0 };
+        match *self {
+            Self::Tare { seconds } => {
+                builder.course.skip(Segment::Vented { seconds: VENT_S });
+                builder.course.record(Segment::Vented { seconds });
+            }
+            Self::BlockedRamp => builder.blocked_ramp(),
+            Self::Loops { level, times, count } => {
+                builder.begin(level);
+                builder.loops(times, count);
+            }
+            Self::Speeds { level } => {
+                builder.begin(level);
+                for (times, count) in [(1.0, 1), (4.0, 2), (16.0, 3)] {
+                    builder.loops(times, count);
+                }
+            }
+            Self::Dwells { level, seconds } => {
+                builder.begin(level);
+                builder.dwells(seconds);
+            }
+            Self::Nested { level, times } => {
+                builder.begin(level);
+                for part in [0.9, 0.25, 0.75, 0.4, 0.6, 0.25, 0.9, 0.0] {
+                    builder.go(part, times);
+                }
+            }
+            Self::Ramps { part } => builder.ramps(part),
+            Self::Staircase { part, seconds } => builder.staircase(part, seconds),
+            Self::Rest { seconds, level } => {
+                builder.course.skip(Segment::Vented { seconds });
+                builder.begin(level);
+                builder.loops(1.0, 1);
+            }
+            Self::Check { .. } => return Course::default(),
+        }
+        builder.end();
+        builder.course
+    }
+
+    /// Bench time that it takes, s.
+    #[must_use]
+    pub fn seconds(&self, places: &Places) -> f64 {
+        match self {
+            Self::Check { check } => check.seconds() + HANDLING_S,
+            _ => {
+                let moves = if places.by_hand { f64::from(self.positions()) * HANDLING_S } else { 0.0 };
+                self.course(places).seconds() + moves
+            }
+        }
+    }
+
+    /// Strokes that a person would have to set.
+    fn positions(&self) -> u32 {
+        match self {
+            Self::Ramps { part } | Self::Staircase { part, .. } if *part > 0.0 => 2,
+            _ => 0,
+        }
+    }
+}
+
+struct Builder<'a> {
+    places: &'a Places,
+    course: Course,
+    level: f64,
+}
+
+impl Builder<'_> {
+    fn begin(&mut self, level: f64) {
+        self.level = level;
+        self.course.skip(Segment::Ramp { to: level, rate: RAMP_SHARE * self.places.top });
+        self.course.skip(Segment::Hold { seconds: 2.0 });
+    }
+
+    fn end(&mut self) {
+        self.course.skip(Segment::Vented { seconds: VENT_S });
+    }
+
+    fn speed(&self, times: f64) -> f64 {
+        (times * self.places.slow_speed()).min(self.places.speed_max)
+    }
+
+    fn travel(&mut self, to: f64, times: f64) {
+        let until_force = (to > 0.0).then_some(self.places.free_force());
+        self.course.record(Segment::Travel { to, speed: self.speed(times), until_force });
+    }
+
+    fn go(&mut self, part: f64, times: f64) {
+        self.travel(part * self.places.free_stroke(self.level), times);
+    }
+
+    fn loops(&mut self, times: f64, count: u32) {
+        for _ in 0..count {
+            self.go(1.0, times);
+            self.go(0.0, times);
+        }
+    }
+
+    fn dwells(&mut self, seconds: f64) {
+        self.go(0.5, 4.0);
+        self.course.record(Segment::Hold { seconds });
+        self.go(0.9, 4.0);
+        self.go(0.5, 4.0);
+        self.course.record(Segment::Hold { seconds });
+        self.go(0.0, 4.0);
+    }
+
+    fn blocked_ramp(&mut self) {
+        let top = self.places.top;
+        let rate = SLOW_RAMP_SHARE * top;
+        self.course.record(Segment::Ramp { to: top, rate });
+        self.course.record(Segment::Hold { seconds: 2.0 });
+        self.course.record(Segment::Ramp { to: 0.0, rate });
+        self.course.record(Segment::Hold { seconds: 2.0 });
+    }
+
+    fn ramps(&mut self, part: f64) {
+        let top = self.places.top;
+        self.begin(top);
+        let stroke = part * self.places.free_stroke(top);
+        let low = self.places.pressure_that_reaches(1.05 * stroke);
+        self.travel(stroke, 4.0);
+        for to in [low, top, low, top] {
+            self.course.record(Segment::Ramp { to, rate: SLOW_RAMP_SHARE * top });
+            self.course.record(Segment::Hold { seconds: 2.0 });
+        }
+        self.travel(0.0, 4.0);
+    }
+
+    fn staircase(&mut self, part: f64, seconds: f64) {
+        let top = self.places.top;
+        self.begin(top);
+        let stroke = part * self.places.free_stroke(top);
+        let low = self.places.pressure_that_reaches(1.05 * stroke);
+        if stroke > 0.0 {
+            self.travel(stroke, 4.0);
+        }
+        let stairs = 8;
+        let at = |i: i32| low + (top - low) * f64::from(i) / f64::from(stairs);
+        let down_and_up = (0..stairs).rev().chain(1..=stairs);
+        for to in down_and_up.map(at) {
+            self.course.record(Segment::Ramp { to, rate: RAMP_SHARE * top });
+            self.course.record(Segment::Hold { seconds });
+        }
+        if stroke > 0.0 {
+            self.travel(0.0, 4.0);
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! An axis that moves the muscle's free end as it is told, at the speed that it is told.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// Where the axis is and goes.
+#[derive(Debug, Clone, Copy, Default)]
+struct Course {
+    now_m: f64,
+    to_m: f64,
+    speed_m_per_s: f64,
+}
+
+/// The command of the axis; clones command the same one.
+///
+/// ```
+/// let axis = pam_device::emulated::Axis::default();
+/// axis.go(1e-3, 2e-3);
+/// assert!((axis.advance(0.25) - 0.5e-3).abs() < 1e-12);
+/// assert_eq!(axis.advance(10.0), 1e-3);
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct Axis {
+    course: Arc<Mutex<Course>>,
+    waits: Arc<AtomicBool>,
+}
+
+impl Axis {
+    /// Moves to a stroke, m, at a speed, m/s, from now on. A number that is none changes nothing.
+    pub fn go(&self, to_m: f64, speed_m_per_s: f64) {
+        if to_m.is_finite() && speed_m_per_s > 0.0 {
+            let mut course = self.course.lock().unwrap_or_else(PoisonError::into_inner);
+            (course.to_m, course.speed_m_per_s) = (to_m, speed_m_per_s);
+        }
+    }
+
+    /// Stops where it is.
+    pub fn stop(&self) {
+        let mut course = self.course.lock().unwrap_or_else(PoisonError::into_inner);
+        course.to_m = course.now_m;
+    }
+
+    /// Where it is, m.
+    #[must_use]
+    pub fn now(&self) -> f64 {
+        self.course.lock().unwrap_or_else(PoisonError::into_inner).now_m
+    }
+
+    /// Where it is after another `dt` seconds, m.
+    pub fn advance(&self, dt: f64) -> f64 {
+        let mut course = self.course.lock().unwrap_or_else(PoisonError::into_inner);
+        let way = course.speed_m_per_s * dt;
+        course.now_m += (course.to_m - course.now_m).clamp(-way, way);
+        course.now_m
+    }
+
+    /// Lets the bench stand still, or go on: an emulated muscle need not wait for a program that computes.
+    pub fn wait(&self, waits: bool) {
+        self.waits.store(waits, Ordering::Relaxed);
+    }
+
+    /// Returns when the bench may go on.
+    pub(super) fn until_due(&self) {
+        while self.waits.load(Ordering::Relaxed) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+}

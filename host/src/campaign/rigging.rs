@@ -1,0 +1,145 @@
+//! The controller of a campaign and what moves its muscle's free end.
+
+use std::path::Path;
+
+use model_core::image;
+use model_core::link::endpoints::{GetSettings, SetSettings};
+use model_core::link::messages::Side;
+use pam_campaign::controller::{Controller, MakeCheck};
+use pam_campaign::rig::{Axis as RigAxis, Rig};
+use pam_campaign::step::CheckKind;
+use pam_campaign::stroke_axis::{Line, NoAxis, Prompt, StrokeAxis};
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::output::write_whole;
+use pam_device::emulated::{Axis, Emulated, Kind, Stand};
+use pam_device::{Client, tables};
+use pam_fit::table_file::TableFile;
+use virtual_bench::bench::BenchSpec;
+use virtual_bench::checks;
+
+use crate::commands::port::PortOption;
+use crate::console::Console;
+use crate::demo::campaign::muscle;
+use crate::demo::tracking::{Law, Task, choose, track};
+
+/// Most ticks without a host that the firmware's settings allow.
+const LONGEST_SILENCE: u32 = 60_000;
+
+/// Everything that carries out steps.
+pub(crate) struct Rigging {
+    pub(crate) controller: Controller,
+    pub(crate) rig: Rig,
+    pub(crate) muscle: MuscleDescription,
+    /// Where the firmware runs, in words.
+    pub(crate) words: String,
+    /// The axis of the virtual bench, and the board that lives as long as this.
+    pub(crate) emulated: Option<(Emulated, Axis)>,
+}
+
+/// An emulated controller with a muscle of the virtual bench on a commanded axis.
+pub(crate) fn emulated(
+    name: &str,
+    description: Option<&Path>,
+    rig: Option<Rig>,
+    (only, speed): (Option<Kind>, f64),
+    folder: &Path,
+) -> Result<Rigging> {
+    let spec = muscle(name)?;
+    let bench = BenchSpec::laboratory(spec.clone(), 1);
+    let muscle = match description {
+        Some(path) => MuscleDescription::read(path)?,
+        None => {
+            std::fs::create_dir_all(folder).map_err(|e| Error::unwritable(folder, &e))?;
+            let path = folder.join("muscle.toml");
+            write_whole(&path, spec.description().as_bytes())?;
+            MuscleDescription::read(&path)?
+        }
+    };
+    let mut rig = rig.unwrap_or_else(|| Rig { checks: true, ..Rig::commanded() });
+    let axis = Axis::default();
+    let emulated = Emulated::start(Stand::commanded(bench.clone(), axis.clone()), only, speed)?;
+    let mut client = Client::open(emulated.address())?;
+    // The watch counts device time, which goes so much faster, and twice as fast again after a pause of a busy machine.
+    let mut settings = client.call::<GetSettings>(&())?;
+    let faster = (2.0 * speed).ceil().max(1.0) as u32;
+    settings.watch.host_silence_ticks =
+        settings.watch.host_silence_ticks.saturating_mul(faster).min(LONGEST_SILENCE);
+    client.call_once::<SetSettings>(&settings)?;
+    limit(&mut rig, &mut client)?;
+    let made: MakeCheck = Box::new(move |check, force, pressure, clock| {
+        let at = match check {
+            CheckKind::DeadWeights => 0,
+            CheckKind::RigidBar => 1,
+            CheckKind::ReferenceGauge => 2,
+        };
+        Ok(checks::all(&bench, force, pressure, clock).into_iter().nth(at).map(|c| c.csv))
+    });
+    let words = emulated.words();
+    let controller = Controller::new(client, Box::new(axis.clone()), made);
+    Ok(Rigging { controller, rig, muscle, words, emulated: Some((emulated, axis)) })
+}
+
+/// A controller at a port, on the rig that is described.
+pub(crate) fn real(
+    port: &PortOption,
+    description: &Path,
+    rig: Option<Rig>,
+    console: &Console,
+) -> Result<Rigging> {
+    let mut rig = rig.unwrap_or_default();
+    let muscle = MuscleDescription::read(description)?;
+    let mut client = port.connect(console)?;
+    limit(&mut rig, &mut client)?;
+    let axis: Box<dyn StrokeAxis> = match (rig.axis, &rig.axis_address) {
+        (RigAxis::Line, Some(address)) => Box::new(Line::open(address)?),
+        (RigAxis::Prompt, _) => {
+            Box::new(Prompt::new(std::io::BufReader::new(std::io::stdin()), std::io::stderr()))
+        }
+        (RigAxis::Commanded, _) => {
+            return Err(Error::new(
+                DataCode::CallInvalid,
+                "the axis `commanded` is that of the virtual bench",
+            )
+            .help("write axis = \"line\" with axis_address, \"prompt\", \"weight\", \"pair\" or \"held\" in rig.toml"));
+        }
+        _ => Box::new(NoAxis),
+    };
+    // A check without the muscle is a person's work; the program says when it is wanted.
+    rig.checks = false;
+    let none: MakeCheck = Box::new(|_, _, _, _| Ok(None));
+    let words = format!("the controller at {}", client.port());
+    Ok(Rigging { controller: Controller::new(client, axis, none), rig, muscle, words, emulated: None })
+}
+
+/// No more pressure and stroke than the controller itself allows.
+fn limit(rig: &mut Rig, client: &mut Client) -> Result<()> {
+    let settings = client.call::<GetSettings>(&())?;
+    // A twentieth below the fault: ripple and overshoot of the regulator.
+    let allowed = settings.regulator.command_max_pa.min(0.95 * settings.limits.pressure_pa);
+    let kpa = f64::from(allowed) * 1e-3;
+    rig.pressure_max_kpa = Some(rig.pressure_max_kpa.map_or(kpa, |own| own.min(kpa)));
+    let mm = f64::from(settings.limits.stroke_max_m) * 1e3;
+    rig.stroke_max_mm = Some(rig.stroke_max_mm.map_or(mm, |own| own.min(mm)));
+    Ok(())
+}
+
+/// Force tracking on the emulated bench without the table and with it: feed-forward, and root mean square of the error, N.
+pub(crate) fn tracked(rigging: &mut Rigging, table: &TableFile) -> Result<Vec<(&'static str, f64)>> {
+    let Some((_, axis)) = &rigging.emulated else { return Ok(Vec::new()) };
+    let axis = axis.clone();
+    let client = rigging.controller.client();
+    let blocked = f64::from(table.table.blocked_force.newtons());
+    let mut buffer = [0; image::MAX_LEN];
+    let image = image::write(&table.table, &mut buffer)
+        .map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
+    tables::write(client, Side::Agonist, image, |_| ())?;
+    let mut told = Vec::new();
+    for law in [Law::Gaylord, Law::Table] {
+        choose(client, law, 1.0)?;
+        axis.go(0.0, 1e-2);
+        let track = track(client, law, Task::Sine, 0.35 * blocked, |_| ())?;
+        told.push((law.name(), track.rms));
+    }
+    Ok(told)
+}

@@ -1,0 +1,173 @@
+//! Force against pressure at a few held lengths, as most laboratories record it, and tables that are useless for control.
+
+#![allow(clippy::unwrap_used)] // what fails here fails the test
+
+mod bench_campaign;
+
+use std::path::Path;
+use std::process::Command;
+
+use bench_campaign::{description, recordings};
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::Campaign;
+use pam_fit::table_file::{About, TableFile};
+use pam_fit::{Options, fit};
+use virtual_bench::bench::{Bench, BenchSpec};
+use virtual_bench::campaigns;
+use virtual_bench::muscle::{Muscle, MuscleSpec};
+use virtual_bench::presets;
+
+/// Pressure staircases at three held lengths; the stroke is the nominal one, as on a bench without a displacement sensor.
+fn staircases(spec: &MuscleSpec, seed: u64) -> Campaign {
+    let muscle = Muscle::new(spec.clone());
+    let protocol = campaigns::staircase(&muscle, &campaigns::levels(&muscle));
+    let files = Bench::new(&BenchSpec::laboratory(spec.clone(), seed)).run(&protocol).unwrap();
+    let mut all = recordings(&files);
+    for r in &mut all {
+        let middle = r.stroke[r.len() / 2];
+        r.stroke.fill(middle);
+    }
+    Campaign::new(all)
+}
+
+/// The bench's muscle with a braid angle that is wrong by so many degrees.
+fn described(spec: &MuscleSpec, degrees: f64) -> MuscleDescription {
+    let mut muscle = description(spec);
+    muscle.braid_angle_deg += degrees;
+    muscle
+}
+
+#[test]
+fn dimensions_are_fitted_where_held_lengths_ask_for_it() {
+    let spec = presets::contractile();
+    let campaign = staircases(&spec, 1);
+    let muscle = described(&spec, -4.0);
+    let fitted = fit(&campaign, &muscle, &Options::default()).unwrap();
+    let kept = fit(&campaign, &muscle, &Options { as_described: true, ..Options::default() }).unwrap();
+    assert!(!fitted.summary.adjusted.is_empty(), "{:?}", fitted.summary.warnings);
+    assert!(kept.summary.adjusted.is_empty());
+    assert!(
+        fitted.summary.rms_N < 0.7 * kept.summary.rms_N,
+        "{} {}",
+        fitted.summary.rms_N,
+        kept.summary.rms_N
+    );
+    assert_eq!(fitted.summary.faults, Vec::<String>::new());
+    let told = fitted.summary.to_string() + &fitted.summary.warnings.join("\n");
+    assert!(told.contains("held lengths (3 mountings)"), "{told}");
+    for advice in ["longer stroke", "slow stroke"] {
+        assert!(!told.contains(advice), "{advice:?} is no advice for held lengths: {told}");
+    }
+}
+
+#[test]
+fn mountings_of_equal_length_have_lengths_of_their_own() {
+    let spec = presets::contractile();
+    let mut all = Vec::new();
+    for (label, error) in [("first", 0.4e-3), ("second", -0.4e-3)] {
+        for (run, mut r) in staircases(&spec, 2).recordings.into_iter().enumerate() {
+            r.labels = vec![("condition".into(), format!("{label}{run}")), ("run".into(), "1".into())];
+            // The tape measure errs; what is written is the same.
+            r.force = r.force.map(|f| f.iter().map(|v| v * (1.0 + 40.0 * error)).collect());
+            r.time.iter_mut().for_each(|t| *t += if label == "second" { 1e4 } else { 0.0 });
+            all.push(r);
+        }
+    }
+    let options = Options { fit_lengths: true, ..Options::default() };
+    let fitted = fit(&Campaign::new(all), &description(&spec), &options).unwrap();
+    assert_eq!(fitted.solution.problem.mountings.len(), 6);
+    let offset = |label: &str| {
+        fitted.solution.problem.mountings.iter().find(|m| m.label == label).map(|m| m.offset).unwrap()
+    };
+    assert!(offset("first1") < offset("second1") - 1e-5, "{} {}", offset("first1"), offset("second1"));
+    assert_eq!(fitted.summary.recordings.len(), 6);
+    assert_eq!(fitted.summary.recordings[4].recording, "second1, run 1");
+}
+
+fn host(folder: &Path, arguments: &[&str]) -> (i32, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_host"))
+        .args(arguments)
+        .current_dir(folder)
+        .env("XDG_CONFIG_HOME", folder)
+        .env_remove("PAM_SETTINGS")
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr) + String::from_utf8_lossy(&output.stdout);
+    (output.status.code().unwrap(), said.into_owned())
+}
+
+#[test]
+fn a_useless_table_is_refused_by_check() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut file = TableFile { table: model_core::table::example(), about: About::default() };
+    file.write(folder.path().join("good.pam")).unwrap();
+    assert_eq!(host(folder.path(), &["table", "check", "good.pam"]).0, 0);
+    file.table.friction.iter_mut().for_each(|k| *k = -0.2);
+    file.write(folder.path().join("bad.pam")).unwrap();
+    let (status, said) = host(folder.path(), &["table", "check", "bad.pam"]);
+    assert_eq!(status, 1, "{said}");
+    assert!(said.contains("not usable") && said.contains("negative friction"), "{said}");
+    let (status, said) = host(folder.path(), &["table", "check", "--json", "bad.pam"]);
+    assert_eq!(status, 1);
+    assert!(said.contains("\"valid\": false"), "{said}");
+}
+
+#[test]
+fn a_useless_table_is_written_on_request_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = presets::miniature();
+    let muscle = Muscle::new(spec.clone());
+    let mut protocol = campaigns::thesis(&muscle, &[207e3, 345e3, 483e3]);
+    protocol.sample_hz = 8.0;
+    let files = Bench::new(&BenchSpec::laboratory(spec.clone(), 3)).run(&protocol).unwrap();
+    std::fs::write(folder.path().join("m.toml"), spec.description()).unwrap();
+    let mut names = Vec::new();
+    for r in recordings(&files) {
+        // A pressure sensor whose zero is 150 kPa too low: the muscle seems to pull below ambient pressure.
+        let mut text = "time_s,pressure_kPa,displacement_mm,force_N\n".to_owned();
+        for i in 0..r.len() {
+            let force = r.force.as_ref().unwrap()[i];
+            text += &format!("{},{},{},{force}\n", r.time[i], r.pressure[i] / 1e3 - 150.0, r.stroke[i] * 1e3);
+        }
+        let name = format!("{}.csv", r.name);
+        std::fs::write(folder.path().join(&name), text).unwrap();
+        names.push(name);
+    }
+    let call = |more: &[&'static str]| {
+        let mut arguments = vec!["fit", "--muscle", "m.toml", "-o", "t.pam"];
+        arguments.extend(names.iter().map(String::as_str));
+        arguments.extend(more);
+        host(folder.path(), &arguments)
+    };
+    let (status, said) = call(&[]);
+    assert_eq!(status, 1, "{said}");
+    assert!(said.contains("fit::implausible") && said.contains("P0 is -"), "{said}");
+    assert!(!folder.path().join("t.pam").exists());
+    assert_eq!(call(&["--force"]).0, 0);
+    assert_eq!(host(folder.path(), &["table", "check", "t.pam"]).0, 1);
+}
+
+/// A file of three runs: `--where` picks by list and by exclusion, `compare` picks one each, `-` is standard input.
+#[test]
+fn runs_of_one_file_are_picked_by_list_exclusion_and_side() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "run,t_s,pressure_kPa,stroke_mm,force_N\n".to_owned();
+    for run in 1..=3 {
+        for i in 0..40 {
+            text += &format!("{run},{},300,{},{}\n", f64::from(i) * 0.1, f64::from(i) * 0.05, 40 - i + run);
+        }
+    }
+    std::fs::write(folder.path().join("all.csv"), &text).unwrap();
+    std::fs::write(folder.path().join("i.toml"), "split_by = [\"run\"]\n").unwrap();
+    let compare = |more: &[&'static str]| {
+        let mut arguments = vec!["compare", "--import", "i.toml", "all.csv", "all.csv"];
+        arguments.extend(more);
+        host(folder.path(), &arguments)
+    };
+    let (status, said) = compare(&[]);
+    assert_eq!(status, 2, "{said}");
+    assert!(said.contains("3 recordings: run 1; run 2; run 3") && said.contains("--where-a run=1"), "{said}");
+    let (status, said) = compare(&["--where-a", "run=1", "--where-b", "run!=1,2"]);
+    assert_eq!(status, 0, "{said}");
+    assert!(said.contains("2.0"), "runs 1 and 3 differ by 2 N: {said}");
+}

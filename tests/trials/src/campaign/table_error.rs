@@ -1,0 +1,74 @@
+//! The table's error on unseen motion after some minutes, beside the thesis's protocol for as long.
+
+use crate::campaign::methods::until;
+use crate::spec::Spec;
+use model_core::units::{Length, Pressure};
+use pam_campaign::analysis::fitted;
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::Recording;
+use serde::{Deserialize, Serialize};
+use virtual_bench::bench::Bench;
+use virtual_bench::campaigns;
+use virtual_bench::muscle::Muscle;
+
+/// Minutes at which both are compared.
+pub const MINUTES: [f64; 5] = [3.0, 5.0, 8.0, 12.0, 20.0];
+
+/// The error after so many minutes, % of the blocked force; absent where no table can be fitted yet.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct After {
+    /// Bench time, min.
+    pub minutes: f64,
+    /// Steps chosen by expected information.
+    pub chosen: Option<f64>,
+    /// The thesis's protocol.
+    pub thesis: Option<f64>,
+}
+
+/// Root mean square of the table's friction-free force against the bench's own, on a grid of pressures and strokes that no protocol has
+/// as its levels, % of the blocked force.
+fn error(recordings: &[Recording], description: &MuscleDescription, muscle: &Muscle) -> Option<f64> {
+    let model = fitted(recordings, description)?.model;
+    let levels = campaigns::levels(muscle);
+    let top = *levels.last()?;
+    let blocked = muscle.quasi_static(top, 0.0);
+    let (mut sum, mut n) = (0.0, 0);
+    for w in levels.windows(2) {
+        for share in [0.3, 0.7] {
+            let p = w[0] + share * (w[1] - w[0]);
+            for i in 0..10 {
+                let x = 0.09 * f64::from(i) * muscle.free_stroke(p);
+                let table = model.force(Pressure::from_pascals(p), Length::from_metres(x), 0.0).newtons();
+                sum += (table - muscle.quasi_static(p, x)).powi(2);
+                n += 1;
+            }
+        }
+    }
+    Some(100.0 * (sum / f64::from(n)).sqrt() / blocked)
+}
+
+fn before(recordings: &[Recording], seconds: f64) -> Vec<Recording> {
+    recordings.iter().filter(|r| r.time.last().is_some_and(|t| *t <= seconds)).cloned().collect()
+}
+
+/// Both errors at all times, for a muscle without effects.
+pub fn after(spec: &Spec, chosen: &[Recording]) -> Result<Vec<After>, String> {
+    let muscle = Muscle::new(spec.bench.muscle.clone());
+    let description =
+        MuscleDescription::parse(&spec.bench.muscle.description()).map_err(|e| e.to_string())?;
+    let levels = campaigns::levels(&muscle);
+    let files =
+        Bench::new(&spec.bench).run(&campaigns::thesis(&muscle, &levels)).map_err(|e| e.to_string())?;
+    Ok(MINUTES
+        .iter()
+        .map(|minutes| {
+            let seconds = 60.0 * minutes;
+            let thesis = until(files.iter().map(|f| (f.name.as_str(), f.rows.as_slice())), seconds);
+            After {
+                minutes: *minutes,
+                chosen: error(&before(chosen, seconds), &description, &muscle),
+                thesis: error(&thesis, &description, &muscle),
+            }
+        })
+        .collect())
+}
