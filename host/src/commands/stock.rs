@@ -21,7 +21,7 @@ use crate::documents::{fleet as document, text};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     host stock --muscle new.toml new.csv --kin results -o new.pam\n  \
-    host stock --muscle new.toml new/*.csv --kin results --tag type=mini -o new.pam\n\n\
+    host stock --muscle new.toml new/*.csv --kin results --tag type=mini --json\n\n\
     results is the folder that `host batch` wrote for muscles of the same type. The table is that of a typical muscle, moved as far as the \
     recordings show. Its confidence bands contain the variation of the stock.")]
 pub struct Arguments {
