@@ -144,7 +144,7 @@ fn keep_fit(
         fit: fitted.summary.quality(),
         uncertainty: Some(fitted.stored_uncertainty()),
         corrections: Vec::new(),
-        mountings: fitted.solution.problem.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
+        mountings: table_file::stored_mountings(&fitted.solution.problem),
     };
     match (TableFile { table: fitted.table.clone(), about }).to_bytes() {
         Ok(bytes) => result.files.push(("table.pam".into(), bytes)),
