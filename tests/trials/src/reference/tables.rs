@@ -40,7 +40,7 @@ fn table(muscle: &Muscle, until: usize) -> Option<TableFile> {
     let about = About {
         fit: fitted.summary.quality(),
         uncertainty: Some(fitted.stored_uncertainty()),
-        mountings: fitted.solution.problem.mountings.iter().map(|m| (m.stroke, m.offset)).collect(),
+        mountings: pam_fit::table_file::stored_mountings(&fitted.solution.problem),
         ..About::default()
     };
     Some(TableFile { table: fitted.table, about })
