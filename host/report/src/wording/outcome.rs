@@ -84,6 +84,9 @@ mod tests {
     #[test]
     fn noise_with_a_memory_is_called_so() {
         let said = noise(&Pattern::NotRepeatable(Scatter { sigma: 0.4, share: 0.003, memory: 6.2 }));
-        assert!(said.contains("noise with a memory of about 6.2 s") && said.contains("no effect fits"), "{said}");
+        assert!(
+            said.contains("noise with a memory of about 6.2 s") && said.contains("no effect fits"),
+            "{said}"
+        );
     }
 }
