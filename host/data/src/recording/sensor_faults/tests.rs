@@ -121,7 +121,8 @@ fn held_lengths_are_no_dead_strokes() {
         let stroke = 2e-3 * (number / 2) as f64;
         let phase = |i: usize| (i as f64 / 200.0).fract();
         let pressure: Vec<f64> = (0..400).map(|i| 620e3 * (1.0 - (1.0 - 2.0 * phase(i)).abs())).collect();
-        let force = pressure.iter().map(|p| (p * 8e-4 * (1.0 - 90.0 * stroke).powi(3) - 9e4 * stroke).max(-5.0));
+        let force =
+            pressure.iter().map(|p| (p * 8e-4 * (1.0 - 90.0 * stroke).powi(3) - 9e4 * stroke).max(-5.0));
         Recording {
             name: format!("held{number}"),
             time: (0..400).map(|i| i as f64 * 0.1).collect(),
