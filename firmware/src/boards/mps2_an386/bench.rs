@@ -73,7 +73,7 @@ impl Bench {
         bytes[1] = if self.started { 0 } else { RESET } | if command.vent { VENT } else { 0 };
         bytes[4..8].copy_from_slice(&self.tick.to_le_bytes());
         bytes[8..12].copy_from_slice(&command.pressure_pa.to_le_bytes());
-        bytes[12..16].copy_from_slice(&asked.to_le_bytes());
+        bytes[12..16].copy_from_slice(&setpoint.to_le_bytes());
         let crc = crc16(&bytes[..16]);
         bytes[16..].copy_from_slice(&crc.to_le_bytes());
         bytes
@@ -127,7 +127,7 @@ impl Bench {
         }
     }
 
-    /// Whether a bench has been plugged in here: asked now and then, and never waited for.
+    /// Whether a bench has been connected here: polled every few ticks, without waiting.
     fn look(&mut self) -> bool {
         if poll_once(self.wait()).is_ready() {
             self.started = true;
@@ -139,7 +139,7 @@ impl Bench {
     /// One exchange.
     async fn exchange(&mut self, command: &Command, setpoint: f32) -> Option<Said> {
         watchdog::feed();
-        let request = self.request(command, asked);
+        let request = self.request(command, setpoint);
         let Ok(()) = Sender(self.uart).write_all(&request).await;
         // A quick bench has answered by now, and the loop would continue without end: the other tasks have their turn in every tick.
         yield_now().await;
