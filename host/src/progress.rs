@@ -31,6 +31,7 @@ struct Stage {
 ///
 /// ```
 /// use pam_data::progress::Progress;
+/// use host::progress::ProgressLine;
 /// let progress = ProgressLine::silent();
 /// progress.total(200);
 /// (0..200).for_each(|_| progress.step());

@@ -186,6 +186,29 @@ fn dimensions_from_two_of_three_runs_are_those_from_the_others() {
     }
 }
 
+/// Recordings at held lengths whose description is inexact: without options, dimensions and lengths are fitted, and the table is usable.
+#[test]
+fn held_lengths_have_their_dimensions_fitted_without_an_option() {
+    for name in ["festo10-2022-83mm.toml", "festo10-2022-182mm.toml"] {
+        let Some(campaign) =
+            read("aarl-festo-10mm-2022", "settled_points.csv", "festo-2022-settled.toml", name)
+        else {
+            return;
+        };
+        let muscle = MuscleDescription::read(project().join("examples/muscles").join(name)).unwrap();
+        let fitted = fit(&campaign, &muscle, &Options::default()).unwrap();
+        let kept = fit(&campaign, &muscle, &Options { as_described: true, ..Options::default() }).unwrap();
+        assert!(!fitted.summary.adjusted.is_empty(), "{name}: {:?}", fitted.summary.warnings);
+        assert!(
+            fitted.summary.rms_N < 0.7 * kept.summary.rms_N,
+            "{name}: {} {}",
+            fitted.summary.rms_N,
+            kept.summary.rms_N
+        );
+        assert_eq!(fitted.summary.faults, Vec::<String>::new(), "{name}");
+    }
+}
+
 /// Muscles of one stock predict each other's lengths: percent of blocked force, mean over the muscles, with bounds on both sides.
 #[test]
 fn a_length_that_was_not_recorded_is_predicted_from_the_others() {

@@ -26,9 +26,9 @@ use pam_device::run::vent;
 #[command(arg_required_else_help = true)]
 #[command(after_help = "Examples:\n  \
     host campaign --emulate mini -o campaign --minutes 10\n  \
-    host campaign --muscle mini.toml --port /dev/ttyACM0 --rig rig.toml -o campaign\n\n\
+    host campaign --muscle m.toml --port /dev/ttyACM0 --rig rig.toml -o new\n\n\
     The folder receives every recording, the log journal.jsonl, table.pam, campaign.json, report.html, fit.html and \
-    diagnosis.html. The muscle is vented between two steps, at the end, on any error and on Ctrl-C. The same call goes on with a \
+    diagnosis.html. The muscle is vented between two steps, at the end, on any error and on Ctrl-C. The same call continues a \
     campaign that was interrupted.")]
 pub struct Arguments {
     /// The muscle's description; with --emulate that of the bench's muscle.

@@ -21,7 +21,7 @@ use pam_report::wording::timeline as wording;
 /// Arguments of `host history`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    host history bench/2026-01-05 bench/2026-02-03 bench/2026-03-02 --report life.html\n  \
+    host history 2026-01-05 2026-02-03 2026-03-02 --report life.html\n  \
     host history bench/* --muscle mini.toml --csv life.csv --json life.json\n  \
     host history loops_2026-*.csv --reference loops_2026-03-02.csv\n\n\
     A folder is one campaign, and so are files whose names carry the same date. Campaigns are put into the order of their dates: from \

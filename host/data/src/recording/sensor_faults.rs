@@ -120,7 +120,7 @@ struct Usual {
 
 impl Usual {
     fn of(campaign: &Campaign, skipped: &[bool]) -> Option<Self> {
-        let whole = |(r, skip): (&Recording, &bool)| if *skip { vec![0..r.len()] } else { Vec::new() };
+        let whole = |(r, skip): (&Recording, &bool)| skip.then(|| 0..r.len()).into_iter().collect();
         let masks: Vec<Vec<Range<usize>>> = campaign.recordings.iter().zip(skipped).map(whole).collect();
         let expected = ExpectedForce::of(campaign, &masks)?;
         let taken = || campaign.recordings.iter().zip(skipped).filter(|(_, skip)| !**skip).map(|(r, _)| r);

@@ -163,19 +163,25 @@ impl Search<'_> {
             let before = self.parameters.clone();
             self.linearise();
             self.solve(6);
+            let towards: Vec<f64> =
+                self.parameters[size..].iter().zip(&self.at).map(|(new, a)| new - a).collect();
+            // A long step leaves the range in which the columns are good. It is shortened as a whole: a step whose parts are cut
+            // one by one need not go downhill.
+            let within = self
+                .unknowns
+                .list
+                .iter()
+                .zip(&towards)
+                .map(|(u, d)| u.prior().0 / d.abs())
+                .fold(1.0, f64::min);
             let aim: Vec<f64> = self
                 .unknowns
                 .list
                 .iter()
-                .zip(&self.at)
-                .zip(&self.parameters[size..])
-                .map(|((u, a), new)| {
-                    let (sigma, bound) = u.prior();
-                    // A long step leaves the range in which the columns are good.
-                    (*a + (new - *a).clamp(-sigma, sigma)).clamp(-bound, bound)
-                })
+                .zip(self.at.iter().zip(&towards))
+                .map(|(u, (a, d))| (a + within * d).clamp(-u.prior().1, u.prior().1))
                 .collect();
-            let lower = [1.0, 0.5, 0.25, 0.125, 0.0625].into_iter().find_map(|share| {
+            let lower = (0..9).map(|halvings| 0.5_f64.powi(halvings)).find_map(|share| {
                 let there: Vec<f64> = self.at.iter().zip(&aim).map(|(a, b)| a + share * (b - a)).collect();
                 self.parameters.clone_from(&before);
                 let objective = self.solve_at(&there).objective;

@@ -24,12 +24,28 @@ pub(super) fn find(campaign: &Campaign, skipped: &[bool], usual: &Usual) -> Vec<
             > DEAD * usual.spans[Channel::Stroke as usize]
     };
     let strokes = 2 * campaign.recordings.iter().filter(moving).count() > campaign.recordings.len();
+    // The expected force is that of the other strokes: beyond them a force near zero may be that of a slack muscle.
+    let pulling = |(recording, r): &(usize, &Recording)| {
+        !skipped[*recording] && r.force.is_some() && !r.is_empty() && !is_dead(r, Channel::Force, usual)
+    };
+    let (low, high) = campaign
+        .recordings
+        .iter()
+        .enumerate()
+        .filter(pulling)
+        .flat_map(|(_, r)| thinned(&r.stroke))
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let compared = |r: &Recording| {
+        let mut strokes: Vec<f64> = thinned(&r.stroke).collect();
+        (low..=high).contains(&quantile(&mut strokes, 0.5))
+    };
     let judge = |(recording, r): (usize, &Recording)| {
         if skipped[recording] || r.force.is_none() || r.is_empty() {
             return None;
         }
         let judged = Channel::ALL.into_iter().filter(|c| *c != Channel::Stroke || strokes);
-        let channel = judged.into_iter().find(|c| is_dead(r, *c, usual))?;
+        let dead = |c: &Channel| is_dead(r, *c, usual) && (*c != Channel::Force || compared(r));
+        let channel = judged.into_iter().find(dead)?;
         let mut readings: Vec<f64> = thinned(channel.of(r)).collect();
         let value = quantile(&mut readings, 0.5);
         Some(SensorFault { recording, rows: 0..r.len(), channel, kind: Kind::Dead, value })

@@ -134,3 +134,26 @@ fn held_lengths_are_no_dead_strokes() {
     };
     assert_eq!(faults(&Campaign::new((0..8).map(at).collect())), Vec::new());
 }
+
+#[test]
+fn the_slack_muscle_of_the_shortest_length_is_not_a_dead_force() {
+    // At the shortest of four lengths the muscle hangs slack at every pressure: the cell shows its weight and its noise.
+    let at = |number: usize| {
+        let stroke = 2e-3 * (number / 2) as f64;
+        let pressure: Vec<f64> =
+            (0..400).map(|i| 620e3 * (1.0 - (1.0 - 2.0 * (i as f64 / 200.0).fract()).abs())).collect();
+        let pull = |(i, p): (usize, &f64)| {
+            let noise = 0.2 * ((i * 7919 % 101) as f64 / 50.0 - 1.0);
+            if number / 2 == 3 { noise - 3.7 } else { (p * 8e-4 * (1.0 - 100.0 * stroke)).max(-3.7) + noise }
+        };
+        Recording {
+            name: format!("held{number}"),
+            time: (0..400).map(|i| i as f64 * 0.1).collect(),
+            force: Some(pressure.iter().enumerate().map(pull).collect()),
+            stroke: vec![stroke; 400],
+            pressure,
+            ..Recording::default()
+        }
+    };
+    assert_eq!(faults(&Campaign::new((0..8).map(at).collect())), Vec::new());
+}
