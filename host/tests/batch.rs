@@ -375,7 +375,7 @@ fn a_file_without_permission_and_a_name_that_is_no_text_do_not_stop_the_others()
         .flatten()
         .find(|e| e.path().extension().unwrap() == "csv")
         .unwrap();
-    fs::set_permissions(one.path(), fs::Permissions::from_mode(0)).unwrap();
+    fs::set_permissions(one.path(), fs::Permissions::from_mode(0o0)).unwrap();
     let readable = fs::File::open(one.path()).is_ok();
     let odd = std::ffi::OsStr::from_bytes(b"odd\xff.csv");
     let other = fs::read_dir(folder.join("m1"))

@@ -63,9 +63,7 @@ impl VirtualBench {
         each: &mut dyn FnMut(&Reading) -> Result<bool>,
     ) -> Result<bool> {
         match *segment {
-            Segment::Travel { to, speed, until_force } => {
-                return self.travel(to, speed, until_force, recorded, each);
-            }
+            Segment::Travel { to, speed, until_force } => self.travel(to, speed, until_force, recorded, each),
             Segment::Ramp { to, rate } => {
                 self.command = to;
                 let step =

@@ -408,6 +408,6 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join(JOURNAL), "hello\n").unwrap();
         let error = Journal::open(folder.path()).unwrap_err();
-        assert_eq!(error.place().to_string().contains(JOURNAL), true);
+        assert!(error.place().to_string().contains(JOURNAL));
     }
 }

@@ -147,7 +147,7 @@ fn distributions(fleet: &Fleet, overview: &Overview) -> Section {
         let title = format!("Distribution of {}", name_of(q, fleet));
         let reading = "Each bar counts muscles. Dashed lines: beyond them a muscle is outlying. Values far outside are counted in the last bar.";
         section.figure(Figure::new(
-            &format!("distribution-{}", d.quantity),
+            format!("distribution-{}", d.quantity),
             &title,
             reading,
             histogram(fleet, overview, d),
@@ -335,8 +335,8 @@ fn dates(fleet: &Fleet) -> Section {
             Panel::new(Axis::new("days since the first date", "d"), Axis::new(name_of(q, fleet), q.unit))
                 .points("muscles", Colour::Series(0), &x, &y);
         section.figure(Figure::new(
-            &format!("date-{i}"),
-            &format!("{} over the date", name_of(q, fleet)),
+            format!("date-{i}"),
+            format!("{} over the date", name_of(q, fleet)),
             "One point per muscle, by the tag `date`.",
             panel,
         ));

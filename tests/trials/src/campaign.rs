@@ -17,7 +17,7 @@ use std::time::Instant;
 pub use methods::Method;
 
 /// Seed of the scored set. It and the bounds below stood in the repository before the first scored run.
-const SEED: u64 = 20_261_123_20;
+const SEED: u64 = 2_026_112_320;
 /// Bench time, s.
 const BENCH_S: f64 = 1800.0;
 /// Smallest and largest size of a hidden effect, parts of the blocked force.

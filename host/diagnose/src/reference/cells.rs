@@ -97,8 +97,14 @@ fn row(run: &Run, i: usize, surface: &Surface, duration: f64) -> Means {
     }
 }
 
+/// A cell's direction and pressure bin, and its rows with their weights.
+type Members = ((f64, usize), Vec<(usize, f64)>);
+
+/// What a lag does to the rows of a run, N.
+pub(super) type LagTrace<'a> = &'a dyn Fn(&Run) -> Vec<f64>;
+
 /// Row weights of one run: the settled rows within the range, by cell.
-pub(super) fn members(run: &Run, surface: &Surface) -> Vec<((f64, usize), Vec<(usize, f64)>)> {
+pub(super) fn members(run: &Run, surface: &Surface) -> Vec<Members> {
     let beyond = BEYOND * (surface.high - surface.low);
     let inside = |p: f64| p >= surface.low - beyond && p <= surface.high + beyond;
     let mut cells = vec![Vec::new(); 2 * CELLS];
@@ -132,7 +138,7 @@ pub(super) fn beyond(run: &Run, surface: &Surface) -> (usize, usize) {
 }
 
 /// The cells of all runs. `lag` gives what a lag does to the rows of a run of AFTER, N.
-pub(super) fn cells(all: &Runs, surface: &Surface, lag: Option<&dyn Fn(&Run) -> Vec<f64>>) -> Vec<Cell> {
+pub(super) fn cells(all: &Runs, surface: &Surface, lag: Option<LagTrace<'_>>) -> Vec<Cell> {
     let mut cells = Vec::new();
     for (index, run) in all.runs.iter().enumerate() {
         let late = lag.filter(|_| run.after).map(|of| of(run));

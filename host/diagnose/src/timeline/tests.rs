@@ -124,7 +124,7 @@ fn visit(index: usize, offset: f64, friction: f64, threshold: f64) -> Visit {
     Visit { name: format!("campaign {index}"), date: dates(40)[index], dated_by: DateSource::Name, campaign }
 }
 
-fn course_of<'a>(t: &'a super::Timeline, quantity: Quantity) -> &'a super::course::Course {
+fn course_of(t: &super::Timeline, quantity: Quantity) -> &super::course::Course {
     let of = |s: &Series| s.what == super::series::What::Quantity(quantity);
     &t.series.iter().find(|(s, _)| of(s)).unwrap().1
 }

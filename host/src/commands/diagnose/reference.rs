@@ -139,7 +139,7 @@ fn check(arguments: &Arguments) -> Result<()> {
             Error::new(DataCode::CallInvalid, format!("{option} does not go with --reference")).help(*help)
         );
     }
-    if arguments.changed.prior_changed.is_some_and(|p| !(p >= 0.01 && p <= 0.99)) {
+    if arguments.changed.prior_changed.is_some_and(|p| !(0.01..=0.99).contains(&p)) {
         return Err(Error::new(DataCode::CallInvalid, "--prior-changed must lie between 0.01 and 0.99"));
     }
     if arguments.output.is_some() && arguments.muscle.is_none() {

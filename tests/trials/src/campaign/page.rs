@@ -33,9 +33,8 @@ pub fn page(all: &[Trial], drawn: usize) -> String {
         };
         let (hidden, nulls) = (said(&with), said(&without));
         let named = hidden.iter().filter(|h| !h.1.sets.is_empty()).count();
-        let rate = |right: &dyn Fn(&(Vec<String>, Said)) -> bool, n: usize| {
-            Rate::new(hidden.iter().filter(|h| right(h)).count(), n)
-        };
+        type Right<'a> = &'a dyn Fn(&(Vec<String>, Said)) -> bool;
+        let rate = |right: Right<'_>, n: usize| Rate::new(hidden.iter().filter(|h| right(h)).count(), n);
         let _ = writeln!(
             m,
             "| {} | {} | {} | {} | {} | {} |",

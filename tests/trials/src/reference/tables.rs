@@ -29,7 +29,7 @@ fn description(muscle: &Muscle) -> Option<MuscleDescription> {
         "2021" => name.rsplit('_').next()?.to_owned(),
         _ => format!("{:.0}mm", muscle.rest_length_mm),
     };
-    MuscleDescription::read(&folder.join(format!("festo10-{year}-{own}.toml"))).ok()
+    MuscleDescription::read(folder.join(format!("festo10-{year}-{own}.toml"))).ok()
 }
 
 /// The table of the runs up to one number.

@@ -167,7 +167,7 @@ fn a_single_bad_run_is_named_and_a_clean_campaign_has_none() {
     let bad = &mut c.recordings[8 + 5];
     if let Some(force) = &mut bad.force {
         for (f, p) in force.iter_mut().zip(&bad.pressure) {
-            *f = pull(1e-3 * p + 20.0, THRESHOLDS[1]) - pull(1e-3 * p, THRESHOLDS[1]) + *f;
+            *f += pull(1e-3 * p + 20.0, THRESHOLDS[1]) - pull(1e-3 * p, THRESHOLDS[1]);
         }
     }
     let h = asked(&c);
