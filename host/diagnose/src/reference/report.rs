@@ -11,7 +11,7 @@ use super::stroked;
 use super::surface::Surface;
 use super::{table_surface, units, words};
 use pam_data::error::{DataCode, Error, Result};
-use pam_data::recording::Campaign;
+use pam_data::recording::{self, Campaign, Recording};
 use pam_fit::predict::predict;
 use pam_fit::table_file::TableFile;
 
@@ -55,8 +55,17 @@ fn usual_range(values: &[f64]) -> f64 {
     at(0.99) - at(0.01)
 }
 
+/// Whether a recording was made at a held length: the length varies by no more than a mounting does. A short stroke at a regulated
+/// pressure, as at the lowest level of a campaign of loops, is a stroke.
+fn is_held(r: &Recording) -> bool {
+    let travel = usual_range(&r.stroke);
+    let largest = r.pressure.iter().fold(0.0_f64, |m, p| m.max(p.abs()));
+    let regulated = usual_range(&r.pressure) <= REPORT_REGULATED * largest;
+    travel <= HELD && !(regulated && travel > recording::HELD)
+}
+
 fn protocol(campaign: &Campaign, side: &str) -> Result<Protocol> {
-    let held = campaign.recordings.iter().filter(|r| usual_range(&r.stroke) <= HELD).count();
+    let held = campaign.recordings.iter().filter(|r| is_held(r)).count();
     if held == campaign.recordings.len() {
         return Ok(Protocol::Held);
     }
@@ -234,4 +243,24 @@ pub(super) fn left(verdict: Verdict, unseen: &Unseen, places: &[Place]) -> Left 
         _ => "none".to_owned(),
     };
     Left { share, pattern }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recording(stroke: impl Fn(f64) -> f64, pressure: impl Fn(f64) -> f64) -> Recording {
+        let time: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.1).collect();
+        let of = |f: &dyn Fn(f64) -> f64| time.iter().map(|t| f(*t)).collect::<Vec<f64>>();
+        Recording { stroke: of(&stroke), pressure: of(&pressure), time, ..Recording::default() }
+    }
+
+    #[test]
+    fn short_strokes_at_a_regulated_pressure_are_strokes() {
+        let wave = |t: f64| 0.25 * (1.0 - t.cos());
+        // The lowest level of a campaign of loops, a mounting that gives a little, and a frozen muscle.
+        assert!(!is_held(&recording(|t| 1e-3 * wave(t), |_| 205e3)));
+        assert!(is_held(&recording(|t| 1e-3 * wave(t), |t| 620e3 * wave(t))));
+        assert!(is_held(&recording(|_| 5e-3, |_| 205e3)));
+    }
 }
