@@ -11,8 +11,9 @@
 //! | `motion` | settled rows; which way the pressure or the stroke moves |
 //! | `spline`, `surface` | the force before, over pressure and direction, by mounting; its slopes |
 //! | `table_surface` | the same from a table file |
+//! | `table_error` | what a table is wrong by where nothing changed |
 //! | `cells` | residuals and shapes as means over cells of pressure |
-//! | [`shapes`] | the changes that can be named: shape, class, owner, remedy |
+//! | [`shapes`] | the changes that can be named: shape, class, owner |
 //! | `repeatability` | how far untouched recordings differ: a Gaussian covariance |
 //! | `contrast` | generalised least squares and Bayes factors |
 //! | `lag` | delays between the channels, by rows in motion |
@@ -27,8 +28,7 @@
 //! | `held_out` | how much of the difference is removed on held-out recordings |
 //! | `units` | columns in other units, another actuator |
 //! | `report`, `staircase_answer`, `stroke_answer` | from two sides to the answer |
-//! | [`answer`] | the answer as values and JSON |
-//! | [`words`] | the answer as text |
+//! | [`answer`] | the answer as values |
 //! | [`correction`] | what the answer means for a table |
 //!
 //! The same recordings give the same answer on any number of threads.
@@ -56,12 +56,12 @@ pub(crate) mod stroked;
 pub(crate) mod strokes;
 mod surface;
 pub(crate) mod sweeps;
+mod table_error;
 mod table_surface;
 #[cfg(test)]
 mod tests;
 mod units;
 mod unknown;
-pub mod words;
 
 pub(crate) use crate::criteria::reference as criteria;
 pub use answer::{ChangeReport, Verdict};

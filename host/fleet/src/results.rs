@@ -203,7 +203,7 @@ impl Answer {
                 r.noise_N,
                 r.misfit_rms_N,
                 r.unexplained.share,
-                r.unexplained.pattern.clone(),
+                wording::change::pattern(&r.unexplained),
             ),
         }
     }

@@ -3,7 +3,9 @@
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
 use pam_data::recording::Campaign;
 use pam_diagnose::reference::answer::Curve;
-use pam_diagnose::reference::{ChangeReport, Verdict, words};
+use pam_diagnose::reference::{ChangeReport, Verdict};
+
+use super::wording::change as words;
 
 /// Panels in one picture, at most.
 const MOST_PANELS: usize = 6;
@@ -79,10 +81,10 @@ fn changes(r: &ChangeReport) -> Section {
             "**{}** ({}): {}. Probability {}, of its class {}. Law: {}. Since when: {}. It is {}.",
             m.effect,
             sizes.join(", "),
-            m.remedy,
+            words::remedy(m.change),
             fixed(m.probability, 2),
             fixed(m.class_probability, 2),
-            m.law,
+            m.change.about().law,
             words::since(&m.since),
             words::owner(m.owner)
         ));
@@ -93,7 +95,7 @@ fn changes(r: &ChangeReport) -> Section {
     if r.missing.is_empty() {
         section.text(words::headline(r));
     }
-    section.list(r.remarks.iter().cloned());
+    section.list(r.remarks.iter().map(words::remark));
     section
 }
 
@@ -218,8 +220,8 @@ fn unseen_sizes(r: &ChangeReport) -> Section {
         table.row([
             c.effect.clone(),
             fixed(c.gain, 2),
-            c.detectable.map_or_else(|| "–".into(), |d| words::plain(d, &c.unit)),
-            c.why_not.clone(),
+            c.detectable.map_or_else(|| "–".into(), |d| words::in_usual_unit(d, &c.unit)),
+            words::why_not(c.why_not).into(),
         ]);
     }
     section.table(table);
@@ -228,6 +230,6 @@ fn unseen_sizes(r: &ChangeReport) -> Section {
 
 fn limits(r: &ChangeReport) -> Section {
     let mut section = Section::new("What could not be compared");
-    section.list(r.reference.not_comparable.iter().cloned());
+    section.list(r.reference.not_comparable.iter().map(words::not_comparable));
     section
 }

@@ -1,5 +1,7 @@
 //! Result documents: what a program reads. Typed, with the names of the enums of a diagnosis.
 
+mod change;
 mod diagnosis;
 
+pub use change::change_json;
 pub use diagnosis::{DiagnosisDocument, diagnosis_json};

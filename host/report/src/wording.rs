@@ -1,5 +1,6 @@
 //! The sentences of a diagnosis: one file per kind. The diagnosis itself holds values only.
 
+pub mod change;
 mod experiment;
 mod outcome;
 mod region;

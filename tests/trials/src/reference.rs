@@ -38,6 +38,9 @@ pub struct Reference {
     /// A stratified share: one split a muscle at 3 %, every seventh untouched pair, the cylinder's five configurations.
     #[arg(long)]
     short: bool,
+    /// Only the trials against a table, without a page.
+    #[arg(long, conflicts_with = "page")]
+    tables: bool,
 }
 
 /// Sizes put in, % of the largest force rms.
@@ -204,6 +207,13 @@ pub fn run(what: &Reference) -> Result<(), Box<dyn Error>> {
     let muscles = staircases::read(&what.data)?;
     let slopes: BTreeMap<&str, Slopes> =
         muscles.iter().map(|m| (m.name.as_str(), Slopes::of(&m.between(1, m.runs)))).collect();
+    if what.tables {
+        let trials = tables::run(&muscles, &slopes, what.short);
+        write(&what.output, "tables.json", &serde_json::to_string_pretty(&trials)?)?;
+        let text = page::tables(&trials);
+        print!("{text}");
+        return write(&what.output, "tables.md", &text);
+    }
     let mut jobs = untouched(&muscles, if what.short { SHORT_STEP } else { 1 });
     jobs.extend(injected(&muscles, what.short));
     let trials: Vec<Trial> =

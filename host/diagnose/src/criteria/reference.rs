@@ -99,10 +99,16 @@ pam_data::criteria! {
     GATE_MOUNTINGS: usize = 3, "gate_mountings", "1", Judgement;
     /// A probability from which on something is named.
     NAMED: f64 = 0.5, "named", "1", Convention("more probable than not");
+    /// A probability from which on a cause counts as possible.
+    POSSIBLE: f64 = 0.05, "possible", "1", Convention("1 - 95 %");
     /// The set of names holds so much probability.
     SET: f64 = 0.95, "set", "1", Convention("95 %");
     /// Error of the slopes ∂F/∂P and ∂F/∂x, share of the size: by principle, they are estimated from the same recordings.
     SLOPE_ERROR: f64 = 0.05, "slope_error", "1", Judgement;
+    /// The same where the slopes are a table's.
+    TABLE_SLOPE_ERROR: f64 = 0.2, "table_slope_error", "1", Measured("development half, sizes of changes put in");
+    /// The same over the length, along which a table was fitted at three to five lengths.
+    TABLE_SLOPE_OVER_LENGTH: f64 = 0.5, "table_slope_over_length", "1", Measured("development half, sizes of changes put in");
     /// Start points of a step that are tried, at most.
     STEP_STARTS: usize = 24, "step_starts", "1", Cost;
     /// Log evidence by which one course in time must lead the other to be told: e³ = 20.
@@ -161,6 +167,23 @@ pam_data::criteria! {
     STROKES_ENDS: ((f64, f64)) = (0.02, 0.98), "strokes_ends", "1", Judgement;
     /// With more strokes than this the first pair is left out: run-in of the seal at the level.
     STROKES_RUN_IN: usize = 4, "strokes_run_in", "1", Judgement;
+    /// Error of a table that states none, share of the largest force: what tables of fluidic muscles state.
+    UNSTATED_ERROR: f64 = 0.02, "unstated_error", "1", Measured("tables of the development half, 0.01 to 0.02");
+    /// Error of a table in the compared cells over its stated rms error, each as likely as the others beforehand: rows are not spread
+    /// evenly over the cells.
+    TABLE_ERROR_FACTORS: ([f64; 4]) = [1.0, 1.5, 2.25, 3.4], "table_error_factors", "1", Measured("development half, 0.9 to 2.4");
+    /// Share of the variance of a table's error that all lengths have in common.
+    TABLE_ERROR_COMMON: f64 = 0.3, "table_error_common", "1", Measured("development half, 0.1 to 0.3");
+    /// Correlation of a table's error between the directions.
+    TABLE_ERROR_DIRECTIONS: f64 = 0.75, "table_error_directions", "1", Measured("development half, 0.7 to 0.9");
+    /// Error of a table's friction factor: it was fitted to rows in motion and at rest, and is compared at rest.
+    TABLE_ERROR_FRICTION: f64 = 0.1, "table_error_friction", "1", Measured("development half, 0.02 to 0.11");
+    /// Correlation length of a table's error over the pressure, share of the range.
+    TABLE_ERROR_LENGTH: f64 = 0.3, "table_error_length", "1", Judgement;
+    /// Error of a table where the actuator is slack, as a share of that where it pulls.
+    TABLE_ERROR_SLACK: f64 = 0.3, "table_error_slack", "1", Measured("development half");
+    /// Zero of the load cell when the table was made, as a share of the table's error: no table has a zero.
+    TABLE_ERROR_ZERO: f64 = 0.3, "table_error_zero", "1", Measured("development half");
     /// Step of the slope over the length, m.
     TABLE_SURFACE_STEP: f64 = 1e-4, "table_surface_step", "1", Judgement;
     /// Correlation length over pressure, share of the range, and correlation between the directions of an unknown surface.

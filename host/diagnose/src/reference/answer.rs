@@ -1,11 +1,11 @@
-//! The answer as values and JSON, in the schema of every diagnosis.
+//! The answer as values. Its JSON and its sentences are written by the reports.
 
 #![allow(non_snake_case, reason = "units are spelled as in the JSON")]
 
 use serde::Serialize;
 
-use super::shapes::{Class, Owner};
-use super::words;
+use super::criteria::POSSIBLE;
+use super::shapes::{Change, Class, Owner};
 
 /// The judgement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -52,6 +52,77 @@ pub enum NotComparable {
     },
     /// Changes that strokes at regulated pressures are not asked about.
     Strokes,
+}
+
+/// What a reader should know about the comparison.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Remark {
+    /// The largest force is this many times that of the reference, at the same pressures.
+    ForceRatio(f64),
+    /// The reference is a table.
+    Table {
+        /// Error that it counts with in a cell, N: what it states, times what AFTER shows of it.
+        error: f64,
+        /// Error that it states, N; zero where it states none.
+        stated: f64,
+        /// The recordings that it was fitted to.
+        sources: Vec<String>,
+    },
+    /// The table is one of another actuator than the one described: both names.
+    OtherTable(String, String),
+    /// The difference is larger than a change of the bench makes.
+    OtherActuator,
+    /// Mounted anew, and one length only.
+    OneLengthMountedAnew,
+    /// Nothing in the reference was recorded twice.
+    NothingTwice,
+    /// One mounting, m, differs by itself, with this log Bayes factor.
+    OneMounting {
+        /// Its stroke, m.
+        stroke: f64,
+        /// Log Bayes factor.
+        log: f64,
+    },
+    /// How far campaigns of strokes repeat is assumed.
+    StrokesAssumed,
+    /// Probabilities of strokes are marginal.
+    StrokesMarginal,
+    /// No change is named, but the probability that nothing changed is this only.
+    NotAcquitted(f64),
+    /// Gains look alike at regulated pressures.
+    GainOfStrokes,
+}
+
+/// How recordings were held out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Split {
+    /// Every other recording of AFTER.
+    OtherRecordings,
+    /// None: AFTER is one recording.
+    None,
+    /// Every other level of pressure.
+    OtherLevels,
+}
+
+/// Why a change is not named.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WhyNot {
+    /// These recordings cannot show it.
+    NotComparable,
+    /// Another cause is more probable.
+    LessProbable,
+    /// The difference does not have its shape, or is too small.
+    OtherShape,
+}
+
+impl WhyNot {
+    pub(super) fn of(comparable: bool, probability: f64) -> Self {
+        match comparable {
+            false => Self::NotComparable,
+            true if probability >= POSSIBLE => Self::LessProbable,
+            true => Self::OtherShape,
+        }
+    }
 }
 
 /// A part of the cells in which the difference sits.
@@ -108,8 +179,10 @@ pub struct Size {
 }
 
 /// What changed.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Changed {
+    /// Which one.
+    pub change: Change,
     /// Its name.
     pub effect: String,
     /// How probable this very name is.
@@ -130,28 +203,24 @@ pub struct Changed {
     pub owner: Owner,
     /// Whether it is the bench's: it corrects the data and never goes to a controller.
     pub correction: bool,
-    /// Its law.
-    pub law: String,
-    /// What to do.
-    pub remedy: String,
     /// rms of the force that it adds in AFTER, N.
     pub rms_N: f64,
 }
 
 /// What no name explains.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Left {
     /// Share of the difference's energy.
     pub share: f64,
-    /// Its pattern in words.
-    pub pattern: String,
+    /// Where most of it lies; absent where nothing is left or no part stands out.
+    pub place: Option<Place>,
 }
 
 /// The difference on recordings that the sizes were not fitted to.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct HeldOut {
     /// How recordings were held out.
-    pub split: String,
+    pub split: Split,
     /// rms without the named changes, N.
     pub rms_before_N: f64,
     /// rms with them, N.
@@ -161,14 +230,14 @@ pub struct HeldOut {
 }
 
 /// A change that was looked at.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Considered {
     /// Its name.
     pub effect: String,
     /// Its probability.
     pub gain: f64,
     /// Why it is not named.
-    pub why_not: String,
+    pub why_not: WhyNot,
     /// The size that would have been seen with 90 %, SI; absent where these recordings cannot show it.
     pub detectable: Option<f64>,
     /// Unit of `detectable`.
@@ -176,7 +245,7 @@ pub struct Considered {
 }
 
 /// What the reference is.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
     /// Its files.
     pub files: Vec<String>,
@@ -191,7 +260,7 @@ pub struct Reference {
     /// Whether AFTER counts as mounted anew.
     pub mounted_anew: bool,
     /// What of AFTER could not be compared, and changes that could not be asked about.
-    pub not_comparable: Vec<String>,
+    pub not_comparable: Vec<NotComparable>,
 }
 
 /// Where the repeatability is from.
@@ -231,10 +300,8 @@ pub struct Curve {
 }
 
 /// The whole answer.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ChangeReport {
-    /// `pam-diagnose/1`.
-    pub schema: &'static str,
     /// The actuator's name, where it is described.
     pub muscle: Option<String>,
     /// Rows of AFTER.
@@ -255,37 +322,25 @@ pub struct ChangeReport {
     pub unexplained: Left,
     /// How much of the difference is gone.
     pub held_out: HeldOut,
-    /// Always absent: what to do is with each change.
-    pub next_experiment: Option<()>,
     /// Every change that could be asked about.
     pub considered: Vec<Considered>,
     /// All probabilities of the first weighing, in falling order.
     pub probabilities: Vec<Probability>,
     /// Causes that hold 95 % of the probability.
     pub set: Vec<String>,
-    /// What a reader should know, in sentences.
-    pub remarks: Vec<String>,
+    /// What a reader should know.
+    pub remarks: Vec<Remark>,
     /// What it was compared with.
     pub reference: Reference,
     /// The size that each change would have if it were the only one.
-    #[serde(skip)]
     pub alone: Vec<(String, Size)>,
     /// For pictures.
-    #[serde(skip)]
     pub curves: Vec<Curve>,
     /// Label and unit of the curves' abscissa.
-    #[serde(skip)]
     pub abscissa: (&'static str, &'static str),
 }
 
 impl ChangeReport {
-    /// As JSON text.
-    #[must_use]
-    pub fn to_json(&self) -> String {
-        // Strings, finite numbers and options of them: this cannot fail.
-        serde_json::to_string_pretty(self).unwrap_or_default()
-    }
-
     /// Probability of a cause in the first weighing.
     #[must_use]
     pub fn probability(&self, cause: &str) -> f64 {
@@ -313,9 +368,4 @@ pub(super) fn size(parameter: (&str, &str), value: f64, std: f64, freedom: f64, 
         high: value + half,
         unit: parameter.1.into(),
     }
-}
-
-/// In words, for the JSON's list.
-pub(super) fn not_comparable(all: &[NotComparable]) -> Vec<String> {
-    all.iter().map(words::not_comparable).collect()
 }

@@ -17,6 +17,8 @@ pub(super) struct Contrast {
     pub free: f64,
     /// Independent directions that the runs can teach.
     pub taught: f64,
+    /// Log density of the residual if nothing changed, up to a constant; of no meaning with levels.
+    pub density: f64,
 }
 
 /// Log of the mean of exponentials.
@@ -50,7 +52,9 @@ impl Contrast {
     /// `None` where the covariance is not positive definite.
     pub fn new(k: DMatrix<f64>, level: Option<&[usize]>, y: DVector<f64>, taught: f64) -> Option<Self> {
         let n = y.len();
-        let mut projector = k.cholesky()?.inverse();
+        let factor = k.cholesky()?;
+        let spread: f64 = factor.l_dirty().diagonal().iter().map(|v| v.ln()).sum();
+        let mut projector = factor.inverse();
         let mut levels = 0;
         if let Some(level) = level {
             levels = level.iter().max().map_or(0, |m| m + 1);
@@ -73,13 +77,15 @@ impl Contrast {
             let solved = g.cholesky()?.solve(&w.transpose());
             projector -= &w * solved;
         }
-        Some(Self::from_projector(projector, y, (n as f64 - levels as f64).max(1.0), taught))
+        let mut of = Self::from_projector(projector, y, (n as f64 - levels as f64).max(1.0), taught);
+        of.density = -spread - 0.5 * of.energy;
+        Some(of)
     }
 
     fn from_projector(projector: DMatrix<f64>, residual: DVector<f64>, free: f64, taught: f64) -> Self {
         let projected = &projector * &residual;
         let energy = residual.dot(&projected);
-        Self { projector, residual, projected, energy, free, taught }
+        Self { projector, residual, projected, energy, free, taught, density: 0.0 }
     }
 
     /// How much more the runs differ than their class, as a factor on the covariance.

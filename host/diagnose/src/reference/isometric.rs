@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::cells::{Cell, cells};
 use super::contrast::{Contrast, evidence};
-use super::criteria::{DIRECTIONS_PER_RUN, LAG_FLOOR, MOST_CHANGES, NAMED, SIZES};
+use super::criteria::{DIRECTIONS_PER_RUN, LAG_FLOOR, MOST_CHANGES, NAMED, SIZES, TABLE_ERROR_FACTORS};
 use super::gate::{self, Asked};
 use super::lag::{self, Shift};
 use super::posterior::{Cause, Posterior};
@@ -13,6 +13,7 @@ use super::runs::{Run, Runs};
 use super::shapes::{CHANGES, Change};
 use super::slip::{self, Slip, rms_after};
 use super::surface::Surface;
+use super::table_error;
 use super::unknown;
 use pam_data::error::{DataCode, Error, Result};
 
@@ -58,6 +59,10 @@ pub(super) struct Analysis {
     pub accepted: Vec<Accepted>,
     /// The weighing after the last name.
     pub last: Posterior,
+    /// Whether the reference is recordings, and no table.
+    pub recorded: bool,
+    /// The likeliest error of a table in a cell, N; zero for recordings.
+    pub reference_error: f64,
 }
 
 /// Which level each cell belongs to, without gaps.
@@ -107,27 +112,17 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
                 surface.high / 1e3
             )));
     }
-    let setting = Setting {
-        range: surface.high - surface.low,
-        largest: surface.largest,
-        remounted: runs.remounted,
-        reference_error: error,
-    };
-    let k = covariance(&cells, &setting);
-    let y = DVector::from_iterator(cells.len(), cells.iter().map(|c| c.means.residual));
-    let used: std::collections::BTreeSet<usize> = runs.runs.iter().map(|r| r.mounting).collect();
-    let taught = DIRECTIONS_PER_RUN * (runs.runs.len() as f64 - 2.0 * used.len() as f64).max(1.0);
-    let levels = recorded.then(|| levels(&cells));
-    let contrast = Contrast::new(k, levels.as_deref(), y, taught).ok_or_else(|| {
-        Error::new(DataCode::RecordingNotFinite, "the recordings hold numbers that cannot be compared")
-    })?;
+    let setting =
+        Setting { range: surface.high - surface.low, largest: surface.largest, remounted: runs.remounted };
+    let contrasts = contrasts(&cells, &runs, &setting, (!recorded).then_some(error))?;
     let mut accepted: Vec<Accepted> = Vec::new();
+    // Lag scores are of rows that still hold what was named before: a lag is named first or not at all.
+    let weighed = |c: Contrast| (weigh(&cells, &c, &surface, Some(&shift), prior_none), c);
+    let (mut round, contrast, which) = likeliest(contrasts.into_iter().map(weighed).collect())?;
+    let reference_error = if recorded { 0.0 } else { error * TABLE_ERROR_FACTORS[which] };
     let mut present = contrast.clone();
     let mut first: Option<Round> = None;
     loop {
-        // Lag scores are of rows that still hold what was named before: a lag is named first or not at all.
-        let lag_open = accepted.is_empty();
-        let round = weigh(&cells, &present, &surface, lag_open.then_some(&shift), prior_none);
         let leader = round.posterior.leader();
         let none = round.posterior.probability(Cause::None);
         // What a lag does to settled rows is not known well enough to look for more beneath it.
@@ -143,7 +138,17 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
                 break Err(Error::new(DataCode::RecordingEmpty, "nothing to weigh"));
             };
             refit(&contrast, &mut accepted, &cells);
-            break Ok(Analysis { runs, surface, cells, contrast, first, accepted, last });
+            break Ok(Analysis {
+                runs,
+                surface,
+                cells,
+                contrast,
+                first,
+                accepted,
+                last,
+                recorded,
+                reference_error,
+            });
         };
         if is_lag(next.change) {
             let residual = &present.residual - lag::trace(&cells);
@@ -152,7 +157,50 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
             present = present.without_shapes(std::slice::from_ref(&next.shape));
         }
         accepted.push(next);
+        round = weigh(&cells, &present, &surface, None, prior_none);
     }
+}
+
+/// Generalised least squares for every error that the reference may have; one, without an error, for recordings.
+fn contrasts(
+    cells: &[Cell],
+    runs: &Runs,
+    setting: &Setting,
+    table_error: Option<f64>,
+) -> Result<Vec<Contrast>> {
+    let unusable =
+        || Error::new(DataCode::RecordingNotFinite, "the recordings hold numbers that cannot be compared");
+    let repeats = covariance(cells, setting);
+    let y = DVector::from_iterator(cells.len(), cells.iter().map(|c| c.means.residual));
+    let Some(error) = table_error else {
+        let used: std::collections::BTreeSet<usize> = runs.runs.iter().map(|r| r.mounting).collect();
+        let taught = DIRECTIONS_PER_RUN * (runs.runs.len() as f64 - 2.0 * used.len() as f64).max(1.0);
+        return Ok(vec![Contrast::new(repeats, Some(&levels(cells)), y, taught).ok_or_else(unusable)?]);
+    };
+    // What the error's size adapts to, the scale of what repeats must not take once more.
+    let of = |factor: &f64| {
+        let k = &repeats + table_error::covariance(cells, setting.range, factor * error);
+        Contrast::new(k, None, y.clone(), 0.0).ok_or_else(unusable)
+    };
+    TABLE_ERROR_FACTORS.iter().map(of).collect()
+}
+
+/// The likeliest of several errors of the reference, with the probabilities of causes averaged over all of them.
+fn likeliest(mut all: Vec<(Round, Contrast)>) -> Result<(Round, Contrast, usize)> {
+    let log = |(round, contrast): &(Round, Contrast)| contrast.density + round.posterior.evidence;
+    let logs: Vec<f64> = all.iter().map(log).collect();
+    let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let best = logs.iter().position(|l| *l == top).unwrap_or(0);
+    let weights: Vec<(f64, &Posterior)> =
+        logs.iter().zip(&all).map(|(l, (round, _))| ((l - top).exp(), &round.posterior)).collect();
+    // One has no mean; its weight may be of no meaning.
+    let mean = (all.len() > 1).then(|| Posterior::mean(&weights));
+    if best >= all.len() {
+        return Err(Error::new(DataCode::RecordingEmpty, "nothing to weigh"));
+    }
+    let (mut round, contrast) = all.swap_remove(best);
+    round.posterior = mean.unwrap_or(round.posterior);
+    Ok((round, contrast, best))
 }
 
 fn is_lag(change: Change) -> bool {

@@ -28,6 +28,8 @@ impl Cause {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Posterior {
     pub all: Vec<(Cause, f64)>,
+    /// Log evidence of all causes together, priors included.
+    pub evidence: f64,
 }
 
 impl Posterior {
@@ -49,7 +51,19 @@ impl Posterior {
         };
         let mut all: Vec<(Cause, f64)> = evidence.iter().zip(&logs).map(one).collect();
         all.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        Self { all }
+        Self { all, evidence: total }
+    }
+
+    /// The mean of several, by their weights.
+    pub fn mean(several: &[(f64, &Self)]) -> Self {
+        let total: f64 = several.iter().map(|(w, _)| w).sum();
+        let mut sums: BTreeMap<Cause, f64> = BTreeMap::new();
+        for (weight, one) in several {
+            one.all.iter().for_each(|(c, p)| *sums.entry(*c).or_insert(0.0) += weight / total * p);
+        }
+        let mut all: Vec<(Cause, f64)> = sums.into_iter().collect();
+        all.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        Self { all, evidence: several.first().map_or(0.0, |(_, p)| p.evidence) }
     }
 
     pub fn probability(&self, cause: Cause) -> f64 {

@@ -62,13 +62,11 @@ pub(super) struct Setting {
     pub largest: f64,
     /// Whether AFTER was mounted anew.
     pub remounted: bool,
-    /// What the reference itself is wrong by in every mounting, N: a table's stated error; zero for recordings.
-    pub reference_error: f64,
 }
 
 /// Covariance of the cells if nothing was changed, N².
 pub(super) fn covariance(cells: &[Cell], setting: &Setting) -> DMatrix<f64> {
-    let Setting { range, largest, remounted, reference_error } = *setting;
+    let Setting { range, largest, remounted } = *setting;
     let r: &Repeats = &REPEATS;
     let unit = largest / 100.0;
     let mounted = centred(cells.iter().map(|c| c.means.mounted));
@@ -99,7 +97,6 @@ pub(super) fn covariance(cells: &[Cell], setting: &Setting) -> DMatrix<f64> {
             if remounted {
                 v += square(REMOUNT / unit) * mounting * side * a.means.by_stroke * b.means.by_stroke;
             }
-            v += square(reference_error / unit) * mounting * base;
             v += square(r.offset) * run;
             if i == j {
                 v += square(r.cell) * (0.2 + a.means.active) * (1.0 + 2.0 / a.rows)

@@ -1,7 +1,7 @@
 //! From two sides to the answer: which protocol, which reference, and what both kinds of answers share.
 
-use super::answer::{ChangeReport, Left, NotComparable, Place, Repeatability, Verdict};
-use super::criteria::{HELD, NAMED, OTHER_ACTUATOR, PRIOR_NONE, REPORT_REGULATED};
+use super::answer::{ChangeReport, Left, NotComparable, Place, Remark, Repeatability, Verdict};
+use super::criteria::{HELD, NAMED, OTHER_ACTUATOR, PRIOR_NONE, REPORT_REGULATED, UNSTATED_ERROR};
 use super::held_out::Unseen;
 use super::isometric;
 use super::runs::Runs;
@@ -9,7 +9,7 @@ use super::staircase_answer::staircases;
 use super::stroke_answer::strokes;
 use super::stroked;
 use super::surface::Surface;
-use super::{table_surface, units, words};
+use super::{table_surface, units};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::{self, Campaign, Recording};
 use pam_fit::predict::predict;
@@ -153,14 +153,13 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
             };
             report.reference.table = Some(path.to_owned());
             report.reference.repeatability_from = Repeatability::Assumed;
-            report.remarks.push(words::TABLE_REFERENCE.to_owned());
             report
         }
     };
     report.samples = after.samples();
     report.muscle.clone_from(&options.muscle);
     if report.misfit_rms_N > OTHER_ACTUATOR * report.largest_force_N {
-        report.remarks.push(words::OTHER_ACTUATOR.to_owned());
+        report.remarks.push(Remark::OtherActuator);
     }
     Ok(report)
 }
@@ -202,13 +201,20 @@ fn held(before: &Campaign, after: &Campaign, options: &Options) -> Result<Change
 }
 
 fn held_against_table(table: &TableFile, after: &Campaign, options: &Options) -> Result<ChangeReport> {
-    let runs = Runs::alone(after)?;
+    let runs = Runs::alone(after, options.mounted)?;
     let surface = table_surface::of(table, &runs)?;
-    let error = table.about.fit.rms_newtons;
-    let error = if error > 0.0 { error } else { 0.01 * surface.largest };
+    let stated = table.about.fit.rms_newtons;
+    let error = if stated > 0.0 { stated } else { UNSTATED_ERROR * surface.largest };
     let reference = isometric::Reference { surface, error, recorded: false };
     let analysis = isometric::analyse(runs, reference, prior(options, PRIOR_NONE))?;
-    Ok(staircases(&analysis, options))
+    let mut report = staircases(&analysis, options);
+    report.remarks.push(table_remark(table, analysis.reference_error));
+    Ok(report)
+}
+
+fn table_remark(table: &TableFile, error: f64) -> Remark {
+    let sources = table.about.sources.iter().map(|s| s.path.clone()).collect();
+    Remark::Table { error, stated: table.about.fit.rms_newtons.max(0.0), sources }
 }
 
 /// Strokes against what the table gives for the same motion.
@@ -218,9 +224,12 @@ fn stroked_against_table(table: &TableFile, after: &Campaign, options: &Options)
     for (recording, p) in before.recordings.iter_mut().zip(predicted.recordings) {
         recording.force = Some(p.force);
     }
-    let compared = stroked::compare(&before, after, table.about.fit.rms_newtons.max(0.0))?;
-    strokes(&compared, options)
+    let error = table.about.fit.rms_newtons.max(0.0);
+    let mut report = strokes(&stroked::compare(&before, after, error)?, options)?;
+    report.remarks.push(table_remark(table, error));
+    Ok(report)
 }
+
 /// The verdict from what is named and what is left.
 pub(super) fn verdict(none: f64, named: usize, left: bool) -> Verdict {
     match (named, left) {
@@ -236,13 +245,8 @@ pub(super) fn left(verdict: Verdict, unseen: &Unseen, places: &[Place]) -> Left 
         Verdict::Unexplained => 1.0,
         _ => (1.0 - unseen.share()).clamp(0.0, 1.0),
     };
-    let pattern = match verdict {
-        Verdict::Unexplained | Verdict::PartlyExplained => {
-            places.first().map_or_else(|| "none".to_owned(), words::place)
-        }
-        _ => "none".to_owned(),
-    };
-    Left { share, pattern }
+    let told = matches!(verdict, Verdict::Unexplained | Verdict::PartlyExplained);
+    Left { share, place: places.first().filter(|_| told).cloned() }
 }
 
 #[cfg(test)]

@@ -130,8 +130,10 @@ impl Runs {
     ///
     /// # Errors
     /// A recording without force.
-    pub fn alone(after: &Campaign) -> Result<Self> {
-        let mut all = Self { strokes: mountings(&after.recordings), remounted: true, ..Self::default() };
+    pub fn alone(after: &Campaign, said: Mounted) -> Result<Self> {
+        // A table was made at some other time: without a word AFTER counts as mounted anew.
+        let remounted = said != Mounted::Same;
+        let mut all = Self { strokes: mountings(&after.recordings), remounted, ..Self::default() };
         all.add(after, true)?;
         all.count();
         Ok(all)

@@ -1,4 +1,4 @@
-//! The changes that can be named: what each does to the force, whose it is, what to do about it.
+//! The changes that can be named: what each does to the force, and whose it is.
 
 use serde::Serialize;
 
@@ -76,8 +76,6 @@ pub struct About {
     pub parameter: (&'static str, &'static str),
     /// Its law.
     pub law: &'static str,
-    /// What to do about it.
-    pub remedy: &'static str,
 }
 
 const fn about(
@@ -87,40 +85,15 @@ const fn about(
     owner: Owner,
     parameter: (&'static str, &'static str),
     law: &'static str,
-    remedy: &'static str,
 ) -> About {
-    About { change, name, class, owner, parameter, law, remedy }
+    About { change, name, class, owner, parameter, law }
 }
 
 /// Every change, in the order in which they are weighed.
 pub const CHANGES: [About; 15] = [
-    about(
-        Change::ForceOffset,
-        "force-offset",
-        Class::Zero,
-        Owner::Sensor,
-        ("offset", "N"),
-        "ΔF = b",
-        "re-zero the load cell with nothing pulling on it",
-    ),
-    about(
-        Change::ForceGain,
-        "force-gain",
-        Class::Gain,
-        Owner::Sensor,
-        ("gain", ""),
-        "ΔF = γ·F",
-        "check the load cell's calibration with a known weight",
-    ),
-    about(
-        Change::GaugeGain,
-        "gauge-gain",
-        Class::Gain,
-        Owner::Sensor,
-        ("gain", ""),
-        "ΔF = −γ·P·∂F/∂P",
-        "compare the pressure gauge with another one at a high pressure",
-    ),
+    about(Change::ForceOffset, "force-offset", Class::Zero, Owner::Sensor, ("offset", "N"), "ΔF = b"),
+    about(Change::ForceGain, "force-gain", Class::Gain, Owner::Sensor, ("gain", ""), "ΔF = γ·F"),
+    about(Change::GaugeGain, "gauge-gain", Class::Gain, Owner::Sensor, ("gain", ""), "ΔF = −γ·P·∂F/∂P"),
     about(
         Change::GaugeOffset,
         "gauge-offset",
@@ -128,17 +101,8 @@ pub const CHANGES: [About; 15] = [
         Owner::SensorOrMuscle,
         ("offset", "Pa"),
         "ΔF = −δ·∂F/∂P",
-        "vent and read the gauge; if it reads zero, the actuator's deadband has changed",
     ),
-    about(
-        Change::CrossTalk,
-        "cross-talk",
-        Class::Gain,
-        Owner::Rig,
-        ("thrust_area", "m²"),
-        "ΔF = c·P",
-        "look for a hose or fitting whose pressure acts on the load cell",
-    ),
+    about(Change::CrossTalk, "cross-talk", Class::Gain, Owner::Rig, ("thrust_area", "m²"), "ΔF = c·P"),
     about(
         Change::DisplacementOffset,
         "displacement-offset",
@@ -146,7 +110,6 @@ pub const CHANGES: [About; 15] = [
         Owner::Rig,
         ("offset", "m"),
         "ΔF = δ·∂F/∂x",
-        "measure the mounted length, re-zero the stroke and clamp again",
     ),
     about(
         Change::CoulombFriction,
@@ -155,7 +118,6 @@ pub const CHANGES: [About; 15] = [
         Owner::RigOrMuscle,
         ("force", "N"),
         "ΔF = −f·sgn v",
-        "look at guides, alignment and lubrication",
     ),
     about(
         Change::PressureFriction,
@@ -164,7 +126,6 @@ pub const CHANGES: [About; 15] = [
         Owner::RigOrMuscle,
         ("force_per_pressure", "m²"),
         "ΔF = −μ·P·sgn v",
-        "look at the seal, or at wear and lubrication of the braid",
     ),
     about(
         Change::FrictionFactor,
@@ -173,7 +134,6 @@ pub const CHANGES: [About; 15] = [
         Owner::Muscle,
         ("factor", ""),
         "ΔF = −k·F·sgn v",
-        "the braid rubs differently: look at wear and lubrication, then refit the table",
     ),
     about(
         Change::ElasticStiffening,
@@ -182,17 +142,8 @@ pub const CHANGES: [About; 15] = [
         Owner::Muscle,
         ("stiffening", ""),
         "ΔF = η·(F − P·∂F/∂P)",
-        "the bladder has become stiffer or softer: refit the table",
     ),
-    about(
-        Change::ForceDrift,
-        "force-drift",
-        Class::Zero,
-        Owner::Sensor,
-        ("drift_to_end", "N"),
-        "ΔF = δ·t/T",
-        "let the load cell warm up, and tare at both ends of a campaign",
-    ),
+    about(Change::ForceDrift, "force-drift", Class::Zero, Owner::Sensor, ("drift_to_end", "N"), "ΔF = δ·t/T"),
     about(
         Change::RigCompliance,
         "rig-compliance",
@@ -200,7 +151,6 @@ pub const CHANGES: [About; 15] = [
         Owner::Rig,
         ("compliance", "m/N"),
         "ΔF = c·F·∂F/∂x",
-        "tighten bolts and clamps, and stiffen the frame",
     ),
     about(
         Change::EndSlip,
@@ -209,7 +159,6 @@ pub const CHANGES: [About; 15] = [
         Owner::RigOrMuscle,
         ("slip", "m"),
         "ΔF = δ·∂F/∂x from one moment on",
-        "look at the end fittings, clamp again and measure the length",
     ),
     about(
         Change::SensorDelay,
@@ -218,7 +167,6 @@ pub const CHANGES: [About; 15] = [
         Owner::Sensor,
         ("delay", "s"),
         "F(t) = S(P(t − τ))",
-        "look at the filter settings and the sampling of the force channel",
     ),
     about(
         Change::PressureSensorLag,
@@ -227,7 +175,6 @@ pub const CHANGES: [About; 15] = [
         Owner::Sensor,
         ("time_constant", "s"),
         "P reads late by a first-order lag τ",
-        "look for a long or throttled line to the pressure sensor, and at its filter",
     ),
 ];
 

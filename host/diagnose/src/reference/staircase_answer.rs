@@ -3,17 +3,20 @@
 use nalgebra::DVector;
 
 use super::answer::{
-    ChangeReport, Changed, Considered, Curve, HeldOut, NotComparable, Probability, Reference, Repeatability,
-    Size, Verdict, not_comparable, size,
+    ChangeReport, Changed, Considered, Curve, HeldOut, NotComparable, Probability, Reference, Remark,
+    Repeatability, Size, Split, Verdict, WhyNot, size,
 };
-use super::criteria::{CELLS, FEWEST_CELLS, GATE, NAMED, PRIOR_NONE, SCALE_PRIOR, SIZES, SLOPE_ERROR};
+use super::criteria::{
+    CELLS, FEWEST_CELLS, GATE, NAMED, PRIOR_NONE, SCALE_PRIOR, SIZES, SLOPE_ERROR, TABLE_SLOPE_ERROR,
+    TABLE_SLOPE_OVER_LENGTH,
+};
 use super::held_out;
 use super::isometric::{Accepted, Analysis, Estimate};
 use super::posterior::Cause;
 use super::report::{Options, left, prior, verdict};
 use super::shapes::{CHANGES, Change};
 use super::slip::rms_after;
-use super::{cells, localise, repeatability, words};
+use super::{cells, localise, repeatability};
 
 /// Everything that was found, as the answer.
 pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport {
@@ -22,7 +25,7 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
     let shapes: Vec<DVector<f64>> = analysis.accepted.iter().map(|a| a.shape.clone()).collect();
     let unseen = held_out::unseen(&analysis.cells, &analysis.contrast, &shapes);
     let scale = analysis.contrast.without_shapes(&shapes).scale();
-    let noise = repeatability::spread(analysis.surface.largest, scale);
+    let noise = repeatability::spread(analysis.surface.largest, scale).hypot(analysis.reference_error);
     let verdict = verdict(
         first.probability(Cause::None),
         analysis.accepted.len(),
@@ -31,12 +34,12 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
     let mut remarks = remarks(analysis, verdict);
     let not = incomparable(analysis);
     if not.iter().any(|n| matches!(n, NotComparable::OneLength)) && analysis.runs.remounted {
-        remarks.push(words::ONE_LENGTH_REMOUNTED.to_owned());
+        remarks.push(Remark::OneLengthMountedAnew);
     }
     let before: Vec<usize> = analysis.runs.side(false).map(|r| r.mounting).collect();
     let measured = before.iter().any(|m| before.iter().filter(|o| *o == m).count() > 1);
     if !measured && !before.is_empty() {
-        remarks.push(words::ASSUMED.to_owned());
+        remarks.push(Remark::NothingTwice);
     }
     let where_ = if verdict == Verdict::Consistent {
         Vec::new()
@@ -44,7 +47,6 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
         localise::places(analysis, &difference, options.rest_length)
     };
     ChangeReport {
-        schema: "pam-diagnose/1",
         muscle: None,
         samples: 0,
         verdict,
@@ -55,12 +57,11 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
         r#where: where_,
         missing: analysis.accepted.iter().map(|a| changed(analysis, a)).collect(),
         held_out: HeldOut {
-            split: words::split(unseen.held).to_owned(),
+            split: if unseen.held { Split::OtherRecordings } else { Split::None },
             rms_before_N: unseen.before,
             rms_after_N: unseen.after,
             noise_N: noise,
         },
-        next_experiment: None,
         considered: considered(analysis, options),
         probabilities: first
             .all
@@ -76,7 +77,7 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
             repeatability_N: noise,
             repeatability_from: if measured { Repeatability::Measured } else { Repeatability::Assumed },
             mounted_anew: analysis.runs.remounted,
-            not_comparable: not_comparable(&not),
+            not_comparable: not,
         },
         alone: alone(analysis),
         curves: curves(analysis, &difference),
@@ -84,12 +85,12 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
     }
 }
 
-fn remarks(analysis: &Analysis, verdict: Verdict) -> Vec<String> {
+fn remarks(analysis: &Analysis, verdict: Verdict) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if let Some((mounting, log)) = analysis.first.local.filter(|l| l.1 > GATE.ln()) {
         // With a change that all mountings show, the one that shows it most is no news.
         if verdict == Verdict::Consistent || verdict == Verdict::Unexplained {
-            remarks.push(words::one_mounting(analysis.runs.strokes[mounting], log));
+            remarks.push(Remark::OneMounting { stroke: analysis.runs.strokes[mounting], log });
         }
     }
     remarks
@@ -127,19 +128,34 @@ fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
     let unseen = held_out::unseen(&analysis.cells, &analysis.contrast, std::slice::from_ref(&accepted.shape));
     let class = analysis.first.posterior.classes().get(&about.class).copied().unwrap_or(0.0);
     Changed {
+        change: about.change,
         effect: about.name.into(),
         probability: accepted.probability,
         class_probability: class.max(accepted.probability),
         class: about.class,
         share_explained: unseen.share().max(0.0),
-        parameters: vec![size(about.parameter, accepted.size, accepted.std, freedom, SLOPE_ERROR)],
+        parameters: vec![size(
+            about.parameter,
+            accepted.size,
+            accepted.std,
+            freedom,
+            slope_error(analysis, accepted.change),
+        )],
         confusable_with: accepted.rivals.iter().map(|c| c.name().to_owned()).collect(),
         since: localise::since(analysis, accepted),
         owner: about.owner,
         correction: accepted.change.is_bench(),
-        law: about.law.into(),
-        remedy: about.remedy.into(),
         rms_N: rms_after(&analysis.cells, &accepted.shape) * accepted.size.abs(),
+    }
+}
+
+/// How inexact the shape of a change is, share of its size.
+fn slope_error(analysis: &Analysis, change: Change) -> f64 {
+    match change {
+        _ if analysis.recorded => SLOPE_ERROR,
+        Change::ForceOffset | Change::ForceDrift | Change::CoulombFriction => SLOPE_ERROR,
+        Change::DisplacementOffset | Change::RigCompliance | Change::EndSlip => TABLE_SLOPE_OVER_LENGTH,
+        _ => TABLE_SLOPE_ERROR,
     }
 }
 
@@ -148,7 +164,10 @@ fn alone(analysis: &Analysis) -> Vec<(String, Size)> {
     let freedom = SCALE_PRIOR + analysis.contrast.taught.min(analysis.contrast.free);
     let one = |e: &Estimate| {
         let about = e.change.about();
-        (about.name.to_owned(), size(about.parameter, e.size, e.std, freedom, SLOPE_ERROR))
+        (
+            about.name.to_owned(),
+            size(about.parameter, e.size, e.std, freedom, slope_error(analysis, e.change)),
+        )
     };
     analysis.first.estimates.iter().map(one).collect()
 }
@@ -176,7 +195,7 @@ fn considered(analysis: &Analysis, options: &Options) -> Vec<Considered> {
             Considered {
                 effect: about.name.into(),
                 gain: p,
-                why_not: words::why_not(detectable.is_some(), p).into(),
+                why_not: WhyNot::of(detectable.is_some(), p),
                 detectable: detectable.filter(|d| d.is_finite()),
                 unit: about.parameter.1.into(),
             }

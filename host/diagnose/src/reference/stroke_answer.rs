@@ -1,15 +1,14 @@
 //! The answer for strokes at regulated pressures.
 
 use super::answer::{
-    ChangeReport, Changed, Considered, Curve, HeldOut, Place, Probability, Reference, Repeatability, Since,
-    Verdict, not_comparable, size,
+    ChangeReport, Changed, Considered, Curve, HeldOut, Place, Probability, Reference, Remark, Repeatability,
+    Since, Split, Verdict, WhyNot, size,
 };
 use super::criteria::{NAMED, STROKE_PRIOR_NONE};
 use super::held_out::Unseen;
 use super::report::{Options, left, prior};
 use super::shapes::{Change, Class};
 use super::stroked::{self, Compared, Weighed};
-use super::words;
 use pam_data::error::Result;
 
 /// What was compared, weighed, as the answer.
@@ -39,15 +38,14 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
         .chain([Probability { cause: "none".into(), probability: weighed.none() }])
         .collect();
     probabilities.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    let mut remarks = vec![words::STROKES_ASSUMED.to_owned(), words::STROKES_MARGINAL.to_owned()];
+    let mut remarks = vec![Remark::StrokesAssumed, Remark::StrokesMarginal];
     if named.is_empty() && verdict == Verdict::Consistent && weighed.none() < NAMED {
-        remarks.push(words::not_acquitted(weighed.none()));
+        remarks.push(Remark::NotAcquitted(weighed.none()));
     }
     if named.iter().any(|c| c.class() == Class::Gain) {
-        remarks.push(words::GAIN_OF_STROKES.to_owned());
+        remarks.push(Remark::GainOfStrokes);
     }
     Ok(ChangeReport {
-        schema: "pam-diagnose/1",
         muscle: None,
         samples: 0,
         verdict,
@@ -58,19 +56,18 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
         r#where: places,
         missing: named.iter().map(|c| stroke_change(compared, &weighed, *c)).collect(),
         held_out: HeldOut {
-            split: words::STROKE_SPLIT.to_owned(),
+            split: Split::OtherLevels,
             rms_before_N: before,
             rms_after_N: after,
             noise_N: noise,
         },
-        next_experiment: None,
         considered: stroked::ASKED
             .iter()
             .filter(|c| !named.contains(c))
             .map(|c| Considered {
                 effect: c.name().into(),
                 gain: weighed.marginal(*c),
-                why_not: words::why_not(true, weighed.marginal(*c)).into(),
+                why_not: WhyNot::of(true, weighed.marginal(*c)),
                 detectable: weighed.alone.get(c).map(|(_, std)| std * (3.5 + 1.28)),
                 unit: c.about().parameter.1.into(),
             })
@@ -85,7 +82,7 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
             repeatability_N: noise,
             repeatability_from: Repeatability::Assumed,
             mounted_anew: true,
-            not_comparable: not_comparable(&compared.not_comparable),
+            not_comparable: compared.not_comparable.clone(),
         },
         alone: weighed
             .alone
@@ -116,6 +113,7 @@ fn stroke_change(compared: &Compared, weighed: &Weighed, change: Change) -> Chan
         rivals.extend([Change::GaugeGain, Change::CrossTalk].map(|c| c.name().to_owned()));
     }
     Changed {
+        change,
         effect: about.name.into(),
         probability: weighed.marginal(change),
         class_probability: weighed.class(about.class),
@@ -126,8 +124,6 @@ fn stroke_change(compared: &Compared, weighed: &Weighed, change: Change) -> Chan
         since: Since::NotDetermined,
         owner: about.owner,
         correction: change.is_bench(),
-        law: about.law.into(),
-        remedy: about.remedy.into(),
         rms_N: (shape.norm_squared() / shape.len().max(1) as f64).sqrt() * value.abs(),
     }
 }

@@ -3,11 +3,19 @@
 use model_core::muscle::Muscle;
 use model_core::units::{Length, Pressure};
 
-use super::criteria::{GRID, TABLE_SURFACE_STEP};
+use super::criteria::{GRID, SAME_STROKE, TABLE_SURFACE_STEP};
 use super::runs::Runs;
 use super::surface::{Curves, Surface};
 use pam_data::error::{DataCode, Error, Result};
-use pam_fit::table_file::TableFile;
+use pam_fit::table_file::{StoredMounting, TableFile};
+
+/// What the fit found a held stroke to be off by, m; zero where it did not look.
+fn offset(table: &TableFile, held: f64) -> f64 {
+    let near = |m: &&StoredMounting| (m.stroke - held).abs() <= SAME_STROKE;
+    let apart = |m: &StoredMounting| (m.stroke - held).abs();
+    let nearest = table.about.mountings.iter().filter(near).min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    nearest.map_or(0.0, |m| m.offset)
+}
 
 /// A table's surface at the mountings of AFTER, over the pressures that AFTER has and the table was made for.
 ///
@@ -43,7 +51,8 @@ pub(super) fn of(table: &TableFile, runs: &Runs) -> Result<Surface> {
     let curves = runs
         .strokes
         .iter()
-        .map(|&x| Curves {
+        .map(|held| held + offset(table, *held))
+        .map(|x| Curves {
             force: grid.iter().map(|p| mean(*p, x)).collect(),
             gap: grid.iter().map(|p| (force(*p, x, 1.0) - force(*p, x, -1.0)) / 2.0).collect(),
             by_pressure: grid

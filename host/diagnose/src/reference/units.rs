@@ -1,5 +1,6 @@
 //! Columns that seem to be in another unit than the reference's, recordings on both sides, and another actuator.
 
+use super::answer::Remark;
 use super::criteria::{FORCE_RATIO, UNIT_NEAR};
 use super::motion::range;
 use pam_data::error::{DataCode, Error, Result};
@@ -37,7 +38,7 @@ fn largest(values: &[f64]) -> f64 {
 ///
 /// # Errors
 /// The same recording on both sides, nothing that moves, columns in another unit.
-pub(super) fn check(before: &Campaign, after: &Campaign) -> Result<Vec<String>> {
+pub(super) fn check(before: &Campaign, after: &Campaign) -> Result<Vec<Remark>> {
     for a in &after.recordings {
         if let Some(b) = before.recordings.iter().find(|b| a.same_rows(b)) {
             let whom = if a.name == b.name {
@@ -77,9 +78,7 @@ pub(super) fn check(before: &Campaign, after: &Campaign) -> Result<Vec<String>> 
     let same_pressures = (largest(&p1) / largest(&p0) - 1.0).abs() < 0.1;
     let mut remarks = Vec::new();
     if same_pressures && !(ratio >= FORCE_RATIO.0 && ratio <= FORCE_RATIO.1) {
-        remarks.push(format!(
-            "the largest force of AFTER is {ratio:.2} times that of the reference at the same pressures: is it the same actuator?"
-        ));
+        remarks.push(Remark::ForceRatio(ratio));
     }
     Ok(remarks)
 }

@@ -165,7 +165,7 @@ fn verdict(report: Option<&ChangeReport>) -> String {
         .missing
         .iter()
         .map(|m| {
-            let size = m.parameters.first().map(pam_diagnose::reference::words::size);
+            let size = m.parameters.first().map(super::change::size);
             format!("{} {}", m.effect, size.unwrap_or_default()).trim_end().to_owned()
         })
         .collect();

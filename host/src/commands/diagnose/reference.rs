@@ -14,9 +14,10 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::write_whole;
 use pam_data::recording::{Campaign, Import, Reader};
 use pam_diagnose::reference::correction::{self, Done};
-use pam_diagnose::reference::{Against, ChangeReport, Mounted, Options as Asked, compare, words};
+use pam_diagnose::reference::{Against, ChangeReport, Mounted, Options as Asked, compare};
 use pam_fit::table_file::{self, TableFile};
-use pam_report::change_page;
+use pam_report::wording::change as wording;
+use pam_report::{change_page, document};
 
 /// m: with lengths and no rest length, strokes count from this one; differences between mountings are all that matters.
 const ANY_LENGTH: f64 = 10.0;
@@ -191,11 +192,11 @@ pub fn run(arguments: &Arguments, console: &Console, taken: bool) -> Result<()> 
     let report = compare(&after, against, &asked)?;
     console.detail(format!("compared in {:.3} s", start.elapsed().as_secs_f64()));
     if let Some(path) = &arguments.json {
-        write_whole(path, (report.to_json() + "\n").as_bytes())?;
+        write_whole(path, (document::change_json(&report) + "\n").as_bytes())?;
     }
     arguments.reports.write(console, || change_page::page(&report, &after))?;
     if arguments.json.as_deref() != Some(Path::new("-")) {
-        let words = words::summary(&report);
+        let words = wording::summary(&report);
         if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
     }
     // Last, so that the answer is there where no table can be written.

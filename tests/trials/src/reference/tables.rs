@@ -14,7 +14,7 @@ use super::staircases::{Muscle, Run};
 use super::{Answer, Trial};
 
 /// Sizes put in, % of the largest force rms.
-const SIZES: [f64; 2] = [3.0, 5.0];
+const SIZES: [f64; 3] = [3.0, 5.0, 10.0];
 
 fn campaign(runs: &[Run]) -> Campaign {
     Campaign::new(runs.iter().map(Run::recording).collect())

@@ -1,48 +1,121 @@
-//! The answer in words. Everything that reads as a sentence stands here.
+//! Sentences of a comparison with a reference.
 
 use std::fmt::Write;
 
-use super::answer::{ChangeReport, Changed, NotComparable, Place, Repeatability, Since, Size, Verdict};
-use super::shapes::Owner;
+use pam_diagnose::reference::answer::{
+    ChangeReport, Changed, Left, NotComparable, Place, Remark, Repeatability, Since, Size, Split, Verdict,
+    WhyNot,
+};
+use pam_diagnose::reference::shapes::{Change, Owner};
 
-pub(super) const TABLE_REFERENCE: &str = "the reference is a table: how far this actuator repeats is not known, and what is usual for its class was taken; small changes are missed";
-pub(super) const OTHER_ACTUATOR: &str = "the difference is larger than a change of the bench makes: is it the same actuator, and are the signs and units the same?";
-pub(super) const ONE_LENGTH_REMOUNTED: &str = "AFTER was mounted anew and has one length only: a shift of the clamp by a millimetre cannot be told from a change of gain; record at two lengths";
-pub(super) const ASSUMED: &str =
-    "nothing in the reference was recorded twice: how far the actuator repeats is assumed, not measured";
-pub(super) const STROKES_ASSUMED: &str = "how far campaigns of strokes repeat is assumed (zero and level to 0.2 % of the largest force, gain to 0.5 %, friction to 5 to 10 %), not measured";
-pub(super) const STROKES_MARGINAL: &str =
-    "probabilities are those that a change is there at all; several can be there at once";
-pub(super) const GAIN_OF_STROKES: &str =
-    "at regulated pressures a gain of the load cell, a gain of the gauge and another piston area look alike";
-pub(super) const STROKE_SPLIT: &str = "every other level of pressure";
-
-pub(super) fn split(held: bool) -> &'static str {
-    if held { "every other recording of AFTER" } else { "none: AFTER is one recording" }
-}
-
-pub(super) fn not_acquitted(none: f64) -> String {
-    format!("no change is named, but that nothing changed has a probability of {none:.2} only")
-}
-
-pub(super) fn one_mounting(stroke: f64, log: f64) -> String {
-    format!(
-        "the mounting at {:.1} mm differs by itself (Bayes factor e^{log:.0}), and the others do not: clamped again, or slipped?",
-        stroke * 1e3
-    )
-}
-
-pub(super) fn why_not(comparable: bool, probability: f64) -> &'static str {
-    if !comparable {
-        "these recordings cannot show it"
-    } else if probability >= 0.05 {
-        "possible, but another cause is more probable"
-    } else {
-        "the difference does not have its shape, or is too small"
+/// How recordings were held out.
+#[must_use]
+pub fn split(split: Split) -> &'static str {
+    match split {
+        Split::OtherRecordings => "every other recording of AFTER",
+        Split::None => "none: AFTER is one recording",
+        Split::OtherLevels => "every other level of pressure",
     }
 }
 
-pub(super) fn place(p: &Place) -> String {
+/// Files in one sentence, at most.
+const MOST_FILES: usize = 3;
+
+fn table(error: f64, stated: f64, sources: &[String]) -> String {
+    let mut text = if stated > 0.0 {
+        format!(
+            "the reference is a table: its error ({stated:.2} N rms as stated, {error:.2} N counted here) is part of what repeats, and smaller changes are missed"
+        )
+    } else {
+        format!(
+            "the reference is a table that states no error: {error:.2} N is assumed as part of what repeats, and smaller changes are missed"
+        )
+    };
+    if let Some(first) = sources.first() {
+        let more = match sources.len() {
+            1 => String::new(),
+            n if n <= MOST_FILES => sources[1..].iter().map(|s| format!(", {s}")).collect(),
+            n => format!(" and {} more", n - 1),
+        };
+        let _ = write!(text, "; a comparison with its recordings ({first}{more}) finds smaller ones");
+    }
+    text
+}
+
+/// What a reader should know about a comparison.
+#[must_use]
+pub fn remark(remark: &Remark) -> String {
+    match remark {
+        Remark::ForceRatio(ratio) => format!(
+            "the largest force of AFTER is {ratio:.2} times that of the reference at the same pressures: is it the same actuator?"
+        ),
+        Remark::Table { error, stated, sources } => table(*error, *stated, sources),
+        Remark::OtherTable(table, muscle) => {
+            format!("the table is that of `{table}`, and `{muscle}` is described: is it the same actuator?")
+        }
+        Remark::OtherActuator => "the difference is larger than a change of the bench makes: is it the same actuator, and are the signs and units the same?".into(),
+        Remark::OneLengthMountedAnew => "AFTER was mounted anew and has one length only: a shift of the clamp by a millimetre cannot be told from a change of gain; record at two lengths".into(),
+        Remark::NothingTwice => "nothing in the reference was recorded twice: how far the actuator repeats is assumed, not measured".into(),
+        Remark::OneMounting { stroke, log } => format!(
+            "the mounting at {:.1} mm differs by itself (Bayes factor e^{log:.0}), and the others do not: clamped again, or slipped?",
+            stroke * 1e3
+        ),
+        Remark::StrokesAssumed => "how far campaigns of strokes repeat is assumed (zero and level to 0.2 % of the largest force, gain to 0.5 %, friction to 5 to 10 %), not measured".into(),
+        Remark::StrokesMarginal => "probabilities are those that a change is there at all; several can be there at once".into(),
+        Remark::NotAcquitted(none) => {
+            format!("no change is named, but that nothing changed has a probability of {none:.2} only")
+        }
+        Remark::GainOfStrokes => "at regulated pressures a gain of the load cell, a gain of the gauge and another piston area look alike".into(),
+    }
+}
+
+/// Why a change is not named.
+#[must_use]
+pub fn why_not(why: WhyNot) -> &'static str {
+    match why {
+        WhyNot::NotComparable => "these recordings cannot show it",
+        WhyNot::LessProbable => "possible, but another cause is more probable",
+        WhyNot::OtherShape => "the difference does not have its shape, or is too small",
+    }
+}
+
+/// What to do about a change.
+#[must_use]
+pub fn remedy(change: Change) -> &'static str {
+    match change {
+        Change::ForceOffset => "re-zero the load cell with nothing pulling on it",
+        Change::ForceGain => "check the load cell's calibration with a known weight",
+        Change::GaugeGain => "compare the pressure gauge with another one at a high pressure",
+        Change::GaugeOffset => {
+            "vent and read the gauge; if it reads zero, the actuator's deadband has changed"
+        }
+        Change::CrossTalk => "look for a hose or fitting whose pressure acts on the load cell",
+        Change::DisplacementOffset => "measure the mounted length, re-zero the stroke and clamp again",
+        Change::CoulombFriction => "look at guides, alignment and lubrication",
+        Change::PressureFriction => "look at the seal, or at wear and lubrication of the braid",
+        Change::FrictionFactor => {
+            "the braid rubs differently: look at wear and lubrication, then refit the table"
+        }
+        Change::ElasticStiffening => "the bladder has become stiffer or softer: refit the table",
+        Change::ForceDrift => "let the load cell warm up, and tare at both ends of a campaign",
+        Change::RigCompliance => "tighten bolts and clamps, and stiffen the frame",
+        Change::EndSlip => "look at the end fittings, clamp again and measure the length",
+        Change::SensorDelay => "look at the filter settings and the sampling of the force channel",
+        Change::PressureSensorLag => {
+            "look for a long or throttled line to the pressure sensor, and at its filter"
+        }
+    }
+}
+
+/// Where what no name explains lies.
+#[must_use]
+pub fn pattern(left: &Left) -> String {
+    left.place.as_ref().map_or_else(|| "none".to_owned(), place)
+}
+
+/// A part of the data in which the difference lies.
+#[must_use]
+pub fn place(p: &Place) -> String {
     let range = if p.from == p.to {
         format!("{:.4} {}", p.from, p.unit)
     } else {
@@ -57,7 +130,9 @@ pub(super) fn place(p: &Place) -> String {
     format!("{:.0} % of the difference lies in {what} ({:.0} % of the data)", 100.0 * p.share, 100.0 * p.rows)
 }
 
-pub(super) fn not_comparable(n: &NotComparable) -> String {
+/// What could not be compared.
+#[must_use]
+pub fn not_comparable(n: &NotComparable) -> String {
     match n {
         NotComparable::Stroke { recording, stroke } => {
             format!("`{recording}`: the reference has no recording at a stroke of {:.1} mm", stroke * 1e3)
@@ -135,7 +210,7 @@ pub fn size(s: &Size) -> String {
 
 /// A size in a unit that people use, without an interval.
 #[must_use]
-pub fn plain(value: f64, unit: &str) -> String {
+pub fn in_usual_unit(value: f64, unit: &str) -> String {
     let (scale, unit) = usual_unit(unit);
     format!("{}{unit}", rounded(scale * value, scale * value.abs()))
 }
@@ -163,10 +238,10 @@ fn one(text: &mut String, m: &Changed) {
     for s in &m.parameters {
         let _ = writeln!(text, "  how large   {} {} (95 %)", s.name, size(s));
     }
-    let _ = writeln!(text, "  law         {}", m.law);
+    let _ = writeln!(text, "  law         {}", m.change.about().law);
     let _ = writeln!(text, "  since when  {}", since(&m.since));
     let _ = writeln!(text, "  whose       {}", owner(m.owner));
-    let _ = writeln!(text, "  what to do  {}", m.remedy);
+    let _ = writeln!(text, "  what to do  {}", remedy(m.change));
     if !m.confusable_with.is_empty() {
         let _ = writeln!(text, "  or          {}", m.confusable_with.join(", "));
     }
@@ -197,7 +272,7 @@ pub fn summary(r: &ChangeReport) -> String {
         let _ = writeln!(
             text,
             "\nOn recordings held out ({}): {:.2} N without, {:.2} N with; {:.0} % of the difference's energy is gone.",
-            h.split,
+            split(h.split),
             h.rms_before_N,
             h.rms_after_N,
             100.0 * share
@@ -216,19 +291,19 @@ pub fn summary(r: &ChangeReport) -> String {
         .map(|p| format!("{} {:.2}", p.cause, p.probability))
         .collect();
     let _ = writeln!(text, "\nprobabilities: {}", shown.join(", "));
-    if r.verdict == Verdict::Consistent {
+    if r.verdict == Verdict::Consistent || r.reference.table.is_some() {
         let seen: Vec<String> = r
             .considered
             .iter()
-            .filter_map(|c| Some(format!("{} {}", c.effect, plain(c.detectable?, &c.unit))))
+            .filter_map(|c| Some(format!("{} {}", c.effect, in_usual_unit(c.detectable?, &c.unit))))
             .collect();
         let _ = writeln!(text, "would have been seen (90 %): {}", seen.join(", "));
     }
     for n in &r.reference.not_comparable {
-        let _ = writeln!(text, "not comparable: {n}");
+        let _ = writeln!(text, "not comparable: {}", not_comparable(n));
     }
-    for remark in &r.remarks {
-        let _ = writeln!(text, "note: {remark}");
+    for one in &r.remarks {
+        let _ = writeln!(text, "note: {}", remark(one));
     }
     text
 }
