@@ -149,6 +149,74 @@ fn what_cannot_be_compared_is_said_with_a_remedy() {
 }
 
 #[test]
+fn bad_references_are_refused_with_the_cause() {
+    let bench = Bench::new();
+    let after = bench.runs("after", None, same);
+    let file = |name: &str, text: &str| {
+        let path = bench.0.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let (status, _, said) = bench.ask(&after, &[bench.0.path().join("absent.csv")], &[]);
+    assert!(status == 1 && said.contains("absent.csv") && said.contains("help"), "{said}");
+    let (status, _, said) = bench.ask(&after, &[file("empty.csv", "")], &[]);
+    assert!(status == 1 && said.contains("empty.csv"), "{said}");
+    let (status, _, said) = bench.ask(&after, &[file("head.csv", "time_s,pressure_kPa,force_N\n")], &[]);
+    assert!(status == 1 && said.contains("head.csv"), "{said}");
+    let (status, _, said) = bench.ask(&after, &[file("broken.pam", "no table")], &[]);
+    assert!(status == 1 && said.contains("broken.pam") && said.contains("table"), "{said}");
+    let (status, _, said) = bench.ask(&after, &[file("a.pam", "x"), file("b.pam", "x")], &[]);
+    assert!(status == 2 && said.contains("one table"), "{said}");
+}
+
+#[test]
+fn overlapping_parts_of_one_recording_are_refused_and_the_wrong_order_is_told() {
+    let bench = Bench::new();
+    let whole = bench.runs("whole", None, same);
+    let text = std::fs::read_to_string(&whole[0]).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let part = |name: &str, from: usize, to: usize| {
+        let path = bench.0.path().join(name);
+        std::fs::write(&path, format!("{}\n{}\n", lines[0], lines[from..to].join("\n"))).unwrap();
+        path
+    };
+    let (first, second) = (part("first.csv", 1, 400), part("second.csv", 200, 600));
+    let (status, _, said) = bench.ask(&[second], &[first], &[]);
+    assert!(status == 2 && said.contains("overlap"), "{said}");
+    let dated = |name: &str, from: &Path| {
+        let path = bench.0.path().join(name);
+        std::fs::copy(from, &path).unwrap();
+        path
+    };
+    let march: Vec<PathBuf> =
+        whole.iter().enumerate().map(|(i, f)| dated(&format!("2026-03-0{}.csv", i + 1), f)).collect();
+    let other = bench.runs("other", None, same);
+    let may: Vec<PathBuf> =
+        other.iter().enumerate().map(|(i, f)| dated(&format!("2026-05-0{}.csv", i + 1), f)).collect();
+    let remarks = |after: &[PathBuf], before: &[PathBuf]| {
+        let (status, answer, said) = bench.ask(after, before, &[]);
+        assert_eq!(status, 0, "{said}");
+        answer["remarks"].to_string()
+    };
+    assert!(remarks(&march, &may).contains("2026-05-01"), "the reference is later");
+    assert!(!remarks(&may, &march).contains("wrong way round"));
+}
+
+#[test]
+fn another_actuator_gets_no_names() {
+    let bench = Bench::new();
+    let before = bench.runs("before", None, same);
+    // Three times as stiff above another threshold.
+    let after =
+        bench.runs("after", None, |p, f| (0.0, 1.8 * (p - 250.0).max(0.0) - f + 0.3 * (f - 100.0).max(0.0)));
+    let (status, answer, said) = bench.ask(&after, &before, &[]);
+    assert_eq!(status, 0, "{said}");
+    assert_eq!(answer["verdict"], "unexplained", "{answer:#}");
+    assert_eq!(answer["missing"], Value::Array(Vec::new()));
+    assert!(answer["remarks"].to_string().contains("same actuator"), "{answer:#}");
+}
+
+#[test]
 fn recordings_without_a_reference_need_a_muscle() {
     let out = Command::new(env!("CARGO_BIN_EXE_host")).args(["diagnose", "a.csv"]).output().unwrap();
     assert_eq!(out.status.code(), Some(2));

@@ -27,6 +27,7 @@
 //! | `localise` | which cells, since which file, abruptly or gradually |
 //! | `held_out` | how much of the difference is removed on held-out recordings |
 //! | `units` | columns in other units, another actuator |
+//! | `sides` | rows on both sides, sides in the wrong order |
 //! | `report`, `staircase_answer`, `stroke_answer` | from two sides to the answer |
 //! | [`answer`] | the answer as values |
 //! | [`correction`] | what the answer means for a table |
@@ -48,6 +49,7 @@ pub(crate) mod repeatability;
 mod report;
 mod runs;
 pub mod shapes;
+mod sides;
 mod slip;
 mod spline;
 mod staircase_answer;

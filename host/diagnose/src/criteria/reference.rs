@@ -121,6 +121,14 @@ pam_data::criteria! {
     FORCE_RATIO: ((f64, f64)) = (0.7, 1.4), "force_ratio", "1", Judgement;
     /// How near a ratio must be to a factor between units to be taken for one.
     UNIT_NEAR: f64 = 0.05, "unit_near", "1", Judgement;
+    /// A column smaller than what a table gives by this factor is in another unit, where the factor is one between units.
+    UNIT_FAR: f64 = 50.0, "unit_far", "1", Judgement;
+    /// Two recordings that share this part of the smaller one's rows in motion overlap: rows in motion agree by chance in far fewer.
+    SHARED_ROWS: f64 = 0.1, "shared_rows", "1", Judgement;
+    /// Rest lengths that differ by more than this share are of two actuators: a tape measure errs by less.
+    OTHER_LENGTH: f64 = 0.02, "other_length", "1", Judgement;
+    /// With a difference that suspects another actuator, names that leave more than this share of the largest force are withdrawn.
+    LEFT_BY_NAMES: f64 = 0.1, "left_by_names", "1", Judgement;
     /// Strokes: bins over the middle of the stroke.
     STROKE_BINS: usize = 6, "stroke_bins", "1", Judgement;
     /// Share of the stroke left out at either end.

@@ -59,6 +59,13 @@ pub enum NotComparable {
 pub enum Remark {
     /// The largest force is this many times that of the reference, at the same pressures.
     ForceRatio(f64),
+    /// The reference is later than AFTER, s since 1970.
+    ReferenceLater {
+        /// First date of the reference.
+        reference: f64,
+        /// Last date of AFTER.
+        after: f64,
+    },
     /// The reference is a table.
     Table {
         /// Error that it counts with in a cell, N: what it states, times what AFTER shows of it.

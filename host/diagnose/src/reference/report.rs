@@ -1,7 +1,9 @@
 //! From two sides to the answer: which protocol, which reference, and what both kinds of answers share.
 
 use super::answer::{ChangeReport, Left, NotComparable, Place, Remark, Repeatability, Verdict};
-use super::criteria::{HELD, NAMED, OTHER_ACTUATOR, PRIOR_NONE, REPORT_REGULATED, UNSTATED_ERROR};
+use super::criteria::{
+    HELD, LEFT_BY_NAMES, NAMED, OTHER_ACTUATOR, OTHER_LENGTH, PRIOR_NONE, REPORT_REGULATED, UNSTATED_ERROR,
+};
 use super::held_out::Unseen;
 use super::isometric;
 use super::runs::Runs;
@@ -9,7 +11,7 @@ use super::staircase_answer::staircases;
 use super::stroke_answer::strokes;
 use super::stroked;
 use super::surface::Surface;
-use super::{table_surface, units};
+use super::{sides, table_surface, units};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::{self, Campaign, Recording};
 use pam_fit::predict::predict;
@@ -126,7 +128,9 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
             for r in &before.recordings {
                 r.require_force()?;
             }
-            let remarks = units::check(before, after)?;
+            sides::apart(before, after)?;
+            let mut remarks = units::check(before, after)?;
+            remarks.extend(sides::order(before, after));
             let mut report = match (protocol(before, "the reference")?, kind) {
                 (Protocol::Held, Protocol::Held) => held(before, after, options)?,
                 (Protocol::Stroked, Protocol::Stroked) => {
@@ -147,11 +151,13 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
             report
         }
         (Against::Table(table, path), kind) => {
+            let other = same_actuator(table, options)?;
             let mut report = match kind {
                 Protocol::Held => held_against_table(table, after, options)?,
                 Protocol::Stroked => stroked_against_table(table, after, options)?,
             };
             report.reference.table = Some(path.to_owned());
+            report.remarks.splice(0..0, other);
             report.reference.repeatability_from = Repeatability::Assumed;
             report
         }
@@ -160,6 +166,14 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
     report.muscle.clone_from(&options.muscle);
     if report.misfit_rms_N > OTHER_ACTUATOR * report.largest_force_N {
         report.remarks.push(Remark::OtherActuator);
+        if report.held_out.rms_after_N > LEFT_BY_NAMES * report.largest_force_N && !report.missing.is_empty()
+        {
+            // Of another actuator everything differs, and the nearest shape is no change.
+            report.missing.clear();
+            report.verdict = Verdict::Unexplained;
+            report.held_out.rms_after_N = report.held_out.rms_before_N;
+            report.unexplained = Left { share: 1.0, place: report.r#where.first().cloned() };
+        }
     }
     Ok(report)
 }
@@ -202,7 +216,9 @@ fn held(before: &Campaign, after: &Campaign, options: &Options) -> Result<Change
 
 fn held_against_table(table: &TableFile, after: &Campaign, options: &Options) -> Result<ChangeReport> {
     let runs = Runs::alone(after, options.mounted)?;
+    units::check_pressure(after, f64::from(table.table.tested.pressure_high.pascals()))?;
     let surface = table_surface::of(table, &runs)?;
+    units::check_force(after, surface.largest)?;
     let stated = table.about.fit.rms_newtons;
     let error = if stated > 0.0 { stated } else { UNSTATED_ERROR * surface.largest };
     let reference = isometric::Reference { surface, error, recorded: false };
@@ -210,6 +226,29 @@ fn held_against_table(table: &TableFile, after: &Campaign, options: &Options) ->
     let mut report = staircases(&analysis, options);
     report.remarks.push(table_remark(table, analysis.reference_error));
     Ok(report)
+}
+
+/// The table's own muscle beside the described one.
+///
+/// # Errors
+/// Rest lengths of two actuators.
+fn same_actuator(table: &TableFile, options: &Options) -> Result<Option<Remark>> {
+    let own = f64::from(table.table.geometry.rest_length.metres());
+    let name = &table.about.muscle;
+    if let Some(rest) = options.rest_length.filter(|r| !((r / own - 1.0).abs() <= OTHER_LENGTH)) {
+        let described = options.muscle.as_deref().unwrap_or("the muscle");
+        return Err(Error::new(
+            DataCode::CallInvalid,
+            format!(
+                "the table is that of `{name}` with a rest length of {:.1} mm, `{described}` has {:.1} mm",
+                own * 1e3,
+                rest * 1e3
+            ),
+        )
+        .help("give the table and the description of one muscle"));
+    }
+    let other = options.muscle.as_ref().filter(|m| !name.is_empty() && *m != name);
+    Ok(other.map(|m| Remark::OtherTable(name.clone(), m.clone())))
 }
 
 fn table_remark(table: &TableFile, error: f64) -> Remark {

@@ -1,7 +1,7 @@
-//! Columns that seem to be in another unit than the reference's, recordings on both sides, and another actuator.
+//! Columns that seem to be in another unit than the reference's, and another actuator.
 
 use super::answer::Remark;
-use super::criteria::{FORCE_RATIO, UNIT_NEAR};
+use super::criteria::{FORCE_RATIO, UNIT_FAR, UNIT_NEAR};
 use super::motion::range;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
@@ -37,20 +37,8 @@ fn largest(values: &[f64]) -> f64 {
 /// Looks at both sides before anything is computed.
 ///
 /// # Errors
-/// The same recording on both sides, nothing that moves, columns in another unit.
+/// Nothing that moves, columns in another unit.
 pub(super) fn check(before: &Campaign, after: &Campaign) -> Result<Vec<Remark>> {
-    for a in &after.recordings {
-        if let Some(b) = before.recordings.iter().find(|b| a.same_rows(b)) {
-            let whom = if a.name == b.name {
-                format!("`{}` is", a.name)
-            } else {
-                format!("`{}` and `{}` hold the same rows:", a.name, b.name)
-            };
-            return Err(Error::new(DataCode::CallInvalid, format!("{whom} on both sides of the comparison"))
-                .file(&a.source)
-                .help("give each recording once, before or after --reference; --where and --reference-where pick rows of one file"));
-        }
-    }
     let ((p0, f0), (p1, f1)) = (columns(before), columns(after));
     for (what, b, a) in [("pressure", &p0, &p1), ("force", &f0, &f1)] {
         if !(range(a) > 0.0) || !(range(b) > 0.0) {
@@ -83,9 +71,50 @@ pub(super) fn check(before: &Campaign, after: &Campaign) -> Result<Vec<Remark>> 
     Ok(remarks)
 }
 
+/// Whether the pressure of AFTER is in the unit of a table's; `most`: the table's highest, Pa.
+///
+/// # Errors
+/// Another unit.
+pub(super) fn check_pressure(after: &Campaign, most: f64) -> Result<()> {
+    same_unit("pressure", largest(&columns(after).0), most)
+}
+
+/// Whether the force of AFTER is in the unit of a table's; `most`: the largest that the table gives at the lengths of AFTER, N.
+///
+/// # Errors
+/// Another unit.
+pub(super) fn check_force(after: &Campaign, most: f64) -> Result<()> {
+    same_unit("force", largest(&columns(after).1), most)
+}
+
+/// A table reaches to higher pressures and forces than many recordings: only a column that is larger than it can be, or by far too
+/// small, is in another unit.
+fn same_unit(what: &str, found: f64, known: f64) -> Result<()> {
+    let ratio = found / known;
+    let far = ratio > FORCE_RATIO.1 || ratio * UNIT_FAR < 1.0;
+    match factor(ratio).filter(|_| far) {
+        None => Ok(()),
+        Some(words) => Err(Error::new(
+            DataCode::RecordingUnknownUnit,
+            format!("the {what} of AFTER and of the table differ by a factor of about {words}"),
+        )
+        .help(format!(
+            "AFTER reaches {found:.4}, the table {known:.4} (SI); put the unit that was logged into the column's name, or scale it in an import description"
+        ))),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_column_may_be_smaller_than_the_table_and_not_in_another_unit() {
+        // A seventh of the table's pressure is no psi; pounds are smaller than newtons, kilopascals a thousand times pascals.
+        assert!(same_unit("pressure", 100e3, 690e3).is_ok() && same_unit("force", 400.0, 440.0).is_ok());
+        assert!(same_unit("pressure", 690e6, 690e3).is_err() && same_unit("pressure", 620.0, 630e3).is_err());
+        assert!(same_unit("force", 4.4e5, 440.0).is_err() && same_unit("force", f64::NAN, 1.0).is_ok());
+    }
 
     #[test]
     fn factors_are_known_both_ways_and_a_gain_is_none() {

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use pam_data::date;
 use pam_diagnose::reference::answer::{
     ChangeReport, Changed, Left, NotComparable, Place, Remark, Repeatability, Since, Size, Split, Verdict,
     WhyNot,
@@ -48,6 +49,11 @@ pub fn remark(remark: &Remark) -> String {
     match remark {
         Remark::ForceRatio(ratio) => format!(
             "the largest force of AFTER is {ratio:.2} times that of the reference at the same pressures: is it the same actuator?"
+        ),
+        Remark::ReferenceLater { reference, after } => format!(
+            "the reference is of {}, AFTER of {}: were they given the wrong way round?",
+            date::day(*reference),
+            date::day(*after)
         ),
         Remark::Table { error, stated, sources } => table(*error, *stated, sources),
         Remark::OtherTable(table, muscle) => {
