@@ -200,7 +200,7 @@ impl Engine {
         steps.fold(f64::INFINITY, f64::min)
     }
 
-    /// The step of the menu that tells most per second within the time left, and whether everything asked for is known.
+    /// The step of the menu with the most information per second within the time left, and whether all targets are met.
     fn weigh(&mut self, left_s: f64) -> (Option<(Step, Gain, f64)>, bool) {
         let Some(findings) = &self.findings else {
             let next = menu(&self.places, &self.rig)
@@ -309,12 +309,12 @@ impl Engine {
         self.since_diagnosis = DIAGNOSE_EVERY;
     }
 
-    /// Leaves a step out for good.
+    /// Leaves a step out permanently.
     pub fn leave_out(&mut self, step: Step) {
         self.left_out.push(step);
     }
 
-    /// Fits and, from time to time, diagnoses; says in words what the last step told.
+    /// Fits and, from time to time, diagnoses; states as text what the last step contributed.
     ///
     /// # Errors
     /// What a diagnosis fails with.

@@ -21,7 +21,7 @@ pub struct Places {
     pub stroke_max: f64,
     /// Largest speed that is allowed, m/s.
     pub speed_max: f64,
-    /// Whether a person sets strokes.
+    /// Whether the operator sets strokes by hand.
     pub by_hand: bool,
     /// Blocked force at the highest level, N; zero until it is measured.
     pub blocked: f64,
@@ -53,7 +53,7 @@ impl Places {
         let stroke_max = (LARGEST_CONTRACTION * muscle.rest_length())
             .min(rig.stroke_max_mm.map_or(f64::INFINITY, |mm| mm * 1e-3));
         Ok(Self {
-            // Whole kilopascals, as a person would set them.
+            // Whole kilopascals, as an operator would set them.
             top: (TOP_SHARE * highest * 1e-3).floor() * 1e3,
             stroke_max,
             speed_max: rig.speed_max_mm_s.map_or(f64::INFINITY, |v| v * 1e-3),

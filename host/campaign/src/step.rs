@@ -140,7 +140,7 @@ impl Step {
         }
     }
 
-    /// In words.
+    /// As text.
     #[must_use]
     pub fn words(&self) -> String {
         let kpa = |p: f64| format!("{:.0} kPa", p * 1e-3);
@@ -230,7 +230,7 @@ impl Step {
         }
     }
 
-    /// Strokes that a person would have to set.
+    /// Strokes that the operator would have to set.
     fn positions(&self) -> u32 {
         match self {
             Self::Ramps { part } | Self::Staircase { part, .. } if *part > 0.0 => 2,

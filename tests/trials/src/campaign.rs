@@ -49,7 +49,7 @@ pub struct Campaigns {
     /// A few muscles, and only the campaign that chooses its own steps; fails on a false alarm.
     #[arg(long)]
     short: bool,
-    /// Begin no further muscle after this many minutes; the same command goes on later.
+    /// Begin no further muscle after this many minutes; the same command continues later.
     #[arg(long)]
     minutes: Option<f64>,
 }

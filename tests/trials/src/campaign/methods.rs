@@ -30,11 +30,11 @@ use virtual_bench::rng::Rng;
 pub enum Method {
     /// The campaign that chooses its own steps.
     Chosen,
-    /// Protocol C, broken off after the same time; its checks of the bench are given to it.
+    /// Protocol C, interrupted after the same time; its checks of the bench are given to it.
     Complete,
     /// The same first steps, then steps of the same menu at random.
     Random,
-    /// Protocol A, then what `host diagnose` proposes, broken off after the same time.
+    /// Protocol A, then what `host diagnose` proposes, interrupted after the same time.
     Proposed,
 }
 
@@ -42,7 +42,7 @@ impl Method {
     /// All.
     pub const ALL: [Self; 4] = [Self::Chosen, Self::Complete, Self::Random, Self::Proposed];
 
-    /// In words.
+    /// As text.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Chosen => "steps chosen by expected information",
@@ -79,7 +79,7 @@ impl Scratch {
 
 impl Drop for Scratch {
     fn drop(&mut self) {
-        // What is left of a temporary folder does no harm.
+        // A temporary folder that remains is harmless.
         let _ = std::fs::remove_dir_all(&self.0);
     }
 }

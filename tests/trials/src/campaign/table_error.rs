@@ -14,7 +14,7 @@ use virtual_bench::muscle::Muscle;
 /// Minutes at which both are compared.
 pub const MINUTES: [f64; 5] = [3.0, 5.0, 8.0, 12.0, 20.0];
 
-/// The error after so many minutes, % of the blocked force; absent where no table can be fitted yet.
+/// The error after this many minutes, % of the blocked force; absent where no table can be fitted yet.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct After {
     /// Bench time, min.
