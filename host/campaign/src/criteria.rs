@@ -14,6 +14,11 @@ pub const FIT_FROM: usize = 3;
 pub const LEVELS: usize = 6;
 /// Seconds for the free stroke at the slow speed (the thesis: 1 mm/s for a 150 mm muscle).
 pub const SLOW_STROKE: f64 = 27.0;
+/// Pressure rate of the first ramp at rest length, share of the highest level per second: it shows deadband and blocked force, and takes
+/// 5 s each way.
+pub const FIRST_RAMP_SHARE: f64 = 0.2;
+/// Speed of the survey of all levels, in slow speeds: a stroke of some seconds, slow against regulators of some hundredths of a second.
+pub const SURVEY_SPEED: f64 = 8.0;
 /// Share of the blocked force below which the muscle counts as free; a stroke turns there.
 pub const FREE_FORCE: f64 = 0.01;
 /// Largest contraction that a stroke may reach before anything is known, as a share of the rest length. A braid's

@@ -160,7 +160,7 @@ impl Engine {
                 choosing_s: begun.elapsed().as_secs_f64(),
             })
         };
-        for (step, why) in opening(&self.places, &self.rig) {
+        for (step, why) in opening(&self.rig) {
             let kind = |s: &Step| s.name();
             let done = self.steps.iter().chain(&self.left_out).any(|s| kind(s) == kind(&step));
             // How long it takes is known only when the free stroke is; without these steps nothing else can be chosen.
@@ -290,6 +290,7 @@ impl Engine {
         let Some(recording) = recording else { return };
         match step {
             Step::BlockedRamp | Step::Staircase { .. } => self.places.learn_ramp(&recording),
+            Step::Survey { .. } => self.places.learn_survey(&recording),
             Step::Loops { .. } => self.places.learn_strokes(&recording),
             _ => {}
         }

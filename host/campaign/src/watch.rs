@@ -159,7 +159,11 @@ impl Watch {
             Step::BlockedRamp | Step::Staircase { .. } => {
                 falls_with_pressure(rows).then_some(Spoiled::WrongSign)
             }
-            Step::Loops { .. } | Step::Speeds { .. } | Step::Nested { .. } | Step::Rest { .. } => {
+            Step::Loops { .. }
+            | Step::Survey { .. }
+            | Step::Speeds { .. }
+            | Step::Nested { .. }
+            | Step::Rest { .. } => {
                 let (from, to) = range(&stroke);
                 if !(to - from > 0.0) {
                     return Some(Spoiled::Frozen);

@@ -160,7 +160,7 @@ fn random(spec: &Spec, made: &Made, bench_s: f64, folder: Scratch) -> Result<Rec
     let mut made_checks: Vec<CheckKind> = Vec::new();
     let mut number = 0;
     loop {
-        let begin = opening(&places, &rig());
+        let begin = opening(&rig());
         let step = if let Some((first, _)) = begin.get(number) {
             *first
         } else {
@@ -194,6 +194,7 @@ fn random(spec: &Spec, made: &Made, bench_s: f64, folder: Scratch) -> Result<Rec
         let recorded = recording(&step.name(), &rows);
         match step {
             Step::BlockedRamp => places.learn_ramp(&recorded),
+            Step::Survey { .. } => places.learn_survey(&recorded),
             Step::Loops { .. } => places.learn_strokes(&recorded),
             _ => {}
         }
