@@ -54,7 +54,7 @@ pub enum NotComparable {
     Strokes,
 }
 
-/// What a reader should know about the comparison.
+/// A note on the comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Remark {
     /// The largest force is this many times that of the reference, at the same pressures.
@@ -83,7 +83,7 @@ pub enum Remark {
     OneLengthMountedAnew,
     /// Nothing in the reference was recorded twice.
     NothingTwice,
-    /// One mounting, m, differs by itself, with this log Bayes factor.
+    /// One mounting, m, differs alone, with this log Bayes factor.
     OneMounting {
         /// Its stroke, m.
         stroke: f64,
@@ -96,7 +96,7 @@ pub enum Remark {
     StrokesMarginal,
     /// No change is named, but the probability that nothing changed is this only.
     NotAcquitted(f64),
-    /// Gains look alike at regulated pressures.
+    /// Gains have the same shape at regulated pressures.
     GainOfStrokes,
 }
 
@@ -132,7 +132,7 @@ impl WhyNot {
     }
 }
 
-/// A part of the cells in which the difference sits.
+/// A part of the cells in which the difference is concentrated.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Place {
     /// Its name, one of those of every diagnosis.
@@ -155,7 +155,7 @@ pub struct Place {
 pub enum Since {
     /// From the first recording of AFTER on.
     Beginning,
-    /// From one recording on, at once.
+    /// A step, from one recording on.
     From {
         /// Its name.
         recording: String,
@@ -266,7 +266,7 @@ pub struct Reference {
     pub repeatability_from: Repeatability,
     /// Whether AFTER counts as mounted anew.
     pub mounted_anew: bool,
-    /// What of AFTER could not be compared, and changes that could not be asked about.
+    /// What of AFTER could not be compared, and changes that were not weighed.
     pub not_comparable: Vec<NotComparable>,
 }
 
@@ -321,7 +321,7 @@ pub struct ChangeReport {
     pub misfit_rms_N: f64,
     /// Largest force of the reference, N.
     pub largest_force_N: f64,
-    /// Where the difference sits; empty where nothing changed.
+    /// Where the difference is concentrated; empty where nothing changed.
     pub r#where: Vec<Place>,
     /// What changed.
     pub missing: Vec<Changed>,
@@ -329,13 +329,13 @@ pub struct ChangeReport {
     pub unexplained: Left,
     /// How much of the difference is gone.
     pub held_out: HeldOut,
-    /// Every change that could be asked about.
+    /// Every change that was weighed.
     pub considered: Vec<Considered>,
     /// All probabilities of the first weighing, in falling order.
     pub probabilities: Vec<Probability>,
     /// Causes that hold 95 % of the probability.
     pub set: Vec<String>,
-    /// What a reader should know.
+    /// Notes on the comparison.
     pub remarks: Vec<Remark>,
     /// What it was compared with.
     pub reference: Reference,

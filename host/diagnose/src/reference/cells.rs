@@ -44,7 +44,7 @@ pub(super) struct Means {
     pub elastic: f64,
     /// Variance of the surface, N².
     pub variance: f64,
-    /// What a lag of a given size does, N; filled in where one is asked about.
+    /// What a lag of a given size does, N; filled in where one is weighed.
     pub lag: f64,
 }
 
@@ -195,7 +195,7 @@ fn join(mut cells: Vec<Cell>) -> Vec<Cell> {
                 cell
             })
             .collect();
-        // The first run of a pair stands for both, so that their cells stay together.
+        // The first run of a pair names both, so that their cells stay together.
         let mut first = std::collections::BTreeMap::new();
         for c in &mut cells {
             c.run = *first.entry((c.after, c.mounting, c.number)).or_insert(c.run);

@@ -1,4 +1,4 @@
-//! Generalised least squares: what AFTER differs by beyond what repeats, and how strongly that speaks for a shape.
+//! Generalised least squares: what AFTER differs by beyond what repeats, and how strongly that supports a shape.
 
 use nalgebra::{DMatrix, DVector};
 

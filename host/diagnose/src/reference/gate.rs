@@ -16,7 +16,7 @@ pub(super) struct Asked<'a> {
     pub log: f64,
 }
 
-/// Limits the log evidences. Within three mountings nothing can be asked.
+/// Limits the log evidences. With fewer than three mountings there is no limit.
 pub(super) fn limit(cells: &[Cell], contrast: &Contrast, asked: &mut [Asked<'_>], sizes: &[f64]) {
     let mut mountings: Vec<usize> = cells.iter().filter(|c| c.after).map(|c| c.mounting).collect();
     mountings.sort_unstable();
@@ -42,7 +42,7 @@ pub(super) fn limit(cells: &[Cell], contrast: &Contrast, asked: &mut [Asked<'_>]
     let strong = GATE.ln();
     let best = candidates.iter().map(|i| worst[*i]).fold(f64::NEG_INFINITY, f64::max);
     for &i in &candidates {
-        // The gate asks whether there is a change of this kind at all: it closes for every name or for none. Only a step may sit at the
+        // The gate tests the presence of a change of this kind: it closes for every name or for none. Only a step may lie at the
         // end of AFTER, where one mounting shows it.
         let closed = best < strong || (asked[i].change == Change::EndSlip && worst[i] < strong);
         if closed {

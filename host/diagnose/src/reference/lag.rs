@@ -12,7 +12,7 @@ pub(super) struct Score {
     pub lag: f64,
     /// How much a lag would show: a slack mounting says nothing.
     pub weight: f64,
-    /// What the run's own noise leaves open, s²: large where two lags explain the force about as well.
+    /// Variance by the run's own noise, s²: large where two lags explain the force about as well.
     pub variance: f64,
 }
 
@@ -123,7 +123,7 @@ fn spread(tried: &[(f64, f64)], lag: f64, temperature: f64) -> f64 {
     let least = tried.iter().map(|t| t.1).fold(f64::INFINITY, f64::min);
     let (mut sum, mut all) = (0.0, f64::MIN_POSITIVE);
     for i in 0..tried.len() {
-        // Lags are not tried at equal distances: each stands for the half-way to its neighbours.
+        // Lags are not tried at equal distances: each has the weight of half the way to its neighbours.
         let width = tried[(i + 1).min(tried.len() - 1)].0 - tried[i.saturating_sub(1)].0;
         let p = width * (-(tried[i].1 - least) / temperature.max(f64::MIN_POSITIVE)).exp();
         sum += p * (tried[i].0 - lag).powi(2);

@@ -1,4 +1,4 @@
-//! Where the difference sits, and since when.
+//! Where the difference is concentrated, and since when.
 
 use nalgebra::DVector;
 

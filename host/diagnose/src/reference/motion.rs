@@ -47,7 +47,7 @@ pub(super) fn settled(time: &[f64], pressure: &[f64]) -> Vec<bool> {
     if (count as f64) < FEWEST_SETTLED * n as f64 { vec![true; n] } else { settled }
 }
 
-/// The sign of a signal's motion between its turning points: 1 or −1 for every value.
+/// The sign of a signal's motion between its reversals: 1 or −1 for every value.
 pub(super) fn turning(values: &[f64], threshold: f64, hold: f64) -> Vec<f64> {
     let mut direction = vec![1.0; values.len()];
     let Some(first) = values.first() else { return direction };

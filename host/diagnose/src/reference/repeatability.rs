@@ -27,7 +27,7 @@ pub(crate) struct Repeats {
     pub group_common: f64,
     /// The load cell's zero per run (floor; the estimate was 0.015).
     pub offset: f64,
-    /// What remains in one cell (floor; the estimate was 0.042).
+    /// Residual of one cell (floor; the estimate was 0.042).
     pub cell: f64,
     /// Correlation length in pressure, share of the range.
     pub length: f64,

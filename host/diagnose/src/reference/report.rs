@@ -269,7 +269,7 @@ fn stroked_against_table(table: &TableFile, after: &Campaign, options: &Options)
     Ok(report)
 }
 
-/// The verdict from what is named and what is left.
+/// The verdict from the named changes and the residual.
 pub(super) fn verdict(none: f64, named: usize, left: bool) -> Verdict {
     match (named, left) {
         (0, _) if none >= NAMED => Verdict::Consistent,

@@ -12,7 +12,7 @@ pub enum Mounted {
     /// Found from files and clocks: one file, or one clock without a long pause, is one visit.
     #[default]
     Found,
-    /// AFTER goes on where BEFORE ended: nothing was taken off the bench.
+    /// AFTER continues where BEFORE ended: nothing was taken off the bench.
     Same,
     /// Taken off and put on again.
     Anew,

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::cells::Means;
 
-/// Changes that recordings often cannot tell apart within; a class is right where the name may not be.
+/// Changes that recordings often cannot distinguish; a class is right where the name may not be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Class {
@@ -66,7 +66,7 @@ pub enum Change {
 pub struct About {
     /// Which one.
     pub change: Change,
-    /// Its name, as in the catalogue of effects where it stands there.
+    /// Its name, as in the catalogue of effects where it is listed.
     pub name: &'static str,
     /// Its class.
     pub class: Class,

@@ -187,7 +187,7 @@ fn considered(analysis: &Analysis, options: &Options) -> Vec<Considered> {
             let p = round.posterior.probability(Cause::Named(about.change));
             let estimate = round.estimates.iter().find(|e| e.change == about.change);
             let detectable = estimate.map(|e| {
-                // What the prior, a lead of e³ and the price of the size ask of the evidence; 1.28: with 90 %.
+                // What the prior, a lead of e³ and the price of the size require of the evidence; 1.28: with 90 %.
                 let price = (middle / e.rms / e.std).powi(2).ln_1p();
                 let z = (2.0 * (none / prior_name).ln() + 6.0 + price).max(0.0).sqrt();
                 e.std * (z + 1.28)

@@ -1,7 +1,7 @@
 //! What a table is wrong by where nothing changed: a Gaussian covariance beside what repeats.
 //!
 //! A table states its rms error on the recordings that it was fitted to. Equations that do not fit are wrong in a smooth way over the
-//! pressure, in both directions alike, and mostly by another amount at each length. How much larger the error is in the cells that are
+//! pressure, similarly in both directions, and mostly by another amount at each length. How much larger the error is in the cells that are
 //! compared is not stated: several factors are tried, and AFTER itself says how probable each is.
 
 use nalgebra::DMatrix;

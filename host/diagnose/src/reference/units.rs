@@ -47,7 +47,7 @@ pub(super) fn check(before: &Campaign, after: &Campaign) -> Result<Vec<Remark>> 
                 DataCode::RecordingOutOfRange,
                 format!("the {what} of {side} does not change"),
             )
-            .help("a sensor that stands still says nothing; look at its cable and at the column"));
+            .help("a constant reading holds no information; look at its cable and at the column"));
         }
         if let Some(words) = factor(range(a) / range(b)).filter(|_| factor(largest(a) / largest(b)).is_some())
         {

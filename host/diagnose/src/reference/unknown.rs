@@ -11,7 +11,7 @@ use super::criteria::{GATE_MOUNTINGS, SIZES, UNKNOWN_LEAST, UNKNOWN_SMOOTH};
 pub(super) struct Unknown {
     /// Log evidence that holds without any one mounting.
     pub log: f64,
-    /// The mounting that says most by itself, with the log evidence that is lost without it.
+    /// The mounting with the most evidence alone, with the log evidence that is lost without it.
     pub local: Option<(usize, f64)>,
 }
 

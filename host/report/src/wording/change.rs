@@ -43,7 +43,7 @@ fn table(error: f64, stated: f64, sources: &[String]) -> String {
     text
 }
 
-/// What a reader should know about a comparison.
+/// A note on a comparison.
 #[must_use]
 pub fn remark(remark: &Remark) -> String {
     match remark {
@@ -60,18 +60,18 @@ pub fn remark(remark: &Remark) -> String {
             format!("the table is that of `{table}`, and `{muscle}` is described: is it the same actuator?")
         }
         Remark::OtherActuator => "the difference is larger than a change of the bench makes: is it the same actuator, and are the signs and units the same?".into(),
-        Remark::OneLengthMountedAnew => "AFTER was mounted anew and has one length only: a shift of the clamp by a millimetre cannot be told from a change of gain; record at two lengths".into(),
+        Remark::OneLengthMountedAnew => "AFTER was mounted anew and has one length only: a shift of the clamp by a millimetre cannot be distinguished from a change of gain; record at two lengths".into(),
         Remark::NothingTwice => "nothing in the reference was recorded twice: how far the actuator repeats is assumed, not measured".into(),
         Remark::OneMounting { stroke, log } => format!(
-            "the mounting at {:.1} mm differs by itself (Bayes factor e^{log:.0}), and the others do not: clamped again, or slipped?",
+            "the mounting at {:.1} mm differs alone (Bayes factor e^{log:.0}): clamped again, or slipped?",
             stroke * 1e3
         ),
         Remark::StrokesAssumed => "how far campaigns of strokes repeat is assumed (zero and level to 0.2 % of the largest force, gain to 0.5 %, friction to 5 to 10 %), not measured".into(),
-        Remark::StrokesMarginal => "probabilities are those that a change is there at all; several can be there at once".into(),
+        Remark::StrokesMarginal => "probabilities are those that a change is there at all; several changes can be present together".into(),
         Remark::NotAcquitted(none) => {
             format!("no change is named, but that nothing changed has a probability of {none:.2} only")
         }
-        Remark::GainOfStrokes => "at regulated pressures a gain of the load cell, a gain of the gauge and another piston area look alike".into(),
+        Remark::GainOfStrokes => "at regulated pressures a gain of the load cell, a gain of the gauge and another piston area have the same shape".into(),
     }
 }
 
@@ -186,7 +186,7 @@ pub fn since(since: &Since) -> String {
     }
 }
 
-/// A value with so many digits that the last ones mean something.
+/// A value with as many digits as its standard deviation supports.
 fn rounded(value: f64, std: f64) -> String {
     let digits =
         if std > 0.0 && std.is_finite() { (1.0 - std.log10().floor()).clamp(0.0, 9.0) as usize } else { 3 };
