@@ -263,7 +263,7 @@ pub fn tables(trials: &[Trial]) -> String {
         text,
         "\n## Nothing but the table of then\n\nThe table is fitted to the first half of the runs (dimensions and mounted lengths, too) and is the only \
          reference of the later ones. The error of the table counts as part of what repeats, and the later runs decide its size. The later runs count as mounted \
-         anew (± 1 mm), which hides offsets of the stroke, gains and compliance of that size. The constants of the error come from the development half.\n\n{HEAD}"
+         anew (± 1 mm), which hides offsets of the stroke, gains and compliance of that size. The form of this error was chosen after a look at both halves, its constants on the development half: these windows are not a clean test.\n\n{HEAD}"
     );
     for percent in [3.0, 5.0, 10.0] {
         let own: Vec<&Trial> = trials.iter().filter(|t| t.effect.is_some() && t.percent == percent).collect();
