@@ -38,13 +38,7 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
         .chain([Probability { cause: "none".into(), probability: weighed.none() }])
         .collect();
     probabilities.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    let mut remarks = vec![Remark::StrokesAssumed, Remark::StrokesMarginal];
-    if named.is_empty() && verdict == Verdict::Consistent && weighed.none() < NAMED {
-        remarks.push(Remark::NotAcquitted(weighed.none()));
-    }
-    if named.iter().any(|c| c.class() == Class::Gain) {
-        remarks.push(Remark::GainOfStrokes);
-    }
+    let remarks = remarks(&named, verdict, weighed.none());
     Ok(ChangeReport {
         muscle: None,
         samples: 0,
@@ -95,6 +89,17 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
         curves: stroke_curves(compared, &weighed, &named),
         abscissa: ("displacement", "mm"),
     })
+}
+
+fn remarks(named: &[Change], verdict: Verdict, none: f64) -> Vec<Remark> {
+    let mut remarks = vec![Remark::StrokesAssumed, Remark::StrokesMarginal];
+    if named.is_empty() && verdict == Verdict::Consistent && none < NAMED {
+        remarks.push(Remark::NotAcquitted(none));
+    }
+    if named.iter().any(|c| c.class() == Class::Gain) {
+        remarks.push(Remark::GainOfStrokes);
+    }
+    remarks
 }
 
 fn stroke_change(compared: &Compared, weighed: &Weighed, change: Change) -> Changed {
