@@ -113,6 +113,13 @@ pub enum Remark {
         /// Rows in all.
         total: usize,
     },
+    /// Readings at which a valve's pulse still rings, excluded.
+    Ringing {
+        /// Readings excluded.
+        excluded: usize,
+        /// Readings in all.
+        total: usize,
+    },
     /// `k_F(P)` of the fitted tables follows `constant + slope/P`.
     InverseFriction {
         /// The constant.

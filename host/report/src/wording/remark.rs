@@ -37,6 +37,10 @@ pub fn remark(remark: &Remark) -> String {
         ),
         Remark::Screening(text) => text.clone(),
         Remark::NoAdvice(error) => format!("no next experiment proposed: {error}"),
+        Remark::Ringing { excluded, total } => format!(
+            "{excluded} of {total} readings excluded: within a third of a second after a pulse of the valve, pressure and force oscillate \
+             faster than any effect of the library"
+        ),
         Remark::Spikes { excluded, total } => {
             format!("{excluded} of {total} force readings excluded: isolated outliers")
         }
