@@ -144,8 +144,19 @@ pub(super) fn scatter(s: &Scatter) -> String {
 fn refused(effect: &str, why: &Refusal) -> String {
     match why {
         Refusal::NotConfirmed { without, with } => format!(
-            "{effect} not named: it fits these recordings but does not improve held-out rows ({without:.3} N without it, {with:.3} N \
-             with it)"
+            "{effect} not named: it fits these recordings but does not improve held-out rows by more than chance ({without:.3} N \
+             without it, {with:.3} N with it)"
+        ),
+        Refusal::UncertainSize(half) if half.is_finite() => format!(
+            "{effect} not named: the 95 % interval of its size includes zero (± {:.0} % of the size, with all effects refitted without a \
+             half-stroke, a pressure, a recording or a quarter of the time)",
+            100.0 * half
+        ),
+        Refusal::UncertainSize(_) => {
+            format!("{effect} not named: its size is not identifiable, because other effects or the model make the same force")
+        }
+        Refusal::Impossible { parameter, value, most } => format!(
+            "{effect} not named: the fit gives {parameter} = {value:.3}, and no more than {most:.3} is possible"
         ),
         Refusal::UnknownMemory(memory) => format!(
             "{effect} not named: it would act in the first strokes of recordings only, where the state of {memory} is unknown"
