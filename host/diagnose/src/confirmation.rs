@@ -4,12 +4,12 @@
 //! | --- | --- |
 //! | the 95 % interval of its size excludes zero | [`SIZE_ERRORS`] |
 //! | no parameter has a value that cannot be | [`RANGE_ERRORS`] |
-//! | it lowers the error on held-out rows, by more than the standard error of the difference | [`HELD_OUT_LEAVES`](super::criteria::uncertainty::HELD_OUT_LEAVES), [`HELD_OUT_ERRORS`](super::criteria::uncertainty::HELD_OUT_ERRORS) |
+//! | it lowers the error on held-out rows, by more than the standard error of the difference unless a test by whole blocks supports it already | [`HELD_OUT_LEAVES`](super::criteria::uncertainty::HELD_OUT_LEAVES), [`HELD_OUT_ERRORS`](super::criteria::uncertainty::HELD_OUT_ERRORS) |
 
 use model_core::effects::Parameter;
 
 use super::candidates::Candidate;
-use super::criteria::selection::MOST_REFUSED;
+use super::criteria::selection::{FAMILY_ALPHA, MOST_REFUSED};
 use super::criteria::uncertainty::{RANGE_ERRORS, SIZE_ERRORS};
 use super::cross_validation::HeldOutRows;
 use super::forward_selection::forward_selection;
@@ -86,7 +86,9 @@ fn impossible(selection: &Selection, library: &[Candidate]) -> Option<(usize, Re
         let fit = &selection.selected[place].fit;
         let parameters = library[fit.candidate].info.parameters.iter().zip(&fit.amplitudes).enumerate();
         let most = |p: &Parameter| p.low.abs().max(p.high.abs());
-        let mut beyond = parameters.filter(|(_, (p, a))| p.bounded && a.abs() > most(p));
+        // A share of the whole has a limit by its meaning; a time has a usual range only.
+        let limited = |p: &Parameter| p.bounded && p.unit.is_empty();
+        let mut beyond = parameters.filter(|(_, (p, a))| limited(p) && a.abs() > most(p));
         beyond.next().map(|(k, (p, a))| (k, p.name, *a, most(p)))
     };
     let suspects: Vec<usize> = (0..selection.selected.len()).filter(|i| beyond(*i).is_some()).collect();
@@ -116,7 +118,8 @@ fn drop_what_does_not_help(mut selection: Selection, library: &[Candidate]) -> (
         let held = unseen.held_out(&selection.traces, selection.noise.sigma);
         let Some(last) = selection.traces.len().checked_sub(1) else { return (selection, Some(held)) };
         // An effect that takes a third of what is above the noise lowers the whole by more than this.
-        let (without, with, helps) = unseen.last_helps(&selection.traces);
+        let tested = selection.selected[last].p <= FAMILY_ALPHA;
+        let (without, with, helps) = unseen.last_helps(&selection.traces, tested);
         if helps {
             return (selection, Some(held));
         }

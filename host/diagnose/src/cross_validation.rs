@@ -7,11 +7,12 @@ use rayon::prelude::*;
 
 use super::baselines::{self, Kind};
 use super::criteria::baseline::TABLE_ORDER;
-use super::criteria::rows::NO_LOAD;
 use super::criteria::noise::SAME_LENGTH;
+use super::criteria::rows::NO_LOAD;
 use super::criteria::uncertainty::{
-    FEWEST_LENGTHS_HELD_OUT, FEWEST_LEVELS_HELD_OUT, FEWEST_RECORDINGS, FEWEST_STROKES_HELD_OUT, FEWEST_UNITS, FOLDS, HELD_OUT_ERRORS,
-    HELD_OUT_LEAVES, HELD_OUT_ROWS, ONE_BLADDER, RECORDING_FOLDS, SEEN_ONCE, STROKE_PARTS,
+    FEWEST_LENGTHS_HELD_OUT, FEWEST_LEVELS_HELD_OUT, FEWEST_RECORDINGS, FEWEST_STROKES_HELD_OUT,
+    FEWEST_UNITS, FOLDS, HELD_OUT_ERRORS, HELD_OUT_LEAVES, HELD_OUT_ROWS, ONE_BLADDER, RECORDING_FOLDS,
+    SEEN_ONCE, STROKE_PARTS,
 };
 use super::linear::energy;
 use super::rows::Rows;
@@ -263,21 +264,22 @@ impl HeldOutRows {
     }
 
     /// The errors without the last of some effects and with it, N, and whether it lowers them: by [`HELD_OUT_LEAVES`], and by more than
-    /// the standard error of the difference. Where the length was held it must do so at lengths that are left out, too: runs of one length
-    /// share the static error of the model there, which any surface over pressure and length takes up.
-    pub(super) fn last_helps(&self, traces: &[Vec<f64>]) -> (f64, f64, bool) {
-        let (without, with, helps) = self.compared(traces, &self.split);
+    /// the standard error of the difference; of an effect that a test by whole blocks supports (`tested`) that is known to be no chance.
+    /// Where the length was held, blocks of one length share the static error of the model there, which any surface over pressure and length
+    /// takes up: the error must be lower by more than its standard error, and at lengths that are left out, too.
+    pub(super) fn last_helps(&self, traces: &[Vec<f64>], tested: bool) -> (f64, f64, bool) {
+        let (without, with, helps) = self.compared(traces, &self.split, tested && !self.rows.isometric);
         match self.lengths.as_ref().filter(|_| helps) {
-            Some(lengths) => self.compared(traces, lengths),
+            Some(lengths) => self.compared(traces, lengths, false),
             None => (without, with, helps),
         }
     }
 
-    fn compared(&self, traces: &[Vec<f64>], split: &Groups) -> (f64, f64, bool) {
+    fn compared(&self, traces: &[Vec<f64>], split: &Groups, tested: bool) -> (f64, f64, bool) {
         let before = self.squares(&traces[..traces.len().saturating_sub(1)], split);
         let after = self.squares(traces, split);
         let ([without, _], [with, _]) = (rms(&before), rms(&after));
-        (without, with, with < HELD_OUT_LEAVES * without && is_lower(&before, &after))
+        (without, with, with < HELD_OUT_LEAVES * without && (tested || is_lower(&before, &after)))
     }
 
     /// The error on the sure rows that were left out, with effects of these traces, N.
@@ -341,5 +343,29 @@ mod tests {
         let held = HeldOutRows::new(&rows, Kind::Stiff, &[]);
         assert_eq!(held.rows.names.len(), 5);
         assert_eq!((held.split.split, held.split.groups.len()), (Split::TenthRecordings, 5));
+    }
+
+    #[test]
+    fn a_gain_of_one_group_is_not_beyond_its_standard_error() {
+        let units = |sums: [f64; 4]| sums.map(|s| Squares { sums: [s; 2], counts: [100.0; 2] });
+        let before = units([400.0; 4]);
+        assert!(is_lower(&before, &units([300.0, 310.0, 290.0, 305.0])));
+        assert!(!is_lower(&before, &units([100.0, 410.0, 405.0, 395.0])), "all of it comes from one group");
+        assert!(!is_lower(&before, &before));
+        assert!(is_lower(&before[..2], &units([300.0; 4])[..2]), "two groups have no standard error");
+    }
+
+    #[test]
+    fn held_lengths_are_left_out_too() {
+        let braid = geometry().build().expect("a braid");
+        let (rows, _) = prepare(&isometric(), &braid).expect("rows");
+        let held = HeldOutRows::new(&rows, Kind::Stiff, &[]);
+        assert_eq!(held.lengths.as_ref().map(|l| l.groups.len()), Some(5));
+        // What acts at one end of the lengths only cannot be predicted there, however well it fits runs of it.
+        let trace: Vec<f64> =
+            rows.contexts().iter().map(|c| if c.stroke < 5e-4 { 10.0 } else { 0.0 }).collect();
+        let shifted = rows.with_force(rows.force.iter().zip(&trace).map(|(f, t)| f + t).collect());
+        let held = HeldOutRows::new(&shifted, Kind::Stiff, std::slice::from_ref(&trace));
+        assert!(!held.last_helps(std::slice::from_ref(&trace), true).2);
     }
 }

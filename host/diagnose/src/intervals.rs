@@ -107,9 +107,11 @@ pub(crate) fn size_deviations(selection: &Selection, rows: &Rows) -> Vec<Option<
     if tangents.is_empty() {
         return Vec::new();
     }
-    let by_groups = by_groups(selection, &tangents, rows);
+    // Half-strokes are independent units of a muscle that moves. Those of one held length share the static error of the model there.
     let strokes = by_strokes(selection, &tangents, rows);
-    strokes.iter().zip(by_groups).map(|(s, groups)| s.map(|s| s.max(groups).sqrt())).collect()
+    let groups =
+        if rows.isometric { by_groups(selection, &tangents, rows) } else { vec![0.0; tangents.len()] };
+    strokes.iter().zip(groups).map(|(s, groups)| s.map(|s| s.max(groups).sqrt())).collect()
 }
 
 /// Variances by the scatter of whole half-strokes: amplitudes exactly, shapes by their linearised traces.

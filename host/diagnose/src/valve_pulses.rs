@@ -4,8 +4,8 @@
 //! lags. The quasi-static model and every effect of the library are about slower changes, so these readings are set aside.
 
 use super::criteria::valve_pulses::{
-    CONCENTRATED, LEAST_PERIODICITY, NARROW_PART, PULSE_BINS, PULSE_GRID, PULSE_PERIODS, PULSE_STEPS, RING_TIME,
-    WINDOW_FROM, WINDOW_TO,
+    CONCENTRATED, LEAST_PERIODICITY, NARROW_PART, PULSE_BINS, PULSE_GRID, PULSE_PERIODS, PULSE_STEPS,
+    RING_TIME, WINDOW_FROM, WINDOW_TO,
 };
 use pam_data::recording::Recording;
 
@@ -123,7 +123,6 @@ fn fold(rate: &[f64], step: f64, period: f64) -> (f64, f64, Vec<f64>) {
     (uneven, start as f64 / bins as f64 * period, means)
 }
 
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -173,5 +172,25 @@ mod tests {
             let ramp = recording(rate, |t| 1e4 * t + 300.0 * (1.7 * t).sin());
             assert!(!ringing(&ramp).contains(&true), "{rate} Hz");
         }
+    }
+
+    #[test]
+    fn ringing_rows_carry_no_weight_and_a_remark_counts_them() {
+        let mut campaign = pam_data::recording::Campaign::new(vec![recording(106.0, pulsed(0.5))]);
+        for r in &mut campaign.recordings {
+            r.force = Some(r.pressure.iter().map(|p| 1e-3 * p).collect());
+        }
+        let braid = crate::tests::geometry().build().expect("a braid");
+        let (rows, remarks) = crate::rows::prepare(&campaign, &braid).expect("rows");
+        let rings = ringing(&campaign.recordings[0]).iter().filter(|r| **r).count();
+        assert!(
+            remarks
+                .iter()
+                .any(|r| matches!(r, crate::remark::Remark::Ringing { excluded, .. } if *excluded == rings))
+        );
+        // Two thirds of each period ring.
+        assert!((0.6..0.85).contains(&(rings as f64 / campaign.samples() as f64)), "{rings}");
+        let counted = rows.effective() as f64;
+        assert!(counted > 0.0 && counted < 0.4 * campaign.samples() as f64, "{counted}");
     }
 }

@@ -4,11 +4,11 @@ pam_data::criteria! {
     "Held-out rows, intervals, probabilities":
     /// Held-out error with an effect must be less than this share of the error without it.
     HELD_OUT_LEAVES: f64 = 0.96, "e_with/e_without", "1", Derived("an effect that takes a third of the excess lowers the whole by more");
-    /// ... and less by more than this many of the difference's standard errors, over whole groups that are left out (over held lengths, where the length is held).
+    /// ... and less by more than this many of the difference's standard errors, over whole groups that are left out (over held lengths, where the length is held), unless a test by whole blocks supports the effect.
     HELD_OUT_ERRORS: f64 = 1.0, "n_held", "1", Published("the one-standard-error rule: L. Breiman, J. H. Friedman, R. A. Olshen, C. J. Stone, Classification and Regression Trees, 1984");
     /// Groups from which a difference has a standard error.
     FEWEST_UNITS: usize = 3, "n_unit,min", "1", Derived("two degrees of freedom");
-    /// An effect is named where its size differs from zero by more than this many of its standard deviations, with all effects refitted without a half-stroke, a pressure, a recording or a quarter of the time.
+    /// An effect is named where its size differs from zero by more than this many of its standard deviations, by the scatter of whole half-strokes; where the length was held also with a pressure, a recording or a quarter of the time left out.
     SIZE_ERRORS: f64 = 1.96, "n_size", "1", Convention("its 95 % interval excludes zero");
     /// A value that cannot be is refused where it lies outside the possible range by more than this many standard deviations.
     RANGE_ERRORS: f64 = 1.96, "n_range", "1", Convention("its 95 % interval excludes the possible range");

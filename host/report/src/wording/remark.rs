@@ -148,12 +148,13 @@ fn refused(effect: &str, why: &Refusal) -> String {
              without it, {with:.3} N with it)"
         ),
         Refusal::UncertainSize(half) if half.is_finite() => format!(
-            "{effect} not named: the 95 % interval of its size includes zero (± {:.0} % of the size, with all effects refitted without a \
-             half-stroke, a pressure, a recording or a quarter of the time)",
+            "{effect} not named: the 95 % interval of its size includes zero (± {:.0} % of the size, by parts of the recordings)",
             100.0 * half
         ),
         Refusal::UncertainSize(_) => {
-            format!("{effect} not named: its size is not identifiable, because other effects or the model make the same force")
+            format!(
+                "{effect} not named: its size is not identifiable, because other effects or the model make the same force"
+            )
         }
         Refusal::Impossible { parameter, value, most } => format!(
             "{effect} not named: the fit gives {parameter} = {value:.3}, and no more than {most:.3} is possible"
