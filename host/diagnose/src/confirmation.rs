@@ -1,16 +1,25 @@
-//! Selected effects must reduce the error on held-out rows.
+//! What an effect must show before it is named: a size, a possible value, and a lower error on held-out rows.
+//!
+//! | requirement | criterion |
+//! | --- | --- |
+//! | the 95 % interval of its size excludes zero | [`SIZE_ERRORS`] |
+//! | no parameter has a value that cannot be | [`RANGE_ERRORS`] |
+//! | it lowers the error on held-out rows, by more than the standard error of the difference unless a test by whole blocks supports it already | [`HELD_OUT_LEAVES`](super::criteria::uncertainty::HELD_OUT_LEAVES), [`HELD_OUT_ERRORS`](super::criteria::uncertainty::HELD_OUT_ERRORS) |
+
+use model_core::effects::Parameter;
 
 use super::candidates::Candidate;
-use super::criteria::selection::MOST_REFUSED;
-use super::criteria::uncertainty::HELD_OUT_LEAVES;
+use super::criteria::selection::{FAMILY_ALPHA, MOST_REFUSED};
+use super::criteria::uncertainty::{RANGE_ERRORS, SIZE_ERRORS};
 use super::cross_validation::HeldOutRows;
 use super::forward_selection::forward_selection;
+use super::intervals::{deviations, size_deviations};
 use super::remark::{Refusal, Remark};
 use super::rows::Rows;
 use super::selection_step::Selection;
 use super::verdict::HeldOut;
 
-/// The effects that forward selection finds and held-out rows confirm, with the error on these rows.
+/// The effects that forward selection finds and their sizes and held-out rows confirm, with the error on these rows.
 pub(super) fn select_and_confirm(
     rows: &Rows,
     library: &[Candidate],
@@ -21,38 +30,99 @@ pub(super) fn select_and_confirm(
     let mut remarks = Vec::new();
     let mut rows = rows.clone();
     loop {
-        let selected = forward_selection(&rows, library, blocked, step, &refused);
-        let first = selected.selected.first().map(|t| t.fit.candidate);
-        let (mut selection, held) = drop_what_does_not_help(selected, library);
+        let mut selection = forward_selection(&rows, library, blocked, step, &refused);
+        let mut failed = None;
+        while let Some((place, why)) = unfounded(&selection, library) {
+            failed = failed.or(Some(selection.selected[place].fit.candidate));
+            selection = refuse(selection, place, why, library);
+            // Another effect may have been kept out by this one: the search is repeated without it.
+            if refused.len() < MOST_REFUSED {
+                break;
+            }
+        }
+        let first = selection.selected.first().map(|t| t.fit.candidate);
+        let (mut selection, held) = match failed {
+            Some(_) if refused.len() < MOST_REFUSED => (selection, None),
+            _ => drop_what_does_not_help(selection, library),
+        };
         remarks.append(&mut selection.remarks);
-        match first {
-            Some(candidate) if selection.selected.is_empty() && refused.len() < MOST_REFUSED => {
+        let again = match held {
+            None => failed,
+            Some(_) => first.filter(|_| selection.selected.is_empty()),
+        };
+        match (again, held) {
+            (Some(candidate), _) if refused.len() < MOST_REFUSED => {
                 refused.push(candidate);
                 // The next search begins from the model that this one ended with.
                 rows = selection.rows;
             }
-            _ => return (Selection { remarks, ..selection }, held),
+            (_, held) => {
+                let held = held.unwrap_or_else(|| error(&selection));
+                return (Selection { remarks, ..selection }, held);
+            }
         }
     }
 }
 
+/// The error on held-out rows with the effects as they are.
+fn error(selection: &Selection) -> HeldOut {
+    HeldOutRows::new(&selection.rows, selection.joint.kind, &selection.traces)
+        .held_out(&selection.traces, selection.noise.sigma)
+}
+
+/// The last selected effect whose size the recordings do not determine, or that has a value that cannot be; and why it is not named.
+fn unfounded(selection: &Selection, library: &[Candidate]) -> Option<(usize, Refusal)> {
+    let sizes = size_deviations(selection, &selection.rows);
+    let without_size = sizes.iter().enumerate().rev().find_map(|(place, deviation)| {
+        let half = SIZE_ERRORS * deviation.unwrap_or(f64::INFINITY);
+        (!(half < 1.0)).then_some((place, Refusal::UncertainSize(half)))
+    });
+    without_size.or_else(|| impossible(selection, library))
+}
+
+/// The last selected effect with a parameter whose whole interval lies beyond what is possible.
+fn impossible(selection: &Selection, library: &[Candidate]) -> Option<(usize, Refusal)> {
+    let beyond = |place: usize| {
+        let fit = &selection.selected[place].fit;
+        let parameters = library[fit.candidate].info.parameters.iter().zip(&fit.amplitudes).enumerate();
+        let most = |p: &Parameter| p.low.abs().max(p.high.abs());
+        // A share of the whole has a limit by its meaning; a time has a usual range only.
+        let limited = |p: &Parameter| p.bounded && p.unit.is_empty();
+        let mut beyond = parameters.filter(|(_, (p, a))| limited(p) && a.abs() > most(p));
+        beyond.next().map(|(k, (p, a))| (k, p.name, *a, most(p)))
+    };
+    let suspects: Vec<usize> = (0..selection.selected.len()).filter(|i| beyond(*i).is_some()).collect();
+    if suspects.is_empty() {
+        return None;
+    }
+    let deviations = deviations(selection, library, &selection.rows);
+    suspects.into_iter().rev().find_map(|place| {
+        let (k, name, value, most) = beyond(place)?;
+        let deviation = deviations[place][k]?;
+        (value.abs() - RANGE_ERRORS * deviation > most)
+            .then(|| (place, Refusal::Impossible { parameter: name.to_owned(), value, most }))
+    })
+}
+
+/// The selection without an effect, and a remark on it.
+fn refuse(mut selection: Selection, place: usize, why: Refusal, library: &[Candidate]) -> Selection {
+    let effect = library[selection.selected[place].fit.candidate].name().to_owned();
+    selection.remarks.push(Remark::Refused { effect, why });
+    selection.without(place, library)
+}
+
 /// Drops effects, the last selected first, that do not reduce the error on held-out rows; gives that error.
-fn drop_what_does_not_help(mut selection: Selection, library: &[Candidate]) -> (Selection, HeldOut) {
-    let sigma = selection.noise.sigma;
+fn drop_what_does_not_help(mut selection: Selection, library: &[Candidate]) -> (Selection, Option<HeldOut>) {
     loop {
         let unseen = HeldOutRows::new(&selection.rows, selection.joint.kind, &selection.traces);
-        let with = unseen.held_out(&selection.traces, sigma);
-        let Some(fewer) = selection.traces.len().checked_sub(1) else { return (selection, with) };
-        let before = if fewer == 0 { with.rms_before_N } else { unseen.error(&selection.traces[..fewer]) };
+        let held = unseen.held_out(&selection.traces, selection.noise.sigma);
+        let Some(last) = selection.traces.len().checked_sub(1) else { return (selection, Some(held)) };
         // An effect that takes a third of what is above the noise lowers the whole by more than this.
-        if with.rms_after_N < HELD_OUT_LEAVES * before {
-            return (selection, with);
+        let tested = selection.selected[last].p <= FAMILY_ALPHA;
+        let (without, with, helps) = unseen.last_helps(&selection.traces, tested);
+        if helps {
+            return (selection, Some(held));
         }
-        let name = selection.selected.last().map_or("", |t| library[t.fit.candidate].name());
-        selection.remarks.push(Remark::Refused {
-            effect: name.to_owned(),
-            why: Refusal::NotConfirmed { without: before, with: with.rms_after_N },
-        });
-        selection = selection.without_last(library);
+        selection = refuse(selection, last, Refusal::NotConfirmed { without, with }, library);
     }
 }

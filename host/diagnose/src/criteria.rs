@@ -29,10 +29,12 @@ pub(crate) mod rows;
 pub(crate) mod selection;
 pub(crate) mod timeline;
 pub(crate) mod uncertainty;
+pub(crate) mod valve_pulses;
 
 /// The whole page, stage by stage in the order in which they decide.
-pub const PAGE: [Stage; 14] = [
+pub const PAGE: [Stage; 15] = [
     motion::CRITERIA,
+    valve_pulses::STAGE,
     rows::STAGE,
     baseline::STAGE,
     rest_friction::STAGE,

@@ -7,10 +7,12 @@ use rayon::prelude::*;
 
 use super::baselines::{self, Kind};
 use super::criteria::baseline::TABLE_ORDER;
+use super::criteria::noise::SAME_LENGTH;
 use super::criteria::rows::NO_LOAD;
 use super::criteria::uncertainty::{
-    FEWEST_LEVELS_HELD_OUT, FEWEST_RECORDINGS, FEWEST_STROKES_HELD_OUT, FOLDS, HELD_OUT_ROWS, ONE_BLADDER,
-    RECORDING_FOLDS, SEEN_ONCE, STROKE_PARTS,
+    FEWEST_LENGTHS_HELD_OUT, FEWEST_LEVELS_HELD_OUT, FEWEST_RECORDINGS, FEWEST_STROKES_HELD_OUT,
+    FEWEST_UNITS, FOLDS, HELD_OUT_ERRORS, HELD_OUT_LEAVES, HELD_OUT_ROWS, ONE_BLADDER, RECORDING_FOLDS,
+    SEEN_ONCE, STROKE_PARTS,
 };
 use super::linear::energy;
 use super::rows::Rows;
@@ -70,11 +72,29 @@ fn strokes(rows: &Rows) -> RangeInclusive<f64> {
     fitted().fold(f64::INFINITY, f64::min)..=fitted().fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Sums of squares on rows that the fit did not see: on the sure rows, and with those about the turns.
-fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Groups, tares: bool) -> [f64; 2] {
+/// Squared errors on rows that the fit did not see, and their number: on the sure rows, and with those about the turns.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Squares {
+    sums: [f64; 2],
+    counts: [f64; 2],
+}
+
+impl Squares {
+    fn add(&mut self, other: &Self) {
+        for k in 0..2 {
+            self.sums[k] += other.sums[k];
+            self.counts[k] += other.counts[k];
+        }
+    }
+}
+
+/// Squared errors on rows that the fit did not see, by independent unit.
+fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Groups, tares: bool) -> Vec<Squares> {
     let claimed = claimed(rows);
+    let units = units(rows, split);
+    let count = units.iter().max().map_or(0, |last| *last as usize + 1);
     rows.progress().stage("predicting what was left out", split.groups.len() as u64);
-    let parts: Vec<([f64; 2], [f64; 2])> = split
+    let parts: Vec<Vec<Squares>> = split
         .groups
         .par_iter()
         .map(|g| {
@@ -82,32 +102,67 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Groups, tares:
             let blind = rows.without(|i| split.group[i] == *g);
             let reach = strokes(&blind);
             let fitted = baselines::fit(&blind, kind, traces);
-            let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
+            let mut squares = vec![Squares::default(); count];
             for i in 0..rows.len() {
                 // The place where friction rests was fitted there and cannot be predicted.
                 let within = reach.contains(&rows.contexts()[i].stroke);
                 let judged =
                     if rows.vented[i] { tares } else { rows.sign[i] != 0.0 && rows.at_rest().rest[i] == 0 };
-                if split.group[i] == *g && within && judged && claimed[i] {
-                    let square = fitted.raw_residual[i].powi(2);
-                    if square.is_finite() {
-                        sums[1] += square;
-                        counts[1] += 1.0;
-                        if rows.root_weight()[i] > 0.0 {
-                            sums[0] += square;
-                            counts[0] += 1.0;
-                        }
-                    }
+                let square = fitted.raw_residual[i].powi(2);
+                if split.group[i] == *g && within && judged && claimed[i] && square.is_finite() {
+                    let sure = if rows.root_weight()[i] > 0.0 { 1.0 } else { 0.0 };
+                    squares[units[i] as usize]
+                        .add(&Squares { sums: [sure * square, square], counts: [sure, 1.0] });
                 }
             }
-            (sums, counts)
+            squares
         })
         .collect();
-    std::array::from_fn(|k| {
-        let sum: f64 = parts.iter().map(|p| p.0[k]).sum();
-        let count: f64 = parts.iter().map(|p| p.1[k]).sum();
-        (sum / f64::max(count, 1.0)).sqrt()
-    })
+    let mut total = vec![Squares::default(); count];
+    for part in &parts {
+        total.iter_mut().zip(part).for_each(|(t, p)| t.add(p));
+    }
+    total
+}
+
+/// The independent unit of each row in a comparison of two models: the group that is left out with it. Runs of one held length share the
+/// static error of that length, so there the unit is the length.
+fn units(rows: &Rows, split: &Groups) -> Vec<u32> {
+    if !rows.isometric {
+        let place = |g: &u32| split.groups.iter().position(|h| h == g).unwrap_or(0) as u32;
+        return split.group.iter().map(place).collect();
+    }
+    let mut lengths: Vec<f64> = Vec::new();
+    let mut of_row = Vec::with_capacity(rows.len());
+    for context in rows.contexts() {
+        let here = |l: &f64| (l - context.contraction).abs() < SAME_LENGTH;
+        let known = lengths.iter().position(here);
+        of_row.push(known.unwrap_or(lengths.len()) as u32);
+        if known.is_none() {
+            lengths.push(context.contraction);
+        }
+    }
+    of_row
+}
+
+/// Root mean square error over all units: on the sure rows, and with those about the turns.
+fn rms(units: &[Squares]) -> [f64; 2] {
+    let mut total = Squares::default();
+    units.iter().for_each(|u| total.add(u));
+    std::array::from_fn(|k| (total.sums[k] / total.counts[k].max(1.0)).sqrt())
+}
+
+/// Whether the error is lower after than before by more than its standard error over independent units.
+fn is_lower(before: &[Squares], after: &[Squares]) -> bool {
+    let seen = before.iter().zip(after).filter(|(b, _)| b.counts[0] > 0.0);
+    let gains: Vec<f64> = seen.map(|(b, a)| b.sums[0] - a.sums[0]).collect();
+    let n = gains.len() as f64;
+    let sum: f64 = gains.iter().sum();
+    if gains.len() < FEWEST_UNITS {
+        return sum > 0.0;
+    }
+    let scatter: f64 = gains.iter().map(|g| (g - sum / n).powi(2)).sum();
+    sum > HELD_OUT_ERRORS * (scatter * n / (n - 1.0)).sqrt()
 }
 
 /// Whether the residual of an effect's trace is concentrated in one group.
@@ -158,6 +213,8 @@ pub(super) struct HeldOutRows {
     split: Groups,
     /// Whether the effects are read of a vented muscle, too.
     tares: bool,
+    /// Where the length was held: how lengths are left out.
+    lengths: Option<Groups>,
 }
 
 impl HeldOutRows {
@@ -182,17 +239,47 @@ impl HeldOutRows {
                 |i: usize| ((thin.contexts()[i].stroke - strokes.start()) / part).max(0.0) as u32 % FOLDS;
             split = self::split(Split::StrokeParts, &thin, &of);
         }
-        Self { rows: thin, stride: stride(rows), kind, split, tares }
+        let lengths = thin.isometric.then(|| {
+            let length = units(&thin, &split);
+            self::split(Split::Recordings, &thin, &|i| length[i])
+        });
+        let lengths = lengths.filter(|l| l.groups.len() >= FEWEST_LENGTHS_HELD_OUT);
+        Self { rows: thin, stride: stride(rows), kind, split, tares, lengths }
+    }
+
+    /// Squared errors on rows that were left out, with effects of these traces, by independent unit; where nothing can be left out, on all.
+    fn squares(&self, traces: &[Vec<f64>], split: &Groups) -> Vec<Squares> {
+        let traces: Vec<Vec<f64>> =
+            traces.iter().map(|t| t.iter().step_by(self.stride).copied().collect()).collect();
+        if split.groups.len() < 2 {
+            let rms = baselines::fit(&self.rows, self.kind, &traces).rms(&self.rows);
+            return vec![Squares { sums: [rms * rms; 2], counts: [1.0; 2] }];
+        }
+        left_out(&self.rows, self.kind, &traces, split, self.tares)
     }
 
     /// The error on rows that were left out, with effects of these traces: on the sure rows, and with those about the turns, N.
     fn errors(&self, traces: &[Vec<f64>]) -> [f64; 2] {
-        let traces: Vec<Vec<f64>> =
-            traces.iter().map(|t| t.iter().step_by(self.stride).copied().collect()).collect();
-        if self.split.groups.len() < 2 {
-            return [baselines::fit(&self.rows, self.kind, &traces).rms(&self.rows); 2];
+        rms(&self.squares(traces, &self.split))
+    }
+
+    /// The errors without the last of some effects and with it, N, and whether it lowers them: by [`HELD_OUT_LEAVES`], and by more than
+    /// the standard error of the difference; of an effect that a test by whole blocks supports (`tested`) that is known to be no chance.
+    /// Where the length was held, blocks of one length share the static error of the model there, which any surface over pressure and length
+    /// takes up: the error must be lower by more than its standard error, and at lengths that are left out, too.
+    pub(super) fn last_helps(&self, traces: &[Vec<f64>], tested: bool) -> (f64, f64, bool) {
+        let (without, with, helps) = self.compared(traces, &self.split, tested && !self.rows.isometric);
+        match self.lengths.as_ref().filter(|_| helps) {
+            Some(lengths) => self.compared(traces, lengths, false),
+            None => (without, with, helps),
         }
-        left_out(&self.rows, self.kind, &traces, &self.split, self.tares)
+    }
+
+    fn compared(&self, traces: &[Vec<f64>], split: &Groups, tested: bool) -> (f64, f64, bool) {
+        let before = self.squares(&traces[..traces.len().saturating_sub(1)], split);
+        let after = self.squares(traces, split);
+        let ([without, _], [with, _]) = (rms(&before), rms(&after));
+        (without, with, with < HELD_OUT_LEAVES * without && (tested || is_lower(&before, &after)))
     }
 
     /// The error on the sure rows that were left out, with effects of these traces, N.
@@ -256,5 +343,29 @@ mod tests {
         let held = HeldOutRows::new(&rows, Kind::Stiff, &[]);
         assert_eq!(held.rows.names.len(), 5);
         assert_eq!((held.split.split, held.split.groups.len()), (Split::TenthRecordings, 5));
+    }
+
+    #[test]
+    fn a_gain_of_one_group_is_not_beyond_its_standard_error() {
+        let units = |sums: [f64; 4]| sums.map(|s| Squares { sums: [s; 2], counts: [100.0; 2] });
+        let before = units([400.0; 4]);
+        assert!(is_lower(&before, &units([300.0, 310.0, 290.0, 305.0])));
+        assert!(!is_lower(&before, &units([100.0, 410.0, 405.0, 395.0])), "all of it comes from one group");
+        assert!(!is_lower(&before, &before));
+        assert!(is_lower(&before[..2], &units([300.0; 4])[..2]), "two groups have no standard error");
+    }
+
+    #[test]
+    fn held_lengths_are_left_out_too() {
+        let braid = geometry().build().expect("a braid");
+        let (rows, _) = prepare(&isometric(), &braid).expect("rows");
+        let held = HeldOutRows::new(&rows, Kind::Stiff, &[]);
+        assert_eq!(held.lengths.as_ref().map(|l| l.groups.len()), Some(5));
+        // What acts at one end of the lengths only cannot be predicted there, however well it fits runs of it.
+        let trace: Vec<f64> =
+            rows.contexts().iter().map(|c| if c.stroke < 5e-4 { 10.0 } else { 0.0 }).collect();
+        let shifted = rows.with_force(rows.force.iter().zip(&trace).map(|(f, t)| f + t).collect());
+        let held = HeldOutRows::new(&shifted, Kind::Stiff, std::slice::from_ref(&trace));
+        assert!(!held.last_helps(std::slice::from_ref(&trace), true).2);
     }
 }

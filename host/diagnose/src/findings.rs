@@ -116,6 +116,8 @@ pub(crate) fn considered(
             let unseen = hidden.is_none_or(|h| h > RELEVANT_SIZE * blocked);
             let why_not = if confusable.iter().any(|c| c.as_str() == name) {
                 WhyNot::Confusable
+            } else if selection.remarks.iter().any(|r| r.drops(name)) {
+                WhyNot::Refused
             } else if t.size <= 0.0 {
                 WhyNot::NotExcited
             } else if unseen && t.score < LEAST_SCORE {

@@ -95,6 +95,25 @@ pub(crate) fn deviations(selection: &Selection, library: &[Candidate], rows: &Ro
     result
 }
 
+/// Standard deviation of the size of each chosen effect, as a share of it: of its whole trace, its shape as fitted, beside all others. Single
+/// parameters may trade against each other where the size of the trace is sure. None where the other effects make the same trace.
+pub(crate) fn size_deviations(selection: &Selection, rows: &Rows) -> Vec<Option<f64>> {
+    let tangents: Vec<Tangent> = selection
+        .traces
+        .iter()
+        .enumerate()
+        .map(|(effect, trace)| Tangent { effect, parameter: 0, column: trace.clone() })
+        .collect();
+    if tangents.is_empty() {
+        return Vec::new();
+    }
+    // Half-strokes are independent units of a muscle that moves. Those of one held length share the static error of the model there.
+    let strokes = by_strokes(selection, &tangents, rows);
+    let groups =
+        if rows.isometric { by_groups(selection, &tangents, rows) } else { vec![0.0; tangents.len()] };
+    strokes.iter().zip(groups).map(|(s, groups)| s.map(|s| s.max(groups).sqrt())).collect()
+}
+
 /// Variances by the scatter of whole half-strokes: amplitudes exactly, shapes by their linearised traces.
 fn by_strokes(selection: &Selection, tangents: &[Tangent], rows: &Rows) -> Vec<Option<f64>> {
     // The bare baseline's span, not the full one's, which holds the amplitudes themselves.

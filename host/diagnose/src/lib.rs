@@ -9,6 +9,7 @@
 //! | stage | module | what it does |
 //! | --- | --- | --- |
 //! | rows | `rows` | averages samples between reversals, with the motion in each; finds levels, blocks, vented rows |
+//! | | `valve_pulses` | finds the readings that ring after the pulses of a valve; they are set aside |
 //! | | `bench_checks` | corrects faults that checks of the bench measured, and enters them into the answer |
 //! | | `preconditions` | says what can be judged |
 //! | base model | `baselines` | tables free over pressure; one bladder for all pressures; one that may differ a little |
@@ -70,6 +71,7 @@ mod table_evidence;
 #[cfg(test)]
 mod tests;
 pub mod timeline;
+mod valve_pulses;
 pub mod verdict;
 pub mod why;
 pub mod why_not;

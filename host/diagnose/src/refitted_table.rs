@@ -14,7 +14,7 @@ use pam_data::recording::Campaign;
 use pam_data::recording::dropouts::Screened;
 use pam_fit::bench::Candidate;
 use pam_fit::predict::predict;
-use pam_fit::table_file::{About, Correction, TableFile};
+use pam_fit::table_file::{About, Correction, TableFile, stored_mountings};
 use pam_fit::{Options as FitOptions, fit};
 
 /// A refitted table file and how well it does on the recordings.
@@ -47,6 +47,8 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
         fit: fitted.summary.quality(),
         uncertainty: Some(fitted.stored_uncertainty()),
         corrections,
+        // Fitted lengths go with fitted dimensions: the table is wrong without them.
+        mountings: stored_mountings(&fitted.solution.problem),
         ..About::default()
     };
     let bare = TableFile { table: plain.table.clone(), about: about(&plain, Vec::new()) };

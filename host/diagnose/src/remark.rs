@@ -59,6 +59,17 @@ pub enum Refusal {
         /// Error with it, N.
         with: f64,
     },
+    /// The recordings do not determine its size: its 95 % interval includes zero. The interval's half-width as a share of the size.
+    UncertainSize(f64),
+    /// The fit gives it a value that cannot be.
+    Impossible {
+        /// The parameter.
+        parameter: String,
+        /// Its value, SI.
+        value: f64,
+        /// The largest possible size of it, SI.
+        most: f64,
+    },
     /// It acts in the first strokes of recordings only, where the state of this memory effect is not known.
     UnknownMemory(String),
     /// Too many others explain the same share, so that none is named.
@@ -111,6 +122,13 @@ pub enum Remark {
         /// Rows excluded.
         excluded: usize,
         /// Rows in all.
+        total: usize,
+    },
+    /// Readings at which a valve's pulse still rings, excluded.
+    Ringing {
+        /// Readings excluded.
+        excluded: usize,
+        /// Readings in all.
         total: usize,
     },
     /// `k_F(P)` of the fitted tables follows `constant + slope/P`.
@@ -187,6 +205,13 @@ impl Remark {
             _ => false,
         }
     }
+
+    /// Whether it reports that an effect was selected and then failed a requirement of its own.
+    #[must_use]
+    pub fn drops(&self, name: &str) -> bool {
+        use Refusal::{Impossible, NotConfirmed, UncertainSize};
+        matches!(self, Self::Refused { effect, why: NotConfirmed { .. } | UncertainSize(_) | Impossible { .. } } if effect == name)
+    }
 }
 
 #[cfg(test)]
@@ -199,6 +224,8 @@ mod tests {
         let remark = Remark::Refused { effect: "backlash".into(), why: rivals };
         assert!(remark.refuses("backlash") && remark.refuses("leak") && !remark.refuses("gravity"));
         let alone = Remark::Refused { effect: "gauge-gain".into(), why: Refusal::SlowDrift };
+        let uncertain = Remark::Refused { effect: "leak".into(), why: Refusal::UncertainSize(3.0) };
+        assert!(uncertain.drops("leak") && !uncertain.drops("gauge-gain") && !alone.drops("gauge-gain"));
         assert!(alone.refuses("gauge-gain") && !alone.refuses("gain") && !Remark::HeldLength.refuses("gain"));
     }
 }

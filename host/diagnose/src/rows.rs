@@ -213,7 +213,7 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<(Rows, 
     let isometric = motions.iter().all(|m| m.is_isometric);
     let ends = readings::ends(campaign);
     let gathered = gather::gather(campaign, &screened, &motions, braid, &ends)?;
-    let remarks = remarks(&screened, &ends, gathered.spiked, campaign.samples());
+    let remarks = remarks(&screened, &ends, &gathered, campaign.samples());
     let levels = Levels::find(&gathered.contexts, &gathered.piece, pressures);
     let vented = tares::vented(&gathered.contexts);
     let levels = tares::without_vented(levels, &gathered.contexts);
@@ -257,12 +257,16 @@ pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<(Rows, 
 }
 
 /// Remarks on the data.
-fn remarks(screened: &Screened<'_>, ends: &[Clip], spiked: usize, total: usize) -> Vec<Remark> {
+fn remarks(screened: &Screened<'_>, ends: &[Clip], gathered: &gather::Gathered, total: usize) -> Vec<Remark> {
+    let spiked = gathered.spiked;
     let mut remarks: Vec<Remark> =
         ends.iter().map(|end| Remark::SensorEnd { rows: end.rows, force: end.force }).collect();
     remarks.extend(screened.remark().map(Remark::Screening));
     if spiked * SPIKES_MENTIONED > total {
         remarks.push(Remark::Spikes { excluded: spiked, total });
+    }
+    if gathered.ringing > 0 {
+        remarks.push(Remark::Ringing { excluded: gathered.ringing, total });
     }
     remarks
 }

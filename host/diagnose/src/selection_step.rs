@@ -57,9 +57,9 @@ pub(crate) struct Selection {
 }
 
 impl Selection {
-    /// Without the effect that was selected last.
-    pub(crate) fn without_last(mut self, library: &[Candidate]) -> Self {
-        self.selected.pop();
+    /// Without one of the effects, by its place among those selected.
+    pub(crate) fn without(mut self, place: usize, library: &[Candidate]) -> Self {
+        self.selected.remove(place);
         let left: Vec<CandidateFit> = self.selected.iter().map(|t| t.fit.clone()).collect();
         let kind = left.last().map_or(self.base_alone.kind, |t| Kind::Soft(t.prior));
         let joint = refit(&self.rows, kind, left, library);

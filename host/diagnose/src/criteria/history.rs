@@ -9,12 +9,6 @@ pam_data::criteria! {
     MEMORY_SAME_LENGTH: f64 = 0.5e-3, "ΔL_m", "m", Derived("half of a tape measure's ±1 mm");
     /// Rows at least this far apart are settled points already.
     SETTLED_INTERVAL: f64 = 0.25, "Δt_s", "s", Derived("valve pulses ring for 0.2 to 0.3 s (20 Hz, damping 0.5)");
-    /// A settled point begins at this share of the pulse period.
-    WINDOW_FROM: f64 = 0.70, "w_1", "1", Derived("after the ring of a pulse of 0.5 s");
-    /// A settled point ends at this share of the pulse period.
-    WINDOW_TO: f64 = 0.94, "w_2", "1", Derived("before the next pulse");
-    /// Least autocorrelation of |dP/dt| at a pulse period.
-    LEAST_PERIODICITY: f64 = 0.15, "r_p", "1", Derived("well above 2/√n of the shortest run");
     /// Least number of settled points of a campaign.
     LEAST_POINTS: f64 = 40.0, "n_p", "1", Derived("some ten per spline of a mounting");
     /// Least number of runs of a campaign.
@@ -129,18 +123,10 @@ pam_data::criteria! {
     RUN_OFFSET_LEAST: usize = 5, "run_offset_least", "1", Judgement;
     /// Weak prior that keeps a coefficient finite which no row determines.
     SHIFT_FIT_PRIOR: f64 = 1e-8, "shift_fit_prior", "1", Judgement;
-    /// Shortest and longest pulse period looked for, s.
-    STAIRCASE_PERIODS: ((f64, f64)) = (0.2, 5.0), "staircase_periods", "s", Judgement;
     /// Averages over this time where no pulses are found, s: longer than the ring of a pulse.
     STAIRCASE_WITHOUT_PULSES: f64 = 0.5, "staircase_without_pulses", "s", Judgement;
-    /// The grid on which the period is looked for is no finer than this, s.
-    STAIRCASE_FINEST: f64 = 0.01, "staircase_finest", "s", Judgement;
-    /// Longest series whose period is looked for, in grid steps.
-    STAIRCASE_LONGEST: usize = 6_000, "staircase_longest", "1", Judgement;
     /// The pressure has turned when it has gone back by this share of the run's range: above a regulator's ripple.
     STAIRCASE_TURN: f64 = 0.04, "staircase_turn", "1", Judgement;
-    /// Bins of the pressure range of a staircase.
-    STAIRCASE_BINS: usize = 20, "staircase_bins", "1", Judgement;
     /// Single time constants that the spectrum is tried against.
     MEMORY_SINGLE_TIMES: ([f64; 2]) = [30.0, 300.0], "tau_1", "s", Judgement;
 }

@@ -4,6 +4,14 @@ pam_data::criteria! {
     "Held-out rows, intervals, probabilities":
     /// Held-out error with an effect must be less than this share of the error without it.
     HELD_OUT_LEAVES: f64 = 0.96, "e_with/e_without", "1", Derived("an effect that takes a third of the excess lowers the whole by more");
+    /// ... and less by more than this many of the difference's standard errors, over whole groups that are left out (over held lengths, where the length is held), unless a test by whole blocks supports the effect.
+    HELD_OUT_ERRORS: f64 = 1.0, "n_held", "1", Published("the one-standard-error rule: L. Breiman, J. H. Friedman, R. A. Olshen, C. J. Stone, Classification and Regression Trees, 1984");
+    /// Groups from which a difference has a standard error.
+    FEWEST_UNITS: usize = 3, "n_unit,min", "1", Derived("two degrees of freedom");
+    /// An effect is named where its size differs from zero by more than this many of its standard deviations, by the scatter of whole half-strokes; where the length was held also with a pressure, a recording or a quarter of the time left out.
+    SIZE_ERRORS: f64 = 1.96, "n_size", "1", Convention("its 95 % interval excludes zero");
+    /// A value that cannot be is refused where it lies outside the possible range by more than this many standard deviations.
+    RANGE_ERRORS: f64 = 1.96, "n_range", "1", Convention("its 95 % interval excludes the possible range");
     /// Rows at most from which the held-out error is taken.
     HELD_OUT_ROWS: usize = 6_000, "N_held", "1", Cost;
     /// No pressure is predicted from the others where the bladder differs between them by more than this share of the largest force.
@@ -20,6 +28,8 @@ pam_data::criteria! {
     FEWEST_RECORDINGS: usize = 4, "n_rec,min", "1", Judgement;
     /// Pressure levels from which a pressure can be left out.
     FEWEST_LEVELS_HELD_OUT: usize = 3, "n_P,min", "1", Derived("two others span a range to interpolate in");
+    /// Held lengths from which a length can be left out; it is predicted where others lie on both sides.
+    FEWEST_LENGTHS_HELD_OUT: usize = 3, "n_L,min", "1", Derived("two others span a range to interpolate in");
     /// Half-strokes from which cycles are left out.
     FEWEST_STROKES_HELD_OUT: usize = 16, "n_stroke,min", "1", Derived("four cycles, left out in turn");
     /// How far a parameter is off by its law's inexactness, as a share of it.

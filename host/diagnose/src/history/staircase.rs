@@ -1,9 +1,8 @@
 //! Isometric staircases: pulses of a valve, the settled point after each, and the direction of the drive.
 
-use super::criteria::{
-    LEAST_PERIODICITY, SETTLED_INTERVAL, STAIRCASE_BINS, STAIRCASE_FINEST, STAIRCASE_LONGEST,
-    STAIRCASE_PERIODS, STAIRCASE_TURN, STAIRCASE_WITHOUT_PULSES, WINDOW_FROM, WINDOW_TO,
-};
+use super::criteria::{SETTLED_INTERVAL, STAIRCASE_TURN, STAIRCASE_WITHOUT_PULSES};
+use crate::criteria::valve_pulses::{WINDOW_FROM, WINDOW_TO};
+use crate::valve_pulses::{self, ValvePulses};
 use pam_data::recording::Recording;
 
 /// The mean of the last part of a pulse period.
@@ -31,8 +30,7 @@ pub(super) fn settled(recording: &Recording, force: &[f64]) -> (Vec<Point>, bool
 }
 
 fn averages(recording: &Recording, force: &[f64], directions: &[i8]) -> (Vec<Point>, bool) {
-    let mut steps: Vec<f64> = recording.time.windows(2).map(|w| w[1] - w[0]).collect();
-    let interval = pam_fit::numerics::median(&mut steps);
+    let interval = valve_pulses::interval(recording);
     if !(interval < SETTLED_INTERVAL) {
         let points = (0..recording.len())
             .map(|i| Point {
@@ -45,8 +43,8 @@ fn averages(recording: &Recording, force: &[f64], directions: &[i8]) -> (Vec<Poi
         return (points, false);
     }
     let first = recording.time.first().copied().unwrap_or(0.0);
-    let (period, phase, window) = match pulses(recording, interval) {
-        Some((period, phase)) => (period, phase, (WINDOW_FROM, WINDOW_TO)),
+    let (period, phase, window) = match ValvePulses::find(recording) {
+        Some(pulses) => (pulses.period, pulses.phase, (WINDOW_FROM, WINDOW_TO)),
         None => (STAIRCASE_WITHOUT_PULSES, 0.0, (0.0, 1.0)),
     };
     let mut points = Vec::new();
@@ -115,64 +113,6 @@ fn turns(points: &mut [Point]) {
     }
     // Nothing turned: it fills, or stays.
     points.iter_mut().filter(|p| p.direction == 0).for_each(|p| p.direction = 1);
-}
-
-/// Period and phase (after the first row) of a valve's pulses, s, from the autocorrelation of |dP/dt|.
-fn pulses(recording: &Recording, interval: f64) -> Option<(f64, f64)> {
-    let step = interval.max(STAIRCASE_FINEST);
-    let first = *recording.time.first()?;
-    let count = ((recording.duration() / step) as usize).min(STAIRCASE_LONGEST);
-    let mut at = 0;
-    let even: Vec<f64> = (0..count)
-        .map(|k| {
-            let time = first + k as f64 * step;
-            while at + 2 < recording.len() && recording.time[at + 1] < time {
-                at += 1;
-            }
-            let (t, p) = (&recording.time[at..], &recording.pressure[at..]);
-            let share = ((time - t[0]) / (t.get(1)? - t[0])).clamp(0.0, 1.0);
-            Some(p[0] + share * (p.get(1)? - p[0]))
-        })
-        .collect::<Option<_>>()?;
-    let mut rate: Vec<f64> = even.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
-    let mean = rate.iter().sum::<f64>() / rate.len().max(1) as f64;
-    rate.iter_mut().for_each(|r| *r -= mean);
-    let power: f64 = rate.iter().map(|r| r * r).sum();
-    let lags = ((STAIRCASE_PERIODS.0 / step).ceil() as usize).max(2)..(STAIRCASE_PERIODS.1 / step) as usize;
-    let correlation = |lag: usize| {
-        let product: f64 = rate.iter().zip(rate.get(lag..).unwrap_or(&[])).map(|(a, b)| a * b).sum();
-        product / power.max(f64::MIN_POSITIVE)
-    };
-    let found: Vec<(usize, f64)> = lags.map(|lag| (lag, correlation(lag))).collect();
-    let best = found.iter().map(|f| f.1).fold(0.0, f64::max);
-    if !(best >= LEAST_PERIODICITY) {
-        return None;
-    }
-    // Multiples of a period correlate almost as well as the period itself.
-    let peak = |w: &[(usize, f64)]| w[1].1 >= 0.8 * best && w[1].1 >= w[0].1 && w[1].1 >= w[2].1;
-    let lag = found.windows(3).find(|w| peak(w))?[1].0;
-    let near = |k: i32| (lag as f64 + 0.02 * f64::from(k)) * step;
-    let folds = (-50..=50).map(|k| (near(k), fold(&rate, step, near(k))));
-    let (period, (_, phase)) = folds.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
-    Some((period, phase))
-}
-
-/// Folds |dP/dt| over a period: how unevenly it lies, and where it begins to rise.
-fn fold(rate: &[f64], step: f64, period: f64) -> (f64, f64) {
-    let bins = ((period / step) as usize).clamp(2, STAIRCASE_BINS);
-    let mut sums = vec![(0.0, 0.0); bins];
-    for (k, r) in rate.iter().enumerate() {
-        let turns = (k as f64 + 0.5) * step / period;
-        let bin = (((turns - turns.floor()) * bins as f64) as usize).min(bins - 1);
-        sums[bin] = (sums[bin].0 + r, sums[bin].1 + 1.0);
-    }
-    let means: Vec<f64> = sums.iter().map(|s| s.0 / f64::max(s.1, 1.0)).collect();
-    let uneven = means.iter().map(|m| m * m).sum();
-    let top = (0..bins).max_by(|a, b| means[*a].total_cmp(&means[*b])).unwrap_or(0);
-    // The pulse may begin a bin before the steepest one.
-    let before = (top + bins - 1) % bins;
-    let start = if means[before] > 0.3 * means[top] { before } else { top };
-    (uneven, start as f64 / bins as f64 * period)
 }
 
 #[cfg(test)]

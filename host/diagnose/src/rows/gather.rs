@@ -9,6 +9,7 @@ use super::readings;
 use super::sleeve::{self, Shape};
 use crate::criteria::baseline::TABLE_ORDER;
 use crate::criteria::rows::TARGET_ROWS;
+use crate::valve_pulses;
 use pam_data::error::Result;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::motion::{Motion, MotionState};
@@ -39,6 +40,8 @@ pub(super) struct Gathered {
     pub has_temperature: bool,
     /// Outliers among the readings.
     pub spiked: usize,
+    /// Readings set aside because a valve's pulse still rings.
+    pub ringing: usize,
 }
 
 /// Averages all recordings of a campaign into rows.
@@ -98,11 +101,12 @@ struct Average {
     good: f64,
 }
 
-/// The motion of a recording, and the state of each of its samples.
+/// The motion of a recording, the state of each of its samples, and which ring after a pulse of a valve.
 #[derive(Clone, Copy)]
 struct Moved<'a> {
     samples: &'a [MotionSample<f64>],
     state: &'a MotionState,
+    ringing: &'a [bool],
 }
 
 /// The readings of a recording's force, whether each stands out alone, and whether the pressure beside it was read.
@@ -134,14 +138,18 @@ impl Gathering<'_> {
         let samples = self.follower.follow(recording, motion, pause);
         let pressure_rate: Vec<f64> = samples.iter().map(|s| s.pressure_rate).collect();
         let state = motion.state(recording, &pressure_rate);
-        let moved = Moved { samples: &samples, state: &state };
+        // Where the muscle moves, its own motion changes the pressure as periodically as a valve.
+        let ringing =
+            if self.isometric { valve_pulses::ringing(recording) } else { vec![false; recording.len()] };
+        self.rows.ringing += ringing.iter().filter(|r| **r).count();
+        let moved = Moved { samples: &samples, state: &state, ringing: &ringing };
         let spike = readings::spikes(force);
         let readings = Readings { force, spike: &spike, read };
         let mut previous: Option<f64> = None;
         let mut piece = None;
         let mut i = 0;
         while i < recording.len() {
-            let j = self.row_end(&state, i);
+            let j = self.row_end(moved, i);
             if piece != Some(state.piece[i]) {
                 piece = Some(state.piece[i]);
                 self.pieces += 1;
@@ -150,23 +158,26 @@ impl Gathering<'_> {
             // The pause before the recording counts for its first row.
             mean.motion.dt = previous.map_or(samples[i].dt, |p| mean.motion.time - p);
             previous = Some(mean.motion.time);
-            self.push(&mean, &state, i);
+            self.push(&mean, moved, i);
             self.rows.cycle.push(recording.cycle.as_ref().map_or(0, |c| c[i]));
             i = j;
         }
         Ok(())
     }
 
-    /// Where the row that begins at a sample ends: before the next turn, hold or ramp, or when it is full.
-    fn row_end(&self, state: &MotionState, i: usize) -> usize {
+    /// Where the row that begins at a sample ends: before the next turn, hold or ramp, where a ring begins or ends, or when it is full.
+    fn row_end(&self, moved: Moved<'_>, i: usize) -> usize {
+        let Moved { state, ringing, .. } = moved;
         let alike = |j: usize| {
             state.piece[j] == state.piece[i]
                 && state.sure[j] == state.sure[i]
                 && state.ramped[j] == state.ramped[i]
                 && state.on_ramp[j] == state.on_ramp[i]
                 && state.turns[j] == state.turns[i]
+                && ringing[j] == ringing[i]
         };
-        let full = (i + self.per_row).min(state.piece.len());
+        // One row is enough for what is set aside; memory effects see its mean.
+        let full = if ringing[i] { state.piece.len() } else { (i + self.per_row).min(state.piece.len()) };
         (i + 1..full).find(|j| !alike(*j)).unwrap_or(full)
     }
 
@@ -207,7 +218,7 @@ impl Gathering<'_> {
                 continue;
             }
             if spike[j] {
-                self.rows.spiked += 1;
+                self.rows.spiked += usize::from(!moved.ringing[j]);
             } else if self.ends.iter().all(|end| force[j] != end.force) {
                 average.force += force[j];
                 average.good += 1.0;
@@ -223,8 +234,9 @@ impl Gathering<'_> {
     }
 
     /// Appends a row that begins at sample `i` of its recording.
-    fn push(&mut self, mean: &Average, state: &MotionState, i: usize) {
+    fn push(&mut self, mean: &Average, moved: Moved<'_>, i: usize) {
         let Self { rows, braid, .. } = self;
+        let Moved { state, ringing, .. } = moved;
         let motion = &mean.motion;
         let posture = braid.posture(Length::from_metres(motion.stroke));
         self.largest = motion.stroke.max(self.largest);
@@ -263,10 +275,10 @@ impl Gathering<'_> {
         // Just after a reversal of the pressure at held length the model only estimates how far friction has reversed; where the muscle
         // also moves, its strokes and what ramps are steady are what is judged.
         let on_ramp = state.on_ramp[i] && !self.isometric;
-        let judged = state.sure[i] && (self.isometric || !state.ramped[i] || on_ramp);
+        let judged = state.sure[i] && !ringing[i] && (self.isometric || !state.ramped[i] || on_ramp);
         rows.on_ramp.push(on_ramp);
         let read = (mean.good / self.per_row as f64).sqrt();
-        rows.readable.push(if state.held[i] { read } else { 0.0 });
+        rows.readable.push(if state.held[i] && !ringing[i] { read } else { 0.0 });
         rows.judged.push(if judged { read } else { 0.0 });
         rows.recording.push(rows.names.len() as u32 - 1);
         rows.piece.push(self.pieces);

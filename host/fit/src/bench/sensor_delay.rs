@@ -35,8 +35,8 @@ impl Effect for SensorDelay {
         link: Link::Reading,
         parameters: &[
             Parameter::amplitude("δ", "skew", "s", -0.1, 0.1).bounded(),
-            Parameter::amplitude("κ", "filtered_part", "", 0.1, 1.2),
-            Parameter::amplitude("κ_d", "delayed_part", "", 0.1, 1.2),
+            Parameter::amplitude("κ", "filtered_part", "", 0.1, 1.2).bounded(),
+            Parameter::amplitude("κ_d", "delayed_part", "", 0.1, 1.2).bounded(),
             Parameter::shape("τ", "filter_time", "s", 1.0e-3, 0.5),
         ],
         depends_on_pressure: true,

@@ -37,6 +37,10 @@ pub fn remark(remark: &Remark) -> String {
         ),
         Remark::Screening(text) => text.clone(),
         Remark::NoAdvice(error) => format!("no next experiment proposed: {error}"),
+        Remark::Ringing { excluded, total } => format!(
+            "{excluded} of {total} readings excluded: within a third of a second after a pulse of the valve, pressure and force oscillate \
+             faster than any effect of the library"
+        ),
         Remark::Spikes { excluded, total } => {
             format!("{excluded} of {total} force readings excluded: isolated outliers")
         }
@@ -140,8 +144,20 @@ pub(super) fn scatter(s: &Scatter) -> String {
 fn refused(effect: &str, why: &Refusal) -> String {
     match why {
         Refusal::NotConfirmed { without, with } => format!(
-            "{effect} not named: it fits these recordings but does not improve held-out rows ({without:.3} N without it, {with:.3} N \
-             with it)"
+            "{effect} not named: it fits these recordings but does not improve held-out rows by more than chance ({without:.3} N \
+             without it, {with:.3} N with it)"
+        ),
+        Refusal::UncertainSize(half) if half.is_finite() => format!(
+            "{effect} not named: the 95 % interval of its size includes zero (± {:.0} % of the size, by parts of the recordings)",
+            100.0 * half
+        ),
+        Refusal::UncertainSize(_) => {
+            format!(
+                "{effect} not named: its size is not identifiable, because other effects or the model make the same force"
+            )
+        }
+        Refusal::Impossible { parameter, value, most } => format!(
+            "{effect} not named: the fit gives {parameter} = {value:.3}, and no more than {most:.3} is possible"
         ),
         Refusal::UnknownMemory(memory) => format!(
             "{effect} not named: it would act in the first strokes of recordings only, where the state of {memory} is unknown"

@@ -19,7 +19,7 @@ pub fn why_not(c: &Considered) -> String {
         WhyNot::NotExcited => "not excited by these recordings".to_owned(),
         WhyNot::Chance(p) => format!("explains no more than chance does over all effects tried (p = {p:.2})"),
         WhyNot::Refused => {
-            "explains much of the excess error, but was not confirmed (see the remarks)".to_owned()
+            "explains a part of the excess error, but was not confirmed (see the remarks)".to_owned()
         }
         WhyNot::WithinInexactness => {
             "explains much of the excess error, which is within the model's own inexactness".to_owned()
