@@ -15,7 +15,9 @@ use crate::fields::codes;
 
 pub use self::device::{DeviceInfo, StartedBy, Status};
 pub use self::refusal::{Field, Refusal, StoreFault, TableFault};
-pub use self::requests::{REFERENCE_PIECE, Reference, ReferencePoints, Session, SetPoint, Start};
+pub use self::requests::{
+    REFERENCE_PIECE, Reference, ReferenceOrder, ReferencePoints, Session, SetPoint, SetPointOrder, Start,
+};
 pub use self::safety::{FAULT_LOG, Fault, FaultReport, Faults, PastFault, Sensor, State};
 pub use self::table::{
     Evaluate, Evaluated, ForgetMemory, PIECE, POINTS, Point, RollBack, TableBegin, TableInfo, TablePiece,
