@@ -5,9 +5,10 @@ use model_core::effects::Memory;
 use model_core::image::{self, ImageError};
 use model_core::link::endpoints::Service;
 use model_core::link::messages::{
-    DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, PIECE, PastFault, ReferenceOrder,
-    ReferencePoints, Refusal, RollBack, Session, SetPointOrder, Side, Start, State, Status, TableBegin,
-    TableInfo, TablePiece, TableRead, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead, Value,
+    DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, HealthRead, HealthSums, PIECE,
+    PastFault, ReferenceOrder, ReferencePoints, Refusal, RollBack, Session, SetPointOrder, Side, Start,
+    State, Status, TableBegin, TableInfo, TablePiece, TableRead, TelemetryRate, TraceArm, TraceInfo,
+    TracePiece, TraceRead, Value,
 };
 use model_core::link::settings::Settings;
 use model_core::muscle::AtStroke;
@@ -44,6 +45,7 @@ impl<F: NorFlash> Answers<'_, F> {
             telemetry_dropped: self.shared.telemetry_dropped(),
             saturated_ticks: controller.saturated_ticks(),
             line_errors: self.shared.line_errors(),
+            tables: Side::ALL.map(|side| controller.health(side).state()),
         });
         Ok(())
     }
@@ -255,6 +257,11 @@ impl<F: NorFlash> Service for Answers<'_, F> {
                 Ok(())
             }
         }
+    }
+
+    fn health(&mut self, request: &HealthRead, answer: &mut HealthSums) -> Result<(), Refusal> {
+        self.shared.with(|controller| controller.health(request.side).tell(answer));
+        Ok(())
     }
 
     fn keep_alive(&mut self, request: &Session, (): &mut ()) -> Result<(), Refusal> {

@@ -2,9 +2,9 @@
 
 use super::frame::{Exchange, Kind};
 use super::messages::{
-    DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, PastFault, ReferenceOrder,
-    ReferencePoints, Refusal, RollBack, Session, SetPointOrder, Start, Status, TableBegin, TableInfo,
-    TablePiece, TableRead, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead,
+    DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, HealthRead, HealthSums, PastFault,
+    ReferenceOrder, ReferencePoints, Refusal, RollBack, Session, SetPointOrder, Start, Status, TableBegin,
+    TableInfo, TablePiece, TableRead, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead,
 };
 use super::messages::{Event, Telemetry};
 use super::settings::Settings;
@@ -184,6 +184,8 @@ endpoints! {
     26 restart Restart: () => ();
     /// Keeps an armed device or a running mode going; refused to a session that does not own it. No other request does so.
     27 keep_alive KeepAlive: Session => ();
+    /// Sums of the load cell against the table, from which the host names a change.
+    28 health ReadHealth: HealthRead => HealthSums;
 }
 
 /// Topic of [`Telemetry`].
@@ -231,7 +233,7 @@ mod tests {
     /// and write the new hash here.
     #[test]
     fn the_schema_changes_only_on_purpose() {
-        assert_eq!(SCHEMA_HASH, 0x5be7_11fd_b770_d4ad, "{SCHEMA_HASH:#018x}");
+        assert_eq!(SCHEMA_HASH, 0x269f_2b8b_992c_f534, "{SCHEMA_HASH:#018x}");
     }
 
     #[test]
