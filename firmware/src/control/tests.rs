@@ -8,6 +8,7 @@ use crate::board::{Inputs, Outputs, Readings};
 use crate::watch::Finding;
 
 mod ownership;
+mod refusals;
 
 /// The session that arms and starts in these tests.
 const OWNER: Session = Session { id: 7 };
