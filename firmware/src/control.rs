@@ -14,6 +14,7 @@ use model_core::single;
 use model_core::table::{MuscleTable, TableError};
 
 use crate::board::{Hardware, Inputs, Outputs, Readings};
+use crate::health::{Health, Scales};
 use crate::modes::{Model, Seat};
 use crate::pair::PairState;
 use crate::reference::Generator;
@@ -235,12 +236,21 @@ impl Controller {
     /// # Errors
     /// The number of the table that cannot be used; there is none in use then.
     pub fn use_table(&mut self, side: Side, table: &MuscleTable) -> Result<(), TableError> {
-        self.sides[side.index()].model.fill(table)
+        let actuator = &mut self.sides[side.index()];
+        actuator.health = Health::new(Scales::of(table));
+        actuator.model.fill(table)
+    }
+
+    /// Whether a muscle's table still describes it.
+    pub fn health(&self, side: Side) -> &Health {
+        &self.sides[side.index()].health
     }
 
     /// Uses no table.
     pub fn forget_table(&mut self, side: Side) {
-        self.sides[side.index()].model.clear();
+        let actuator = &mut self.sides[side.index()];
+        actuator.health = Health::default();
+        actuator.model.clear();
     }
 
     /// One telemetry sample every n ticks, 0 for none.
@@ -327,6 +337,11 @@ impl Controller {
                 self.disarm_when_silent();
                 self.rest();
             }
+        }
+        for side in Side::ALL {
+            let runs = self.machine.state() == State::Running && self.mode != Mode::Vent && self.uses(side);
+            let counts = runs && self.settings.force.fitted;
+            self.sides[side.index()].compare(counts);
         }
         self.record()
     }

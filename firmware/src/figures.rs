@@ -25,7 +25,7 @@ use firmware::control::Controller;
 use firmware::modes::Model;
 use model_core::effects::{EffectName, FittedEffect, MAX_PARAMETERS};
 use model_core::image;
-use model_core::link::messages::{Mode, Reference, Session, Side};
+use model_core::link::messages::{Mode, Reference, ReferenceOrder, Session, Side};
 use model_core::link::settings::Settings;
 use model_core::motion::Motion;
 use model_core::muscle::Muscle;
@@ -195,7 +195,7 @@ fn whole_step(table: &MuscleTable) {
     let owner = Session::default();
     let began = controller.arm(owner).is_ok()
         && controller.start(Mode::Force, owner).is_ok()
-        && controller.reference(wave).is_ok();
+        && controller.reference(ReferenceOrder { reference: wave, session: owner }).is_ok();
     controller.set_telemetry(10);
     let mut sweep = Sweep::default();
     let mut pressure = 100e3;

@@ -7,6 +7,7 @@
 //! | a joint of two muscles: angle, stiffness, what can be had | [`pair`] |
 //! | states and faults, each in one table | [`safety`] |
 //! | how faults are noticed | [`watch`] |
+//! | whether the table still describes the muscle | [`health`] |
 //! | sine, trapezoid, chirp, table | [`mod@reference`] |
 //! | lag, limits and scaling of the pressure regulator | [`regulator`] |
 //! | the record of every loop variable | [`trace`] |
@@ -29,6 +30,7 @@
 pub mod board;
 pub mod compact_float;
 pub mod control;
+pub mod health;
 #[cfg(feature = "log")]
 pub mod log;
 pub mod modes;

@@ -183,6 +183,14 @@ impl Model {
         self.now.context.direction
     }
 
+    /// `∂F/∂P`, N/Pa, and `∂F/∂x`, N/m, of the base model at this tick's stroke.
+    pub fn slopes(&self, pressure_pa: f32) -> (f32, f32) {
+        let pressure = Pressure::from_pascals(pressure_pa);
+        let parts = single::parts(&self.muscle, &self.now.held, pressure);
+        let by_stroke = single::stroke_slope(&self.muscle, &self.now.held, pressure);
+        (parts.slope(self.now.context.direction), by_stroke)
+    }
+
     /// The muscle at this tick's stroke.
     pub fn held(&self) -> &AtStroke<f32> {
         &self.now.held

@@ -302,7 +302,8 @@ mod tests {
 
     #[test]
     fn a_table_is_followed_and_ends_or_repeats() {
-        let points = ReferencePoints { offset: 0, points: [0.0, 10.0, 4.0].into_iter().collect() };
+        let points =
+            ReferencePoints { points: [0.0, 10.0, 4.0].into_iter().collect(), ..ReferencePoints::default() };
         let mut generator = Generator::default();
         assert_eq!(
             generator.begin(Reference::Table { step_s: 0.01, repeat: false }),

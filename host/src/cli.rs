@@ -105,6 +105,8 @@ enum Command {
     Recover(commands::record::RecoverArguments),
     /// Vent the muscle and disarm the controller.
     Vent(commands::run::VentArguments),
+    /// Say whether the table on a controller still describes its muscle, and name what has changed.
+    Health(commands::health::Arguments),
     /// The live view in the browser: connect, run, fit, flash, compare.
     Studio(commands::studio::Arguments),
     /// A controller without hardware, for all commands that talk to one.
@@ -142,6 +144,7 @@ impl Command {
             Self::Record(a) => a.run(console),
             Self::Recover(a) => a.run(console),
             Self::Vent(a) => a.run(console),
+            Self::Health(a) => a.run(console),
             Self::Studio(a) => a.run(console),
             Self::Emulate(a) => a.run(console),
             Self::Device(a) => a.run(console),

@@ -13,6 +13,7 @@ pub mod evaluate;
 pub mod fit;
 pub mod flash;
 pub mod fleet;
+pub mod health;
 pub mod history;
 pub mod man;
 pub mod new;

@@ -8,6 +8,7 @@ pub(crate) mod evaluate;
 #[cfg(test)]
 mod fit;
 pub(crate) mod fleet;
+pub(crate) mod health;
 pub(crate) mod history;
 pub(crate) mod predict;
 pub(crate) mod table;
@@ -74,6 +75,7 @@ mod tests {
         published::<super::effects::Effects>("pam-effects-1");
         published::<super::evaluate::Evaluate>("pam-evaluate-1");
         published::<super::fit::Fit>("pam-fit-1");
+        published::<super::health::Health>("pam-health-1");
         published::<super::history::History>("pam-history-1");
         published::<super::fleet::Fleet<'_>>("pam-fleet-1");
         published::<super::fleet::Stock<'_>>("pam-stock-1");

@@ -3,9 +3,9 @@
 use model_core::fields::{self, Fields};
 use model_core::link::frame::MAX_BODY;
 use model_core::link::messages::{
-    DeviceInfo, Evaluate, Evaluated, Event, FaultReport, Faults, ForgetMemory, PastFault, Reference,
-    ReferencePoints, Refusal, SetPoint, Side, Start, Status, TableBegin, TableInfo, TablePiece, TableRead,
-    Telemetry, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead,
+    DeviceInfo, Evaluate, Evaluated, Event, FaultReport, Faults, ForgetMemory, PastFault, ReferenceOrder,
+    ReferencePoints, Refusal, SetPointOrder, Side, Start, Status, TableBegin, TableInfo, TablePiece,
+    TableRead, Telemetry, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead,
 };
 use model_core::link::settings::Settings;
 use model_core::table::MuscleTable;
@@ -73,9 +73,9 @@ const READ: [&str; 24] = [
     "Faults",
     "ForgetMemory",
     "PastFault",
-    "Reference",
+    "ReferenceOrder",
     "ReferencePoints",
-    "SetPoint",
+    "SetPointOrder",
     "Side",
     "Start",
     "Status",
@@ -105,8 +105,8 @@ fn any_bytes_are_the_same_message_to_both() {
         let bytes = bytes().new_tree(&mut runner).expect("bytes").current();
         let mut here = seen.get();
         let mut tried = || -> Result<(), TestCaseError> {
-            alike!(&bytes, here; DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, PastFault, Reference,
-                ReferencePoints, SetPoint, Side, Start, Status, TableBegin, TableInfo, TablePiece, TableRead, Telemetry,
+            alike!(&bytes, here; DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, PastFault, ReferenceOrder,
+                ReferencePoints, SetPointOrder, Side, Start, Status, TableBegin, TableInfo, TablePiece, TableRead, Telemetry,
                 TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead, Settings);
             if let Ok(mut refusal) = postcard::from_bytes::<Refusal>(&bytes) {
                 written_alike(&mut refusal)?;

@@ -82,6 +82,7 @@ def removed(only=None):
 def generated(arguments):
     """Runs cargo-mutants on the files of its configuration and adds its outcomes to those of earlier runs."""
     output = TARGET / "mutants-generated"
+    output.mkdir(parents=True, exist_ok=True)
     if shutil.which("cargo-mutants") is None:
         sys.exit("no cargo-mutants: install it with `cargo install --locked cargo-mutants`")
     command = ["cargo", "mutants", "-j1", "--no-shuffle", "--output", str(output), *arguments]

@@ -153,4 +153,4 @@ class Link:
         return self.ask(TABLE_COMMIT, wait=5.0)
 
     def set_point(self, kind, value):
-        return self.ask(SET_POINT, bytes([kind]) + struct.pack("<f", value))
+        return self.ask(SET_POINT, bytes([kind]) + struct.pack("<f", value) + varint(SESSION))

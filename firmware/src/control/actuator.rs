@@ -6,6 +6,7 @@ use model_core::motion::MotionTracker;
 
 use super::motion_settings;
 use crate::board::Command;
+use crate::health::{Health, Sample};
 use crate::modes::{Integral, Model, Seat};
 use crate::regulator::{Air, RegulatorState};
 use crate::tick::TICK_S;
@@ -30,6 +31,8 @@ pub(super) struct Actuator {
     pub(super) trim_pa: f32,
     /// Force by the table at this tick's readings, N; none without a table or without readings that are numbers.
     pub(super) model_n: Option<f32>,
+    /// The load cell against the table.
+    pub(super) health: Health,
 }
 
 impl Actuator {
@@ -50,6 +53,7 @@ impl Actuator {
             forward_pa: 0.0,
             trim_pa: 0.0,
             model_n: None,
+            health: Health::default(),
         }
     }
 
@@ -59,6 +63,29 @@ impl Actuator {
         self.regulator.vent(TICK_S, &air, regulator);
         self.command = Command::VENT;
         self.sample.pressure_demand_pa = 0.0;
+    }
+
+    /// One tick of the comparison of load cell and table, which counts while the muscle is controlled and has a load cell.
+    pub(super) fn compare(&mut self, counts: bool) {
+        if !self.health.tick() {
+            return;
+        }
+        let (Some(model_n), true) = (self.model_n, counts) else { return self.health.interrupt() };
+        let Some(model) = self.model.as_ref() else { return self.health.interrupt() };
+        let SideSample { pressure_pa, stroke_m, force_n, .. } = self.sample;
+        if !self.health.scales().covers(pressure_pa, stroke_m, model_n) {
+            return self.health.interrupt();
+        }
+        let (by_pressure, by_stroke) = model.slopes(pressure_pa);
+        let direction = model.direction();
+        self.health.sample(&Sample {
+            measured_n: force_n,
+            model_n,
+            pressure_pa,
+            by_pressure,
+            by_stroke,
+            direction,
+        });
     }
 
     /// The air in the muscle, as far as a table tells.

@@ -35,10 +35,11 @@ impl Controller {
     /// Arms for a session, or begins the test that arms when it has passed.
     ///
     /// # Errors
-    /// As [`Machine::request`](crate::safety::Machine::request); [`Refusal::StillFaulty`] where a muscle is not empty or the
-    /// settings have not been confirmed.
+    /// As [`Machine::request`](crate::safety::Machine::request); [`Refusal::OtherSession`] where another session owns the device and
+    /// is not silent; [`Refusal::StillFaulty`] where a muscle is not empty or the settings have not been confirmed.
     pub fn arm(&mut self, session: Session) -> Result<(), Refusal> {
         self.machine.allows(Cause::Arm)?;
+        self.may_take(session)?;
         if self.machine.state() == State::Disarmed {
             if self.unconfirmed {
                 return Err(Refusal::StillFaulty(Fault::SettingsInvalid));

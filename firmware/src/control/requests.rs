@@ -1,6 +1,9 @@
-//! What a host asks of the controller: states, modes, setpoints, references.
+//! Requests of a host to the controller: states, modes, setpoints, references.
 
-use model_core::link::messages::{Fault, Field, Mode, Reference, Refusal, Session, SetPoint, Side, State};
+use model_core::link::messages::{
+    Fault, Field, Mode, Reference, ReferenceOrder, ReferencePoints, Refusal, Session, SetPoint,
+    SetPointOrder, Side, State,
+};
 use model_core::link::settings::{FeedForward, Settings};
 
 use super::actuator::Actuator;
@@ -30,10 +33,11 @@ impl Controller {
     /// Starts a mode at what is measured now, for a session that has to keep it alive.
     ///
     /// # Errors
-    /// As [`Machine::request`](crate::safety::Machine::request); [`Refusal::NoTable`], with the fault latched, where the mode needs
-    /// a table.
+    /// As [`Machine::request`](crate::safety::Machine::request); [`Refusal::OtherSession`] where another session owns the device and
+    /// is not silent; [`Refusal::NoTable`], with the fault latched, where the mode needs a table.
     pub fn start(&mut self, mode: Mode, session: Session) -> Result<(), Refusal> {
         self.machine.allows(Cause::Start)?;
+        self.may_take(session)?;
         let needs: &[Side] = match mode {
             Mode::Vent | Mode::Pressure => &[],
             Mode::Force if self.settings.feed_forward == FeedForward::Off => &[],
@@ -103,18 +107,38 @@ impl Controller {
         self.owner_age = 0;
     }
 
+    /// Whether a session owns the device. One that is neither armed nor running, and holds nothing, has no owner.
+    fn is_owned(&self) -> bool {
+        self.arming != Arming::Idle
+            || matches!(self.machine.state(), State::Armed | State::Running)
+            || !self.is_vented()
+    }
+
+    /// Whether a session may give orders to what another one has started.
+    ///
+    /// # Errors
+    /// [`Refusal::OtherSession`] where another session owns the device.
+    fn obeys(&self, session: Session) -> Result<(), Refusal> {
+        if session == self.owner || !self.is_owned() { Ok(()) } else { Err(Refusal::OtherSession) }
+    }
+
+    /// Whether a session may arm or start: as [`Controller::obeys`], or in the place of an owner that has been silent for as long as
+    /// a run may continue without it.
+    ///
+    /// # Errors
+    /// [`Refusal::OtherSession`] where another session owns the device and is not silent.
+    pub(super) fn may_take(&self, session: Session) -> Result<(), Refusal> {
+        if self.owner_age > self.settings.watch.host_silence_ticks { Ok(()) } else { self.obeys(session) }
+    }
+
     /// The owner's program is alive.
     ///
     /// # Errors
-    /// [`Refusal::OtherSession`] where another session owns what is armed or running. A device that is neither has no owner.
+    /// As [`Controller::obeys`].
     pub fn keep_alive(&mut self, session: Session) -> Result<(), Refusal> {
-        let owned = self.arming != Arming::Idle
-            || matches!(self.machine.state(), State::Armed | State::Running)
-            || !self.is_vented();
+        self.obeys(session)?;
         if session == self.owner {
             self.owner_age = 0;
-        } else if owned {
-            return Err(Refusal::OtherSession);
         }
         Ok(())
     }
@@ -147,10 +171,10 @@ impl Controller {
     /// A new setpoint; ends a reference.
     ///
     /// # Errors
-    /// [`Refusal::WrongMode`] where it is not the running mode's, [`Refusal::Value`] where it is not a finite number,
-    /// [`Refusal::Angle`] or [`Refusal::Stiffness`] where a joint cannot have it.
-    pub fn set_point(&mut self, set_point: SetPoint) -> Result<(), Refusal> {
-        let (mode, asked, second) = match set_point {
+    /// [`Refusal::OtherSession`] where another session started the mode, [`Refusal::WrongMode`] where it is not the running mode's,
+    /// [`Refusal::Value`] where it is not a finite number, [`Refusal::Angle`] or [`Refusal::Stiffness`] where a joint cannot have it.
+    pub fn set_point(&mut self, order: SetPointOrder) -> Result<(), Refusal> {
+        let (mode, asked, second) = match order.set_point {
             SetPoint::Pressure(pascals) => (Mode::Pressure, pascals, 0.0),
             SetPoint::Force(newtons) => (Mode::Force, newtons, 0.0),
             SetPoint::Stroke(metres) => (Mode::Stroke, metres, 0.0),
@@ -159,6 +183,7 @@ impl Controller {
             }
         };
         self.running()?;
+        self.obeys(order.session)?;
         if mode != self.mode {
             return Err(Refusal::WrongMode(self.mode));
         }
@@ -201,9 +226,12 @@ impl Controller {
     ///
     /// # Errors
     /// As [`Generator::begin`](crate::reference::Generator::begin); [`Refusal::WrongMode`] while venting; [`Refusal::Angle`] or
-    /// [`Refusal::Stiffness`] where a joint cannot have an end of the wave.
-    pub fn reference(&mut self, reference: Reference) -> Result<(), Refusal> {
+    /// [`Refusal::Stiffness`] where a joint cannot have an end of the wave; [`Refusal::OtherSession`] where another session started the
+    /// mode.
+    pub fn reference(&mut self, order: ReferenceOrder) -> Result<(), Refusal> {
+        let ReferenceOrder { reference, session } = order;
         self.running()?;
+        self.obeys(session)?;
         if self.mode == Mode::Vent {
             return Err(Refusal::WrongMode(Mode::Vent));
         }
@@ -218,6 +246,16 @@ impl Controller {
         self.setpoint_age = 0;
         self.trace.on_start();
         Ok(())
+    }
+
+    /// Points for the reference table.
+    ///
+    /// # Errors
+    /// As [`Generator::take_points`](crate::reference::Generator::take_points); [`Refusal::OtherSession`] where another session owns
+    /// the device.
+    pub fn reference_points(&mut self, piece: &ReferencePoints) -> Result<u16, Refusal> {
+        self.obeys(piece.session)?;
+        self.generator.take_points(piece)
     }
 
     fn running(&self) -> Result<(), Refusal> {
@@ -260,7 +298,8 @@ mod tests {
         run(&mut controller, &mut pressure, 10);
         assert_eq!(controller.arm(Session::default()), Ok(()));
         assert_eq!(controller.start(Mode::Pressure, Session::default()), Ok(()));
-        assert_eq!(controller.set_point(SetPoint::Pressure(300e3)), Ok(()));
+        let order = SetPointOrder { set_point: SetPoint::Pressure(300e3), ..SetPointOrder::default() };
+        assert_eq!(controller.set_point(order), Ok(()));
         run(&mut controller, &mut pressure, 1000);
         assert!((pressure - 300e3).abs() < 1e3, "{pressure}");
         assert_eq!(controller.start(Mode::Vent, Session::default()), Ok(()));

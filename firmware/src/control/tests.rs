@@ -1,14 +1,22 @@
 //! What the controller does when something goes wrong, as physical statements on a muscle that follows its command within 30 ms.
 
-use model_core::link::messages::{Event, Fault, Mode, Refusal, Session, SetPoint, Side, State};
+use model_core::link::messages::{Fault, Mode, Refusal, Session, SetPoint, SetPointOrder, Side, State};
 use model_core::link::settings::Settings;
 
 use super::Controller;
 use crate::board::{Inputs, Outputs, Readings};
 use crate::watch::Finding;
 
+mod ownership;
+mod refusals;
+
 /// The session that arms and starts in these tests.
 const OWNER: Session = Session { id: 7 };
+
+/// A setpoint of the owner.
+fn to_pressure(pascals: f32) -> SetPointOrder {
+    SetPointOrder { set_point: SetPoint::Pressure(pascals), session: OWNER }
+}
 
 /// A muscle, its regulator and its dump valve.
 struct Bench {
@@ -79,7 +87,7 @@ impl Bench {
         bench.pass(10);
         assert_eq!(bench.controller.arm(OWNER), Ok(()));
         assert_eq!(bench.controller.start(Mode::Pressure, OWNER), Ok(()));
-        assert_eq!(bench.controller.set_point(SetPoint::Pressure(400e3)), Ok(()));
+        assert_eq!(bench.controller.set_point(to_pressure(400e3)), Ok(()));
         bench.pass(1000);
         assert_eq!(bench.controller.state(), State::Running);
         bench
@@ -262,7 +270,7 @@ fn a_command_that_is_no_number_is_never_sent() {
         assert_eq!(bench.controller.arm(OWNER), Ok(()));
         assert_eq!(bench.controller.start(Mode::Pressure, OWNER), Ok(()));
         for set_point in [400e3, 0.0, 3e38, 100e3] {
-            let _ = bench.controller.set_point(SetPoint::Pressure(set_point));
+            let _ = bench.controller.set_point(to_pressure(set_point));
             for _ in 0..100 {
                 bench.pass(1);
                 let sent = bench.last.sides[0];
@@ -283,71 +291,6 @@ fn nothing_is_armed_until_settings_that_could_not_be_trusted_are_confirmed() {
     bench.controller.confirm_settings();
     assert_eq!(bench.controller.clear(), Ok(()));
     assert_eq!(bench.controller.arm(OWNER), Ok(()));
-}
-
-#[test]
-fn only_the_session_that_started_the_mode_keeps_it_going() {
-    let mut bench = Bench::running(|_| ());
-    bench.hears_host = false;
-    let watcher = Session { id: OWNER.id + 1 };
-    let mut refused = 0;
-    for _ in 0..20 {
-        bench.pass(100);
-        refused += u32::from(bench.controller.keep_alive(watcher) == Err(Refusal::OtherSession));
-    }
-    assert_eq!(bench.latched(), Some(Fault::HostSilence));
-    assert!(bench.is_vented());
-    assert!(
-        (10..=11).contains(&refused),
-        "refused {refused} times while it ran: nothing is owned in a vented fault"
-    );
-}
-
-#[test]
-fn a_session_that_takes_over_is_the_one_that_counts() {
-    let mut bench = Bench::running(|_| ());
-    bench.hears_host = false;
-    let second = Session { id: OWNER.id + 1 };
-    bench.pass(900);
-    assert_eq!(bench.controller.start(Mode::Pressure, second), Ok(()));
-    assert_eq!(bench.controller.keep_alive(OWNER), Err(Refusal::OtherSession));
-    bench.pass(900);
-    assert_eq!(bench.controller.keep_alive(second), Ok(()));
-    bench.pass(900);
-    assert_eq!(bench.controller.state(), State::Running);
-    bench.pass(200);
-    assert_eq!(bench.latched(), Some(Fault::HostSilence));
-}
-
-#[test]
-fn a_held_command_is_let_go_when_its_owner_is_silent_whoever_else_asks() {
-    let mut bench = Bench::holding();
-    bench.hears_host = false;
-    bench.pass(500);
-    assert_eq!(bench.controller.keep_alive(Session { id: 99 }), Err(Refusal::OtherSession));
-    assert!(!bench.is_vented());
-    bench.pass(600);
-    assert!(bench.is_vented());
-}
-
-#[test]
-fn an_armed_device_whose_owner_is_silent_disarms_itself() {
-    let mut bench = Bench::new(|settings| settings.watch.armed_silence_ticks = 2_000);
-    bench.pass(10);
-    assert_eq!(bench.controller.arm(OWNER), Ok(()));
-    bench.pass(5_000);
-    assert_eq!(bench.controller.state(), State::Armed, "its owner keeps it alive");
-    bench.hears_host = false;
-    bench.pass(1_999);
-    assert_eq!(bench.controller.keep_alive(Session { id: 99 }), Err(Refusal::OtherSession));
-    let _ = bench.controller.take_event();
-    assert_eq!(bench.controller.state(), State::Armed);
-    bench.pass(2);
-    assert_eq!(bench.controller.state(), State::Disarmed);
-    assert_eq!(bench.controller.take_event(), Some(Event::State(State::Disarmed)));
-    assert!(bench.is_vented());
-    assert_eq!(bench.latched(), None);
-    assert_eq!(bench.controller.start(Mode::Pressure, OWNER), Err(Refusal::WrongState(State::Disarmed)));
 }
 
 #[test]

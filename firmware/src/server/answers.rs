@@ -5,9 +5,10 @@ use model_core::effects::Memory;
 use model_core::image::{self, ImageError};
 use model_core::link::endpoints::Service;
 use model_core::link::messages::{
-    DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, PIECE, PastFault, Reference,
-    ReferencePoints, Refusal, RollBack, Session, SetPoint, Side, Start, State, Status, TableBegin, TableInfo,
-    TablePiece, TableRead, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead, Value,
+    DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, HealthRead, HealthSums, PIECE,
+    PastFault, ReferenceOrder, ReferencePoints, Refusal, RollBack, Session, SetPointOrder, Side, Start,
+    State, Status, TableBegin, TableInfo, TablePiece, TableRead, TelemetryRate, TraceArm, TraceInfo,
+    TracePiece, TraceRead, Value,
 };
 use model_core::link::settings::Settings;
 use model_core::muscle::AtStroke;
@@ -44,6 +45,7 @@ impl<F: NorFlash> Answers<'_, F> {
             telemetry_dropped: self.shared.telemetry_dropped(),
             saturated_ticks: controller.saturated_ticks(),
             line_errors: self.shared.line_errors(),
+            tables: Side::ALL.map(|side| controller.health(side).state()),
         });
         Ok(())
     }
@@ -101,16 +103,16 @@ impl<F: NorFlash> Service for Answers<'_, F> {
         self.status_after(self.shared.with(Controller::disarm), answer)
     }
 
-    fn set_point(&mut self, request: &SetPoint, answer: &mut Status) -> Result<(), Refusal> {
+    fn set_point(&mut self, request: &SetPointOrder, answer: &mut Status) -> Result<(), Refusal> {
         self.status_after(self.shared.with(|controller| controller.set_point(*request)), answer)
     }
 
-    fn reference(&mut self, request: &Reference, answer: &mut Status) -> Result<(), Refusal> {
+    fn reference(&mut self, request: &ReferenceOrder, answer: &mut Status) -> Result<(), Refusal> {
         self.status_after(self.shared.with(|controller| controller.reference(*request)), answer)
     }
 
     fn reference_points(&mut self, request: &ReferencePoints, answer: &mut u16) -> Result<(), Refusal> {
-        *answer = self.shared.with(|controller| controller.generator().take_points(request))?;
+        *answer = self.shared.with(|controller| controller.reference_points(request))?;
         Ok(())
     }
 
@@ -255,6 +257,11 @@ impl<F: NorFlash> Service for Answers<'_, F> {
                 Ok(())
             }
         }
+    }
+
+    fn health(&mut self, request: &HealthRead, answer: &mut HealthSums) -> Result<(), Refusal> {
+        self.shared.with(|controller| controller.health(request.side).tell(answer));
+        Ok(())
     }
 
     fn keep_alive(&mut self, request: &Session, (): &mut ()) -> Result<(), Refusal> {

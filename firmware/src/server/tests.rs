@@ -3,7 +3,7 @@
 use model_core::link::endpoints::Service;
 use model_core::link::hello::Board;
 use model_core::link::messages::{
-    Fault, Mode, RollBack, Session, SetPoint, State, TableBegin, TableInfo, TablePiece,
+    Fault, Mode, RollBack, Session, SetPoint, SetPointOrder, State, TableBegin, TableInfo, TablePiece,
 };
 use model_core::link::settings::Settings;
 use model_core::table;
@@ -19,6 +19,11 @@ use crate::store::mock_flash::MockFlash;
 
 /// The session that arms and starts in these tests.
 const OWNER: Session = Session { id: 7 };
+
+/// A setpoint of the owner.
+pub(super) fn to_pressure(pascals: f32) -> SetPointOrder {
+    SetPointOrder { set_point: SetPoint::Pressure(pascals), session: OWNER }
+}
 
 fn started(flash: MockFlash, shared: &Shared) -> Server<MockFlash> {
     let identity = Identity {
@@ -98,7 +103,7 @@ fn nothing_is_written_while_a_fault_holds_a_command() {
     pass(&shared, 10, &mut pressure);
     assert_eq!(shared.with(|c| c.arm(OWNER)), Ok(()));
     assert_eq!(shared.with(|c| c.start(Mode::Pressure, OWNER)), Ok(()));
-    assert_eq!(shared.with(|c| c.set_point(SetPoint::Pressure(300e3))), Ok(()));
+    assert_eq!(shared.with(|c| c.set_point(to_pressure(300e3))), Ok(()));
     pass(&shared, 600, &mut pressure);
     assert_eq!(shared.with(|c| c.state()), State::Fault);
     server.keep(&shared);
@@ -160,7 +165,7 @@ fn no_request_of_a_reader_keeps_a_run_alive() {
     pass(&shared, 10, &mut pressure);
     assert_eq!(shared.with(|c| c.arm(OWNER)), Ok(()));
     assert_eq!(shared.with(|c| c.start(Mode::Pressure, OWNER)), Ok(()));
-    assert_eq!(shared.with(|c| c.set_point(SetPoint::Pressure(300e3))), Ok(()));
+    assert_eq!(shared.with(|c| c.set_point(to_pressure(300e3))), Ok(()));
     for tick in 0..1_100 {
         step(&shared, tick, &mut pressure);
         if tick % 50 == 0 {

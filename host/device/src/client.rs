@@ -5,10 +5,14 @@ use std::hash::{BuildHasher, RandomState};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use model_core::link::endpoints::{Arm, Disarm, EVENT, Endpoint, KeepAlive, LOG, StartMode, TELEMETRY};
+use model_core::link::endpoints::{
+    Arm, Disarm, EVENT, Endpoint, KeepAlive, LOG, SetReference, SetTo, StartMode, TELEMETRY,
+};
 use model_core::link::frame::{Accumulator, Header, Kind, MAX_BODY, MAX_WIRE, encode, encode_bytes};
 use model_core::link::hello::{self, Hello};
-use model_core::link::messages::{Event, Refusal, Session, Telemetry};
+use model_core::link::messages::{
+    Event, Reference, ReferenceOrder, Refusal, Session, SetPoint, SetPointOrder, Status, Telemetry,
+};
 use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 
 use super::line_activity::{LineActivity, lost, version_error};
@@ -143,16 +147,18 @@ impl Client {
             serial: [0; 12],
             starts: 0,
         };
+        let session = Session { id: random_id() };
         let mut client = Self {
             port,
             accumulator: Accumulator::new(),
-            sequence: 0,
+            // Programs that share a line must not take each other's answers for their own.
+            sequence: session.id as u16,
             hello: unknown,
             topics: VecDeque::new(),
             expected: None,
             losses: Losses::default(),
             patience,
-            session: Session { id: random_id() },
+            session,
             controls: false,
             displaced: None,
             kept_alive: Instant::now(),
@@ -219,7 +225,8 @@ impl Client {
     /// Asks once more when no answer comes: for questions that may be queried twice.
     ///
     /// # Errors
-    /// [`DeviceCode::DeviceSilent`], or [`DeviceCode::DeviceRefused`] with the device's reason as text.
+    /// [`DeviceCode::DeviceSilent`], [`DeviceCode::DeviceInUse`] when another session owns the device, or
+    /// [`DeviceCode::DeviceRefused`] with the device's reason as text.
     pub fn call<E: Endpoint>(&mut self, request: &E::Request) -> Result<E::Response> {
         match self.ask::<E>(request, self.patience.answer, self.patience.tries)? {
             Ok(response) => Ok(response),
@@ -252,11 +259,33 @@ impl Client {
         self.session
     }
 
+    /// Whether this session armed the controller or started its mode, and has not disarmed it since.
+    #[must_use]
+    pub fn controls(&self) -> bool {
+        self.controls
+    }
+
+    /// Sends a setpoint for the mode that this session has started.
+    ///
+    /// # Errors
+    /// As [`Self::call`]; [`DeviceCode::DeviceInUse`] when another session started the mode.
+    pub fn set_point(&mut self, set_point: SetPoint) -> Result<Status> {
+        self.call::<SetTo>(&SetPointOrder { set_point, session: self.session })
+    }
+
+    /// Starts a reference generator for the mode that this session has started.
+    ///
+    /// # Errors
+    /// As [`Self::set_point`].
+    pub fn reference(&mut self, reference: Reference) -> Result<Status> {
+        self.call::<SetReference>(&ReferenceOrder { reference, session: self.session })
+    }
+
     /// Sends a keep-alive request if this session controls the device and the last one is 0.1 s old. Does not wait for the response.
     /// A session that only reads sends nothing, so it never keeps the run of another program alive.
     ///
     /// # Errors
-    /// [`DeviceCode::DeviceSilent`] when the line is gone; once, [`DeviceCode::DeviceRefused`] when another session has taken over.
+    /// [`DeviceCode::DeviceSilent`] when the line is gone; once, [`DeviceCode::DeviceInUse`] when another session has taken over.
     pub fn keep_alive(&mut self) -> Result<()> {
         if let Some(refusal) = self.displaced.take() {
             self.controls = false;

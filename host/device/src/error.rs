@@ -20,6 +20,9 @@ error_codes! {
         /// The device refused the setpoint.
         DeviceRefused = "device::refused", Input,
             "`host device info` shows what it is doing, `host device settings` what it allows";
+        /// Another program controls the device.
+        DeviceInUse = "device::in-use", Input,
+            "end the other program; `host vent` ends its run";
         /// What the device keeps is not what it was sent.
         DeviceVerify = "device::verify", Input,
             "send it again; if the error returns, the memory of the device is failing";

@@ -354,12 +354,19 @@ pub fn refused(request: &str, refusal: Refusal) -> Error {
             "choose an angle in this range; a smaller radius or another rest stroke of the joint moves them (the settings' `joint`)"
                 .to_owned(),
         ),
-        Refusal::OtherSession => (
-            "another program controls it".to_owned(),
-            "close the other program, or vent and start again here".to_owned(),
-        ),
+        Refusal::OtherSession => return in_use(request),
     };
     Error::new(DeviceCode::DeviceRefused, format!("the device refuses `{request}`: {why}")).help(help)
+}
+
+/// The error of a program that asks for what belongs to another one.
+#[must_use]
+pub fn in_use(request: &str) -> Error {
+    Error::new(
+        DeviceCode::DeviceInUse,
+        format!("the device refuses `{request}`: another program has armed it or started its mode"),
+    )
+    .help("end the other program; `host vent --port PORT` ends its run")
 }
 
 fn table_refused(why: TableFault) -> Error {

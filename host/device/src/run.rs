@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use model_core::link::Endpoint;
 use model_core::link::endpoints::{
-    Arm, Disarm, GetFaults, GetStatus, SetReference, SetReferencePoints, SetTelemetry, SetTo, StartMode, Stop,
+    Arm, Disarm, GetFaults, GetStatus, SetReferencePoints, SetTelemetry, StartMode, Stop,
 };
 use model_core::link::messages::{
     Event, Fault, REFERENCE_PIECE, Reference, ReferencePoints, Refusal, Start, State, Status, Telemetry,
@@ -40,6 +40,10 @@ pub enum Ending {
 
 /// Silence of the telemetry after which the device counts as gone.
 const SILENCE: Duration = Duration::from_secs(5);
+
+/// After this time without a keep-alive request of the session that armed the device, another may: `watch.host_silence_ticks` by
+/// default, and half a second more.
+const OWNER_SILENCE: Duration = Duration::from_millis(1_500);
 
 /// How long arming may take: the air of the run before leaves in two seconds, the test of the dump valve takes as long at most.
 const ARMING: Duration = Duration::from_secs(8);
@@ -85,6 +89,8 @@ pub fn run_asking(
     stop: impl Fn() -> bool,
     next: impl FnMut(f64) -> Option<f32>,
 ) -> Result<Ending> {
+    // What belongs to another program is neither vented nor made silent.
+    claim(client)?;
     let outcome = follow(client, plan, sample, stop, next);
     let quiet = client.try_call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 });
     let vented = vent(client);
@@ -94,17 +100,20 @@ pub fn run_asking(
     Ok(ending)
 }
 
-/// Arms, once the last run's air has left the muscle, and waits for the device's own test of its dump valve.
+/// Arms, once the last run's air has left the muscle, and waits for the device's own test of its dump valve. Where another session has
+/// armed the device, waits until that has been silent for long enough to have ended.
 ///
 /// # Errors
 /// As the device refuses, or the fault that the test ended in.
 pub fn arm(client: &mut Client) -> Result<()> {
     let deadline = Instant::now() + ARMING;
+    let silent = Instant::now() + OWNER_SILENCE;
     let empty = Refusal::StillFaulty(Fault::NotVented);
     loop {
         let now = match client.try_call::<Arm>(&client.session())? {
             Ok(status) => status.state,
             Err(refusal) if refusal == empty && Instant::now() < deadline => State::Disarmed,
+            Err(Refusal::OtherSession) if Instant::now() < silent => State::Disarmed,
             Err(refusal) => return Err(messages::refused(Arm::NAME, refusal)),
         };
         match now {
@@ -119,6 +128,20 @@ pub fn arm(client: &mut Client) -> Result<()> {
     }
 }
 
+/// Makes the device this session's, armed.
+fn claim(client: &mut Client) -> Result<()> {
+    let status = client.call::<GetStatus>(&())?;
+    match status.state {
+        State::Fault => return Err(fault(client)?),
+        State::Running if !client.controls() => return Err(messages::in_use(StartMode::NAME)),
+        State::Running => {
+            client.call::<Stop>(&())?;
+        }
+        State::Disarmed | State::Armed => {}
+    }
+    arm(client)
+}
+
 fn follow(
     client: &mut Client,
     plan: &Plan,
@@ -126,17 +149,7 @@ fn follow(
     stop: impl Fn() -> bool,
     mut next: impl FnMut(f64) -> Option<f32>,
 ) -> Result<Ending> {
-    let mut status = client.call::<GetStatus>(&())?;
-    if status.state == State::Fault {
-        return Err(fault(client)?);
-    }
-    if status.state == State::Running {
-        client.call::<Stop>(&())?;
-        status = client.call::<GetStatus>(&())?;
-    }
-    if status.state == State::Disarmed {
-        arm(client)?;
-    }
+    let status = client.call::<GetStatus>(&())?;
     if let SetpointProfile::Points { values, .. } = &plan.profile {
         send_points(client, values)?;
     }
@@ -169,7 +182,7 @@ fn follow(
                 }
                 steps.advance(client, plan.quantity, elapsed)?;
                 if let Some(value) = next(elapsed) {
-                    client.call::<SetTo>(&plan.quantity.set_point(value))?;
+                    client.set_point(plan.quantity.set_point(value))?;
                 }
             }
             Some(Topic::Event(Event::Fault(report))) => return Err(messages::stopped(&report)),
@@ -206,7 +219,7 @@ fn send_points(client: &mut Client, values: &[f32]) -> Result<()> {
     for (piece, points) in values.chunks(REFERENCE_PIECE).enumerate() {
         let offset = u16::try_from(piece * REFERENCE_PIECE).map_err(|_| too_long())?;
         let points = heapless::Vec::from_slice(points).map_err(|_| too_long())?;
-        client.call::<SetReferencePoints>(&ReferencePoints { offset, points })?;
+        client.call::<SetReferencePoints>(&ReferencePoints { offset, points, session: client.session() })?;
     }
     Ok(())
 }
@@ -250,22 +263,22 @@ impl Steps {
         {
             // A wave has one value; the stiffness is the last setpoint's.
             let angle = begins_at(&plan.profile);
-            client.call::<SetTo>(&plan.quantity.set_point(angle))?;
+            client.set_point(plan.quantity.set_point(angle))?;
         }
         let (values, hold_s) = match &plan.profile {
             SetpointProfile::Constant(value) => (vec![*value], f64::INFINITY),
             SetpointProfile::Steps { values, hold_s } => (values.clone(), *hold_s),
             SetpointProfile::Wave(reference) => {
-                client.call::<SetReference>(reference)?;
+                client.reference(*reference)?;
                 (Vec::new(), f64::INFINITY)
             }
             SetpointProfile::Points { step_s, .. } => {
-                client.call::<SetReference>(&Reference::Table { step_s: *step_s, repeat: true })?;
+                client.reference(Reference::Table { step_s: *step_s, repeat: true })?;
                 (Vec::new(), f64::INFINITY)
             }
         };
         if let Some(first) = values.first() {
-            client.call::<SetTo>(&plan.quantity.set_point(*first))?;
+            client.set_point(plan.quantity.set_point(*first))?;
         }
         Ok(Self { values, hold_s, sent: 0 })
     }
@@ -278,7 +291,7 @@ impl Steps {
         let due = (elapsed / self.hold_s) as usize;
         if due > self.sent && !self.values.is_empty() {
             self.sent = due;
-            client.call::<SetTo>(&quantity.set_point(self.values[due % self.values.len()]))?;
+            client.set_point(quantity.set_point(self.values[due % self.values.len()]))?;
         }
         Ok(())
     }

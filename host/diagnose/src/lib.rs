@@ -46,6 +46,7 @@ mod diagnosis;
 pub mod experiment;
 mod findings;
 mod forward_selection;
+pub mod health;
 pub mod history;
 mod intervals;
 pub mod isolability;

@@ -19,6 +19,7 @@ use pam_campaign::rig::Rig;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::write_whole;
 use pam_device::emulated::Kind;
+use pam_device::error::DeviceCode;
 use pam_device::run::vent;
 
 /// Arguments of `host campaign`.
@@ -110,7 +111,9 @@ impl Arguments {
         let outcome = run(&mut engine, &mut rigging.controller, &mut journal, &mut watching);
         drop(watching);
         // Vented already where the run ended in order; a second time does no harm, and covers errors of the program.
-        let vented = vent(rigging.controller.client());
+        // What another program runs is left alone.
+        let foreign = outcome.as_ref().is_err_and(|error| error.code() == DeviceCode::DeviceInUse);
+        let vented = if foreign { Ok(()) } else { vent(rigging.controller.client()).map(drop) };
         let (outcome, course) = outcome?;
         vented?;
         let (complete, reason) = match outcome {

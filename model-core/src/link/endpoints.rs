@@ -2,9 +2,9 @@
 
 use super::frame::{Exchange, Kind};
 use super::messages::{
-    DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, PastFault, Reference,
-    ReferencePoints, Refusal, RollBack, Session, SetPoint, Start, Status, TableBegin, TableInfo, TablePiece,
-    TableRead, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead,
+    DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, HealthRead, HealthSums, PastFault,
+    ReferenceOrder, ReferencePoints, Refusal, RollBack, Session, SetPointOrder, Start, Status, TableBegin,
+    TableInfo, TablePiece, TableRead, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead,
 };
 use super::messages::{Event, Telemetry};
 use super::settings::Settings;
@@ -134,19 +134,19 @@ endpoints! {
     1 info GetInfo: () => DeviceInfo;
     /// What the device is doing.
     2 status GetStatus: () => Status;
-    /// `Disarmed` → `Armed`, immediately or after a test of the dump valve (`watch.valve_test_pa`); refused while pressure is in a muscle. The session owns the device.
+    /// `Disarmed` → `Armed`, immediately or after a test of the dump valve (`watch.valve_test_pa`); refused while pressure is in a muscle, or to another session than the owner that is not silent. The session owns the device.
     3 arm Arm: Session => Status;
-    /// `Armed` → `Running`, or another mode while running. The first setpoint is what is measured. The session owns the mode.
+    /// `Armed` → `Running`, or another mode while running. The first setpoint is what is measured. Refused to another session than the owner that is not silent. The session owns the mode.
     4 start StartMode: Start => Status;
     /// Vents and goes to `Armed`; allowed always except in `Fault`, where it vents and stays.
     5 stop Stop: () => Status;
     /// Vents and goes to `Disarmed`; in `Fault` it vents and stays.
     6 disarm Disarm: () => Status;
-    /// What is demanded from now on; ends a reference.
-    7 set_point SetTo: SetPoint => Status;
-    /// Starts a reference generator.
-    8 reference SetReference: Reference => Status;
-    /// Points for the reference table.
+    /// What is demanded from now on; ends a reference. Refused to a session that does not own the mode.
+    7 set_point SetTo: SetPointOrder => Status;
+    /// Starts a reference generator. Refused to a session that does not own the mode.
+    8 reference SetReference: ReferenceOrder => Status;
+    /// Points for the reference table. Refused to a session that does not own the device, where one does.
     9 reference_points SetReferencePoints: ReferencePoints => u16;
     /// Sets the stream of telemetry; the answer is the rate in force.
     10 telemetry SetTelemetry: TelemetryRate => TelemetryRate;
@@ -184,6 +184,8 @@ endpoints! {
     26 restart Restart: () => ();
     /// Keeps an armed device or a running mode going; refused to a session that does not own it. No other request does so.
     27 keep_alive KeepAlive: Session => ();
+    /// Sums of the load cell against the table, from which the host names a change.
+    28 health ReadHealth: HealthRead => HealthSums;
 }
 
 /// Topic of [`Telemetry`].
@@ -231,7 +233,7 @@ mod tests {
     /// and write the new hash here.
     #[test]
     fn the_schema_changes_only_on_purpose() {
-        assert_eq!(SCHEMA_HASH, 0xabbb_052f_4136_0911, "{SCHEMA_HASH:#018x}");
+        assert_eq!(SCHEMA_HASH, 0x269f_2b8b_992c_f534, "{SCHEMA_HASH:#018x}");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The bodies of requests, answers and topics. SI units, named in the fields; closed enums, never text.
 
 mod device;
+mod health;
 mod refusal;
 mod requests;
 mod safety;
@@ -14,8 +15,11 @@ use serde::{Deserialize, Serialize};
 use crate::fields::codes;
 
 pub use self::device::{DeviceInfo, StartedBy, Status};
+pub use self::health::{COLUMNS, HealthRead, HealthSums, LAGGED, SHAPES, SUMS, Shape, TableHealth, WATCHED};
 pub use self::refusal::{Field, Refusal, StoreFault, TableFault};
-pub use self::requests::{REFERENCE_PIECE, Reference, ReferencePoints, Session, SetPoint, Start};
+pub use self::requests::{
+    REFERENCE_PIECE, Reference, ReferenceOrder, ReferencePoints, Session, SetPoint, SetPointOrder, Start,
+};
 pub use self::safety::{FAULT_LOG, Fault, FaultReport, Faults, PastFault, Sensor, State};
 pub use self::table::{
     Evaluate, Evaluated, ForgetMemory, PIECE, POINTS, Point, RollBack, TableBegin, TableInfo, TablePiece,

@@ -6,7 +6,9 @@ use firmware::control::Controller;
 use firmware::outbox::Sample;
 use firmware::regulator::SMOOTHING;
 use firmware::tick::TICK_S;
-use model_core::link::messages::{Mode, Reference, Session, SetPoint, Side, State};
+use model_core::link::messages::{
+    Mode, Reference, ReferenceOrder, Session, SetPoint, SetPointOrder, Side, State,
+};
 use model_core::link::settings::{FeedForward, Settings};
 use model_core::table::MuscleTable;
 use model_core::units::Length;
@@ -105,7 +107,7 @@ impl Loop {
     /// # Panics
     /// When it is refused.
     pub fn wave(&mut self, reference: Reference) {
-        self.controller.reference(reference).expect("a wave");
+        self.controller.reference(ReferenceOrder { reference, session: Session::default() }).expect("a wave");
     }
 
     /// Asks for a value.
@@ -113,7 +115,9 @@ impl Loop {
     /// # Panics
     /// When it is refused.
     pub fn point(&mut self, point: SetPoint) {
-        self.controller.set_point(point).expect("a set-point");
+        self.controller
+            .set_point(SetPointOrder { set_point: point, session: Session::default() })
+            .expect("a setpoint");
     }
 }
 

@@ -15,6 +15,7 @@ pub mod line;
 pub mod machine;
 pub mod pair;
 pub mod program;
+pub mod shared_line;
 pub mod stations;
 pub mod sweep;
 pub mod tracking;

@@ -2,7 +2,7 @@
 
 use firmware::board::{Inputs, Outputs, Readings};
 use firmware::control::Controller;
-use model_core::link::messages::{Mode, Refusal, Session, SetPoint, Side, State};
+use model_core::link::messages::{Mode, Refusal, Session, SetPoint, SetPointOrder, Side, State};
 use model_core::link::settings::Settings;
 use model_core::table::MuscleTable;
 
@@ -82,7 +82,8 @@ impl PairLoop {
     /// # Errors
     /// As [`Controller::set_point`].
     pub fn ask(&mut self, angle_rad: f32, stiffness_nm_per_rad: f32) -> Result<(), Refusal> {
-        self.controller.set_point(SetPoint::Pair { angle_rad, stiffness_nm_per_rad })
+        let set_point = SetPoint::Pair { angle_rad, stiffness_nm_per_rad };
+        self.controller.set_point(SetPointOrder { set_point, session: Session::default() })
     }
 
     /// One millisecond.

@@ -3,8 +3,7 @@
 use std::time::{Duration, Instant};
 
 use model_core::link::endpoints::{
-    ClearFault, Disarm, GetSettings, GetStatus, SetReference, SetSettings, SetTelemetry, SetTo, StartMode,
-    Stop,
+    ClearFault, Disarm, GetSettings, GetStatus, SetSettings, SetTelemetry, StartMode, Stop,
 };
 use model_core::link::messages::{
     Event, FaultReport, Mode, Reference, SetPoint, Start, State, Telemetry, TelemetryRate,
@@ -116,8 +115,8 @@ pub fn run(client: &mut Client, mode: Mode, stretches: &[Stretch]) -> Vec<Teleme
     let mut judged = Vec::new();
     for stretch in stretches {
         let began = match stretch.wanted {
-            Wanted::Point(point) => client.call::<SetTo>(&point).expect("a set-point"),
-            Wanted::Wave(wave) => client.call::<SetReference>(&wave).expect("a wave"),
+            Wanted::Point(point) => client.set_point(point).expect("a set-point"),
+            Wanted::Wave(wave) => client.reference(wave).expect("a wave"),
         };
         loop {
             let sample = sample(client).unwrap_or_else(|event| panic!("stopped by {event:?}"));

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use emulator_tests::line::{self, Line};
 use emulator_tests::machine::{Folder, HOPELESS};
 use emulator_tests::{Machine, Options, Watched, program, tracking, upload};
-use model_core::link::endpoints::{Arm, ClearFault, GetFaults, GetInfo, GetStatus, SetTo, StartMode};
+use model_core::link::endpoints::{Arm, ClearFault, GetFaults, GetInfo, GetStatus, StartMode};
 use model_core::link::messages::{Fault, Mode, Refusal, SetPoint, Side, Start, StartedBy, State};
 use model_core::table;
 use virtual_bench::bench::BenchSpec;
@@ -159,14 +159,14 @@ fn a_burst_a_leak_a_closed_supply_and_a_jammed_valve_are_noticed_on_the_plant_it
     upload(&mut client, Side::Agonist, &table::example());
     for Break { name, fault, how, then_asked } in BREAKS {
         tracking::start(&mut client, Mode::Pressure);
-        client.call::<SetTo>(&SetPoint::Pressure(250e3)).expect("a set-point");
+        client.set_point(SetPoint::Pressure(250e3)).expect("a set-point");
         let begun = station.periods();
         station.until(name, |now| now > begun + 400);
         let whole = station.with(|bench| *bench.plant().pneumatics());
         station.with(|bench| how(bench.plant().pneumatics()));
         let broken = station.periods();
         if let Some(pascals) = then_asked {
-            client.call::<SetTo>(&SetPoint::Pressure(pascals)).expect("a set-point");
+            client.set_point(SetPoint::Pressure(pascals)).expect("a set-point");
         }
         let report = tracking::stopped(&mut client);
         let told = station.periods();
@@ -199,7 +199,7 @@ fn a_program_that_hangs_is_restarted_vented_and_says_so() {
     let mut client = machine.client();
     assert_eq!(client.call::<GetInfo>(&()).expect("its limits").started_by, StartedBy::Power);
     tracking::start(&mut client, Mode::Pressure);
-    client.call::<SetTo>(&SetPoint::Pressure(250e3)).expect("a set-point");
+    client.set_point(SetPoint::Pressure(250e3)).expect("a set-point");
     station.until("it runs", |_| command(&station) > 200e3);
     drop(client);
     let mut debugger = machine.debugger();

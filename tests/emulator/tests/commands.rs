@@ -10,7 +10,7 @@ use emulator_tests::line::{self, Line};
 use emulator_tests::machine::{self, Folder, PATIENCE};
 use emulator_tests::{Machine, Options, Watched, fitting, pair, program, tracking, upload};
 use model_core::effects::{EffectName, FittedEffect};
-use model_core::link::endpoints::{Disarm, SetTelemetry, SetTo, Stop};
+use model_core::link::endpoints::{Disarm, SetTelemetry, Stop};
 use model_core::link::messages::{Fault, Mode, SetPoint, Side, TelemetryRate};
 use model_core::muscle::Muscle;
 use model_core::table::{self, MuscleTable};
@@ -372,7 +372,7 @@ fn what_a_muscle_remembers_is_there_after_the_plug_was_pulled_and_can_be_forgott
     upload(&mut client, Side::Agonist, &table);
     let run = |client: &mut Client, samples: usize, meanwhile: &dyn Fn()| {
         tracking::start(client, Mode::Pressure);
-        client.call::<SetTo>(&SetPoint::Pressure(300e3)).expect("a set-point");
+        client.set_point(SetPoint::Pressure(300e3)).expect("a set-point");
         meanwhile();
         let soft = softening(client, &muscle, samples);
         client.call::<Stop>(&()).expect("it stops");

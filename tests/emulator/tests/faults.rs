@@ -6,11 +6,12 @@ use std::time::Duration;
 use emulator_tests::machine::Folder;
 use emulator_tests::{Machine, Options, Watched, tracking, upload};
 use model_core::link::endpoints::{
-    Arm, ClearFault, GetFaults, GetPastFault, GetSettings, GetStatus, SetReference, SetSettings,
-    SetTelemetry, SetTo, StartMode, Stop,
+    Arm, ClearFault, GetFaults, GetPastFault, GetSettings, GetStatus, SetSettings, SetTelemetry, SetTo,
+    StartMode, Stop,
 };
 use model_core::link::messages::{
-    Fault, Field, Mode, PastFault, Reference, Refusal, SetPoint, Side, Start, State, TelemetryRate,
+    Fault, Field, Mode, PastFault, Reference, Refusal, SetPoint, SetPointOrder, Side, Start, State,
+    TelemetryRate,
 };
 use model_core::link::settings::Settings;
 use model_core::table;
@@ -113,7 +114,7 @@ fn every_fault_of_the_plant_is_noticed_in_time_and_latched() {
         });
         tracking::start(&mut client, Mode::Pressure);
         client.call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 }).expect("quiet");
-        client.call::<SetTo>(&SetPoint::Pressure(250e3)).expect("a set-point");
+        client.set_point(SetPoint::Pressure(250e3)).expect("a set-point");
         station.pass(400);
         let mut began = None;
         let cause = case.cause;
@@ -126,7 +127,7 @@ fn every_fault_of_the_plant_is_noticed_in_time_and_latched() {
         });
         if fault == Fault::SensorStuck {
             station.pass(20);
-            client.call::<SetTo>(&SetPoint::Pressure(400e3)).expect("a set-point");
+            client.set_point(SetPoint::Pressure(400e3)).expect("a set-point");
         }
         let report = tracking::stopped(&mut client);
         station.pass(5);
@@ -195,7 +196,7 @@ fn a_host_that_falls_silent_and_a_hold_that_was_asked_for() {
     });
     tracking::start(&mut client, Mode::Pressure);
     client.call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 }).expect("quiet");
-    client.call::<SetTo>(&SetPoint::Pressure(300e3)).expect("a set-point");
+    client.set_point(SetPoint::Pressure(300e3)).expect("a set-point");
     let report = tracking::stopped(&mut client);
     assert_eq!((report.fault, report.value, report.limit), (Fault::SetPointSilence, 2_001.0, 2_000.0));
     station.pass(100);
@@ -226,7 +227,8 @@ fn a_mode_without_its_table_is_a_fault_and_nothing_starts_by_itself() {
     assert_eq!(latched, Some(Fault::TableMissing));
     client.call::<ClearFault>(&()).expect("it clears");
     // A setpoint to a device that does not run moves nothing.
-    let refused = client.try_call::<SetTo>(&SetPoint::Pressure(300e3)).expect("an answer");
+    let order = SetPointOrder { set_point: SetPoint::Pressure(300e3), session: client.session() };
+    let refused = client.try_call::<SetTo>(&order).expect("an answer");
     assert_eq!(refused, Err(Refusal::WrongState(State::Disarmed)));
     station.pass(50);
     assert!(station.since(0).iter().all(|exchange| exchange.command == 0.0));
@@ -242,7 +244,7 @@ fn a_calculation_that_fails_vents_and_is_told_with_its_result() {
     client.call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 }).expect("quiet");
     // Both are numbers, and their sum is none.
     let wave = Reference::Sine { mean: 3.0e38, amplitude: 3.0e38, frequency_hz: 1.0 };
-    client.call::<SetReference>(&wave).expect("a wave");
+    client.reference(wave).expect("a wave");
     let report = tracking::stopped(&mut client);
     assert!(report.fault == Fault::NotANumber && report.value == f32::INFINITY, "{report:?}");
     station.pass(5);

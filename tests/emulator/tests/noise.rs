@@ -11,7 +11,7 @@ use emulator_tests::machine::{Folder, HOPELESS, PATIENCE};
 use emulator_tests::{Machine, Options, Watched, image_of, tracking, upload};
 use model_core::link::endpoints::{Endpoint, GetStatus, SetTelemetry, SetTo};
 use model_core::link::frame::{Header, Kind, MAX_WIRE, encode};
-use model_core::link::messages::{Mode, SetPoint, Side, State, TelemetryRate};
+use model_core::link::messages::{Mode, SetPoint, SetPointOrder, Side, State, TelemetryRate};
 use model_core::table::{self, MuscleTable};
 use model_core::units::Pressure;
 use pam_device::{Client, Patience, Port, Topic, tables};
@@ -79,7 +79,8 @@ fn flipped_bits_cost_repeats_and_nothing_else() {
         for step in 0..40 {
             let pascals = 150e3 + 1e3 * n as f32 + 17.0 * step as f32;
             sent.push(pascals);
-            let _ = client.try_once::<SetTo>(&SetPoint::Pressure(pascals));
+            let order = SetPointOrder { set_point: SetPoint::Pressure(pascals), session: client.session() };
+            let _ = client.try_once::<SetTo>(&order);
         }
         let mut frames_bad = 0;
         let seen = std::cell::Cell::new(0);
@@ -219,9 +220,7 @@ fn telemetry_of_two_muscles_at_1_khz_and_commands_beside_it_fit_a_line_of_1_mbau
                 // A setpoint fifty times a second, as a program that controls the joint would send.
                 if sample.tick % 20 == 0 {
                     let angle_rad = 0.03 * (samples as f32 * 1e-3).sin();
-                    client
-                        .call::<SetTo>(&SetPoint::Pair { angle_rad, stiffness_nm_per_rad: 4.0 })
-                        .expect("set");
+                    client.set_point(SetPoint::Pair { angle_rad, stiffness_nm_per_rad: 4.0 }).expect("set");
                     commands += 1;
                 }
             }

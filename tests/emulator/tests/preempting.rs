@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use emulator_tests::machine::{self, Folder};
 use emulator_tests::{Machine, Options, image_of, tracking, upload};
-use model_core::link::endpoints::{EvaluateTable, GetInfo, GetSettings, GetStatus, SetReference};
+use model_core::link::endpoints::{EvaluateTable, GetInfo, GetSettings, GetStatus};
 use model_core::link::messages::{Evaluate, Event, Mode, Point, Reference, Side, State};
 use model_core::muscle::Muscle;
 use model_core::table;
@@ -47,7 +47,7 @@ fn answers_are_whole_while_control_steps_interrupt_their_making() {
     let info = client.call::<GetInfo>(&()).expect("its limits");
     let settings = client.call::<GetSettings>(&()).expect("its settings");
     let wave = Reference::Sine { mean: 45.0, amplitude: 20.0, frequency_hz: 2.0 };
-    let began = client.call::<SetReference>(&wave).expect("a wave");
+    let began = client.reference(wave).expect("a wave");
     let points = (0..16).map(|n| Point { pressure_pa: 30e3 + 35e3 * n as f32, stroke_m: 1e-3 }).collect();
     let request = Evaluate { side: Side::Agonist, direction: 1, points };
     let expected: Vec<[u32; 2]> = request

@@ -19,7 +19,7 @@ fn running(shared: &Shared) -> (Server<MockFlash>, f32) {
     pass(shared, 10, &mut pressure);
     assert_eq!(shared.with(|c| c.arm(OWNER)), Ok(()));
     assert_eq!(shared.with(|c| c.start(Mode::Pressure, OWNER)), Ok(()));
-    assert_eq!(shared.with(|c| c.set_point(SetPoint::Pressure(300e3))), Ok(()));
+    assert_eq!(shared.with(|c| c.set_point(to_pressure(300e3))), Ok(()));
     pass(shared, 500, &mut pressure);
     (server, pressure)
 }

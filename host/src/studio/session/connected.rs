@@ -164,7 +164,7 @@ impl Connected {
     pub(super) fn listen(&mut self, say: &broadcast::Sender<String>) -> Result<()> {
         match self.client.keep_alive() {
             // Another program has started a mode; the page continues to show what the controller does.
-            Err(error) if error.code() == DeviceCode::DeviceRefused => {
+            Err(error) if error.code() == DeviceCode::DeviceInUse => {
                 self.running = None;
                 tell(say, "bad", &error);
             }
@@ -215,7 +215,11 @@ impl Connected {
                 let elapsed = sample.time_us.saturating_sub(begin) as f64 * 1e-6;
                 match steps.advance(&mut self.client, *quantity, elapsed) {
                     // A controller that was vented beside this conversation refuses setpoints; it is still connected.
-                    Err(error) if error.code() == DeviceCode::DeviceRefused => {
+                    Err(error)
+                        if [DeviceCode::DeviceRefused, DeviceCode::DeviceInUse]
+                            .iter()
+                            .any(|c| error.code() == *c) =>
+                    {
                         self.running = None;
                         self.status = self.client.call::<GetStatus>(&())?;
                         if self.status.state == State::Running {
@@ -248,6 +252,9 @@ impl Connected {
                 let reachable = Reachability::of(&mut self.client)?;
                 if let Some(words) = reachable.and_then(|r| r.beyond(quantity, &profile)) {
                     return Err(Error::new(DataCode::CallInvalid, words).help("ask for less"));
+                }
+                if self.status.state == State::Running && !self.client.controls() {
+                    return Err(messages::in_use("start"));
                 }
                 if self.status.state == State::Running && self.status.mode != quantity.mode() {
                     self.client.call::<Stop>(&())?;

@@ -3,7 +3,7 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use super::{Fault, Mode, State, TableInfo};
+use super::{Fault, Mode, State, TableHealth, TableInfo};
 use crate::fields::{codes, fields};
 
 /// Identity and limits of a device.
@@ -76,6 +76,8 @@ pub struct Status {
     pub saturated_ticks: u32,
     /// Times that received bytes were lost: the receiver was not read in time, or the line was disturbed.
     pub line_errors: u32,
+    /// Whether the tables still describe their muscles.
+    pub tables: [TableHealth; 2],
 }
 
 fields!(Status {
@@ -89,5 +91,6 @@ fields!(Status {
     frames_bad,
     telemetry_dropped,
     saturated_ticks,
-    line_errors
+    line_errors,
+    tables
 });

@@ -22,7 +22,8 @@ pub struct Start {
 fields!(Start { mode, session });
 
 /// The session of one program, from when it opens the link until it ends: a number that the program draws at random. The session that
-/// armed the device or started its mode owns it, and only its keep-alive requests count for the watch of host silence.
+/// armed the device or started its mode owns it: only its orders are carried out, and only its keep-alive requests count for the watch
+/// of host silence. Each session may vent and read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Session {
     /// The number.
@@ -62,6 +63,28 @@ choices!(SetPoint {
     2 Stroke { 0: metres },
     3 Pair { angle_rad: angle, stiffness_nm_per_rad: stiffness },
 });
+
+/// A setpoint with the session that sends it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+pub struct SetPointOrder {
+    /// What is demanded.
+    pub set_point: SetPoint,
+    /// The session that owns the mode.
+    pub session: Session,
+}
+
+fields!(SetPointOrder { set_point, session });
+
+/// A reference with the session that sends it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+pub struct ReferenceOrder {
+    /// What is generated.
+    pub reference: Reference,
+    /// The session that owns the mode.
+    pub session: Session,
+}
+
+fields!(ReferenceOrder { reference, session });
 
 /// A wave that the device makes itself, in the unit of the mode's first value (Pa, N, m, rad); it begins immediately and
 /// holds its last value at its end. A pair's stiffness is the last setpoint's.
@@ -127,6 +150,8 @@ pub struct ReferencePoints {
     pub offset: u16,
     /// The points, in the unit of the mode.
     pub points: Vec<f32, REFERENCE_PIECE>,
+    /// The session that sends them; that of the owner, where the device has one.
+    pub session: Session,
 }
 
-fields!(ReferencePoints { offset, points });
+fields!(ReferencePoints { offset, points, session });

@@ -5,9 +5,7 @@ use std::process::Command;
 use std::sync::{Arc, Mutex};
 
 use model_core::effects::{EffectName, FittedEffect};
-use model_core::link::endpoints::{
-    ArmTrace, EvaluateTable, Forget, GetInfo, GetPastFault, Restart, SetTo, Stop,
-};
+use model_core::link::endpoints::{ArmTrace, EvaluateTable, Forget, GetInfo, GetPastFault, Restart, Stop};
 use model_core::link::messages::{
     Evaluate, ForgetMemory, Mode, PastFault, Point, Reference, SetPoint, Side, TraceArm, Trigger, Variable,
 };
@@ -148,13 +146,11 @@ fn of_a_joint() -> Result<u32, Skipped> {
     tracking::set(&mut client, pair::adjust);
     let point = SetPoint::Pair { angle_rad: 0.05, stiffness_nm_per_rad: 120.0 };
     tracking::start(&mut client, Mode::Pair);
-    client.call::<SetTo>(&point).expect("within reach");
+    client.set_point(point).expect("within reach");
     for _ in 0..500 {
         tracking::sample(&mut client).expect("no fault");
     }
-    client
-        .call::<SetTo>(&SetPoint::Pair { angle_rad: 0.0, stiffness_nm_per_rad: 100.0 })
-        .expect("within reach");
+    client.set_point(SetPoint::Pair { angle_rad: 0.0, stiffness_nm_per_rad: 100.0 }).expect("within reach");
     client.call::<Stop>(&()).expect("it stops");
     Ok(reached(&machine))
 }
