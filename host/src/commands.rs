@@ -14,6 +14,7 @@ pub mod fit;
 pub mod flash;
 pub mod fleet;
 pub mod history;
+pub mod import;
 pub mod man;
 pub mod new;
 pub mod plan;

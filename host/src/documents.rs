@@ -9,6 +9,7 @@ pub(crate) mod evaluate;
 mod fit;
 pub(crate) mod fleet;
 pub(crate) mod history;
+pub(crate) mod import;
 pub(crate) mod predict;
 pub(crate) mod table;
 
@@ -75,6 +76,7 @@ mod tests {
         published::<super::evaluate::Evaluate>("pam-evaluate-1");
         published::<super::fit::Fit>("pam-fit-1");
         published::<super::history::History>("pam-history-1");
+        published::<super::import::Import>("pam-import-1");
         published::<super::fleet::Fleet<'_>>("pam-fleet-1");
         published::<super::fleet::Stock<'_>>("pam-stock-1");
         published::<super::predict::Predict>("pam-predict-1");
