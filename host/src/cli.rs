@@ -91,7 +91,7 @@ enum Command {
     Effects(commands::effects::Arguments),
     /// Say before recording what a planned protocol can and cannot distinguish.
     Plan(commands::plan::Arguments),
-    /// Record, judge, fit and diagnose by itself: the program chooses each step of the campaign.
+    /// Record, check, fit and diagnose automatically: the program chooses each step of the campaign.
     Campaign(commands::campaign::Arguments),
     /// Two recordings, in numbers and in a picture.
     Compare(commands::compare::Arguments),

@@ -92,7 +92,7 @@ fn complete(output: &Path) -> BTreeMap<PathBuf, std::time::SystemTime> {
         .collect()
 }
 
-/// Killed at random moments, and run again: the output is that of an uninterrupted run, byte for byte, no reader ever sees a part of a
+/// With a SIGKILL at random moments, and run again: the output is that of an uninterrupted run, byte for byte, no reader ever sees a part of a
 /// muscle, and none is computed twice.
 #[test]
 fn a_killed_batch_continues_and_ends_with_the_same_bytes() {

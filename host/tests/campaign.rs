@@ -1,4 +1,4 @@
-//! `host campaign` from outside: whole, interrupted by a signal, killed, and resumed.
+//! `host campaign` from outside: whole, interrupted by a signal, ended by SIGKILL, and resumed.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "what fails here fails the test")]

@@ -40,7 +40,9 @@ function pieces(text) {
             let stop = at + 1;
             while (stop < text.length && text[stop] !== '"') stop += text[stop] === "\\" ? 2 : 1;
             // A backslash at a line's end joins the lines; keep the line break for the numbering.
-            const body = text.slice(at + 1, stop).replace(/\\\n/g, "\n").replace(/([.:;,!?]?)(?:\\n)+/g, (_, mark) => `${mark || "."} `).replace(/\\(["\\])/g, "$1");
+            // A line that begins with two spaces is code: an example of a command, a line of a grammar.
+            const prose = text.slice(at + 1, stop).replace(/\\n {2}(?:\\\\|\\\n|\\(?=["])|(?!\\n).)*/gs, (code) => code.replace(/[^\n]/g, ""));
+            const body = prose.replace(/\\\n/g, "\n").replace(/([.:;,!?]?)(?:\\n)+/g, (_, mark) => `${mark || "."} `).replace(/\\(["\\])/g, "$1");
             out.push({ kind: "string", line, text: body });
             advance(stop + 1);
         } else if ((m = /^'(?:\\.[^']*|[^'\\\n])'/.exec(rest))) {

@@ -31,12 +31,12 @@ pub enum Ending {
     Ended,
 }
 
-/// Something that carries out courses. Whatever happens, the muscle is vented when [`Actuation::perform`] returns.
+/// Performs the setpoint profiles of steps. In all cases, errors included, the muscle is vented when [`Actuation::perform`] returns.
 pub trait Actuation {
     /// The clock of the campaign, s.
     fn clock(&self) -> f64;
 
-    /// Sets the clock: a resumed campaign goes on later than it stopped.
+    /// Sets the clock: a resumed campaign continues later than it stopped.
     fn set_clock(&mut self, seconds: f64);
 
     /// Carries out a course; `each` is handed every reading and says whether to go on.
@@ -51,6 +51,6 @@ pub trait Actuation {
     /// As [`Actuation::perform`].
     fn check(&mut self, check: CheckKind, force: f64, pressure: f64) -> Result<Option<String>>;
 
-    /// Whether time may stand still, while the program computes. A real muscle waits vented.
+    /// Whether the clock can pause while the program computes. A real muscle waits vented.
     fn compute(&mut self, _computing: bool) {}
 }

@@ -75,7 +75,7 @@ impl VirtualBench {
                 (self.command, self.stroke) = (0.0, 0.0);
                 let step = if recorded { BenchStep::Tare { seconds } } else { BenchStep::Rest { seconds } };
                 let rows = self.act(step, recorded)?;
-                // What the bench does not record, nobody sees.
+                // What the bench does not record is not reported.
                 if recorded { handed(&rows, each) } else { Ok(true) }
             }
         }

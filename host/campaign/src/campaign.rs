@@ -1,4 +1,4 @@
-//! The course of a campaign: choose, record, judge, learn, until there is nothing more to do.
+//! The loop of a campaign: choose a step, record it, check it, update the estimates, until a stopping rule holds.
 
 use std::path::{Path, PathBuf};
 
@@ -49,7 +49,7 @@ pub trait Observer {
     }
 }
 
-/// Nobody watches.
+/// No observer.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Alone;
 
@@ -60,7 +60,7 @@ impl Observer for Alone {}
 pub enum Outcome {
     /// It is complete; why, in one sentence.
     Complete(String),
-    /// It was interrupted; the same call goes on.
+    /// It was interrupted; the same call continues it.
     Interrupted,
 }
 
@@ -178,10 +178,10 @@ pub fn simulate(engine: &mut Engine, bench: &mut VirtualBench, checks: Option<&P
     Ok(course)
 }
 
-/// Carries out a campaign in a folder, or goes on with the one that is there.
+/// Carries out a campaign in a folder, or continues the one that is there.
 ///
 /// # Errors
-/// What the device or the disk fails with; the muscle is vented then, and the same call goes on.
+/// What the device or the disk fails with; the muscle is then vented, and the same call continues the campaign.
 pub fn run(
     engine: &mut Engine,
     actuation: &mut dyn Actuation,
@@ -232,7 +232,7 @@ fn resume(engine: &mut Engine, journal: &Journal, muscle: &MuscleDescription) ->
             Event::Chosen(c) => (chosen, spoiled) = (Some(c.clone()), Vec::new()),
             Event::Spoiled { reason, .. } => spoiled.push(*reason),
             Event::Cut { file, rows, .. } => {
-                // Fewer rows than this are no recording.
+                // A recording has at least this many rows.
                 if *rows >= 20 {
                     engine.add_rows(read(&journal.folder().join(file), muscle)?);
                 }
@@ -357,7 +357,7 @@ fn one_check(
 enum Attempt {
     /// The course is complete.
     Whole,
-    /// Somebody asked to stop.
+    /// A stop was requested.
     Stopped,
 }
 
@@ -446,7 +446,7 @@ fn attempt(
     match (danger, ending) {
         (Some(danger), _) => {
             Err(Error::new(DataCode::RecordingOutOfRange, format!("the muscle was vented: {danger}"))
-                .help("find the cause; the same call goes on with the campaign"))
+                .help("find the cause; the same call continues the campaign"))
         }
         (None, Ending::Ended) => Ok(Attempt::Stopped),
         (None, Ending::Whole) => Ok(Attempt::Whole),

@@ -97,7 +97,7 @@ impl Table {
         prior
     }
 
-    /// Adds the prior to the block of the table's coefficients, which comes first.
+    /// Adds the prior distribution to the block of the table's coefficients, which comes first.
     pub(crate) fn add_prior(&self, inner: &mut DMatrix<f64>) {
         let m = self.len();
         for i in 0..m {
@@ -169,7 +169,7 @@ pub(crate) struct Library {
 }
 
 impl Library {
-    /// All effects that a campaign asks about; those of the sets with more shapes.
+    /// All effects that a campaign checks for; those of the sets with more shapes.
     pub(crate) fn new(sets: &[Vec<Hypothesis>]) -> Self {
         let open = |law: Candidate| sets.iter().any(|s| s.iter().take(LARGEST_SET).any(|h| h.law == law));
         let mut named = asked();

@@ -86,7 +86,7 @@ impl<'a> Player<'a> {
         self.course.segments.get(self.at).is_some_and(|s| s.1)
     }
 
-    /// Goes on to a time; gives the pressure to command.
+    /// Advances to a time; returns the pressure to command.
     fn advance(&mut self, elapsed: f64, shown: Shown, axis: &mut dyn StrokeAxis) -> Result<f64> {
         while let Some((segment, _)) = self.course.segments.get(self.at) {
             if !self.started {
@@ -193,7 +193,7 @@ impl Actuation for Controller {
             },
             || ended.get() || failed.borrow().is_some() || player.borrow().finished(),
             |elapsed| match player.borrow_mut().advance(elapsed, shown.get(), axis.as_mut()) {
-                // Every time: a controller that is emulated faster than real time must hear from its host as often.
+                // Every time: a controller that is emulated faster than real time must receive messages from its host as often.
                 Ok(command) => Some(command as f32),
                 Err(e) => {
                     *failed.borrow_mut() = Some(e);
@@ -202,7 +202,7 @@ impl Actuation for Controller {
             },
         );
         self.last = last.get();
-        // The muscle is vented; the free end goes back whatever the outcome was.
+        // The muscle is vented; the free end moves back after failures, too.
         let back = self.axis.rest();
         outcome?;
         if let Some(error) = failed.into_inner() {

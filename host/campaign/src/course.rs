@@ -1,4 +1,4 @@
-//! The course of a step: what pressure and stroke do one after the other, in SI units.
+//! The setpoint profile of a step: pressure and stroke over time, in SI units.
 
 /// One stretch of a course.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -14,6 +14,11 @@ pub const FIT_FROM: usize = 3;
 pub const LEVELS: usize = 6;
 /// Seconds for the free stroke at the slow speed (the thesis: 1 mm/s for a 150 mm muscle).
 pub const SLOW_STROKE: f64 = 27.0;
+/// Pressure rate of the first ramp at rest length, share of the highest level per second: it shows deadband and blocked force, and takes
+/// 5 s each way.
+pub const FIRST_RAMP_SHARE: f64 = 0.2;
+/// Speed of the survey of all levels, in slow speeds: a stroke of some seconds, slow against regulators of some hundredths of a second.
+pub const SURVEY_SPEED: f64 = 8.0;
 /// Share of the blocked force below which the muscle counts as free; a stroke turns there.
 pub const FREE_FORCE: f64 = 0.01;
 /// Largest contraction that a stroke may reach before anything is known, as a share of the rest length. A braid's
@@ -26,7 +31,7 @@ pub const SLOW_RAMP_SHARE: f64 = 0.04;
 /// Samples per second of bench time.
 pub const SAMPLE_HZ: f64 = 10.0;
 
-/// Wanted standard error of the table's force on unseen pressures and strokes, share of the blocked force. The model's own stated
+/// Target for the standard error of the table's force on unseen pressures and strokes, share of the blocked force. The model's own stated
 /// inexactness is as large (`pam_diagnose::criteria`, lack of fit).
 pub const WANTED_ERROR: f64 = 0.0015;
 /// Inexactness of the model that no number of rows averages out, share of the blocked force (as above).
@@ -54,11 +59,11 @@ pub const DIAGNOSE_EVERY: usize = 3;
 pub const DIAGNOSE_FROM: f64 = 240.0;
 /// Probability from which a name counts as the only one.
 pub const SURE: f64 = 0.9;
-/// Expected entropy of the set, nats, below which an effect that were there would be named: one rival at a tenth of its odds.
+/// Expected entropy of the set, nats, below which an effect that is present would be named: one competing candidate at a tenth of its odds.
 pub const NAMED: f64 = 0.1;
 /// Times that a spoiled step is repeated before it is left out.
 pub const REPEATS: u32 = 2;
-/// Seconds that a person needs to set a stroke or mount a check by hand.
+/// Seconds that the operator needs to set a stroke or mount a check by hand.
 pub const HANDLING_S: f64 = 60.0;
 
 /// Largest difference of pressure and command before a reading counts as not settled, share of the highest level.

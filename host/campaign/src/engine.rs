@@ -160,7 +160,7 @@ impl Engine {
                 choosing_s: begun.elapsed().as_secs_f64(),
             })
         };
-        for (step, why) in opening(&self.places, &self.rig) {
+        for (step, why) in opening(&self.rig) {
             let kind = |s: &Step| s.name();
             let done = self.steps.iter().chain(&self.left_out).any(|s| kind(s) == kind(&step));
             // How long it takes is known only when the free stroke is; without these steps nothing else can be chosen.
@@ -200,7 +200,7 @@ impl Engine {
         steps.fold(f64::INFINITY, f64::min)
     }
 
-    /// The step of the menu that tells most per second within the time left, and whether everything asked for is known.
+    /// The step of the menu with the most information per second within the time left, and whether all targets are met.
     fn weigh(&mut self, left_s: f64) -> (Option<(Step, Gain, f64)>, bool) {
         let Some(findings) = &self.findings else {
             let next = menu(&self.places, &self.rig)
@@ -290,6 +290,7 @@ impl Engine {
         let Some(recording) = recording else { return };
         match step {
             Step::BlockedRamp | Step::Staircase { .. } => self.places.learn_ramp(&recording),
+            Step::Survey { .. } => self.places.learn_survey(&recording),
             Step::Loops { .. } => self.places.learn_strokes(&recording),
             _ => {}
         }
@@ -309,12 +310,12 @@ impl Engine {
         self.since_diagnosis = DIAGNOSE_EVERY;
     }
 
-    /// Leaves a step out for good.
+    /// Leaves a step out permanently.
     pub fn leave_out(&mut self, step: Step) {
         self.left_out.push(step);
     }
 
-    /// Fits and, from time to time, diagnoses; says in words what the last step told.
+    /// Fits and, from time to time, diagnoses; states as text what the last step contributed.
     ///
     /// # Errors
     /// What a diagnosis fails with.

@@ -4,7 +4,7 @@
 //! table    Σ ½ ln((s² + δ²)/(s₁² + δ²))      s²: predicted variance of the force on unseen pressures and strokes, before and after
 //! effects  H(π) − E[H(π | step)],  E[H] ≈ Σ_h π_h ln Σ_h' (π_h'/π_h) exp(−d²_hh'/8)      h: none, and each effect in turn
 //! ```
-//! `δ` is the wanted error; `d²_hh'` the squared distance, in noise variances, of the force under effect h from the nearest force that the
+//! `δ` is the target error; `d²_hh'` the squared distance, in noise variances, of the force under effect h from the nearest force that the
 //! tables and effect h' can imitate, over everything recorded so far and the step. `exp(−d²/8)` is the Bhattacharyya coefficient of two
 //! normal distributions (K. Chaloner and I. Verdinelli, Statist. Sci. 10 (1995) 273, doi 10.1214/ss/1177009939, for designs of this kind).
 
@@ -186,8 +186,8 @@ impl<'a> Design<'a> {
         gain
     }
 
-    /// For each effect, the expected entropy of the set if it were there in the wanted size: among nothing and all others, whose sizes and
-    /// shapes are free beside the table. Effects that a check of the bench settles are no rivals, and have none.
+    /// For each effect, the expected entropy of the set if it were present at the target size: among nothing and all others, whose sizes and
+    /// shapes are free beside the table. Effects that a check of the bench settles are not competing candidates, and have none.
     fn doubts(
         &self,
         gram: &DMatrix<f64>,
@@ -376,7 +376,7 @@ fn less(before: &[f64], after: &[f64]) -> f64 {
     (before.iter().sum::<f64>() - after.iter().sum::<f64>()).max(0.0)
 }
 
-/// Every so many rows of a recording, without its force.
+/// Every nth row of a recording, without its force.
 fn thinned(recording: &Recording, stride: usize) -> Recording {
     let pick = |v: &[f64]| v.iter().copied().step_by(stride).collect::<Vec<f64>>();
     Recording {
@@ -407,7 +407,7 @@ fn weights(campaign: &Campaign, independent_s: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Effects that a campaign asks about: all but those that only the order of the polynomial imitates.
+/// Effects that a campaign checks for: all but those that only the order of the polynomial imitates.
 #[must_use]
 pub fn asked() -> Vec<Candidate> {
     Candidate::all().filter(|l| l.traits().imitates != Some(Imitates::ElasticOrders)).collect()

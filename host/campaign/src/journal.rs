@@ -52,7 +52,7 @@ pub struct Chosen {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub enum Event {
-    /// A campaign began, or went on after an interruption.
+    /// A campaign began, or continued after an interruption.
     Begin {
         /// Schema of the log.
         schema: String,
@@ -115,12 +115,12 @@ pub enum Event {
     Told {
         /// Its number.
         number: u32,
-        /// In words.
+        /// As text.
         words: String,
     },
     /// The campaign ended.
     Ended {
-        /// Why, in words.
+        /// The reason, as text.
         reason: String,
         /// Clock, s.
         clock_s: f64,
@@ -247,7 +247,7 @@ impl Journal {
         if part.synced.elapsed() >= PIECE { part.sync() } else { Ok(()) }
     }
 
-    /// Ends the recording of a step: `suffix` tells a spoiled one apart. Gives the file's name and its rows.
+    /// Ends the recording of a step: `suffix` marks a spoiled one. Returns the file's name and its rows.
     ///
     /// # Errors
     /// [`DataCode::FileUnwritable`].

@@ -1,5 +1,6 @@
 //! Which steps a rig can do, and the first ones of every campaign.
 
+use crate::criteria::SURVEY_SPEED;
 use crate::places::Places;
 use crate::rig::{Axis, Rig};
 use crate::step::{CheckKind, Step};
@@ -40,9 +41,7 @@ pub fn menu(places: &Places, rig: &Rig) -> Vec<Step> {
 
 /// The first steps of a campaign with the reason of each: before there is a table, nothing can be weighed.
 #[must_use]
-pub fn opening(places: &Places, rig: &Rig) -> Vec<(Step, &'static str)> {
-    let levels = places.levels();
-    let at = |i: usize| levels.get(i).copied().unwrap_or(places.top);
+pub fn opening(rig: &Rig) -> Vec<(Step, &'static str)> {
     let mut steps = vec![
         (Step::Tare { seconds: 10.0 }, "The zeros of the instruments are needed before anything else."),
         (
@@ -51,12 +50,10 @@ pub fn opening(places: &Places, rig: &Rig) -> Vec<(Step, &'static str)> {
         ),
     ];
     if rig.axis.moves() {
-        let loops = |level: f64| Step::Loops { level, times: 1.0, count: 2 };
-        steps.extend([
-            (loops(places.top), "It shows the free stroke and the friction at the highest level."),
-            (loops(at(0)), "The lowest level limits the table on the other side."),
-            (loops(at(3)), "A table needs a third level before the next step can be weighed."),
-        ]);
+        steps.push((
+            Step::Survey { times: SURVEY_SPEED },
+            "It shows the free stroke and the friction at all pressure levels, as soon as possible.",
+        ));
     } else {
         steps.push((
             Step::Staircase { part: 0.0, seconds: 4.0 },

@@ -21,7 +21,7 @@ pub struct Places {
     pub stroke_max: f64,
     /// Largest speed that is allowed, m/s.
     pub speed_max: f64,
-    /// Whether a person sets strokes.
+    /// Whether the operator sets strokes by hand.
     pub by_hand: bool,
     /// Blocked force at the highest level, N; zero until it is measured.
     pub blocked: f64,
@@ -53,7 +53,7 @@ impl Places {
         let stroke_max = (LARGEST_CONTRACTION * muscle.rest_length())
             .min(rig.stroke_max_mm.map_or(f64::INFINITY, |mm| mm * 1e-3));
         Ok(Self {
-            // Whole kilopascals, as a person would set them.
+            // Whole kilopascals, as an operator would set them.
             top: (TOP_SHARE * highest * 1e-3).floor() * 1e3,
             stroke_max,
             speed_max: rig.speed_max_mm_s.map_or(f64::INFINITY, |v| v * 1e-3),
@@ -95,13 +95,26 @@ impl Places {
 
     /// Takes the free stroke from recorded strokes at the highest level.
     pub fn learn_strokes(&mut self, recording: &Recording) {
-        let longest = recording.stroke.iter().copied().fold(0.0, f64::max);
-        let pressure = recording.pressure.iter().sum::<f64>() / recording.len().max(1) as f64;
-        if pressure > 0.95 * self.top && longest > 0.0 {
+        let at_top = recording.pressure.iter().zip(&recording.stroke).filter(|(p, _)| **p > 0.95 * self.top);
+        let longest = at_top.map(|(_, x)| *x).fold(0.0, f64::max);
+        if longest > 0.0 {
             self.free = self.free.max(longest.min(self.stroke_max));
         }
         let highest = recording.force.iter().flatten().copied().fold(0.0, f64::max);
         self.blocked = self.blocked.max(highest);
+    }
+
+    /// Takes free stroke and levels from the survey of all levels. The levels stay where the muscle moves at the lowest of them.
+    pub fn learn_survey(&mut self, recording: &Recording) {
+        let levels = self.levels();
+        self.learn_strokes(recording);
+        let (lowest, next) = (levels[0], levels[1]);
+        let lowest_rows =
+            recording.pressure.iter().zip(&recording.stroke).filter(|(p, _)| **p < 0.5 * (lowest + next));
+        let moved = lowest_rows.map(|(_, x)| *x).fold(0.0, f64::max);
+        if self.free > 0.0 && moved >= BOTTOM_STROKE * self.free {
+            self.decided = Some(levels);
+        }
     }
 
     /// Takes a fitted model.

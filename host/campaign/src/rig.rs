@@ -24,7 +24,7 @@ pub enum Axis {
     Weight,
     /// A second muscle at constant pressure pulls back; the program commands the pressure of the first one only.
     Pair,
-    /// A person sets the stroke when asked; it is held while recording.
+    /// The operator sets the stroke when prompted; it is held during the recording.
     Prompt,
     /// A machine that takes commands line by line.
     Line,
@@ -71,7 +71,7 @@ pub struct Rig {
     /// The hanging weight, N.
     #[serde(rename = "weight_N", skip_serializing_if = "Option::is_none")]
     pub weight: Option<f64>,
-    /// Whether checks of the bench (dead weights, rigid bar, reference gauge) can be made when asked for.
+    /// Whether checks of the bench (dead weights, rigid bar, reference gauge) can be made on request.
     #[serde(default)]
     pub checks: bool,
 }

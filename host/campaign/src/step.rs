@@ -4,7 +4,7 @@ use model_core::effects::BenchCheck;
 use serde::{Deserialize, Serialize};
 
 use crate::course::{Course, Segment, VENT_S};
-use crate::criteria::{HANDLING_S, RAMP_SHARE, SLOW_RAMP_SHARE};
+use crate::criteria::{FIRST_RAMP_SHARE, HANDLING_S, RAMP_SHARE, SLOW_RAMP_SHARE};
 use crate::places::Places;
 
 /// What a step does.
@@ -18,6 +18,11 @@ pub enum Step {
     },
     /// Pressure up and down at rest length: deadband, and blocked force.
     BlockedRamp,
+    /// One stroke from blocked to free and back at every level, the highest first.
+    Survey {
+        /// Speed, in slow speeds.
+        times: f64,
+    },
     /// Strokes from blocked to free and back.
     Loops {
         /// Pressure, Pa.
@@ -128,6 +133,7 @@ impl Step {
         match *self {
             Self::Tare { .. } => "tare".into(),
             Self::BlockedRamp => "blocked_ramp".into(),
+            Self::Survey { .. } => "survey".into(),
             Self::Loops { level, times, .. } if times > 1.0 => format!("fast_{}", kpa(level)),
             Self::Loops { level, .. } => format!("loops_{}", kpa(level)),
             Self::Speeds { level } => format!("speeds_{}", kpa(level)),
@@ -140,13 +146,16 @@ impl Step {
         }
     }
 
-    /// In words.
+    /// As text.
     #[must_use]
     pub fn words(&self) -> String {
         let kpa = |p: f64| format!("{:.0} kPa", p * 1e-3);
         match *self {
             Self::Tare { seconds } => format!("vented at rest length for {seconds:.0} s"),
-            Self::BlockedRamp => "a slow pressure ramp up and down at rest length".into(),
+            Self::BlockedRamp => "a pressure ramp up and down at rest length".into(),
+            Self::Survey { times } => {
+                format!("a stroke at each pressure level, {times:.3} × the slow speed")
+            }
             Self::Loops { level, times, count } => {
                 format!("{count} strokes at {}, {times:.3} × the slow speed", kpa(level))
             }
@@ -185,6 +194,12 @@ impl Step {
                 builder.course.record(Segment::Vented { seconds });
             }
             Self::BlockedRamp => builder.blocked_ramp(),
+            Self::Survey { times } => {
+                for level in places.levels().into_iter().rev() {
+                    builder.begin(level);
+                    builder.loops(times, 1);
+                }
+            }
             Self::Loops { level, times, count } => {
                 builder.begin(level);
                 builder.loops(times, count);
@@ -230,7 +245,7 @@ impl Step {
         }
     }
 
-    /// Strokes that a person would have to set.
+    /// Strokes that the operator would have to set.
     fn positions(&self) -> u32 {
         match self {
             Self::Ramps { part } | Self::Staircase { part, .. } if *part > 0.0 => 2,
@@ -287,7 +302,7 @@ impl Builder<'_> {
 
     fn blocked_ramp(&mut self) {
         let top = self.places.top;
-        let rate = SLOW_RAMP_SHARE * top;
+        let rate = FIRST_RAMP_SHARE * top;
         self.course.record(Segment::Ramp { to: top, rate });
         self.course.record(Segment::Hold { seconds: 2.0 });
         self.course.record(Segment::Ramp { to: 0.0, rate });

@@ -1,4 +1,4 @@
-//! What moves the free end of the muscle: an emulated axis, a machine that takes lines, a person, or nothing.
+//! What moves the free end of the muscle: an emulated axis, a machine with a line protocol, the operator, or nothing.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
@@ -46,7 +46,7 @@ pub trait StrokeAxis {
         Ok(())
     }
 
-    /// Whether time may stand still.
+    /// Whether the clock can pause.
     fn compute(&mut self, _computing: bool) {}
 }
 
@@ -85,7 +85,7 @@ impl StrokeAxis for pam_device::emulated::Axis {
     }
 }
 
-/// A person sets the stroke when asked, and presses Enter.
+/// The operator sets the stroke when prompted, and presses Enter.
 pub struct Prompt<R, W> {
     input: R,
     output: W,
@@ -106,15 +106,18 @@ impl<R: BufRead, W: Write> Prompt<R, W> {
 
     fn ask(&mut self, words: &str) -> Result<()> {
         let lost = |e: std::io::Error| {
-            Error::new(DeviceCode::DeviceSilent, format!("nobody can be asked to set the stroke: {e}"))
+            Error::new(
+                DeviceCode::DeviceSilent,
+                format!("no terminal to request a stroke from the operator: {e}"),
+            )
         };
         write!(self.output, "{words}, then press Enter: ")
             .and_then(|()| self.output.flush())
             .map_err(lost)?;
         let mut line = String::new();
         if self.input.read_line(&mut line).map_err(lost)? == 0 {
-            return Err(Error::new(DeviceCode::DeviceSilent, "nobody answers the request to set the stroke")
-                .help("run the command on a terminal; the same call goes on with the campaign"));
+            return Err(Error::new(DeviceCode::DeviceSilent, "no answer to the request to set the stroke")
+                .help("run the command on a terminal; the same call continues the campaign"));
         }
         Ok(())
     }
@@ -122,7 +125,7 @@ impl<R: BufRead, W: Write> Prompt<R, W> {
 
 impl<R: BufRead, W: Write> StrokeAxis for Prompt<R, W> {
     fn prepare(&mut self, stroke: f64) -> Result<()> {
-        // A hundredth of a millimetre is more than a person sets.
+        // A hundredth of a millimetre is finer than an operator sets a stroke.
         if (stroke - self.now).abs() > 1e-5 {
             self.ask(&format!("The muscle is vented. Move to a stroke of {:.2} mm", stroke * 1e3))?;
             self.now = stroke;

@@ -58,7 +58,7 @@ impl fmt::Display for Spoiled {
     }
 }
 
-/// Why the campaign must end at once.
+/// Why the campaign must end immediately.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Danger {
     /// Measured pressure, Pa.
@@ -67,7 +67,7 @@ pub enum Danger {
     Force(f64),
     /// Measured stroke, m.
     Stroke(f64),
-    /// A reading is no number.
+    /// A reading is not a number.
     NotANumber,
 }
 
@@ -159,7 +159,11 @@ impl Watch {
             Step::BlockedRamp | Step::Staircase { .. } => {
                 falls_with_pressure(rows).then_some(Spoiled::WrongSign)
             }
-            Step::Loops { .. } | Step::Speeds { .. } | Step::Nested { .. } | Step::Rest { .. } => {
+            Step::Loops { .. }
+            | Step::Survey { .. }
+            | Step::Speeds { .. }
+            | Step::Nested { .. }
+            | Step::Rest { .. } => {
                 let (from, to) = range(&stroke);
                 if !(to - from > 0.0) {
                     return Some(Spoiled::Frozen);

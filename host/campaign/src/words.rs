@@ -9,7 +9,7 @@ use crate::step::Step;
 
 /// Why a campaign ends with a tare.
 pub const CLOSING: &str = "Zeros at the end show whether the instruments drifted.";
-/// Why a step was chosen while there is no table.
+/// Why a step was chosen before the first table.
 pub const NO_TABLE: &str =
     "The recordings do not determine a table yet, so the steps of the menu are made in their order.";
 /// Why a campaign ends although not everything is known.
@@ -74,13 +74,13 @@ pub fn diagnosis(earlier: Option<&[String]>, now: &Diagnosis) -> String {
 #[must_use]
 pub fn settled(diagnosis: Option<&Diagnosis>, purpose: Purpose) -> String {
     match (purpose, diagnosis) {
-        (Purpose::Fit, _) | (_, None) => "The table is known to the wanted error.".into(),
+        (Purpose::Fit, _) | (_, None) => "The table is known to the target error.".into(),
         (_, Some(d)) if d.missing.is_empty() => {
-            "The table is known to the wanted error, and no effect of 1 % of the blocked force is missing."
+            "The table is known to the target error, and no effect of 1 % of the blocked force is missing."
                 .into()
         }
         (_, Some(d)) => format!(
-            "The table is known to the wanted error, and what is missing has one name: {}.",
+            "The table is known to the target error, and what is missing has one name: {}.",
             d.missing.iter().map(|m| m.effect.as_str()).collect::<Vec<_>>().join(", ")
         ),
     }

@@ -47,7 +47,7 @@ const YEAR_2000: f64 = 946_684_800.0;
 const YEAR_2100: f64 = 4_102_444_800.0;
 /// Bytes of a text file in which a date is looked for.
 const HEAD: usize = 4096;
-/// Names of columns that hold a date in words.
+/// Names of columns that hold a date as text.
 const DATE_COLUMNS: [&str; 6] = ["date", "datetime", "date_time", "timestamp", "recorded", "started"];
 
 /// The first date in a text: `2026-01-05`, `20260105`, `2026_01_05`, also with a time of day behind it (`T14:30`, `_143000`). The order
@@ -68,7 +68,7 @@ pub fn in_text(text: &str) -> Option<f64> {
     })
 }
 
-/// A number of so many digits at the beginning, and what follows.
+/// A number of `n` digits at the beginning, and what follows.
 fn number(bytes: &[u8], digits: usize) -> Option<(u64, &[u8])> {
     let (own, rest) = bytes.split_at_checked(digits)?;
     let value = own.iter().try_fold(0, |v, b| b.is_ascii_digit().then(|| 10 * v + u64::from(b - b'0')))?;

@@ -247,7 +247,7 @@ fn judge(selected: &SelectionResult, excess: &Excess, line: Option<&Line>) -> Ve
     }
 }
 
-/// Whether the effects remove most of the excess error on unseen rows, or leave no more than the model admits (N).
+/// Whether the effects remove most of the excess error on held-out rows, or leave no more than the model admits (N).
 fn removes_on_unseen(held: &HeldOut, admitted: f64) -> bool {
     let excess = |rms: f64| (rms.powi(2) - held.noise_N.powi(2)).max(0.0);
     let (before, after) = (excess(held.rms_before_N), excess(held.rms_after_N));

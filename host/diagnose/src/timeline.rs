@@ -132,7 +132,7 @@ fn refuse_others(visits: &[Visit], comparisons: &[Option<ChangeReport>]) -> Resu
                     100.0 * r.misfit_rms_N / r.largest_force_N
                 ),
             )
-            .help("leave it out; whatever it is, `host diagnose --reference` compares it with one other campaign"));
+            .help("leave it out; `host diagnose --reference` compares it with one other campaign"));
         }
     }
     Ok(())

@@ -192,7 +192,7 @@ fn sync_folder(_: &Path) -> io::Result<()> {
 fn replace(fresh: &Path, target: &Path) -> io::Result<()> {
     match fs::rename(fresh, target) {
         Ok(()) => Ok(()),
-        // There is a folder with files: results for other inputs.
+        // A folder with files exists: results for other inputs.
         Err(e) if target.is_dir() => {
             exchange(fresh, target).or_else(|_| move_aside(fresh, target)).map_err(|_| e)
         }

@@ -1,4 +1,4 @@
-//! The fit beside a stock on muscles of the virtual bench: error on pressures that were not recorded, and honest bands.
+//! The fit beside a stock on muscles of the virtual bench: error on pressures that were not recorded, and calibrated bands.
 
 #![allow(clippy::unwrap_used, reason = "what fails here fails the test")]
 
@@ -46,7 +46,7 @@ fn campaign(spec: &MuscleSpec, levels: &[f64], seed: u64) -> Campaign {
     Campaign::new(recordings.collect())
 }
 
-/// All muscles are described alike: the description is the drawing's.
+/// All muscles have the same description: that of the drawing.
 fn description() -> MuscleDescription {
     MuscleDescription::parse(&presets::miniature().description()).unwrap()
 }

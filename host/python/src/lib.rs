@@ -676,7 +676,7 @@ fn fit(
     Ok(Fit { fit, campaign, options })
 }
 
-/// Scores a fit on recordings that it has not seen: each run is left out in turn. Returns mean and rms error and bias in N, the percentage
+/// Scores a fit on held-out recordings: each run is left out in turn. Returns mean and rms error and bias in N, the percentage
 /// of the largest measured force, and the errors by recording.
 #[pyfunction]
 #[pyo3(signature = (campaign, muscle, *, order = 4, leave_out = "runs"))]

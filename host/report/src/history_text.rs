@@ -1,4 +1,4 @@
-//! The history of a campaign for a person at a terminal.
+//! The history of a campaign as text for a terminal.
 
 use std::fmt::Write;
 
@@ -14,7 +14,7 @@ pub(crate) fn with_half(estimate: &Estimate, scale: f64, decimals: usize) -> Str
     }
 }
 
-/// What was assumed of times that nobody recorded.
+/// Assumptions about times that are not recorded.
 pub(crate) fn assumed(history: &History) -> String {
     let loaded = format!("loaded for {:.0} s before the first run", history.law.loaded_before_s);
     match history.law.pause_s {
@@ -23,7 +23,7 @@ pub(crate) fn assumed(history: &History) -> String {
     }
 }
 
-/// The history in words.
+/// The history as text.
 #[must_use]
 pub fn text(history: &History) -> String {
     let mut s = String::new();

@@ -137,7 +137,7 @@ fn table_section(told: &document::Campaign) -> Section {
         let wanted = t.wanted_error_pct;
         table.row([
             "predicted standard error on unseen pressures and strokes".to_owned(),
-            format!("{error:.3} % of blocked force; wanted: {wanted:.2} %"),
+            format!("{error:.3} % of blocked force; target: {wanted:.2} %"),
         ]);
     }
     section.table(table);

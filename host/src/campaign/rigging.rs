@@ -31,7 +31,7 @@ pub(crate) struct Rigging {
     pub(crate) controller: Controller,
     pub(crate) rig: Rig,
     pub(crate) muscle: MuscleDescription,
-    /// Where the firmware runs, in words.
+    /// Where the firmware runs, as text.
     pub(crate) words: String,
     /// The axis of the virtual bench, and the board that lives as long as this.
     pub(crate) emulated: Option<(Emulated, Axis)>,
@@ -105,7 +105,7 @@ pub(crate) fn real(
         }
         _ => Box::new(NoAxis),
     };
-    // A check without the muscle is a person's work; the program says when it is wanted.
+    // A check without the muscle is done by hand; the program says when it is needed.
     rig.checks = false;
     let none: MakeCheck = Box::new(|_, _, _, _| Ok(None));
     let words = format!("the controller at {}", client.port());

@@ -1,4 +1,4 @@
-//! What a person sees of a running campaign.
+//! The terminal output of a running campaign.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,4 +1,4 @@
-//! `host campaign`: the program records, judges, fits and diagnoses by itself.
+//! `host campaign`: the program records, checks, fits and diagnoses automatically.
 
 use std::path::{Path, PathBuf};
 
@@ -39,7 +39,7 @@ pub struct Arguments {
     /// Run on an emulated controller with a muscle of the virtual bench: mini, contractile, push or random:SEED.
     #[arg(long, value_name = "NAME", conflicts_with = "port")]
     emulate: Option<String>,
-    /// Folder of the campaign; one that was interrupted goes on.
+    /// Folder of the campaign; an interrupted one continues.
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
     /// Bench time that is allowed, min.
@@ -92,7 +92,7 @@ impl For {
 }
 
 impl Arguments {
-    /// Runs the campaign, or goes on with it.
+    /// Runs the campaign, or continues it.
     ///
     /// # Errors
     /// A muscle without a pressure limit, a device that fails, a disk that is full. The muscle is vented in every case.
@@ -102,7 +102,7 @@ impl Arguments {
         // The log is opened before any device moves: a folder that is in use, or is none, costs nothing then.
         let mut journal = Journal::open(&self.output)?;
         let mut rigging = self.rigging(console)?;
-        console.note(format!("{}; Ctrl-C vents the muscle, and the same call goes on", rigging.words));
+        console.note(format!("{}; Ctrl-C vents the muscle, and the same call continues", rigging.words));
         let (purpose, purpose_name) = self.purpose.purpose();
         let mut engine =
             Engine::new(rigging.muscle.clone(), rigging.rig.clone(), purpose, 60.0 * self.minutes)?;
@@ -116,8 +116,8 @@ impl Arguments {
         let (complete, reason) = match outcome {
             Outcome::Complete(reason) => (true, reason),
             Outcome::Interrupted => {
-                console.note("interrupted; the muscle is vented; the same call goes on");
-                (false, "The campaign was interrupted; the same call goes on.".to_owned())
+                console.note("interrupted; the muscle is vented; the same call continues it");
+                (false, "The campaign was interrupted; the same call continues it.".to_owned())
             }
         };
         let told = Told {

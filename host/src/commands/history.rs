@@ -24,9 +24,9 @@ use pam_report::wording::timeline as wording;
     host history 2026-01-05 2026-02-03 2026-03-02 --report life.html\n  \
     host history bench/* --muscle mini.toml --csv life.csv --json life.json\n  \
     host history loops_2026-*.csv --reference loops_2026-03-02.csv\n\n\
-    A folder is one campaign, and so are files whose names carry the same date. Campaigns are put into the order of their dates: from \
-    the name (2026-01-05, 20260105, with or without a time of day), else from a column (date, timestamp, or a time that counts from 1970) \
-    or a remark above the header, else from the time of modification; the answer says which.")]
+    A folder is one campaign, and so are files whose names carry the same date. Campaigns are sorted by date. \
+    The date is from the name (2026-01-05, 20260105, with or without a time of day), else from a column (date, timestamp, or a time that \
+    counts from 1970) or a remark above the header. Otherwise it is the time of modification. The answer says which.")]
 pub struct Arguments {
     /// Folders or files with the recordings of one actuator.
     #[arg(required = true, value_name = "CAMPAIGN")]

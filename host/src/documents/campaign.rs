@@ -18,7 +18,7 @@ pub(crate) struct Campaign {
     pub minutes: f64,
     /// Bench time that was used, s.
     pub bench_s: f64,
-    /// Whether it ended by itself; false after an interruption.
+    /// Whether it ended by a stopping rule; false after an interruption.
     pub complete: bool,
     /// Why it ended, in one sentence.
     pub ended_by: String,
@@ -75,7 +75,7 @@ pub(crate) struct Table {
     pub left_out_pressure_mean_error_pct: Option<f64>,
     /// Predicted standard error on unseen pressures and strokes, percent of the blocked force.
     pub predicted_error_pct: Option<f64>,
-    /// What was wanted of it.
+    /// Its targets.
     pub wanted_error_pct: f64,
 }
 

@@ -37,7 +37,7 @@ const BOUNDS: [(&str, &str); 5] = [
 /// What is tried.
 #[derive(Args)]
 pub struct Campaigns {
-    /// Where to; what an earlier run has done there is gone on with.
+    /// Where to; a run that was interrupted continues there.
     #[arg(short, long)]
     output: PathBuf,
     /// Write the tables as this page of the book, too.
@@ -49,7 +49,10 @@ pub struct Campaigns {
     /// A few muscles, and only the campaign that chooses its own steps; fails on a false alarm.
     #[arg(long)]
     short: bool,
-    /// Begin no further muscle after this many minutes; the same command goes on later.
+    /// Table errors only: the muscles without hidden effects, no diagnosis.
+    #[arg(long, conflicts_with = "short")]
+    tables: bool,
+    /// Begin no further muscle after this many minutes; the same command continues later.
     #[arg(long)]
     minutes: Option<f64>,
 }
@@ -129,15 +132,22 @@ fn specs(muscles: usize) -> Vec<Spec> {
 
 /// Runs the trials.
 pub fn run(what: &Campaigns) -> Result<(), Box<dyn Error>> {
-    let folder = what.output.join("campaigns");
+    let folder = what.output.join(if what.tables { "tables" } else { "campaigns" });
     std::fs::create_dir_all(&folder)?;
     let mut specs = specs(what.muscles);
     if what.short {
         specs.truncate(2);
     }
+    if what.tables {
+        specs.retain(|s| s.stratum == Stratum::NullClean);
+    }
     let begun = Instant::now();
     let over = || what.minutes.is_some_and(|m| begun.elapsed().as_secs_f64() > 60.0 * m);
-    let methods: &[Method] = if what.short { &[Method::Chosen] } else { &Method::ALL };
+    let methods: &[Method] = match (what.tables, what.short) {
+        (true, _) => &[],
+        (false, true) => &[Method::Chosen],
+        (false, false) => &Method::ALL,
+    };
     let progress = Progress::new("campaigns", specs.len());
     let done = in_order(&specs, |spec| {
         let path = folder.join(format!("{:04}.json", spec.id));
@@ -158,6 +168,10 @@ pub fn run(what: &Campaigns) -> Result<(), Box<dyn Error>> {
     })?;
     let all: Vec<Trial> = done.into_iter().flatten().collect();
     std::fs::write(what.output.join("campaign.json"), serde_json::to_string_pretty(&all)?)?;
+    if what.tables {
+        println!("{}", page::errors(&all.iter().collect::<Vec<_>>()));
+        return Ok(());
+    }
     let text = page::page(&all, specs.len());
     if let Some(page) = &what.page {
         std::fs::write(page, &text)?;
@@ -184,12 +198,12 @@ fn check(all: &[Trial]) -> Result<(), Box<dyn Error>> {
 fn one(spec: &Spec, methods: &[Method], bench_s: f64, with_errors: bool) -> Result<Trial, String> {
     let made = crate::generate::make(spec, &crate::residuals::Residuals::read(std::path::Path::new("")));
     let mut said = Vec::new();
-    let mut errors = Vec::new();
+    let errors = match spec.stratum {
+        Stratum::NullClean if with_errors => table_error::after(spec, &made.truth.bench)?,
+        _ => Vec::new(),
+    };
     for method in methods {
         let recorded = methods::record(*method, spec, &made, bench_s)?;
-        if with_errors && spec.stratum == Stratum::NullClean && matches!(method, Method::Chosen) {
-            errors = table_error::after(spec, &recorded.recordings)?;
-        }
         said.push(methods::ask(*method, &made, &recorded)?);
     }
     let truth = made.truth.effects.iter().map(|e| e.name.clone()).collect();

@@ -94,7 +94,7 @@ const WRITTEN: [Written; 5] = [
 const FORMS: [(&str, &str); 2] =
     [("staircase", "as recorded, valve pulses and all"), ("settled", "settled points, one a stay")];
 
-/// What was asked of a muscle, and the answer.
+/// A muscle and its answer.
 struct Asked {
     label: String,
     answer: Result<(Answer, Value), String>,
@@ -148,7 +148,7 @@ fn evaluate(data: &Path, output: &Path, host: &Path, set: &Set) -> Result<Value,
     json(&answer)
 }
 
-/// Asks about every muscle, and writes festo.md.
+/// Diagnoses every muscle, and writes festo.md.
 pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(output)?;
     let cases: Vec<Case> = FORMS
@@ -159,8 +159,8 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
     let mut text = String::from(
         "# Real recordings as they are\n\nWritten by `cargo run --release -p trials -- festo -o DIR --page docs/src/festo.md`; nothing here is \
          typed by hand. Isometric pressure staircases of a commercial 10 mm fluidic muscle (two sets of one laboratory, eleven lengths, \
-         `../shared/data`, which is not part of the project), as they were recorded. The tool sees the columns only; what is written about \
-         these recordings stands below beside what it says. The muscle is never moved under pressure, so strokes, speeds and viscous \
+         `../shared/data`, which is not part of the project), as they were recorded. The program reads the columns only; its answers are \
+         compared with the published description of the recordings. The muscle is never moved under pressure, so strokes, speeds and viscous \
          friction cannot be judged.\n",
     );
     let per_form = cases.len() / FORMS.len();
@@ -168,7 +168,7 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
         let _ = writeln!(
             text,
             "\n## What it says: {words}\n\n\
-             | set, muscle | verdict | named (probability, share explained) | where | unseen rows before → after, N |\n\
+             | set, muscle | verdict | named (probability, share explained) | where | held-out rows before → after, N |\n\
              | --- | --- | --- | --- | --- |"
         );
         for a in asked {
@@ -178,10 +178,10 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
     }
     let _ = writeln!(text, "\n{}", remembered(&cases[per_form..], &asked[per_form..]).trim_end());
     text.push_str(
-        "\n## Recordings it has not seen\n\nMean error in percent of the blocked force at the highest pressure, of the settled points: each run, each \
-         contraction, each length predicted from all others (`host evaluate`), beside the laboratory's published formula on the rows of \
-         the unseen runs (its coefficients were fitted to its own recordings, these among them).\n\n\
-         | set, muscle | unseen runs | the lab's formula | unseen contractions | unseen length | end effect by the other lengths, mm |\n\
+        "\n## Held-out recordings\n\nMean error of the settled points, in percent of the blocked force at the highest pressure. Each run, each \
+         contraction, and each length is predicted from all others (`host evaluate`). The laboratory's published formula is compared on the \
+         rows of the held-out runs; its coefficients were fitted to its own recordings, these included.\n\n\
+         | set, muscle | held-out runs | the lab's formula | held-out contractions | held-out length | end effect by the other lengths, mm |\n\
          | --- | --- | --- | --- | --- | --- |\n",
     );
     for set in &SETS {
@@ -211,7 +211,7 @@ fn remembered(cases: &[Case], asked: &[Asked]) -> String {
     festo_history::section(&told)
 }
 
-/// Asks about settled points only, and writes the section on what the muscles remember into `page`.
+/// Diagnoses settled points only, and writes the section on what the muscles remember into `page`.
 pub fn run_history(
     data: &Path,
     output: &Path,
@@ -271,9 +271,9 @@ fn line(text: &mut String, asked: &Asked) {
 /// What is written about the recordings, and the answers that say it.
 fn beside(text: &mut String, asked: &[Asked]) {
     text.push_str(
-        "\n### Beside what is written about them\n\nA name counts where it is one of those that would say it, a set where such a name is \
-         confusable with what is named, a place where the misfit is located on such a coordinate, \"could be\" where such an effect is said \
-         to be possible at more than a hundredth of the blocked force.\n\n\
+        "\n### Beside what is written about them\n\n\"Named\": one of the listed effects is named. \"In a set\": such an effect is \
+         confusable with a named one. \"Located there\": the misfit is located on such a coordinate. \"Could be hidden\": such an effect is \
+         possible at more than 1 % of the blocked force.\n\n\
          | written | would be said by | named | in a set | located there | could be hidden |\n| --- | --- | --- | --- | --- | --- |\n",
     );
     let answers: Vec<(&str, &Answer, &Value)> =

@@ -55,9 +55,9 @@ fn t_quantile(freedom: usize) -> f64 {
 /// The whole section.
 pub fn section(told: &[Told<'_>]) -> String {
     let mut text = format!(
-        "{HEADING}\n\nSettled points. Each run is predicted from the other runs of the muscle: by a static curve for each mounting and direction, \
-         and by a curve for each mounting with the memory of the bladder (everything chosen without the predicted run, except the places of \
-         slips, and, of sets with 20 runs and more, pause and earlier load). Root mean square in percent of the largest force. A point is \
+        "{HEADING}\n\nSettled points. Each run is predicted from the other runs of the muscle. \"Static\": a curve for each mounting and direction. \
+         \"With memory\": a curve for each mounting, with the memory of the bladder. Everything is chosen without the predicted run, except \
+         the places of slips and, in sets with 20 runs and more, pause and earlier load. Root mean square in percent of the largest force. A point is \
          supported when another run of the mounting reaches its pressure. Intervals: 95 %, delete-one-run jackknife.\n\n\
          | set, muscle | static | with memory | change | supported points | beside slips | relaxed share c | P_b, kPa | one time constant, times the error |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
@@ -104,8 +104,7 @@ pub fn section(told: &[Told<'_>]) -> String {
 fn documented(text: &mut String, told: &[Told<'_>]) {
     text.push_str(
         "\n### Documented findings\n\nUnits of uncertainty are mountings or runs. \"Pooled\": one spread between mountings for all muscles of a \
-         set, which is an assumption on the protocol; it gives the intervals of a muscle with two or three mountings their degrees of \
-         freedom.\n\n| set, muscle | first filling low by, N | pooled | creep with memory | emptying over filling, shortened less full length, N | pooled | gap explained by | slips, bad runs |\n\
+         set. This is an assumption on the protocol; a muscle with two or three mountings alone has too few degrees of freedom.\n\n| set, muscle | first filling low by, N | pooled | creep with memory | emptying over filling, shortened less full length, N | pooled | gap explained by | slips, bad runs |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     let mut counts = [0; 5];

@@ -194,7 +194,7 @@ fn ask(job: &Job<'_>, slopes: &Slopes) -> Result<Trial, String> {
     })
 }
 
-/// Runs all trials and writes `reference.json`, `reference.md` and, where asked for, the page.
+/// Runs all trials and writes `reference.json`, `reference.md` and, on request, the page.
 ///
 /// # Errors
 /// Files that cannot be read or written, a trial without an answer.

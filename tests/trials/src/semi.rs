@@ -211,11 +211,11 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
     let answers = answers?;
     let mut text = String::from(
         "# The proof on real recordings\n\nWritten by `cargo run --release -p trials -- semi -o DIR --page docs/src/proof-real.md`; nothing \
-         here is typed by hand. Effects are put into the columns of real recordings (isometric pressure staircases of a commercial 10 mm \
-         muscle, six lengths, four mountings, three runs each, `../shared/data`), whose own physics is not synthetic. \"New\" is what was not \
-         said of the same recordings as they are. The muscle is never moved under pressure, so speed, viscous friction and strokes cannot be \
-         judged. The recordings' own misfit (a gap between filling and emptying that grows with contraction, a first \
-         run below the others, mounting errors) is larger than most of what is put in.\n\n\
+         here is typed by hand. Effects are added to the columns of real recordings: isometric pressure staircases of a commercial 10 mm \
+         muscle, six lengths, four mountings, three runs each (`../shared/data`). Their own physics is not synthetic. \"New\" marks names that \
+         the unchanged recordings did not get. The muscle is never moved under pressure, so speed, viscous friction and strokes cannot be \
+         judged. The recordings have a misfit of their own: a gap between filling and emptying that grows with contraction, a low first \
+         run, mounting errors. It is larger than most of the added effects.\n\n\
          | muscle | effect | size, % of largest force | verdict | named | new | class right | in the set |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     let (mut right, mut in_set, mut asked) = (0, 0, 0);

@@ -1,8 +1,8 @@
-//! Sensors that fail: a reading that stands still, stops at the end of its range, is dead, or drops out.
+//! Sensors that fail: a reading that does not change, stops at the end of its range, is dead, or drops out.
 //!
-//! A failing sensor is no physics of a muscle, but a model would name it as such. It is found from two properties together: the reading
-//! is constant (or steps away and back within one row each), and force, pressure and stroke of these rows contradict the surface of
-//! force over pressure and stroke that the other rows of the campaign have in common. A constant reading alone is no fault: a regulated
+//! A failing sensor is no physics of a muscle, but a model would name it as such. It is found from two properties together. The
+//! reading is constant, or steps away and back within one row each. And force, pressure and stroke of these rows contradict the surface
+//! of force over pressure and stroke that the other rows of the campaign have in common. A constant reading alone is no fault: a regulated
 //! pressure and a held length are constant.
 //!
 //! | fault | reading | contradiction | file |
@@ -147,7 +147,7 @@ impl Usual {
         (share * self.spans[2]).max(CLEAR * self.residual)
     }
 
-    /// The same for a reading that stands still in a way that is unknown of this bench, N.
+    /// The same for a constant reading of a kind that the other recordings of this bench do not show, N.
     fn noticeable_unusually(&self) -> f64 {
         (UNUSUALLY.0 * self.spans[2]).max(UNUSUALLY.1 * self.residual)
     }
@@ -156,7 +156,7 @@ impl Usual {
 /// Six times the usual residual: of a normal distribution next to nothing lies there, and friction (both branches, twice the residual
 /// that it leaves) stays below.
 const CLEAR: f64 = 6.0;
-/// For a reading that stands still in a way that is unknown of this bench: a share of the range of forces, and usual residuals (friction
+/// For a constant reading of a kind that the other recordings of this bench do not show: a share of the range of forces, and usual residuals (friction
 /// alone changes the residual by two).
 const UNUSUALLY: (f64, f64) = (0.05, 2.0);
 /// Some thousand rows of a recording are examined.

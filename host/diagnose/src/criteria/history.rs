@@ -1,6 +1,6 @@
 //! What a muscle remembers over a campaign of isometric staircases.
 //!
-//! "Eleven muscles" stands for the two public sets of isometric pressure staircases of a 10 mm fluidic muscle (eleven lengths). Law,
+//! "Eleven muscles" are the two public sets of isometric pressure staircases of a 10 mm fluidic muscle (eleven lengths). Law,
 //! spectrum and clock were chosen on six of them and then run once on the other five.
 
 pam_data::criteria! {
@@ -93,7 +93,7 @@ pam_data::criteria! {
     LOADED: ([f64; 3]) = [0.0, 100.0, 1e3], "T_0", "s", Judgement;
     /// A single time constant is refuted when its unseen error (rms) is larger by this factor: a tenth of the squared error.
     ENTER_REFUTES: f64 = 1.054, "enter_refutes", "1", Judgement;
-    /// How sure the name is then; and how sure where a single time constant does as well. Both are judgements, not calibrated on known truths.
+    /// Probability of the name then, and where a single time constant fits as well. Both are judgements, not calibrated on known truths.
     ENTER_SURE: f64 = 0.9, "enter_sure", "1", Judgement;
     /// Probability of a name that the unseen runs support and another name shares.
     ENTER_UNSURE: f64 = 0.5, "enter_unsure", "1", Judgement;
@@ -109,7 +109,7 @@ pam_data::criteria! {
     LAW_NO_SIGN: f64 = 1.0, "law_no_sign", "kPa", Judgement;
     /// Most steps of a fit.
     LAW_MOST_STEPS: usize = 10, "law_most_steps", "1", Judgement;
-    /// Below this relaxed share nothing tells the stress-free pressure.
+    /// Below this relaxed share the stress-free pressure is not identifiable.
     LAW_TELLS_BALANCE: f64 = 0.05, "law_tells_balance", "1", Judgement;
     /// Step of the numeric derivative in the stress-free pressure, kPa.
     LAW_NUDGE: f64 = 1.0, "law_nudge", "kPa", Judgement;
@@ -119,7 +119,7 @@ pam_data::criteria! {
     LAW_SETTLED_SHARE: f64 = 5e-4, "law_settled_share", "1", Judgement;
     /// Shuffles; the least p is one over this.
     PLACES_SHUFFLES: usize = 499, "places_shuffles", "1", Judgement;
-    /// A place is told when it holds at least this much more of the error than of the points.
+    /// A place is reported when it holds at least this much more of the error than of the points.
     PLACES_CONCENTRATED: f64 = 1.5, "places_concentrated", "1", Judgement;
     /// And when chance gives as much no more often than this.
     PLACES_SURE: f64 = 0.05, "places_sure", "1", Judgement;

@@ -22,7 +22,7 @@ pam_data::criteria! {
     EXPLAINED: f64 = 0.8, "q_expl", "1", Convention("four fifths");
     /// ... and partly explained from this one on.
     PARTLY_EXPLAINED: f64 = 0.25, "q_part", "1", Convention("a quarter");
-    /// ... and only if the effects remove this share of the excess error on unseen rows, too.
+    /// ... and only if the effects remove this share of the excess error on held-out rows, too.
     EXPLAINED_UNSEEN: f64 = 0.5, "q_unseen", "1", Convention("half: more remains than is explained below it");
     /// p from which a line of the spectrum is real.
     LINE_ALPHA: f64 = 0.02, "p_line", "1", Convention("2 %, the second smallest p of 99 shuffles");

@@ -87,7 +87,7 @@ pam_data::criteria! {
     DIRECTIONS_PER_RUN: f64 = 4.0, "directions_per_run", "1", Judgement;
     /// Never believe that this actuator repeats more than √2 better than its class.
     LEAST_SCALE: f64 = 0.5, "least_scale", "1", Judgement;
-    /// Sizes of a change that are equally likely beforehand, share of the largest force rms: heavy-tailed and scale-free over what is of interest; below 1 % nobody asks.
+    /// Sizes of a change that are equally likely beforehand, share of the largest force rms: heavy-tailed and scale-free over what is of interest; below 1 % a change has no practical effect.
     SIZES: ([f64; 4]) = [0.01, 0.02, 0.04, 0.08], "sizes", "1", Judgement;
     /// Prior probability that nothing changed: four of five pairs of campaigns.
     PRIOR_NONE: f64 = 0.80, "prior_none", "1", Judgement;
@@ -105,7 +105,7 @@ pam_data::criteria! {
     SLOPE_ERROR: f64 = 0.05, "slope_error", "1", Judgement;
     /// Start points of a step that are tried, at most.
     STEP_STARTS: usize = 24, "step_starts", "1", Cost;
-    /// Log evidence by which one course in time must lead the other to be told: e³ = 20.
+    /// Log evidence by which one profile over time must lead the other to be reported: e³ = 20.
     COURSE_LEAD: f64 = 3.0, "course_lead", "1", Convention("e^3 = 20");
     /// Names in one answer, at most.
     MOST_CHANGES: usize = 3, "most_changes", "1", Cost;
@@ -141,7 +141,7 @@ pam_data::criteria! {
     STROKE_PRIOR_NONE: f64 = 0.5, "stroke_prior_none", "1", Judgement;
     /// Log evidence that lies this much below none needs no gate.
     GATE_WORTH_ASKING: f64 = -1.0, "gate_worth_asking", "1", Judgement;
-    /// A part of the cells is told where it holds this much more of the energy than of the cells.
+    /// A part of the cells is reported where it holds this much more of the energy than of the cells.
     LOCALISE_STANDS_OUT: f64 = 1.2, "localise_stands_out", "1", Judgement;
     /// Below this share of the usual slope the elastic part is not told from slack.
     REPEATABILITY_PULLS: f64 = 0.05, "repeatability_pulls", "1", Judgement;

@@ -8,7 +8,7 @@ pam_data::criteria! {
     FEWEST_POINTS: usize = 4, "n_pt", "1", Derived("a level, a change, and two degrees of freedom of scatter");
     /// Bins of pressure of a profile at a held length.
     PRESSURE_BINS: usize = 12, "n_P", "1", Judgement;
-    /// Share of the common pressures left out at either end, where the direction at a turn is not sure.
+    /// Share of the common pressures left out at either end, where the direction at a reversal is uncertain.
     TURN_MARGIN: f64 = 0.02, "m_P", "1", Derived("twice TURN_HOLD");
     /// Share of the reference's largest force at which the actuator counts as pulling.
     THRESHOLD_SHARE: f64 = 0.1, "F/F_max", "1", Convention("ten per cent, as of rise times");
@@ -20,9 +20,9 @@ pam_data::criteria! {
     COURSE_EFFECT_PRIOR: f64 = 10.0, "nu_e", "1", Derived("SCALE_PRIOR of the comparison of two campaigns");
     /// Sizes of a change that are equally likely beforehand, in units of the scatter.
     COURSE_SIZES: ([f64; 4]) = [1.0, 3.0, 10.0, 30.0], "delta/s", "1", Judgement;
-    /// Probability of a change from which on it is named: several series are asked about at once.
+    /// Probability of a change from which on it is named: several series are tested together.
     COURSE_CHANGED: f64 = 0.95, "p", "1", Convention("5 %");
-    /// Share of a change's probability that a step must have to be told from a slope.
+    /// Share of a change's probability that a step must have to be distinguished from a slope.
     AT_ONCE: f64 = 0.9, "p_step", "1", Convention("10 %");
     /// Changes of one series, at most.
     COURSE_MOST_CHANGES: usize = 4, "n_ch", "1", Cost;

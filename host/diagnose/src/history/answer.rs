@@ -68,7 +68,7 @@ pub struct MemoryLaw {
     pub balance_identifiable: bool,
     /// Time constants, s.
     pub time_constants_s: Vec<f64>,
-    /// Pause between runs, s: chosen on a grid; absent where the bench's clock tells the pauses.
+    /// Pause between runs, s: chosen on a grid; absent where the bench's clock gives the pauses.
     pub pause_s: Option<f64>,
     /// How long the muscle had been loaded before the first run of a mounting, s: chosen on a grid.
     pub loaded_before_s: f64,
@@ -76,7 +76,7 @@ pub struct MemoryLaw {
     pub one_time_constant_ratio: f64,
 }
 
-/// Sizes of errors on points that the fit had not seen.
+/// Sizes of errors on held-out points.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ErrorSize {
     /// Root mean square, N.
@@ -125,7 +125,7 @@ pub struct RunError {
     pub rms_before_N: f64,
     /// With memory.
     pub rms_after_N: f64,
-    /// Shift of pressure that remains against the other runs of the mounting, kPa; absent where it cannot be told.
+    /// Shift of pressure that remains against the other runs of the mounting, kPa; absent where it is not identifiable.
     pub offset_kPa: Option<f64>,
 }
 
@@ -166,7 +166,7 @@ pub struct Finding {
     pub mounting: Option<usize>,
     /// Number of the run within the mounting, from 1, where it is about one.
     pub run: Option<usize>,
-    /// In words.
+    /// As text.
     pub words: String,
 }
 
@@ -203,7 +203,7 @@ pub struct Course {
 pub struct History {
     /// Whether the memory is named: its rules hold.
     pub named: bool,
-    /// Which rules do not hold, in words; empty where it is named.
+    /// Which rules do not hold, as text; empty where it is named.
     pub why_not: Vec<String>,
     /// Settled points.
     pub points: usize,

@@ -1,4 +1,4 @@
-//! The history beside what the static search says: the search is asked about recordings from which the memory was taken out.
+//! The history beside the static search: the search runs on recordings from which the memory was subtracted.
 
 use model_core::braid::{Braid, Geometry};
 
@@ -110,7 +110,7 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
     diagnosis.history = Some(answer);
 }
 
-/// How often chance alone gives a share so many standard errors from none, by Chebyshev's inequality: no law of errors is assumed.
+/// Probability that chance alone gives a share this many standard errors from zero, by Chebyshev's inequality: no law of errors is assumed.
 fn chance(share: &super::answer::Estimate) -> f64 {
     share.half().map_or(1.0, |h| (h / 1.96 / share.value.abs().max(f64::MIN_POSITIVE)).powi(2).min(1.0))
 }

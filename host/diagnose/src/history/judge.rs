@@ -1,4 +1,4 @@
-//! From the fits to the answer: the rules of the verdict, and each finding in words.
+//! From the fits to the answer: the rules of the verdict, and each finding as text.
 
 use super::Fits;
 use super::answer::{
@@ -185,7 +185,7 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
                 e.shift,
                 match (e.lasts, e.sure) {
                     (true, true) => "the held length changed",
-                    (true, false) => "the held length may have changed; four standard errors are asked before that is said",
+                    (true, false) => "the held length may have changed; a finding requires four standard errors",
                     (false, _) => "look at this run before it is used",
                 }
             ),

@@ -25,7 +25,7 @@ use super::memory::Clockwork;
 use super::shift_fit::{self, ShiftFit};
 use super::spline::Spline;
 
-/// What is assumed of times that nobody recorded.
+/// Assumptions about times that are not recorded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Choice {
     /// Which of the pauses.

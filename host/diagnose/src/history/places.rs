@@ -1,4 +1,4 @@
-//! Where the error of static curves on unseen runs sits: run within mounting, time since mounting, mounting.
+//! Where the error of static curves on held-out runs is concentrated: run within mounting, time since mounting, mounting.
 //!
 //! How likely a concentration is by chance comes from shuffling whole runs: within each mounting for the order, over all for the mounting.
 

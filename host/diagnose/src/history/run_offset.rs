@@ -32,7 +32,7 @@ pub(super) struct Event {
     pub sure: bool,
 }
 
-/// Offset of each run from the others of its mounting, kPa; not a number where it cannot be told.
+/// Offset of each run from the others of its mounting, kPa; not a number where it is not identifiable.
 pub(super) fn offsets(layer: &Layer<'_>, law: &Law) -> Vec<f64> {
     let points = layer.points;
     let shifted: Vec<f64> = (0..points.len())

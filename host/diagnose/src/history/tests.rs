@@ -1,4 +1,4 @@
-//! Synthetic campaigns whose truth is known, nulls, and the Festo recordings where they are at hand.
+//! Synthetic campaigns whose truth is known, nulls, and the Festo recordings where they are available.
 //!
 //! The synthetic muscle is integrated here in small steps from the law's equations, apart from the code under test.
 

@@ -134,7 +134,7 @@ pub(super) fn with_memory(layer: &Layer<'_>, full: &Law, further: &[Vec<f64>], h
             let own = group.iter().filter(|r| has_others(points, **r));
             let own = own.flat_map(|r| points.runs[*r].points.0..points.runs[*r].points.1);
             let own = own.map(|i| (i, layer.predict(&law, i))).collect();
-            // The shifts of all points are not asked for again.
+            // The shifts of all points are not computed again.
             law.columns.clear();
             (law, own)
         })

@@ -1,4 +1,4 @@
-//! Change points: whether a series stays, steps between two campaigns, or goes on gradually.
+//! Change points: whether a series stays, steps between two campaigns, or changes gradually.
 //!
 //! With `y` the values, `s` their standard errors and one unknown factor `κ` on all of them, because campaigns differ by more than their
 //! repeats show:
@@ -82,7 +82,7 @@ impl Known {
                 all.error.push(p.std.unwrap_or(f64::NAN));
             }
         }
-        // Where nothing repeats, the differences between neighbours stand for the error.
+        // Where nothing repeats, the differences between neighbours estimate the error.
         let differences: f64 = all.value.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum();
         let neighbours = (differences / 2.0 / all.value.len().saturating_sub(1).max(1) as f64).sqrt();
         let known: Vec<f64> = all.error.iter().copied().filter(|e| *e > 0.0).collect();
@@ -264,7 +264,7 @@ impl Candidate {
         total.is_finite().then_some(Self { none, shape, how })
     }
 
-    /// Its parts: there and back are two changes with sizes of their own.
+    /// Its parts: a change and its reverse are two changes, each with its own size.
     fn changes(&self, known: &Known) -> Vec<(Vec<f64>, Change)> {
         let change = |from: usize, to: usize| Change {
             how: self.how,

@@ -47,7 +47,7 @@ pub(super) fn series(
     ]
 }
 
-/// Mean of `k_F` over the tested pressures. Its errors at different pressures have much in common: the mean of the errors stands for it.
+/// Mean of `k_F` over the tested pressures. Its errors at different pressures have much in common: its error is estimated by their mean.
 fn friction(fit: &Fit) -> Option<Point> {
     let all = &fit.summary.pressures;
     let n = all.len() as f64;

@@ -17,10 +17,10 @@ use super::Options;
 use super::screen::PointUse;
 use super::solution::Solution;
 
-/// Fewer lengths do not tell the braid's angle from its diameter.
+/// With fewer lengths the braid's angle and its diameter are not separately identifiable.
 const FEWEST_LENGTHS: usize = 3;
 
-/// The options that open dimensions and lengths, where the recordings were held and nothing was asked for.
+/// The options that open dimensions and lengths, where the recordings were held and no option was given.
 pub(super) fn open(solution: &Solution, options: &Options) -> Option<Options> {
     let asked = options.fit_geometry || options.fit_lengths || options.as_described;
     let held = solution.problem.points.held_lengths();

@@ -53,7 +53,7 @@ fn parameters(h: &History) -> Table {
     ]);
     let times: Vec<String> = h.law.time_constants_s.iter().map(|t| fixed(*t, 0)).collect();
     table.row(["time constants".into(), times.join(", "), "s".to_owned()]);
-    table.row(["times that nobody recorded".into(), assumed(h), String::new()]);
+    table.row(["times not recorded".into(), assumed(h), String::new()]);
     table
 }
 
@@ -77,7 +77,7 @@ fn run_in(h: &History) -> Figure {
     Figure::multiples(
         "history-runs",
         "Error of unseen runs by run within the mounting",
-        "Left a static curve for each mounting and direction: the first run lies low. Right with memory: all runs should lie at zero.",
+        "Left a static curve for each mounting and direction: the first run lies low. Right with memory: all runs lie at zero.",
         vec![panel("static curves", false), panel("with memory", true)],
     )
     .shared(true, true)

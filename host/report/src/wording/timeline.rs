@@ -114,10 +114,10 @@ pub fn change(visits: &[Visit], series: &Series, change: &Change) -> String {
     };
     let (from, to) = (&visits[change.from], &visits[change.to]);
     let when = match change.how {
-        How::AtOnce => format!("at once, between {}", between(from, to)),
+        How::AtOnce => format!("in one step, between {}", between(from, to)),
         How::Gradual => format!("gradually, between {}", between(from, to)),
         How::NotDetermined => {
-            format!("at once or gradually, around {} (`{}`)", day(to.date), to.name)
+            format!("in one step or gradually, around {} (`{}`)", day(to.date), to.name)
         }
     };
     format!(
@@ -128,7 +128,7 @@ pub fn change(visits: &[Visit], series: &Series, change: &Change) -> String {
     )
 }
 
-/// What a reader should know.
+/// Warnings for the reader.
 #[must_use]
 pub fn warnings(visits: &[Visit], found: &Timeline) -> Vec<String> {
     let mut all = Vec::new();
@@ -145,7 +145,7 @@ pub fn warnings(visits: &[Visit], found: &Timeline) -> Vec<String> {
     }
     let equal = visits.windows(2).any(|w| w[0].date == w[1].date);
     if equal {
-        all.push("some campaigns have the same date; they stand in the order given".to_owned());
+        all.push("some campaigns have the same date; they are listed in the order given".to_owned());
     }
     if found.series.iter().any(|(_, c)| c.too_few) {
         all.push(
@@ -202,7 +202,7 @@ pub fn headline(found: &Timeline) -> String {
     if !names.is_empty() {
         format!("What changed over these campaigns: {}.", super::list(&names))
     } else if named {
-        "Some campaigns differ from the reference; there are too few for a course in time.".to_owned()
+        "Some campaigns differ from the reference; too few for a trend over time.".to_owned()
     } else if unexplained {
         "Some campaigns differ from the reference in a way that no known change describes.".to_owned()
     } else {
@@ -239,7 +239,7 @@ pub fn summary(visits: &[Visit], found: &Timeline) -> String {
     text
 }
 
-/// What is said of the course of a quantity.
+/// The text on the trend of a quantity.
 #[must_use]
 pub fn judged(course: &Course) -> String {
     match (course.too_few, course.changes.len()) {

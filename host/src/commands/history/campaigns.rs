@@ -115,7 +115,7 @@ pub(super) fn read(request: &Request<'_>, console: &Console) -> Result<Vec<Found
         let campaign = read_campaign(&recordings, request.muscle, console)?;
         let dated =
             |r: &pam_data::recording::Recording| date::of_recording(&r.source, r.time.first().copied());
-        // The first recording's date is the campaign's; the least sure source of all is told.
+        // The first recording's date is the campaign's; the least reliable source of all is reported.
         let dates: Vec<(f64, DateSource)> = campaign.recordings.iter().filter_map(dated).collect();
         let when = dates.iter().map(|d| d.0).fold(f64::INFINITY, f64::min);
         let dated_by = dates.iter().map(|d| d.1).max().unwrap_or(DateSource::Modified);

@@ -163,7 +163,7 @@ impl Connected {
     /// Takes what the controller sends for some milliseconds.
     pub(super) fn listen(&mut self, say: &broadcast::Sender<String>) -> Result<()> {
         match self.client.keep_alive() {
-            // Another program has started a mode; the page goes on showing what the controller does.
+            // Another program has started a mode; the page continues to show what the controller does.
             Err(error) if error.code() == DeviceCode::DeviceRefused => {
                 self.running = None;
                 tell(say, "bad", &error);

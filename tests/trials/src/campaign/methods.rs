@@ -30,11 +30,11 @@ use virtual_bench::rng::Rng;
 pub enum Method {
     /// The campaign that chooses its own steps.
     Chosen,
-    /// Protocol C, broken off after the same time; its checks of the bench are given to it.
+    /// Protocol C, interrupted after the same time; its checks of the bench are given to it.
     Complete,
     /// The same first steps, then steps of the same menu at random.
     Random,
-    /// Protocol A, then what `host diagnose` proposes, broken off after the same time.
+    /// Protocol A, then what `host diagnose` proposes, interrupted after the same time.
     Proposed,
 }
 
@@ -42,7 +42,7 @@ impl Method {
     /// All.
     pub const ALL: [Self; 4] = [Self::Chosen, Self::Complete, Self::Random, Self::Proposed];
 
-    /// In words.
+    /// As text.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Chosen => "steps chosen by expected information",
@@ -79,7 +79,7 @@ impl Scratch {
 
 impl Drop for Scratch {
     fn drop(&mut self) {
-        // What is left of a temporary folder does no harm.
+        // A temporary folder that remains is harmless.
         let _ = std::fs::remove_dir_all(&self.0);
     }
 }
@@ -160,7 +160,7 @@ fn random(spec: &Spec, made: &Made, bench_s: f64, folder: Scratch) -> Result<Rec
     let mut made_checks: Vec<CheckKind> = Vec::new();
     let mut number = 0;
     loop {
-        let begin = opening(&places, &rig());
+        let begin = opening(&rig());
         let step = if let Some((first, _)) = begin.get(number) {
             *first
         } else {
@@ -194,6 +194,7 @@ fn random(spec: &Spec, made: &Made, bench_s: f64, folder: Scratch) -> Result<Rec
         let recorded = recording(&step.name(), &rows);
         match step {
             Step::BlockedRamp => places.learn_ramp(&recorded),
+            Step::Survey { .. } => places.learn_survey(&recorded),
             Step::Loops { .. } => places.learn_strokes(&recorded),
             _ => {}
         }

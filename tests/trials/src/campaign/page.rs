@@ -1,6 +1,5 @@
 //! The results as a page of the book.
 
-use super::table_error::MINUTES;
 use super::{BENCH_S, BOUNDS, Method, SEED, Said, Trial};
 use crate::report::Rate;
 use std::fmt::Write as _;
@@ -69,22 +68,56 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     values.get(values.len() / 2).copied()
 }
 
-fn errors(nulls: &[&Trial]) -> String {
+/// Table errors over bench time, and how much of the thesis's time the chosen steps need.
+pub fn errors(nulls: &[&Trial]) -> String {
     let mut m = String::from(
         "\n## Table error on unseen pressures and strokes\n\nMuscles without hidden effects; rms against the bench's own friction-free \
          force between the levels, median over the muscles, percent of the blocked force. Bound: the error of the thesis's protocol in at \
          most a third of its time.\n\n| minutes | chosen steps | thesis's protocol | muscles |\n| --- | --- | --- | --- |\n",
     );
-    for (i, minutes) in MINUTES.iter().enumerate() {
+    for minutes in SHOWN {
         let of = |pick: fn(&super::table_error::After) -> Option<f64>| {
-            median(nulls.iter().filter_map(|t| pick(t.errors.get(i)?)).collect())
+            median(
+                nulls.iter().filter_map(|t| pick(t.errors.iter().find(|a| a.minutes == minutes)?)).collect(),
+            )
         };
         let words = |v: Option<f64>| v.map_or("no table yet".to_owned(), |v| format!("{v:.2}"));
-        let n = nulls.iter().filter(|t| t.errors.len() > i).count();
+        let n = nulls.iter().filter(|t| !t.errors.is_empty()).count();
         let (chosen, thesis) = (of(|a| a.chosen), of(|a| a.thesis));
         let _ = writeln!(m, "| {minutes} | {} | {} | {n} |", words(chosen), words(thesis));
     }
+    m += "\n| error of the table, at most | chosen steps, min | thesis's protocol, min | ratio, median over the muscles | muscles |\n\
+          | --- | --- | --- | --- | --- |\n";
+    for bound in ERRORS {
+        let reached: Vec<(f64, f64)> = nulls
+            .iter()
+            .filter_map(|t| Some((minutes(t, bound, |a| a.chosen)?, minutes(t, bound, |a| a.thesis)?)))
+            .collect();
+        let of = |pick: fn(&(f64, f64)) -> f64| {
+            median(reached.iter().map(pick).collect()).map_or("–".to_owned(), |v| format!("{v:.2}"))
+        };
+        let _ = writeln!(
+            m,
+            "| {bound} % | {} | {} | {} | {} of {} |",
+            of(|r| r.0),
+            of(|r| r.1),
+            of(|r| r.0 / r.1),
+            reached.len(),
+            nulls.len()
+        );
+    }
     m
+}
+
+/// Bench times of the table, min.
+const SHOWN: [f64; 9] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0];
+/// Errors whose first time is compared, % of the blocked force.
+const ERRORS: [f64; 4] = [1.0, 0.5, 0.2, 0.1];
+
+/// The first time from which on the error stays below a bound, min.
+fn minutes(trial: &Trial, bound: f64, of: fn(&super::table_error::After) -> Option<f64>) -> Option<f64> {
+    let above = trial.errors.iter().rposition(|a| !of(a).is_some_and(|e| e <= bound));
+    trial.errors.get(above.map_or(0, |i| i + 1)).map(|a| a.minutes)
 }
 
 /// Every muscle whose effect was not found as one right name.

@@ -4,17 +4,23 @@ use crate::campaign::methods::until;
 use crate::spec::Spec;
 use model_core::units::{Length, Pressure};
 use pam_campaign::analysis::fitted;
+use pam_campaign::bench::VirtualBench;
+use pam_campaign::campaign::simulate;
+use pam_campaign::engine::{Engine, Purpose};
+use pam_campaign::rig::Rig;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Recording;
 use serde::{Deserialize, Serialize};
-use virtual_bench::bench::Bench;
+use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::Muscle;
 
-/// Minutes at which both are compared.
-pub const MINUTES: [f64; 5] = [3.0, 5.0, 8.0, 12.0, 20.0];
+/// Bench time between two comparisons, min.
+const EVERY: f64 = 0.25;
+/// Bench time of the last comparison, min.
+const LAST: f64 = 10.0;
 
-/// The error after so many minutes, % of the blocked force; absent where no table can be fitted yet.
+/// The error after this many minutes, % of the blocked force; absent where no table can be fitted yet.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct After {
     /// Bench time, min.
@@ -51,21 +57,26 @@ fn before(recordings: &[Recording], seconds: f64) -> Vec<Recording> {
     recordings.iter().filter(|r| r.time.last().is_some_and(|t| *t <= seconds)).cloned().collect()
 }
 
-/// Both errors at all times, for a muscle without effects.
-pub fn after(spec: &Spec, chosen: &[Recording]) -> Result<Vec<After>, String> {
+/// Both errors at all times, for a muscle without effects. The chosen campaign is for the table alone (`--for fit`).
+pub fn after(spec: &Spec, bench: &BenchSpec) -> Result<Vec<After>, String> {
     let muscle = Muscle::new(spec.bench.muscle.clone());
     let description =
         MuscleDescription::parse(&spec.bench.muscle.description()).map_err(|e| e.to_string())?;
     let levels = campaigns::levels(&muscle);
+    let budget = 60.0 * LAST;
+    let mut engine = Engine::new(description.clone(), Rig::commanded(), Purpose::Fit, budget)
+        .map_err(|e| e.to_string())?;
+    simulate(&mut engine, &mut VirtualBench::new(bench), None).map_err(|e| e.to_string())?;
+    let chosen = engine.recordings();
     let files =
         Bench::new(&spec.bench).run(&campaigns::thesis(&muscle, &levels)).map_err(|e| e.to_string())?;
-    Ok(MINUTES
-        .iter()
-        .map(|minutes| {
+    Ok((1..=(LAST / EVERY) as u32)
+        .map(|n| {
+            let minutes = EVERY * f64::from(n);
             let seconds = 60.0 * minutes;
             let thesis = until(files.iter().map(|f| (f.name.as_str(), f.rows.as_slice())), seconds);
             After {
-                minutes: *minutes,
+                minutes,
                 chosen: error(&before(chosen, seconds), &description, &muscle),
                 thesis: error(&thesis, &description, &muscle),
             }

@@ -120,7 +120,7 @@ fn monotone(x: &[f64], y: &[f64]) -> Vec<f64> {
     s
 }
 
-/// Which way the pressure goes, for friction: turning points at a twentieth of the range.
+/// Which way the pressure goes, for friction: reversals at a twentieth of the range.
 pub fn ways(pressure: &[f64]) -> Vec<f64> {
     let top = pressure.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let bottom = pressure.iter().copied().fold(f64::INFINITY, f64::min);

@@ -17,7 +17,7 @@ use crate::clopper::interval;
 /// Rows of either side in the measurement of speed.
 const SPEED_ROWS: usize = 30_000;
 
-/// s for so many rows on each side, of the muscle with the most rows; `None` without recordings.
+/// s for this many rows on each side, of the muscle with the most rows; `None` without recordings.
 ///
 /// # Errors
 /// A comparison without an answer.
@@ -281,7 +281,7 @@ fn untouched(text: &mut String, trials: &[Trial]) {
     let _ = write!(
         text,
         "\n## Untouched pairs\n\nEvery contiguous window of runs, parted once. Windows of one muscle share runs: errors come in clusters, so the intervals \
-         are narrower than they should be. \"Not none\": probability of no change below one half.\n\n\
+         are too narrow. \"Not none\": probability of no change below one half.\n\n\
          | | pairs | named | not none |\n| --- | --- | --- | --- |\n"
     );
     let mut groups: BTreeMap<(Half, &str), Vec<&Trial>> = BTreeMap::new();
@@ -353,12 +353,12 @@ fn cylinder(text: &mut String, pairs: &[Pair]) {
 }
 
 const UNTESTED: &str = "\n## What is not tested\n\n\
-    - Two changes at once in staircases, several campaigns in the reference of strokes, \"since when\" and leaks: computed or \
+    - Two simultaneous changes in staircases, several campaigns in the reference of strokes, \"since when\" and leaks: computed or \
     specified, not measured here. A leak has no shape yet and is never named.\n\
     - A lag beside another change is never named: the rows that show a lag hold the other change, too.\n\
     - Lengths between those of the reference are not interpolated; they are reported as not comparable.\n\
     - Stroked *muscles*: the same route as the cylinder, not measured; gauge offset, stroke offset, compliance, slip and lags are not asked of strokes.\n\
-    - All staircases are of one laboratory and one type of muscle, and the constants of what repeats come from six of the eleven. There is no second rig.\n\
+    - All staircases are of one laboratory and one type of muscle, and the constants of what repeats come from six of the eleven. A second rig is missing.\n\
     - Injected drift and slip run through AFTER by run, then mounting. Lags of the 12 Hz recordings are put in by the same interpolation that the analysis \
     assumes.\n\
     - Mounting anew (± 1 mm) is modelled but not tried here; it hides stroke offsets and compliance of that size.\n\

@@ -12,7 +12,7 @@ const BINS: usize = 24;
 const WIDTH: f64 = 27e3;
 /// An effect is named when it lowers the BIC by more: "very strong" (Kass and Raftery 1995).
 const LEAD: f64 = 10.0;
-/// Part of AFTER after which a slip is supposed.
+/// Part of AFTER from which on a slip is assumed.
 const MIDDLE: f64 = 0.5;
 
 /// Sums of a column by mounting, direction and bin.

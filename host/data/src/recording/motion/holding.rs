@@ -24,8 +24,8 @@ pub struct Hold {
 
 /// The holds of a smoothed stroke, in order.
 ///
-/// A hold is a stretch that stays within the threshold for much longer than the motion around it takes for that distance,
-/// and within which the stroke is flat and not the round top of a smooth turn.
+/// A hold stays within the threshold for much longer than the motion around it takes for that distance. Within a hold the stroke is flat;
+/// the round top of a smooth reversal is not a hold.
 pub(super) fn holds(time: &[f64], smooth: &[f64], scale: &Scale, legs: &[Leg]) -> Vec<Hold> {
     let n = smooth.len();
     if n == 0 {

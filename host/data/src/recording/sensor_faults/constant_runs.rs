@@ -7,8 +7,9 @@ use crate::statistics::quantile;
 
 /// Shorter runs are left to the outliers of the fit.
 const SHORTEST: usize = 10;
-/// While a reading stands still, the force changes by this share of its range beyond what the reading allows (the expected force where the
-/// force stands still, else the residual), and by this many usual residuals: friction alone changes it by two.
+/// While a reading is constant, the force changes by this share of its range beyond what the reading allows, and by this many usual
+/// residuals (friction alone changes it by two). The change is that of the expected force where the force is constant, else that of the
+/// residual.
 const MOVES: (f64, f64) = (0.15, 6.0);
 /// Constant readings are unknown of a column whose neighbours are rarely equal in the other recordings, with no run there a tenth as long.
 const RARE: f64 = 0.2;
@@ -118,7 +119,7 @@ fn contradicted(r: &Recording, rows: &Range<usize>, channel: Channel, bound: f64
     match channel {
         Channel::Force => {
             let value = r.force.as_ref().map_or(0.0, |f| f[rows.start]);
-            // A slack muscle makes one force, whatever its pressure; so does a load cell that cannot read below zero.
+            // A slack muscle makes one force at all pressures; a load cell that cannot read below zero does the same.
             value > usual.expected.floor() + SLACK * usual.spans[2]
                 && spread(&|i| usual.expected.at(r, i)) > bound
         }

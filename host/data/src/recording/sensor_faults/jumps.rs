@@ -35,7 +35,7 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
     }
     let others = Channel::ALL.into_iter().filter(|c| *c != channel);
     let others: Vec<(&[f64], f64)> = others.map(|c| (c.of(r), OTHERS * usual.spans[c as usize])).collect();
-    // At constant pressure or length a column has no range, and whatever it does is noise.
+    // At constant pressure or length a column has no range, and its changes are noise.
     let quiet = |i: usize| others.iter().all(|(c, most)| *most <= 0.0 || (c[i] - c[i - 1]).abs() <= *most);
     let edge = |i: usize| (column[i] - column[i - 1]).abs() > step;
     let mut found = Vec::new();

@@ -1,4 +1,4 @@
-//! Settled points of real muscles (`../shared/data`, not part of the project), where they are at hand: the numbers of the reference
+//! Settled points of real muscles (`../shared/data`, not part of the project), where they are available: the numbers of the reference
 //! computation, within the tolerance that another search for `P_b` and a finer grid of pauses make.
 
 use std::path::{Path, PathBuf};
