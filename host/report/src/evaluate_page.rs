@@ -139,7 +139,7 @@ fn first(all: &[Evaluated<'_>], means: &Means) -> Section {
                 section.figure(residual_table::figure(
                     "held-out",
                     "Error of every recording when it was held out",
-                    "A recording whose interval does not reach zero differs from the others as a whole: in its mounting, its zero or its history.",
+                    "A recording whose interval does not reach zero is off as a whole: in its mounting, its zero or its history.",
                     &any.recordings,
                 ));
             }
@@ -164,11 +164,11 @@ fn first(all: &[Evaluated<'_>], means: &Means) -> Section {
         .iter()
         .filter_map(Evaluated::any)
         .flat_map(|a| &a.recordings)
-        .filter(|r| r.against_others_N.is_some_and(|own| own.abs() > r.rms_N.max(0.0) * 0.8));
+        .filter(|r| residual_table::is_off(r));
     let odd: Vec<String> = lowest.take(3).map(|r| r.recording.clone()).collect();
     if !odd.is_empty() && worst > GOOD {
         steps.push(format!(
-            "Compare first: {}. They differ as a whole from the others of their mounting.",
+            "Compare first: {}. Their mean error is larger than the scatter about it.",
             odd.join("; ")
         ));
     }

@@ -47,11 +47,21 @@ fn signed(value: f64) -> String {
     if value > 0.0 { format!("+{text}") } else { text }
 }
 
-/// The mean residual of every recording with its root mean square.
+/// Standard deviation of the residuals of one recording about their mean, N: `rms² = mean² + std²`.
+fn scatter(r: &RecordingResidual) -> f64 {
+    (r.rms_N * r.rms_N - r.mean_N * r.mean_N).max(0.0).sqrt()
+}
+
+/// Whether a recording is off as a whole: its mean residual is larger than the scatter about it.
+pub(crate) fn is_off(r: &RecordingResidual) -> bool {
+    r.mean_N.abs() > scatter(r)
+}
+
+/// The mean residual of every recording with the standard deviation about it.
 pub(crate) fn figure(id: &str, title: &str, reading: &str, all: &[RecordingResidual]) -> Figure {
     let x: Vec<f64> = (0..all.len()).map(|i| i as f64).collect();
     let mean: Vec<f64> = all.iter().map(|r| r.mean_N).collect();
-    let edge = |sign: f64| -> Vec<f64> { all.iter().map(|r| r.mean_N + sign * r.rms_N).collect() };
+    let edge = |sign: f64| -> Vec<f64> { all.iter().map(|r| r.mean_N + sign * scatter(r)).collect() };
     let names: Vec<String> = all.iter().map(|r| r.recording.clone()).collect();
     let (axis, x) = if all.len() <= NAMES && names.iter().all(|n| n.chars().count() <= 12) {
         (Axis::names("recording", names), x)
@@ -59,7 +69,7 @@ pub(crate) fn figure(id: &str, title: &str, reading: &str, all: &[RecordingResid
         (Axis::new("recording, in the order of the table", ""), x.iter().map(|x| x + 1.0).collect())
     };
     let panel = Panel::new(axis, Axis::new("measured − predicted force", "N"))
-        .intervals("mean ± rms", Colour::Muted, &x, &edge(-1.0), &edge(1.0))
+        .intervals("mean ± standard deviation", Colour::Muted, &x, &edge(-1.0), &edge(1.0))
         .points("mean", Colour::Series(0), &x, &mean);
     Figure::new(id, title, reading, panel)
 }
@@ -92,5 +102,18 @@ mod tests {
         let mut one = Section::new("x");
         add(&mut one, "c", &all[..1]);
         assert!(one.blocks.is_empty());
+    }
+
+    #[test]
+    fn only_a_recording_that_is_off_as_a_whole_has_an_interval_without_zero() {
+        let of = |mean_N: f64, std: f64| RecordingResidual {
+            mean_N,
+            rms_N: (mean_N * mean_N + std * std).sqrt(),
+            ..residual(0)
+        };
+        assert!(is_off(&of(3.0, 1.0)) && is_off(&of(-3.0, 1.0)));
+        assert!(!is_off(&of(0.5, 1.0)) && !is_off(&of(0.0, 0.0)));
+        let shown = figure("a", "t", "r", &[of(3.0, 1.0), of(0.5, 1.0)]).csv();
+        assert!(shown.contains("2") && shown.contains("4"), "{shown}");
     }
 }
