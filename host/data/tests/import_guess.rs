@@ -1,4 +1,5 @@
-//! Guessed import descriptions: files as laboratories write them, and real recordings where they are present.
+//! Import descriptions by guess: files as laboratories write them, and real recordings where they are present.
+#![allow(clippy::unwrap_used)] // what fails here fails the test
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -143,7 +144,7 @@ fn data(file: &str) -> Option<PathBuf> {
     Some(path)
 }
 
-/// Descriptions that a person wrote of the same files are the reference.
+/// Descriptions that a user wrote of the same files are the reference.
 #[test]
 fn real_recordings_are_read_as_by_the_description_of_a_person() {
     let cases = [

@@ -7,7 +7,7 @@ use pam_data::muscle_description::MuscleDescription;
 
 use super::Page;
 
-/// Digits of a hash that are shown: enough to compare by eye, and to tell any two files of a laboratory apart.
+/// Digits of a hash that are shown: enough to compare by eye, and to distinguish any two files of a laboratory.
 const DIGITS: usize = 16;
 
 /// Where a report comes from.

@@ -106,9 +106,9 @@ mod tests {
 
     #[test]
     fn only_a_recording_that_is_off_as_a_whole_has_an_interval_without_zero() {
-        let of = |mean_N: f64, std: f64| RecordingResidual {
-            mean_N,
-            rms_N: (mean_N * mean_N + std * std).sqrt(),
+        let of = |mean: f64, std: f64| RecordingResidual {
+            mean_N: mean,
+            rms_N: (mean * mean + std * std).sqrt(),
             ..residual(0)
         };
         assert!(is_off(&of(3.0, 1.0)) && is_off(&of(-3.0, 1.0)));

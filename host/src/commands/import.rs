@@ -17,7 +17,7 @@ use pam_data::short_number::short;
 
 /// At most this many different held strokes are listed.
 const LISTED: usize = 8;
-/// The rest length, m, that stands in for an unknown one while a file is tried: only the stroke's zero depends on it.
+/// The rest length, m, that replaces an unknown one while a file is tried: only the stroke's zero depends on it.
 const STAND_IN: f64 = 1.0;
 
 /// Arguments of `host import`.
@@ -26,7 +26,7 @@ const STAND_IN: f64 = 1.0;
     host import --guess bench.csv -o bench.toml\n  \
     host import --guess march/*.txt -o bench.toml --muscle mini.toml\n  \
     host import --guess data.xlsx --sheet Run1 > bench.toml\n\n\
-    The description is guessed from the first file, and all files are read by it. Check the units, signs and the list of open \
+    The description is made from the first file, and all files are read by it. Check the units, signs and the list of open \
     points before you use it. Exit status 1: the files cannot be read by it yet; the open points say what is missing.")]
 pub struct Arguments {
     /// The files to look at, of one bench.
@@ -53,7 +53,7 @@ impl Arguments {
     /// Guesses, writes, tries.
     ///
     /// # Errors
-    /// A file that cannot be read or is no table; one that the guessed description does not suffice for.
+    /// A file that cannot be read or is not a table; one that the description does not suffice for.
     pub fn run(self, console: &Console) -> Result<()> {
         let Some(first) = self.guess.first() else { return Ok(()) };
         if let Some(path) =
@@ -109,7 +109,7 @@ fn guess_needed(path: &Path, muscle: Option<&MuscleDescription>) -> bool {
     file && muscle.map_or_else(Reader::new, Reader::of).file(path).is_ok()
 }
 
-/// Reads a file by the guess. Where the muscle is not given, its rest length is that of the file's first row, or stands in.
+/// Reads a file by the guess. Where the muscle is not given, its rest length is that of the file's first row, or replaced.
 fn tried(
     path: &Path,
     import: &Import,

@@ -22,7 +22,7 @@ pub(crate) struct Import {
     pub unused: Vec<String>,
     /// What could not be understood.
     pub unknown: Vec<String>,
-    /// What a person has to check.
+    /// What the user has to check.
     pub checks: Vec<String>,
     /// The import description, TOML.
     pub description: String,

@@ -1,7 +1,7 @@
 //! An import description by looking at a file: what separates its cells, where its rows begin, which column is what, where its runs are.
 //!
-//! Names are compared with a table of synonyms, units with a table of spellings; values only fill in what a name leaves open, and each
-//! such choice is listed for a person to check. What cannot be known, such as the calibration of a load cell in volts, is left out.
+//! Names are compared with a table of synonyms, units with a table of spellings; values only supply what a name does not say, and each
+//! such choice is listed for the user to check. What cannot be known, such as the calibration of a load cell in volts, is left out.
 //!
 //! ```
 //! use pam_data::recording::import_guess::guess;
@@ -102,7 +102,7 @@ pub struct Guess {
     pub unused: Vec<String>,
     /// What could not be understood.
     pub unknown: Vec<String>,
-    /// What a person has to check.
+    /// What the user has to check.
     pub checks: Vec<String>,
     /// The import description.
     pub description: String,

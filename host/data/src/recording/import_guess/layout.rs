@@ -1,4 +1,4 @@
-//! How a text file is laid out: what separates its cells, how decimals are written, where the names are and where the rows begin.
+//! The layout of a text file: what separates its cells, how decimals are written, where the names are and where the rows begin.
 
 use crate::recording::cells::Dialect;
 use crate::recording::line::Cells;
@@ -27,7 +27,7 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// The layout of a text, from its first lines; `None` where they are no table.
+    /// The layout of a text, from its first lines; `None` where they are not a table.
     pub(super) fn of(lines: &[&[u8]]) -> Option<Self> {
         let judged = &lines[..lines.len().min(JUDGED)];
         let remarks = judged.iter().any(|l| l.first() == Some(&b'#'));
@@ -85,14 +85,13 @@ impl Layout {
         }
     }
 
-    /// Whether the reader finds the names by itself: in the line right above the rows.
+    /// Whether the reader finds the names without help: in the line right above the rows.
     pub(super) fn has_header(&self, lines: &[&[u8]]) -> bool {
         let blank = |l: &&[u8]| l.trim_ascii().is_empty() || l.first() == Some(&b'#');
-        self.units.is_none()
-            && self.names_at.is_some_and(|at| lines[at + 1..self.data_at].iter().all(|l| blank(l)))
+        self.units.is_none() && self.names_at.is_some_and(|at| lines[at + 1..self.data_at].iter().all(blank))
     }
 
-    /// What separates the cells, in words.
+    /// What separates the cells, as text.
     pub(super) fn delimiter_name(&self) -> &'static str {
         match self.delimiter {
             b'\t' => "tab",
@@ -130,7 +129,7 @@ fn number_of(cell: &str, decimal_comma: bool) -> bool {
     number(cell, decimal_comma).is_some()
 }
 
-/// Whether a cell stands for a value that is missing.
+/// Whether a cell marks a missing value.
 pub(super) fn is_missing(cell: &str) -> bool {
     let bare = cell.trim().trim_start_matches(['-', '+']).to_lowercase();
     ["", "nan", "inf", "infinity", "na", "n/a", "null", "none", "#n/a", "1.#qnan", "1.#inf"]

@@ -317,7 +317,7 @@ impl Name {
         Self { words: words(header), unit: unit(header).filter(|u| u.text.len() > 1), unknown_unit: None }
     }
 
-    /// A name with the unit that stands below it, in a row of its own.
+    /// A name with the unit that is below it, in a row of its own.
     pub(super) fn with_unit_below(header: &str, below: &str) -> Self {
         let bare = below.trim().trim_matches(['[', ']', '(', ')']).trim();
         let (found, words) = (unit(bare), words(header));

@@ -1,4 +1,4 @@
-//! Which column is which quantity, in which unit, and what remains open.
+//! Which column is which quantity, in which unit, and what is not known.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::recording::Quantity;
 use crate::short_number::short;
 
 /// A correlation of force with displacement at equal pressure from which the sign of the displacement is taken as shown. Uncorrelated
-/// readings of two independent slow movements reach 0.8 seldom, and a force that falls with the stroke exceeds it.
+/// readings of two independent slow movements rarely reach 0.8, and a force that falls with the stroke exceeds it.
 const SHOWN: f64 = 0.8;
 
 /// Decides on every column.
@@ -424,7 +424,7 @@ fn judge_stroke(sample: &Sample, guess: &mut Guess) {
         if !(longest.abs() <= (high - low) / 3.0) {
             column.from_longest = true;
             guess.checks.push(format!(
-                "{header} has a zero of its own: the stroke is counted from the greatest length in each file, which should be the rest length"
+                "{header} has a zero of its own: the stroke is counted from the greatest length in each file, which must be the rest length"
             ));
         }
     }

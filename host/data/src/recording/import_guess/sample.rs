@@ -101,9 +101,9 @@ impl SampleColumn {
 pub(super) struct Sample {
     /// The sheet of a workbook.
     pub sheet: Option<String>,
-    /// How its text is laid out; none for a file of named columns.
+    /// The layout of its text; none for a file of named columns.
     pub layout: Option<Layout>,
-    /// Whether the reader finds the names by itself.
+    /// Whether the reader finds the names without help.
     pub has_header: bool,
     /// The lines above the names.
     pub preamble: Vec<String>,
@@ -115,6 +115,8 @@ pub(super) struct Sample {
 
 impl Sample {
     pub(super) fn read(path: &Path, sheet: Option<&str>) -> Result<Self> {
+        #[cfg(not(feature = "excel"))]
+        let _ = sheet;
         let mut source = source::open(path, None, false)?;
         if source.magic.is_empty() {
             return Err(Error::new(DataCode::RecordingEmpty, "the file is empty"));
@@ -148,7 +150,7 @@ impl Sample {
         if !whole {
             lines.pop();
         }
-        // Spreadsheets tell each other the delimiter in a first line, which the reader understands by itself.
+        // Spreadsheets tell each other the delimiter in a first line, which the reader understands without help.
         let Some(layout) = Layout::of(&lines) else {
             return Err(Error::new(DataCode::RecordingNotText, "no table of numbers is found in this file").help(
                 "a recording has one row per reading, with equally many cells separated by commas, tabs, semicolons or blanks",
@@ -166,7 +168,7 @@ impl Sample {
         };
         for line in &lines[layout.data_at..] {
             let Some(row) = cells(line, dialect) else { continue };
-            // The reader tells the line that has too few or too many cells.
+            // The reader reports the line that has too few or too many cells.
             if row.len() != sample.columns.len() || row.iter().all(|c| c.is_empty()) {
                 continue;
             }

@@ -29,7 +29,7 @@ fn number(value: f64) -> String {
 /// The text of the description, with the open points as remarks.
 pub(super) fn description(guess: &Guess) -> String {
     let mut out = format!(
-        "# Import description of {}, guessed from its contents. Check the units and signs.\n",
+        "# Import description of {}, written from its contents. Check the units and signs.\n",
         guess.file
     );
     for line in guess.unknown.iter().chain(&guess.checks) {

@@ -1,4 +1,4 @@
-//! What the values of a column say: the unit that a name leaves open, and whether a unit can be right.
+//! What the values of a column say: the unit that a name does not say, and whether a unit can be right.
 
 use super::sample::SampleColumn;
 use crate::recording::Quantity;
@@ -152,7 +152,7 @@ mod tests {
         };
         assert_eq!((at(0.01).unit, at(10.0).unit), ("s", "ms"));
         assert_eq!((at(1000.0).unit, at(1000.0).scale), ("ms", 1e-3));
-        // 120 may be kPa or psi, and is told so.
+        // 120 may be kPa or psi, and is reported so.
         assert_eq!(suggested(Quantity::Pressure, &column([0.0, 120.0])).map(|s| s.others), Some(vec!["psi"]));
     }
 

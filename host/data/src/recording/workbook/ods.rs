@@ -102,7 +102,7 @@ struct Table {
     line: Vec<(usize, usize, String)>,
     value: Option<String>,
     text: Option<String>,
-    /// Comments of a person that are open: they are no contents of a cell.
+    /// Comments of a user that are open: they are no contents of a cell.
     notes: usize,
 }
 
