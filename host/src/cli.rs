@@ -69,6 +69,8 @@ enum Command {
     Demo(commands::demo::Arguments),
     /// Describe a muscle by answering what to measure, with drawings.
     New(commands::new::Arguments),
+    /// Describe how to read a bench's files, by looking at one.
+    Import(commands::import::Arguments),
     /// Fit a muscle's table to recordings.
     Fit(commands::fit::Arguments),
     /// Score a fit on recordings that it did not use.
@@ -126,6 +128,7 @@ impl Command {
         match self {
             Self::Demo(a) => a.run(console),
             Self::New(a) => a.run(console),
+            Self::Import(a) => a.run(console),
             Self::Fit(a) => a.run(console),
             Self::Evaluate(a) => a.run(console),
             Self::Predict(a) => a.run(console),

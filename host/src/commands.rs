@@ -15,6 +15,7 @@ pub mod flash;
 pub mod fleet;
 pub mod health;
 pub mod history;
+pub mod import;
 pub mod man;
 pub mod new;
 pub mod plan;

@@ -10,6 +10,7 @@ mod fit;
 pub(crate) mod fleet;
 pub(crate) mod health;
 pub(crate) mod history;
+pub(crate) mod import;
 pub(crate) mod predict;
 pub(crate) mod table;
 
@@ -77,6 +78,7 @@ mod tests {
         published::<super::fit::Fit>("pam-fit-1");
         published::<super::health::Health>("pam-health-1");
         published::<super::history::History>("pam-history-1");
+        published::<super::import::Import>("pam-import-1");
         published::<super::fleet::Fleet<'_>>("pam-fleet-1");
         published::<super::fleet::Stock<'_>>("pam-stock-1");
         published::<super::predict::Predict>("pam-predict-1");

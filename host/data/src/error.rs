@@ -141,10 +141,10 @@ error_codes! {
             "write the unit behind the last underscore, such as pressure_kPa";
         /// A cell holds something that is not a number.
         RecordingNotANumber = "recording::not-a-number", Input,
-            "write numbers with a point, and leave such rows out";
+            "write numbers with a point, or leave such rows out by --missing skip";
         /// A cell holds NaN or an infinity.
         RecordingNotFinite = "recording::not-finite", Input,
-            "leave such rows out; missing values are not filled in silently";
+            "leave such rows out by --missing skip; missing values are not filled in";
         /// A line has too few or too many cells.
         RecordingWrongWidth = "recording::wrong-width", Input,
             "every line has as many cells as the header";

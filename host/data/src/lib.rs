@@ -11,6 +11,7 @@
 //! | order statistics | [`statistics`] |
 //! | thresholds with symbol, unit, meaning and source | [`criteria`] |
 //! | progress reports, dates, plurals | [`progress`], [`date`], [`pluralise`] |
+//! | numbers in messages | [`short_number`] |
 //!
 //! A file is parsed and converted to SI units once, at [`Reader`](recording::Reader); nothing behind it knows another unit. The crate
 //! knows no force model: `pam-fit` and the crates above it use it.
@@ -48,5 +49,6 @@ pub mod physical_limits;
 pub mod pluralise;
 pub mod progress;
 pub mod recording;
+pub mod short_number;
 pub mod statistics;
 pub mod toml_errors;

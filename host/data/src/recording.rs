@@ -19,6 +19,7 @@ mod force_surface;
 mod hdf5;
 mod header;
 pub mod import;
+pub mod import_guess;
 mod line;
 mod matlab;
 mod mcap;
@@ -33,12 +34,14 @@ pub mod sensor_faults;
 mod source;
 mod stroke_zero;
 mod unit_check;
+#[cfg(feature = "excel")]
+mod workbook;
 
 pub use campaign::{Campaign, Clock, largest_force};
 pub use columns::{HELD, Recording};
 pub use follow::{Follower, UNKNOWN_PAUSE};
 pub use header::has_decimal_commas;
-pub use import::Import;
+pub use import::{Import, Missing};
 pub use noise::white_noise;
 pub use quantity::{Named, Quantity, Unit, named};
 pub use read::{Hashes, Reader};

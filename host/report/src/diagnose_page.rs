@@ -14,12 +14,24 @@ use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fi
 use pam_data::recording::Campaign;
 use pam_diagnose::history::is_from_history;
 use pam_diagnose::verdict::{Diagnosis, Missing, Pattern, Verdict};
+use pam_fit::RecordingResidual;
 use pam_fit::bench::Candidate;
 
 /// The page of a diagnosis. `geometry` is that of the muscle at rest, to say what a force means in pressure; `campaign` gives the
 /// recordings' names.
 #[must_use]
 pub fn page(d: &Diagnosis, geometry: &Geometry, campaign: &Campaign) -> Page {
+    page_with_residuals(d, geometry, campaign, &[])
+}
+
+/// As [`page`], with the residuals by recording of the table without effects.
+#[must_use]
+pub fn page_with_residuals(
+    d: &Diagnosis,
+    geometry: &Geometry,
+    campaign: &Campaign,
+    residuals: &[RecordingResidual],
+) -> Page {
     let mut page = Page::new(
         format!("Diagnosis of {}", d.muscle),
         if d.judged() {
@@ -31,7 +43,7 @@ pub fn page(d: &Diagnosis, geometry: &Geometry, campaign: &Campaign) -> Page {
     header(&mut page, d);
     page.push(recommendation(d));
     page.push(history::section(d.history.as_ref()));
-    page.push(located::section(d));
+    page.push(located::section(d, residuals));
     for missing in &d.missing {
         page.push(what_it_is(d, missing));
     }
@@ -77,10 +89,13 @@ fn header(page: &mut Page, d: &Diagnosis) {
     page.fact(
         "error of the plain model",
         format!("{} N", figures(d.misfit_rms_N, 2)),
-        format!("rms, {} % of blocked force", percent(d.misfit_rms_N, d.blocked_force_N)),
+        format!(
+            "rms, {} % of blocked force; the noise is {} N",
+            percent(d.misfit_rms_N, d.blocked_force_N),
+            figures(d.noise_N, 2)
+        ),
         if d.verdict() == Verdict::Consistent { Tone::Good } else { Tone::Caution },
     );
-    page.fact("noise", format!("{} N", figures(d.noise_N, 2)), "rms, the least possible error", Tone::Plain);
     if !d.missing.is_empty() {
         let h = &d.held_out;
         let better = h.rms_after_N < h.rms_before_N;

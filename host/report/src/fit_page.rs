@@ -9,7 +9,7 @@ mod parameters;
 mod residuals;
 mod view;
 
-use super::{Page, Section, Tone, figures, fixed};
+use super::{Page, Section, Table, Tone, figures, fixed};
 use pam_data::pluralise::pluralise;
 use pam_data::recording::Campaign;
 use pam_fit::Fit;
@@ -37,7 +37,10 @@ pub fn page(fit: &Fit, campaign: &Campaign, options: &Options) -> Page {
         ),
     );
     header(&mut page, &view);
-    page.push(loads::overview(&view));
+    let mut overview = loads::overview(&view);
+    overview.text("What to do:");
+    overview.list(steps(&view));
+    page.push(overview);
     page.push(remarks(&view));
     page.push(loads::section(&view));
     page.push(models::section(&view));
@@ -91,12 +94,6 @@ fn header(page: &mut Page, view: &View<'_>) {
         "of blocked force",
         tone(s.mean_error_pct, GOOD, BAD),
     );
-    page.fact(
-        "largest error",
-        format!("{} %", figures(s.max_error_pct, 2)),
-        view.worst_place(),
-        tone(s.max_error_pct, 3.0 * GOOD, 3.0 * BAD),
-    );
     if let Some(unseen) = unseen {
         page.fact(
             "error at held-out pressures",
@@ -105,24 +102,69 @@ fn header(page: &mut Page, view: &View<'_>) {
             tone(unseen, 2.0 * GOOD, BAD),
         );
     }
-    page.fact(
-        "deadband P_{0}",
-        format!("{} kPa", fixed(s.deadband_kPa, 1)),
-        format!("± {} kPa (95 % confidence interval)", figures(1.96 * s.deadband_std_kPa, 2)),
-        Tone::Plain,
-    );
+    if unseen.is_none() {
+        page.fact(
+            "largest error",
+            format!("{} %", figures(s.max_error_pct, 2)),
+            view.worst_place(),
+            tone(s.max_error_pct, 3.0 * GOOD, 3.0 * BAD),
+        );
+    }
     page.fact(
         "blocked force",
         format!("{} N", figures(s.blocked_force_N, 4)),
         view.levels.last().map_or(String::new(), |p| format!("at {} kPa", fixed(p / 1e3, 0))),
         Tone::Plain,
     );
-    page.fact("residual", format!("{} N", figures(s.rms_N, 2)), "rms of all fitted points", Tone::Plain);
+}
+
+/// The numbers behind the three of the header.
+fn further_figures(view: &View<'_>) -> Table {
+    let s = &view.fit.summary;
+    let mut table = Table::new("Figures of the fit", &["quantity", "value", "remark"]);
+    table.row(["largest error", &format!("{} %", figures(s.max_error_pct, 2)), &view.worst_place()]);
+    table.row([
+        "deadband P_{0}",
+        &format!("{} kPa", fixed(s.deadband_kPa, 1)),
+        &format!("± {} kPa (95 % confidence interval)", figures(1.96 * s.deadband_std_kPa, 2)),
+    ]);
+    table.row(["residual", &format!("{} N", figures(s.rms_N, 2)), "rms of all fitted points"]);
+    table
+}
+
+/// What to do with the table.
+fn steps(view: &View<'_>) -> Vec<String> {
+    let s = &view.fit.summary;
+    if !s.faults.is_empty() {
+        return vec![
+            "Do not use the table for control: the warnings below say why.".to_owned(),
+            "Check units, signs, and dimensions of the muscle, then fit again.".to_owned(),
+        ];
+    }
+    let mut steps = Vec::new();
+    if !s.warnings.is_empty() {
+        steps.push("Read the warnings below.".to_owned());
+    }
+    let unseen = s.left_out_pressure_mean_error_pct.unwrap_or(f64::INFINITY);
+    if s.mean_error_pct > GOOD || unseen > 2.0 * GOOD {
+        steps.push("Find the cause of the error: `host diagnose` with the same recordings.".to_owned());
+    }
+    if s.left_out_pressure_mean_error_pct.is_none() {
+        steps.push("Record at further pressures: forces at others are not identifiable.".to_owned());
+    }
+    steps.push(
+        "Check the table on recordings that it was not fitted to: `host predict`, or `host evaluate`."
+            .to_owned(),
+    );
+    if s.mean_error_pct <= BAD {
+        steps.push("Send it to the controller: `host flash`.".to_owned());
+    }
+    steps
 }
 
 fn remarks(view: &View<'_>) -> Section {
     let s = &view.fit.summary;
-    let mut section = Section::new("Warnings and excluded rows").summarised();
+    let mut section = Section::new("Warnings and figures").summarised();
     for warning in &s.warnings {
         section.notice(Tone::Caution, capital(warning));
     }
@@ -138,6 +180,7 @@ fn remarks(view: &View<'_>) -> Section {
             ),
         );
     }
+    section.table(further_figures(view));
     let rows = &s.rows;
     let excluded = [
         (rows.near_turn, "just after a reversal, where friction has not yet reversed"),

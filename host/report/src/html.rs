@@ -64,7 +64,7 @@ fn file(page: &Page) -> String {
                 }
                 @if !page.origin.is_empty() {
                     footer {
-                        h2 { "Where this comes from" }
+                        h2 { "Provenance" }
                         dl {
                             @for (what, value) in &page.origin {
                                 dt { (inline_markup::html(what)) }

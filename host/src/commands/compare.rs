@@ -6,7 +6,7 @@ use std::sync::Arc;
 use clap::Args;
 
 use super::recordings;
-use super::reports::Reports;
+use super::reports::{self, Reports};
 use crate::console::Console;
 use crate::documents::{bench, text};
 use pam_data::compare::{Comparison, compare};
@@ -99,7 +99,9 @@ impl Arguments {
             (one(&self.a, &self.filters_a, "--where-a")?, one(&self.b, &self.filters_b, "--where-b")?);
         drop(progress);
         let found = compare(&a, &b)?;
-        self.reports.write(console, || compare_page::page(&a, &b, &found))?;
+        self.reports.write(console, &reports::of_files(&[self.a.clone(), self.b.clone()]), || {
+            compare_page::page(&a, &b, &found)
+        })?;
         if self.json {
             console.result(text(&to_document(&found))?);
         } else if taken {

@@ -11,7 +11,7 @@ use model_core::muscle::Muscle;
 
 use super::effects;
 use super::recordings::Recordings;
-use super::reports::Reports;
+use super::reports::{self, Reports};
 use crate::console::Console;
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
@@ -111,6 +111,7 @@ impl Arguments {
         for warning in &campaign.warnings {
             console.warning(warning);
         }
+        let read_hashes = hashes.clone();
         let table = self.table.as_ref().map(TableFile::read).transpose()?;
         let geometry = muscle.geometry();
         let progress = SharedProgress::new(Arc::new(ProgressLine::new(&watched, "diagnosing")));
@@ -164,7 +165,11 @@ impl Arguments {
         if let Some(path) = &self.json {
             write_whole(path, (document::diagnosis_json(&answer) + "\n").as_bytes())?;
         }
-        self.reports.write(console, || diagnose_page::page(&answer, &geometry, &campaign))?;
+        let from = reports::provenance().muscle(&muscle).files(&self.recordings.files, &read_hashes);
+        let residuals = plain.as_ref().map_or(&[][..], |plain| &plain.summary.recordings);
+        self.reports.write(console, &from, || {
+            diagnose_page::page_with_residuals(&answer, &geometry, &campaign, residuals)
+        })?;
         if self.json.as_deref() != Some(std::path::Path::new("-")) {
             let history = answer.history.as_ref().map(|h| format!("\n{}", history_text::text(h)));
             let residuals =

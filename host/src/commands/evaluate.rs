@@ -1,14 +1,15 @@
 //! `host evaluate`: errors on held-out recordings.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::recordings::Recordings;
+use super::reports::{self, Reports};
 use crate::console::Console;
 use crate::documents::{evaluate as document, text};
 use clap::{Args, ValueEnum};
 use pam_data::error::{Error, Result};
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::output::{json_of, write_whole};
+use pam_data::output::{json_of, to_standard_output, write_whole};
 use pam_data::progress::Progress;
 use pam_evaluate::cross_validation::{CrossValidation, Score, Split, Spot, cross_validate};
 use pam_evaluate::length_transfer::{LengthTransfer, predict_unseen_length};
@@ -18,11 +19,12 @@ use pam_fit::{Options, recording_table};
 
 use crate::progress::ProgressLine;
 use pam_data::recording::{Campaign, Reader};
+use pam_report::evaluate_page::{self, Evaluated};
 
 /// Arguments of `host evaluate`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    host evaluate --muscle mini.toml loops/*.csv\n  \
+    host evaluate --muscle mini.toml loops/*.csv --report evaluation.html\n  \
     host evaluate --muscle short.toml --muscle long.toml --import festo.toml \\\n      \
         --fit-geometry --fit-lengths --published bolen-10mm settled_points.csv\n\n\
     Each run (or contraction) is held out in turn, the rest is fitted, and the held-out part is scored. With several \
@@ -55,6 +57,8 @@ pub struct Arguments {
     /// Write the errors as JSON to a file; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    reports: Reports,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -80,6 +84,7 @@ impl Arguments {
     /// # Errors
     /// What is wrong with the input.
     pub fn run(self, console: &Console) -> Result<()> {
+        to_standard_output(&[("--json", self.json.as_deref()), ("--report", self.reports.file())])?;
         let published = self.published.as_deref().map(Published::named).transpose()?;
         let options = Options {
             order: usize::from(self.order),
@@ -93,10 +98,12 @@ impl Arguments {
         let progress = ProgressLine::new(&watched, "holding out");
         progress.total(splits * self.muscle.len() as u64);
         let mut cases = Vec::new();
+        let mut hashes = Vec::new();
         let mut failure: Option<Error> = None;
         for path in &self.muscle {
             let muscle = MuscleDescription::read(path)?;
-            let campaign = self.recordings.read(Reader::of(&muscle))?;
+            let campaign;
+            (campaign, hashes) = self.recordings.read_hashed(Reader::of(&muscle), console)?;
             let mut over = |split, wanted: bool| {
                 let score = || cross_validate(&campaign, &muscle, &options, split, published.as_ref());
                 // A split that cannot be fitted does not suppress the others.
@@ -126,6 +133,7 @@ impl Arguments {
             return Err(e);
         }
         let lengths = (0..cases.len()).map(|i| by_others(&cases, i)).collect::<Result<Vec<_>>>()?;
+        self.write_report(console, &cases, &lengths, hashes)?;
         if let Some(path) = &self.json {
             let muscles = cases.iter().zip(&lengths).map(|(c, l)| to_document(c, l.as_ref())).collect();
             let json = text(&document::Evaluate { schema: "pam-evaluate/1", muscles })?;
@@ -134,8 +142,38 @@ impl Arguments {
                 return Ok(());
             }
         }
-        console.result(to_text(&cases, &lengths, self.published.as_deref()));
+        let words = to_text(&cases, &lengths, self.published.as_deref());
+        // A report that goes to standard output stands there alone.
+        if self.reports.file() == Some(Path::new("-")) {
+            console.note(words)
+        } else {
+            console.result(words)
+        }
         Ok(())
+    }
+
+    fn write_report(
+        &self,
+        console: &Console,
+        cases: &[Case],
+        lengths: &[Option<LengthTransfer>],
+        hashes: Vec<String>,
+    ) -> Result<()> {
+        let from = cases.iter().fold(reports::provenance(), |from, case| from.muscle(&case.muscle));
+        let from = from.files(&self.recordings.files, &hashes);
+        self.reports.write(console, &from, || {
+            let found: Vec<Evaluated<'_>> = cases
+                .iter()
+                .zip(lengths)
+                .map(|(case, length)| Evaluated {
+                    muscle: &case.muscle.name,
+                    runs: case.runs.as_ref(),
+                    contractions: case.contractions.as_ref(),
+                    length: length.as_ref(),
+                })
+                .collect();
+            evaluate_page::page(&found, self.published.as_deref())
+        })
     }
 }
 

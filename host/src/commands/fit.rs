@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 
 use super::recordings::Recordings;
-use super::reports::Reports;
+use super::reports::{self, Reports};
 use crate::console::Console;
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
@@ -109,6 +109,7 @@ impl Arguments {
         let fitted = fit_with_progress(&campaign, &muscle, &options, &progress)?;
         drop(progress);
         console.detail(format!("fitted in {:.3} s", started.elapsed().as_secs_f64()));
+        let read_hashes = hashes.clone();
         let about = table_file::About {
             muscle: muscle.name.clone(),
             date: date::now_utc(),
@@ -135,7 +136,8 @@ impl Arguments {
         if let Some(path) = &self.json {
             write_whole(path, format!("{json}\n").as_bytes())?;
         }
-        self.reports.write(console, || fit_page::page(&fitted, &campaign, &options))?;
+        let from = reports::provenance().muscle(&muscle).files(&files, &read_hashes);
+        self.reports.write(console, &from, || fit_page::page(&fitted, &campaign, &options))?;
         for warning in &fitted.summary.warnings {
             console.warning(warning);
         }

@@ -11,7 +11,7 @@ use pam_fleet::groups::Difference;
 use pam_fleet::overview::Overview;
 use pam_fleet::{page, robust};
 
-use super::reports::Reports;
+use super::reports::{self, Reports};
 use crate::console::{Console, name};
 use crate::documents::{fleet as document, text};
 
@@ -46,7 +46,7 @@ impl Arguments {
         let fleet = Fleet::read(&self.output)?;
         let overview = Overview::of(&fleet);
         let results = relative(&self.output, self.reports.file());
-        self.reports.write(console, || page::page(&fleet, &overview, &results))?;
+        self.reports.write(console, &reports::provenance(), || page::page(&fleet, &overview, &results))?;
         if self.json {
             console.result(text(&to_document(&fleet, &overview))?);
         } else if taken {

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::reports::Reports;
+use super::reports::{self, Reports};
 use crate::console::Console;
 use crate::documents::{history as document, text};
 use pam_data::error::{DataCode, Error, Result};
@@ -103,7 +103,7 @@ impl Arguments {
         if let Some(path) = &self.csv {
             write_whole(path, wording::csv(&visits, &found).as_bytes())?;
         }
-        self.reports.write(console, || timeline_page::page(&visits, &found))?;
+        self.reports.write(console, &reports::provenance(), || timeline_page::page(&visits, &found))?;
         let printed = |p: &Option<PathBuf>| p.as_deref() == Some(Path::new("-"));
         if !printed(&self.json) && !printed(&self.csv) {
             let words = wording::summary(&visits, &found);

@@ -3,14 +3,15 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use crate::console::Console;
 use pam_data::error::{DataCode, Error, Result};
+use pam_data::pluralise::pluralise;
 use pam_data::progress::Progress;
 
 use crate::progress::ProgressLine;
-use pam_data::recording::{Campaign, Hashes, Import, Reader};
+use pam_data::recording::{Campaign, Hashes, Import, Missing, Reader};
 
 /// Recordings on the command line.
 #[derive(Debug, Clone, Args)]
@@ -25,6 +26,21 @@ pub struct Recordings {
     /// times.
     #[arg(long = "where", value_name = "COLUMN=VALUE")]
     pub filters: Vec<String>,
+    /// What becomes of rows with empty cells, NaN or `---` in a column that is used [default: error, or as the import description says].
+    #[arg(long, value_enum, value_name = "WHAT")]
+    pub missing: Option<MissingRows>,
+    /// The sheet of an Excel or OpenDocument workbook [default: the only one with contents].
+    #[arg(long, value_name = "SHEET")]
+    pub sheet: Option<String>,
+}
+
+/// What becomes of rows without a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MissingRows {
+    /// The file is refused, with the place of the first such row.
+    Error,
+    /// The rows are left out, and counted in a warning.
+    Skip,
 }
 
 /// A recording on the command line. Standard input is a file like any other pipe.
@@ -53,6 +69,11 @@ impl Recordings {
     pub fn read(&self, reader: Reader<'_>) -> Result<Campaign> {
         let import = self.import.as_ref().map(Import::read).transpose()?;
         let mut reader = reader.import(import.as_ref());
+        reader.missing = self.missing.map(|what| match what {
+            MissingRows::Error => Missing::Error,
+            MissingRows::Skip => Missing::Skip,
+        });
+        reader.sheet = self.sheet.clone();
         for text in &self.filters {
             reader.filters.push(filter(text)?);
         }
@@ -79,6 +100,11 @@ impl Recordings {
         let progress = Arc::new(ProgressLine::new(console, "reading"));
         progress.total(sizes.map(|m| m.len()).sum());
         reader.progress = Some(progress);
-        self.read(reader)
+        let campaign = self.read(reader)?;
+        for recording in campaign.recordings.iter().filter(|r| r.skipped > 0) {
+            let rows = pluralise(recording.skipped, "row");
+            console.warning(format!("{}: {rows} without a number left out", recording.source.display()));
+        }
+        Ok(campaign)
     }
 }

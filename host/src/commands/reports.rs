@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::console::Console;
+use crate::program_name;
 use pam_data::error::Result;
 use pam_data::output::write_whole;
 use pam_data::pluralise::pluralise;
-use pam_report::Page;
+use pam_fit::table_file;
+use pam_report::{Page, Provenance};
 
 /// What to write of a report.
 #[derive(Debug, Clone, Default, Args)]
@@ -34,15 +36,16 @@ impl Reports {
         self.report.as_deref()
     }
 
-    /// Writes what is requested; `page` is called only then.
+    /// Writes what is requested, with its provenance; `page` is called only then.
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn write(&self, console: &Console, page: impl FnOnce() -> Page) -> Result<()> {
+    pub fn write(&self, console: &Console, from: &Provenance, page: impl FnOnce() -> Page) -> Result<()> {
         if !self.wanted() {
             return Ok(());
         }
-        let page = page();
+        let mut page = page();
+        page.provenance(from);
         if let Some(path) = &self.report {
             write_whole(path, page.html().as_bytes())?;
             console.detail(format!("report in {}", path.display()));
@@ -52,5 +55,49 @@ impl Reports {
             console.detail(format!("{} in {}", pluralise(files.len(), "file"), folder.display()));
         }
         Ok(())
+    }
+}
+
+/// The provenance of a report of this call: its command line and the version of the program.
+#[must_use]
+pub(super) fn provenance() -> Provenance {
+    let words: Vec<String> = std::env::args().skip(1).map(|word| quoted(&word)).collect();
+    Provenance {
+        command: format!("{} {}", program_name::called(), words.join(" ")),
+        program: format!("host {}", env!("CARGO_PKG_VERSION")),
+        ..Provenance::default()
+    }
+}
+
+/// The provenance of a report of this call that is made from some files. A pipe was read already, and has no hash here.
+#[must_use]
+pub(super) fn of_files(files: &[PathBuf]) -> Provenance {
+    let hashed = |file: &PathBuf| {
+        let whole = std::fs::metadata(file).is_ok_and(|m| m.is_file());
+        whole.then(|| table_file::sha256(file).ok()).flatten().map(|hash| (file.clone(), hash))
+    };
+    Provenance { files: files.iter().filter_map(hashed).collect(), ..provenance() }
+}
+
+/// A word of a command line as a shell reads it back.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./:=,+@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn words_are_quoted_where_a_shell_would_change_them() {
+        assert_eq!(quoted("--where=run=1,2"), "--where=run=1,2");
+        assert_eq!(quoted("my muscle.csv"), "'my muscle.csv'");
+        assert_eq!(quoted("it's"), r"'it'\''s'");
+        assert_eq!(quoted(""), "''");
     }
 }

@@ -54,6 +54,10 @@ pub(super) fn assemble(job: &Job<'_>, mut rows: Rows) -> Result<Vec<Recording>> 
             1 => "there is one row only".to_owned(),
             n => format!("there are {n} rows only"),
         };
+        let cause = match rows.skipped.len() {
+            0 => cause,
+            n => format!("{cause}, and {} without a number", pluralise(n, "row")),
+        };
         return Err(Error::new(DataCode::RecordingTooShort, cause)
             .help(format!("a recording has at least {}", pluralise(job.min_rows, "row"))));
     }
@@ -62,7 +66,9 @@ pub(super) fn assemble(job: &Job<'_>, mut rows: Rows) -> Result<Vec<Recording>> 
     if let Some(interval) = job.import.sample_interval_s
         && !table.quantities.contains_key(&Quantity::Time)
     {
-        table.quantities.insert(Quantity::Time, (0..rows.rows).map(|i| i as f64 * interval).collect());
+        table
+            .quantities
+            .insert(Quantity::Time, (0..rows.rows).map(|i| rows.ordinal(i) as f64 * interval).collect());
     }
     for (quantity, value) in &job.plan.constants {
         table.quantities.insert(*quantity, vec![*value; rows.rows]);
@@ -76,6 +82,9 @@ pub(super) fn assemble(job: &Job<'_>, mut rows: Rows) -> Result<Vec<Recording>> 
         recording.labels.extend(job.labels.iter().cloned());
         check(&recording, &map)?;
         recordings.push(recording);
+    }
+    if let Some(first) = recordings.first_mut() {
+        first.skipped = rows.skipped.len();
     }
     Ok(recordings)
 }
@@ -128,7 +137,7 @@ fn sort_columns(job: &Job<'_>, rows: &mut Rows) -> Result<Table> {
 }
 
 /// Whether two cells say the same: as numbers when both are, else as text.
-fn same(a: &str, b: &str) -> bool {
+pub(super) fn same(a: &str, b: &str) -> bool {
     let (a, b) = (a.trim(), b.trim());
     a == b
         || matches!((number(a), number(b)), (Some(x), Some(y)) if (x - y).abs() <= 1e-9 * x.abs().max(y.abs()))
@@ -409,5 +418,6 @@ fn take(job: &Job<'_>, table: &mut Table, rows: Option<Vec<u32>>, labels: &[Stri
         cycle,
         direction,
         rows,
+        skipped: 0,
     })
 }

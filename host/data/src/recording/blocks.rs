@@ -76,10 +76,30 @@ pub(super) struct Rows {
     pub rows: usize,
     /// Lines count from the first line of the first block, from 0.
     pub map: LineMap,
+    /// For every row that was left out, how many were kept before it.
+    pub skipped: Vec<usize>,
     lines: u64,
 }
 
 impl Rows {
+    /// Notes the rows that were left out of all those of a file, and which line each of the others came from.
+    pub(super) fn leave_out(&mut self, keep: &[bool]) {
+        self.rows = 0;
+        for (line, kept) in keep.iter().enumerate() {
+            if *kept {
+                self.map.note(self.rows, line as u64);
+                self.rows += 1;
+            } else {
+                self.skipped.push(self.rows);
+            }
+        }
+    }
+
+    /// Number of a row among all rows of the file, those included that were left out; counted from 0.
+    pub(super) fn ordinal(&self, row: usize) -> usize {
+        row + self.skipped.partition_point(|kept| *kept <= row)
+    }
+
     fn append(&mut self, block: &Parsed, expected_rows: usize) {
         if self.numbers.is_empty() {
             self.numbers = block.numbers.iter().map(|_| Vec::new()).collect();
@@ -96,6 +116,7 @@ impl Rows {
             column.append(part);
         }
         self.map.append(&block.map, self.rows, self.lines);
+        self.skipped.extend(block.skipped.iter().map(|kept| self.rows + kept));
         self.rows += block.rows;
         self.lines += block.lines;
     }
@@ -252,7 +273,8 @@ mod tests {
     use super::super::cells::{Fault, Want};
     use super::*;
 
-    const DIALECT: Dialect = Dialect { delimiter: b',', comment: Some(b'#'), decimal_comma: false };
+    const DIALECT: Dialect =
+        Dialect { delimiter: b',', comment: Some(b'#'), decimal_comma: false, skip_missing: false };
 
     const VALUES: usize = 1 << 20;
 

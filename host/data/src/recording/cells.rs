@@ -14,6 +14,8 @@ pub(super) struct Dialect {
     pub comment: Option<u8>,
     /// Decimals are written with a comma.
     pub decimal_comma: bool,
+    /// Rows with a missing number are left out.
+    pub skip_missing: bool,
 }
 
 /// The requested form of one column.
@@ -126,9 +128,34 @@ pub(super) struct Parsed {
     pub rows: usize,
     pub lines: u64,
     pub map: LineMap,
+    /// For every row that was left out, how many were kept before it.
+    pub skipped: Vec<usize>,
+}
+
+impl Fault {
+    /// Whether a cell stands for a value that is missing: empty, not finite, or signs without digits.
+    fn is_missing(&self, value: &str) -> bool {
+        match self {
+            Self::Empty | Self::NotFinite => true,
+            Self::NotANumber => only_signs(value),
+            Self::Width { .. } | Self::OpenQuote => false,
+        }
+    }
+}
+
+/// Whether a cell such as `---` has signs, but no digits.
+pub(super) fn only_signs(cell: &str) -> bool {
+    cell.chars().all(|c| "-+ ".contains(c))
 }
 
 impl Parsed {
+    /// Takes back what was read of a row.
+    fn leave_out(&mut self) {
+        self.numbers.iter_mut().for_each(|n| n.truncate(self.rows));
+        self.texts.iter_mut().for_each(|t| t.codes.truncate(self.rows));
+        self.skipped.push(self.rows);
+    }
+
     /// Memory that its content takes, in values of 8 bytes: numbers, the codes of texts, every word twice with its place in a table,
     /// and the places where lines were skipped.
     pub(super) fn values(&self) -> usize {
@@ -136,7 +163,7 @@ impl Parsed {
         let texts = self.texts.iter().map(|t| {
             t.codes.len().div_ceil(2) + t.words.iter().map(|w| 12 + w.len().div_ceil(4)).sum::<usize>()
         });
-        numbers + texts.sum::<usize>() + 2 * self.map.0.len()
+        numbers + texts.sum::<usize>() + 2 * self.map.0.len() + self.skipped.len()
     }
 }
 
@@ -179,11 +206,16 @@ pub(super) fn parse(
         let skip = line.first().is_none_or(|b| Some(*b) == dialect.comment)
             || line.iter().all(|b| is_blank(*b) || *b == dialect.delimiter);
         if !skip {
-            row(line, dialect, wanted, width, &mut out).map_err(|(cell, value, fault)| {
-                Box::new(LineError { line: out.lines, cell, value, fault })
-            })?;
-            out.map.note(out.rows, out.lines);
-            out.rows += 1;
+            match row(line, dialect, wanted, width, &mut out) {
+                Ok(()) => {
+                    out.map.note(out.rows, out.lines);
+                    out.rows += 1;
+                }
+                Err((_, value, fault)) if dialect.skip_missing && fault.is_missing(&value) => out.leave_out(),
+                Err((cell, value, fault)) => {
+                    return Err(Box::new(LineError { line: out.lines, cell, value, fault }));
+                }
+            }
         }
         out.lines += 1;
     }
@@ -344,4 +376,48 @@ fn explain(mut cells: Cells<'_>, width: usize, index: usize) -> CellError {
 
 fn lossy(line: &[u8]) -> String {
     String::from_utf8_lossy(&line[..line.len().min(200)]).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::recording::{Import, Missing, Reader};
+
+    fn rows(cells: &[&str]) -> tempfile::NamedTempFile {
+        let file = tempfile::NamedTempFile::with_suffix(".csv").unwrap();
+        let rows: String = cells.iter().enumerate().map(|(i, c)| format!("{i},300,1,{c}\n")).collect();
+        std::fs::write(&file, format!("time_s,pressure_kPa,displacement_mm,force_N\n{rows}")).unwrap();
+        file
+    }
+
+    #[test]
+    fn rows_without_a_number_are_an_error_or_left_out_by_choice() {
+        let cells = ["1", "", "3", "NaN", "5", "---", "7", "inf", "9", "10", "11", "12", "13", "14"];
+        let file = rows(&cells);
+        let error = Reader::new().file(file.path()).unwrap_err();
+        assert!(error.advice().is_some_and(|a| a.contains("--missing skip")), "{error}");
+        let skipping = Reader { missing: Some(Missing::Skip), ..Reader::new() };
+        let read = skipping.file(file.path()).unwrap().remove(0);
+        assert_eq!(read.time, [0.0, 2.0, 4.0, 6.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0]);
+        assert_eq!((read.skipped, read.require_force().unwrap()[1]), (4, 3.0));
+        // A word is a mistake, and no missing value.
+        let word = rows(&["1", "2", "x", "4", "5", "6", "7", "8", "9", "10", "11"]);
+        assert!(skipping.file(word.path()).is_err());
+    }
+
+    #[test]
+    fn equally_spaced_rows_keep_their_time_where_others_are_left_out() {
+        let description =
+            "missing = \"skip\"\nsample_interval_s = 0.5\n[columns.pressure]\ncolumn = \"pressure_kPa\"\n";
+        let import = Import::parse(description).unwrap();
+        let file = rows(&["nan", "1", "2", "", "4", "5", "6", "7", "8", "9", "10", "11"]);
+        let read = Reader::new().import(Some(&import)).file(file.path()).unwrap().remove(0);
+        assert_eq!(read.time[..3], [0.5, 1.0, 2.0]);
+    }
+
+    #[test]
+    fn an_error_behind_rows_that_were_left_out_names_its_line() {
+        let file = rows(&["1", "", "3", "x"]);
+        let skipping = Reader { missing: Some(Missing::Skip), ..Reader::new() };
+        assert!(skipping.file(file.path()).unwrap_err().to_string().contains(":5, column force_N"));
+    }
 }

@@ -2,6 +2,7 @@
 
 use super::blocks::Rows;
 use super::cells::{Want, Wanted, Words};
+use super::import::Missing;
 use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;
 
@@ -60,8 +61,10 @@ pub(super) fn without_common_prefix(mut table: ColumnTable) -> ColumnTable {
 }
 
 /// Takes the requested columns, as numbers in SI or as words. Where text errors name a line, these name the row, counted from 1.
-pub(super) fn select(table: &ColumnTable, wanted: &[Wanted]) -> Result<Rows> {
+pub(super) fn select(table: &ColumnTable, wanted: &[Wanted], missing: Missing) -> Result<Rows> {
     let mut rows = Rows::default();
+    let keep = if missing == Missing::Skip { complete(table, wanted) } else { None };
+    let kept = |row: &usize| keep.as_ref().is_none_or(|k| k.get(*row).copied().unwrap_or(true));
     let mut length: Option<(usize, &str)> = None;
     for wanted in wanted {
         let Some((name, column)) = table.get(wanted.index) else { continue };
@@ -90,14 +93,16 @@ pub(super) fn select(table: &ColumnTable, wanted: &[Wanted]) -> Result<Rows> {
         let (mut numbers, mut words) = (Vec::new(), Words::default());
         match (wanted.want, column) {
             (Want::Number { scale, offset }, Column::Numbers(values)) => {
-                if let Some(row) = values.iter().position(|v| !v.is_finite()) {
+                let bad = values.iter().enumerate().position(|(row, v)| !v.is_finite() && kept(&row));
+                if let Some(row) = bad {
                     return Err(Error::new(DataCode::RecordingNotFinite, "not a finite number")
                         .line(row as u64 + 1)
                         .column(name)
                         .value(values[row].to_string())
-                        .help("leave such rows out; missing values are not filled in silently"));
+                        .help("leave such rows out by --missing skip (missing = \"skip\" in an import description)"));
                 }
-                numbers = values.iter().map(|v| v * scale + offset).collect();
+                let values = values.iter().enumerate().filter(|(row, _)| kept(row));
+                numbers = values.map(|(_, v)| v * scale + offset).collect();
             }
             (Want::Number { .. }, Column::Texts(texts)) => {
                 return Err(Error::new(
@@ -108,13 +113,37 @@ pub(super) fn select(table: &ColumnTable, wanted: &[Wanted]) -> Result<Rows> {
                 .value(texts.first().map_or("", String::as_str))
                 .help("save the column as numbers"));
             }
-            (Want::Text, Column::Numbers(values)) => values.iter().for_each(|v| words.push(&v.to_string())),
-            (Want::Text, Column::Texts(texts)) => texts.iter().for_each(|t| words.push(t)),
+            (Want::Text, Column::Numbers(values)) => {
+                let values = values.iter().enumerate().filter(|(row, _)| kept(row));
+                values.for_each(|(_, v)| words.push(&v.to_string()));
+            }
+            (Want::Text, Column::Texts(texts)) => {
+                let texts = texts.iter().enumerate().filter(|(row, _)| kept(row));
+                texts.for_each(|(_, t)| words.push(t));
+            }
             (_, Column::Other(_)) => {}
         }
         rows.numbers.push(numbers);
         rows.texts.push(words);
     }
     rows.rows = length.map_or(0, |(n, _)| n);
+    if let Some(keep) = &keep {
+        rows.leave_out(keep);
+    }
     Ok(rows)
+}
+
+/// Which rows have a finite number in every requested column of numbers; `None` where all have.
+fn complete(table: &ColumnTable, wanted: &[Wanted]) -> Option<Vec<bool>> {
+    let mut keep: Option<Vec<bool>> = None;
+    for wanted in wanted.iter().filter(|w| w.want != Want::Text) {
+        let Some((_, Column::Numbers(values))) = table.get(wanted.index) else { continue };
+        for row in values.iter().enumerate().filter(|(_, v)| !v.is_finite()).map(|(row, _)| row) {
+            let keep = keep.get_or_insert_with(|| vec![true; values.len()]);
+            if let Some(kept) = keep.get_mut(row) {
+                *kept = false;
+            }
+        }
+    }
+    keep
 }

@@ -19,6 +19,8 @@ pub struct Recording {
     pub labels: Vec<(String, String)>,
     /// The rows of the file that are here, counted from 0 below the header; `None` when all of them are, in order.
     pub rows: Option<Vec<u32>>,
+    /// Rows of the file that were left out, since they lack a number; of a file that was split, the first recording counts them all.
+    pub skipped: usize,
     /// L0 in metres that the stroke counts from, where it was needed or is known.
     pub rest_length: Option<f64>,
     /// Time in seconds, strictly increasing.

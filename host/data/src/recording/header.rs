@@ -1,7 +1,7 @@
 //! The beginning of a text file: what separates its cells, what its columns are called, where its rows begin.
 
 use super::cells::Dialect;
-use super::import::{Decimal, Import};
+use super::import::{Decimal, Import, Missing};
 use super::line::Cells;
 use super::quantity::{Named, named};
 use crate::error::{DataCode, Error, Result};
@@ -55,7 +55,12 @@ impl Header {
             let with_row = |rows: &[u8]| {
                 let row = rows.split(|b| *b == b'\n').find(|l| !l.trim_ascii().is_empty());
                 let commas = delimiter != b',' && has_decimal_commas(row.unwrap_or_default(), delimiter);
-                Dialect { delimiter, comment, decimal_comma: import.decimal == Decimal::Comma || commas }
+                Dialect {
+                    delimiter,
+                    comment,
+                    decimal_comma: import.decimal == Decimal::Comma || commas,
+                    skip_missing: import.missing == Missing::Skip,
+                }
             };
             let dialect = with_row(&rest[end..]);
             let split = |line: &[u8]| {

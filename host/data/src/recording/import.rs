@@ -6,6 +6,8 @@
 //! delimiter = "tab"                 # "comma", "tab", "semicolon", "space" (runs of blanks) or one character
 //! comment = "#"                     # lines that begin so are skipped
 //! decimal = "comma"                 # how decimals are written; "point" unless said otherwise
+//! missing = "skip"                  # leave out rows with empty cells or NaN; "error" unless said otherwise
+//! sheet = "Run 1"                   # of a workbook; the only one with contents unless said otherwise
 //! sample_interval_s = 0.01          # when there is no column of time
 //! file_name = '(?<pressure_kPa>[0-9.]+)kPa'   # regular expression; what its named groups catch is constant per file
 //! preamble = 'pressure: (?<pressure_psi>[0-9.]+)' # the same for the skipped lines
@@ -148,6 +150,17 @@ pub enum Decimal {
     Comma,
 }
 
+/// What becomes of a row without a number in a column that is used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Missing {
+    /// The file is refused, with the place of the first such row.
+    #[default]
+    Error,
+    /// The row is left out, and counted.
+    Skip,
+}
+
 /// A text or a number to compare cells with.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(untagged)]
@@ -220,6 +233,11 @@ pub struct Import {
     /// How decimals are written.
     #[serde(default)]
     pub decimal: Decimal,
+    /// What becomes of rows with empty cells, NaN or `---` in a column that is used.
+    #[serde(default)]
+    pub missing: Missing,
+    /// The sheet of a workbook; the only one with contents by default.
+    pub sheet: Option<String>,
     /// Seconds between rows, when no column gives the time.
     pub sample_interval_s: Option<f64>,
     /// A regular expression for the file's name.

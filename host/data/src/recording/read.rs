@@ -8,13 +8,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::assemble::{Job, LookupTable, assemble};
 use super::blocks::{BlockError, Blocks, Rows, RowsError, read_rows};
 use super::campaign::Campaign;
-use super::cells::{Dialect, Fault, LineError};
+use super::cells::{Dialect, Fault, LineError, only_signs};
 use super::column_plan::{ColumnPlan, Context, plan};
 use super::column_table::select;
 use super::columns::Recording;
 use super::container::{self, Container};
 use super::header::Header;
-use super::import::{Decimal, Import, Value, pattern as pattern_of};
+use super::import::{Decimal, Import, Missing, Value, pattern as pattern_of};
 use super::line::Cells;
 use super::quantity::{Named, named};
 use super::source;
@@ -36,6 +36,10 @@ pub struct Reader<'a> {
     pub import: Option<&'a Import>,
     /// Further row filters: column and the text or number that it must have, as [`Value::of_option`] reads them.
     pub filters: Vec<(String, String)>,
+    /// What becomes of rows without a number in a column that is used; as the import description says where it is `None`.
+    pub missing: Option<Missing>,
+    /// The sheet of a workbook; as the import description says where it is `None`.
+    pub sheet: Option<String>,
     /// Files with fewer rows are refused.
     pub min_rows: usize,
     /// Told of every byte that is read.
@@ -66,6 +70,15 @@ impl Hashes {
 
 /// Lines below what was taken for the header among which the header itself is looked for.
 const LOOKED_BELOW: usize = 100;
+#[cfg(feature = "excel")]
+use super::workbook::is_one as workbook_magic;
+
+/// Workbooks are told from text also where they are not read.
+#[cfg(not(feature = "excel"))]
+fn workbook_magic(magic: &[u8]) -> bool {
+    magic.starts_with(b"PK\x03\x04") || magic.starts_with(b"\xd0\xcf\x11\xe0")
+}
+
 /// Fewer rows than this are not a recording of a muscle, but a mistake.
 const MIN_ROWS: usize = 10;
 
@@ -149,7 +162,8 @@ impl<'a> Reader<'a> {
         let bytes = source.bytes.clone();
         let recordings = match Container::of(&source.magic) {
             Some(container) => self.container(path, container, source)?,
-            None => self.text(path, source)?,
+            None if workbook_magic(&source.magic) => self.workbook(path, source)?,
+            None => self.text(path, source, self.description())?,
         };
         if let Some(hashes) = &self.hashes
             && let Some(hash) = bytes.sha256().map_err(|e| Error::unreadable(path, &e))?
@@ -159,8 +173,32 @@ impl<'a> Reader<'a> {
         Ok(recordings)
     }
 
-    fn text(&self, path: &Path, source: source::Source) -> Result<Vec<Recording>> {
-        let description = self.description();
+    /// A sheet of a workbook is read as the CSV file that it would be saved as.
+    #[cfg(feature = "excel")]
+    fn workbook(&self, path: &Path, mut source: source::Source) -> Result<Vec<Recording>> {
+        let mut description = self.description();
+        let sheet = super::workbook::sheet(path, &mut source, description.sheet.as_deref())?;
+        if description.delimiter.is_some() || description.decimal != Decimal::Point {
+            let own = description.into_owned();
+            description = Cow::Owned(Import { delimiter: None, decimal: Decimal::Point, ..own });
+        }
+        source.size = Some(sheet.text.len() as u64);
+        source.reader = Box::new(std::io::Cursor::new(sheet.text));
+        self.text(path, source, description)
+    }
+
+    #[cfg(not(feature = "excel"))]
+    fn workbook(&self, _: &Path, _: source::Source) -> Result<Vec<Recording>> {
+        Err(Error::new(DataCode::RecordingContainer, "this build does not read workbooks")
+            .help("it was built without the feature `excel`: build it with it, or save the sheet as CSV"))
+    }
+
+    fn text(
+        &self,
+        path: &Path,
+        source: source::Source,
+        description: Cow<'_, Import>,
+    ) -> Result<Vec<Recording>> {
         let mut blocks = Blocks::new(source.reader);
         let mut first = Vec::new();
         let start = match blocks.next(&mut first) {
@@ -213,7 +251,7 @@ impl<'a> Reader<'a> {
         let table = container::columns(path, container, &mut source)?;
         let names: Vec<String> = table.iter().map(|(n, _)| n.clone()).collect();
         let layout = self.layout(path, &names, &description, "")?;
-        let rows = select(&table, &layout.plan.wanted)?;
+        let rows = select(&table, &layout.plan.wanted, description.missing)?;
         drop(table);
         self.finish(path, &description, &names, &layout, 1, rows)
     }
@@ -221,7 +259,14 @@ impl<'a> Reader<'a> {
     fn description(&self) -> Cow<'a, Import> {
         // What a file of no description has for sure: a line that begins with a number sign is a remark.
         let own = || Cow::Owned(Import { comment: Some('#'), ..Import::default() });
-        self.import.map_or_else(own, Cow::Borrowed)
+        let description = self.import.map_or_else(own, Cow::Borrowed);
+        if self.missing.is_none() && self.sheet.is_none() {
+            return description;
+        }
+        let own = description.into_owned();
+        let (missing, sheet) =
+            (self.missing.unwrap_or(own.missing), self.sheet.clone().or(own.sheet.clone()));
+        Cow::Owned(Import { missing, sheet, ..own })
     }
 
     /// Decides what to read of columns with these names.
@@ -330,9 +375,9 @@ fn rows_error(error: RowsError, header: &Header, import: &Import) -> Error {
     };
     let error = match &fault {
         Fault::Empty => Error::new(DataCode::RecordingNotANumber, "empty cell")
-            .help("every row needs a number in every column that is used; leave incomplete rows out"),
+            .help("every row needs a number in every column that is used; --missing skip leaves incomplete rows out"),
         Fault::NotFinite => Error::new(DataCode::RecordingNotFinite, "not a finite number")
-            .help("leave such rows out, or repair the sensor's channel; missing values are never filled in"),
+            .help("--missing skip leaves such rows out; missing values are never filled in"),
         Fault::NotANumber => {
             let comma =
                 value.contains(',') && value.chars().all(|c| c.is_ascii_digit() || ",.-+ ".contains(c));
@@ -349,8 +394,8 @@ fn rows_error(error: RowsError, header: &Header, import: &Import) -> Error {
                 "the import description specifies decimal commas"
             } else if header.dialect.decimal_comma && value.contains('.') {
                 "this file's first row has decimal commas: write numbers without thousands separators"
-            } else if value.chars().all(|c| "-+ ".contains(c)) {
-                "signs without digits usually mark a missing value: leave such rows out"
+            } else if only_signs(&value) {
+                "signs without digits usually mark a missing value: --missing skip leaves such rows out"
             } else {
                 "every cell of a column that is used must be a number"
             };
@@ -414,7 +459,7 @@ impl Constants {
     }
 }
 
-fn read_lookup(recording: &Path, file: &str) -> Result<LookupTable> {
+pub(super) fn read_lookup(recording: &Path, file: &str) -> Result<LookupTable> {
     let path = recording.parent().unwrap_or(Path::new("")).join(file);
     let text = bounds::read(&path, bounds::WRITTEN).map_err(|e| {
         e.help("the lookup table of an import description belongs in the folder of the recording")
@@ -426,7 +471,7 @@ fn read_lookup(recording: &Path, file: &str) -> Result<LookupTable> {
         return Err(Error::new(DataCode::RecordingEmpty, "the lookup table is empty").file(&path));
     };
     let delimiter = if header.contains(&b'\t') { b'\t' } else { b',' };
-    let dialect = Dialect { delimiter, comment: None, decimal_comma: false };
+    let dialect = Dialect { delimiter, comment: None, decimal_comma: false, skip_missing: false };
     let open = |line: usize| {
         Error::new(DataCode::RecordingWrongWidth, "a quotation mark is not closed")
             .file(&path)

@@ -1,7 +1,8 @@
 //! Where the model is wrong: along each coordinate, and over time.
 
-use crate::{Axis, Colour, Figure, Mark, Panel, Section, figures, wording};
+use crate::{Axis, Colour, Figure, Mark, Panel, Section, figures, residual_table, wording};
 use pam_diagnose::verdict::{Diagnosis, Profile};
+use pam_fit::RecordingResidual;
 use pam_fit::numerics::median;
 
 /// A coordinate's name and numbers as an engineer reads them.
@@ -55,7 +56,7 @@ fn along(d: &Diagnosis, p: &Profile) -> Panel {
 }
 
 /// The chapter: a summary, along each coordinate, over time.
-pub(super) fn section(d: &Diagnosis) -> Section {
+pub(super) fn section(d: &Diagnosis, residuals: &[RecordingResidual]) -> Section {
     let mut section = Section::new("Where the model is wrong").summarised();
     if !d.judged() {
         return section;
@@ -83,6 +84,11 @@ pub(super) fn section(d: &Diagnosis) -> Section {
             panels,
         ));
     }
+    residual_table::add(
+        &mut section,
+        "Residuals by recording of the table without effects (F − F_model)",
+        residuals,
+    );
     let t = &d.trace;
     if t.time.len() > 1 {
         let [time, before, after, effects] = with_pauses(&t.time, [&t.time, &t.before, &t.after, &t.effects]);

@@ -1,6 +1,6 @@
 //! Residuals: against every coordinate, over time, and their autocorrelation.
 
-use super::super::{Axis, Colour, Figure, Mark, Panel, Section, Table, fixed};
+use super::super::{Axis, Colour, Figure, Mark, Panel, Section, Table, fixed, residual_table};
 use super::view::View;
 
 pub(super) fn section(view: &View<'_>) -> Section {
@@ -9,6 +9,7 @@ pub(super) fn section(view: &View<'_>) -> Section {
         "Residuals are measured minus computed force, with friction in the direction of motion. A random part is noise; a \
          systematic part is physics that the model lacks, which `host diagnose` identifies.",
     );
+    residual_table::add(&mut section, "Residuals by recording (F − F_model)", &view.fit.summary.recordings);
     section.figure(coordinates(view));
     section.figure(time(view));
     section.figure(memory(view));

@@ -44,6 +44,31 @@ fn bench_check(check: BenchCheck) -> &'static str {
     }
 }
 
+/// Whether an effect shows only where the muscle moves.
+#[must_use]
+pub(super) fn needs_strokes(measure: Experiment) -> bool {
+    match measure {
+        Experiment::NestedLoops
+        | Experiment::Speeds
+        | Experiment::PressuresAndRamps
+        | Experiment::RestsFromBothSides
+        | Experiment::FirstStrokes
+        | Experiment::RepeatsAfterRest
+        | Experiment::EndOfStroke
+        | Experiment::Varied => true,
+        Experiment::VentedReadings
+        | Experiment::Weighing
+        | Experiment::ReferenceGauge
+        | Experiment::DeadWeights
+        | Experiment::RigidBar
+        | Experiment::VentedLength
+        | Experiment::EndsAndDiameter
+        | Experiment::PressureRamps
+        | Experiment::Rests
+        | Experiment::LongHolds => false,
+    }
+}
+
 /// What to do so that an effect would show which recordings like these conceal.
 #[must_use]
 pub fn measure(measure: Experiment) -> &'static str {

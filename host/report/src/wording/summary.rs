@@ -3,8 +3,10 @@
 use std::fmt::Write;
 
 use pam_diagnose::experiment::what_would_show;
+use pam_diagnose::remark::Remark;
 use pam_diagnose::verdict::{Diagnosis, Missing, Pattern, Verdict};
 
+use super::experiment::needs_strokes;
 use super::{measure, pattern, proposal, region, remark, sentence, split, why, with_interval};
 use crate::effect_page::place;
 
@@ -128,6 +130,8 @@ fn effect(s: &mut String, m: &Missing) {
 
 /// What may be there unseen, by what would show it; and what checks of the bench have excluded.
 fn could_be_hidden(s: &mut String, d: &Diagnosis) {
+    let held = d.remarks.contains(&Remark::HeldLength);
+    let mut moving = Vec::new();
     let mut by_measure: Vec<(&str, Vec<String>)> = Vec::new();
     for c in &d.considered {
         let unseen = c.hidden_up_to_N.is_none_or(|h| h > 0.02 * d.blocked_force_N);
@@ -138,7 +142,13 @@ fn could_be_hidden(s: &mut String, d: &Diagnosis) {
             Some(h) => format!("{} up to {h:.1} N", c.effect),
             None => format!("{} of any size", c.effect),
         };
-        let measure = measure(what_would_show(&c.effect));
+        let shown_by = what_would_show(&c.effect);
+        // Strokes are no advice for a muscle that is used at held lengths.
+        if held && needs_strokes(shown_by) {
+            moving.push(size);
+            continue;
+        }
+        let measure = measure(shown_by);
         match by_measure.iter_mut().find(|m| m.0 == measure) {
             Some(known) => known.1.push(size),
             None => by_measure.push((measure, vec![size])),
@@ -149,6 +159,13 @@ fn could_be_hidden(s: &mut String, d: &Diagnosis) {
     }
     for (measure, effects) in by_measure {
         let _ = writeln!(s, "  {}: {measure}", effects.join(", "));
+    }
+    if !moving.is_empty() {
+        let _ = writeln!(
+            s,
+            "\nEffects that only a moving muscle shows; they do not matter where its length is held\n  {}",
+            moving.join(", ")
+        );
     }
     let checked = d.considered.iter().filter(|c| c.checked);
     let cleared: Vec<String> = checked

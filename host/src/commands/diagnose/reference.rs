@@ -6,6 +6,7 @@ use std::time::Instant;
 use clap::Args;
 
 use super::super::recordings::Recordings;
+use super::super::reports;
 use super::Arguments;
 use crate::console::Console;
 use pam_data::date;
@@ -116,8 +117,7 @@ fn before(arguments: &Arguments, muscle: Option<&MuscleDescription>, console: &C
         _ => {
             let own = &arguments.changed.reference_where;
             let filters = if own.is_empty() { arguments.recordings.filters.clone() } else { own.clone() };
-            let recordings =
-                Recordings { files: files.clone(), import: arguments.recordings.import.clone(), filters };
+            let recordings = Recordings { files: files.clone(), filters, ..arguments.recordings.clone() };
             Ok(Before::Recordings(read(&recordings, muscle, console)?))
         }
     }
@@ -194,7 +194,10 @@ pub fn run(arguments: &Arguments, console: &Console, taken: bool) -> Result<()> 
     if let Some(path) = &arguments.json {
         write_whole(path, (document::change_json(&report) + "\n").as_bytes())?;
     }
-    arguments.reports.write(console, || change_page::page(&report, &after))?;
+    let files: Vec<PathBuf> =
+        arguments.recordings.files.iter().chain(&arguments.changed.reference).cloned().collect();
+    let from = muscle.iter().fold(reports::of_files(&files), |from, muscle| from.muscle(muscle));
+    arguments.reports.write(console, &from, || change_page::page(&report, &after))?;
     if arguments.json.as_deref() != Some(Path::new("-")) {
         let words = wording::summary(&report);
         if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }

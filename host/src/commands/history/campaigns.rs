@@ -109,6 +109,8 @@ pub(super) fn read(request: &Request<'_>, console: &Console) -> Result<Vec<Found
             files: group.files.clone(),
             import: request.import.cloned(),
             filters: request.filters.to_vec(),
+            missing: None,
+            sheet: None,
         };
         let campaign = read_campaign(&recordings, request.muscle, console)?;
         let dated =

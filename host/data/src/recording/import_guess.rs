@@ -1,0 +1,135 @@
+//! An import description by looking at a file: what separates its cells, where its rows begin, which column is what, where its runs are.
+//!
+//! Names are compared with a table of synonyms, units with a table of spellings; values only supply what a name does not say, and each
+//! such choice is listed for the user to check. What cannot be known, such as the calibration of a load cell in volts, is left out.
+//!
+//! ```
+//! use pam_data::recording::import_guess::guess;
+//! use pam_data::recording::{Import, Reader};
+//!
+//! let rows: String = (0..20).map(|i| format!("{},{:02};3,5;{},1;40,{}\n", i / 10, i % 10 * 10, i, 10 + i)).collect();
+//! let file = tempfile::NamedTempFile::with_suffix(".csv")?;
+//! std::fs::write(&file, format!("Zeit [s];Druck [bar];Weg [mm];Kraft [N]\n{rows}"))?;
+//! let guessed = guess(file.path(), None)?;
+//! let import = Import::parse(&guessed.description)?;
+//! let recording = &Reader::new().import(Some(&import)).file(file.path())?[0];
+//! assert_eq!((recording.pressure[0], recording.len()), (350e3, 20));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod layout;
+mod lookup;
+mod names;
+mod roles;
+mod runs;
+mod sample;
+mod text;
+mod values;
+
+use std::path::Path;
+
+use super::quantity::Quantity;
+use crate::error::Result;
+use lookup::Listed;
+use sample::Sample;
+
+/// Where a column of a description is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Source {
+    /// In the file, by its number, counted from 1.
+    Number(usize),
+    /// In the file, by its name.
+    Named(String),
+    /// In the table beside the file that lists its runs.
+    Listed(String),
+}
+
+/// One column that was understood.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GuessedColumn {
+    /// What it is.
+    pub quantity: Quantity,
+    /// Where it is.
+    pub source: Source,
+    /// What the file calls it.
+    pub header: String,
+    /// The unit after scale and offset.
+    pub unit: &'static str,
+    /// Value in `unit` = cell · scale + offset.
+    pub scale: f64,
+    /// See `scale`.
+    pub offset: f64,
+    /// Whether it grows as the muscle gets longer.
+    pub extension: bool,
+    /// Whether the stroke counts from the greatest length.
+    pub from_longest: bool,
+    /// Words with their direction.
+    pub values: Vec<(String, i8)>,
+    /// The least and the greatest cell.
+    pub range: Option<(f64, f64)>,
+}
+
+/// What a file seems to be.
+#[derive(Debug, Clone, Default)]
+pub struct Guess {
+    /// The file's name.
+    pub file: String,
+    /// Rows that were looked at, and whether these are all.
+    pub rows: usize,
+    /// See `rows`.
+    pub whole: bool,
+    /// The sheet of a workbook.
+    pub sheet: Option<String>,
+    /// Lines before the header, or before the first row where the header is not used.
+    pub skip_lines: usize,
+    /// Whether the description uses the header's names.
+    pub header: bool,
+    /// `comma`, `tab`, `semicolon`, `space` or a character; none for files of named columns.
+    pub delimiter: Option<String>,
+    /// Whether decimals are written with a comma.
+    pub decimal_comma: bool,
+    /// Whether lines begin with a number sign.
+    pub remarks: bool,
+    /// Regular expressions for constants: `file_name` or `preamble`, and the expression.
+    pub patterns: Vec<(&'static str, String)>,
+    /// Columns that set runs apart.
+    pub split_by: Vec<String>,
+    /// Columns that were understood.
+    pub columns: Vec<GuessedColumn>,
+    /// A filter for the rows of one muscle.
+    pub filters: Vec<(String, String)>,
+    /// Columns that are not used.
+    pub unused: Vec<String>,
+    /// What could not be understood.
+    pub unknown: Vec<String>,
+    /// What the user has to check.
+    pub checks: Vec<String>,
+    /// The import description.
+    pub description: String,
+    lookup: Option<Listed>,
+}
+
+impl Guess {
+    /// The table beside the file that says how long the muscle was.
+    #[must_use]
+    pub fn list_of_runs(&self) -> Option<&str> {
+        self.lookup.as_ref().map(|l| l.file.as_str())
+    }
+
+    /// Whether a quantity was found.
+    #[must_use]
+    pub fn has(&self, quantity: Quantity) -> bool {
+        self.columns.iter().any(|c| c.quantity == quantity)
+    }
+}
+
+/// Looks at a file and describes it.
+///
+/// # Errors
+/// A file that cannot be read, or that holds no table.
+pub fn guess(path: &Path, sheet: Option<&str>) -> Result<Guess> {
+    let sample = Sample::read(path, sheet).map_err(|e| e.file(path))?;
+    let mut guess = roles::assign(path, &sample);
+    guess.description = text::description(&guess);
+    Ok(guess)
+}

@@ -1,0 +1,455 @@
+//! Which column is which quantity, in which unit, and what is not known.
+
+use std::path::Path;
+
+use super::lookup;
+use super::names::{Family, Name, Score};
+use super::sample::{Sample, SampleColumn};
+use super::{Guess, GuessedColumn, Source, runs, values};
+use crate::recording::Quantity;
+use crate::short_number::short;
+
+/// A correlation of force with displacement at equal pressure from which the sign of the displacement is taken as shown. Uncorrelated
+/// readings of two independent slow movements rarely reach 0.8, and a force that falls with the stroke exceeds it.
+const SHOWN: f64 = 0.8;
+
+/// Decides on every column.
+pub(super) fn assign(path: &Path, sample: &Sample) -> Guess {
+    let mut guess = Guess {
+        file: path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
+        rows: sample.rows,
+        whole: sample.whole,
+        header: sample.has_header,
+        sheet: sample.sheet.clone(),
+        ..Guess::default()
+    };
+    if let Some(layout) = &sample.layout {
+        guess.delimiter = sample.sheet.is_none().then(|| layout.delimiter_name().to_owned());
+        guess.decimal_comma = layout.decimal_comma;
+        guess.remarks = layout.remarks;
+        guess.skip_lines =
+            if sample.has_header { layout.names_at.unwrap_or(layout.data_at) } else { layout.data_at };
+    }
+    let mut used = vec![false; sample.columns.len()];
+    for quantity in [
+        Quantity::Time,
+        Quantity::Pressure,
+        Quantity::Displacement,
+        Quantity::Length,
+        Quantity::Contraction,
+        Quantity::RestLength,
+        Quantity::Force,
+        Quantity::Temperature,
+        Quantity::PressureCommand,
+        Quantity::Cycle,
+    ] {
+        let stroke = [Quantity::Displacement, Quantity::Length, Quantity::Contraction];
+        if stroke.contains(&quantity) && stroke.iter().any(|q| guess.has(*q)) {
+            continue;
+        }
+        if let Some(n) = best(sample, quantity, &used, &mut guess)
+            && let Some(column) = described(sample, n, quantity, &mut guess)
+        {
+            used[n] = true;
+            guess.columns.push(column);
+        }
+    }
+    find_time(sample, &mut used, &mut guess);
+    find_pressure(sample, &mut guess);
+    find_runs(path, sample, &mut used, &mut guess);
+    judge_stroke(sample, &mut guess);
+    let rest = sample.columns.iter().zip(&used).filter(|(_, used)| !**used);
+    guess.unused = rest.map(|(c, _)| c.header.clone()).collect();
+    what_is_missing(sample, &mut guess);
+    guess
+}
+
+/// Where a column is, for the description: by name where the reader finds that name once.
+fn source(sample: &Sample, n: usize) -> Source {
+    let header = &sample.columns[n].header;
+    let once = sample.columns.iter().filter(|c| c.header == *header).count() == 1;
+    if sample.has_header && once && !header.is_empty() {
+        Source::Named(header.clone())
+    } else {
+        Source::Number(n + 1)
+    }
+}
+
+/// The column that fits a quantity best.
+fn best(sample: &Sample, quantity: Quantity, used: &[bool], guess: &mut Guess) -> Option<usize> {
+    let fits = |(n, c): (usize, &SampleColumn)| -> Option<(Score, usize)> {
+        let (q, score) = c.name.quantity()?;
+        (q == quantity && c.is_numeric() && !used[n]).then_some((score, n))
+    };
+    let mut found: Vec<(Score, usize)> = sample.columns.iter().enumerate().filter_map(fits).collect();
+    found.sort_by_key(|(score, n)| (-score, *n));
+    let (score, first) = *found.first()?;
+    let rivals: Vec<&str> = found[1..]
+        .iter()
+        .filter(|(s, _)| *s == score)
+        .map(|(_, n)| sample.columns[*n].header.as_str())
+        .collect();
+    if !rivals.is_empty() {
+        let header = &sample.columns[first].header;
+        if quantity == Quantity::PressureCommand {
+            guess.checks.push(format!(
+                "commanded pressures are in {header}, {}: describe that of this muscle as columns.pressure_command",
+                rivals.join(", ")
+            ));
+            return None;
+        }
+        guess.checks.push(format!(
+            "{} is taken from {header}; {} could be meant, too",
+            quantity.name().replace('_', " "),
+            rivals.join(", ")
+        ));
+    }
+    Some(first)
+}
+
+/// A column in its unit; `None` where it cannot be used.
+fn described(sample: &Sample, n: usize, quantity: Quantity, guess: &mut Guess) -> Option<GuessedColumn> {
+    let column = &sample.columns[n];
+    let (header, what) = (&column.header, quantity.name().replace('_', " "));
+    if column.name.is_raw() {
+        let unit = column.name.unit.map_or("", |u| u.text);
+        guess.unknown.push(format!(
+            "{header} looks like {what} in {unit}: describe it with the scale and the offset of the sensor's calibration"
+        ));
+        return None;
+    }
+    let (mut unit, mut scale, mut offset) = ("", 1.0, 0.0);
+    if let Some(spelled) = column.name.unit {
+        (unit, scale, offset) = (spelled.unit, spelled.scale, spelled.offset);
+    } else if let Some(text) = &column.name.unknown_unit {
+        guess.unknown.push(format!("{header} looks like {what}, but its unit `{text}` is not known"));
+        return None;
+    } else if quantity == Quantity::Contraction && column.range().1 > 1.0 {
+        scale = 0.01;
+        guess
+            .checks
+            .push(format!("{header} is taken as per cent, since it reaches {}", short(column.range().1)));
+    } else if quantity.units().len() > 1 {
+        let Some(suggested) = values::suggested(quantity, column) else {
+            let (low, high) = column.range();
+            guess.unknown.push(format!(
+                "{header} looks like {what}, but neither its name nor its values ({} to {}) say the unit",
+                short(low),
+                short(high)
+            ));
+            return None;
+        };
+        (unit, scale) = (suggested.unit, suggested.scale);
+        let others = if suggested.others.is_empty() {
+            String::new()
+        } else {
+            format!(" (or {})", suggested.others.join(", "))
+        };
+        guess.checks.push(format!("{header} does not say its unit; its values look like {unit}{others}"));
+    }
+    let (low, high) = column.range();
+    if quantity == Quantity::Pressure && column.name.absolute() {
+        // Standard atmosphere; the pressure of the day differs by a few per cent of it.
+        offset -= quantity.unit(unit).map_or(0.0, |u| 101_325.0 / u.scale);
+        guess.checks.push(format!("{header} is absolute pressure: one standard atmosphere is subtracted"));
+    }
+    let si = |v: f64| quantity.unit(unit).map_or(v, |u| (v * scale + offset) * u.scale);
+    if let Some(doubt) = values::doubt(quantity, si(low), si(high)) {
+        if quantity == Quantity::Contraction {
+            guess.unknown.push(format!("{header}: {doubt}"));
+            return None;
+        }
+        guess.checks.push(format!("{header}: {doubt}"));
+    }
+    if column.missing > 0 {
+        guess.checks.push(format!(
+            "{header} has {} of {} cells without a number: write missing = \"skip\" to leave these rows out",
+            column.missing, sample.rows
+        ));
+    }
+    if quantity == Quantity::Force && -low > high && scale > 0.0 {
+        scale = -scale;
+        guess.checks.push(format!(
+            "{header} is negative where it is largest: its sign is reversed, so that pulling is positive"
+        ));
+    }
+    Some(GuessedColumn {
+        quantity,
+        source: source(sample, n),
+        header: header.clone(),
+        unit,
+        scale,
+        offset,
+        extension: quantity == Quantity::Displacement && column.name.lengthens(),
+        from_longest: false,
+        values: Vec::new(),
+        range: Some((low, high)),
+    })
+}
+
+/// A column that increases from row to row is the time where no name says so.
+fn find_time(sample: &Sample, used: &mut [bool], guess: &mut Guess) {
+    if guess.has(Quantity::Time) {
+        return;
+    }
+    let dated = sample
+        .columns
+        .iter()
+        .find(|c| !c.is_numeric() && c.name.quantity().is_some_and(|(q, _)| q == Quantity::Time));
+    if let Some(column) = dated {
+        guess.unknown.push(format!(
+            "{} holds dates or times of day, which are not read: write seconds from some beginning, or give sample_interval_s",
+            column.header
+        ));
+        return;
+    }
+    let unnamed = |(n, c): &(usize, &SampleColumn)| {
+        !used[*n]
+            && c.name.quantity().is_none()
+            && c.name.unit.is_none()
+            && values::increases(c)
+            && !values::counts_rows(c)
+    };
+    if let Some((n, column)) = sample.columns.iter().enumerate().find(unnamed)
+        && let Some(suggested) = values::suggested(Quantity::Time, column)
+    {
+        used[n] = true;
+        guess.checks.push(format!(
+            "column {} is taken as the time in {}, since it increases from row to row",
+            column.header,
+            if suggested.scale == 1.0 { suggested.unit } else { "µs" }
+        ));
+        guess.columns.insert(
+            0,
+            GuessedColumn {
+                quantity: Quantity::Time,
+                source: source(sample, n),
+                header: column.header.clone(),
+                unit: suggested.unit,
+                scale: suggested.scale,
+                offset: 0.0,
+                extension: false,
+                from_longest: false,
+                values: Vec::new(),
+                range: Some(column.range()),
+            },
+        );
+    }
+}
+
+/// A pressure that the file's name or a line above the table states.
+fn find_pressure(sample: &Sample, guess: &mut Guess) {
+    if guess.has(Quantity::Pressure) {
+        return;
+    }
+    const NUMBER: &str = r"[0-9]+(?:\.[0-9]+)?";
+    for unit in Quantity::Pressure.units().iter().rev().map(|u| u.name) {
+        let line = sample.preamble.iter().find_map(|line| {
+            let found = regex_lite::Regex::new(&format!(
+                r"(?i)^(.*(?:pressure|druck)[^0-9]*{unit}[^0-9]*?)({NUMBER})"
+            ))
+            .ok()?;
+            let before = found.captures(line)?.get(1)?.as_str().to_owned();
+            Some(format!("{}(?<pressure_{unit}>{NUMBER})", regex_lite::escape(&before).replace('\t', r"\s")))
+        });
+        let behind = sample.preamble.iter().find_map(|line| {
+            let found =
+                regex_lite::Regex::new(&format!(r"(?i)^(.*(?:pressure|druck)[^0-9]*)({NUMBER})\s*{unit}\b"))
+                    .ok()?;
+            let before = found.captures(line)?.get(1)?.as_str().to_owned();
+            Some(format!(
+                r"{}(?<pressure_{unit}>{NUMBER})\s*{unit}",
+                regex_lite::escape(&before).replace('\t', r"\s")
+            ))
+        });
+        if let Some(pattern) = line.or(behind) {
+            guess.checks.push(format!("the pressure is taken from the lines above the table, in {unit}"));
+            guess.patterns.push(("preamble", pattern));
+            return;
+        }
+    }
+    for unit in Quantity::Pressure.units().iter().rev().map(|u| u.name) {
+        let pattern = format!("(?<pressure_{unit}>{NUMBER}) ?{unit}");
+        if regex_lite::Regex::new(&pattern).is_ok_and(|p| p.is_match(&guess.file)) {
+            guess.checks.push(format!("the pressure is taken from the file's name, in {unit}"));
+            guess.patterns.push(("file_name", pattern));
+            return;
+        }
+    }
+}
+
+/// Labels, directions, the list of runs and the muscles of a file.
+fn find_runs(path: &Path, sample: &Sample, used: &mut [bool], guess: &mut Guess) {
+    for (n, column) in sample.columns.iter().enumerate() {
+        if let Some(values) = runs::directions(column).filter(|_| !guess.has(Quantity::Direction)) {
+            used[n] = true;
+            guess.columns.push(GuessedColumn {
+                quantity: Quantity::Direction,
+                source: source(sample, n),
+                header: column.header.clone(),
+                unit: "",
+                scale: 1.0,
+                offset: 0.0,
+                extension: false,
+                from_longest: false,
+                values,
+                range: None,
+            });
+        }
+    }
+    let name_of = |n: usize| match source(sample, n) {
+        Source::Named(name) | Source::Listed(name) => name,
+        Source::Number(n) => n.to_string(),
+    };
+    let time = guess.columns.iter().find(|c| c.quantity == Quantity::Time);
+    let time = time.and_then(|t| (0..sample.columns.len()).find(|n| source(sample, *n) == t.source));
+    let (splits, left) = time.map(|t| runs::splits(&sample.columns, t)).unwrap_or_default();
+    if left > 0 {
+        guess.unknown.push(format!(
+            "time does not increase at {left} rows, and no column says which run a row belongs to: make one file of each run, or remove \
+             the rows that are given twice"
+        ));
+    }
+    for n in splits {
+        used[n] = true;
+        guess.split_by.push(name_of(n));
+    }
+    let stroke = [Quantity::Displacement, Quantity::Length, Quantity::Contraction];
+    if !stroke.iter().any(|q| guess.has(*q))
+        && let Some(listed) = lookup::find(path, &sample.columns)
+    {
+        guess.unknown.retain(|line| !line.contains("a contraction of"));
+        for (quantity, header, name) in &listed.quantities {
+            guess.columns.push(from_list(*quantity, header, name));
+        }
+        guess.checks.push(format!("the mounted length of each run is taken from {}", listed.file));
+        guess.lookup = Some(listed);
+    }
+    several_muscles(sample, guess);
+}
+
+fn from_list(quantity: Quantity, header: &str, name: &Name) -> GuessedColumn {
+    let unit = name.unit.filter(|u| u.family != Family::Raw);
+    GuessedColumn {
+        quantity,
+        source: Source::Listed(header.to_owned()),
+        header: header.to_owned(),
+        unit: unit.map_or("", |u| u.unit),
+        scale: unit.map_or(1.0, |u| u.scale),
+        offset: 0.0,
+        extension: quantity == Quantity::Displacement && name.lengthens(),
+        from_longest: false,
+        values: Vec::new(),
+        range: None,
+    }
+}
+
+/// A file of several muscles needs a filter for the one that is described.
+fn several_muscles(sample: &Sample, guess: &mut Guess) {
+    let lengths = guess.columns.iter().find(|c| c.quantity == Quantity::RestLength).cloned();
+    let Some(lengths) = lengths else { return };
+    let column = sample.columns.iter().find(|c| c.header == lengths.header);
+    let Some(levels) = column.and_then(|c| c.levels.as_ref()).filter(|l| l.words.len() > 1) else { return };
+    guess.checks.push(format!(
+        "the file holds muscles of {} rest lengths ({}): the description takes the rows of the muscle that is fitted",
+        levels.words.len(),
+        list(&levels.words)
+    ));
+    if lengths.unit == "mm" && lengths.scale == 1.0 {
+        guess.filters.push((lengths.header, "{rest_length_mm}".to_owned()));
+    }
+    let named = sample.columns.iter().find(|c| {
+        let more = c.levels.as_ref().is_some_and(|l| l.words.len() > levels.words.len());
+        more && c.texts > 0
+            && c.name.words.iter().any(|w| ["muscle", "muskel", "specimen", "sample"].contains(&w.as_str()))
+    });
+    if let Some(name) = named {
+        let words = name.levels.as_ref().map(|l| l.words.clone()).unwrap_or_default();
+        guess.checks.push(format!(
+            "some of them share a rest length: choose one by --where {}=NAME ({})",
+            name.header,
+            list(&words)
+        ));
+    }
+}
+
+fn list(words: &[String]) -> String {
+    const SHOWN: usize = 8;
+    let more = if words.len() > SHOWN { ", …" } else { "" };
+    format!("{}{more}", words.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", "))
+}
+
+/// The sign and the zero of a displacement, by its name and by the force.
+fn judge_stroke(sample: &Sample, guess: &mut Guess) {
+    let values = |q: Quantity| {
+        let column = guess.columns.iter().find(|c| c.quantity == q)?;
+        let n = (0..sample.columns.len()).find(|n| source(sample, *n) == column.source)?;
+        Some((column.scale.signum(), &sample.columns[n].numbers))
+    };
+    let Some((_, stroke)) = values(Quantity::Displacement) else { return };
+    let force: Option<Vec<f64>> =
+        values(Quantity::Force).map(|(sign, force)| force.iter().map(|f| sign * f).collect());
+    // An uncalibrated reading shows the sign as well, where nothing better is there.
+    let raw = || {
+        let is_force = |c: &&SampleColumn| {
+            c.is_numeric() && c.name.quantity().is_some_and(|(q, _)| q == Quantity::Force)
+        };
+        sample.columns.iter().find(is_force).map(|c| c.numbers.clone())
+    };
+    let force = force.or_else(raw);
+    let pressure = values(Quantity::Pressure).map(|(_, p)| p.as_slice());
+    let shown = force.and_then(|f| values::force_against(stroke, &f, pressure));
+    let Some(column) = guess.columns.iter_mut().find(|c| c.quantity == Quantity::Displacement) else {
+        return;
+    };
+    let header = column.header.clone();
+    match shown {
+        Some(r) if r > SHOWN && !column.extension => {
+            column.extension = true;
+            guess.checks.push(format!(
+                "the force rises with {header} at equal pressure: it is taken to grow as the muscle gets longer"
+            ));
+        }
+        Some(r) if r < -SHOWN && column.extension => {
+            column.extension = false;
+            guess.checks.push(format!(
+                "the force falls with {header} at equal pressure: it is taken to grow as the muscle shortens, despite its name"
+            ));
+        }
+        _ => {}
+    }
+    if let Some((low, high)) = column.range {
+        let longest = if column.extension { high } else { low };
+        // A zero within a third of the stroke may be meant; one farther away is that of the machine.
+        if !(longest.abs() <= (high - low) / 3.0) {
+            column.from_longest = true;
+            guess.checks.push(format!(
+                "{header} has a zero of its own: the stroke is counted from the greatest length in each file, which must be the rest length"
+            ));
+        }
+    }
+}
+
+/// What a recording needs and the file does not say.
+fn what_is_missing(sample: &Sample, guess: &mut Guess) {
+    if !guess.has(Quantity::Time) && !guess.unknown.iter().any(|u| u.contains("times of day")) {
+        let text = "no column of time: where the rows are equally spaced, write sample_interval_s = SECONDS";
+        guess.unknown.insert(0, text.to_owned());
+    }
+    if !guess.has(Quantity::Pressure) && guess.patterns.is_empty() {
+        let text = "no column of pressure: where it is constant, write it as pressure_kPa under [constants]";
+        guess.unknown.push(text.to_owned());
+    }
+    let stroke = [Quantity::Displacement, Quantity::Length, Quantity::Contraction];
+    if !stroke.iter().any(|q| guess.has(*q)) {
+        let text = "no column of displacement, length or contraction: where the length is held, write it as length_mm \
+                    under [constants]";
+        guess.unknown.push(text.to_owned());
+    }
+    if !guess.has(Quantity::Force) {
+        guess.unknown.push("no column of force: a fit and a diagnosis need it".to_owned());
+    }
+    if !sample.whole {
+        guess.checks.push(format!("the first {} rows were looked at", sample.rows));
+    }
+}

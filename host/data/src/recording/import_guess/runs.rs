@@ -1,0 +1,105 @@
+//! Where one run of a file ends and the next begins: time begins again, and columns of labels change there.
+
+use std::collections::HashMap;
+
+use super::sample::{Levels, SampleColumn};
+
+/// The columns, by their index, whose values set the runs of a file apart, none where time increases throughout; and how often time
+/// does not increase within the runs.
+pub(super) fn splits(columns: &[SampleColumn], time: usize) -> (Vec<usize>, usize) {
+    let time = &columns[time].numbers;
+    let restarts: Vec<bool> = (0..time.len()).map(|i| i > 0 && !(time[i] > time[i - 1])).collect();
+    let labels = |c: &SampleColumn| -> Option<bool> {
+        let levels = c.levels.as_ref().filter(|l| l.words.len() > 1)?;
+        // A label changes only where a run begins; what changes within a run is a measurement or a direction.
+        let at_starts = levels.codes.windows(2).zip(&restarts[1..]).all(|(w, start)| w[0] == w[1] || *start);
+        at_starts.then(|| c.name.sets_apart())
+    };
+    let mut candidates: Vec<(bool, usize)> =
+        columns.iter().enumerate().filter_map(|(n, c)| Some((labels(c)?, n))).collect();
+    // Columns that are called run or condition before those of lengths and other settings.
+    candidates.sort_by_key(|(named, n)| (!*named, *n));
+    let mut chosen: Vec<usize> = Vec::new();
+    let mut left = violations(columns, &chosen, time);
+    while left > 0 {
+        let open = candidates.iter().filter(|(_, n)| !chosen.contains(n));
+        let after = open.map(|(_, n)| {
+            let with: Vec<usize> = chosen.iter().copied().chain([*n]).collect();
+            (violations(columns, &with, time), *n)
+        });
+        match after.min_by_key(|(count, _)| *count) {
+            Some((count, n)) if count < left => {
+                chosen.push(n);
+                left = count;
+            }
+            _ => break,
+        }
+    }
+    chosen.sort_unstable();
+    (chosen, left)
+}
+
+/// Rows whose time is not later than that of the row before them in the same group.
+fn violations(columns: &[SampleColumn], by: &[usize], time: &[f64]) -> usize {
+    let levels: Vec<&Levels> = by.iter().filter_map(|n| columns[*n].levels.as_ref()).collect();
+    let mut last: HashMap<Vec<u32>, f64> = HashMap::new();
+    let mut count = 0;
+    for (row, time) in time.iter().enumerate() {
+        let key: Vec<u32> = levels.iter().map(|l| l.codes[row]).collect();
+        let before = last.insert(key, *time);
+        count += usize::from(before.is_some_and(|b| !(*time > b)));
+    }
+    count
+}
+
+/// The direction of each word of a column of phases; `None` where one of them is not known.
+pub(super) fn directions(column: &SampleColumn) -> Option<Vec<(String, i8)>> {
+    const UP: [&str; 14] = [
+        "up",
+        "fill",
+        "filling",
+        "inflate",
+        "inflating",
+        "inflation",
+        "pressurising",
+        "pressurizing",
+        "shortening",
+        "contracting",
+        "auf",
+        "steigend",
+        "rising",
+        "hin",
+    ];
+    const DOWN: [&str; 14] = [
+        "down",
+        "empty",
+        "emptying",
+        "deflate",
+        "deflating",
+        "deflation",
+        "depressurising",
+        "depressurizing",
+        "lengthening",
+        "extending",
+        "ab",
+        "fallend",
+        "falling",
+        "rueck",
+    ];
+    const STILL: [&str; 4] = ["", "hold", "rest", "wait"];
+    let levels = column.levels.as_ref().filter(|_| column.name.is_way())?;
+    let direction = |word: &String| {
+        let bare = word.trim().to_lowercase();
+        let way = if UP.contains(&bare.as_str()) {
+            1
+        } else if DOWN.contains(&bare.as_str()) {
+            -1
+        } else if STILL.contains(&bare.as_str()) {
+            0
+        } else {
+            return None;
+        };
+        Some((word.clone(), way))
+    };
+    levels.words.iter().map(direction).collect()
+}

@@ -1,0 +1,217 @@
+//! The first rows of a file, column by column, before anything is known of their meaning.
+
+use std::collections::HashMap;
+use std::io::Read;
+use std::path::Path;
+
+use super::layout::{Layout, cells, is_missing, number};
+use super::names::Name;
+use crate::error::{DataCode, Error, Result};
+use crate::recording::column_table::Column as Stored;
+use crate::recording::container::{self, Container};
+use crate::recording::source;
+#[cfg(feature = "excel")]
+use crate::recording::workbook;
+
+/// Bytes of a text that are looked at: some hundred thousand rows.
+const LOOKED_AT: u64 = 32 << 20;
+/// Rows that are looked at.
+const ROWS: usize = 300_000;
+/// A column with more different values than this is a measurement, no label.
+const LABELS: usize = 1000;
+
+/// One column.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SampleColumn {
+    /// As the file has it; a number where it has none.
+    pub header: String,
+    pub name: Name,
+    /// Numbers; NaN where a cell holds none.
+    pub numbers: Vec<f64>,
+    /// Cells that are empty or not finite.
+    pub missing: usize,
+    /// Cells that are neither numbers nor missing.
+    pub texts: usize,
+    /// The different cells, where there are few, and which of them each row has.
+    pub levels: Option<Levels>,
+}
+
+/// Cells as numbers into a vocabulary.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Levels {
+    pub words: Vec<String>,
+    pub codes: Vec<u32>,
+    index: HashMap<String, u32>,
+}
+
+impl Levels {
+    /// Adds a cell; `false` where there are too many different ones.
+    fn push(&mut self, cell: &str) -> bool {
+        let code = match self.index.get(cell) {
+            Some(code) => *code,
+            None => {
+                let code = self.words.len() as u32;
+                self.words.push(cell.to_owned());
+                self.index.insert(cell.to_owned(), code);
+                code
+            }
+        };
+        self.codes.push(code);
+        self.words.len() <= LABELS
+    }
+}
+
+impl SampleColumn {
+    fn named(header: &str, name: Name) -> Self {
+        Self { header: header.to_owned(), name, levels: Some(Levels::default()), ..Self::default() }
+    }
+
+    fn push(&mut self, cell: &str, decimal_comma: bool) {
+        let cell = cell.trim();
+        let value = number(cell, decimal_comma);
+        match value {
+            None if is_missing(cell) => self.missing += 1,
+            None => self.texts += 1,
+            Some(_) => {}
+        }
+        self.numbers.push(value.unwrap_or(f64::NAN));
+        if self.levels.as_mut().is_some_and(|l| !l.push(cell)) {
+            self.levels = None;
+        }
+    }
+
+    /// Whether it holds numbers.
+    pub(super) fn is_numeric(&self) -> bool {
+        self.texts == 0 && self.missing < self.numbers.len()
+    }
+
+    /// Its finite numbers.
+    pub(super) fn values(&self) -> impl Iterator<Item = f64> {
+        self.numbers.iter().copied().filter(|v| v.is_finite())
+    }
+
+    /// The least and the greatest number.
+    pub(super) fn range(&self) -> (f64, f64) {
+        self.values().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
+    }
+}
+
+/// The first rows of a file.
+#[derive(Debug, Default)]
+pub(super) struct Sample {
+    /// The sheet of a workbook.
+    pub sheet: Option<String>,
+    /// The layout of its text; none for a file of named columns.
+    pub layout: Option<Layout>,
+    /// Whether the reader finds the names without help.
+    pub has_header: bool,
+    /// The lines above the names.
+    pub preamble: Vec<String>,
+    pub columns: Vec<SampleColumn>,
+    pub rows: usize,
+    /// Whether these are all rows.
+    pub whole: bool,
+}
+
+impl Sample {
+    pub(super) fn read(path: &Path, sheet: Option<&str>) -> Result<Self> {
+        #[cfg(not(feature = "excel"))]
+        let _ = sheet;
+        let mut source = source::open(path, None, false)?;
+        if source.magic.is_empty() {
+            return Err(Error::new(DataCode::RecordingEmpty, "the file is empty"));
+        }
+        match Container::of(&source.magic) {
+            Some(container) => {
+                let table = container::columns(path, container, &mut source)?;
+                Ok(Self::of_columns(&table))
+            }
+            #[cfg(feature = "excel")]
+            None if workbook::is_one(&source.magic) => {
+                let sheet = workbook::sheet(path, &mut source, sheet)?;
+                let mut sample = Self::of_text(&sheet.text)?;
+                sample.sheet = Some(sheet.name);
+                Ok(sample)
+            }
+            None => {
+                let mut text = Vec::new();
+                let read = source.reader.take(LOOKED_AT).read_to_end(&mut text);
+                read.map_err(|e| Error::unreadable(path, &e))?;
+                Self::of_text(&text)
+            }
+        }
+    }
+
+    fn of_text(text: &[u8]) -> Result<Self> {
+        let text = &text[source::check_text(text)?..];
+        let whole = (text.len() as u64) < LOOKED_AT - 3;
+        let mut lines: Vec<&[u8]> =
+            text.split(|b| *b == b'\n').map(|l| l.strip_suffix(b"\r").unwrap_or(l)).take(2 * ROWS).collect();
+        if !whole {
+            lines.pop();
+        }
+        // Spreadsheets tell each other the delimiter in a first line, which the reader understands without help.
+        let Some(layout) = Layout::of(&lines) else {
+            return Err(Error::new(DataCode::RecordingNotText, "no table of numbers is found in this file").help(
+                "a recording has one row per reading, with equally many cells separated by commas, tabs, semicolons or blanks",
+            ));
+        };
+        let dialect = layout.dialect();
+        let lossy = |l: &&[u8]| String::from_utf8_lossy(l).trim_end().to_owned();
+        let names_at = layout.names_at.unwrap_or(layout.data_at);
+        let mut sample = Self {
+            has_header: layout.has_header(&lines),
+            preamble: lines[..names_at].iter().map(lossy).collect(),
+            columns: columns_of(&layout),
+            whole,
+            ..Self::default()
+        };
+        for line in &lines[layout.data_at..] {
+            let Some(row) = cells(line, dialect) else { continue };
+            // The reader reports the line that has too few or too many cells.
+            if row.len() != sample.columns.len() || row.iter().all(|c| c.is_empty()) {
+                continue;
+            }
+            for (column, cell) in sample.columns.iter_mut().zip(&row) {
+                column.push(cell, layout.decimal_comma);
+            }
+            sample.rows += 1;
+            if sample.rows == ROWS {
+                sample.whole = false;
+                break;
+            }
+        }
+        sample.layout = Some(layout);
+        Ok(sample)
+    }
+
+    fn of_columns(table: &[(String, Stored)]) -> Self {
+        let mut sample = Self { has_header: true, whole: true, ..Self::default() };
+        for (header, stored) in table {
+            let mut column = SampleColumn::named(header, Name::of(header));
+            match stored {
+                Stored::Numbers(numbers) => {
+                    sample.whole &= numbers.len() <= ROWS;
+                    for value in numbers.iter().take(ROWS) {
+                        column.push(&value.to_string(), false);
+                    }
+                }
+                Stored::Texts(texts) => texts.iter().take(ROWS).for_each(|t| column.push(t, false)),
+                Stored::Other(_) => continue,
+            }
+            sample.rows = sample.rows.max(column.numbers.len());
+            sample.columns.push(column);
+        }
+        let rows = sample.rows;
+        sample.columns.retain(|c| c.numbers.len() == rows);
+        sample
+    }
+}
+
+fn columns_of(layout: &Layout) -> Vec<SampleColumn> {
+    let name = |(k, header): (usize, &String)| match layout.units.as_ref().and_then(|u| u.get(k)) {
+        Some(unit) => SampleColumn::named(header, Name::with_unit_below(header, unit)),
+        None => SampleColumn::named(header, Name::of(header)),
+    };
+    layout.names.iter().enumerate().map(name).collect()
+}
