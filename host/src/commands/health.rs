@@ -10,6 +10,7 @@ use crate::documents::health::{Change, Health};
 use crate::documents::text;
 use pam_data::error::Result;
 use pam_diagnose::health::{Assessment, Verdict, assess, unit};
+use pam_report::wording::change as wording;
 
 /// Say whether the table on a controller still describes its muscle, and name what has changed.
 ///
@@ -60,7 +61,7 @@ fn document(assessment: &Assessment) -> Health {
         unit: unit(finding.change),
         share_explained: finding.share,
         confusable_with: finding.confusable_with.iter().map(|c| c.name()).collect(),
-        remedy: finding.change.about().remedy,
+        remedy: wording::remedy(finding.change),
     };
     Health {
         schema: "pam-health/1",
@@ -100,7 +101,7 @@ fn words(assessment: &Assessment) -> String {
                     number(finding.interval.1),
                     100.0 * finding.share
                 ));
-                lines.push(format!("    what to do: {}", about.remedy));
+                lines.push(format!("    what to do: {}", wording::remedy(finding.change)));
                 if !finding.confusable_with.is_empty() {
                     let names: Vec<_> = finding.confusable_with.iter().map(|c| c.name()).collect();
                     lines.push(format!("    not distinguished from: {}", names.join(", ")));
