@@ -10,7 +10,7 @@
 use model_core::link::messages::{Fault, FaultReport, Mode, Session, Side, State};
 use model_core::link::settings::{Reaction, Settings};
 use model_core::motion::{MotionSettings, MotionTracker};
-use model_core::single;
+use model_core::single_precision;
 use model_core::table::{MuscleTable, TableError};
 
 use crate::board::{Hardware, Inputs, Outputs, Readings};
@@ -315,7 +315,7 @@ impl Controller {
         self.tick += 1;
         self.step_us = inputs.step_us;
         for side in Side::ALL {
-            let model_n = self.look(side, inputs);
+            let model_n = self.take_readings(side, inputs);
             self.sides[side.index()].model_n = model_n;
         }
         let found = self.watch(inputs);
@@ -359,7 +359,7 @@ impl Controller {
     }
 
     /// Takes one muscle's readings; the force that its table gives at them.
-    fn look(&mut self, side: Side, inputs: &Inputs) -> Option<f32> {
+    fn take_readings(&mut self, side: Side, inputs: &Inputs) -> Option<f32> {
         let actuator = &mut self.sides[side.index()];
         let Readings { pressure_pa, stroke_m, force_n } = inputs.sides[side.index()]?;
         actuator.sample.pressure_pa = pressure_pa;
@@ -370,7 +370,7 @@ impl Controller {
         if !(pressure_pa.is_finite() && stroke_m.is_finite()) {
             return None;
         }
-        let motion = single::follow(&mut actuator.motion, TICK_S, stroke_m, pressure_pa);
+        let motion = single_precision::follow(&mut actuator.motion, TICK_S, stroke_m, pressure_pa);
         let model_n = actuator.model.as_mut()?.tick(motion, pressure_pa);
         actuator.sample.model_n = model_n;
         Some(model_n)

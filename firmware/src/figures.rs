@@ -29,7 +29,7 @@ use model_core::link::messages::{Mode, Reference, ReferenceOrder, Session, Side}
 use model_core::link::settings::Settings;
 use model_core::motion::Motion;
 use model_core::muscle::Muscle;
-use model_core::single;
+use model_core::single_precision;
 use model_core::table::{self, MuscleTable};
 use model_core::units::{Length, Pressure};
 use static_cell::StaticCell;
@@ -162,12 +162,12 @@ fn functions(table: &MuscleTable, muscle: &Muscle<f32>) {
     sweep(|p, x, s| {
         let (pressure, stroke) = (Pressure::from_pascals(p), Length::from_metres(x));
         force.add(instructions(64, (pressure, stroke, s), |(pressure, stroke, s)| {
-            single::force(muscle, pressure, stroke, s)
+            single_precision::force(muscle, pressure, stroke, s)
         }));
-        let wanted = single::force(muscle, pressure, stroke, s);
+        let wanted = single_precision::force(muscle, pressure, stroke, s);
         let guess = Pressure::from_pascals(p + 5e3);
         inverse.add(instructions(64, (wanted, stroke, s, guess), |(wanted, stroke, s, guess)| {
-            single::pressure_at(muscle, stroke, s, wanted, guess, &search)
+            single_precision::pressure_at(muscle, stroke, s, wanted, guess, &search)
         }));
         if let Some(port) = &port {
             direct.add(instructions(16, (p, x, s), |(p, x, s)| direct_force_of(port, table, p, x, s)));

@@ -7,7 +7,7 @@ use model_core::link::settings::{FeedForward, ForceLoop, Settings, StrokeLoop};
 use model_core::motion::{Motion, Slide};
 use model_core::muscle::{AtStroke, Moment, Muscle};
 use model_core::scalar::Scalar;
-use model_core::single;
+use model_core::single_precision;
 use model_core::table::{MuscleTable, TableError};
 use model_core::units::{Force, Length, Pressure};
 
@@ -120,10 +120,10 @@ impl Model {
         self.chain.resume(&table.effects);
         self.muscle.begin(&mut self.now);
         // At rest, without pressure. As the control step does it, so that no other form of it is in the image.
-        single::update(&self.muscle, &mut self.now, &Motion::default(), Pressure::ZERO);
+        single_precision::update(&self.muscle, &mut self.now, &Motion::default(), Pressure::ZERO);
         let reach_m = table.tested.contraction_high.at_least(1.0e-2) * self.muscle.braid().rest_length();
         let distance_m = SLIDE * reach_m;
-        let area = self.now.held.posture.area;
+        let area = self.now.at_stroke.posture.area;
         // Free, the muscle would go all its way for the pressure that holds its blocked force.
         let blocked_pa = table.blocked_force.newtons().abs().at_least(1.0e-3) / area;
         let slip = SLIP * reach_m / blocked_pa.abs().at_least(1.0);
@@ -135,7 +135,8 @@ impl Model {
         self.held_back = 0.0;
         self.demanded = false;
         self.slope = area;
-        self.inv_rest_volume = 1.0 / self.muscle.braid().gas_volume(&self.now.held.posture).at_least(1.0e-12);
+        self.inv_rest_volume =
+            1.0 / self.muscle.braid().gas_volume(&self.now.at_stroke.posture).at_least(1.0e-12);
         self.taut_n = TAUT * table.blocked_force.newtons().abs();
         Ok(())
     }
@@ -168,12 +169,18 @@ impl Model {
         let pressure = Pressure::from_pascals(pressure_pa);
         let newtons = if chain.is_empty() {
             now.context.direction = direction;
-            single::pose(muscle, &mut now.held, Length::from_metres(motion.stroke), pressure, direction)
+            single_precision::pose(
+                muscle,
+                &mut now.at_stroke,
+                Length::from_metres(motion.stroke),
+                pressure,
+                direction,
+            )
         } else {
-            single::update(muscle, now, motion, pressure);
+            single_precision::update(muscle, now, motion, pressure);
             now.context.direction = direction;
-            single::step(chain, &now.context);
-            muscle.pull(now.context.force() + single::effects(chain, &now.context))
+            single_precision::step(chain, &now.context);
+            muscle.pull(now.context.force() + single_precision::effects(chain, &now.context))
         };
         newtons.newtons()
     }
@@ -186,21 +193,21 @@ impl Model {
     /// `∂F/∂P`, N/Pa, and `∂F/∂x`, N/m, of the base model at this tick's stroke.
     pub fn slopes(&self, pressure_pa: f32) -> (f32, f32) {
         let pressure = Pressure::from_pascals(pressure_pa);
-        let parts = single::parts(&self.muscle, &self.now.held, pressure);
-        let by_stroke = single::stroke_slope(&self.muscle, &self.now.held, pressure);
+        let parts = single_precision::parts(&self.muscle, &self.now.at_stroke, pressure);
+        let by_stroke = single_precision::stroke_slope(&self.muscle, &self.now.at_stroke, pressure);
         (parts.slope(self.now.context.direction), by_stroke)
     }
 
     /// The muscle at this tick's stroke.
-    pub fn held(&self) -> &AtStroke<f32> {
-        &self.now.held
+    pub fn at_stroke(&self) -> &AtStroke<f32> {
+        &self.now.at_stroke
     }
 
     /// The air in it at this tick's stroke and a speed of contraction, m/s: its volume grows by the braid's area times the
     /// stroke.
     pub fn air(&self, speed_m_per_s: f32) -> Air {
         let Self { muscle, now, inv_rest_volume, .. } = self;
-        let posture = &now.held.posture;
+        let posture = &now.at_stroke.posture;
         let volume = muscle.braid().gas_volume(posture).at_least(0.1 / inv_rest_volume);
         Air { fill: volume * inv_rest_volume, widening_per_s: posture.area * speed_m_per_s / volume }
     }
@@ -223,9 +230,16 @@ impl Model {
         let direction = now.context.direction;
         now.context.direction = share * direction;
         let found = if chain.is_empty() {
-            single::pressure_for(muscle, &now.held, now.context.direction, force, guess, &search)
+            single_precision::pressure_for(
+                muscle,
+                &now.at_stroke,
+                now.context.direction,
+                force,
+                guess,
+                &search,
+            )
         } else {
-            single::pressure_with(muscle, chain, now, force, guess, &search)
+            single_precision::pressure_with(muscle, chain, now, force, guess, &search)
         };
         now.context.direction = direction;
         self.slope = found.slope;
@@ -240,7 +254,7 @@ impl Model {
     /// `P = F / g`, the ideal braid alone, `g = (3L² − B²)/(4πN²)`; the highest pressure past the neutral angle.
     pub fn gaylord_pressure(&self, force_n: f32) -> (f32, bool) {
         let high = self.muscle.max_pressure().pascals();
-        let area = self.now.held.posture.area;
+        let area = self.now.at_stroke.posture.area;
         if area <= 0.0 {
             return (high, false);
         }

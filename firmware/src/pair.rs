@@ -13,7 +13,7 @@ use model_core::link::messages::Refusal;
 use model_core::link::settings::Joint;
 use model_core::muscle::AtStroke;
 use model_core::scalar::Scalar;
-use model_core::single;
+use model_core::single_precision;
 use model_core::units::{Force, Length, Pressure};
 
 use crate::modes::{Integral, Model};
@@ -73,8 +73,12 @@ impl PairState {
     /// Begins anew, at the force that both muscles have at their pressures: below zero where they are slack.
     pub fn begin(&mut self, arms: [Arm<'_>; 2]) {
         let quasi = arms.map(|arm| {
-            single::parts(&arm.model.muscle, arm.model.held(), Pressure::from_pascals(arm.pressure_pa))
-                .quasi()
+            single_precision::parts(
+                &arm.model.muscle,
+                arm.model.at_stroke(),
+                Pressure::from_pascals(arm.pressure_pa),
+            )
+            .quasi()
         });
         *self = Self { integral: Integral::default(), tension_n: quasi[0].min(quasi[1]) };
     }
@@ -88,15 +92,18 @@ impl PairState {
         let (mut stiffness, mut gain, mut quickest) = (0.0, 0.0, f32::MAX);
         let most_n = arms.map(|arm| {
             let Model { muscle, .. } = arm.model;
-            let held = arm.model.held();
-            let resists =
-                |pascals: f32| -single::stroke_slope(muscle, held, Pressure::from_pascals(pascals)) * r * r;
+            let held = arm.model.at_stroke();
+            let resists = |pascals: f32| {
+                -single_precision::stroke_slope(muscle, held, Pressure::from_pascals(pascals)) * r * r
+            };
             let (here, there) = (resists(arm.pressure_pa), resists(arm.pressure_pa + PROBE_PA));
-            let rise = single::parts(muscle, held, Pressure::from_pascals(arm.pressure_pa)).pressure_slope;
+            let rise =
+                single_precision::parts(muscle, held, Pressure::from_pascals(arm.pressure_pa)).pressure_slope;
             stiffness += here;
             gain += (there - here) / (PROBE_PA * rise);
             quickest = (QUICKEST_PA * rise).min(quickest);
-            single::parts(muscle, held, Pressure::from_pascals(arm.high_pa)).force(arm.model.direction())
+            single_precision::parts(muscle, held, Pressure::from_pascals(arm.high_pa))
+                .force(arm.model.direction())
         });
         let error = posed.angle_rad - posed.measured_rad;
         self.integral.step(joint.integral_nm_per_rad_s * error, joint.torque_limit_nm, saturation);
@@ -128,7 +135,7 @@ fn taut(arms: [Arm<'_>; 2]) -> f32 {
 /// What depends on a muscle's length alone, where the pulley has turned by `turn`, m, of its circumference.
 fn held_at(joint: &Joint, arm: Arm<'_>, turn: f32) -> AtStroke<f32> {
     let mut held = AtStroke::NONE;
-    single::hold(&arm.model.muscle, &mut held, Length::from_metres(joint.rest_stroke_m + turn));
+    single_precision::hold(&arm.model.muscle, &mut held, Length::from_metres(joint.rest_stroke_m + turn));
     held
 }
 
@@ -136,7 +143,7 @@ fn held_at(joint: &Joint, arm: Arm<'_>, turn: f32) -> AtStroke<f32> {
 fn tensions(joint: &Joint, arms: [Arm<'_>; 2], angle_rad: f32) -> Option<(f32, f32)> {
     let most = |arm: Arm<'_>, turn: f32| {
         let held = held_at(joint, arm, turn);
-        single::parts(&arm.model.muscle, &held, Pressure::from_pascals(arm.high_pa)).quasi()
+        single_precision::parts(&arm.model.muscle, &held, Pressure::from_pascals(arm.high_pa)).quasi()
     };
     let turn = joint.radius_m * angle_rad;
     let (low, high) = (taut(arms), most(arms[0], turn).min(most(arms[1], -turn)));
@@ -150,8 +157,8 @@ fn stiffness_at(joint: &Joint, arms: [Arm<'_>; 2], angle_rad: f32, tension_n: f3
         let (muscle, held) = (&arm.model.muscle, held_at(joint, arm, turn));
         let guess = Pressure::from_pascals(0.5 * arm.high_pa);
         let force = Force::from_newtons(tension_n);
-        let found = single::pressure_for(muscle, &held, 0.0, force, guess, &muscle.search());
-        -single::stroke_slope(muscle, &held, found.pressure)
+        let found = single_precision::pressure_for(muscle, &held, 0.0, force, guess, &muscle.search());
+        -single_precision::stroke_slope(muscle, &held, found.pressure)
     };
     joint.radius_m * joint.radius_m * (resists(arms[0], turn) + resists(arms[1], -turn))
 }

@@ -36,8 +36,8 @@
 //!     command = muscle.pressure_with(demanded, &chain, &moment, command, &muscle.search()).pressure;
 //! }
 //! // A tenth of the time constant has gone by: most of the over-stress is still there, and costs pressure.
-//! let held = muscle.held(Length::from_metres(1.0e-3_f32));
-//! let settled = muscle.pressure_for(demanded, &held, 1.0, command, &muscle.search());
+//! let at_stroke = muscle.at_stroke(Length::from_metres(1.0e-3_f32));
+//! let settled = muscle.pressure_for(demanded, &at_stroke, 1.0, command, &muscle.search());
 //! let more = command.pascals() - settled.pressure.pascals();
 //! assert!(more > 1.0e3 && more < 30.0e3, "{more} Pa");
 //! ```

@@ -157,7 +157,7 @@ fn judge<T: Scalar>(miss: T, slope: T, tolerance: T) -> Reach {
 /// The base model at one stroke and direction: one product of two cubics in each piece.
 struct Base<'a, T> {
     muscle: &'a Muscle<T>,
-    held: &'a AtStroke<T>,
+    at_stroke: &'a AtStroke<T>,
     direction: T,
     quasi: Cubic<T>,
     grip: Cubic<T>,
@@ -171,9 +171,9 @@ struct Base<'a, T> {
 impl<'a, T: Scalar> Base<'a, T> {
     /// Without cubics yet; they are put together where the search enters.
     #[inline(always)]
-    fn new(muscle: &'a Muscle<T>, held: &'a AtStroke<T>, direction: T) -> Self {
+    fn new(muscle: &'a Muscle<T>, at_stroke: &'a AtStroke<T>, direction: T) -> Self {
         let (quasi, grip) = ([T::ZERO; 4], [T::ZERO; 4]);
-        Self { muscle, held, direction, quasi, grip, origin: T::ZERO, from: T::ZERO, to: T::ZERO }
+        Self { muscle, at_stroke, direction, quasi, grip, origin: T::ZERO, from: T::ZERO, to: T::ZERO }
     }
 }
 
@@ -184,7 +184,7 @@ impl<T: Scalar> Curve<T> for Base<'_, T> {
         let index = muscle.nodes.find(p);
         (self.from, self.to) = muscle.nodes.bounds(index);
         let Piece { origin, elastic: e, friction } = &muscle.pieces[index];
-        let (c, area, s) = (&self.held.columns, self.held.posture.area, -self.direction);
+        let (c, area, s) = (&self.at_stroke.columns, self.at_stroke.posture.area, -self.direction);
         let sum = |n: usize, of: T| of + c[0] * e[0][n] + c[1] * e[1][n] + c[2] * e[2][n] + c[3] * e[3][n];
         let steady = (*origin - muscle.deadband) * area;
         self.quasi = [sum(0, steady), sum(1, area), sum(2, T::ZERO), sum(3, T::ZERO)];
@@ -214,7 +214,7 @@ impl<T: Scalar> Curve<T> for Base<'_, T> {
 /// The base model and effects that change with pressure.
 struct Whole<'a, T> {
     muscle: &'a Muscle<T>,
-    held: &'a AtStroke<T>,
+    at_stroke: &'a AtStroke<T>,
     slopes: &'a StrokeSlopes<T>,
     chain: &'a Chain<T>,
     /// The present moment, moved to the pressures that are tried.
@@ -236,7 +236,7 @@ impl<T: Scalar> Curve<T> for Whole<'_, T> {
     fn force_and_slope(&mut self, p: T) -> (T, T) {
         let direction = self.context.direction;
         let pressure = Pressure::from_pascals(p);
-        let parts = self.muscle.move_to(&mut self.context, self.held, self.slopes, pressure);
+        let parts = self.muscle.move_to(&mut self.context, self.at_stroke, self.slopes, pressure);
         let extra = self.chain.force(&self.context);
         if let Some((p0, extra0)) = self.last
             && p != p0
@@ -265,12 +265,12 @@ impl<T: Scalar> Muscle<T> {
     pub fn pressure_for(
         &self,
         force: Force<T>,
-        held: &AtStroke<T>,
+        at_stroke: &AtStroke<T>,
         direction: T,
         guess: Pressure<T>,
         search: &Search<T>,
     ) -> Solution<T> {
-        solve(&mut Base::new(self, held, direction), force.si(), guess, search)
+        solve(&mut Base::new(self, at_stroke, direction), force.si(), guess, search)
     }
 
     /// The pressure for a demanded force with effects, at a moment to which `chain` has been stepped.
@@ -291,7 +291,7 @@ impl<T: Scalar> Muscle<T> {
             return self.pressure_by_search(force, chain, moment, guess, search);
         }
         let rest = Force::from_newtons(force.si() - chain.force(&moment.context));
-        self.pressure_for(rest, &moment.held, moment.context.direction, guess, search)
+        self.pressure_for(rest, &moment.at_stroke, moment.context.direction, guess, search)
     }
 
     /// The same where an effect's force depends on the pressure.
@@ -304,10 +304,10 @@ impl<T: Scalar> Muscle<T> {
         guess: Pressure<T>,
         search: &Search<T>,
     ) -> Solution<T> {
-        let Moment { held, slopes, context } = moment;
+        let Moment { at_stroke, slopes, context } = moment;
         let context = *context;
         let mut whole =
-            Whole { muscle: self, held, slopes, chain, context, last: None, effect_slope: T::ZERO };
+            Whole { muscle: self, at_stroke, slopes, chain, context, last: None, effect_slope: T::ZERO };
         solve(&mut whole, force.si(), guess, search)
     }
 }

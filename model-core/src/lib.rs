@@ -32,7 +32,7 @@ pub mod link;
 pub mod motion;
 pub mod muscle;
 pub mod scalar;
-pub mod single;
+pub mod single_precision;
 pub mod spline;
 pub mod table;
 pub mod units;

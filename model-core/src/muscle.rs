@@ -126,7 +126,7 @@ impl<T: Scalar> Muscle<T> {
 
     /// The muscle at one contraction stroke.
     #[inline(always)]
-    pub fn held(&self, stroke: Length<T>) -> AtStroke<T> {
+    pub fn at_stroke(&self, stroke: Length<T>) -> AtStroke<T> {
         let posture = self.braid.posture(stroke);
         let (z, x) = (posture.axial_strain, posture.radial_strain);
         let (a1, h1) = (posture.axial_area * z, posture.hoop_area * x);
@@ -151,28 +151,28 @@ impl<T: Scalar> Muscle<T> {
 
     /// The parts of the force at a held stroke and a pressure.
     #[inline]
-    pub fn parts(&self, held: &AtStroke<T>, pressure: Pressure<T>) -> Parts<T> {
-        self.parts_and_stiffness(held, &StrokeSlopes::default(), pressure).0
+    pub fn parts(&self, at_stroke: &AtStroke<T>, pressure: Pressure<T>) -> Parts<T> {
+        self.parts_and_stiffness(at_stroke, &StrokeSlopes::default(), pressure).0
     }
 
     /// The same, and `∂F_quasi/∂x`, N/m, from how the coefficients change with stroke.
     #[inline(always)]
     fn parts_and_stiffness(
         &self,
-        held: &AtStroke<T>,
+        at_stroke: &AtStroke<T>,
         slopes: &StrokeSlopes<T>,
         pressure: Pressure<T>,
     ) -> (Parts<T>, T) {
         let p = pressure.si();
         let (piece, u) = self.around(p);
         let corrected = p - self.deadband;
-        let area = held.posture.area;
+        let area = at_stroke.posture.area;
         let (mut elastic, mut pressure_slope) = (T::ZERO, area);
         let mut stiffness = corrected * slopes.area;
         let mut add = |k: usize| {
             let (value, slope) = spline::value_and_slope(&piece.elastic[k], u);
-            elastic += held.columns[k] * value;
-            pressure_slope += held.columns[k] * slope;
+            elastic += at_stroke.columns[k] * value;
+            pressure_slope += at_stroke.columns[k] * slope;
             stiffness += slopes.columns[k] * value;
         };
         add(0);
@@ -189,8 +189,13 @@ impl<T: Scalar> Muscle<T> {
     }
 
     /// `∂F_quasi/∂x` at a held stroke and a pressure, N/m; below zero, since a muscle pulls less the shorter it is.
-    pub fn stroke_slope(&self, held: &AtStroke<T>, slopes: &StrokeSlopes<T>, pressure: Pressure<T>) -> T {
-        self.parts_and_stiffness(held, slopes, pressure).1
+    pub fn stroke_slope(
+        &self,
+        at_stroke: &AtStroke<T>,
+        slopes: &StrokeSlopes<T>,
+        pressure: Pressure<T>,
+    ) -> T {
+        self.parts_and_stiffness(at_stroke, slopes, pressure).1
     }
 
     /// The force of the base model, without effects. `direction` is +1 while shortening, −1 while lengthening, 0 for the
@@ -249,8 +254,8 @@ impl<T: Scalar> Muscle<T> {
     pub fn moment(&self) -> Moment<T> {
         let mut moment = Moment::NONE;
         self.begin(&mut moment);
-        moment.held = self.held(Length::ZERO);
-        moment.slopes = self.slopes(&moment.held);
+        moment.at_stroke = self.at_stroke(Length::ZERO);
+        moment.slopes = self.slopes(&moment.at_stroke);
         moment
     }
 
@@ -268,16 +273,16 @@ impl<T: Scalar> Muscle<T> {
     /// Brings a moment to a motion and a pressure.
     #[inline]
     pub fn update(&self, moment: &mut Moment<T>, motion: &Motion<T>, pressure: Pressure<T>) {
-        moment.held = self.held(Length::from_metres(motion.stroke));
-        moment.slopes = self.slopes(&moment.held);
+        moment.at_stroke = self.at_stroke(Length::from_metres(motion.stroke));
+        moment.slopes = self.slopes(&moment.at_stroke);
         self.look(moment, motion, pressure);
     }
 
     /// The rest of [`Muscle::update`]: what effects look at, in a moment that has its shape and slopes already.
     #[inline]
     pub(crate) fn look(&self, moment: &mut Moment<T>, motion: &Motion<T>, pressure: Pressure<T>) {
-        let Moment { held, slopes, context } = moment;
-        let posture = &held.posture;
+        let Moment { at_stroke, slopes, context } = moment;
+        let posture = &at_stroke.posture;
         context.dt = motion.dt;
         context.time = motion.time;
         context.pressure_rate = motion.pressure_rate;
@@ -299,7 +304,7 @@ impl<T: Scalar> Muscle<T> {
         context.axial_area = posture.axial_area;
         context.hoop_area = posture.hoop_area;
         context.area = posture.area;
-        self.move_to(context, held, slopes, pressure);
+        self.move_to(context, at_stroke, slopes, pressure);
     }
 
     /// Moves a moment's context to another pressure than the measured one: what the force there would be.
@@ -307,11 +312,11 @@ impl<T: Scalar> Muscle<T> {
     pub fn move_to(
         &self,
         context: &mut Context<T>,
-        held: &AtStroke<T>,
+        at_stroke: &AtStroke<T>,
         slopes: &StrokeSlopes<T>,
         pressure: Pressure<T>,
     ) -> Parts<T> {
-        let (parts, stiffness) = self.parts_and_stiffness(held, slopes, pressure);
+        let (parts, stiffness) = self.parts_and_stiffness(at_stroke, slopes, pressure);
         context.pressure = pressure.si();
         context.corrected_pressure = pressure.si() - self.deadband;
         context.gaylord = parts.gaylord;
@@ -325,8 +330,8 @@ impl<T: Scalar> Muscle<T> {
 
     /// How the coefficients of pressure and of the `E_k` change with stroke.
     #[inline(always)]
-    pub fn slopes(&self, held: &AtStroke<T>) -> StrokeSlopes<T> {
-        let posture = &held.posture;
+    pub fn slopes(&self, at_stroke: &AtStroke<T>) -> StrokeSlopes<T> {
+        let posture = &at_stroke.posture;
         let slopes = self.braid.slopes(posture);
         let mut columns = [T::ZERO; MAX_ORDER];
         // c_k = A ε_z^k − H ε_x^k, so c_k′ = (A′ ε_z + k A ε_z′) ε_z^(k−1) − (H′ ε_x + k H ε_x′) ε_x^(k−1).

@@ -305,12 +305,12 @@ proptest! {
                     chain.step(c);
                 }
                 let now = contexts.last().expect("readings");
-                let held = muscle.held(Length::from_metres(now.stroke));
-                let slopes = muscle.slopes(&held);
-                let moment = Moment { held, slopes, context: *now };
+                let at_stroke = muscle.at_stroke(Length::from_metres(now.stroke));
+                let slopes = muscle.slopes(&at_stroke);
+                let moment = Moment { at_stroke, slopes, context: *now };
                 let force_at = |p: f64| {
                     let mut moved = *now;
-                    muscle.move_to(&mut moved, &held, &slopes, Pressure::from_pascals(p));
+                    muscle.move_to(&mut moved, &at_stroke, &slopes, Pressure::from_pascals(p));
                     moved.force() + chain.force(&moved)
                 };
                 // Only a force that rises with pressure has one pressure that belongs to it.
@@ -350,8 +350,8 @@ proptest! {
             chain.step(&c.cast());
         }
         let context = contexts.last().expect("readings").cast::<f32>();
-        let held = muscle.held(Length::from_metres(context.stroke));
-        let moment = Moment { slopes: muscle.slopes(&held), held, context };
+        let at_stroke = muscle.at_stroke(Length::from_metres(context.stroke));
+        let moment = Moment { slopes: muscle.slopes(&at_stroke), at_stroke, context };
         let found = muscle.pressure_with(
             Force::from_newtons(wanted), &chain, &moment, Pressure::from_kilopascals(300.0), &muscle.search(),
         );

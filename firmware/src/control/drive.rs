@@ -133,7 +133,7 @@ impl Controller {
         };
         let slope = match (settings.feed_forward, actuator.model.as_ref()) {
             (FeedForward::Table, Some(model)) => model.slope(),
-            (FeedForward::Gaylord, Some(model)) => model.held().posture.area,
+            (FeedForward::Gaylord, Some(model)) => model.at_stroke().posture.area,
             _ => 0.0,
         };
         let lookahead_pa = if slope > 0.0 { foreseen_n / slope } else { 0.0 };

@@ -12,7 +12,7 @@ use model_core::link::messages::{
 };
 use model_core::link::settings::Settings;
 use model_core::muscle::AtStroke;
-use model_core::single;
+use model_core::single_precision;
 use model_core::units::{Length, Pressure};
 
 use super::{Server, table_refusal};
@@ -212,8 +212,15 @@ impl<F: NorFlash> Service for Answers<'_, F> {
                 let muscle = &controller.model(request.side)?.muscle;
                 // As the control step does it, so that no other form of either is in the image.
                 let mut held = AtStroke::NONE;
-                let force = single::pose(muscle, &mut held, stroke, pressure, direction);
-                let found = single::pressure_for(muscle, &held, direction, force, pressure, &muscle.search());
+                let force = single_precision::pose(muscle, &mut held, stroke, pressure, direction);
+                let found = single_precision::pressure_for(
+                    muscle,
+                    &held,
+                    direction,
+                    force,
+                    pressure,
+                    &muscle.search(),
+                );
                 Some(Value { force_n: force.newtons(), pressure_pa: found.pressure.pascals() })
             });
             let value = value.ok_or(Refusal::NoTable(request.side))?;

@@ -82,9 +82,10 @@ fn deadband_in_use(shared: &Shared) -> Option<f32> {
         let muscle = &controller.model(Side::Agonist)?.muscle;
         let mut held = model_core::muscle::AtStroke::NONE;
         let (stroke, force) = (Default::default(), model_core::units::Force::from_newtons(10.0));
-        model_core::single::hold(muscle, &mut held, stroke);
+        model_core::single_precision::hold(muscle, &mut held, stroke);
         let guess = Pressure::from_kilopascals(100.0);
-        let found = model_core::single::pressure_for(muscle, &held, 0.0, force, guess, &muscle.search());
+        let found =
+            model_core::single_precision::pressure_for(muscle, &held, 0.0, force, guess, &muscle.search());
         Some(found.pressure.pascals())
     })
 }

@@ -5,18 +5,18 @@ use super::tests::{kept, open, settings_of, table, used};
 use super::*;
 use model_core::link::settings::Settings;
 
-/// Writes with a bad cell in each word in turn, until all words are good; `look` is reported whether the store said that it had succeeded.
+/// Writes with a bad cell in each word in turn, until all words are good; `inspect` learns whether the store said that it had succeeded.
 fn with_each_word_wrong(
     before: &MockFlash,
     operation: impl Fn(&mut Store<MockFlash>) -> bool,
-    look: impl Fn(&mut Store<MockFlash>, bool, usize),
+    inspect: impl Fn(&mut Store<MockFlash>, bool, usize),
 ) -> usize {
     for word in 0.. {
         let mut store = open(before.clone().wrong_at(word));
         let said = operation(&mut store);
         let flash = store.close();
         let written = flash.done;
-        look(&mut open(flash), said, word);
+        inspect(&mut open(flash), said, word);
         if written <= word {
             assert!(said, "without a bad cell it succeeds");
             return word;

@@ -44,7 +44,7 @@ pub(super) fn used(commits: u8) -> Store<MockFlash> {
 pub(super) fn cut_everywhere(
     before: &MockFlash,
     operation: impl Fn(&mut Store<MockFlash>) -> bool,
-    look: impl Fn(&mut Store<MockFlash>, usize),
+    inspect: impl Fn(&mut Store<MockFlash>, usize),
 ) -> usize {
     let mut cuts = 0;
     for tear in 0..3 {
@@ -59,7 +59,7 @@ pub(super) fn cut_everywhere(
                 break;
             }
             cuts += 1;
-            look(&mut open(flash.powered(usize::MAX, 0)), left);
+            inspect(&mut open(flash.powered(usize::MAX, 0)), left);
         }
     }
     cuts

@@ -59,17 +59,17 @@ pub fn sets(diagnosis: &Diagnosis) -> Vec<Vec<Hypothesis>> {
 
 fn set(missing: &Missing) -> Option<Vec<Hypothesis>> {
     let law = Candidate::from_name(&missing.effect)?;
-    let rivals: Vec<Candidate> =
+    let competitors: Vec<Candidate> =
         missing.confusable_with.iter().filter_map(|n| Candidate::from_name(n)).collect();
     // A probability of 1 would leave nothing to ask.
     let own = missing.probability.clamp(0.05, 0.95);
-    let others = rivals.len() as f64;
+    let others = competitors.len() as f64;
     let mut set = vec![Hypothesis {
         law,
-        weight: if rivals.is_empty() { 1.0 } else { own },
+        weight: if competitors.is_empty() { 1.0 } else { own },
         parameters: Some(missing.parameters.iter().map(|p| p.value).collect()),
     }];
-    set.extend(rivals.into_iter().map(|law| Hypothesis {
+    set.extend(competitors.into_iter().map(|law| Hypothesis {
         law,
         weight: (1.0 - own) / others,
         parameters: None,

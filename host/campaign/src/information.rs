@@ -240,10 +240,10 @@ impl<'a> Design<'a> {
             return DECIDED;
         }
         let Some(trace) = seen.traces.get(set).and_then(|t| t.get(of)) else { return 0.0 };
-        let Some(rival) = self.library.index(b.law).map(|e| &seen.places[e]) else { return 0.0 };
+        let Some(competitor) = self.library.index(b.law).map(|e| &seen.places[e]) else { return 0.0 };
         let m = self.table.len();
         let mut least = f64::INFINITY;
-        for shape in &rival.shapes {
+        for shape in &competitor.shapes {
             let keep: Vec<usize> =
                 (0..m).chain(shape.iter().copied().filter(|c| seen.peak[*c] > 0.0)).collect();
             let n = keep.len();

@@ -61,7 +61,7 @@ impl Reachability {
             )),
             Quantity::Force => {
                 let friction = self.table.friction.iter().copied().fold(0.0, f32::max);
-                let rest = self.muscle.held(Length::from_metres(0.0));
+                let rest = self.muscle.at_stroke(Length::from_metres(0.0));
                 let largest = self.muscle.parts(&rest, most).quasi() * (1.0 + friction);
                 (highest > largest).then(|| {
                     format!(
@@ -90,7 +90,7 @@ impl Reachability {
             && (tested.contraction_low - slack..=tested.contraction_high + slack).contains(&contraction);
         self.outside_tested += u64::from(!inside);
         if quantity == Quantity::Force && sample.setpoint.is_finite() {
-            let held = self.muscle.held(Length::from_metres(side.stroke_m));
+            let held = self.muscle.at_stroke(Length::from_metres(side.stroke_m));
             let force = Force::from_newtons(sample.setpoint);
             let found = self.muscle.pressure_for(force, &held, 0.0, self.guess, &self.muscle.search());
             self.guess = found.pressure;

@@ -1,10 +1,10 @@
-//! Learns from answered trials with known truths how often a name was right that the diagnosis believed in so much.
+//! Learns from answered trials with known truths how often a name was right at each model weight.
 //!
 //! ```text
 //! cargo run --release -p pam-diagnose --example calibrate_diagnosis -- SET…
 //! ```
 //! Each `SET` is a directory as `trials generate` and `trials answer` make it (`answers/ID.json`, `sealed/ID/truth.json`); use development
-//! sets only. Fits `logit p = A + B logit(belief) + C logit(explained)` by penalised maximum likelihood and prints the constants of
+//! sets only. Fits `logit p = A + B logit(model_weight) + C logit(explained)` by penalised maximum likelihood and prints the constants of
 //! `host/diagnose/src/criteria/uncertainty.rs`, with log score and calibration error found by leaving out every fifth trial in turn.
 
 use std::path::Path;
@@ -45,10 +45,13 @@ fn names(set: &Path, first_trial: usize) -> Vec<Name> {
             truth["effects"].as_array().into_iter().flatten().filter_map(|e| e["name"].as_str()).collect();
         let explained = 1.0 - answer["unexplained"]["share"].as_f64().unwrap_or(1.0);
         for m in answer["missing"].as_array().into_iter().flatten() {
-            let (Some(effect), Some(belief)) = (m["effect"].as_str(), m["belief"].as_f64()) else { continue };
+            let (Some(effect), Some(model_weight)) = (m["effect"].as_str(), m["model_weight"].as_f64())
+            else {
+                continue;
+            };
             found.push(Name {
                 trial: first_trial + trial,
-                features: [1.0, logit(belief), logit(explained)],
+                features: [1.0, logit(model_weight), logit(explained)],
                 right: hidden.contains(&effect),
             });
         }

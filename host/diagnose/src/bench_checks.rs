@@ -207,7 +207,7 @@ fn missing(judged: &Judged, share: f64) -> Missing {
     Missing {
         effect: info.name.into(),
         probability: CHECKED_PROBABILITY,
-        belief: CHECKED_PROBABILITY,
+        model_weight: CHECKED_PROBABILITY,
         share_explained: share,
         parameters,
         confusable_with: Vec::new(),

@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! cargo run --release -p pam-diagnose --example calibrate_diagnosis -- SET…
-//! logit p = A + B logit(belief) + C logit(explained)
+//! logit p = A + B logit(model_weight) + C logit(explained)
 //! ```
 
 use super::criteria::uncertainty::{CALIBRATION, CERTAINTY};
@@ -16,7 +16,7 @@ fn logit(x: f64) -> f64 {
 }
 
 /// The probability of a name with this model weight among its competitors, where all names together explain this share of the misfit above noise.
-pub(crate) fn probability(belief: f64, explained: f64) -> f64 {
+pub(crate) fn probability(model_weight: f64, explained: f64) -> f64 {
     let [a, b, c] = CALIBRATION;
-    1.0 / (1.0 + (-(a + b * logit(belief) + c * logit(explained))).exp())
+    1.0 / (1.0 + (-(a + b * logit(model_weight) + c * logit(explained))).exp())
 }

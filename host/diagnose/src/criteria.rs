@@ -8,7 +8,7 @@
 //! | `selection::SELECTION_FLOOR` | the base model, below which nothing is selected | blocked force |
 //! | `judgement::LACK_OF_FIT` | the base model with everything it admits, for the verdict | blocked force |
 //! | `candidates::LAW_ERROR` | a law in its sensitivities, as a penalty of its score | the law's own trace |
-//! | `selection::RIVAL_FLOOR` | a law, when two are compared by what they leave | the excess error |
+//! | `selection::COMPETITOR_FLOOR` | a law, when two are compared by what they leave | the excess error |
 //! | `uncertainty::LAW_DEVIATION` | a law in its parameters, for their intervals | the parameter |
 //!
 //! `cargo run -p pam-diagnose --example criteria` prints the page. The criteria of the motion stand with it, in `pam-data`.

@@ -119,7 +119,7 @@ fn settle(rows: &Rows, remarks: &mut Vec<Remark>) -> Result<Settled, Unjudgeable
 struct SelectionResult {
     library: Vec<Candidate>,
     selection: Selection,
-    held: HeldOut,
+    held_out: HeldOut,
     missing: Vec<Missing>,
 }
 
@@ -135,7 +135,7 @@ fn select(
     let library: Vec<Candidate> = everything.filter(|c| !known.settles(c, &options.given)).collect();
     let given: Vec<usize> =
         options.given.iter().filter_map(|law| library.iter().position(|c| c.is(*law))).collect();
-    let (selection, held) = if options.given.is_empty() {
+    let (selection, held_out) = if options.given.is_empty() {
         select_and_confirm(rows, &library, blocked, step)
     } else {
         known_effects::fitted(rows, &library, blocked, step, &given)
@@ -146,10 +146,10 @@ fn select(
     }
     let mut missing = missing(&selection, &library, &selection.rows);
     if !options.given.is_empty() {
-        known_effects::judge(&mut missing, &selection, &held);
+        known_effects::judge(&mut missing, &selection, &held_out);
     }
     remarks.extend(missing.iter().filter_map(implausible_size));
-    SelectionResult { library, selection, held, missing }
+    SelectionResult { library, selection, held_out, missing }
 }
 
 /// The error above the noise, and what became of it.
@@ -238,7 +238,9 @@ fn judge(selected: &SelectionResult, excess: &Excess, line: Option<&Line>) -> Ve
         // A periodic residual is no noise, even where repeats seem to explain it; nor is a residual larger than any instrument's noise.
         let steady = line.is_none_or(|l| l.share < LINE_UNEXPLAINED) && !excess.restless;
         if small && steady { Verdict::Consistent } else { Verdict::Unexplained }
-    } else if (excess.explained >= EXPLAINED || small) && removes_on_unseen(&selected.held, excess.admitted) {
+    } else if (excess.explained >= EXPLAINED || small)
+        && removes_on_unseen(&selected.held_out, excess.admitted)
+    {
         Verdict::Explained
     } else if excess.explained >= PARTLY_EXPLAINED || small {
         Verdict::PartlyExplained
@@ -248,9 +250,9 @@ fn judge(selected: &SelectionResult, excess: &Excess, line: Option<&Line>) -> Ve
 }
 
 /// Whether the effects remove most of the excess error on held-out rows, or leave no more than the model admits (N).
-fn removes_on_unseen(held: &HeldOut, admitted: f64) -> bool {
-    let excess = |rms: f64| (rms.powi(2) - held.noise_N.powi(2)).max(0.0);
-    let (before, after) = (excess(held.rms_before_N), excess(held.rms_after_N));
+fn removes_on_unseen(held_out: &HeldOut, admitted: f64) -> bool {
+    let excess = |rms: f64| (rms.powi(2) - held_out.noise_N.powi(2)).max(0.0);
+    let (before, after) = (excess(held_out.rms_before_N), excess(held_out.rms_after_N));
     after <= admitted.powi(2) || after <= (1.0 - EXPLAINED_UNSEEN) * before
 }
 
@@ -272,7 +274,7 @@ fn answer(
     remarks: Vec<Remark>,
 ) -> Diagnosis {
     let Measures { blocked, misfit, excess } = measures;
-    let SelectionResult { library, selection, held, missing } = selected;
+    let SelectionResult { library, selection, held_out, missing } = selected;
     let sigma = selection.noise.sigma;
     let consistent = verdict == Verdict::Consistent;
     let considered = considered(&selection, &library, &missing, sigma, blocked);
@@ -281,7 +283,7 @@ fn answer(
         effect: name(t.fit.candidate),
         rms_N: t.rms,
         p: t.p,
-        runners_up: t.rivals.iter().map(|r| (name(r.0), r.1)).collect(),
+        runners_up: t.competitors.iter().map(|r| (name(r.0), r.1)).collect(),
     });
     Diagnosis {
         muscle: options.muscle.clone(),
@@ -295,7 +297,7 @@ fn answer(
             share: if consistent { 0.0 } else { 1.0 - excess.explained },
             pattern: located.pattern,
         },
-        held_out: held,
+        held_out,
         next_experiment: None,
         considered,
         path: path.collect(),

@@ -5,7 +5,7 @@ use super::candidates::Candidate;
 use super::change_point;
 use super::criteria::judgement::{ABSURD_SIZE, DETECTION, DETECTION_ROWS, RELEVANT_SIZE};
 use super::criteria::selection::{
-    CONCEALED, FAMILY_ALPHA, LEAST_SCORE, LEAST_SHARE, MOST_REPORTED, REPORTED_RIVAL, SELECTION_FLOOR,
+    CONCEALED, FAMILY_ALPHA, LEAST_SCORE, LEAST_SHARE, MOST_REPORTED, REPORTED_COMPETITOR, SELECTION_FLOOR,
     STATIC_PEAK,
 };
 use super::intervals::deviations;
@@ -43,12 +43,12 @@ pub(crate) fn missing(selection: &Selection, library: &[Candidate], rows: &Rows)
                     outside_known_range: ParameterValue::is_outside(*v, p),
                 })
                 .collect();
-            let sum: f64 = 1.0 + t.rivals.iter().map(|r| r.1).sum::<f64>();
-            let belief = 1.0 / sum;
+            let sum: f64 = 1.0 + t.competitors.iter().map(|r| r.1).sum::<f64>();
+            let model_weight = 1.0 / sum;
             let confusable: Vec<String> = t
-                .rivals
+                .competitors
                 .iter()
-                .filter(|r| r.1 > REPORTED_RIVAL)
+                .filter(|r| r.1 > REPORTED_COMPETITOR)
                 .take(MOST_REPORTED)
                 .map(|r| library[r.0].name().to_owned())
                 .collect();
@@ -62,8 +62,8 @@ pub(crate) fn missing(selection: &Selection, library: &[Candidate], rows: &Rows)
                 .map(|shape| change_point::of(t.fit.shapes[shape], rows));
             Missing {
                 effect: info.name.into(),
-                probability: calibration::probability(belief, explained),
-                belief,
+                probability: calibration::probability(model_weight, explained),
+                model_weight,
                 share_explained: share,
                 parameters,
                 confusable_with: confusable,

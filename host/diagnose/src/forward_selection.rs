@@ -12,8 +12,8 @@ use super::criteria::baseline::{FIRST_DEVIATIONS, TABLE_ORDER};
 use super::criteria::candidates::LEAST_SIGMA;
 use super::criteria::selection::{
     ALIKE, ALONE_FLOOR, CONFUSABLE, EXCHANGE_LEAVES, FAMILY_ALPHA, FEWEST_INDEPENDENT, FIRST_STROKES,
-    FURTHER_SHARE, KEPT_GAIN, LEAST_EXCESS, LEAST_SCORE, LEAST_SCORE_ALONE, LEAST_SHARE, MOST_EXCLUDED,
-    MOST_RIVALS, MOST_SELECTED, NARROW_FLOOR, NARROW_PEAK, NARROW_SCORE, SELECTION_FLOOR, SHADOW,
+    FURTHER_SHARE, KEPT_GAIN, LEAST_EXCESS, LEAST_SCORE, LEAST_SCORE_ALONE, LEAST_SHARE, MOST_COMPETITORS,
+    MOST_EXCLUDED, MOST_SELECTED, NARROW_FLOOR, NARROW_PEAK, NARROW_SCORE, SELECTION_FLOOR, SHADOW,
 };
 use super::likelihood::Scale;
 use super::linear::energy;
@@ -21,7 +21,7 @@ use super::noise::{self, Noise};
 use super::remark::{Refusal, Remark};
 use super::rows::{ORDERS, Rows};
 use super::selection_step::{
-    JointFit, SelectedEffect, Selection, best_of_each, is_selectable, refit, rivals, scan_step,
+    JointFit, SelectedEffect, Selection, best_of_each, competitors, is_selectable, refit, scan_step,
 };
 
 /// Selects the effects that are missing. Candidates in `refused` are scored and may compete, but are not selected.
@@ -141,27 +141,31 @@ impl<'a> ForwardSelection<'a> {
         }
         let beside = Kind::Soft(winner.prior);
         let metric = baselines::fit(&self.rows, beside, &[]);
-        let rivals = rivals(&winner, &best, self.library, &self.rows, &scorer, &metric.span);
-        let open: Vec<String> =
-            rivals.iter().filter(|r| r.1 > CONFUSABLE).map(|r| self.library[r.0].name().to_owned()).collect();
-        if open.len() > MOST_RIVALS {
+        let competitors = competitors(&winner, &best, self.library, &self.rows, &scorer, &metric.span);
+        let open: Vec<String> = competitors
+            .iter()
+            .filter(|r| r.1 > CONFUSABLE)
+            .map(|r| self.library[r.0].name().to_owned())
+            .collect();
+        if open.len() > MOST_COMPETITORS {
             self.remarks.push(Remark::Refused {
                 effect: self.library[winner.candidate].name().to_owned(),
-                why: Refusal::Rivals { share: self.of_rest(&winner), others: open },
+                why: Refusal::Competitors { share: self.of_rest(&winner), others: open },
             });
             return ControlFlow::Break(());
         }
-        self.take(winner, p[at], rivals, metric);
+        self.take(winner, p[at], competitors, metric);
         ControlFlow::Continue(())
     }
 
     /// Whether a candidate may be judged at all.
     fn is_eligible(&self, t: &CandidateFit, scorer: &Scorer<'_>) -> bool {
-        let rival = |k: &SelectedEffect| k.rivals.iter().any(|r| r.0 == t.candidate && r.1 > CONFUSABLE);
+        let competitor =
+            |k: &SelectedEffect| k.competitors.iter().any(|r| r.0 == t.candidate && r.1 > CONFUSABLE);
         t.gain > 0.0
             && !self.chosen.iter().any(|c| c.candidate == t.candidate)
             && !self.excluded.contains(&t.candidate)
-            && !self.selected.iter().any(rival)
+            && !self.selected.iter().any(competitor)
             && is_selectable(t, self.library, &self.rows, scorer)
     }
 
@@ -188,8 +192,8 @@ impl<'a> ForwardSelection<'a> {
             return winner.clone();
         }
         let metric = baselines::fit(&self.rows, Kind::Soft(winner.prior), &[]);
-        let rivals = rivals(winner, best, self.library, &self.rows, scorer, &metric.span);
-        let alike = |t: &CandidateFit| rivals.iter().any(|r| r.0 == t.candidate && r.1 >= ALIKE);
+        let competitors = competitors(winner, best, self.library, &self.rows, scorer, &metric.span);
+        let alike = |t: &CandidateFit| competitors.iter().any(|r| r.0 == t.candidate && r.1 >= ALIKE);
         best.iter()
             .filter(|t| known(t) && alike(t) && self.is_eligible(t, scorer))
             .max_by(|a, b| a.score.total_cmp(&b.score))
@@ -247,7 +251,7 @@ impl<'a> ForwardSelection<'a> {
     }
 
     /// Refits all effects jointly with it. It is selected if it keeps most of its gain; else it is excluded.
-    fn take(&mut self, winner: CandidateFit, p: f64, rivals: Vec<(usize, f64, f64)>, metric: Baseline) {
+    fn take(&mut self, winner: CandidateFit, p: f64, competitors: Vec<(usize, f64, f64)>, metric: Baseline) {
         let name = self.library[winner.candidate].name();
         let beside = Kind::Soft(winner.prior);
         let chosen = self.chosen.iter().chain([&winner]).cloned().collect();
@@ -275,7 +279,13 @@ impl<'a> ForwardSelection<'a> {
         self.joined(joint);
         self.noise = Noise { sigma: self.noise.sigma, ..left };
         let share = winner.gain / self.excess_energy;
-        self.selected.push(SelectedEffect { fit: winner, p, share, rivals, rms: self.joint.rms(&self.rows) });
+        self.selected.push(SelectedEffect {
+            fit: winner,
+            p,
+            share,
+            competitors,
+            rms: self.joint.rms(&self.rows),
+        });
         if self.chosen.len() > 1 {
             self.exchange();
         }
@@ -309,8 +319,8 @@ impl<'a> ForwardSelection<'a> {
                 if refined.score > own + LEAST_SCORE && refined.before - refined.gain < EXCHANGE_LEAVES * mine
                 {
                     let selected = &mut self.selected[position];
-                    selected.rivals.retain(|r| r.0 != refined.candidate);
-                    selected.rivals.insert(0, (present, CONFUSABLE, 0.0));
+                    selected.competitors.retain(|r| r.0 != refined.candidate);
+                    selected.competitors.insert(0, (present, CONFUSABLE, 0.0));
                     selected.fit = refined.clone();
                     self.chosen[position] = refined;
                 }

@@ -16,7 +16,7 @@ use super::forward_selection::forward_selection;
 use super::likelihood::Scale;
 use super::linear::energy;
 use super::rows::Rows;
-use super::selection_step::{JointFit, SelectedEffect, Selection, refit, rivals, scan_step};
+use super::selection_step::{JointFit, SelectedEffect, Selection, competitors, refit, scan_step};
 use super::verdict::{HeldOut, Missing, Why};
 use super::why::UnseenError;
 use pam_data::error::{DataCode, Error, Result};
@@ -95,8 +95,8 @@ pub(super) fn fitted(
             .unwrap_or_else(|| forced(index, &scorer, library, rows));
         let kind = Kind::Soft(fit.prior);
         let metric = baselines::fit(rows, kind, &[]);
-        let mut rivals = rivals(&fit, &best, library, rows, &scorer, &metric.span);
-        rivals.retain(|r| !given.contains(&r.0));
+        let mut competitors = competitors(&fit, &best, library, rows, &scorer, &metric.span);
+        competitors.retain(|r| !given.contains(&r.0));
         if chosen.is_empty() {
             selection.excess_energy = (fit.before - noise_energy).max(LEAST_EXCESS * fit.before).max(1e-12);
         }
@@ -110,7 +110,7 @@ pub(super) fn fitted(
             fit,
             p,
             share,
-            rivals,
+            competitors,
             rms: selection.joint.rms(&selection.rows),
         });
     }

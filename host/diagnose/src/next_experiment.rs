@@ -7,7 +7,9 @@ use model_core::muscle::Muscle;
 use rayon::prelude::*;
 
 use self::menu::menu;
-use super::criteria::planning::{EXPECTED_NOISE, RIVAL_GRID, RIVAL_GRID_SEVERAL, WORTHWHILE_DIFFERENCE};
+use super::criteria::planning::{
+    COMPETITOR_GRID, COMPETITOR_GRID_SEVERAL, EXPECTED_NOISE, WORTHWHILE_DIFFERENCE,
+};
 use super::experiment::{Motion, Proposal, bench_check};
 use super::history::is_from_history;
 use super::isolability::tables;
@@ -47,7 +49,7 @@ pub fn next_experiment(
         return Ok(None);
     };
     let Some(law) = Candidate::from_name(&first.effect) else { return Ok(None) };
-    let rivals: Vec<Candidate> =
+    let competitors: Vec<Candidate> =
         first.confusable_with.iter().filter_map(|n| Candidate::from_name(n)).collect();
     let values: Vec<f64> = first.parameters.iter().map(|p| p.value).collect();
     let (amplitudes, shape) = values.split_at(law.amplitudes().len().min(values.len()));
@@ -60,14 +62,15 @@ pub fn next_experiment(
             let mine = trace(law, shape, amplitudes, &contexts);
             // The competitor takes its best shape and size: the remaining difference is what the experiment would show.
             let mut least = f64::INFINITY;
-            for rival in &rivals {
+            for competitor in &competitors {
                 let span = pam_fit::bench::Span::of(&contexts)?;
                 let mut best = f64::INFINITY;
-                for shape in
-                    rival.grid(if rival.shapes().len() < 2 { RIVAL_GRID } else { RIVAL_GRID_SEVERAL }, &span)
-                {
+                for shape in competitor.grid(
+                    if competitor.shapes().len() < 2 { COMPETITOR_GRID } else { COMPETITOR_GRID_SEVERAL },
+                    &span,
+                ) {
                     let mut with = basis.clone();
-                    for c in rival.columns(&contexts, &shape, &mut [0.0; MEMORY]) {
+                    for c in competitor.columns(&contexts, &shape, &mut [0.0; MEMORY]) {
                         if c.iter().all(|v| v.is_finite()) {
                             with.push(c);
                         }

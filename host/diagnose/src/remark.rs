@@ -73,7 +73,7 @@ pub enum Refusal {
     /// It acts in the first strokes of recordings only, where the state of this memory effect is not known.
     UnknownMemory(String),
     /// Too many others explain the same share, so that none is named.
-    Rivals {
+    Competitors {
         /// Share of the misfit that each explains.
         share: f64,
         /// Their names.
@@ -196,7 +196,7 @@ impl Remark {
     #[must_use]
     pub fn refuses(&self, name: &str) -> bool {
         match self {
-            Self::Refused { effect, why: Refusal::Rivals { others, .. } } => {
+            Self::Refused { effect, why: Refusal::Competitors { others, .. } } => {
                 effect == name || others.iter().any(|o| o == name)
             }
             Self::Refused { effect, why: Refusal::UnknownMemory(memory) } => effect == name || memory == name,
@@ -220,8 +220,8 @@ mod tests {
 
     #[test]
     fn a_remark_refuses_the_effect_it_is_about_and_those_it_was_confused_with() {
-        let rivals = Refusal::Rivals { share: 0.5, others: vec!["leak".into(), "inertia".into()] };
-        let remark = Remark::Refused { effect: "backlash".into(), why: rivals };
+        let competitors = Refusal::Competitors { share: 0.5, others: vec!["leak".into(), "inertia".into()] };
+        let remark = Remark::Refused { effect: "backlash".into(), why: competitors };
         assert!(remark.refuses("backlash") && remark.refuses("leak") && !remark.refuses("gravity"));
         let alone = Remark::Refused { effect: "gauge-gain".into(), why: Refusal::SlowDrift };
         let uncertain = Remark::Refused { effect: "leak".into(), why: Refusal::UncertainSize(3.0) };

@@ -7,8 +7,9 @@ use super::candidate_fit::{self, CandidateFit};
 use super::candidate_scoring::Scorer;
 use super::candidates::Candidate;
 use super::criteria::selection::{
-    CONCEALED, LARGEST_PEAK, LEAST_SHARE, NEGLIGIBLE_RIVAL, PARALLEL, REFINED, RIVAL_COST, RIVAL_FLOOR,
-    RIVAL_SHARPNESS, SELECTION_FLOOR, SIGN_FLIPS, STATIC_MOVED, STATIC_PEAK, TWIN_OF_TABLES, WORSE,
+    COMPETITOR_COST, COMPETITOR_FLOOR, COMPETITOR_SHARPNESS, CONCEALED, LARGEST_PEAK, LEAST_SHARE,
+    NEGLIGIBLE_COMPETITOR, PARALLEL, REFINED, SELECTION_FLOOR, SIGN_FLIPS, STATIC_MOVED, STATIC_PEAK,
+    TWIN_OF_TABLES, WORSE,
 };
 use super::likelihood::Scale;
 use super::linear::{Sign, add_scaled, energy};
@@ -26,7 +27,7 @@ pub(crate) struct SelectedEffect {
     /// Share of all misfit above noise.
     pub share: f64,
     /// Competitors: candidate, weight against the winner (1), cosine with it.
-    pub rivals: Vec<(usize, f64, f64)>,
+    pub competitors: Vec<(usize, f64, f64)>,
     /// Rms after it, N.
     pub rms: f64,
 }
@@ -219,7 +220,7 @@ fn is_visible_beyond_tables(
 
 /// The weight of each competitor against the winner, from what each leaves of the misfit above noise where the bladder differs between
 /// pressures as much as it does beside the winner.
-pub(crate) fn rivals(
+pub(crate) fn competitors(
     winner: &CandidateFit,
     best: &[CandidateFit],
     library: &[Candidate],
@@ -234,20 +235,21 @@ pub(crate) fn rivals(
     let noise_energy = scale.sigma * scale.sigma * scale.weight;
     let excess = |e: f64| (e - noise_energy).max(0.0);
     let (own_left, before) = scorer.left_under(winner, library, rows, winner.prior);
-    let floor = RIVAL_FLOOR * excess(before) + noise_energy * (2.0 / scale.independent.max(2.0)).sqrt();
-    let mut rivals: Vec<(usize, f64, f64)> = best
+    let floor = COMPETITOR_FLOOR * excess(before) + noise_energy * (2.0 / scale.independent.max(2.0)).sqrt();
+    let mut competitors: Vec<(usize, f64, f64)> = best
         .par_iter()
         .filter(|t| t.candidate != winner.candidate && t.gain > 0.0)
         .map(|t| {
             let (left, _) = scorer.left_under(t, library, rows, winner.prior);
             let worse = ((excess(left) + floor) / (excess(own_left) + floor)).ln();
-            let weight =
-                (-RIVAL_SHARPNESS * worse - RIVAL_COST * (numbers(t) - numbers(winner))).min(0.0).exp();
+            let weight = (-COMPETITOR_SHARPNESS * worse - COMPETITOR_COST * (numbers(t) - numbers(winner)))
+                .min(0.0)
+                .exp();
             let c = cosine(&mine, &candidate_fit::projected_trace(t, library, rows, span));
             (t.candidate, weight, c)
         })
         .collect();
-    rivals.sort_by(|a, b| b.1.total_cmp(&a.1));
-    rivals.retain(|r| r.1 > NEGLIGIBLE_RIVAL || r.2.abs() > PARALLEL);
-    rivals
+    competitors.sort_by(|a, b| b.1.total_cmp(&a.1));
+    competitors.retain(|r| r.1 > NEGLIGIBLE_COMPETITOR || r.2.abs() > PARALLEL);
+    competitors
 }

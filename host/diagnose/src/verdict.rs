@@ -66,7 +66,7 @@ pub struct Missing {
     /// How probable this name is: its model weight, calibrated where truths are known.
     pub probability: f64,
     /// Its weight among its competitors, before calibration.
-    pub belief: f64,
+    pub model_weight: f64,
     /// Share of the misfit's energy above noise that it explains.
     pub share_explained: f64,
     /// Its parameters.

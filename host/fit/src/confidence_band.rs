@@ -64,7 +64,7 @@ impl ConfidenceBand {
     /// friction-free force), N, from the uncertainty of the table's parameters.
     #[must_use]
     pub fn std(&self, pressure: f64, stroke: f64, direction: f64) -> f64 {
-        let held = self.muscle.held(Length::from_metres(stroke));
+        let held = self.muscle.at_stroke(Length::from_metres(stroke));
         let parts = self.muscle.parts(&held, Pressure::from_pascals(pressure));
         let phi = self.basis.at(pressure);
         let grip = 1.0 - parts.friction * direction;

@@ -111,7 +111,7 @@ fn inverse(table: &MuscleTable) -> Option<String> {
     let (mut pulling, mut lost) = (0_usize, Vec::new());
     for i in 0..=STEPS {
         let contraction = between(t.contraction_low, t.contraction_high, i);
-        let held = muscle.held(Length::from_metres(contraction * l0));
+        let held = muscle.at_stroke(Length::from_metres(contraction * l0));
         for j in 0..=STEPS {
             let pressure = between(t.pressure_low.pascals(), t.pressure_high.pascals(), j);
             let parts = muscle.parts(&held, Pressure::from_pascals(pressure));

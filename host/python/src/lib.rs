@@ -445,7 +445,7 @@ impl Table {
         let model = Model::<f64>::build(&self.0.table).map_err(|e| wrong(e.to_string()))?;
         let search = model.search();
         let solve = |f: f64, x: f64, s: f64| {
-            let held = model.held(Length::from_metres(x));
+            let held = model.at_stroke(Length::from_metres(x));
             let found = model.pressure_for(Force::from_newtons(f), &held, s, Pressure::ZERO, &search);
             if found.reach == Reach::Reached { found.pressure.pascals() } else { f64::NAN }
         };

@@ -407,13 +407,13 @@ fn looked_at(d: &Diagnosis) -> Section {
             &["selected", "residual after it (N)", "p (chance)", "next best"],
         );
         for step in &d.path {
-            let rivals: Vec<String> =
+            let competitors: Vec<String> =
                 step.runners_up.iter().take(3).map(|(name, _)| format!("`{name}`")).collect();
             table.row([
                 format!("`{}`", step.effect),
                 figures(step.rms_N, 3),
                 figures(step.p, 2),
-                rivals.join(", "),
+                competitors.join(", "),
             ]);
         }
         section.table(table);

@@ -13,7 +13,7 @@ proptest! {
         let m = muscle();
         let stroke = Length::from_millimetres(mm);
         let force = m.force(Pressure::from_pascals(p), stroke, f64::from(s));
-        let found = m.pressure_for(force, &m.held(stroke), f64::from(s), Pressure::from_pascals(guess), &m.search());
+        let found = m.pressure_for(force, &m.at_stroke(stroke), f64::from(s), Pressure::from_pascals(guess), &m.search());
         prop_assert_eq!(found.reach, Reach::Reached);
         prop_assert!((found.pressure.pascals() - p).abs() < 2.0, "{:?} for {}", found, p);
     }
@@ -21,8 +21,8 @@ proptest! {
     #[test]
     fn in_single_precision_it_ends_and_says_what_it_found(f in -1.0e3..1.0e3_f32, mm in -5.0..20.0_f32, s in -1..=1_i32, guess in -1e6..1e6_f32) {
         let m = Muscle::<f32>::build(&table::example()).expect("a valid table");
-        let held = m.held(Length::from_millimetres(mm));
-        let found = m.pressure_for(Force::from_newtons(f), &held, s as f32, Pressure::from_pascals(guess), &m.search());
+        let at_stroke = m.at_stroke(Length::from_millimetres(mm));
+        let found = m.pressure_for(Force::from_newtons(f), &at_stroke, s as f32, Pressure::from_pascals(guess), &m.search());
         prop_assert!(found.pressure.pascals() >= 0.0 && found.pressure <= m.max_pressure());
         prop_assert!(found.steps <= MAX_STEPS);
     }
@@ -50,15 +50,15 @@ proptest! {
         table in wild(), mm in -0.5..4.0_f64, s in -1.0..=1.0_f64, wanted in -100.0..400.0_f64, guess in 0.0..600.0e3_f64,
     ) {
         let m = Muscle::<f64>::build(&table).expect("it passes its check");
-        let held = m.held(Length::from_millimetres(mm));
-        let at = |p: Pressure<f64>| m.parts(&held, p).force(s);
+        let at_stroke = m.at_stroke(Length::from_millimetres(mm));
+        let at = |p: Pressure<f64>| m.parts(&at_stroke, p).force(s);
         let search = m.search();
-        let found = m.pressure_for(Force::from_newtons(wanted), &held, s, Pressure::from_pascals(guess), &search);
+        let found = m.pressure_for(Force::from_newtons(wanted), &at_stroke, s, Pressure::from_pascals(guess), &search);
         let miss = at(found.pressure) - wanted;
         match found.reach {
             // The slope that is reported is that of the last step; on a bend it differs from the one at the answer.
             Reach::Reached => {
-                let slope = m.parts(&held, found.pressure).slope(s).abs().max(found.slope.abs());
+                let slope = m.parts(&at_stroke, found.pressure).slope(s).abs().max(found.slope.abs());
                 prop_assert!(miss.abs() <= 2.0 * slope + 1e-6, "{found:?} misses by {miss} N");
             }
             Reach::BeyondBlockedForce => prop_assert!(miss < 0.0 && found.pressure == search.high, "{found:?}"),
@@ -75,7 +75,7 @@ fn from_five_kilopascals_away_three_steps_are_enough() {
         let stroke = Length::from_millimetres(1.0);
         let force = m.force(Pressure::from_kilopascals(kpa), stroke, 1.0);
         let guess = Pressure::from_kilopascals(kpa + 5.0);
-        let found = m.pressure_for(force, &m.held(stroke), 1.0, guess, &m.search());
+        let found = m.pressure_for(force, &m.at_stroke(stroke), 1.0, guess, &m.search());
         assert!(found.steps <= 3, "{} steps at {kpa} kPa", found.steps);
     }
 }
@@ -83,16 +83,16 @@ fn from_five_kilopascals_away_three_steps_are_enough() {
 #[test]
 fn what_is_out_of_reach_is_said() {
     let m = muscle();
-    let held = m.held(Length::ZERO);
-    let at = |n| m.pressure_for(Force::from_newtons(n), &held, 0.0, Pressure::ZERO, &m.search());
+    let at_stroke = m.at_stroke(Length::ZERO);
+    let at = |n| m.pressure_for(Force::from_newtons(n), &at_stroke, 0.0, Pressure::ZERO, &m.search());
     assert_eq!(at(1.0e4).reach, Reach::BeyondBlockedForce);
     assert_eq!(at(1.0e4).pressure, m.max_pressure());
     assert_eq!(at(-1.0e4).reach, Reach::BelowDeadband);
     assert_eq!(at(-1.0e4).pressure, Pressure::ZERO);
-    let past_neutral = m.held(Length::from_millimetres(30.0));
+    let past_neutral = m.at_stroke(Length::from_millimetres(30.0));
     let found = m.pressure_for(Force::from_newtons(50.0), &past_neutral, 0.0, Pressure::ZERO, &m.search());
     assert_eq!(found.reach, Reach::NotRising);
-    let nan = m.pressure_for(Force::from_newtons(f64::NAN), &held, 0.0, Pressure::ZERO, &m.search());
+    let nan = m.pressure_for(Force::from_newtons(f64::NAN), &at_stroke, 0.0, Pressure::ZERO, &m.search());
     assert_ne!(nan.reach, Reach::Reached);
     assert!(nan.pressure.is_finite());
 }
@@ -106,12 +106,12 @@ fn the_pressure_is_smooth_where_one_piece_of_the_table_ends() {
     let mut compared = 0;
     for node in &table.nodes[1..table.nodes.len() - 1] {
         for (mm, s) in [(0.0, 1.0), (0.7, -1.0), (1.4, 1.0)] {
-            let held = m.held(Length::from_millimetres(mm));
+            let at_stroke = m.at_stroke(Length::from_millimetres(mm));
             let node = Pressure::from_pascals(f64::from(*node));
-            let parts = m.parts(&held, node);
+            let parts = m.parts(&at_stroke, node);
             let step = 100.0 * parts.slope(s);
             let at = |wanted: f64| {
-                let found = m.pressure_for(Force::from_newtons(wanted), &held, s, node, &search);
+                let found = m.pressure_for(Force::from_newtons(wanted), &at_stroke, s, node, &search);
                 assert_eq!(found.reach, Reach::Reached, "{wanted} N at {mm} mm");
                 found.pressure.pascals()
             };

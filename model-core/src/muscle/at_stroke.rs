@@ -27,7 +27,7 @@ pub struct StrokeSlopes<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment<T> {
     /// The muscle at the measured stroke.
-    pub held: AtStroke<T>,
+    pub at_stroke: AtStroke<T>,
     /// How that changes with stroke.
     pub slopes: StrokeSlopes<T>,
     /// What effects look at.
@@ -42,7 +42,7 @@ impl<T: Scalar> AtStroke<T> {
 impl<T: Scalar> Moment<T> {
     /// All zeros, for a place that is not filled yet.
     pub const NONE: Self = Self {
-        held: AtStroke::NONE,
+        at_stroke: AtStroke::NONE,
         slopes: StrokeSlopes { area: T::ZERO, columns: [T::ZERO; MAX_ORDER] },
         context: Context::NONE,
     };

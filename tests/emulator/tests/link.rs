@@ -155,7 +155,8 @@ fn host_and_target_compute_the_same_bits() {
                 let stroke = Length::from_metres(point.stroke_m);
                 let s = f32::from(direction);
                 let force = muscle.force(pressure, stroke, s);
-                let found = muscle.pressure_for(force, &muscle.held(stroke), s, pressure, &muscle.search());
+                let found =
+                    muscle.pressure_for(force, &muscle.at_stroke(stroke), s, pressure, &muscle.search());
                 assert_eq!(value.force_n.to_bits(), force.newtons().to_bits(), "force at {point:?}");
                 assert_eq!(
                     value.pressure_pa.to_bits(),

@@ -57,7 +57,8 @@ fn answers_are_whole_while_control_steps_interrupt_their_making() {
             let (pressure, stroke) =
                 (Pressure::from_pascals(point.pressure_pa), Length::from_metres(point.stroke_m));
             let force = muscle.force(pressure, stroke, 1.0);
-            let found = muscle.pressure_for(force, &muscle.held(stroke), 1.0, pressure, &muscle.search());
+            let found =
+                muscle.pressure_for(force, &muscle.at_stroke(stroke), 1.0, pressure, &muscle.search());
             [force.newtons().to_bits(), found.pressure.pascals().to_bits()]
         })
         .collect();

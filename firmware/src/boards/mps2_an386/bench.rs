@@ -58,13 +58,13 @@ pub struct Bench {
     /// Whether the bench has been told to start from its initial state.
     started: bool,
     buffer: [u8; ANSWER],
-    held: usize,
+    filled: usize,
 }
 
 impl Bench {
     /// The bench behind a UART.
     pub const fn new(uart: &'static Uart) -> Self {
-        Self { uart, tick: 0, started: false, buffer: [0; ANSWER], held: 0 }
+        Self { uart, tick: 0, started: false, buffer: [0; ANSWER], filled: 0 }
     }
 
     fn request(&self, command: &Command, setpoint: f32) -> [u8; REQUEST] {
@@ -106,10 +106,10 @@ impl Bench {
     /// Waits for the answer to this tick, passing over anything else.
     async fn wait(&mut self) -> Said {
         loop {
-            while self.held < ANSWER {
-                let room = &mut self.buffer[self.held..];
+            while self.filled < ANSWER {
+                let room = &mut self.buffer[self.filled..];
                 let Ok(count) = Receiver(self.uart).read(room).await;
-                self.held += count;
+                self.filled += count;
             }
             let whole = self.is_whole();
             let found = if whole { self.answer() } else { None };
@@ -120,7 +120,7 @@ impl Bench {
                 self.buffer[1..].iter().position(|&b| b == ANSWER_SYNC).map_or(ANSWER, |at| at + 1)
             };
             self.buffer.copy_within(next.., 0);
-            self.held = ANSWER - next;
+            self.filled = ANSWER - next;
             if let Some(said) = found {
                 return said;
             }
@@ -128,7 +128,7 @@ impl Bench {
     }
 
     /// Whether a bench has been connected here: polled every few ticks, without waiting.
-    fn look(&mut self) -> bool {
+    fn poll_connection(&mut self) -> bool {
         if poll_once(self.wait()).is_ready() {
             self.started = true;
             self.tick = self.tick.wrapping_add(1);
@@ -153,7 +153,7 @@ impl Bench {
             Either::Second(()) => {
                 // The same tick is requested again: if only the answer was lost, nothing advances twice.
                 self.uart.discard();
-                self.held = 0;
+                self.filled = 0;
                 None
             }
         }
@@ -182,7 +182,7 @@ impl Plant for Benches {
         let step_us = self.stepped_at.elapsed().as_micros() as u32 as f32;
         let first = self.first.exchange(&outputs.sides[0], outputs.setpoint).await;
         let mut second = None;
-        if self.second.started || self.second.look() {
+        if self.second.started || self.second.poll_connection() {
             second = self.second.exchange(&outputs.sides[1], 0.0).await;
         } else if self.until_asked == 0 {
             self.until_asked = LOOK_EVERY;

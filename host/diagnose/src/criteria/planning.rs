@@ -15,9 +15,9 @@ pam_data::criteria! {
     /// Powers of pressure in the tables that a protocol is judged against.
     PLAN_POWERS: (i32) = 3, "n_plan", "1", Judgement;
     /// Grid points of a competitor's only shape.
-    RIVAL_GRID: usize = 5, "n_1", "1", Cost;
+    COMPETITOR_GRID: usize = 5, "n_1", "1", Cost;
     /// Grid points of each of several shapes of a competitor.
-    RIVAL_GRID_SEVERAL: usize = 3, "n_2", "1", Cost;
+    COMPETITOR_GRID_SEVERAL: usize = 3, "n_2", "1", Cost;
     /// Time of a slow half-stroke over the free stroke.
     SLOW_STROKE: f64 = 27.0, "t_slow", "s", Judgement;
     /// Low and high pressure of the menu, as shares of the range.

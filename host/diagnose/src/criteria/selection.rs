@@ -59,21 +59,21 @@ pam_data::criteria! {
     /// A competitor of this weight keeps the effect from being selected itself; an exchanged effect counts with it.
     CONFUSABLE: f64 = 0.1, "w_conf", "1", Trials("sets of names made with it held the truth, with 3.3 members on average");
     /// A competitor of this weight is reported beside the selected effect.
-    REPORTED_RIVAL: f64 = 0.15, "w_rep", "1", Trials("of 62 larger effects of a sealed set 59 sets held the truth, with 1.6 members (docs/src/proof.md)");
+    REPORTED_COMPETITOR: f64 = 0.15, "w_rep", "1", Trials("of 62 larger effects of a sealed set 59 sets held the truth, with 1.6 members (docs/src/proof.md)");
     /// Competitors reported at most.
     MOST_REPORTED: usize = 8, "n_rep", "1", Cost;
     /// A competitor of this weight explains what the selected effect explains.
     ALIKE: f64 = 0.5, "w_alike", "1", Judgement;
     /// Competitors of less weight than this are dropped unless their traces are parallel.
-    NEGLIGIBLE_RIVAL: f64 = 0.01, "w_min", "1", Judgement;
+    NEGLIGIBLE_COMPETITOR: f64 = 0.01, "w_min", "1", Judgement;
     /// With more competitors than this no effect is selected.
-    MOST_RIVALS: usize = 10, "n_rival", "1", Judgement;
+    MOST_COMPETITORS: usize = 10, "n_comp", "1", Judgement;
     /// A trace with this cosine to the selected one, once the base is refitted, is kept as a competitor at any weight.
     PARALLEL: f64 = 0.95, "cos", "1", Convention("18 degrees");
     /// How inexact a right law is, as a share of the excess error it explains, when competitors are compared.
-    RIVAL_FLOOR: f64 = 0.05, "e_rival", "1", Judgement;
+    COMPETITOR_FLOOR: f64 = 0.05, "e_comp", "1", Judgement;
     /// How fast the weight of a competitor falls with the logarithm of its residual beyond that.
-    RIVAL_SHARPNESS: f64 = 7.0, "kappa", "1", Judgement;
+    COMPETITOR_SHARPNESS: f64 = 7.0, "kappa", "1", Judgement;
     /// What each further free number costs in the logarithm of the weight.
-    RIVAL_COST: f64 = 0.3, "c_number", "1", Judgement;
+    COMPETITOR_COST: f64 = 0.3, "c_number", "1", Judgement;
 }

@@ -147,7 +147,7 @@ fn memory(history: &History, peak: f64) -> Missing {
     Missing {
         effect: NAMES[0].into(),
         probability,
-        belief: probability,
+        model_weight: probability,
         share_explained: history.unseen.gain.clamp(0.0, 1.0),
         parameters,
         confusable_with: vec![NAMES[1].into()],

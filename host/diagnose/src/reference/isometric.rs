@@ -33,7 +33,7 @@ pub(super) struct Accepted {
     pub change: Change,
     pub probability: f64,
     /// Other names that the set of this round holds.
-    pub rivals: Vec<Change>,
+    pub competitors: Vec<Change>,
     /// Per unit of size, N; zero on BEFORE.
     pub shape: DVector<f64>,
     pub size: f64,
@@ -296,14 +296,14 @@ fn accept(
         c if is_lag(c) => lag::trace(cells) / shift.lag.abs().max(1e-9),
         c => shape(cells, c)?,
     };
-    let rivals = round.posterior.set().into_iter().filter_map(|c| match c {
+    let competitors = round.posterior.set().into_iter().filter_map(|c| match c {
         Cause::Named(other) if other != change => Some(other),
         _ => None,
     });
     Some(Accepted {
         change,
         probability,
-        rivals: rivals.collect(),
+        competitors: competitors.collect(),
         shape,
         size: estimate.size,
         std: estimate.std,

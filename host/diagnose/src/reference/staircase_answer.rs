@@ -141,7 +141,7 @@ fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
             freedom,
             slope_error(analysis, accepted.change),
         )],
-        confusable_with: accepted.rivals.iter().map(|c| c.name().to_owned()).collect(),
+        confusable_with: accepted.competitors.iter().map(|c| c.name().to_owned()).collect(),
         since: localise::since(analysis, accepted),
         owner: about.owner,
         correction: accepted.change.is_bench(),

@@ -108,14 +108,14 @@ fn stroke_change(compared: &Compared, weighed: &Weighed, change: Change) -> Chan
     let (before, after) = stroked::unseen(compared, &[change]);
     let index = stroked::ASKED.iter().position(|c| *c == change).unwrap_or(0);
     let shape = &compared.shapes[index];
-    let mut rivals: Vec<String> = stroked::ASKED
+    let mut competitors: Vec<String> = stroked::ASKED
         .iter()
         .filter(|c| **c != change && c.class() == about.class && weighed.marginal(**c) >= 0.05)
         .map(|c| c.name().to_owned())
         .collect();
     if change == Change::ForceGain {
         // At regulated pressures the force grows with pressure: these three have one shape.
-        rivals.extend([Change::GaugeGain, Change::CrossTalk].map(|c| c.name().to_owned()));
+        competitors.extend([Change::GaugeGain, Change::CrossTalk].map(|c| c.name().to_owned()));
     }
     Changed {
         change,
@@ -125,7 +125,7 @@ fn stroke_change(compared: &Compared, weighed: &Weighed, change: Change) -> Chan
         class: about.class,
         share_explained: (1.0 - (after / before.max(f64::MIN_POSITIVE)).powi(2)).clamp(0.0, 1.0),
         parameters: vec![size(about.parameter, value, std, 1e6, 0.0)],
-        confusable_with: rivals,
+        confusable_with: competitors,
         since: Since::NotDetermined,
         owner: about.owner,
         correction: change.is_bench(),

@@ -62,7 +62,7 @@ struct MissingDocument<'a> {
     /// Calibrated probability that the name is right.
     probability: f64,
     /// Before calibration.
-    belief: f64,
+    model_weight: f64,
     share_explained: f64,
     parameters: Vec<ParameterDocument<'a>>,
     /// Effects that these recordings do not distinguish from it.
@@ -245,7 +245,7 @@ fn missing(m: &Missing) -> MissingDocument<'_> {
     MissingDocument {
         effect: &m.effect,
         probability: m.probability,
-        belief: m.belief,
+        model_weight: m.model_weight,
         share_explained: m.share_explained,
         parameters: m.parameters.iter().map(parameter).collect(),
         confusable_with: &m.confusable_with,

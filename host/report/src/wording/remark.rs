@@ -162,7 +162,7 @@ fn refused(effect: &str, why: &Refusal) -> String {
         Refusal::UnknownMemory(memory) => format!(
             "{effect} not named: it would act in the first strokes of recordings only, where the state of {memory} is unknown"
         ),
-        Refusal::Rivals { share, others } => format!(
+        Refusal::Competitors { share, others } => format!(
             "{effect} not named: it would explain {:.0} % of the excess error, but these explain it nearly as well: {}",
             100.0 * share,
             others.join(", ")

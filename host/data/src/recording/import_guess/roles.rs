@@ -84,24 +84,24 @@ fn best(sample: &Sample, quantity: Quantity, used: &[bool], guess: &mut Guess) -
     let mut found: Vec<(Score, usize)> = sample.columns.iter().enumerate().filter_map(fits).collect();
     found.sort_by_key(|(score, n)| (-score, *n));
     let (score, first) = *found.first()?;
-    let rivals: Vec<&str> = found[1..]
+    let competitors: Vec<&str> = found[1..]
         .iter()
         .filter(|(s, _)| *s == score)
         .map(|(_, n)| sample.columns[*n].header.as_str())
         .collect();
-    if !rivals.is_empty() {
+    if !competitors.is_empty() {
         let header = &sample.columns[first].header;
         if quantity == Quantity::PressureCommand {
             guess.checks.push(format!(
                 "commanded pressures are in {header}, {}: describe that of this muscle as columns.pressure_command",
-                rivals.join(", ")
+                competitors.join(", ")
             ));
             return None;
         }
         guess.checks.push(format!(
             "{} is taken from {header}; {} could be meant, too",
             quantity.name().replace('_', " "),
-            rivals.join(", ")
+            competitors.join(", ")
         ));
     }
     Some(first)

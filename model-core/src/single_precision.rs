@@ -21,56 +21,56 @@ pub fn force(
     muscle.force(pressure, stroke, direction)
 }
 
-/// [`Muscle::held`], into its place.
+/// [`Muscle::at_stroke`], into its place.
 #[inline(never)]
-pub fn hold(muscle: &Muscle<f32>, held: &mut AtStroke<f32>, stroke: Length<f32>) {
-    *held = muscle.held(stroke);
+pub fn hold(muscle: &Muscle<f32>, at_stroke: &mut AtStroke<f32>, stroke: Length<f32>) {
+    *at_stroke = muscle.at_stroke(stroke);
 }
 
 /// Both for one tick: the shape into its place, and the force there.
 #[inline(never)]
 pub fn pose(
     muscle: &Muscle<f32>,
-    held: &mut AtStroke<f32>,
+    at_stroke: &mut AtStroke<f32>,
     stroke: Length<f32>,
     pressure: Pressure<f32>,
     direction: f32,
 ) -> Force<f32> {
-    hold(muscle, held, stroke);
-    muscle.pull(muscle.force_posed(&held.posture, pressure, direction))
+    hold(muscle, at_stroke, stroke);
+    muscle.pull(muscle.force_posed(&at_stroke.posture, pressure, direction))
 }
 
 /// [`Muscle::slopes`], into their place.
 #[inline(never)]
-fn lean(muscle: &Muscle<f32>, held: &AtStroke<f32>, slopes: &mut StrokeSlopes<f32>) {
-    *slopes = muscle.slopes(held);
+fn refresh_slopes(muscle: &Muscle<f32>, at_stroke: &AtStroke<f32>, slopes: &mut StrokeSlopes<f32>) {
+    *slopes = muscle.slopes(at_stroke);
 }
 
 /// [`Muscle::parts`].
 #[inline(never)]
-pub fn parts(muscle: &Muscle<f32>, held: &AtStroke<f32>, pressure: Pressure<f32>) -> Parts<f32> {
-    muscle.parts(held, pressure)
+pub fn parts(muscle: &Muscle<f32>, at_stroke: &AtStroke<f32>, pressure: Pressure<f32>) -> Parts<f32> {
+    muscle.parts(at_stroke, pressure)
 }
 
 /// [`Muscle::stroke_slope`].
 #[inline(never)]
-pub fn stroke_slope(muscle: &Muscle<f32>, held: &AtStroke<f32>, pressure: Pressure<f32>) -> f32 {
+pub fn stroke_slope(muscle: &Muscle<f32>, at_stroke: &AtStroke<f32>, pressure: Pressure<f32>) -> f32 {
     let mut slopes = StrokeSlopes::default();
-    lean(muscle, held, &mut slopes);
-    muscle.stroke_slope(held, &slopes, pressure)
+    refresh_slopes(muscle, at_stroke, &mut slopes);
+    muscle.stroke_slope(at_stroke, &slopes, pressure)
 }
 
 /// [`Muscle::pressure_for`].
 #[inline(never)]
 pub fn pressure_for(
     muscle: &Muscle<f32>,
-    held: &AtStroke<f32>,
+    at_stroke: &AtStroke<f32>,
     direction: f32,
     force: Force<f32>,
     guess: Pressure<f32>,
     search: &Search<f32>,
 ) -> Solution<f32> {
-    muscle.pressure_for(force, held, direction, guess, search)
+    muscle.pressure_for(force, at_stroke, direction, guess, search)
 }
 
 /// The same for a stroke that nothing else is queried about.
@@ -83,7 +83,7 @@ pub fn pressure_at(
     guess: Pressure<f32>,
     search: &Search<f32>,
 ) -> Solution<f32> {
-    muscle.pressure_for(force, &muscle.held(stroke), direction, guess, search)
+    muscle.pressure_for(force, &muscle.at_stroke(stroke), direction, guess, search)
 }
 
 /// [`Muscle::pressure_with`].
@@ -100,14 +100,14 @@ pub fn pressure_with(
         return muscle.pressure_by_search(force, chain, moment, guess, search);
     }
     let rest = Force::from_newtons(force.newtons() - effects(chain, &moment.context));
-    pressure_for(muscle, &moment.held, moment.context.direction, rest, guess, search)
+    pressure_for(muscle, &moment.at_stroke, moment.context.direction, rest, guess, search)
 }
 
 /// [`Muscle::update`].
 #[inline(never)]
 pub fn update(muscle: &Muscle<f32>, moment: &mut Moment<f32>, motion: &Motion<f32>, pressure: Pressure<f32>) {
-    hold(muscle, &mut moment.held, Length::from_metres(motion.stroke));
-    lean(muscle, &moment.held, &mut moment.slopes);
+    hold(muscle, &mut moment.at_stroke, Length::from_metres(motion.stroke));
+    refresh_slopes(muscle, &moment.at_stroke, &mut moment.slopes);
     muscle.look(moment, motion, pressure);
 }
 
