@@ -22,6 +22,7 @@ mod report;
 mod residuals;
 mod score;
 mod semi;
+mod sensitivity;
 mod sensors;
 mod spec;
 mod tool;
@@ -177,6 +178,8 @@ enum Command {
     Festo(Real),
     /// The same for settled points only: writes the section of the page on what the muscles remember.
     FestoHistory(Real),
+    /// Answer a development set again with each criterion at half and at double its value.
+    Sensitivity(sensitivity::Study),
     /// Spoil one recording of clean campaigns in every way that sensors and loggers fail, and count what is found.
     Sensors(sensors::Sensors),
     /// Diagnose changes: changes added to later runs of real recordings, untouched pairs, a cylinder whose seal was replaced.
@@ -233,6 +236,7 @@ fn main() -> ExitCode {
             festo::run_history(&real.data, &real.output, &real.host, real.page.as_deref())
         }
         Command::Campaign(what) => campaign::run(&what),
+        Command::Sensitivity(study) => sensitivity::run(&study),
         Command::Sensors(what) => sensors::run(&what),
         Command::Reference(what) => reference::run(&what),
         Command::Prove { set, what, tool, check } => prove(&set, &what, &tool, check),
