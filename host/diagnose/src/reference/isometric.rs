@@ -96,10 +96,14 @@ pub(super) struct Reference {
 pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Result<Analysis> {
     let Reference { surface, error, recorded } = reference;
     use rayon::prelude::*;
-    let scores: Vec<_> = runs.runs.par_iter().map(|r| lag::score(r, &surface)).collect();
-    let shift = lag::shift(&runs, &scores);
-    let traced = |run: &Run| lag::effect(run, &surface, shift.lag);
-    let lag = (shift.lag.abs() > LAG_FLOOR).then_some(&traced as &dyn Fn(&Run) -> Vec<f64>);
+    // Rows of one part of a motion do not follow one another: they say nothing about lags.
+    let shift = (!runs.moving).then(|| {
+        let scores: Vec<_> = runs.runs.par_iter().map(|r| lag::score(r, &surface)).collect();
+        lag::shift(&runs, &scores)
+    });
+    let late = shift.as_ref().map_or(0.0, |s| s.lag);
+    let traced = |run: &Run| lag::effect(run, &surface, late);
+    let lag = (late.abs() > LAG_FLOOR).then_some(&traced as &dyn Fn(&Run) -> Vec<f64>);
     let cells = cells(&runs, &surface, lag);
     if !cells.iter().any(|c| c.after) {
         let values = || runs.side(true).flat_map(|r| r.pressure.iter().copied());
@@ -112,12 +116,16 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
                 surface.high / 1e3
             )));
     }
-    let setting =
-        Setting { range: surface.high - surface.low, largest: surface.largest, remounted: runs.remounted };
+    let setting = Setting {
+        range: surface.high - surface.low,
+        largest: surface.largest,
+        remounted: runs.remounted,
+        moving: runs.moving,
+    };
     let contrasts = contrasts(&cells, &runs, &setting, (!recorded).then_some(error))?;
     let mut accepted: Vec<Accepted> = Vec::new();
     // Lag scores are of rows that still hold what was named before: a lag is named first or not at all.
-    let weighed = |c: Contrast| (weigh(&cells, &c, &surface, Some(&shift), prior_none), c);
+    let weighed = |c: Contrast| (weigh(&cells, &c, &surface, shift.as_ref(), prior_none), c);
     let (mut round, contrast, which) = likeliest(contrasts.into_iter().map(weighed).collect())?;
     let reference_error = if recorded { 0.0 } else { error * TABLE_ERROR_FACTORS[which] };
     let mut present = contrast.clone();
@@ -128,7 +136,7 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
         // What a lag does to settled rows is not known well enough to look for more beneath it.
         let lagged = accepted.iter().any(|a| is_lag(a.change));
         let more = leader.filter(|_| !lagged && none < NAMED && accepted.len() < MOST_CHANGES);
-        let next = more.and_then(|(change, p)| accept(&cells, &round, change, p, &shift));
+        let next = more.and_then(|(change, p)| accept(&cells, &round, change, p, late));
         let last = round.posterior.clone();
         first.get_or_insert(round);
         // A second change of the same kind is what the first one's shape is inexact by.
@@ -283,17 +291,11 @@ fn weigh_lag(cells: &[Cell], contrast: &Contrast, lag: &Shift) -> (Change, f64) 
     (change, gain + own.max(-5.0) + lag.changed)
 }
 
-fn accept(
-    cells: &[Cell],
-    round: &Round,
-    change: Change,
-    probability: f64,
-    shift: &Shift,
-) -> Option<Accepted> {
+fn accept(cells: &[Cell], round: &Round, change: Change, probability: f64, late: f64) -> Option<Accepted> {
     let estimate = round.estimates.iter().find(|e| e.change == change)?;
     let shape = match change {
         Change::EndSlip => round.slip.as_ref()?.shape.clone(),
-        c if is_lag(c) => lag::trace(cells) / shift.lag.abs().max(1e-9),
+        c if is_lag(c) => lag::trace(cells) / late.abs().max(1e-9),
         c => shape(cells, c)?,
     };
     let competitors = round.posterior.set().into_iter().filter_map(|c| match c {

@@ -57,7 +57,11 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
         r#where: where_,
         missing: analysis.accepted.iter().map(|a| changed(analysis, a)).collect(),
         held_out: HeldOut {
-            split: if unseen.held { Split::OtherRecordings } else { Split::None },
+            split: match (unseen.held, analysis.runs.moving) {
+                (false, _) => Split::None,
+                (true, false) => Split::OtherRecordings,
+                (true, true) => Split::OtherParts,
+            },
             rms_before_N: unseen.before,
             rms_after_N: unseen.after,
             noise_N: noise,
@@ -89,7 +93,7 @@ fn remarks(analysis: &Analysis, verdict: Verdict) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if let Some((mounting, log)) = analysis.first.local.filter(|l| l.1 > GATE.ln()) {
         // With a change that all mountings show, the one that shows it most is no news.
-        if verdict == Verdict::Consistent || verdict == Verdict::Unexplained {
+        if !analysis.runs.moving && matches!(verdict, Verdict::Consistent | Verdict::Unexplained) {
             remarks.push(Remark::OneMounting { stroke: analysis.runs.strokes[mounting], log });
         }
     }
@@ -100,19 +104,27 @@ fn incomparable(analysis: &Analysis) -> Vec<NotComparable> {
     let mut not = analysis.runs.not_comparable.clone();
     for run in analysis.runs.side(true) {
         let (out, all) = cells::beyond(run, &analysis.surface);
-        if out > 0 {
+        // Each part of a motion has pressures of its own; it names none.
+        if out > 0 && !analysis.runs.moving {
             let share = out as f64 / all.max(1) as f64;
             not.push(NotComparable::Pressure { recording: run.name.clone(), share });
         }
     }
     let recorded = analysis.runs.side(false).next().is_some();
+    if analysis.runs.moving {
+        not.push(NotComparable::Moving);
+    }
     for (m, stroke) in analysis.runs.strokes.iter().enumerate() {
         let mut kinds: Vec<[bool; 2]> = vec![[false; 2]; 2 * CELLS];
         for c in analysis.cells.iter().filter(|c| c.mounting == m) {
             kinds[c.bin + if c.direction < 0.0 { CELLS } else { 0 }][usize::from(c.after)] = true;
         }
         let after = kinds.iter().any(|k| k[1]);
-        if after && recorded && kinds.iter().filter(|k| k[0] && k[1]).count() < FEWEST_CELLS {
+        if after
+            && recorded
+            && !analysis.runs.moving
+            && kinds.iter().filter(|k| k[0] && k[1]).count() < FEWEST_CELLS
+        {
             not.push(NotComparable::FewCells { stroke: *stroke });
         }
     }

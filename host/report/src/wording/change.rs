@@ -16,6 +16,7 @@ pub fn split(split: Split) -> &'static str {
         Split::OtherRecordings => "every other recording of AFTER",
         Split::None => "none: AFTER is one recording",
         Split::OtherLevels => "every other level of pressure",
+        Split::OtherParts => "every other part of AFTER, by length and time",
     }
 }
 
@@ -154,6 +155,12 @@ pub fn not_comparable(n: &NotComparable) -> String {
         }
         NotComparable::Level { pressure } => {
             format!("strokes at {:.0} kPa: on one side only, or fewer than two each way", pressure / 1e3)
+        }
+        NotComparable::Moving => {
+            "sensor-delay, pressure-sensor-lag: not asked of recordings in which length and pressure move together".into()
+        }
+        NotComparable::Lengths { recording, share } => {
+            format!("`{recording}`: {:.0} % of the rows at lengths that the reference does not have", 100.0 * share)
         }
         NotComparable::Strokes => {
             "gauge-offset, displacement-offset, rig-compliance, end-slip, drift and lags: not asked of strokes at regulated pressures".into()
