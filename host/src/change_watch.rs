@@ -7,6 +7,7 @@ mod reference;
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, channel, sync_channel};
 use std::thread::JoinHandle;
 
@@ -96,7 +97,7 @@ impl ChangeWatch {
     ///
     /// # Errors
     /// The system gives no thread.
-    pub fn start(reference: Reference, mounted: Mounted) -> Result<Self> {
+    pub fn start(reference: Arc<Reference>, mounted: Mounted) -> Result<Self> {
         let (samples, rows) = sync_channel(WAITING);
         let (say, answers) = channel();
         let worker = std::thread::Builder::new()
@@ -188,7 +189,7 @@ impl ChangeWatch {
 
 /// The thread's own side.
 struct Comparison {
-    reference: Reference,
+    reference: Arc<Reference>,
     options: Options,
     rows: VecDeque<Row>,
     fresh: usize,
@@ -197,7 +198,7 @@ struct Comparison {
 }
 
 impl Comparison {
-    fn new(reference: Reference, mounted: Mounted) -> Self {
+    fn new(reference: Arc<Reference>, mounted: Mounted) -> Self {
         let options = Options { mounted, ..Options::default() };
         Self { reference, options, rows: VecDeque::new(), fresh: 0, before_last: None, told: false }
     }
@@ -317,7 +318,7 @@ mod tests {
         Telemetry { time_us: tick * 1000, tick, state: State::Running, sides, ..Telemetry::default() }
     }
 
-    fn before() -> Reference {
+    fn before() -> Arc<Reference> {
         let mut noise = 5;
         let mut rows = VecDeque::new();
         for tick in (0..60_000).step_by(10) {
@@ -325,7 +326,7 @@ mod tests {
             let read = [side.pressure_pa, side.stroke_m, side.force_n].map(f64::from);
             rows.push_back(Row { values: [tick as f64 * 1e-3, read[0], read[1], read[2]], begins: false });
         }
-        Reference::Recordings(campaign(&rows))
+        Arc::new(Reference::Recordings(campaign(&rows)))
     }
 
     fn watched(gain: f64) -> Update {

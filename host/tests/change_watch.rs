@@ -6,12 +6,13 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use host::demo::campaign::record;
 use model_core::link::endpoints::StartMode;
 use model_core::link::messages::Start;
+use pam_device::Client;
 use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::run::{Plan, Steps, arm};
 use pam_device::setpoint_profile::{Quantity, SetpointProfile};
-use pam_device::Client;
 use serde_json::Value;
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::plant::Motion;
@@ -27,7 +28,8 @@ fn controller(seed: u64, gain: f64) -> Emulated {
     let motion = Motion::Sine { mean_mm: 0.6, amplitude_mm: 0.4, frequency_hz: 0.5 };
     let emulated = Emulated::start(Stand::new(spec, motion), Some(Kind::Native), 3.0).unwrap();
     let port = emulated.address().to_string();
-    let set = host(Path::new("."), &["device", "settings", "--port", &port, "--set", "watch.autonomous=true"]);
+    let set =
+        host(Path::new("."), &["device", "settings", "--port", &port, "--set", "watch.autonomous=true"]);
     assert!(set.status.success(), "{}", said(&set));
     emulated
 }
@@ -92,6 +94,25 @@ fn works(controller: &Emulated) {
     let profile = SetpointProfile::parse(PRESSURE, Quantity::Pressure).unwrap();
     let plan = Plan { quantity: Quantity::Pressure, profile, seconds: None, every_ticks: 1 };
     Steps::begin(&mut client, &plan).unwrap();
+}
+
+#[test]
+fn beside_the_table_of_the_controller_a_gain_is_named_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = record("mini", 1, &folder.path().join("bench")).unwrap();
+    let mut line = vec!["fit".to_owned(), "--muscle".into(), made.muscle.display().to_string()];
+    line.extend(made.recordings.iter().map(|r| r.display().to_string()));
+    line.extend(["-o".to_owned(), "own.pam".into()]);
+    let fitted = host(folder.path(), &line.iter().map(String::as_str).collect::<Vec<_>>());
+    assert!(fitted.status.success(), "{}", said(&fitted));
+
+    let (about, words) = run(folder.path(), 8, 0.0, &["--reference", "own.pam"]);
+    let changed = &about["changed"];
+    assert_eq!(changed["missing"].as_array().unwrap().len(), 0, "{changed:#}\n{words}");
+
+    let (about, words) = run(folder.path(), 9, 0.1, &["--reference", "own.pam"]);
+    let changed = &about["changed"];
+    assert_eq!(changed["missing"][0]["effect"], "force-gain", "{changed:#}\n{words}");
 }
 
 #[test]

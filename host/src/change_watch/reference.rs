@@ -1,6 +1,7 @@
 //! What a running actuator is compared with: earlier recordings, or its table.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
 
@@ -15,6 +16,7 @@ use pam_fit::table_file::TableFile;
 use pam_report::wording::change as wording;
 
 /// Earlier recordings, or a table with its path.
+#[derive(Debug)]
 pub enum Reference {
     /// Earlier recordings.
     Recordings(Campaign),
@@ -99,7 +101,7 @@ impl ReferenceOptions {
         }
         let reference = Reference::read(&self.reference, self.reference_import.as_ref(), console)?;
         let mounted = if self.remounted { Mounted::Anew } else { Mounted::Same };
-        ChangeWatch::start(reference, mounted).map(Some)
+        ChangeWatch::start(Arc::new(reference), mounted).map(Some)
     }
 }
 
