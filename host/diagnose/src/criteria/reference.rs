@@ -202,6 +202,8 @@ pam_data::criteria! {
     COMBINED_FEWEST_ROWS: usize = 10, "combined_fewest_rows", "1", Judgement;
     /// Ridge on the coefficients of the force over pressure and stroke, share of the rows.
     COMBINED_RIDGE: f64 = 1e-6, "combined_ridge", "1", Judgement;
+    /// A table is compared where it gives more than this share of its largest force: it is fitted where the muscle pulls.
+    COMBINED_PULLS: f64 = 0.05, "combined_pulls", "1", Judgement;
     /// After a turn the stroke must come back by this share of its range before friction counts as turned.
     COMBINED_TURNED: f64 = 0.1, "combined_turned", "1", Judgement;
     /// Mean square of the stroke's steps from row to row over its variance, below which it is a motion; of white noise it is 2.

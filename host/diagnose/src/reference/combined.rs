@@ -9,8 +9,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::answer::NotComparable;
 use super::criteria::{
-    BEYOND, COMBINED_FEWEST_ROWS, COMBINED_LENGTHS, COMBINED_RIDGE, COMBINED_SMOOTH, COMBINED_SPANS,
-    COMBINED_SWING, COMBINED_TURNED, COMBINED_TURNS, POINT_BINS, STROKES_ENDS, TABLE_SURFACE_STEP, TURN,
+    BEYOND, COMBINED_FEWEST_ROWS, COMBINED_LENGTHS, COMBINED_PULLS, COMBINED_RIDGE, COMBINED_SMOOTH,
+    COMBINED_SPANS, COMBINED_SWING, COMBINED_TURNED, COMBINED_TURNS, POINT_BINS, STROKES_ENDS,
+    TABLE_SURFACE_STEP, TURN,
 };
 use super::motion::{range, turning};
 use super::runs::{Mounted, Run, Runs, mounted_anew};
@@ -44,8 +45,8 @@ pub(super) fn swings(r: &Recording) -> bool {
     turns >= COMBINED_TURNS && spread > COMBINED_SWING * travel
 }
 
-/// ∂F/∂x, N/m, over pressure and stroke.
-type Slope<'a> = dyn Fn(f64, f64) -> f64 + 'a;
+/// ∂F/∂x, N/m, over pressure and stroke; `None` where the reference says nothing.
+type Slope<'a> = dyn Fn(f64, f64) -> Option<f64> + 'a;
 
 /// A smooth force over pressure and stroke with another level for each direction; only its slope is used.
 struct Plane {
@@ -133,7 +134,7 @@ impl Plane {
 /// A recording without force, or a reference of too few rows.
 pub(super) fn of(before: &Campaign, after: &Campaign, said: Mounted) -> Result<Runs> {
     let plane = Plane::of(before)?;
-    let slope = |p: f64, x: f64| plane.slope(p, x);
+    let slope = |p: f64, x: f64| Some(plane.slope(p, x));
     let mut runs = Runs {
         strokes: middles(before),
         remounted: mounted_anew(before, after, said),
@@ -154,8 +155,13 @@ pub(super) fn alone(table: &TableFile, after: &Campaign, said: Mounted) -> Resul
         Muscle::<f64>::build(&table.table).map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
     let force =
         |p: f64, x: f64| muscle.force(Pressure::from_pascals(p), Length::from_metres(x), 0.0).newtons();
+    let high = f64::from(table.table.tested.pressure_high.pascals());
+    let least = COMBINED_PULLS * force(high, 0.0).max(0.0);
+    // A table is fitted where the muscle pulls: of a slack one it says nothing.
     let slope = |p: f64, x: f64| {
-        (force(p, x + TABLE_SURFACE_STEP) - force(p, x - TABLE_SURFACE_STEP)) / (2.0 * TABLE_SURFACE_STEP)
+        (force(p, x) > least).then(|| {
+            (force(p, x + TABLE_SURFACE_STEP) - force(p, x - TABLE_SURFACE_STEP)) / (2.0 * TABLE_SURFACE_STEP)
+        })
     };
     let remounted = said != Mounted::Same;
     let mut runs = Runs { strokes: middles(after), remounted, moving: true, ..Runs::default() };
@@ -214,11 +220,14 @@ fn add(runs: &mut Runs, campaign: &Campaign, after: bool, slope: &Slope<'_>) -> 
         let mut out = 0;
         for i in 0..r.time.len() {
             let x = r.stroke[i];
-            if !(x >= low - beyond && x <= high + beyond) {
+            let known = x >= low - beyond && x <= high + beyond;
+            let Some(slope) = slope(r.pressure[i], x).filter(|_| known) else {
                 out += 1;
-            } else if turned[i] {
+                continue;
+            };
+            if turned[i] {
                 let span = bin(r.time[i] - r.time[0], 0.0, duration, spans);
-                members[span * parts + bin(x, low, high, parts)].push(i);
+                members[span * parts + bin(x, low, high, parts)].push((i, slope));
             }
         }
         if after && out > 0 {
@@ -230,18 +239,17 @@ fn add(runs: &mut Runs, campaign: &Campaign, after: bool, slope: &Slope<'_>) -> 
             let (span, mounting) = (place / parts, place % parts);
             let begins = duration * span as f64 / spans as f64;
             let middle = runs.strokes[mounting];
-            let at = |i: &usize| force[*i] - slope(r.pressure[*i], r.stroke[*i]) * (r.stroke[*i] - middle);
             runs.runs.push(Run {
                 name: r.name.clone(),
                 after,
                 mounting,
                 number: number + span,
                 shift: 0.0,
-                time: rows.iter().map(|i| r.time[*i] - r.time[0] - begins).collect(),
-                pressure: rows.iter().map(|i| r.pressure[*i]).collect(),
-                force: rows.iter().map(at).collect(),
+                time: rows.iter().map(|(i, _)| r.time[*i] - r.time[0] - begins).collect(),
+                pressure: rows.iter().map(|(i, _)| r.pressure[*i]).collect(),
+                force: rows.iter().map(|(i, slope)| force[*i] - slope * (r.stroke[*i] - middle)).collect(),
                 settled: vec![true; rows.len()],
-                direction: rows.iter().map(|i| direction[*i]).collect(),
+                direction: rows.iter().map(|(i, _)| direction[*i]).collect(),
                 since_mounted: elapsed + begins,
                 since_after: if after { elapsed + begins } else { 0.0 },
             });

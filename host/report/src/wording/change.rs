@@ -160,7 +160,7 @@ pub fn not_comparable(n: &NotComparable) -> String {
             "sensor-delay, pressure-sensor-lag: not asked of recordings in which length and pressure move together".into()
         }
         NotComparable::Lengths { recording, share } => {
-            format!("`{recording}`: {:.0} % of the rows at lengths that the reference does not have", 100.0 * share)
+            format!("`{recording}`: {:.0} % of the rows at lengths that the reference does not have, or where its muscle does not pull", 100.0 * share)
         }
         NotComparable::Strokes => {
             "gauge-offset, displacement-offset, rig-compliance, end-slip, drift and lags: not asked of strokes at regulated pressures".into()
