@@ -202,6 +202,8 @@ pam_data::criteria! {
     COMBINED_FEWEST_ROWS: usize = 10, "combined_fewest_rows", "1", Judgement;
     /// Ridge on the coefficients of the force over pressure and stroke, share of the rows.
     COMBINED_RIDGE: f64 = 1e-6, "combined_ridge", "1", Judgement;
+    /// Error of the shapes where length and pressure move together, share of their size: slopes are those of five coarse parts.
+    COMBINED_SHAPE_ERROR: f64 = 0.2, "combined_shape_error", "1", Judgement;
     /// A table is compared where it gives more than this share of its largest force: it is fitted where the muscle pulls.
     COMBINED_PULLS: f64 = 0.05, "combined_pulls", "1", Judgement;
     /// After a turn the stroke must come back by this share of its range before friction counts as turned.

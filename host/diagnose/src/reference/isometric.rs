@@ -4,7 +4,9 @@ use nalgebra::DVector;
 
 use super::cells::{Cell, cells};
 use super::contrast::{Contrast, evidence};
-use super::criteria::{DIRECTIONS_PER_RUN, LAG_FLOOR, MOST_CHANGES, NAMED, SIZES, TABLE_ERROR_FACTORS};
+use super::criteria::{
+    COMBINED_SHAPE_ERROR, DIRECTIONS_PER_RUN, LAG_FLOOR, MOST_CHANGES, NAMED, SIZES, TABLE_ERROR_FACTORS,
+};
 use super::gate::{self, Asked};
 use super::lag::{self, Shift};
 use super::posterior::{Cause, Posterior};
@@ -46,6 +48,29 @@ pub(super) struct Round {
     pub estimates: Vec<Estimate>,
     pub slip: Option<Slip>,
     pub local: Option<(usize, f64)>,
+    /// Log evidence of the best name.
+    pub best: f64,
+}
+
+/// How inexact shapes are, share of their size, and the evidence of the best name of the first round.
+#[derive(Debug, Clone, Copy, Default)]
+struct Inexact {
+    share: f64,
+    first: f64,
+}
+
+impl Inexact {
+    /// A shape that is wrong by a share of its size leaves that share of what it explains, and another shape may take it: evidence
+    /// counts as with a variance larger by so much.
+    fn temper(self, all: &mut [(Cause, f64)]) -> f64 {
+        let named = all.iter().filter(|(c, _)| matches!(c, Cause::Named(_)));
+        let best = named.map(|(_, log)| *log).fold(0.0, f64::max);
+        let factor = 1.0 + 2.0 * self.share * self.share * best.max(self.first);
+        for (_, log) in all.iter_mut().filter(|(_, log)| log.is_finite()) {
+            *log = best - (best - *log) / factor;
+        }
+        best
+    }
 }
 
 /// Everything that was found.
@@ -125,7 +150,8 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
     let contrasts = contrasts(&cells, &runs, &setting, (!recorded).then_some(error))?;
     let mut accepted: Vec<Accepted> = Vec::new();
     // Lag scores are of rows that still hold what was named before: a lag is named first or not at all.
-    let weighed = |c: Contrast| (weigh(&cells, &c, &surface, shift.as_ref(), prior_none), c);
+    let mut inexact = Inexact { share: if runs.moving { COMBINED_SHAPE_ERROR } else { 0.0 }, first: 0.0 };
+    let weighed = |c: Contrast| (weigh(&cells, &c, &surface, (shift.as_ref(), inexact), prior_none), c);
     let (mut round, contrast, which) = likeliest(contrasts.into_iter().map(weighed).collect())?;
     let reference_error = if recorded { 0.0 } else { error * TABLE_ERROR_FACTORS[which] };
     let mut present = contrast.clone();
@@ -138,6 +164,7 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
         let more = leader.filter(|_| !lagged && none < NAMED && accepted.len() < MOST_CHANGES);
         let next = more.and_then(|(change, p)| accept(&cells, &round, change, p, late));
         let last = round.posterior.clone();
+        inexact.first = inexact.first.max(round.best);
         first.get_or_insert(round);
         // A second change of the same kind is what the first one's shape is inexact by.
         let Some(next) = next.filter(|n| accepted.iter().all(|a| a.change.class() != n.change.class()))
@@ -165,7 +192,7 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
             present = present.without_shapes(std::slice::from_ref(&next.shape));
         }
         accepted.push(next);
-        round = weigh(&cells, &present, &surface, None, prior_none);
+        round = weigh(&cells, &present, &surface, (None, inexact), prior_none);
     }
 }
 
@@ -220,7 +247,7 @@ fn weigh(
     cells: &[Cell],
     contrast: &Contrast,
     surface: &Surface,
-    lag: Option<&Shift>,
+    (lag, inexact): (Option<&Shift>, Inexact),
     prior_none: f64,
 ) -> Round {
     let scale = contrast.scale();
@@ -266,7 +293,9 @@ fn weigh(
         let rms = rms_after(cells, &lag::trace(cells)) / lag.lag.abs().max(1e-9);
         estimates.push(Estimate { change, size: lag.lag.abs(), std: lag.variance.sqrt(), rms });
     }
+    let best = if inexact.share > 0.0 { inexact.temper(&mut all) } else { 0.0 };
     Round {
+        best,
         posterior: Posterior::of(&all, prior_none),
         estimates,
         slip,

@@ -7,8 +7,8 @@ use super::answer::{
     Repeatability, Size, Split, Verdict, WhyNot, size,
 };
 use super::criteria::{
-    CELLS, FEWEST_CELLS, GATE, NAMED, PRIOR_NONE, SCALE_PRIOR, SIZES, SLOPE_ERROR, TABLE_SLOPE_ERROR,
-    TABLE_SLOPE_OVER_LENGTH,
+    CELLS, COMBINED_SHAPE_ERROR, FEWEST_CELLS, GATE, NAMED, PRIOR_NONE, SCALE_PRIOR, SIZES, SLOPE_ERROR,
+    TABLE_SLOPE_ERROR, TABLE_SLOPE_OVER_LENGTH,
 };
 use super::held_out;
 use super::isometric::{Accepted, Analysis, Estimate};
@@ -164,8 +164,9 @@ fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
 /// How inexact the shape of a change is, share of its size.
 fn slope_error(analysis: &Analysis, change: Change) -> f64 {
     match change {
-        _ if analysis.recorded => SLOPE_ERROR,
         Change::ForceOffset | Change::ForceDrift | Change::CoulombFriction => SLOPE_ERROR,
+        _ if analysis.recorded && analysis.runs.moving => COMBINED_SHAPE_ERROR,
+        _ if analysis.recorded => SLOPE_ERROR,
         Change::DisplacementOffset | Change::RigCompliance | Change::EndSlip => TABLE_SLOPE_OVER_LENGTH,
         _ => TABLE_SLOPE_ERROR,
     }
