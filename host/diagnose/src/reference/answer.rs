@@ -107,6 +107,8 @@ pub enum Remark {
     NotAcquitted(f64),
     /// Gains have the same shape at regulated pressures.
     GainOfStrokes,
+    /// A zero of the gauge often takes the name of a gain or of another zero where length and pressure move together.
+    GaugeOfMotion,
 }
 
 /// How recordings were held out.

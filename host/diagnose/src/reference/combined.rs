@@ -10,13 +10,13 @@ use nalgebra::{DMatrix, DVector};
 use super::answer::NotComparable;
 use super::criteria::{
     BEYOND, COMBINED_FEWEST_ROWS, COMBINED_LENGTHS, COMBINED_PULLS, COMBINED_RIDGE, COMBINED_SMOOTH,
-    COMBINED_SPANS, COMBINED_SWING, COMBINED_TURNED, COMBINED_TURNS, POINT_BINS, STROKES_ENDS,
+    COMBINED_SPANS, COMBINED_SWING, COMBINED_TURNED, COMBINED_TURNS, GRID, POINT_BINS, STROKES_ENDS,
     TABLE_SURFACE_STEP, TURN,
 };
 use super::motion::{range, turning};
 use super::runs::{Mounted, Run, Runs, mounted_anew};
 use super::strokes::{ends, percentile};
-use super::surface::bin;
+use super::surface::{Surface, bin};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::{self, Campaign, Recording};
 use pam_fit::table_file::TableFile;
@@ -48,8 +48,9 @@ pub(super) fn swings(r: &Recording) -> bool {
 /// ∂F/∂x, N/m, over pressure and stroke; `None` where the reference says nothing.
 type Slope<'a> = dyn Fn(f64, f64) -> Option<f64> + 'a;
 
-/// A smooth force over pressure and stroke with another level for each direction; only its slope is used.
-struct Plane {
+/// A smooth force over pressure and stroke with another level for each direction; only its slopes are used. Over one part of the stroke
+/// alone the pressure passes too seldom for a slope.
+pub(super) struct Plane {
     pressures: (f64, f64),
     strokes: (f64, f64),
     coefficients: DVector<f64>,
@@ -118,6 +119,7 @@ impl Plane {
         DVector::from_iterator(TERMS.len() + GAP_TERMS.len(), TERMS.iter().map(term).chain(gap))
     }
 
+    /// ∂F/∂x, N/m.
     fn slope(&self, pressure: f64, stroke: f64) -> f64 {
         let (p, x) = self.scaled(pressure, stroke);
         let term = |((a, b), c): (&(i32, i32), &f64)| {
@@ -126,13 +128,34 @@ impl Plane {
         let sum: f64 = TERMS.iter().zip(self.coefficients.iter()).map(term).sum();
         2.0 * sum / (self.strokes.1 - self.strokes.0).max(f64::MIN_POSITIVE)
     }
+
+    /// ∂F/∂P, N/Pa.
+    fn by_pressure(&self, pressure: f64, stroke: f64) -> f64 {
+        let (p, x) = self.scaled(pressure, stroke);
+        let term = |((a, b), c): (&(i32, i32), &f64)| {
+            if *a > 0 { c * f64::from(*a) * p.powi(a - 1) * x.powi(*b) } else { 0.0 }
+        };
+        let sum: f64 = TERMS.iter().zip(self.coefficients.iter()).map(term).sum();
+        2.0 * sum / (self.pressures.1 - self.pressures.0).max(f64::MIN_POSITIVE)
+    }
+
+    /// Gives a surface these slopes.
+    pub(super) fn into_slopes(self, surface: &mut Surface, strokes: &[f64]) {
+        let step = (surface.high - surface.low) / (GRID - 1) as f64;
+        let grid: Vec<f64> = (0..GRID).map(|i| surface.low + step * i as f64).collect();
+        for (curve, x) in surface.curves.iter_mut().zip(strokes) {
+            curve.by_pressure = grid.iter().map(|p| self.by_pressure(*p, *x)).collect();
+            curve.by_stroke = grid.iter().map(|p| self.slope(*p, *x)).collect();
+        }
+        surface.find_usual_slope();
+    }
 }
 
-/// Runs of AFTER and of earlier recordings.
+/// Runs of AFTER and of earlier recordings, and the slopes of these.
 ///
 /// # Errors
 /// A recording without force, or a reference of too few rows.
-pub(super) fn of(before: &Campaign, after: &Campaign, said: Mounted) -> Result<Runs> {
+pub(super) fn of(before: &Campaign, after: &Campaign, said: Mounted) -> Result<(Runs, Plane)> {
     let plane = Plane::of(before)?;
     let slope = |p: f64, x: f64| Some(plane.slope(p, x));
     let mut runs = Runs {
@@ -143,7 +166,7 @@ pub(super) fn of(before: &Campaign, after: &Campaign, said: Mounted) -> Result<R
     };
     add(&mut runs, before, false, &slope)?;
     add(&mut runs, after, true, &slope)?;
-    Ok(runs)
+    Ok((runs, plane))
 }
 
 /// Runs of AFTER alone, for a reference that is a table.

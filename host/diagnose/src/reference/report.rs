@@ -143,8 +143,10 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
                 }
                 (Protocol::Combined, Protocol::Combined | Protocol::Stroked)
                 | (Protocol::Stroked, Protocol::Combined) => {
-                    let runs = combined::of(before, after, options.mounted)?;
-                    recorded(runs, options)?
+                    let (runs, plane) = combined::of(before, after, options.mounted)?;
+                    let mut surface = Surface::of(&runs)?;
+                    plane.into_slopes(&mut surface, &runs.strokes);
+                    recorded(runs, surface, options)?
                 }
                 _ => {
                     return Err(Error::new(
@@ -221,12 +223,12 @@ fn held(before: &Campaign, after: &Campaign, options: &Options) -> Result<Change
             }))
         )));
     }
-    recorded(runs, options)
+    let surface = Surface::of(&runs)?;
+    recorded(runs, surface, options)
 }
 
 /// Runs on both sides.
-fn recorded(runs: Runs, options: &Options) -> Result<ChangeReport> {
-    let surface = Surface::of(&runs)?;
+fn recorded(runs: Runs, surface: Surface, options: &Options) -> Result<ChangeReport> {
     let reference = isometric::Reference { surface, error: 0.0, recorded: true };
     let analysis = isometric::analyse(runs, reference, prior(options, PRIOR_NONE))?;
     Ok(staircases(&analysis, options))

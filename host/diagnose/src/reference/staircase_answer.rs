@@ -14,7 +14,7 @@ use super::held_out;
 use super::isometric::{Accepted, Analysis, Estimate};
 use super::posterior::Cause;
 use super::report::{Options, left, prior, verdict};
-use super::shapes::{CHANGES, Change};
+use super::shapes::{CHANGES, Change, Class};
 use super::slip::rms_after;
 use super::{cells, localise, repeatability};
 
@@ -91,6 +91,10 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
 
 fn remarks(analysis: &Analysis, verdict: Verdict) -> Vec<Remark> {
     let mut remarks = Vec::new();
+    let like = |a: &Accepted| matches!(a.change.class(), Class::Gain | Class::Zero);
+    if analysis.runs.moving && analysis.accepted.iter().any(like) {
+        remarks.push(Remark::GaugeOfMotion);
+    }
     if let Some((mounting, log)) = analysis.first.local.filter(|l| l.1 > GATE.ln()) {
         // With a change that all mountings show, the one that shows it most is no news.
         if !analysis.runs.moving && matches!(verdict, Verdict::Consistent | Verdict::Unexplained) {
@@ -153,12 +157,23 @@ fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
             freedom,
             slope_error(analysis, accepted.change),
         )],
-        confusable_with: accepted.competitors.iter().map(|c| c.name().to_owned()).collect(),
+        confusable_with: confusable(analysis, accepted),
         since: localise::since(analysis, accepted),
         owner: about.owner,
         correction: accepted.change.is_bench(),
         rms_N: rms_after(&analysis.cells, &accepted.shape) * accepted.size.abs(),
     }
+}
+
+/// Names that these recordings cannot tell from a change. In motion the gauge's zero is always one of those of a gain or a zero: on
+/// emulated muscles most of these zeros took such a name.
+fn confusable(analysis: &Analysis, accepted: &Accepted) -> Vec<String> {
+    let mut all: Vec<Change> = accepted.competitors.clone();
+    let like = matches!(accepted.change.class(), Class::Gain | Class::Zero);
+    if analysis.runs.moving && like && !all.contains(&Change::GaugeOffset) {
+        all.push(Change::GaugeOffset);
+    }
+    all.into_iter().map(|c| c.name().to_owned()).collect()
 }
 
 /// How inexact the shape of a change is, share of its size.

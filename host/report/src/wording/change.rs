@@ -72,6 +72,7 @@ pub fn remark(remark: &Remark) -> String {
         Remark::NotAcquitted(none) => {
             format!("no change is named, but that nothing changed has a probability of {none:.2} only")
         }
+        Remark::GaugeOfMotion => "where length and pressure move together, a zero error of the pressure gauge is often mistaken for a gain, an offset of the stroke or a zero of the load cell: vent the actuator and read the gauge first".into(),
         Remark::GainOfStrokes => "at regulated pressures a gain of the load cell, a gain of the gauge and another piston area have the same shape".into(),
     }
 }
