@@ -180,7 +180,7 @@ impl ChangeWatch {
     #[must_use]
     pub fn finish(mut self) -> Option<Update> {
         if let Some(samples) = self.samples.take() {
-            // The comparison may have ended with a panic; then nobody takes them.
+            // The comparison may have ended with a panic; then no thread takes them.
             let _ = samples.send(self.pending.drain(..).collect());
         }
         self.worker.take().and_then(|w| w.join().ok()).flatten()

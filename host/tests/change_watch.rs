@@ -66,7 +66,7 @@ fn a_wrong_gain_is_named_while_the_muscle_works_and_nothing_is_where_nothing_is_
     let gain = &changed["missing"][0]["parameters"][0];
     let (low, high) = (gain["low"].as_f64().unwrap(), gain["high"].as_f64().unwrap());
     assert!(low < 0.06 && high > 0.06 && low > 0.02, "{gain}");
-    // Not only at the end: the comparison is told while the muscle moves, with its size.
+    // Not only at the end: the comparison is printed while the muscle moves, with its size.
     assert!(said.contains("What changed: force-gain"), "{said}");
 
     let (about, said) = run(folder.path(), 5, 0.0, &["--reference", "commissioning/first.csv"]);
@@ -74,7 +74,7 @@ fn a_wrong_gain_is_named_while_the_muscle_works_and_nothing_is_where_nothing_is_
     assert_eq!(changed["verdict"], "consistent", "{changed:#}\n{said}");
     assert_eq!(changed["missing"].as_array().unwrap().len(), 0, "{changed:#}");
 
-    // A recording of a controller that works by itself.
+    // A recording of a controller that works alone.
     let controller = controller(6, 0.06);
     works(&controller);
     let port = controller.address().to_string();

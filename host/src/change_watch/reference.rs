@@ -105,7 +105,7 @@ impl ReferenceOptions {
     }
 }
 
-/// Tells the console what is new, where the words differ from the last ones.
+/// Prints what is new, where the words differ from the last ones.
 pub fn tell(watch: Option<&ChangeWatch>, last: &mut String, console: &Console) {
     let Some(update) = watch.and_then(ChangeWatch::news) else { return };
     let names = match &update {

@@ -49,7 +49,7 @@ pub(super) fn swings(r: &Recording) -> bool {
 type Slope<'a> = dyn Fn(f64, f64) -> Option<f64> + 'a;
 
 /// A smooth force over pressure and stroke with another level for each direction; only its slopes are used. Over one part of the stroke
-/// alone the pressure passes too seldom for a slope.
+/// alone the pressure passes too rarely for a slope.
 pub(super) struct Plane {
     pressures: (f64, f64),
     strokes: (f64, f64),
