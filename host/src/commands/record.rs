@@ -10,7 +10,7 @@ use model_core::link::messages::{Event, Telemetry, TelemetryRate};
 use serde_json::json;
 
 use super::port::PortOption;
-use super::run::{begin, end, interrupts, not_there, positive};
+use super::run::{begin, end, interrupts, not_there, positive, warn_of};
 use crate::change_watch::{self, ReferenceOptions};
 use crate::console::Console;
 use crate::documents::{bench, text};
@@ -139,13 +139,7 @@ impl Arguments {
         watched?;
         kept?;
         quiet?.map_err(|refusal| messages::refused("telemetry", refusal))?;
-        if losses.samples > 0 {
-            console.warning(format!(
-                "{} lost on the line, in {}",
-                pluralise(losses.samples, "sample"),
-                pluralise(losses.gaps, "gap")
-            ));
-        }
+        warn_of(losses, console);
         console.result(if self.json {
             format!("{about:#}")
         } else {

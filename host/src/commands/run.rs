@@ -21,7 +21,7 @@ use pam_device::reachability::Reachability;
 use pam_device::recorder::{Recorder, about_losses, about_start};
 use pam_device::run::{Ending, Plan, run, vent};
 use pam_device::setpoint_profile::{Quantity, SetpointProfile};
-use pam_device::{Client, messages};
+use pam_device::{Client, Losses, messages};
 
 use crate::progress::ProgressLine;
 
@@ -203,13 +203,7 @@ impl Arguments {
         let kept = recorder.map(|recorder| end(recorder, &about, console)).transpose();
         let ending = outcome?;
         let kept = kept?;
-        if losses.samples > 0 {
-            console.warning(format!(
-                "{} lost on the line, in {}",
-                pluralise(losses.samples, "sample"),
-                pluralise(losses.gaps, "gap")
-            ));
-        }
+        warn_of(losses, console);
         let lasted = errors.all.samples as f64 * f64::from(every_ticks);
         // A step asks for more than can be had for a moment, and is none the worse for it.
         if let Some(saturated) = saturated.map(f64::from).filter(|&saturated| saturated > 0.1 * lasted) {
@@ -382,6 +376,17 @@ pub(super) fn end(recorder: Recorder, about: &Value, console: &Console) -> Resul
         ));
     }
     recorder.finish(about)
+}
+
+/// Warns of samples that were lost.
+pub(super) fn warn_of(losses: Losses, console: &Console) {
+    if losses.samples > 0 {
+        console.warning(format!(
+            "{} lost on the line, in {}",
+            pluralise(losses.samples, "sample"),
+            pluralise(losses.gaps, "gap")
+        ));
+    }
 }
 
 /// A flag that Ctrl-C and a request to end set.
