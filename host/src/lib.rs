@@ -1,6 +1,7 @@
 //! The program `host`: its commands, the live view, the demo, settings.
 
 mod campaign;
+pub mod change_watch;
 pub mod cli;
 pub mod commands;
 pub mod console;

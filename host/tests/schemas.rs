@@ -94,6 +94,18 @@ fn results_of_recordings_and_tables_are_valid() {
         }
     }
     seen.push(own("history --quiet 2026-01-05 2026-02-05 --muscle m.toml --json -", false));
+    // What changed beside another campaign, and beside a table: nothing, and a gain of the load cell.
+    let (first, second) = ("2026-01-05", "2026-02-05");
+    let of = |day: &str| {
+        let mut files: Vec<String> = std::fs::read_dir(folder.join(day))
+            .unwrap()
+            .map(|f| f.unwrap().path().display().to_string())
+            .collect();
+        files.sort();
+        files.join(" ")
+    };
+    own(&format!("diagnose --quiet {} --reference {} --json -", of(second), of(first)), false);
+    own(&format!("diagnose --quiet {} --reference t.pam --json -", of(second)), false);
     let (a, b) = (&recordings[0], &recordings[1]);
     seen.push(valid(&all, "compare", &host(folder, &["compare", "--quiet", a, b, "--json"])));
     seen.sort();

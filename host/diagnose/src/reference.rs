@@ -22,6 +22,7 @@
 //! | `gate` | a change must show without any single mounting |
 //! | `posterior` | probabilities, set, verdict |
 //! | `isometric` | all of this for pressure staircases at held lengths |
+//! | `combined` | length and pressure that move together, taken apart into runs at nearly held lengths |
 //! | `strokes`, `stroked` | the same question for strokes at regulated pressures |
 //! | `sweeps` | runs at the reference's lengths, for quantities that are followed over campaigns |
 //! | `localise` | which cells, since which file, abruptly or gradually |
@@ -36,6 +37,7 @@
 
 pub mod answer;
 mod cells;
+mod combined;
 mod contrast;
 pub mod correction;
 mod gate;

@@ -166,7 +166,7 @@ mod tests {
     fn a_wave_or_a_ramp_rings_nowhere() {
         for rate in [12.0, 106.0] {
             for period in [1.0, 4.0] {
-                let wave = recording(rate, |t| 3e5 + 1e5 * (6.283 * t / period).sin());
+                let wave = recording(rate, |t| 3e5 + 1e5 * (std::f64::consts::TAU * t / period).sin());
                 assert!(!ringing(&wave).contains(&true), "{rate} Hz, {period} s");
             }
             let ramp = recording(rate, |t| 1e4 * t + 300.0 * (1.7 * t).sin());

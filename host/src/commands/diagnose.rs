@@ -1,6 +1,6 @@
 //! `host diagnose`: which effects the model lacks, where it is wrong, and how certain that is; with `--reference`, what has changed.
 
-pub(super) mod reference;
+pub(crate) mod reference;
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -6,18 +6,19 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use model_core::link::endpoints::{GetInfo, GetStatus, SetTelemetry};
-use model_core::link::messages::TelemetryRate;
+use model_core::link::messages::{Event, Telemetry, TelemetryRate};
 use serde_json::json;
 
 use super::port::PortOption;
-use super::run::{begin, end, interrupts, not_there, positive};
+use super::run::{begin, end, interrupts, not_there, positive, warn_of};
+use crate::change_watch::{self, ReferenceOptions};
 use crate::console::Console;
 use crate::documents::{bench, text};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::pluralise::pluralise;
 use pam_data::progress::Progress;
 use pam_device::error::DeviceCode;
-use pam_device::recorder::{Recorder, about_losses, about_start, recover};
+use pam_device::recorder::{about_losses, about_start, recover};
 use pam_device::{Client, Topic, messages};
 
 use crate::progress::ProgressLine;
@@ -28,7 +29,8 @@ use pam_data::date::now_utc;
 #[command(after_help = "Examples:\n  \
     host record --port /dev/ttyACM0\n  \
     host record --seconds 60 -o run.csv -o run.mcap\n  \
-    host record --rate 100 --folder campaign\n\n\
+    host record --rate 100 --folder campaign\n  \
+    host record --reference commissioning.csv\n\n\
     It only watches: it does not keep the run of another program alive. Every 0.1 s goes to the disk; a program that is killed, a cable \
     that is pulled or a disk that fills leaves everything until then. CSV and MCAP are read by `host fit` and all others; \
     MCAP opens in the viewers of robotics. OUT.json says which versions, table and settings the controller had.")]
@@ -53,6 +55,8 @@ pub struct Arguments {
     /// Print what was recorded as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    changed: ReferenceOptions,
 }
 
 /// Silence of the telemetry after which the device's faults are read.
@@ -78,6 +82,8 @@ impl Arguments {
             self.output.clone()
         };
         not_there(&output, self.replace)?;
+        let mut changed = self.changed.start(console)?;
+        let mut said = String::new();
         let interrupted = interrupts()?;
         let mut client = self.port.connect(console)?;
         let ticks = f64::from(client.call::<GetInfo>(&())?.ticks_per_s);
@@ -91,9 +97,23 @@ impl Arguments {
         console.note(format!("recording to {names}; Ctrl-C ends it"));
         let progress = ProgressLine::new(console, "record");
         progress.total(self.seconds.map_or(0, |s| (s * 1e3) as u64));
-        let watched = watch(&mut client, every_ticks, self.seconds, &mut recorder, &progress, || {
-            interrupted.load(Ordering::Relaxed)
-        });
+        let watched = watch(
+            &mut client,
+            every_ticks,
+            self.seconds,
+            |happened| match happened {
+                Happened::Sample(sample, elapsed) => {
+                    if let Some(changed) = &mut changed {
+                        changed.push(sample);
+                    }
+                    change_watch::tell(changed.as_ref(), &mut said, console);
+                    progress.set(elapsed);
+                    recorder.push(sample)
+                }
+                Happened::Event(event) => recorder.event(event),
+            },
+            || interrupted.load(Ordering::Relaxed),
+        );
         drop(progress);
         let losses = client.losses();
         about["losses"] = about_losses(losses);
@@ -102,6 +122,8 @@ impl Arguments {
             Ok(Ending::Interrupt) => "interrupt".to_owned(),
             Err(e) => e.to_string(),
         });
+        let changed = change_watch::finish(changed);
+        about["changed"] = json!(changed.as_ref().map(|c| &c.1));
         let rows = recorder.rows();
         about["rows"] = json!(rows);
         about["files"] = json!(output.iter().map(|f| f.display().to_string()).collect::<Vec<_>>());
@@ -117,29 +139,32 @@ impl Arguments {
         watched?;
         kept?;
         quiet?.map_err(|refusal| messages::refused("telemetry", refusal))?;
-        if losses.samples > 0 {
-            console.warning(format!(
-                "{} lost on the line, in {}",
-                pluralise(losses.samples, "sample"),
-                pluralise(losses.gaps, "gap")
-            ));
-        }
+        warn_of(losses, console);
         console.result(if self.json {
             format!("{about:#}")
         } else {
             format!("{} in {names}, {} lost", pluralise(rows, "sample"), losses.samples)
         });
+        if let Some((words, _)) = changed.filter(|_| !self.json) {
+            console.result(words.trim_end());
+        }
         Ok(())
     }
 }
 
-/// Hands every sample and event to the recorder.
+/// What a device sends.
+enum Happened<'a> {
+    /// A sample, and the time since the first one, ms.
+    Sample(&'a Telemetry, u64),
+    Event(&'a Event),
+}
+
+/// Hands on every sample and event.
 fn watch(
     client: &mut Client,
     every_ticks: u16,
     seconds: Option<f64>,
-    recorder: &mut Recorder,
-    progress: &ProgressLine,
+    mut take: impl FnMut(Happened<'_>) -> Result<()>,
     stop: impl Fn() -> bool,
 ) -> Result<Ending> {
     client
@@ -163,10 +188,9 @@ fn watch(
                 if seconds.is_some_and(|end| elapsed as f64 * 1e-6 >= end) {
                     return Ok(Ending::Time);
                 }
-                recorder.push(&sample)?;
-                progress.set(elapsed / 1000);
+                take(Happened::Sample(&sample, elapsed / 1000))?;
             }
-            Some(Topic::Event(event)) => recorder.event(&event)?,
+            Some(Topic::Event(event)) => take(Happened::Event(&event))?,
             Some(Topic::Log(_)) => {}
             None if heard.elapsed() > SILENCE => {
                 let status = client.call::<GetStatus>(&())?;

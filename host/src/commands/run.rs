@@ -10,6 +10,7 @@ use model_core::link::settings::{FeedForward, Joint};
 use serde_json::{Value, json};
 
 use super::port::PortOption;
+use crate::change_watch::{self, ReferenceOptions};
 use crate::console::Console;
 use crate::documents::{device, line};
 use pam_data::error::{DataCode, Error, Result};
@@ -20,7 +21,7 @@ use pam_device::reachability::Reachability;
 use pam_device::recorder::{Recorder, about_losses, about_start};
 use pam_device::run::{Ending, Plan, run, vent};
 use pam_device::setpoint_profile::{Quantity, SetpointProfile};
-use pam_device::{Client, messages};
+use pam_device::{Client, Losses, messages};
 
 use crate::progress::ProgressLine;
 
@@ -33,6 +34,7 @@ use crate::progress::ProgressLine;
         --force 'sine mean=60 amplitude=20 frequency=0.5'\n  \
     host run --force 'steps 40 60 80 hold=2' --seconds 12 -o steps.mcap\n  \
     host run --stroke @profile.csv --seconds 30 -o stroke.csv\n  \
+    host run --force 'sine mean=60 amplitude=20 frequency=0.2' --seconds 120 --reference commissioning.csv\n  \
     host run --angle 'sine mean=0 amplitude=5 frequency=0.5' --stiffness 12\n\n\
     Setpoint profiles (frequencies in Hz, times in s):\n  \
     VALUE\n  \
@@ -68,6 +70,8 @@ pub struct Arguments {
     /// Print how it went as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    changed: ReferenceOptions,
 }
 
 #[derive(Debug, Args)]
@@ -127,6 +131,8 @@ impl Arguments {
             return Err(Error::new(DataCode::CallInvalid, "--stiffness must be zero or more"));
         }
         not_there(&self.output, self.replace)?;
+        let mut changed = self.changed.start(console)?;
+        let mut said = String::new();
         let interrupted = interrupts()?;
         let mut client = self.port.connect(console)?;
         if let Some(source) = self.feed_forward {
@@ -157,6 +163,10 @@ impl Arguments {
             &plan,
             |sample| {
                 errors.add(quantity, sample);
+                if let Some(changed) = &mut changed {
+                    changed.push(sample);
+                }
+                change_watch::tell(changed.as_ref(), &mut said, console);
                 if let Some(reached) = &mut reached {
                     reached.add(quantity, sample);
                 }
@@ -182,6 +192,8 @@ impl Arguments {
         about["saturated_ticks"] = json!(saturated);
         let per_s = ticks / f64::from(every_ticks);
         about["reach"] = json!(reached.as_ref().map(|reached| reached.to_json(per_s)));
+        let changed = change_watch::finish(changed);
+        about["changed"] = json!(changed.as_ref().map(|c| &c.1));
         about["ended_by"] = json!(match &outcome {
             Ok(Ending::Done) => "time".to_owned(),
             Ok(Ending::Stopped) => "interrupt".to_owned(),
@@ -191,13 +203,7 @@ impl Arguments {
         let kept = recorder.map(|recorder| end(recorder, &about, console)).transpose();
         let ending = outcome?;
         let kept = kept?;
-        if losses.samples > 0 {
-            console.warning(format!(
-                "{} lost on the line, in {}",
-                pluralise(losses.samples, "sample"),
-                pluralise(losses.gaps, "gap")
-            ));
-        }
+        warn_of(losses, console);
         let lasted = errors.all.samples as f64 * f64::from(every_ticks);
         // A step asks for more than can be had for a moment, and is none the worse for it.
         if let Some(saturated) = saturated.map(f64::from).filter(|&saturated| saturated > 0.1 * lasted) {
@@ -222,6 +228,9 @@ impl Arguments {
             let name = kept.map(|p| format!(" in {}", p.display())).unwrap_or_default();
             let rms = errors.to_text(quantity);
             console.result(format!("{}{name}{rms}; vented", pluralise(errors.all.samples, "sample")));
+            if let Some((words, _)) = changed {
+                console.result(words.trim_end());
+            }
         }
         Ok(())
     }
@@ -367,6 +376,17 @@ pub(super) fn end(recorder: Recorder, about: &Value, console: &Console) -> Resul
         ));
     }
     recorder.finish(about)
+}
+
+/// Warns of samples that were lost.
+pub(super) fn warn_of(losses: Losses, console: &Console) {
+    if losses.samples > 0 {
+        console.warning(format!(
+            "{} lost on the line, in {}",
+            pluralise(losses.samples, "sample"),
+            pluralise(losses.gaps, "gap")
+        ));
+    }
 }
 
 /// A flag that Ctrl-C and a request to end set.

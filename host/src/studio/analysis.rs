@@ -10,6 +10,8 @@ use model_core::units::{Length, Pressure};
 use serde_json::{Value, json};
 
 use super::access::{same, token};
+use crate::change_watch::Reference;
+use crate::console::Console;
 use crate::demo::campaign::record;
 use pam_data::compare::compare;
 use pam_data::date;
@@ -85,6 +87,23 @@ impl Analysis {
             .help("show the difference to the device again"));
         }
         Ok(table)
+    }
+
+    /// What a running controller is compared with: all recordings, or the table of the last fit.
+    ///
+    /// # Errors
+    /// [`DataCode::CallInvalid`] where there is none, or as it is read.
+    pub fn reference(&self, table: bool) -> Result<Reference> {
+        let files = if table {
+            vec![self.table()?]
+        } else {
+            self.known().recordings.iter().map(|r| r.1.clone()).collect()
+        };
+        if files.is_empty() {
+            return Err(Error::new(DataCode::CallInvalid, "no recordings to compare with")
+                .help("record a minute of ordinary motion, or load an earlier recording"));
+        }
+        Reference::read(&files, None, &Console::silent())
     }
 
     /// A report by its name, which only its creator knows.

@@ -5,13 +5,21 @@ use model_core::link::settings::Settings;
 use serde_json::{Value, json};
 use tokio::sync::broadcast;
 
+use crate::change_watch::Update;
 use pam_data::error::Error;
 use pam_device::messages;
+use pam_diagnose::reference::Verdict;
 
 /// Something went wrong.
 pub(super) fn tell(say: &broadcast::Sender<String>, level: &str, error: &Error) {
     let _ = say
         .send(json!({ "k": "e", "level": level, "text": error.cause(), "help": error.advice() }).to_string());
+}
+
+/// What changed since the reference, in one line.
+pub(super) fn compared(update: &Update) -> String {
+    let changed = matches!(update, Update::Answer(report) if report.verdict != Verdict::Consistent);
+    json!({ "k": "c", "text": update.words(), "changed": changed }).to_string()
 }
 
 /// Between what each fitted sensor can read, and the unit, by the names and in the units of [`batch`].

@@ -33,6 +33,7 @@ pub(super) enum Posted {
     Mishap { code: u8 },
     Record,
     EndRecord,
+    Watch { reference: Compared },
     Recordings,
     Curves { number: usize },
     Example { muscle: String },
@@ -41,6 +42,15 @@ pub(super) enum Posted {
     Compare { a: usize, b: usize },
     Difference,
     Flash { table: String },
+}
+
+/// What a running controller is compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Compared {
+    Nothing,
+    Recordings,
+    Table,
 }
 
 impl Shared {
@@ -125,6 +135,11 @@ impl Shared {
                     self.analysis.add(PathBuf::from(path));
                 }
                 Ok(self.analysis.list())
+            }
+            Posted::Watch { reference: Compared::Nothing } => self.order(Order::Watch(None)).await,
+            Posted::Watch { reference } => {
+                let read = self.apart(move |a| a.reference(reference == Compared::Table)).await?;
+                self.order(Order::Watch(Some(Arc::new(read)))).await
             }
             Posted::Recordings => Ok(self.analysis.list()),
             Posted::Curves { number } => self.apart(move |a| a.curves(number)).await,

@@ -6,6 +6,7 @@
 mod connected;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
@@ -16,6 +17,7 @@ use tokio::sync::{broadcast, oneshot};
 pub use self::connected::Connected;
 use super::events::tell;
 use super::vent::Vent;
+use crate::change_watch::Reference;
 use pam_data::error::{DataCode, Error, Result};
 use pam_device::Address;
 use pam_device::setpoint_profile::{Quantity, SetpointProfile};
@@ -49,6 +51,8 @@ pub enum Order {
     Record(PathBuf),
     /// End it.
     EndRecord,
+    /// Compare what runs with this from now on, or with nothing.
+    Watch(Option<Arc<Reference>>),
 }
 
 impl Order {

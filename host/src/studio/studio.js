@@ -94,6 +94,7 @@ function take(m) {
     if (ring.length && m.t[0] < ring.last("t")) ring.clear();
     ring.push(m, m.t.length); samples += m.t.length; mode = m.mode; fresh = true;
   } else if (m.k === "s") show(m);
+  else if (m.k === "c") { $("changed").textContent = m.text; $("changed").classList.toggle("alarm", m.changed); }
   else if (m.k === "e") message(m.text + (m.help ? "\n→ " + m.help : ""));
 }
 
@@ -221,6 +222,12 @@ click("hold", () => {
   redraw();
 });
 $("window").addEventListener("change", redraw);
+$("watch").addEventListener("change", async () => {
+  const reference = $("watch").value, ordered = await order("watch", { reference });
+  if (!ordered) $("watch").value = "nothing";
+  $("changed").hidden = !ordered || reference === "nothing";
+  $("changed").classList.remove("alarm"); $("changed").textContent = "no comparison yet: 25 s of motion under pressure are needed";
+});
 const settings = async (set) => { const r = await order("settings", { set }); if (r) { $("settings").hidden = false; $("settings").textContent = JSON.stringify(r, null, 1); if (set.length) message("written and read back"); } };
 click("set", () => settings([$("key").value + "=" + $("value").value]));
 click("show", () => settings([]));

@@ -13,9 +13,11 @@ use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::{Address, Client, Patience, Port};
 use serde_json::{Value, json};
 use tokio::sync::{Semaphore, broadcast, oneshot};
+use virtual_bench::bench::BenchSpec;
+use virtual_bench::plant::Motion;
 
 use super::analysis::Analysis;
-use super::orders::Posted;
+use super::orders::{Compared, Posted};
 use super::server::Shared;
 use super::session::{self, Connected, Order};
 use super::vent::{self, Vent};
@@ -147,12 +149,17 @@ impl Studio {
 
     /// The next report of the state that `wanted` accepts.
     async fn state(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
+        self.next(|m| m["k"] == "s" && wanted(m)).await
+    }
+
+    /// The next message that `wanted` accepts.
+    async fn next(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
         loop {
             let text = tokio::time::timeout(HOPELESS, self.says.recv()).await.unwrap();
             // A batch that was missed is not a state that is waited for: one comes each 0.4 s.
             let Ok(text) = text else { continue };
             let value: Value = serde_json::from_str(&text).unwrap();
-            if value["k"] == "s" && wanted(&value) {
+            if wanted(&value) {
                 return value;
             }
         }
@@ -283,4 +290,35 @@ fn the_path_of_a_vent_only_vents_and_only_for_the_page() {
         assert!(answer.starts_with(&format!("HTTP/1.1 {status}")), "{head}: {answer}");
         assert_eq!(studio.shared.vent.count(), count);
     }
+}
+
+#[test]
+fn what_runs_is_compared_with_a_recording_made_before_and_can_be_vented_meanwhile() {
+    run(async {
+        let mut studio = Studio::new();
+        let spec = BenchSpec::laboratory(muscle("mini").unwrap(), 2);
+        let motion = Motion::Sine { mean_mm: 0.6, amplitude_mm: 0.4, frequency_hz: 0.5 };
+        let device = Emulated::start(Stand::new(spec, motion), Some(Kind::Native), 3.0).unwrap();
+        let patience = Patience { answer: HOPELESS, slow_answer: HOPELESS, ..Patience::default() };
+        let client = Client::connect(Port::open(device.address()).unwrap(), patience).unwrap();
+        let connected = Connected::new(device.address().clone(), client, None).unwrap();
+        studio.shared.order(Order::Replace(Box::new(connected))).await.unwrap();
+        // Three times as fast as the clock, a busy machine would soon be called silent.
+        let set = vec!["watch.autonomous=true".to_owned()];
+        studio.shared.post(Posted::Settings { set }).await.unwrap();
+        let watch = |reference| studio.shared.post(Posted::Watch { reference });
+        assert!(watch(Compared::Recordings).await.unwrap_err().cause().contains("no recordings"));
+        studio.shared.post(Posted::Arm).await.unwrap();
+        let profile = "sine mean=300 amplitude=150 frequency=0.11".to_owned();
+        studio.shared.post(Posted::Follow { quantity: "pressure".into(), profile }).await.unwrap();
+        studio.shared.post(Posted::Record).await.unwrap();
+        studio.state(|s| s["recording"].as_u64() > Some(40_000)).await;
+        studio.shared.post(Posted::EndRecord).await.unwrap();
+        studio.shared.post(Posted::Watch { reference: Compared::Recordings }).await.unwrap();
+        let said = studio.next(|m| m["k"] == "c").await;
+        assert_eq!(said["changed"], false, "{said}");
+        assert!(said["text"].as_str().unwrap().starts_with("Nothing changed"), "{said}");
+        assert!(studio.press_vent().starts_with("HTTP/1.1 204"));
+        studio.state(|s| s["state"] == "disarmed").await;
+    });
 }

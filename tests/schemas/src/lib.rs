@@ -41,7 +41,11 @@ impl Schemas {
     /// # Errors
     /// The document does not name a published schema, or the schema itself is invalid.
     pub fn check(&self, document: &Value) -> Result<Vec<String>, String> {
-        let name = document["schema"].as_str().ok_or("the document names no schema")?.replace('/', "-");
+        let mut name = document["schema"].as_str().ok_or("the document names no schema")?.replace('/', "-");
+        // A diagnosis against a reference has a form of its own.
+        if name == "pam-diagnose-1" && document.get("reference").is_some() {
+            name.push_str("-reference");
+        }
         let schema = self.0.get(&name).ok_or_else(|| format!("schema {name} is not published"))?;
         let validator = jsonschema::validator_for(schema).map_err(|e| e.to_string())?;
         Ok(validator.iter_errors(document).map(|e| format!("{e} at {}", e.instance_path())).collect())

@@ -194,6 +194,28 @@ pam_data::criteria! {
     TABLE_ERROR_ZERO: f64 = 0.3, "table_error_zero", "1", Measured("development half");
     /// Step of the slope over the length, m.
     TABLE_SURFACE_STEP: f64 = 1e-4, "table_surface_step", "1", Judgement;
+    /// Length and pressure move together: parts of the stroke, each of which counts as a held length.
+    COMBINED_LENGTHS: usize = 5, "combined_lengths", "1", Judgement;
+    /// The same: spans of time, whose differences show how far the actuator repeats.
+    COMBINED_SPANS: usize = 6, "combined_spans", "1", Cost;
+    /// Rows that a part of the stroke must have in a span.
+    COMBINED_FEWEST_ROWS: usize = 10, "combined_fewest_rows", "1", Judgement;
+    /// Ridge on the coefficients of the force over pressure and stroke, share of the rows.
+    COMBINED_RIDGE: f64 = 1e-6, "combined_ridge", "1", Judgement;
+    /// Error of the shapes where length and pressure move together, share of their size: slopes are those of five coarse parts.
+    COMBINED_SHAPE_ERROR: f64 = 0.2, "combined_shape_error", "1", Judgement;
+    /// A table is compared where it gives more than this share of its largest force: it is fitted where the muscle pulls.
+    COMBINED_PULLS: f64 = 0.05, "combined_pulls", "1", Judgement;
+    /// After a turn the stroke must come back by this share of its range before friction counts as turned.
+    COMBINED_TURNED: f64 = 0.1, "combined_turned", "1", Judgement;
+    /// Mean square of the stroke's steps from row to row over its variance, below which it is a motion; of white noise it is 2.
+    COMBINED_SMOOTH: f64 = 0.2, "combined_smooth", "1", Derived("white noise gives 2");
+    /// A stroke that swings comes back by this share of its range, and at one pressure varies by so much of it.
+    COMBINED_SWING: f64 = 0.5, "combined_swing", "1", Judgement;
+    /// Turns of a stroke that swings.
+    COMBINED_TURNS: usize = 4, "combined_turns", "1", Judgement;
+    /// Range of the pressure within a stroke, share of the largest, from which on it is not regulated.
+    COMBINED_UNREST: f64 = 0.1, "combined_unrest", "1", Judgement;
     /// Correlation length over pressure, share of the range, and correlation between the directions of an unknown surface.
     UNKNOWN_SMOOTH: ((f64, f64)) = (0.25, 0.5), "unknown_smooth", "1", Judgement;
     /// Eigenvectors below this share of the largest are left out.

@@ -52,6 +52,15 @@ pub enum NotComparable {
     },
     /// Changes that strokes at regulated pressures are not asked about.
     Strokes,
+    /// Changes that a motion of length and pressure together is not asked about.
+    Moving,
+    /// Rows at lengths that the reference does not have.
+    Lengths {
+        /// Its name.
+        recording: String,
+        /// Their share of the rows.
+        share: f64,
+    },
 }
 
 /// A note on the comparison.
@@ -98,6 +107,8 @@ pub enum Remark {
     NotAcquitted(f64),
     /// Gains have the same shape at regulated pressures.
     GainOfStrokes,
+    /// A zero of the gauge often takes the name of a gain or of another zero where length and pressure move together.
+    GaugeOfMotion,
 }
 
 /// How recordings were held out.
@@ -109,6 +120,8 @@ pub enum Split {
     None,
     /// Every other level of pressure.
     OtherLevels,
+    /// Every other part of AFTER, by length and time.
+    OtherParts,
 }
 
 /// Why a change is not named.

@@ -4,7 +4,9 @@ use nalgebra::DVector;
 
 use super::cells::{Cell, cells};
 use super::contrast::{Contrast, evidence};
-use super::criteria::{DIRECTIONS_PER_RUN, LAG_FLOOR, MOST_CHANGES, NAMED, SIZES, TABLE_ERROR_FACTORS};
+use super::criteria::{
+    COMBINED_SHAPE_ERROR, DIRECTIONS_PER_RUN, LAG_FLOOR, MOST_CHANGES, NAMED, SIZES, TABLE_ERROR_FACTORS,
+};
 use super::gate::{self, Asked};
 use super::lag::{self, Shift};
 use super::posterior::{Cause, Posterior};
@@ -46,6 +48,29 @@ pub(super) struct Round {
     pub estimates: Vec<Estimate>,
     pub slip: Option<Slip>,
     pub local: Option<(usize, f64)>,
+    /// Log evidence of the best name.
+    pub best: f64,
+}
+
+/// How inexact shapes are, share of their size, and the evidence of the best name of the first round.
+#[derive(Debug, Clone, Copy, Default)]
+struct Inexact {
+    share: f64,
+    first: f64,
+}
+
+impl Inexact {
+    /// A shape that is wrong by a share of its size leaves that share of what it explains, and another shape may take it: evidence
+    /// counts as with a variance larger by so much.
+    fn temper(self, all: &mut [(Cause, f64)]) -> f64 {
+        let named = all.iter().filter(|(c, _)| matches!(c, Cause::Named(_)));
+        let best = named.map(|(_, log)| *log).fold(0.0, f64::max);
+        let factor = 1.0 + 2.0 * self.share * self.share * best.max(self.first);
+        for (_, log) in all.iter_mut().filter(|(_, log)| log.is_finite()) {
+            *log = best - (best - *log) / factor;
+        }
+        best
+    }
 }
 
 /// Everything that was found.
@@ -96,10 +121,14 @@ pub(super) struct Reference {
 pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Result<Analysis> {
     let Reference { surface, error, recorded } = reference;
     use rayon::prelude::*;
-    let scores: Vec<_> = runs.runs.par_iter().map(|r| lag::score(r, &surface)).collect();
-    let shift = lag::shift(&runs, &scores);
-    let traced = |run: &Run| lag::effect(run, &surface, shift.lag);
-    let lag = (shift.lag.abs() > LAG_FLOOR).then_some(&traced as &dyn Fn(&Run) -> Vec<f64>);
+    // Rows of one part of a motion do not follow one another: they say nothing about lags.
+    let shift = (!runs.moving).then(|| {
+        let scores: Vec<_> = runs.runs.par_iter().map(|r| lag::score(r, &surface)).collect();
+        lag::shift(&runs, &scores)
+    });
+    let late = shift.as_ref().map_or(0.0, |s| s.lag);
+    let traced = |run: &Run| lag::effect(run, &surface, late);
+    let lag = (late.abs() > LAG_FLOOR).then_some(&traced as &dyn Fn(&Run) -> Vec<f64>);
     let cells = cells(&runs, &surface, lag);
     if !cells.iter().any(|c| c.after) {
         let values = || runs.side(true).flat_map(|r| r.pressure.iter().copied());
@@ -112,12 +141,17 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
                 surface.high / 1e3
             )));
     }
-    let setting =
-        Setting { range: surface.high - surface.low, largest: surface.largest, remounted: runs.remounted };
+    let setting = Setting {
+        range: surface.high - surface.low,
+        largest: surface.largest,
+        remounted: runs.remounted,
+        moving: runs.moving,
+    };
     let contrasts = contrasts(&cells, &runs, &setting, (!recorded).then_some(error))?;
     let mut accepted: Vec<Accepted> = Vec::new();
     // Lag scores are of rows that still hold what was named before: a lag is named first or not at all.
-    let weighed = |c: Contrast| (weigh(&cells, &c, &surface, Some(&shift), prior_none), c);
+    let mut inexact = Inexact { share: if runs.moving { COMBINED_SHAPE_ERROR } else { 0.0 }, first: 0.0 };
+    let weighed = |c: Contrast| (weigh(&cells, &c, &surface, (shift.as_ref(), inexact), prior_none), c);
     let (mut round, contrast, which) = likeliest(contrasts.into_iter().map(weighed).collect())?;
     let reference_error = if recorded { 0.0 } else { error * TABLE_ERROR_FACTORS[which] };
     let mut present = contrast.clone();
@@ -128,8 +162,9 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
         // What a lag does to settled rows is not known well enough to look for more beneath it.
         let lagged = accepted.iter().any(|a| is_lag(a.change));
         let more = leader.filter(|_| !lagged && none < NAMED && accepted.len() < MOST_CHANGES);
-        let next = more.and_then(|(change, p)| accept(&cells, &round, change, p, &shift));
+        let next = more.and_then(|(change, p)| accept(&cells, &round, change, p, late));
         let last = round.posterior.clone();
+        inexact.first = inexact.first.max(round.best);
         first.get_or_insert(round);
         // A second change of the same kind is what the first one's shape is inexact by.
         let Some(next) = next.filter(|n| accepted.iter().all(|a| a.change.class() != n.change.class()))
@@ -157,7 +192,7 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
             present = present.without_shapes(std::slice::from_ref(&next.shape));
         }
         accepted.push(next);
-        round = weigh(&cells, &present, &surface, None, prior_none);
+        round = weigh(&cells, &present, &surface, (None, inexact), prior_none);
     }
 }
 
@@ -212,7 +247,7 @@ fn weigh(
     cells: &[Cell],
     contrast: &Contrast,
     surface: &Surface,
-    lag: Option<&Shift>,
+    (lag, inexact): (Option<&Shift>, Inexact),
     prior_none: f64,
 ) -> Round {
     let scale = contrast.scale();
@@ -258,7 +293,9 @@ fn weigh(
         let rms = rms_after(cells, &lag::trace(cells)) / lag.lag.abs().max(1e-9);
         estimates.push(Estimate { change, size: lag.lag.abs(), std: lag.variance.sqrt(), rms });
     }
+    let best = if inexact.share > 0.0 { inexact.temper(&mut all) } else { 0.0 };
     Round {
+        best,
         posterior: Posterior::of(&all, prior_none),
         estimates,
         slip,
@@ -283,17 +320,11 @@ fn weigh_lag(cells: &[Cell], contrast: &Contrast, lag: &Shift) -> (Change, f64) 
     (change, gain + own.max(-5.0) + lag.changed)
 }
 
-fn accept(
-    cells: &[Cell],
-    round: &Round,
-    change: Change,
-    probability: f64,
-    shift: &Shift,
-) -> Option<Accepted> {
+fn accept(cells: &[Cell], round: &Round, change: Change, probability: f64, late: f64) -> Option<Accepted> {
     let estimate = round.estimates.iter().find(|e| e.change == change)?;
     let shape = match change {
         Change::EndSlip => round.slip.as_ref()?.shape.clone(),
-        c if is_lag(c) => lag::trace(cells) / shift.lag.abs().max(1e-9),
+        c if is_lag(c) => lag::trace(cells) / late.abs().max(1e-9),
         c => shape(cells, c)?,
     };
     let competitors = round.posterior.set().into_iter().filter_map(|c| match c {

@@ -42,7 +42,9 @@ pub(super) fn places(analysis: &Analysis, difference: &DVector<f64>, rest_length
         }
     }
     let first = analysis.runs.side(false).count();
-    for index in first..analysis.runs.runs.len() {
+    // Parts of one motion are no recordings.
+    let last = if analysis.runs.moving { first } else { analysis.runs.runs.len() };
+    for index in first..last {
         let number = (index - first + 1) as f64;
         add("recording", "", number, number, share(&|c| c.run == index));
     }

@@ -62,11 +62,13 @@ pub(super) struct Setting {
     pub largest: f64,
     /// Whether AFTER was mounted anew.
     pub remounted: bool,
+    /// Whether the lengths are parts of one motion: then one mounting shifts them all.
+    pub moving: bool,
 }
 
 /// Covariance of the cells if nothing was changed, N².
 pub(super) fn covariance(cells: &[Cell], setting: &Setting) -> DMatrix<f64> {
-    let Setting { range, largest, remounted } = *setting;
+    let Setting { range, largest, remounted, moving } = *setting;
     let r: &Repeats = &REPEATS;
     let unit = largest / 100.0;
     let mounted = centred(cells.iter().map(|c| c.means.mounted));
@@ -95,7 +97,8 @@ pub(super) fn covariance(cells: &[Cell], setting: &Setting) -> DMatrix<f64> {
                 * elastic[j]
                 * (clocks * square(r.creep_common) + square(r.run_common) * number + square(r.group) * side);
             if remounted {
-                v += square(REMOUNT / unit) * mounting * side * a.means.by_stroke * b.means.by_stroke;
+                let clamped = if moving { 1.0 } else { mounting };
+                v += square(REMOUNT / unit) * clamped * side * a.means.by_stroke * b.means.by_stroke;
             }
             v += square(r.offset) * run;
             if i == j {

@@ -2,7 +2,8 @@
 
 use super::answer::{ChangeReport, Left, NotComparable, Place, Remark, Repeatability, Verdict};
 use super::criteria::{
-    HELD, LEFT_BY_NAMES, NAMED, OTHER_ACTUATOR, OTHER_LENGTH, PRIOR_NONE, REPORT_REGULATED, UNSTATED_ERROR,
+    COMBINED_UNREST, HELD, LEFT_BY_NAMES, NAMED, OTHER_ACTUATOR, OTHER_LENGTH, PRIOR_NONE, REPORT_REGULATED,
+    UNSTATED_ERROR,
 };
 use super::held_out::Unseen;
 use super::isometric;
@@ -11,7 +12,7 @@ use super::staircase_answer::staircases;
 use super::stroke_answer::strokes;
 use super::stroked;
 use super::surface::Surface;
-use super::{sides, table_surface, units};
+use super::{combined, sides, table_surface, units};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::{self, Campaign, Recording};
 use pam_fit::predict::predict;
@@ -46,6 +47,8 @@ pub struct Options {
 enum Protocol {
     Held,
     Stroked,
+    /// Length and pressure move together.
+    Combined,
 }
 
 /// The range of a column without its outermost hundredths, which a noisy sensor makes.
@@ -63,7 +66,7 @@ fn is_held(r: &Recording) -> bool {
     let travel = usual_range(&r.stroke);
     let largest = r.pressure.iter().fold(0.0_f64, |m, p| m.max(p.abs()));
     let regulated = usual_range(&r.pressure) <= REPORT_REGULATED * largest;
-    travel <= HELD && !(regulated && travel > recording::HELD)
+    travel <= HELD && !(regulated && travel > recording::HELD) && !combined::swings(r)
 }
 
 fn protocol(campaign: &Campaign, side: &str) -> Result<Protocol> {
@@ -88,15 +91,8 @@ fn protocol(campaign: &Campaign, side: &str) -> Result<Protocol> {
         if !sorted.is_empty() && at(0.9) - at(0.1) > REPORT_REGULATED * at(1.0).abs() {
             // Several levels in one file are levels still, as long as each stroke has one.
             let levels = super::strokes::levels(&[campaign]);
-            if levels.len() < 2 {
-                return Err(Error::new(
-                    DataCode::RecordingOutOfRange,
-                    format!("in `{}` length and pressure move together", r.name),
-                )
-                .file(&r.source)
-                .help(
-                    "a comparison needs pressure sweeps at held lengths, or strokes at regulated pressures",
-                ));
+            if levels.len() < 2 || super::strokes::unrest(r) > COMBINED_UNREST * at(1.0).abs() {
+                return Ok(Protocol::Combined);
             }
         }
     }
@@ -108,7 +104,15 @@ fn protocol(campaign: &Campaign, side: &str) -> Result<Protocol> {
 /// # Errors
 /// A mixture of both, or length and pressure that move together.
 pub(crate) fn protocol_is_held(campaign: &Campaign) -> Result<bool> {
-    protocol(campaign, "the campaign").map(|kind| kind == Protocol::Held)
+    match protocol(campaign, "the campaign")? {
+        Protocol::Held => Ok(true),
+        Protocol::Stroked => Ok(false),
+        Protocol::Combined => {
+            Err(Error::new(DataCode::RecordingOutOfRange, "length and pressure move together").help(
+                "a comparison needs pressure sweeps at held lengths, or strokes at regulated pressures",
+            ))
+        }
+    }
 }
 
 /// What has changed in AFTER.
@@ -137,6 +141,13 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
                     let compared = stroked::compare(before, after, 0.0)?;
                     strokes(&compared, options)?
                 }
+                (Protocol::Combined, Protocol::Combined | Protocol::Stroked)
+                | (Protocol::Stroked, Protocol::Combined) => {
+                    let (runs, plane) = combined::of(before, after, options.mounted)?;
+                    let mut surface = Surface::of(&runs)?;
+                    plane.into_slopes(&mut surface, &runs.strokes);
+                    recorded(runs, surface, options)?
+                }
                 _ => {
                     return Err(Error::new(
                         DataCode::RecordingOutOfRange,
@@ -153,7 +164,11 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
         (Against::Table(table, path), kind) => {
             let other = same_actuator(table, options)?;
             let mut report = match kind {
-                Protocol::Held => held_against_table(table, after, options)?,
+                Protocol::Held => against_table(table, after, Runs::alone(after, options.mounted)?, options)?,
+                Protocol::Combined => {
+                    let runs = combined::alone(table, after, options.mounted)?;
+                    against_table(table, after, runs, options)?
+                }
                 Protocol::Stroked => stroked_against_table(table, after, options)?,
             };
             report.reference.table = Some(path.to_owned());
@@ -209,13 +224,17 @@ fn held(before: &Campaign, after: &Campaign, options: &Options) -> Result<Change
         )));
     }
     let surface = Surface::of(&runs)?;
+    recorded(runs, surface, options)
+}
+
+/// Runs on both sides.
+fn recorded(runs: Runs, surface: Surface, options: &Options) -> Result<ChangeReport> {
     let reference = isometric::Reference { surface, error: 0.0, recorded: true };
     let analysis = isometric::analyse(runs, reference, prior(options, PRIOR_NONE))?;
     Ok(staircases(&analysis, options))
 }
 
-fn held_against_table(table: &TableFile, after: &Campaign, options: &Options) -> Result<ChangeReport> {
-    let runs = Runs::alone(after, options.mounted)?;
+fn against_table(table: &TableFile, after: &Campaign, runs: Runs, options: &Options) -> Result<ChangeReport> {
     units::check_pressure(after, f64::from(table.table.tested.pressure_high.pascals()))?;
     let surface = table_surface::of(table, &runs)?;
     units::check_force(after, surface.largest)?;

@@ -54,6 +54,8 @@ pub(super) struct Runs {
     pub strokes: Vec<f64>,
     /// Whether the AFTER runs of a mounting were mounted anew.
     pub remounted: bool,
+    /// Whether the runs are parts of recordings in which length and pressure move together.
+    pub moving: bool,
     /// Duration of AFTER, s.
     pub duration: f64,
     pub not_comparable: Vec<NotComparable>,
@@ -90,7 +92,7 @@ fn nearest(strokes: &[f64], stroke: f64) -> Option<usize> {
 }
 
 /// Whether AFTER is another visit to the bench than BEFORE.
-fn mounted_anew(before: &Campaign, after: &Campaign, said: Mounted) -> bool {
+pub(super) fn mounted_anew(before: &Campaign, after: &Campaign, said: Mounted) -> bool {
     match said {
         Mounted::Same => false,
         Mounted::Anew => true,

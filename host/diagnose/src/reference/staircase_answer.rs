@@ -7,14 +7,14 @@ use super::answer::{
     Repeatability, Size, Split, Verdict, WhyNot, size,
 };
 use super::criteria::{
-    CELLS, FEWEST_CELLS, GATE, NAMED, PRIOR_NONE, SCALE_PRIOR, SIZES, SLOPE_ERROR, TABLE_SLOPE_ERROR,
-    TABLE_SLOPE_OVER_LENGTH,
+    CELLS, COMBINED_SHAPE_ERROR, FEWEST_CELLS, GATE, NAMED, PRIOR_NONE, SCALE_PRIOR, SIZES, SLOPE_ERROR,
+    TABLE_SLOPE_ERROR, TABLE_SLOPE_OVER_LENGTH,
 };
 use super::held_out;
 use super::isometric::{Accepted, Analysis, Estimate};
 use super::posterior::Cause;
 use super::report::{Options, left, prior, verdict};
-use super::shapes::{CHANGES, Change};
+use super::shapes::{CHANGES, Change, Class};
 use super::slip::rms_after;
 use super::{cells, localise, repeatability};
 
@@ -57,7 +57,11 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
         r#where: where_,
         missing: analysis.accepted.iter().map(|a| changed(analysis, a)).collect(),
         held_out: HeldOut {
-            split: if unseen.held { Split::OtherRecordings } else { Split::None },
+            split: match (unseen.held, analysis.runs.moving) {
+                (false, _) => Split::None,
+                (true, false) => Split::OtherRecordings,
+                (true, true) => Split::OtherParts,
+            },
             rms_before_N: unseen.before,
             rms_after_N: unseen.after,
             noise_N: noise,
@@ -87,9 +91,13 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
 
 fn remarks(analysis: &Analysis, verdict: Verdict) -> Vec<Remark> {
     let mut remarks = Vec::new();
+    let like = |a: &Accepted| matches!(a.change.class(), Class::Gain | Class::Zero);
+    if analysis.runs.moving && analysis.accepted.iter().any(like) {
+        remarks.push(Remark::GaugeOfMotion);
+    }
     if let Some((mounting, log)) = analysis.first.local.filter(|l| l.1 > GATE.ln()) {
         // With a change that all mountings show, the one that shows it most is no news.
-        if verdict == Verdict::Consistent || verdict == Verdict::Unexplained {
+        if !analysis.runs.moving && matches!(verdict, Verdict::Consistent | Verdict::Unexplained) {
             remarks.push(Remark::OneMounting { stroke: analysis.runs.strokes[mounting], log });
         }
     }
@@ -100,19 +108,27 @@ fn incomparable(analysis: &Analysis) -> Vec<NotComparable> {
     let mut not = analysis.runs.not_comparable.clone();
     for run in analysis.runs.side(true) {
         let (out, all) = cells::beyond(run, &analysis.surface);
-        if out > 0 {
+        // Each part of a motion has pressures of its own; it names none.
+        if out > 0 && !analysis.runs.moving {
             let share = out as f64 / all.max(1) as f64;
             not.push(NotComparable::Pressure { recording: run.name.clone(), share });
         }
     }
     let recorded = analysis.runs.side(false).next().is_some();
+    if analysis.runs.moving {
+        not.push(NotComparable::Moving);
+    }
     for (m, stroke) in analysis.runs.strokes.iter().enumerate() {
         let mut kinds: Vec<[bool; 2]> = vec![[false; 2]; 2 * CELLS];
         for c in analysis.cells.iter().filter(|c| c.mounting == m) {
             kinds[c.bin + if c.direction < 0.0 { CELLS } else { 0 }][usize::from(c.after)] = true;
         }
         let after = kinds.iter().any(|k| k[1]);
-        if after && recorded && kinds.iter().filter(|k| k[0] && k[1]).count() < FEWEST_CELLS {
+        if after
+            && recorded
+            && !analysis.runs.moving
+            && kinds.iter().filter(|k| k[0] && k[1]).count() < FEWEST_CELLS
+        {
             not.push(NotComparable::FewCells { stroke: *stroke });
         }
     }
@@ -141,7 +157,7 @@ fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
             freedom,
             slope_error(analysis, accepted.change),
         )],
-        confusable_with: accepted.competitors.iter().map(|c| c.name().to_owned()).collect(),
+        confusable_with: confusable(analysis, accepted),
         since: localise::since(analysis, accepted),
         owner: about.owner,
         correction: accepted.change.is_bench(),
@@ -149,11 +165,23 @@ fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
     }
 }
 
+/// Names that these recordings cannot tell from a change. In motion the gauge's zero is always one of those of a gain or a zero: on
+/// emulated muscles most of these zeros took such a name.
+fn confusable(analysis: &Analysis, accepted: &Accepted) -> Vec<String> {
+    let mut all: Vec<Change> = accepted.competitors.clone();
+    let like = matches!(accepted.change.class(), Class::Gain | Class::Zero);
+    if analysis.runs.moving && like && !all.contains(&Change::GaugeOffset) {
+        all.push(Change::GaugeOffset);
+    }
+    all.into_iter().map(|c| c.name().to_owned()).collect()
+}
+
 /// How inexact the shape of a change is, share of its size.
 fn slope_error(analysis: &Analysis, change: Change) -> f64 {
     match change {
-        _ if analysis.recorded => SLOPE_ERROR,
         Change::ForceOffset | Change::ForceDrift | Change::CoulombFriction => SLOPE_ERROR,
+        _ if analysis.recorded && analysis.runs.moving => COMBINED_SHAPE_ERROR,
+        _ if analysis.recorded => SLOPE_ERROR,
         Change::DisplacementOffset | Change::RigCompliance | Change::EndSlip => TABLE_SLOPE_OVER_LENGTH,
         _ => TABLE_SLOPE_ERROR,
     }

@@ -60,6 +60,13 @@ pub(crate) fn levels(campaigns: &[&Campaign]) -> Vec<f64> {
     groups.iter().map(|g| g.iter().sum::<f64>() / g.len() as f64).collect()
 }
 
+/// Median over the strokes of the range of pressure within one, Pa.
+pub(super) fn unrest(recording: &Recording) -> f64 {
+    let own = |rows: std::ops::Range<usize>| range(&recording.pressure[rows]);
+    let ranges: Vec<f64> = strokes(recording).into_iter().map(|s| own(s.0)).collect();
+    percentile(&ranges, 0.5)
+}
+
 /// Rows and mean pressure of every stroke.
 fn strokes(recording: &Recording) -> Vec<(std::ops::Range<usize>, f64, f64)> {
     let direction = turning(&recording.stroke, TURN * range(&recording.stroke), 0.0);
@@ -93,7 +100,7 @@ fn speed(time: &[f64], stroke: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-fn percentile(values: &[f64], share: f64) -> f64 {
+pub(super) fn percentile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let at = (share * sorted.len().saturating_sub(1) as f64).round() as usize;

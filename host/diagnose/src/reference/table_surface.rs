@@ -51,7 +51,8 @@ pub(super) fn of(table: &TableFile, runs: &Runs) -> Result<Surface> {
     let curves = runs
         .strokes
         .iter()
-        .map(|held| held + offset(table, *held))
+        // What the fit found of a held mounting is none of a motion's.
+        .map(|held| if runs.moving { *held } else { held + offset(table, *held) })
         .map(|x| Curves {
             force: grid.iter().map(|p| mean(*p, x)).collect(),
             gap: grid.iter().map(|p| (force(*p, x, 1.0) - force(*p, x, -1.0)) / 2.0).collect(),

@@ -11,22 +11,30 @@ use serde::Serialize;
 
 use crate::wording::change as wording;
 
+#[cfg(test)]
+mod schema;
+
 /// What changed.
 #[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 struct ChangedDocument<'a> {
     effect: &'a str,
     /// How probable this very name is.
     probability: f64,
     /// How probable its class is.
     class_probability: f64,
+    #[cfg_attr(test, schemars(with = "schema::Class"))]
     class: Class,
     /// Share of the difference's energy that is gone on recordings held out, this change alone.
     share_explained: f64,
     /// SI units, with the 95 % interval.
+    #[cfg_attr(test, schemars(with = "Vec<schema::Size>"))]
     parameters: &'a [Size],
     /// Names that these recordings do not distinguish from it.
     confusable_with: &'a [String],
+    #[cfg_attr(test, schemars(with = "schema::Since"))]
     since: &'a Since,
+    #[cfg_attr(test, schemars(with = "schema::Owner"))]
     owner: Owner,
     /// Whether it is the bench's: it corrects the data and never goes to a controller.
     correction: bool,
@@ -37,6 +45,7 @@ struct ChangedDocument<'a> {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 struct UnexplainedDocument {
     /// Share of the difference's energy.
     share: f64,
@@ -44,6 +53,7 @@ struct UnexplainedDocument {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 struct HeldOutDocument {
     split: &'static str,
     rms_before_N: f64,
@@ -53,6 +63,7 @@ struct HeldOutDocument {
 
 /// A change that is not named.
 #[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 struct ConsideredDocument<'a> {
     effect: &'a str,
     /// Its probability.
@@ -64,11 +75,13 @@ struct ConsideredDocument<'a> {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 struct ReferenceDocument<'a> {
     files: &'a [String],
     table: Option<&'a str>,
     samples: usize,
     repeatability_N: f64,
+    #[cfg_attr(test, schemars(with = "schema::Repeatability"))]
     repeatability_from: Repeatability,
     mounted_anew: bool,
     not_comparable: Vec<String>,
@@ -76,14 +89,21 @@ struct ReferenceDocument<'a> {
 
 /// The answer of `host diagnose --reference`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(
+    test,
+    derive(schemars::JsonSchema),
+    schemars(deny_unknown_fields, title = "pam-diagnose/1 with a reference")
+)]
 struct ChangeDocument<'a> {
     schema: &'static str,
     muscle: Option<&'a str>,
     samples: usize,
+    #[cfg_attr(test, schemars(with = "schema::Verdict"))]
     verdict: Verdict,
     noise_N: f64,
     misfit_rms_N: f64,
     largest_force_N: f64,
+    #[cfg_attr(test, schemars(with = "Vec<schema::Place>"))]
     r#where: &'a [Place],
     missing: Vec<ChangedDocument<'a>>,
     unexplained: UnexplainedDocument,
@@ -92,6 +112,7 @@ struct ChangeDocument<'a> {
     next_experiment: Option<()>,
     considered: Vec<ConsideredDocument<'a>>,
     /// Of the first weighing, in falling order.
+    #[cfg_attr(test, schemars(with = "Vec<schema::Probability>"))]
     probabilities: &'a [Probability],
     /// Causes that hold 95 % of the probability.
     set: &'a [String],

@@ -16,6 +16,7 @@ pub fn split(split: Split) -> &'static str {
         Split::OtherRecordings => "every other recording of AFTER",
         Split::None => "none: AFTER is one recording",
         Split::OtherLevels => "every other level of pressure",
+        Split::OtherParts => "every other part of AFTER, by length and time",
     }
 }
 
@@ -71,6 +72,7 @@ pub fn remark(remark: &Remark) -> String {
         Remark::NotAcquitted(none) => {
             format!("no change is named, but that nothing changed has a probability of {none:.2} only")
         }
+        Remark::GaugeOfMotion => "where length and pressure move together, a zero error of the pressure gauge is often mistaken for a gain, an offset of the stroke or a zero of the load cell: vent the actuator and read the gauge first".into(),
         Remark::GainOfStrokes => "at regulated pressures a gain of the load cell, a gain of the gauge and another piston area have the same shape".into(),
     }
 }
@@ -154,6 +156,12 @@ pub fn not_comparable(n: &NotComparable) -> String {
         }
         NotComparable::Level { pressure } => {
             format!("strokes at {:.0} kPa: on one side only, or fewer than two each way", pressure / 1e3)
+        }
+        NotComparable::Moving => {
+            "sensor-delay, pressure-sensor-lag: not asked of recordings in which length and pressure move together".into()
+        }
+        NotComparable::Lengths { recording, share } => {
+            format!("`{recording}`: {:.0} % of the rows at lengths that the reference does not have, or where its muscle does not pull", 100.0 * share)
         }
         NotComparable::Strokes => {
             "gauge-offset, displacement-offset, rig-compliance, end-slip, drift and lags: not asked of strokes at regulated pressures".into()

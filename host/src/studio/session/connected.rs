@@ -16,8 +16,9 @@ use model_core::link::settings::Settings;
 use serde_json::{Value, json};
 use tokio::sync::broadcast;
 
-use super::super::events::{batch, credible, tell};
+use super::super::events::{batch, compared, credible, tell};
 use super::{Order, no_controller, report};
+use crate::change_watch::ChangeWatch;
 use crate::demo::campaign::muscle;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::json_of;
@@ -28,6 +29,7 @@ use pam_device::recorder::{Recorder, about_losses, about_start, serial};
 use pam_device::run::{Plan, Steps, arm, vent};
 use pam_device::setpoint_profile::Quantity;
 use pam_device::{Address, Client, Topic, VentLine, messages, table_diff, tables};
+use pam_diagnose::reference::Mounted;
 use pam_fit::table_file::TableFile;
 
 /// Time between two batches of telemetry to the page.
@@ -45,6 +47,7 @@ pub struct Connected {
     running: Option<(Quantity, Steps, Option<u64>)>,
     recorder: Option<(Recorder, Value)>,
     fault: Option<String>,
+    changed: Option<ChangeWatch>,
     batch: Vec<Telemetry>,
     sent: Instant,
     reported: Instant,
@@ -116,6 +119,7 @@ impl Connected {
             running: None,
             recorder: None,
             fault: None,
+            changed: None,
             batch: Vec::new(),
             sent: Instant::now(),
             reported: Instant::now(),
@@ -190,6 +194,10 @@ impl Connected {
             let _ = say.send(batch(&self.batch));
             self.batch.clear();
         }
+        if let Some(update) = self.changed.as_ref().and_then(ChangeWatch::news) {
+            // Without a page nothing receives it.
+            let _ = say.send(compared(&update));
+        }
         if self.reported.elapsed() >= REPORT {
             report(Some(self), say);
         }
@@ -208,6 +216,9 @@ impl Connected {
             // A full disk must not take the controller out of sight.
             tell(say, "bad", &error);
             let _ = self.end_recording();
+        }
+        if let Some(changed) = &mut self.changed {
+            changed.push(&sample);
         }
         if sample.state == State::Running {
             if let Some((quantity, steps, start)) = &mut self.running {
@@ -290,6 +301,10 @@ impl Connected {
                 self.end_recording()?;
                 let about = about_start("pam-run/1", &mut self.client)?;
                 self.recorder = Some((Recorder::create(std::slice::from_ref(&path), &about)?, about));
+            }
+            Order::Watch(reference) => {
+                self.changed =
+                    reference.map(|reference| ChangeWatch::start(reference, Mounted::Same)).transpose()?;
             }
             Order::EndRecord => {
                 let path = self.end_recording()?;

@@ -366,6 +366,7 @@ const UNTESTED: &str = "\n## What is not tested\n\n\
     specified, not measured here. A leak has no shape yet and is never named.\n\
     - A lag beside another change is never named: the rows that show a lag hold the other change, too.\n\
     - Lengths between those of the reference are not interpolated; they are reported as not comparable.\n\
+    - Length and pressure that move together, and a controller at work: tested on an emulated one only (`cargo test -p host --test change_watch`).\n\
     - Stroked *muscles*: the same route as the cylinder, not measured; gauge offset, stroke offset, compliance, slip and lags are not asked of strokes.\n\
     - All staircases are of one laboratory and one type of muscle, and the constants of what repeats come from six of the eleven. A second rig is missing.\n\
     - Injected drift and slip run through AFTER by run, then mounting. Lags of the 12 Hz recordings are put in by the same interpolation that the analysis \
