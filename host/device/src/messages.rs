@@ -143,8 +143,8 @@ pub fn fault(fault: Fault) -> FaultMessage {
         ),
         Fault::NotVented => (
             "not-vented",
-            "pressure stands in a muscle that should be empty",
-            "wait until it has left; if it does not, take the supply air away and look at the dump valve and the sensor's zero",
+            "a vented muscle is still under pressure",
+            "wait until the pressure has fallen; if it does not, shut off the supply air and check the dump valve and the sensor's zero",
             "Pa",
         ),
         Fault::HoldEnded => (
@@ -326,7 +326,7 @@ pub fn refused(request: &str, refusal: Refusal) -> Error {
             match why {
                 StoreFault::Medium => "its memory failed while reading or writing".to_owned(),
                 StoreFault::Full => "its memory is full".to_owned(),
-                StoreFault::NoPrevious => "there is no previous table".to_owned(),
+                StoreFault::NoPrevious => "it has no previous table".to_owned(),
                 StoreFault::Verify => "its memory does not retain what is written".to_owned(),
             },
             match why {

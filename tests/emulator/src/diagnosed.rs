@@ -53,8 +53,8 @@ fn swing(x: f64, frequency_hz: f64) -> Motion {
     Motion::Sine { mean_mm: 0.2e3 * x, amplitude_mm: 0.1e3 * x, frequency_hz }
 }
 
-/// Rests a second and a half, continues by two hundredths of the free stroke `x` (m) within a second, and so on back and forth, as a gripper
-/// that feels its way: what grows during a rest and is lost over the first bit of motion has its say in each move.
+/// Eight small moves back and forth, as of a gripper: a rest of 1.5 s, then a move by two hundredths of the free stroke `x` (m) within a
+/// second. An effect that grows during a rest and fades over the first part of a motion acts in each move.
 fn inching(x: f64) -> Motion {
     const MOVES: [f64; 8] = [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0];
     let mut points = vec![(0.0, 0.2e3 * x)];
@@ -84,7 +84,7 @@ pub fn cases() -> Vec<Case> {
     let seal: Conceal = |m, f, x, _| {
         let dry = 0.04 * f;
         m.physics.seal = Some(Seal { dry, per_pressure: 0.0, travel: 2e-4 * x, slow: 0.0, slow_speed: 0.0 });
-        format!("a seal that rubs with {dry:.1} N whatever the muscle pulls, 4 % of blocked force")
+        format!("a seal with a constant friction of {dry:.1} N, 4 % of blocked force")
     };
     let viscous: Conceal = |m, f, _, v| {
         let drag = 0.006 * f / v;

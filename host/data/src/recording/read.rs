@@ -73,7 +73,7 @@ const LOOKED_BELOW: usize = 100;
 #[cfg(feature = "excel")]
 use super::workbook::is_one as workbook_magic;
 
-/// Workbooks are told from text also where they are not read.
+/// Distinguishes workbooks from text in builds that do not read workbooks.
 #[cfg(not(feature = "excel"))]
 fn workbook_magic(magic: &[u8]) -> bool {
     magic.starts_with(b"PK\x03\x04") || magic.starts_with(b"\xd0\xcf\x11\xe0")

@@ -35,12 +35,13 @@ fn main() -> io::Result<()> {
     let mut out = String::from(
         "# What a diagnosis is worth to the controller\n\n\
          Written by `cargo run --release -p emulator-tests --bin diagnosed`; nothing here is typed by hand.\n\n\
-         In each row a muscle of the virtual bench conceals an effect. It is recorded by protocol D, fitted plainly and diagnosed \
-         (`host diagnose -o`). The controller's image in QEMU then follows a force, a sine of 0.5 Hz and two steps, by feed-forward \
-         alone while the bench moves the muscle; what grows during a rest is tried on one force, while the bench rests a second and \
-         a half and moves by two hundredths of the free stroke within a second, eight times to and fro: with the plain table, with the diagnosed one, and, for what can be had at best, \
-         on the same muscle without the effect with a plain table of its own. Force errors are root mean square by the load \
-         cell, in % of blocked force.\n\n\
+         In each row a muscle of the virtual bench has a concealed effect. It is recorded by protocol D, fitted without effects (plain \
+         table) and diagnosed (`host diagnose -o`, diagnosed table). The controller's image in QEMU then follows a force by feed-forward \
+         alone while the bench moves the muscle: a sine of 0.5 Hz and two steps. For an effect that grows during a rest, the force is \
+         constant, and the bench makes eight small moves back and forth: a rest of 1.5 s, then two hundredths of the free stroke within a \
+         second. Each muscle is controlled with the plain and with the diagnosed table. The last column is the best that can be reached: \
+         the same muscle without the effect, with a plain table of its own. Force errors are root mean square by the load cell, in % of \
+         blocked force.\n\n\
          | concealed | muscle | named (probability) | error on the recordings, plain → diagnosed, N | control, plain table, % | control, \
          diagnosed table, % | control without the effect, % |\n| --- | --- | --- | --- | --- | --- | --- |\n",
     );
