@@ -106,19 +106,19 @@ pub fn cases() -> Vec<Case> {
             .to_vec(),
     };
     type Course<'a> = &'a dyn Fn(f64) -> Motion;
-    type Asked = fn(f64) -> Vec<Stretch>;
-    let all: [(&'static str, u64, Conceal, Course<'_>, Asked); 4] = [
+    type Setpoint = fn(f64) -> Vec<Stretch>;
+    let all: [(&'static str, u64, Conceal, Course<'_>, Setpoint); 4] = [
         ("coulomb-friction", 101, seal, &swing(0.2), sine_and_steps),
         ("viscous-damping", 102, viscous, &swing(0.5), sine_and_steps),
         ("stress-relaxation", 103, relaxation, &path, sine_and_steps),
         ("breakaway-friction", 104, breakaway, &inching, steady),
     ];
-    all.map(|(effect, seed, conceal, motion, asked)| {
+    all.map(|(effect, seed, conceal, motion, setpoint)| {
         let plain = simple(seed);
         let (blocked, x, v) = sizes(&plain);
         let mut spec = plain.clone();
         let words = conceal(&mut spec, blocked, x, v);
-        Case { effect, words, plain, spec, motion: motion(x), setpoint: asked(blocked), blocked }
+        Case { effect, words, plain, spec, motion: motion(x), setpoint: setpoint(blocked), blocked }
     })
     .to_vec()
 }

@@ -1,4 +1,4 @@
-//! Writes `docs/figures/tracking.md` and its picture: how well force and stroke follow, for each muscle, load and law.
+//! Writes `docs/figures/tracking.md` and its picture: tracking errors of force and stroke for each muscle, load and control law.
 
 use std::fmt::Write;
 use std::io;
@@ -10,10 +10,10 @@ use model_core::link::messages::Mode;
 use pam_report::{Axis, Colour, Figure, Panel};
 use virtual_bench::presets;
 
-const HEAD: &str = "| load | asked | table | table + trim | Gaylord | PI alone | regulator's limit | PI : table + trim |\n\
+const HEAD: &str = "| load | setpoint | table | table + trim | Gaylord | PI alone | regulator's limit | PI : table + trim |\n\
                     | --- | --- | --- | --- | --- | --- | --- | --- |\n";
 
-/// What was queried, and the error of each law and the regulator's limit.
+/// A setpoint, and the error of each law and the regulator's limit.
 type Row = (Course, [f64; 5]);
 
 fn rows(text: &mut String, subject: &Subject, mode: Mode, load: Load) -> Vec<Row> {
@@ -35,7 +35,7 @@ fn rows(text: &mut String, subject: &Subject, mode: Mode, load: Load) -> Vec<Row
 }
 
 /// The largest errors of the table and of table and trim where the regulator can follow, and how many times as large that of PI alone is at 1 Hz.
-fn against_the_aim(rows: &[Row]) -> [f64; 4] {
+fn compared_with_target(rows: &[Row]) -> [f64; 4] {
     let can_follow = |course: Course| match course {
         Course::Steps => false,
         Course::Ramps => true,
@@ -85,15 +85,15 @@ fn main() -> io::Result<()> {
          ![Errors over frequency](tracking.svg)\n",
     );
     let mut panels = Vec::new();
-    let mut aims = String::new();
+    let mut targets = String::new();
     let subjects = [presets::miniature(), presets::contractile(), presets::push()].map(Subject::of);
     for subject in &subjects {
         let _ = write!(text, "\n## {}: force\n\n{HEAD}", subject.spec.name);
         for load in [Load::AtStroke, Load::Moved, Load::Spring] {
             let rows = rows(&mut text, subject, Mode::Force, load);
-            let [table, trimmed, times, times_trimmed] = against_the_aim(&rows);
+            let [table, trimmed, times, times_trimmed] = compared_with_target(&rows);
             let _ = writeln!(
-                aims,
+                targets,
                 "| {} | {} | {table:.2} | {trimmed:.2} | {times:.1} | {times_trimmed:.1} |",
                 subject.spec.name,
                 load.name()
@@ -110,7 +110,7 @@ fn main() -> io::Result<()> {
         "\n## Comparison with the target\n\nTarget: force error under 1 % where the regulator can follow (largest of ramps and sines up to \
          2 Hz), and a fifth of that of PI alone at 1 Hz.\n\n\
          | muscle | load | table: largest error, % | table + trim, % | PI : table at 1 Hz | PI : table + trim |\n\
-         | --- | --- | --- | --- | --- | --- |\n{aims}"
+         | --- | --- | --- | --- | --- | --- |\n{targets}"
     );
     text.push_str(
         "\n## Constant force\n\nFive seconds from 1.5 s after a step. Swing is the error's deviation from its own mean, and change the \
@@ -204,15 +204,15 @@ fn main() -> io::Result<()> {
     }
     if !emulated.is_empty() {
         text.push_str(
-            "\n## The same through the image in QEMU and the link\n\nTable and trim, over half as many periods, judged by the device's own \
-             sensors with their noise.\n\n| muscle | what | load | asked | here | in QEMU |\n| --- | --- | --- | --- | --- | --- |\n",
+            "\n## Comparison with the image in QEMU and the link\n\nTable and trim, over half as many periods. Errors are measured with the device's own \
+             sensors, with their noise.\n\n| muscle | mode | load | setpoint | here | in QEMU |\n| --- | --- | --- | --- | --- | --- |\n",
         );
         text.push_str(&emulated);
     }
     let figure = Figure::multiples(
         "tracking",
         "Tracking error of force over frequency",
-        "Lower is better; nothing lies below the regulator's limit for long.",
+        "Lower is better. The regulator's limit is the error that the regulator alone causes.",
         panels,
     )
     .shared(true, true);
