@@ -74,10 +74,10 @@ packages() {
 
 language() {
     local status=0
-    bash tests/prose/run.sh || status=$?
+    bash tests/prose/run.sh --sources || status=$?
     # 3: the linter could not be installed, for example without a network.
     if [ $status = 3 ] && [ "${CI:-}" != true ]; then
-        say "skipped: language of the pages: the linter could not be installed"
+        say "skipped: language of pages and sources: the linter could not be installed"
         return 0
     fi
     return $status
@@ -100,8 +100,8 @@ board_documentation() {
 if cargo fmt --version >/dev/null 2>&1; then
     step "format" cargo fmt --all --check
 fi
-if require "language of the pages" npm nodejs npm; then
-    step "language of the pages" language
+if require "language of pages and sources" npm nodejs npm; then
+    step "language of pages and sources" language
 fi
 if require "picture of the crates" python3 python3; then
     step "picture of the crates" python3 tests/crates.py --check

@@ -15,12 +15,12 @@ pub struct Readings {
     pub force_n: f32,
 }
 
-/// What one regulator and its dump valve are reported.
+/// What one regulator and its dump valve are given.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Command {
-    /// Gauge pressure that the regulator is requested, Pa; above zero beside an open dump valve in the test of that valve only.
+    /// Gauge pressure requested of the regulator, Pa; above zero with an open dump valve in the test of that valve only.
     pub pressure_pa: f32,
-    /// Open the dump valve, regardless of the pressure says.
+    /// Open the dump valve, regardless of the pressure.
     pub vent: bool,
 }
 
@@ -71,8 +71,8 @@ pub struct Span {
     pub high: f32,
 }
 
-/// What a board's converters and regulator can do, regardless of the settings say. A watch or a limit outside a span could never trip,
-/// so settings are refused there.
+/// What a board's converters and regulator can do, independent of the settings. A watch or a limit outside a span could never trip:
+/// such settings are refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hardware {
     /// Pressure sensor's converter, Pa.

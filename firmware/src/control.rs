@@ -32,7 +32,7 @@ mod monitor;
 mod record;
 mod requests;
 
-pub use check::{check_settings, mend_settings};
+pub use check::{check_settings, repair_settings};
 
 use actuator::Actuator;
 use arming::Arming;
@@ -234,7 +234,7 @@ impl Controller {
     /// Uses another table from now on.
     ///
     /// # Errors
-    /// The number of the table that cannot be used; there is none in use then.
+    /// The part of the table that cannot be used; the muscle then has no table.
     pub fn use_table(&mut self, side: Side, table: &MuscleTable) -> Result<(), TableError> {
         let actuator = &mut self.sides[side.index()];
         actuator.health = Health::new(Scales::of(table));

@@ -119,7 +119,7 @@ impl Direct {
         let gaylord = (pressure - self.deadband)
             * (3.0 * libm::powf(length, 2.0) - libm::powf(self.fibre, 2.0))
             / (4.0 * PI * libm::powf(self.turns, 2.0));
-        // Straight lines between the nodes stand for the curves: the cheapest that a direct port can do.
+        // Linear interpolation between the nodes instead of splines: the cheapest form of a direct port.
         let last = table.nodes.len() - 1;
         let after = table.nodes.iter().position(|node| *node > pressure).unwrap_or(last).clamp(1, last);
         let (from, to) = (table.nodes[after - 1], table.nodes[after]);

@@ -335,7 +335,7 @@ impl Health {
     }
 
     /// The sums for the host.
-    pub fn tell(&self, answer: &mut HealthSums) {
+    pub fn describe(&self, answer: &mut HealthSums) {
         let Scales { force_n, pressure_pa, stroke_m, .. } = self.scales;
         answer.table = self.state;
         (answer.suspect, answer.excess) = self.suspect;

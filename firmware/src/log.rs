@@ -27,8 +27,8 @@ static TICK: AtomicU32 = AtomicU32::new(0);
 
 defmt::timestamp!("{=u32:ms}", TICK.load(Ordering::Relaxed));
 
-/// Tells the log what time it is, in ticks of a millisecond, and what happened in that tick.
-pub(crate) fn tell(tick: u64, event: Option<&Event>) {
+/// Gives the log the time, in ticks of a millisecond, and the event of that tick.
+pub(crate) fn record(tick: u64, event: Option<&Event>) {
     TICK.store(tick as u32, Ordering::Relaxed);
     match event {
         Some(Event::Fault(FaultReport { fault, value, limit, .. })) => {

@@ -1,4 +1,4 @@
-//! Which pressure a mode wants: the mathematics between a setpoint and the regulator.
+//! The pressure demand of each mode: the mathematics between a setpoint and the regulator.
 
 use model_core::effects::{Chain, EffectName};
 use model_core::inverse::{Reach, Search};
@@ -22,55 +22,58 @@ pub struct Model {
     pub muscle: Muscle<f32>,
     /// Physics beyond the base model.
     pub chain: Chain<f32>,
-    /// The muscle in this tick. Without effects its shape and direction are all that is kept up.
+    /// The muscle in this tick. Without effects only its shape and direction are updated.
     now: Moment<f32>,
-    /// Direction of friction; none where an effect of the table says how friction goes over from one to the other.
+    /// Direction of friction; none where an effect of the table describes how friction changes after a reversal.
     slide: Option<Slide<f32>>,
     /// Distances of [`Slide`] in a metre of stroke, and in a pascal at held length.
     per_metre: f32,
     per_pascal: f32,
     last: Option<(f32, f32)>,
-    /// Travel that has not left the play, in distances.
+    /// Travel within the play, in distances.
     held_back: f32,
-    /// The force that was last asked of the table, and whether it was since the last tick.
+    /// The last force demand, and whether it was made since the last tick.
     demand: Demand,
     demanded: bool,
     /// `∂F/∂P` where the last search ended, N/Pa.
     slope: f32,
-    /// Least force at which the muscle surely pulls, N.
+    /// Least force at which the muscle is taut, N.
     taut_n: f32,
     /// `1/V₀`, 1/m³.
     inv_rest_volume: f32,
 }
 
-/// Travel over which friction goes over, as a part of the tested contraction: some micrometres of a small muscle, some tens of a
-/// large one. What it is of one muscle only the effect `presliding-hysteresis` knows.
+/// Travel over which friction changes direction after a reversal, as a part of the tested contraction: some micrometres in a small
+/// muscle, some tens in a large one. For a particular muscle only the effect `presliding-hysteresis` determines it.
 const SLIDE: f32 = 2.0e-3;
-/// The part of the free motion that strands slip at held length. No table has it, and muscles differ in it several times over; this is the
-/// middle of the virtual bench's. It is less than half of what [`model_core::effects::BraidTravel`] takes: friction that goes over with the
-/// pressure asks for more pressure, and must not ask for more than what turned it.
+/// Slip of the strands at held length, as a part of that of the free motion. No table contains it, and it differs between muscles
+/// several times over; this is the middle of the virtual bench's range. It is less than half of the value in
+/// [`model_core::effects::BraidTravel`]: friction that reverses with the pressure adds to the pressure command, and this addition must
+/// be smaller than the change of pressure that reversed it.
 const SLIP: f32 = 0.019;
-/// Play of the travel that turns friction, in distances: what noise of the stroke sensor passes is little beside a demand that moves.
+/// Play of the travel that reverses friction, in distances: the noise of the stroke sensor that passes it is small compared with a
+/// changing demand.
 const PLAY: f32 = 0.05;
-/// The same play once a demand has stood still for [`CALM_S`]: no noise passes. What moves a muscle then is its load, however far, and
-/// its friction turns with it. Pressure no longer counts as travel: it would move only because friction has been compensated, and
-/// turn friction by that again.
+/// The same play after a demand has been constant for [`CALM_S`]: no noise passes. Then only the load moves the muscle, by any distance,
+/// and friction reverses with it. Pressure no longer counts as travel: it would change only because friction has been compensated, and
+/// reverse friction again.
 const PLAY_CALM: f32 = 0.2;
-/// The same where a trim answers for what the table leaves. Two that answer for one friction hunt: each swing of a mass on a spring
-/// turns the one before the other has undone it. So friction rests until the muscle is moved far, and the trim does the rest. So it
-/// does in a joint, where each muscle is the other's load and a push should meet the stiffness that was requested, not less.
+/// The same where a trim removes the error of the table. If the trim and the compensation both correct one friction, they cause a limit
+/// cycle: each swing of a mass on a spring reverses one before the other has settled. The direction of friction is therefore held until
+/// the muscle has moved far, and the trim corrects the remainder. The same holds in a joint, where each muscle is the other's load and
+/// an external torque must meet at least the stiffness that was requested.
 const PLAY_RESTING: f32 = 20.0;
-/// Part of friction that is corrected in a joint. Of two muscles that pull against each other each is the other's load: with all of
-/// its friction taken away, nothing holds the joint where it stands. It creeps, the friction turns, and it jumps to the other end of
-/// what friction would have held, some hundredths of a radian back and forth. What a push meets is then a matter of where it was. A
-/// quarter of the friction that stays holds it, at the cost of some stiffness more than was requested.
+/// Part of friction that is corrected in a joint. Of two muscles that pull against each other, each is the other's load: with all
+/// friction compensated, nothing holds the joint in place. It creeps, friction reverses, and it jumps to the other end of the range
+/// that friction would have held, some hundredths of a radian back and forth. The stiffness against an external torque then depends on
+/// the position in this range. The remaining quarter of friction holds the joint, and adds some stiffness to what was requested.
 const JOINT_SHARE: f32 = 0.75;
-/// How long the same force is demanded until a demand does not move, s.
+/// Time after which an unchanged force demand counts as constant, s.
 const CALM_S: f32 = 0.2;
-/// Part of blocked force at which a muscle surely pulls, whatever its table leaves out.
+/// Part of blocked force above which a muscle is taut despite errors of its table.
 const TAUT: f32 = 0.02;
 
-/// A force that is queried of a table.
+/// A force for which the table gives the pressure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Demand {
     force_n: f32,
@@ -212,7 +215,7 @@ impl Model {
         Air { fill: volume * inv_rest_volume, widening_per_s: posture.area * speed_m_per_s / volume }
     }
 
-    /// Least force at which the muscle surely pulls, N.
+    /// Least force at which the muscle is taut, N.
     pub fn taut_n(&self) -> f32 {
         self.taut_n
     }

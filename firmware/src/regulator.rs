@@ -1,16 +1,16 @@
-//! The pressure regulator: what it and its line will do with a command, and which command makes the muscle have what is demanded.
+//! The pressure regulator: the response of it and its line to a command, and the command that gives the muscle the demanded pressure.
 //!
 //! ```text
 //! target  = gain · (command + offset)
 //! dp₁/dt  = clamp((target − p₁) / lag, ±rate), 0 while |target − p₁| < deadband         at the regulator
 //! dp/dt   = (p₁ − p) / (line · V/V₀) − (p + p_atm) · V̇/V                                in the muscle
 //! ```
-//! The line fills a muscle of volume `V`, which the braid gives at every stroke: a muscle that is wide takes longer, and one
-//! that widens draws air through the line. Gain and offset are inverted exactly; line and lag by lead as far as the settings
-//! ask, each by a rate that is smoothed over a seventh of the lag, so that a sensor's noise is not made ten times as large or
-//! more. What that smoothing and the loop itself are late by is led too, or demanded for ahead of time where what comes is known
-//! ([`Demand::lookahead_pa`]). A rate limit and a deadband cannot be inverted; they are only predicted, so that the watch on
-//! pressure knows what to expect. What the measured pressure lacks of the predicted is added slowly
+//! The line fills a muscle of volume `V`, which follows from the braid at every stroke: a wide muscle takes longer, and one
+//! that widens draws air through the line. Gain and offset are inverted exactly. Line and lag are compensated by lead, to the extent
+//! that the settings define. The rate of each lead is smoothed over a seventh of the lag; without smoothing, sensor noise would grow ten
+//! times or more. The delay of this smoothing and of the loop itself is compensated by lead too, or by an earlier demand where the
+//! setpoint is known ahead ([`Demand::lookahead_pa`]). A rate limit and a deadband cannot be inverted; they are only predicted for the
+//! watch on pressure. The difference between predicted and measured pressure is added slowly to the command
 //! ([`RegulatorState::observe`]).
 
 use model_core::link::settings::{Limits, Regulator};
@@ -22,7 +22,7 @@ use crate::tick::TICK_S;
 const OBSERVER_S: f32 = 0.15;
 /// The most that the observer adds, as a part of the largest command.
 const BIAS: f32 = 0.02;
-/// What the loop itself is late by: a command holds for a tick.
+/// Delay of the loop itself: a command holds for a tick.
 const LOOP_S: f32 = 0.5 * TICK_S;
 /// Share of the lag over which the lead's rates are smoothed.
 pub const SMOOTHING: f32 = 0.15;
@@ -39,7 +39,7 @@ pub struct Air {
 }
 
 impl Default for Air {
-    /// A muscle that nothing is known of.
+    /// A muscle without a table.
     fn default() -> Self {
         Self { fill: 1.0, widening_per_s: 0.0 }
     }
@@ -50,11 +50,11 @@ impl Default for Air {
 pub struct Demand {
     /// Pressure in the muscle, Pa.
     pub pressure_pa: f32,
-    /// What of the last change of that was known ahead of time, Pa; it is demanded for [`ahead`] ticks before its time.
+    /// Part of the last change of that pressure that was known ahead, Pa; it is demanded [`ahead`] ticks early.
     pub lookahead_pa: f32,
 }
 
-/// Ticks before its time that what is known should be demanded for.
+/// Ticks by which a setpoint that is known ahead is demanded early.
 pub fn ahead(regulator: &Regulator) -> usize {
     if regulator.lead > 0.0 { ((LOOP_S + SMOOTHING * regulator.lag_s) / TICK_S) as usize } else { 0 }
 }
@@ -64,14 +64,14 @@ pub fn ahead(regulator: &Regulator) -> usize {
 pub struct RegulatorState {
     pressure_demand_pa: f32,
     rate_pa_per_s: f32,
-    /// What the regulator's outlet should have, smoothed, and what of its rate was known.
+    /// Smoothed demand at the regulator's outlet, and the part of its rate that was known ahead.
     outlet_pa: f32,
     foreseen_pa_per_s: f32,
     /// The model: pressure at the regulator and in the muscle.
     supplied_pa: f32,
     model_pa: f32,
     command_pa: f32,
-    /// What the regulator's own model leaves out, added to what is commanded.
+    /// Observed error of the regulator's model, added to the command.
     bias_pa: f32,
 }
 
@@ -100,8 +100,8 @@ impl RegulatorState {
         };
     }
 
-    /// Takes a tick's measured pressure: what it lacks of the model's is given slowly to the command. Zero and gain of a
-    /// regulator drift, and it ripples; its lag and its line are in the model and stir nothing.
+    /// Takes a tick's measured pressure: its difference from the model is added slowly to the command. This corrects drift of the
+    /// regulator's zero and gain, and its ripple; lag and line are in the model and cause no correction.
     pub fn observe(&mut self, dt: f32, measured_pa: f32, regulator: &Regulator) {
         let lack = self.model_pa - measured_pa;
         if lack.is_finite() {
@@ -110,7 +110,7 @@ impl RegulatorState {
         }
     }
 
-    /// Pressure that the regulator should have brought about in the muscle by now, Pa.
+    /// Pressure in the muscle by the regulator's model, Pa.
     pub fn model_pa(&self) -> f32 {
         self.model_pa
     }
@@ -269,7 +269,7 @@ mod tests {
             vented.observe(1e-3, 0.0, &regulator);
         }
         vented.vent(1e-3, &Air::default(), &regulator);
-        assert!(vented.model_pa() > 100e3, "the muscle is not empty at once");
+        assert!(vented.model_pa() > 100e3, "the muscle is not empty immediately");
         // What is commanded next is what a new one would command.
         let mut new = RegulatorState::default();
         for wanted in [0.0, 5e3, 20e3] {

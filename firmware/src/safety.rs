@@ -50,7 +50,7 @@ pub enum Watched {
     Running,
     /// From arming on.
     Armed,
-    /// Always: pressure or force in a muscle that should be empty, anyone who put it there.
+    /// Always: pressure or force in a muscle that must be vented, of any cause.
     Always,
 }
 

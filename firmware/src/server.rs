@@ -95,8 +95,8 @@ impl<F: NorFlash> Server<F> {
         Ok(server)
     }
 
-    /// Has the controller use the kept table of a muscle, its effects with what they remembered. Apart from each other: what the one
-    /// takes of the stack the other does not stand on.
+    /// Has the controller use the kept table of a muscle, its effects with the memories that were kept. In two functions that are not
+    /// inlined: the second reuses the stack of the first.
     fn use_kept(&mut self, side: Side, shared: &Shared) -> Result<(), Refusal> {
         if self.use_table(side, shared)? {
             self.remember(side, shared);
@@ -104,7 +104,7 @@ impl<F: NorFlash> Server<F> {
         Ok(())
     }
 
-    /// Has the controller use the kept table of a muscle; says whether there is one.
+    /// Has the controller use the kept table of a muscle; returns whether there is one.
     #[inline(never)]
     fn use_table(&mut self, side: Side, shared: &Shared) -> Result<bool, Refusal> {
         let Some(bytes) = self.store.table(side).map_err(Refusal::Store)? else {
@@ -205,7 +205,7 @@ impl<F: NorFlash> Server<F> {
         self.restart
     }
 
-    /// Tells the server what the frame accumulator has counted.
+    /// Gives the server the counts of the frame accumulator.
     pub fn note_counts(&mut self, counts: frame::Counts) {
         self.counts = counts;
     }
@@ -260,8 +260,8 @@ fn use_settings<F: NorFlash>(store: &mut Store<F>, damaged: bool, shared: &Share
     let hardware = shared.with(|controller| controller.hardware());
     let mut settings = hardware.settings;
     let kept = store.settings(&mut settings)?;
-    let mended = control::mend_settings(&mut settings, hardware);
-    let untrusted = damaged || mended || kept == Kept::Untrusted;
+    let repaired = control::repair_settings(&mut settings, hardware);
+    let untrusted = damaged || repaired || kept == Kept::Untrusted;
     if !untrusted && kept != Kept::Whole {
         store.put_settings(&mut settings)?;
     }

@@ -55,8 +55,8 @@ impl Drop for Entered<'_> {
     }
 }
 
-/// That a task has left the controller: for a board that lets its loop interrupt at that very moment, when whatever should have been
-/// taken out of it immediately and was not shows.
+/// Signals that a task has left the controller. A board lets its loop interrupt at this moment: state that the task must have taken from
+/// the controller before, and did not, then shows in the test.
 #[cfg(feature = "preempting")]
 pub static LEFT: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
@@ -122,16 +122,16 @@ impl Shared {
     /// counted: the loop never waits for the link.
     pub fn step(&self, inputs: &crate::board::Inputs) -> Outputs {
         let outputs = self.with(|controller| controller.step(inputs));
-        self.tell();
+        self.report();
         outputs
     }
 
-    /// Apart from the step: what this takes of the stack the step does not stand on.
+    /// Queues the event and the sample of the step. Not inlined: the step itself must not need the stack of this function.
     #[inline(never)]
-    fn tell(&self) {
+    fn report(&self) {
         let event = self.with(Controller::take_event);
         #[cfg(feature = "log")]
-        crate::log::tell(self.with(|controller| controller.ticks()), event.as_ref());
+        crate::log::record(self.with(|controller| controller.ticks()), event.as_ref());
         if let Some(event) = event {
             self.changed.signal(());
             // The host must receive it, whatever else waits: the oldest sample makes room.

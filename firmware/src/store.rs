@@ -40,8 +40,8 @@ mod settings;
 
 pub use settings::Kept;
 
-/// Version of the layout. It moves whenever anything that is kept has other fields: postcard's bytes do not say what they are,
-/// so a value of another layout would be read as if it were of this one. Its key moves with it.
+/// Version of the layout. It changes when any kept value has other fields: postcard's bytes do not describe themselves, and a value
+/// of another layout would be read as if it were of this one. Its key changes with it.
 pub const FORMAT: u16 = 5;
 /// Longest item with its key, rounded up to words of a flash of at most 16 bytes.
 const BUFFER: usize = image::MAX_LEN + 16;

@@ -146,8 +146,8 @@ impl Trace {
         false
     }
 
-    /// Tells how the trace stands.
-    pub fn tell(&self, info: &mut TraceInfo) {
+    /// Fills in the progress and the variables of the trace.
+    pub fn describe(&self, info: &mut TraceInfo) {
         info.complete = self.phase == Phase::Complete;
         info.records = self.records as u32;
         info.first_tick = self.first_tick;
@@ -191,7 +191,7 @@ mod tests {
 
     fn info(trace: &Trace) -> TraceInfo {
         let mut info = TraceInfo::default();
-        trace.tell(&mut info);
+        trace.describe(&mut info);
         info
     }
 

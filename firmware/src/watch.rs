@@ -99,7 +99,7 @@ impl OneSensor {
             return None;
         }
         let found = |fault, value, limit| Some(Finding { fault, sensor: Some(sensor), value, limit });
-        // `!(…)` so that a reading that is not a number counts as outside.
+        // With `!(…)`, a reading that is not a number counts as outside.
         let outside = !(value >= watch.low && value <= watch.high);
         if self.out.count(outside, settings.watch.debounce_ticks) {
             return found(Fault::SensorRange, value, if value < watch.low { watch.low } else { watch.high });
@@ -156,7 +156,7 @@ pub struct Seen {
     pub speed_m_per_s: f32,
     /// Command of the last tick.
     pub command: Command,
-    /// Pressure that the regulator should have brought about, Pa.
+    /// Pressure expected by the regulator's model, Pa.
     pub expected_pa: f32,
     /// Force by the table, where there is one, N.
     pub model_n: Option<f32>,

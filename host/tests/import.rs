@@ -62,7 +62,7 @@ fn a_description_that_was_guessed_gives_the_fit_of_the_usual_files() {
     let (by_guess, plain) = (fit(&["--import", "bench.toml"], &files), fit(&[], &usual));
     assert_eq!(by_guess.0, plain.0);
     assert!((by_guess.1 - plain.1).abs() < 1e-9, "{by_guess:?} {plain:?}");
-    // What is there is not replaced without being asked for.
+    // An existing file is replaced only with the option for it.
     let again = host(folder.path(), &["import", "-o", "bench.toml", "--guess", files[0]]);
     assert_eq!(again.status.code(), Some(2));
     // Without -o the description alone is on standard output.

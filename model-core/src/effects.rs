@@ -256,7 +256,7 @@ pub enum Start {
 /// What an effect is, for people and programs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Info {
-    /// The name in the catalogue, e.g. `viscous-damping`.
+    /// The name in the catalogue, for example `viscous-damping`.
     pub name: &'static str,
     /// Where it acts.
     pub link: Link,
@@ -277,7 +277,7 @@ pub struct Info {
     pub fading: &'static [usize],
     /// The force it adds, as an equation in the symbols of [`Context`].
     pub equation: &'static str,
-    /// One sentence for someone who has never heard of it.
+    /// One sentence for a reader who does not know the effect.
     pub summary: &'static str,
     /// Where the equation and the plausible ranges come from.
     pub source: &'static str,

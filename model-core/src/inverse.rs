@@ -275,10 +275,9 @@ impl<T: Scalar> Muscle<T> {
 
     /// The pressure for a demanded force with effects, at a moment to which `chain` has been stepped.
     ///
-    /// What the effects add regardless of pressure is subtracted exactly. Where an effect's force depends on the pressure the
-    /// whole force is solved for, by Newton's method with the base model's slope and a secant for that of the effects, within
-    /// a bracket that ends it for every table. So `force_with(pressure_with(F)) = F` wherever `F` can be reached, to within
-    /// the tolerance times the slope.
+    /// The force of effects that do not depend on pressure is subtracted exactly. Otherwise the whole force is solved for by Newton's
+    /// method, with the base model's slope and a secant for that of the effects. A bracket makes the search end for every table.
+    /// Therefore `force_with(pressure_with(F)) = F` for every `F` within the limits, to within the tolerance times the slope.
     pub fn pressure_with(
         &self,
         force: Force<T>,

@@ -205,10 +205,10 @@ impl<T: Scalar> MotionTracker<T> {
 
 /// Which way friction points, as a number between −1 and +1 that never jumps.
 ///
-/// After a turn the strands of the braid stretch before they slide: friction goes over from one direction to the other over some
-/// distance. Three elastic sliders of Prandtl's kind, `s_i ← clamp(s_i + Δξ/d_i)`, stand for the strands; their mean is within
-/// 0.13 of the exponential `−1 + 2 e^(−ξ/d)` that is the usual law. Being driven by signed travel they are hardly stirred by noise,
-/// as that exponential would be: readings that go back and forth cancel.
+/// After a reversal the strands of the braid stretch before they slide: friction changes from one direction to the other over some
+/// distance. Three elastic sliders of Prandtl's kind, `s_i ← clamp(s_i + Δξ/d_i)`, represent the strands; their mean is within
+/// 0.13 of the usual law, the exponential `−1 + 2 e^(−ξ/d)`. Unlike that exponential they respond to signed travel, and noise of the
+/// readings cancels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slide<T>([T; 3]);
 

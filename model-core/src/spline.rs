@@ -144,7 +144,7 @@ impl<T: Scalar> Nodes<T> {
         }
     }
 
-    /// The same, where the code should not grow by it.
+    /// The same without inlining, to keep the code small.
     #[inline(never)]
     pub fn find(&self, p: T) -> usize {
         self.place(p)

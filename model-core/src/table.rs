@@ -85,11 +85,11 @@ pub enum TableError {
     Geometry(GeometryError),
     /// The deadband is not a finite pressure between −100 kPa and 1 MPa.
     Deadband,
-    /// There is no node.
+    /// No nodes.
     NoNodes,
     /// This node is not finite, or not above the one before.
     Node(u8),
-    /// There is no elastic curve.
+    /// No elastic curve.
     NoOrder,
     /// Curve `k` (from 1) has not one finite value per node, below 10 TPa in size.
     Elastic(u8),

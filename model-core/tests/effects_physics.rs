@@ -385,7 +385,7 @@ fn a_thermometer_is_believed() {
 #[test]
 fn set_grows_with_the_path_and_a_power_up_does_not_undo_it() {
     let mut alone = Alone::new("permanent-set", &[1e-3, 0.0, 0.5, 1e4]);
-    // To and fro by 5 mm ten times on 0.1 m: one rest length.
+    // Back and forth by 5 mm ten times on 0.1 m: one rest length.
     for i in 0..=2000_i32 {
         let phase = i % 200;
         let (stroke, direction) = match phase {
@@ -485,7 +485,7 @@ fn what_the_wall_carries_does_not_stretch_the_fibres() {
             0.5 * compliance * b * tension * tension
         };
         let h = 1e-6;
-        // F = −dW/dL of what they give way by; L falls as the stroke grows.
+        // F = −dW/dL of their elastic energy; L falls as the stroke grows.
         let force = (given_way(stroke + h) - given_way(stroke - h)) / (2.0 * h);
         let law = Alone::new("braid-elasticity", &[compliance]).at(c);
         close(law, force, 0.05 * force.abs());

@@ -41,7 +41,9 @@ function pieces(text) {
             while (stop < text.length && text[stop] !== '"') stop += text[stop] === "\\" ? 2 : 1;
             // A backslash at a line's end joins the lines; keep the line break for the numbering.
             // A line that begins with two spaces is code: an example of a command, a line of a grammar.
-            const prose = text.slice(at + 1, stop).replace(/\\n {2}(?:\\\\|\\\n|\\(?=["])|(?!\\n).)*/gs, (code) => code.replace(/[^\n]/g, ""));
+            const prose = text.slice(at + 1, stop).replace(/\\n {2}(?:\\\\|\\\n|\\(?=["])|(?!\\n).)*/gs, (code) => code.replace(/[^\n]/g, ""))
+                // A row of a table is no sentence; pages with the table are checked themselves.
+                .replace(/\\n(?:\\\n *)?\| (?:(?!\\n).)* \|(?=\\n|$)/gs, (row) => row.replace(/[^\n]/g, ""));
             const body = prose.replace(/\\\n/g, "\n").replace(/([.:;,!?]?)(?:\\n)+/g, (_, mark) => `${mark || "."} `).replace(/\\(["\\])/g, "$1");
             out.push({ kind: "string", line, text: body });
             advance(stop + 1);

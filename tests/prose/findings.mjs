@@ -1,12 +1,10 @@
 // Prints what textlint found, one line each: place, message, rule. Exit status: 0 no findings, 1 findings, 3 a rule is not loaded.
 //
-//     node findings.mjs FINDINGS.json SAMPLE.md EXTRACTED-FOLDER yes|no
-//
-// The last argument says whether tables that programs write into pages are included.
+//     node findings.mjs FINDINGS.json SAMPLE.md EXTRACTED-FOLDER
 import { readFileSync } from "node:fs";
 import { relative, resolve } from "node:path";
 
-const [json, sample, extracted, generated] = process.argv.slice(2);
+const [json, sample, extracted] = process.argv.slice(2);
 const results = JSON.parse(readFileSync(json, "utf8"));
 
 // Each item of the sample begins with the name of the rule that must report it.
@@ -23,21 +21,9 @@ const place = (filePath) => {
     const inside = relative(resolve(extracted), resolve(filePath));
     return inside.startsWith("..") ? relative(process.cwd(), resolve(filePath)) : inside.replace(/\.md$/, "");
 };
-// Lines between `<!-- begin NAME -->` and `<!-- end -->` are written by a program.
-function written(filePath) {
-    const lines = new Set();
-    let inside = false;
-    readFileSync(filePath, "utf8").split("\n").forEach((line, index) => {
-        if (line.startsWith("<!-- begin ")) inside = true;
-        if (line.startsWith("<!-- end ")) inside = false;
-        if (inside) lines.add(index + 1);
-    });
-    return lines;
-}
 let count = 0;
 for (const result of results.filter((r) => r !== own).sort((a, b) => (place(a.filePath) < place(b.filePath) ? -1 : 1))) {
-    const skipped = generated === "yes" ? new Set() : written(result.filePath);
-    for (const { line, column, message, ruleId } of result.messages.filter((m) => !skipped.has(m.line))) {
+    for (const { line, column, message, ruleId } of result.messages) {
         console.log(`${place(result.filePath)}:${line}:${column}: ${message.trim().replace(/\s*\n\s*/g, " ")} [${ruleId.split("/").pop()}]`);
         count += 1;
     }

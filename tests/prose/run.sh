@@ -2,8 +2,8 @@
 # Checks the language of the book and of the other pages with textlint: Google's developer documentation style guide, and the
 # project's own word list (words.tsv).
 #
-#     bash tests/prose/run.sh              # hand-written pages
-#     bash tests/prose/run.sh --sources    # and messages, help, comments of the sources, and the pages made from them
+#     bash tests/prose/run.sh              # pages
+#     bash tests/prose/run.sh --sources    # and messages, help, and comments of the sources: about 40 s
 #     bash tests/prose/run.sh FILE…        # these files only
 #
 # Installs the pinned versions (package-lock.json) into target/prose on the first run. Exit status: 0 no findings, 1 findings,
@@ -51,10 +51,8 @@ if [ ${#files[@]} -gt 0 ]; then
         esac
     done
 else
-    generated=$(grep -v '^#' "$here/generated.txt")
-    while IFS= read -r file; do
-        if [ $sources = yes ] || ! grep -qF "$generated" <<<"$file"; then markdown+=("$file"); fi
-    done < <(git ls-files --cached --others --exclude-standard 'docs/src/*.md' '*README.md' CHANGELOG.md CONTRIBUTING.md SECURITY.md | sort -u)
+    while IFS= read -r file; do markdown+=("$file"); done \
+        < <(git ls-files --cached --others --exclude-standard 'docs/*.md' '*README.md' CHANGELOG.md CONTRIBUTING.md SECURITY.md | sort -u)
     if [ $sources = yes ]; then
         while IFS= read -r file; do code+=("$file"); done < <(git ls-files --cached --others --exclude-standard '*.rs' '*.js' '*.mjs' 'host/*.html' '*.py' '*.sh' '*.toml' | sort -u)
     fi
@@ -77,4 +75,4 @@ if [ "${status:-0}" -gt 1 ] || ! node -e 'JSON.parse(require("fs").readFileSync(
     echo "tests/prose/run.sh: the linter failed" >&2
     exit 3
 fi
-node "$here/findings.mjs" "$work/findings.json" "$here/sample.md" "$extracted" "$sources"
+node "$here/findings.mjs" "$work/findings.json" "$here/sample.md" "$extracted"

@@ -45,9 +45,10 @@ impl Controller {
                 return Err(Refusal::StillFaulty(Fault::SettingsInvalid));
             }
             let watch = &self.settings.watch;
-            // `!(…)` so that a pressure that is not a number counts as one that stands.
-            let stands = |pressure_pa: f32| !(pressure_pa <= watch.vented_pa);
-            if self.settings.pressure.fitted && self.sides.iter().any(|side| stands(side.sample.pressure_pa))
+            // With `!(…)`, a pressure that is not a number counts as pressure in the muscle.
+            let pressurised = |pressure_pa: f32| !(pressure_pa <= watch.vented_pa);
+            if self.settings.pressure.fitted
+                && self.sides.iter().any(|side| pressurised(side.sample.pressure_pa))
             {
                 return Err(Refusal::StillFaulty(Fault::NotVented));
             }

@@ -57,11 +57,11 @@ pub fn check_settings(settings: &Settings, hardware: &Hardware) -> Result<(), Re
     }
 }
 
-/// Puts the board's own value in the place of each group that cannot be used; says whether there was one.
-pub fn mend_settings(settings: &mut Settings, hardware: &Hardware) -> bool {
+/// Replaces each group that cannot be used by the board's own values; returns whether there was one.
+pub fn repair_settings(settings: &mut Settings, hardware: &Hardware) -> bool {
     let own = &hardware.settings;
-    let mut mended = false;
-    // Each round mends a group, of which there are eight.
+    let mut repaired = false;
+    // Each iteration repairs one of eight groups.
     for _ in 0..8 {
         let Err(Refusal::Value(field)) = check_settings(settings, hardware) else { break };
         match field {
@@ -80,9 +80,9 @@ pub fn mend_settings(settings: &mut Settings, hardware: &Hardware) -> bool {
             }
             Field::SetPoint | Field::Reference | Field::Rate => *settings = *own,
         }
-        mended = true;
+        repaired = true;
     }
-    mended
+    repaired
 }
 
 /// Written so that a number that is none is in no range.
@@ -306,13 +306,13 @@ mod tests {
         settings.limits.pressure_pa = 250e3;
         settings.regulator.line_s = 1e30;
         settings.watch.debounce_ticks = 65_535;
-        assert!(mend_settings(&mut settings, HARDWARE));
+        assert!(repair_settings(&mut settings, HARDWARE));
         assert_eq!(settings.limits.pressure_pa, 250e3);
         assert_eq!(
             (settings.regulator, settings.watch),
             (Settings::DEFAULT.regulator, Settings::DEFAULT.watch)
         );
         assert_eq!(check_settings(&settings, HARDWARE), Ok(()));
-        assert!(!mend_settings(&mut settings, HARDWARE), "once");
+        assert!(!repair_settings(&mut settings, HARDWARE), "once");
     }
 }

@@ -135,7 +135,7 @@ fn what_vents_ends_a_hold_and_what_may_be_held_for_does_not_hide_it() {
         assert!(bench.is_vented(), "{fault:?} does not end the hold");
         assert_eq!(bench.latched(), Some(Fault::SetPointSilence), "the first stays latched");
         assert!(bench.controller.faults().counts[usize::from(fault.code())] > 0);
-        assert_ne!(bench.controller.take_event(), None, "and the host hears of it");
+        assert_ne!(bench.controller.take_event(), None, "and the host receives the event");
         let kept: Vec<Fault> =
             core::iter::from_fn(|| bench.controller.machine().take_unsaved()).map(|r| r.fault).collect();
         assert_eq!(kept, [Fault::SetPointSilence, fault]);
@@ -167,7 +167,7 @@ fn a_hold_ends_after_its_time_and_nothing_is_written_before() {
     let mut silent = Bench::holding();
     silent.hears_host = false;
     silent.pass(1_010);
-    assert!(silent.is_vented(), "nobody is there who could let go of it");
+    assert!(silent.is_vented(), "without a host no one could end the hold");
 }
 
 #[test]
@@ -254,7 +254,7 @@ fn regulator_and_dump_valve_are_tried_before_arming() {
     stopped.pass(5);
     assert_eq!(stopped.controller.disarm(), Ok(()));
     stopped.pass(300);
-    assert_eq!(stopped.controller.state(), State::Disarmed, "whoever disarms ends the test");
+    assert_eq!(stopped.controller.state(), State::Disarmed, "disarming ends the test");
 }
 
 #[test]

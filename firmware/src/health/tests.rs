@@ -141,7 +141,7 @@ fn each_change_raises_the_alarm_under_its_own_name() {
             assert_eq!(bench.health.state(), TableHealth::Changed, "{shape:?}, {correlation}");
             assert_eq!(bench.health.suspect.0, shape);
             let mut answer = HealthSums::default();
-            bench.health.tell(&mut answer);
+            bench.health.describe(&mut answer);
             assert_eq!((answer.sums.len(), answer.lagged.len()), (SUMS, LAGGED));
             // What is over is forgotten.
             for _ in 0..8_000 {

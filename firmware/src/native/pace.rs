@@ -1,26 +1,26 @@
-//! Device time beside the clock on the wall.
+//! Device time compared with the computer's clock.
 
 use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::tick::TICKS_PER_S;
 
-/// What a process that waited for a busy machine makes up for immediately.
+/// Delay of a process on a busy machine that is compensated immediately.
 const AT_ONCE: Duration = Duration::from_millis(100);
-/// The most that it makes up for at all: after a longer pause device time continues from now.
+/// Longest delay that is compensated: after a longer pause device time continues from now.
 const AT_ALL: Duration = Duration::from_secs(1);
 
-/// Keeps device time in step with the clock on the wall.
+/// Synchronises device time with the computer's clock.
 #[derive(Debug)]
 pub struct Pace {
     tick: Option<Duration>,
     next: Instant,
-    /// Time that device time is behind and makes up for slowly.
+    /// Delay of device time that is compensated slowly.
     behind: Duration,
 }
 
 impl Pace {
-    /// N device seconds in a second; infinite: as fast as it goes.
+    /// N device seconds in a second; infinite: as fast as possible.
     #[must_use]
     pub fn new(speed: f64) -> Self {
         let seconds = 1.0 / (f64::from(TICKS_PER_S) * speed);
@@ -28,8 +28,8 @@ impl Pace {
         Self { tick, next: Instant::now(), behind: Duration::ZERO }
     }
 
-    /// Waits for the next tick. Sleeps are coarse, so ticks come in small bunches. A pause of up to 100 ms is made up for immediately, one
-    /// of up to a second at twice the speed: a host that was held up as well has its say before a watch counts its silence.
+    /// Waits for the next tick. Sleeps are coarse, so ticks come in small groups. A pause of up to 100 ms is compensated immediately, one
+    /// of up to a second at twice the speed: a host that was delayed as well can send before a watch counts its silence.
     pub fn wait(&mut self) {
         let pause = self.pause(Instant::now());
         if !pause.is_zero() {
@@ -69,7 +69,7 @@ mod tests {
         (0..1_000_000).for_each(|_| unbound.wait());
     }
 
-    /// Milliseconds that n ticks take where a sleep is as long as it should be, to the bunch of one.
+    /// Milliseconds that n ticks take where a sleep has exactly the requested length, to within one group of ticks.
     fn milliseconds(pace: &mut Pace, now: &mut Instant, ticks: u32) -> i32 {
         let began = *now;
         (0..ticks).for_each(|_| *now += pace.pause(*now));
@@ -86,10 +86,10 @@ mod tests {
             assert!((found - expected).abs() <= 2, "{what}: {found} ms instead of {expected}");
         };
         takes(0, 1_000, 500, "no pause");
-        takes(60, 1_000, 440, "a short pause, at once");
+        takes(60, 1_000, 440, "a short pause, immediately");
         // 600 ticks are behind; they and the 600 of the same 300 ms come at twice the speed.
         takes(300, 1_200, 300, "a longer pause");
-        takes(0, 1_000, 500, "all is made up for");
-        takes(1_100, 1_000, 500, "a long pause: it goes on from now");
+        takes(0, 1_000, 500, "the whole delay is compensated");
+        takes(1_100, 1_000, 500, "a long pause: device time continues from now");
     }
 }

@@ -230,17 +230,17 @@ impl<F: NorFlash> Service for Answers<'_, F> {
     }
 
     fn trace_arm(&mut self, request: &TraceArm, answer: &mut TraceInfo) -> Result<(), Refusal> {
-        // A table on its way in has the trace's room.
+        // A table upload uses the shared buffer of the trace.
         self.server.upload.forget(self.shared);
         self.shared.with(|controller| {
             controller.trace().arm(request)?;
-            controller.trace().tell(answer);
+            controller.trace().describe(answer);
             Ok(())
         })
     }
 
     fn trace_info(&mut self, (): &(), answer: &mut TraceInfo) -> Result<(), Refusal> {
-        self.shared.with(|controller| controller.trace().tell(answer));
+        self.shared.with(|controller| controller.trace().describe(answer));
         Ok(())
     }
 
@@ -267,7 +267,7 @@ impl<F: NorFlash> Service for Answers<'_, F> {
     }
 
     fn health(&mut self, request: &HealthRead, answer: &mut HealthSums) -> Result<(), Refusal> {
-        self.shared.with(|controller| controller.health(request.side).tell(answer));
+        self.shared.with(|controller| controller.health(request.side).describe(answer));
         Ok(())
     }
 

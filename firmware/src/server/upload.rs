@@ -1,4 +1,4 @@
-//! A table on its way in: gathered piece by piece, checked as a whole before anything is kept.
+//! Upload of a table: received piece by piece, checked as a whole before anything is kept.
 
 use model_core::check;
 use model_core::image;
@@ -8,7 +8,7 @@ use super::{read_table, table_refusal};
 use crate::shared::Shared;
 use crate::shared_buffer::{Incoming, SharedBuffer};
 
-/// What an upload has gathered, in the room of the trace: the upload ends and forgets that.
+/// What an upload has received. It takes the shared buffer from the trace, which ends and is lost.
 #[derive(Default)]
 pub(super) struct Upload {
     begun: Option<TableBegin>,

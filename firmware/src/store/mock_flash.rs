@@ -21,7 +21,7 @@ pub(crate) struct MockFlash {
     lasts: usize,
     /// What a cut leaves of the word or page it hits: 0 nothing happened, 1 half, 2 all of it.
     tear: usize,
-    /// The word, counted from now, of which a bit is not written as it should be.
+    /// The word, counted from now, of which a bit is written wrongly.
     wrong: usize,
 }
 

@@ -21,6 +21,7 @@ mod header;
 pub mod import;
 pub mod import_guess;
 mod line;
+mod lookup;
 mod matlab;
 mod mcap;
 pub mod motion;

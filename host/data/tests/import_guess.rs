@@ -8,7 +8,7 @@ use pam_data::recording::import_guess::{Guess, guess};
 use pam_data::recording::{Import, Quantity, Reader, Recording};
 use proptest::prelude::*;
 
-/// Reads a text by the description that is guessed of it.
+/// Reads a text with its proposed import description.
 fn by_guess(text: &str, rest_length: Option<f64>) -> (Guess, Vec<Recording>) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bench_300kPa.csv");

@@ -382,7 +382,9 @@ impl Client {
         }
         Err(Error::new(DeviceCode::DeviceSilent, format!("the device no longer answers `{}`", E::NAME))
             .value(self.port.name())
-            .help("check the cable and the supply; a running controller without its host vents by itself"))
+            .help(
+                "check the cable and the supply; a running controller without its host vents automatically",
+            ))
     }
 
     /// How often a question may be queried, when n frames were bad before it was queried first.

@@ -28,6 +28,6 @@ error_codes! {
             "send it again; if the error returns, the memory of the device is failing";
         /// The device stopped because of a fault.
         DeviceFault = "device::fault", Input,
-            "`host device faults` tells it in words, with the remedy";
+            "`host device faults` shows the fault and its remedy";
     }
 }

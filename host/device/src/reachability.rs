@@ -47,15 +47,15 @@ impl Reachability {
         }))
     }
 
-    /// Why a profile asks for more than the muscle can do, before it moves: a pressure above the highest allowed one, or a force above that
-    /// at rest length and this pressure, friction included. `None` where its largest value is within reach.
+    /// Why a profile exceeds the limits of the muscle, before it moves: a pressure above the highest allowed one, or a force above that
+    /// at rest length and this pressure, friction included. `None` where its largest value is within the limits.
     #[must_use]
     pub fn beyond(&self, quantity: Quantity, profile: &SetpointProfile) -> Option<String> {
         let highest = profile.highest();
         let most = self.table.max_pressure;
         match quantity {
             Quantity::Pressure if highest > 1.001 * most.pascals() => Some(format!(
-                "{:.0} kPa is asked for, and the highest pressure of the table is {:.0} kPa: the controller limits the setpoint to it",
+                "the setpoint reaches {:.0} kPa, and the highest pressure of the table is {:.0} kPa: the controller limits the setpoint to it",
                 highest / 1e3,
                 most.kilopascals()
             )),
@@ -65,8 +65,8 @@ impl Reachability {
                 let largest = self.muscle.parts(&rest, most).quasi() * (1.0 + friction);
                 (highest > largest).then(|| {
                     format!(
-                        "{highest:.0} N is asked for, and the muscle pulls at most {largest:.0} N, at rest length and {:.0} kPa: the pressure \
-                         would stay at its highest value",
+                        "the setpoint reaches {highest:.0} N, and the muscle pulls at most {largest:.0} N, at rest length and {:.0} kPa: the \
+                         pressure would stay at its highest value",
                         most.kilopascals()
                     )
                 })
@@ -175,7 +175,7 @@ mod tests {
         let said = reach.beyond(Quantity::Pressure, &constant(9000e3)).expect("beyond");
         assert!(said.contains("9000 kPa") && said.contains("600 kPa"), "{said}");
         let said = reach.beyond(Quantity::Force, &constant(500.0)).expect("beyond");
-        assert!(said.starts_with("500 N is asked for, and the muscle pulls at most 1"), "{said}");
+        assert!(said.starts_with("the setpoint reaches 500 N, and the muscle pulls at most 1"), "{said}");
         let sine =
             SetpointProfile::Wave(Reference::Sine { mean: 100.0, amplitude: 150.0, frequency_hz: 1.0 });
         assert!(reach.beyond(Quantity::Force, &sine).is_some());

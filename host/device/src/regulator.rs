@@ -54,9 +54,9 @@ const LINE_EXPLAINS: f64 = 0.97;
 /// Share of a step, at its end, that counts as settled.
 const SETTLED: f64 = 0.3;
 
-/// Steps a device's pressure between two values (Pa) and finds its regulator, all but the deadband. The steps are commands of the
-/// regulator itself, not those that an earlier model of it makes of a demand; the device's settings are as before afterwards, whatever
-/// happens. [`Found::keep`] uses what was found.
+/// Steps a device's pressure between two values (Pa) and identifies its regulator, except the deadband. The steps are commands of the
+/// regulator itself, not those that an earlier model of it makes of a demand. The device's settings are restored in all cases.
+/// [`Found::keep`] stores the result.
 ///
 /// # Errors
 /// As [`run`]; [`DeviceCode::DeviceVerify`] when the pressure does not follow.
@@ -92,7 +92,7 @@ fn with_plain_commands(
         Regulator { gain: 1.0, offset_pa: 0.0, line_s: 0.0, lead: 0.0, deadband_pa: 0.0, ..before.regulator };
     client.call_once::<SetSettings>(&plain)?;
     let found = measure(client);
-    // A device that is gone keeps what it has; the first error is the one to tell.
+    // A device that is disconnected keeps its settings; the first error is reported.
     let restored = client.call_once::<SetSettings>(&before);
     let found = found?;
     restored?;
@@ -104,7 +104,7 @@ fn steps(client: &mut Client, low_pa: f64, high_pa: f64, stop: &dyn Fn() -> bool
     let mut stroke_m = 0.0;
     let plan = Plan {
         quantity: Quantity::Pressure,
-        // The device makes them, so that each is as long as it should be however late this program is.
+        // The device makes them: each has its exact length, even when this program is late.
         profile: SetpointProfile::Wave(Reference::Trapezoid {
             low: low_pa as f32,
             high: high_pa as f32,

@@ -108,7 +108,7 @@ const TICK_S: f64 = 1e-3;
 
 fn wrong(cause: impl Into<String>) -> Error {
     Error::new(DataCode::CallInvalid, cause).help(
-        "write a value, or: sine mean= amplitude= frequency= | steps V V … hold= | trapezoid low= high= ramp= hold= | \
+        "write a value, or: sine mean= amplitude= frequency= | steps V1 V2 … hold= | trapezoid low= high= ramp= hold= | \
          chirp mean= amplitude= from= to= duration= | @FILE.csv",
     )
 }

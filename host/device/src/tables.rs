@@ -48,8 +48,8 @@ pub fn read(client: &mut Client, side: Side) -> Result<Option<Vec<u8>>> {
     Ok(Some(image))
 }
 
-/// Has an upload committed. The answer may be lost while the device was busy with its flash, and asking twice would be refused;
-/// so the device is queried what it has instead.
+/// Commits an upload. The answer may be lost while the device is busy with its flash, and a second commit would be refused:
+/// this function then queries the table in use instead.
 fn commit(client: &mut Client, side: Side, crc: u32, before: Option<TableInfo>) -> Result<TableInfo> {
     let mut last = None;
     for _ in 0..COMMITS {

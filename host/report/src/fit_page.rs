@@ -137,7 +137,7 @@ fn steps(view: &View<'_>) -> Vec<String> {
     let s = &view.fit.summary;
     if !s.faults.is_empty() {
         return vec![
-            "Do not use the table for control: the warnings below say why.".to_owned(),
+            "Do not use the table for control: the warnings below state the reasons.".to_owned(),
             "Check units, signs, and dimensions of the muscle, then fit again.".to_owned(),
         ];
     }

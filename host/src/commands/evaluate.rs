@@ -143,7 +143,7 @@ impl Arguments {
             }
         }
         let words = to_text(&cases, &lengths, self.published.as_deref());
-        // A report that goes to standard output stands there alone.
+        // If the report goes to standard output, nothing else does.
         if self.reports.file() == Some(Path::new("-")) {
             console.note(words)
         } else {

@@ -39,7 +39,7 @@ use crate::progress::ProgressLine;
     Setpoint profiles (frequencies in Hz, times in s):\n  \
     VALUE\n  \
     sine mean= amplitude= frequency=\n  \
-    steps V V … hold=\n  \
+    steps V1 V2 … hold=\n  \
     trapezoid low= high= ramp= hold=\n  \
     chirp mean= amplitude= from= to= duration=\n  \
     @FILE.csv    two columns: time in s, value\n\n\

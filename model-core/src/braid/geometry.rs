@@ -1,4 +1,4 @@
-//! What a ruler and a protractor tell of a muscle, and the sleeve's constants that follow.
+//! Dimensions of a muscle measured with ruler and protractor, and the constants of the sleeve that follow.
 
 use core::f64::consts::PI;
 

@@ -6,10 +6,10 @@
 //! ```
 //! `T` is the tension of all fibres taken as one, from the balance of hoop forces over a length `L` (`2 N` crossings that carry what
 //! the wall leaves to the braid), N; `c = 1/(EA)` their compliance, 1/N. `h`, Pa, is the pressure that the wall's own hoop stress
-//! carries, with the modulus `E` that the base model's elastic force has there (next to rest length that of its slope, as force and `c_1`
-//! both vanish): about rest length the radius changes many times faster than the length, so that `L h′` is the largest of the three. A longer fibre at the same length means a wider, flatter muscle
-//! that pulls less. To first order in `c` this is the derivative of the energy `−T² B c/2` that the fibres give way by; soft braids with
-//! tens of per cent of loss are beyond it.
+//! carries, with the modulus `E` of the base model's elastic force at this stroke. Next to rest length, where force and `c_1` both
+//! vanish, `E` is the modulus of the slope. About rest length the radius changes many times faster than the length, so that `L h′` is
+//! the largest of the three. A longer fibre at the same length means a wider, flatter muscle that pulls less. To first order in `c`
+//! this is the derivative of the elastic energy `−T² B c/2` of the fibres; it does not hold for soft braids that lose tens of per cent.
 
 use super::{
     BenchCheck, Context, Effect, Experiment, Imitates, Info, Link, Memory, Parameter, Start, Traits,

@@ -13,13 +13,13 @@ pub struct Chain<T> {
 #[derive(Clone, Debug, PartialEq)]
 struct Running<T> {
     effect: EffectName,
-    /// Those that the effect does not have are zero: of n no effect asks beyond the end, and none is looked for there.
+    /// Those beyond the effect's own are zero: an effect with n parameters reads the first n only.
     parameters: [T; MAX_PARAMETERS],
     memory: Memory<T>,
 }
 
-/// Called, not written into the loop over effects: a compiler takes out of a loop whatever stays the same in it, here the
-/// arithmetic of every effect there is on a context that all share, and a table that carries one would pay for all.
+/// Functions that are not inlined into the loop over effects. A compiler moves expressions that do not change out of a loop: here the
+/// arithmetic of all effects on their common context. A table with one effect would then cost as much as one with all.
 impl<T: Scalar> Running<T> {
     #[inline(never)]
     fn step(&mut self, context: &Context<T>) {

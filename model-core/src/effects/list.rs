@@ -27,8 +27,8 @@ macro_rules! effect_list {
                 }
             }
 
-            // What a controller asks of an effect, apart from its description: a program that asks for no more carries none of
-            // the texts.
+            // What a controller needs of an effect, separate from its description: a program that uses nothing else contains none
+            // of the texts.
 
             /// How many parameters it has.
             pub const fn parameter_count(self) -> usize {

@@ -4,9 +4,9 @@
 //! dq_i/dt = du/dt − q_i/τ_i,  τ_i = τ_0 · (1, 10, … 10⁴)
 //! F_add = (1 − s k_F) a · Σ q_i        or, of the pull,    F_add = −(1 − s k_F) a · Σ (u − q_i)
 //! ```
-//! After a step of the drive the force falls by `a` times the step in each decade of time, as `−a log10(1 + 5 t/τ_0)` does to within
-//! 0.11 `a` up to `3000 τ_0`, and then ends, as every real creep must. It remembers earlier runs: a load held for an hour
-//! still shows in the next run.
+//! After a step of the drive the force falls by `a` times the step in each decade of time. Up to `3000 τ_0` this differs from
+//! `−a log10(1 + 5 t/τ_0)` by less than 0.11 `a`; then the creep ends, as every real creep must. The memory covers earlier runs: a load
+//! held for an hour still shows in the next run.
 //!
 //! Three drives, three laws (their amplitudes may be tried singly):
 //!
@@ -16,9 +16,9 @@
 //! | `strain_modulus_per_decade`, Pa | `c_1 = (V_B/L) ε_z − t L² ε_x/(2πN²R)`, m² | stress fades in proportion to strain, regardless of the pressure |
 //! | `yielding_part_per_decade` | `F_quasi` where the muscle pulls, N | the pull itself yields: braid, ends and wall give under load, also at constant length |
 //!
-//! The stress of a bladder is known from the tests that its coefficients come from, when it had long settled; what the gas pulls with is
-//! known immediately. So the pull is counted from the fresh load, and the muscle hung unloaded before the first moment; of the bladder the
-//! memory begins settled, and over-stresses left from before fade on their own.
+//! The stress of a bladder is known from the tests that gave its coefficients, in which it had settled; the force of the gas has no such
+//! delay. For the drive by the pull, the memory begins at zero: the muscle hung unloaded before the first row. For the drives of the
+//! bladder the memory begins settled, and stresses from before the recording fade.
 
 use super::{Context, Effect, Experiment, Fading, Info, Link, Memory, Parameter, Start, Traits};
 use crate::scalar::Scalar;

@@ -1,4 +1,4 @@
-//! Working stretches the muscle permanently: its rest length grows by `δ` in the course of its life.
+//! Use stretches the muscle permanently: its rest length grows by `δ` during its life.
 //!
 //! ```text
 //! F_add = ∂F/∂x · [δ (1 − e^(−ℓ/ℓ_0)) + δ_l (1 − e^(−I/I_0))]

@@ -160,7 +160,7 @@ endpoints! {
     14 settings GetSettings: () => Settings;
     /// Checks, keeps and uses settings, and confirms them where they could not be trusted; only while every muscle is vented.
     15 set_settings SetSettings: Settings => Settings;
-    /// Begins the upload of a table, in the room of the trace: what that recorded is lost.
+    /// Begins the upload of a table, which takes the shared buffer from the trace: its records are lost.
     16 table_begin BeginTable: TableBegin => ();
     /// The next piece; the answer is how many bytes are there.
     17 table_piece SendTablePiece: TablePiece => u32;

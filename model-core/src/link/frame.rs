@@ -9,7 +9,7 @@
 //! | n−4..n | check | CRC-32 (ISO-HDLC: polynomial 0x04C11DB7 reflected, as in Ethernet and zip) of all before it, little-endian |
 //!
 //! Consistent overhead byte stuffing (Cheshire and Baker, 1999, doi:10.1109/90.769765) leaves no zero byte inside, so
-//! a receiver that lost its place waits for the next zero and is in step again, whatever came before.
+//! a receiver that lost its place waits for the next zero and is synchronised again.
 
 use cobs::CobsEncoder;
 use postcard::ser_flavors::Flavor;

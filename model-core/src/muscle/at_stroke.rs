@@ -5,7 +5,7 @@ use crate::effects::Context;
 use crate::scalar::Scalar;
 use crate::table::MAX_ORDER;
 
-/// The muscle held at one stroke: what remains is a function of pressure alone.
+/// The muscle held at one stroke: its force is a function of pressure alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtStroke<T> {
     /// The shape at this stroke.

@@ -51,7 +51,7 @@ impl Loop {
         mut settings: Settings,
         mode: Mode,
     ) -> Self {
-        // There is no link here, and so no host to receive from.
+        // No link, and therefore no host to receive from.
         settings.watch.autonomous = true;
         let mut controller = Controller::new(&settings);
         controller.use_table(Side::Agonist, table).expect("a valid table");
@@ -74,7 +74,7 @@ impl Loop {
         self.controller.take_sample()
     }
 
-    /// Goes on for some ticks and returns what was true in each.
+    /// Continues for some ticks and returns the true values of each.
     ///
     /// # Panics
     /// When a fault stops the controller.

@@ -53,8 +53,8 @@ fn swing(x: f64, frequency_hz: f64) -> Motion {
     Motion::Sine { mean_mm: 0.2e3 * x, amplitude_mm: 0.1e3 * x, frequency_hz }
 }
 
-/// Rests a second and a half, continues by two hundredths of the free stroke `x` (m) within a second, and so on back and forth, as a gripper
-/// that feels its way: what grows during a rest and is lost over the first bit of motion has its say in each move.
+/// Eight small moves back and forth, as of a gripper: a rest of 1.5 s, then a move by two hundredths of the free stroke `x` (m) within a
+/// second. An effect that grows during a rest and fades over the first part of a motion acts in each move.
 fn inching(x: f64) -> Motion {
     const MOVES: [f64; 8] = [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0];
     let mut points = vec![(0.0, 0.2e3 * x)];
@@ -84,7 +84,7 @@ pub fn cases() -> Vec<Case> {
     let seal: Conceal = |m, f, x, _| {
         let dry = 0.04 * f;
         m.physics.seal = Some(Seal { dry, per_pressure: 0.0, travel: 2e-4 * x, slow: 0.0, slow_speed: 0.0 });
-        format!("a seal that rubs with {dry:.1} N whatever the muscle pulls, 4 % of blocked force")
+        format!("a seal with a constant friction of {dry:.1} N, 4 % of blocked force")
     };
     let viscous: Conceal = |m, f, _, v| {
         let drag = 0.006 * f / v;
@@ -106,19 +106,19 @@ pub fn cases() -> Vec<Case> {
             .to_vec(),
     };
     type Course<'a> = &'a dyn Fn(f64) -> Motion;
-    type Asked = fn(f64) -> Vec<Stretch>;
-    let all: [(&'static str, u64, Conceal, Course<'_>, Asked); 4] = [
+    type Setpoint = fn(f64) -> Vec<Stretch>;
+    let all: [(&'static str, u64, Conceal, Course<'_>, Setpoint); 4] = [
         ("coulomb-friction", 101, seal, &swing(0.2), sine_and_steps),
         ("viscous-damping", 102, viscous, &swing(0.5), sine_and_steps),
         ("stress-relaxation", 103, relaxation, &path, sine_and_steps),
         ("breakaway-friction", 104, breakaway, &inching, steady),
     ];
-    all.map(|(effect, seed, conceal, motion, asked)| {
+    all.map(|(effect, seed, conceal, motion, setpoint)| {
         let plain = simple(seed);
         let (blocked, x, v) = sizes(&plain);
         let mut spec = plain.clone();
         let words = conceal(&mut spec, blocked, x, v);
-        Case { effect, words, plain, spec, motion: motion(x), setpoint: asked(blocked), blocked }
+        Case { effect, words, plain, spec, motion: motion(x), setpoint: setpoint(blocked), blocked }
     })
     .to_vec()
 }

@@ -344,7 +344,7 @@ impl Machine {
         Debugger::attach(self.debugger.expect("a board that may be debugged"))
     }
 
-    /// Pulls the plug.
+    /// Interrupts the power.
     pub fn kill(mut self) {
         self.end();
     }

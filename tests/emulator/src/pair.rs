@@ -64,7 +64,7 @@ impl PairLoop {
     /// # Panics
     /// When the controller refuses.
     pub fn start(joint: Joint, table: &MuscleTable, mut settings: Settings) -> Self {
-        // There is no link here, and so no host to receive from.
+        // No link, and therefore no host to receive from.
         settings.watch.autonomous = true;
         let mut controller = Controller::new(&settings);
         for side in Side::ALL {
@@ -98,7 +98,7 @@ impl PairLoop {
         self.outputs = self.controller.step(&Inputs { sides, ..Inputs::default() });
     }
 
-    /// Goes on for some ticks and gives the mean of what was true in the last `judged` of them.
+    /// Continues for some ticks and returns the mean of the true values in the last `judged` of them.
     ///
     /// # Panics
     /// When a fault stops the controller.

@@ -78,7 +78,7 @@ impl<S> Watched<S> {
             if now != last.0 {
                 last = (now, Instant::now());
             }
-            assert!(last.1.elapsed() < HOPELESS, "{what}: the bench stands still");
+            assert!(last.1.elapsed() < HOPELESS, "{what}: the time of the bench does not advance");
             std::thread::sleep(Duration::from_millis(2));
         }
     }

@@ -26,7 +26,7 @@ pub fn stopped(client: &mut Client) -> FaultReport {
             return report;
         }
     }
-    panic!("no fault was told");
+    panic!("no fault was reported");
 }
 
 /// the setpoint.

@@ -40,8 +40,8 @@ fn killed_in_a_wave(station: &Station, line: &Line, folder: &Folder) {
     let mut child: Child = program::start(line, folder.path(), &wave);
     station.until("the wave", |_| command(station) > 150e3);
     let begun = station.periods();
-    // It lives as long as the program does, silence or not.
-    station.until("the wave goes on", |now| now > begun + 1_500);
+    // It lasts as long as the program, even without messages.
+    station.until("the wave continues", |now| now > begun + 1_500);
     assert!(command(station) > 150e3, "the wave was stopped while its host was alive");
     // SIGKILL: nothing of the program runs any more.
     child.kill().expect("it is killed");
@@ -98,8 +98,11 @@ fn a_device_that_was_told_to_go_on_alone_does_and_holds_where_it_was_told_to_hol
     set(&["watch.autonomous=true"]);
     killed_in_a_wave(&station, &line, &folder);
     let killed = station.periods();
-    station.until("it goes on", |now| now > killed + 3_000);
-    assert!(station.since(killed + 100).iter().all(|exchange| exchange.command > 100e3), "it went on alone");
+    station.until("it continues", |now| now > killed + 3_000);
+    assert!(
+        station.since(killed + 100).iter().all(|exchange| exchange.command > 100e3),
+        "it continued without a host"
+    );
     program::done(&line, folder.path(), &["vent"]);
     let hold = format!("hold_on={}", 1_u32 << Fault::HostSilence.code());
     set(&["watch.autonomous=false", "watch.host_silence_ticks=1200", &hold]);
@@ -112,7 +115,7 @@ fn a_device_that_was_told_to_go_on_alone_does_and_holds_where_it_was_told_to_hol
     };
     station.until("it holds", |now| now > killed + 300 && (still(now) || now > killed + 10_000));
     let held = station.periods();
-    assert!(held > killed + 1_200, "it holds {} ticks after its host was killed", held - killed);
+    assert!(held > killed + 1_200, "it holds {} ticks after the end of its host", held - killed);
     assert!(still(held) && command(&station) > 190e3, "it holds {} Pa", command(&station));
     program::done(&line, folder.path(), &["vent"]);
     let vented = station.periods();
@@ -172,9 +175,9 @@ fn a_burst_a_leak_a_closed_supply_and_a_jammed_valve_are_noticed_on_the_plant_it
         let told = station.periods();
         station.until(name, |now| now > told + 5);
         let after = station.since(broken);
-        // Of an air that follows no change nothing is noticed before there is one; it takes a busy machine its time to ask for it.
+        // Blocked air shows only after a change of the command; on a busy machine this change comes late.
         let changed = after.iter().position(|exchange| (exchange.command - 250e3).abs() > 50e3);
-        let began = then_asked.map_or(0, |_| changed.expect("the command follows what is asked"));
+        let began = then_asked.map_or(0, |_| changed.expect("the command follows the setpoint"));
         // The regulator's lead may command zero for a moment on the way down; venting stays.
         let vented = after[began..].iter().rposition(|exchange| exchange.command > 0.0);
         assert_eq!(report.fault, fault, "{name}: {report:?}");

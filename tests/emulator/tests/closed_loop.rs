@@ -162,8 +162,10 @@ fn what_was_out_of_reach_for_long_winds_no_integrator_up() {
         };
         // Twice what the muscle can do, for three seconds; and a little less than it can.
         let ((after_limit, limited), (after_reach, _)) = (back(2.0 * blocked), back(0.7 * blocked));
-        eprintln!("{name}: back in {after_limit} ticks from the limit, {after_reach} from within reach");
-        assert!(limited > 2500, "{limited} ticks out of reach");
+        eprintln!(
+            "{name}: back in {after_limit} ticks from saturation, {after_reach} from within the limits"
+        );
+        assert!(limited > 2500, "{limited} ticks in saturation");
         // With an integrator that continued PI would need 346 and 439.
         assert!(after_limit < most && after_reach < 200, "{name}: {after_limit} and {after_reach} ticks");
     }

@@ -136,7 +136,7 @@ fn every_fault_of_the_plant_is_noticed_in_time_and_latched() {
         if fault == Fault::SensorStuck {
             let before = after[0].command;
             let moved = after.iter().position(|exchange| exchange.command > before + 20e3);
-            after.drain(..moved.expect("the command follows what is asked"));
+            after.drain(..moved.expect("the command follows the setpoint"));
         }
         let vented = after.iter().position(|exchange| exchange.command == 0.0);
         station.heal();

@@ -54,7 +54,8 @@ fn roots_are_taken_in_hardware_and_nothing_is_computed_in_double() {
     let Ok(image) = machine::image() else { return };
     let bytes = std::fs::read(image).expect("an image");
     let elf = object::File::parse(&*bytes).expect("an image");
-    // VSQRT.F32, encoding T1 of the ARMv7-M architecture's manual: 1110 1110 1D11 0001, Vd 1010 11M0 Vm.
+    // VSQRT.F32 by the ARMv7-M Architecture Reference Manual, encoding T1: halfwords 0xEEB1 and 0x0AC0; the bits outside the masks
+    // select the registers.
     let roots: usize = elf
         .sections()
         .filter(|section| section.kind() == SectionKind::Text)

@@ -68,7 +68,7 @@ fn a_plug_pulled_at_any_moment_leaves_a_whole_table() {
         if there == next {
             new += 1;
         } else {
-            assert!(there == kept, "neither the old nor the new table after kill {n}");
+            assert!(there == kept, "neither the old nor the new table after power cut {n}");
             old += 1;
         }
         kept = there;

@@ -118,7 +118,7 @@ fn flipped_bits_cost_repeats_and_nothing_else() {
     let commands: Vec<f32> = station.since(0).iter().map(|exchange| exchange.command).collect();
     let highest = commands.iter().copied().fold(0.0, f32::max);
     let most = sent.iter().copied().fold(0.0, f32::max);
-    assert!(highest < 1.015 * most, "{highest} Pa were commanded, {most} Pa asked for");
+    assert!(highest < 1.015 * most, "{highest} Pa commanded for a setpoint of {most} Pa");
 }
 
 fn frame<E: Endpoint>(request: &E::Request, sequence: u16) -> Vec<u8> {

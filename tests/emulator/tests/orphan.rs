@@ -45,7 +45,7 @@ fn qemu_ends_with_a_host_that_is_killed() {
     host.wait().expect("it ends");
     let deadline = Instant::now() + HOPELESS;
     while is_read(&pipe) {
-        assert!(Instant::now() < deadline, "QEMU still runs, long after its host was killed");
+        assert!(Instant::now() < deadline, "QEMU still runs, long after the end of its host");
         std::thread::sleep(Duration::from_millis(50));
     }
 }

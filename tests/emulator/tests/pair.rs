@@ -47,15 +47,15 @@ fn a_stiffer_joint_gives_way_less_to_a_push_and_roughly_as_much_as_it_says() {
             joint.ask(0.0, stiffness).expect("within reach");
             joint.run(2_000, 200);
             let still: Vec<f64> = (0..75).map(|_| joint.run(20, 20).angle).collect();
-            let wander = still.iter().copied().fold(f64::MIN, f64::max)
+            let drift = still.iter().copied().fold(f64::MIN, f64::max)
                 - still.iter().copied().fold(f64::MAX, f64::min);
-            // A joint whose muscles' friction is wholly taken away stands nowhere: 0.012 rad.
-            assert!(wander < 0.005, "a joint of {stiffness} N·m/rad wanders by {wander} rad");
+            // With friction fully compensated a joint drifts by 0.012 rad.
+            assert!(drift < 0.005, "a joint of {stiffness} N·m/rad drifts by {drift} rad");
             joint.joint.load = push;
             let moved = still[still.len() - 1] - joint.run(1_500, 1_000).angle;
             let ratio = push / moved / f64::from(stiffness);
             eprintln!(
-                "at {stiffness} N·m/rad {push} N·m move it by {moved:.4} rad, {ratio:.2} of it; it wandered by {wander:.4} rad"
+                "at {stiffness} N·m/rad {push} N·m move it by {moved:.4} rad, {ratio:.2} of it; drift {drift:.4} rad"
             );
             // How far the strands slip within the push is worth a fifth either way.
             assert!((0.75..1.25).contains(&ratio), "{ratio} of {stiffness} N·m/rad");
@@ -64,7 +64,7 @@ fn a_stiffer_joint_gives_way_less_to_a_push_and_roughly_as_much_as_it_says() {
         }
     }
     let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
-    eprintln!("on the mean {mean:.3} of what was asked for");
+    eprintln!("mean {mean:.3} of the required stiffness");
     assert!((0.9..1.1).contains(&mean), "{mean}");
     assert!(gave[12].max(gave[13]) < 0.6 * gave[0].min(gave[1]), "{gave:?}");
 }

@@ -25,7 +25,7 @@ fn command(station: &Station) -> f32 {
     station.periods().checked_sub(1).map_or(0.0, |last| station.since(last)[0].command)
 }
 
-/// Starts a run, kills it without a word, and starts `watcher` on the same line.
+/// Starts a run, ends it without a last message, and starts `watcher` on the same line.
 fn killed_and_watched(watcher: &[&str]) {
     let folder = Folder::new();
     let station = station();
@@ -49,7 +49,7 @@ fn killed_and_watched(watcher: &[&str]) {
     assert!(other.try_wait().is_ok_and(|ended| ended.is_none()), "`host {watcher:?}` still watches");
     other.kill().expect("it is killed");
     other.wait().expect("it has ended");
-    assert!(vented <= SILENCE + CHANGE, "under pressure {vented} ticks after its owner was killed");
+    assert!(vented <= SILENCE + CHANGE, "under pressure {vented} ticks after the end of its owner");
     assert!(after.iter().all(|exchange| exchange.command == 0.0), "and stays vented");
     let said = program::done(&line, folder.path(), &["device", "faults"]);
     assert!(said.contains("the host was silent while the controller was running"), "{said}");

@@ -6,7 +6,7 @@ use crate::generate::{TrialTruth, after};
 use crate::ledger::{Ledger, begun, name, open, read_ledger};
 use crate::progress::Progress;
 use crate::queue::in_order;
-use crate::report::Rate;
+use crate::rate::Rate;
 use crate::residuals::Residuals;
 use crate::spec::{Spec, Stratum};
 use crate::tool;
@@ -54,17 +54,17 @@ pub fn markdown(all: &[Second]) -> String {
     let rate =
         |right: &dyn Fn(&Second) -> bool| Rate::new(all.iter().filter(|s| right(s)).count(), all.len());
     let mut m = String::from(
-        "\n## Second round: the proposed recording, made\n\nTrials in which more than one name was possible, the truth among them, \
-         and a recording was proposed.\n\n| one more recording | one name left, the right one | set smaller, truth still in it \
+        "\n## Second round: with the proposed recording\n\nTrials in which more than one name was possible, the truth among them, \
+         and a recording was proposed.\n\n| additional recording | only the right name remains | smaller set with the truth \
          |\n| --- | --- | --- |\n",
     );
     m += &format!(
-        "| as proposed | {} | {} |\n",
+        "| the proposed one | {} | {} |\n",
         rate(&|s| s.resolved(&s.proposed)),
         rate(&|s| s.narrowed(&s.proposed))
     );
     m += &format!(
-        "| a random item of the menu | {} | {} |\n",
+        "| one drawn from the menu | {} | {} |\n",
         rate(&|s| s.resolved(&s.random)),
         rate(&|s| s.narrowed(&s.random))
     );

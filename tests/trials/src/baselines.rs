@@ -5,10 +5,11 @@
 //! columns that are the catalogue's compact equations at fixed shapes.
 
 use crate::answer::recordings;
+use crate::figures::{Scored, big_and_visible};
 use crate::generate::TrialTruth;
 use crate::ledger::name;
 use crate::names::{SINGLES, class};
-use crate::report::{Rate, Scored, big_and_visible};
+use crate::rate::Rate;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::Deserialize;
@@ -53,7 +54,7 @@ pub fn all(set: &Path, truths: &[TrialTruth], scored: &[Scored]) -> Result<Vec<L
         let rate = |right: &dyn Fn(&TrialTruth, &str) -> bool| {
             Rate::new(said.iter().filter(|(t, g)| right(t, g)).count(), said.len())
         };
-        lines.push((format!("PySINDy's STLSQ, apart ({})", others.versions), rate(&is), rate(&is_class)));
+        lines.push((format!("PySINDy's own STLSQ ({})", others.versions), rate(&is), rate(&is_class)));
     }
     Ok(lines)
 }

@@ -1,4 +1,4 @@
-//! `trials campaign`: the campaign that chooses its own steps, beside protocol C for the same time, a random menu, and the proposal of today.
+//! `trials campaign`: the campaign that chooses its own steps, compared with protocol C for the same time, random steps, and single proposals.
 
 mod methods;
 mod page;
@@ -83,7 +83,7 @@ pub struct Trial {
     pub truth: Vec<String>,
     /// What each method said.
     pub said: Vec<Said>,
-    /// Table error on unseen motion after some minutes: method, minutes, % of blocked force. Muscles without effects only.
+    /// Table error on held-out motion after some minutes: method, minutes, % of blocked force. Muscles without effects only.
     pub errors: Vec<table_error::After>,
 }
 

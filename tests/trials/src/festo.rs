@@ -1,5 +1,5 @@
-//! The tool on real recordings as they are: isometric pressure staircases of a commercial 10 mm muscle, two sets, eleven lengths. What it
-//! says is put beside what is written about these recordings; what it predicts of unseen ones beside the lab's own formula.
+//! The tool on unchanged real recordings: isometric pressure staircases of a commercial 10 mm muscle, two sets, eleven lengths. Its
+//! answers are compared with the published description of the recordings, and its predictions with the laboratory's own formula.
 
 use crate::answer::{Answer, run_limited};
 use crate::festo_history;
@@ -42,28 +42,28 @@ const SETS: [Set; 2] = [
     },
 ];
 
-/// What is written about the recordings, and which answers would say it.
-struct Written {
+/// A statement of the published description, and the answers that agree with it.
+struct Published {
     what: &'static str,
     effects: &'static [&'static str],
     regions: &'static [&'static str],
     words: &'static [&'static str],
 }
 
-const WRITTEN: [Written; 5] = [
-    Written {
+const PUBLISHED: [Published; 5] = [
+    Published {
         what: "The first run of a mounting is low: the muscle runs in, and again whenever the mounting is changed",
         effects: &["mullins-softening", "cyclic-softening", "permanent-set", "breakaway-friction"],
         regions: &["recording", "cycle", "time"],
         words: &[],
     },
-    Written {
+    Published {
         what: "At constant pressure and length the force creeps, and remembers earlier runs",
         effects: &["stress-relaxation", "log-creep", "permanent-set"],
         regions: &["hold-time", "time"],
         words: &["at rest", "creep"],
     },
-    Written {
+    Published {
         what: "A gap between filling and emptying that grows with contraction",
         effects: &[
             "friction-asymmetry",
@@ -76,13 +76,13 @@ const WRITTEN: [Written; 5] = [
         regions: &["direction", "contraction"],
         words: &[],
     },
-    Written {
+    Published {
         what: "Ends that are not cylinders: the blocked force grows with the muscle's length",
         effects: &["tip-effect", "contact-loss", "braid-elasticity"],
         regions: &[],
         words: &["ends that are not"],
     },
-    Written {
+    Published {
         what: "Mounted lengths by tape measure, to within a millimetre",
         effects: &["displacement-offset", "end-slip"],
         regions: &["contraction"],
@@ -90,12 +90,12 @@ const WRITTEN: [Written; 5] = [
     },
 ];
 
-/// The two forms of the recordings: as the instruments wrote them, and the mean of each stay after the ringing.
+/// The two forms of the recordings: as the instruments wrote them, and the mean of each step after the oscillation has decayed.
 const FORMS: [(&str, &str); 2] =
-    [("staircase", "as recorded, valve pulses and all"), ("settled", "settled points, one a stay")];
+    [("staircase", "recordings with valve pulses"), ("settled", "settled points, one per step")];
 
 /// A muscle and its answer.
-struct Asked {
+struct Diagnosed {
     label: String,
     answer: Result<(Answer, Value), String>,
 }
@@ -120,18 +120,18 @@ fn json(path: &Path) -> Result<Value, String> {
 /// A muscle of a set, in one form of its recordings.
 type Case = (&'static str, &'static str, &'static str, &'static str);
 
-fn diagnose(data: &Path, output: &Path, host: &Path, (year, muscle, file, form): Case) -> Asked {
-    let asked = || {
-        let answer = output.join(format!("{year}-{muscle}-{form}.json"));
+fn diagnose(data: &Path, output: &Path, host: &Path, (year, muscle, file, form): Case) -> Diagnosed {
+    let answer = || {
+        let json_file = output.join(format!("{year}-{muscle}-{form}.json"));
         let file = if form == "settled" { "settled_points" } else { file };
         let recording = data.join(format!("aarl-festo-10mm-{year}")).join(format!("{file}.csv"));
-        let mut c = tool::diagnose(host, &description(year, muscle), &[recording], &answer);
+        let mut c = tool::diagnose(host, &description(year, muscle), &[recording], &json_file);
         c.arg("--import").arg(import(year, form));
         run_limited(&mut c, Duration::from_secs(300))?;
-        let value = json(&answer)?;
+        let value = json(&json_file)?;
         Ok((serde_json::from_value(value.clone()).map_err(|e| e.to_string())?, value))
     };
-    Asked { label: format!("{year}, {muscle}"), answer: asked() }
+    Diagnosed { label: format!("{year}, {muscle}"), answer: answer() }
 }
 
 fn evaluate(data: &Path, output: &Path, host: &Path, set: &Set) -> Result<Value, String> {
@@ -148,6 +148,28 @@ fn evaluate(data: &Path, output: &Path, host: &Path, set: &Set) -> Result<Value,
     json(&answer)
 }
 
+/// Beginning of the page.
+const HEAD: &str = "# Real recordings of a commercial muscle\n\nWritten by `cargo run --release -p trials -- festo -o DIR --page docs/src/festo.md`; \
+    nothing here is typed by hand. The recordings are isometric pressure staircases of a commercial 10 mm fluidic muscle: two sets of one \
+    laboratory, eleven lengths, `../shared/data` (not part of the project). The program reads the columns only; its answers are compared \
+    with the published description of the recordings. The muscle is never moved under pressure, so strokes, speeds and viscous friction \
+    cannot be judged.\n";
+
+/// Columns of the diagnoses of one form.
+const ANSWERS: &str = "| set, muscle | verdict | named (probability, share explained) | where | held-out rows before → after, N |\n";
+
+/// Paragraph on the published description, and the head of its table.
+const COMPARISON: &str = "### Comparison with the published description\n\n\"Named\": one of the listed effects is named. \"In a set\": such an \
+    effect is confusable with a named one. \"Located there\": the excess error is located on such a coordinate. \"Could be hidden\": such an \
+    effect is possible at more than 1 % of the blocked force.\n\n\
+    | published | effects that agree | named | in a set | located there | could be hidden |\n";
+
+/// Section on held-out recordings, and the head of its table.
+const HELD_OUT: &str = "## Held-out recordings\n\nMean error of the settled points, in percent of the blocked force at the highest pressure. Each \
+    run, each contraction, and each length is predicted from all others (`host evaluate`). The laboratory's published formula is compared \
+    on the rows of the held-out runs; its coefficients were fitted to its own recordings, these included.\n\n\
+    | set, muscle | held-out runs | the lab's formula | held-out contractions | held-out length | end effect by the other lengths, mm |\n";
+
 /// Diagnoses every muscle, and writes festo.md.
 pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(output)?;
@@ -155,35 +177,18 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
         .iter()
         .flat_map(|f| SETS.iter().flat_map(|s| s.muscles.iter().map(|m| (s.year, m.0, m.1, f.0))))
         .collect();
-    let asked = in_order(&cases, |c| Ok(diagnose(data, output, host, *c)))?;
-    let mut text = String::from(
-        "# Real recordings as they are\n\nWritten by `cargo run --release -p trials -- festo -o DIR --page docs/src/festo.md`; nothing here is \
-         typed by hand. Isometric pressure staircases of a commercial 10 mm fluidic muscle (two sets of one laboratory, eleven lengths, \
-         `../shared/data`, which is not part of the project), as they were recorded. The program reads the columns only; its answers are \
-         compared with the published description of the recordings. The muscle is never moved under pressure, so strokes, speeds and viscous \
-         friction cannot be judged.\n",
-    );
+    let diagnosed = in_order(&cases, |c| Ok(diagnose(data, output, host, *c)))?;
+    let mut text = HEAD.to_owned();
     let per_form = cases.len() / FORMS.len();
-    for ((_, words), asked) in FORMS.iter().zip(asked.chunks(per_form)) {
-        let _ = writeln!(
-            text,
-            "\n## What it says: {words}\n\n\
-             | set, muscle | verdict | named (probability, share explained) | where | held-out rows before → after, N |\n\
-             | --- | --- | --- | --- | --- |"
-        );
-        for a in asked {
+    for ((_, words), diagnosed) in FORMS.iter().zip(diagnosed.chunks(per_form)) {
+        let _ = writeln!(text, "\n## Diagnosis: {words}\n\n{ANSWERS}| --- | --- | --- | --- | --- |");
+        for a in diagnosed {
             line(&mut text, a);
         }
-        beside(&mut text, asked);
+        comparison(&mut text, diagnosed);
     }
-    let _ = writeln!(text, "\n{}", remembered(&cases[per_form..], &asked[per_form..]).trim_end());
-    text.push_str(
-        "\n## Held-out recordings\n\nMean error of the settled points, in percent of the blocked force at the highest pressure. Each run, each \
-         contraction, and each length is predicted from all others (`host evaluate`). The laboratory's published formula is compared on the \
-         rows of the held-out runs; its coefficients were fitted to its own recordings, these included.\n\n\
-         | set, muscle | held-out runs | the lab's formula | held-out contractions | held-out length | end effect by the other lengths, mm |\n\
-         | --- | --- | --- | --- | --- | --- |\n",
-    );
+    let _ = writeln!(text, "\n{}", memory_section(&cases[per_form..], &diagnosed[per_form..]).trim_end());
+    let _ = writeln!(text, "\n{HELD_OUT}| --- | --- | --- | --- | --- | --- |");
     for set in &SETS {
         match evaluate(data, output, host, set) {
             Ok(e) => errors(&mut text, set.year, &e),
@@ -197,21 +202,21 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
     Ok(())
 }
 
-/// The section on what the muscles remember, of answers to settled points.
-fn remembered(cases: &[Case], asked: &[Asked]) -> String {
-    let told: Vec<festo_history::Told<'_>> = cases
+/// The section on the memory of the bladder, from answers to settled points.
+fn memory_section(cases: &[Case], diagnosed: &[Diagnosed]) -> String {
+    let answers: Vec<festo_history::MuscleAnswer<'_>> = cases
         .iter()
-        .zip(asked)
-        .map(|(case, a)| festo_history::Told {
+        .zip(diagnosed)
+        .map(|(case, a)| festo_history::MuscleAnswer {
             year: case.0,
             label: &a.label,
             answer: a.answer.as_ref().ok().map(|(_, whole)| whole),
         })
         .collect();
-    festo_history::section(&told)
+    festo_history::section(&answers)
 }
 
-/// Diagnoses settled points only, and writes the section on what the muscles remember into `page`.
+/// Diagnoses settled points only, and writes the section on the memory of the bladder into `page`.
 pub fn run_history(
     data: &Path,
     output: &Path,
@@ -221,8 +226,8 @@ pub fn run_history(
     std::fs::create_dir_all(output)?;
     let cases: Vec<Case> =
         SETS.iter().flat_map(|s| s.muscles.iter().map(|m| (s.year, m.0, m.1, "settled"))).collect();
-    let asked = in_order(&cases, |c| Ok(diagnose(data, output, host, *c)))?;
-    let section = remembered(&cases, &asked);
+    let diagnosed = in_order(&cases, |c| Ok(diagnose(data, output, host, *c)))?;
+    let section = memory_section(&cases, &diagnosed);
     if let Some(page) = page {
         let old = std::fs::read_to_string(page)?;
         std::fs::write(page, festo_history::replaced(&old, &section))?;
@@ -231,11 +236,11 @@ pub fn run_history(
     Ok(())
 }
 
-fn line(text: &mut String, asked: &Asked) {
-    let (a, whole) = match &asked.answer {
+fn line(text: &mut String, diagnosed: &Diagnosed) {
+    let (a, whole) = match &diagnosed.answer {
         Ok(a) => a,
         Err(e) => {
-            let _ = writeln!(text, "| {} | failed: {} | | | |", asked.label, e.replace('|', "/"));
+            let _ = writeln!(text, "| {} | failed: {} | | | |", diagnosed.label, e.replace('|', "/"));
             return;
         }
     };
@@ -259,7 +264,7 @@ fn line(text: &mut String, asked: &Asked) {
     let _ = writeln!(
         text,
         "| {} | {} | {} | {} | {:.2} → {:.2} |",
-        asked.label,
+        diagnosed.label,
         a.verdict,
         named.join(", "),
         places.join("; "),
@@ -268,17 +273,14 @@ fn line(text: &mut String, asked: &Asked) {
     );
 }
 
-/// What is written about the recordings, and the answers that say it.
-fn beside(text: &mut String, asked: &[Asked]) {
-    text.push_str(
-        "\n### Beside what is written about them\n\n\"Named\": one of the listed effects is named. \"In a set\": such an effect is \
-         confusable with a named one. \"Located there\": the misfit is located on such a coordinate. \"Could be hidden\": such an effect is \
-         possible at more than 1 % of the blocked force.\n\n\
-         | written | would be said by | named | in a set | located there | could be hidden |\n| --- | --- | --- | --- | --- | --- |\n",
-    );
-    let answers: Vec<(&str, &Answer, &Value)> =
-        asked.iter().filter_map(|a| a.answer.as_ref().ok().map(|(x, v)| (a.label.as_str(), x, v))).collect();
-    for w in &WRITTEN {
+/// The published description, and the number of answers that agree with it.
+fn comparison(text: &mut String, diagnosed: &[Diagnosed]) {
+    let _ = writeln!(text, "\n{COMPARISON}| --- | --- | --- | --- | --- | --- |");
+    let answers: Vec<(&str, &Answer, &Value)> = diagnosed
+        .iter()
+        .filter_map(|a| a.answer.as_ref().ok().map(|(x, v)| (a.label.as_str(), x, v)))
+        .collect();
+    for w in &PUBLISHED {
         let says = |name: &str| w.effects.contains(&name);
         let who = |test: &dyn Fn(&Answer, &Value) -> bool| {
             let k = answers.iter().filter(|(_, a, v)| test(a, v)).count();
@@ -287,8 +289,8 @@ fn beside(text: &mut String, asked: &[Asked]) {
         let named = who(&|a, _| a.missing.iter().any(|m| says(&m.effect)));
         let set = who(&|a, _| a.missing.iter().any(|m| m.confusable_with.iter().any(|c| says(c))));
         let placed = who(&|a, _| {
-            let told = a.remarks.iter().any(|r| w.words.iter().any(|x| r.contains(x)));
-            told || a.regions.iter().any(|r| w.regions.contains(&r.coordinate.as_str()))
+            let remarked = a.remarks.iter().any(|r| w.words.iter().any(|x| r.contains(x)));
+            remarked || a.regions.iter().any(|r| w.regions.contains(&r.coordinate.as_str()))
         });
         let hidden = who(&|a, v| {
             let blocked = v.get("blocked_force_N").and_then(Value::as_f64).unwrap_or(f64::NAN);
@@ -334,7 +336,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_muscle_and_import_that_is_asked_with_is_among_the_examples() {
+    fn the_page_in_the_book_has_these_texts() {
+        use festo_history::{DOCUMENTED, END_EFFECT, HEADING, INTRODUCTION as MEMORY};
+        let texts = [HEAD, ANSWERS, COMPARISON, HEADING, MEMORY, DOCUMENTED, END_EFFECT, HELD_OUT];
+        crate::book::contains("festo.md", &texts);
+    }
+
+    #[test]
+    fn every_muscle_and_import_is_among_the_examples() {
         for set in &SETS {
             assert!(import(set.year, "staircase").exists() && import(set.year, "settled").exists());
             assert!(set.muscles.iter().all(|m| description(set.year, m.0).exists()), "{}", set.year);
@@ -342,8 +351,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_asked_by_names_of_the_catalogue() {
-        for name in WRITTEN.iter().flat_map(|w| w.effects) {
+    fn the_published_description_is_compared_by_names_of_the_catalogue() {
+        for name in PUBLISHED.iter().flat_map(|w| w.effects) {
             assert!(crate::names::owner(name).is_some(), "{name}");
         }
     }

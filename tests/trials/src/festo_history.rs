@@ -1,14 +1,14 @@
-//! The section of festo.md on what the muscles remember: unseen runs with and without memory, the documented findings by muscle and pooled over
-//! each set, and the end effect over the lengths.
+//! The section of festo.md on the memory of the bladder: errors of held-out runs with and without memory, the documented findings by muscle
+//! and pooled over each set, and the end effect over the lengths.
 
 use serde_json::Value;
 use std::fmt::Write as _;
 
 /// Heading of the section.
-pub const HEADING: &str = "## What the muscles remember: each run predicted from the others";
+pub const HEADING: &str = "## Memory of the bladder: each run predicted from the others";
 
 /// An answer to settled points: set, muscle, JSON.
-pub struct Told<'a> {
+pub struct MuscleAnswer<'a> {
     pub year: &'a str,
     pub label: &'a str,
     pub answer: Option<&'a Value>,
@@ -52,18 +52,31 @@ fn t_quantile(freedom: usize) -> f64 {
     }
 }
 
+/// First paragraph of the section, and the head of its table.
+pub const INTRODUCTION: &str = "Settled points. Each run is predicted from the other runs of the muscle. \"Static\": a curve for each mounting and \
+    direction. \"With memory\": a curve for each mounting, with the memory of the bladder. Everything is chosen without the predicted run, \
+    except the places of slips and, in sets with 20 runs and more, pause and earlier load. Root mean square in percent of the largest \
+    force. A point is supported when another run of the mounting reaches its pressure. Intervals: 95 %, delete-one-run jackknife.\n\n\
+    | set, muscle | static | with memory | change | supported points | with slips | relaxed share c | P_b, kPa | one time constant, times the error |\n";
+
+/// Paragraph on the documented findings, and the head of its table.
+pub const DOCUMENTED: &str = "### Documented findings\n\nUnits of uncertainty are mountings or runs. \"Pooled\": one spread between mountings \
+    for all muscles of a set. This is an assumption on the protocol: a muscle with two or three mountings has too few degrees of freedom \
+    of its own.\n\n\
+    | set, muscle | first filling low by, N | pooled | creep with memory | emptying over filling, shortened less full length, N | pooled | gap explained by | slips, bad runs |\n";
+
+/// Paragraph on the end effect, and the head of its table.
+pub const END_EFFECT: &str = "### End effect\n\nSlope of the force over pressure at full length near the highest pressures, \
+    `A = A_0 (1 − ℓ/L0)`, over the lengths of a set. ℓ is the total length of the ends, which do not pull. Unit of uncertainty: \
+    muscle.\n\n\
+    | set | muscles | ℓ, mm (± standard error) | t | found |\n";
+
 /// The whole section.
-pub fn section(told: &[Told<'_>]) -> String {
-    let mut text = format!(
-        "{HEADING}\n\nSettled points. Each run is predicted from the other runs of the muscle. \"Static\": a curve for each mounting and direction. \
-         \"With memory\": a curve for each mounting, with the memory of the bladder. Everything is chosen without the predicted run, except \
-         the places of slips and, in sets with 20 runs and more, pause and earlier load. Root mean square in percent of the largest force. A point is \
-         supported when another run of the mounting reaches its pressure. Intervals: 95 %, delete-one-run jackknife.\n\n\
-         | set, muscle | static | with memory | change | supported points | beside slips | relaxed share c | P_b, kPa | one time constant, times the error |\n\
-         | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
-    );
+pub fn section(answers: &[MuscleAnswer<'_>]) -> String {
+    let mut text =
+        format!("{HEADING}\n\n{INTRODUCTION}| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
     let mut lower = (0, 0, 0);
-    for t in told {
+    for t in answers {
         let Some(h) = t.answer.and_then(|a| a.get("history")) else {
             let _ = writeln!(text, "| {} | no history | | | | | | | |", t.label);
             continue;
@@ -92,30 +105,26 @@ pub fn section(told: &[Told<'_>]) -> String {
     }
     let _ = writeln!(
         text,
-        "\nLower by 35 % or more on {} of {}, at most 0.6 % on {} of {}.",
+        "\nError lower by 35 % or more on {} of {}, at most 0.6 % on {} of {}.",
         lower.0, lower.2, lower.1, lower.2
     );
-    documented(&mut text, told);
-    end_effect(&mut text, told);
+    documented(&mut text, answers);
+    end_effect(&mut text, answers);
     text
 }
 
 /// The documented findings, muscle by muscle and pooled.
-fn documented(text: &mut String, told: &[Told<'_>]) {
-    text.push_str(
-        "\n### Documented findings\n\nUnits of uncertainty are mountings or runs. \"Pooled\": one spread between mountings for all muscles of a \
-         set. This is an assumption on the protocol; a muscle with two or three mountings alone has too few degrees of freedom.\n\n| set, muscle | first filling low by, N | pooled | creep with memory | emptying over filling, shortened less full length, N | pooled | gap explained by | slips, bad runs |\n\
-         | --- | --- | --- | --- | --- | --- | --- | --- |\n",
-    );
+fn documented(text: &mut String, answers: &[MuscleAnswer<'_>]) {
+    let _ = writeln!(text, "\n{DOCUMENTED}| --- | --- | --- | --- | --- | --- | --- | --- |");
     let mut counts = [0; 5];
-    for t in told {
+    for t in answers {
         let Some(h) = t.answer.and_then(|a| a.get("history")) else { continue };
         let own = |kind: &str| {
             let sign = if found(h, kind) { "found" } else { "not found" };
             format!("{} ({sign})", estimate(finding(h, kind).and_then(|f| f.get("size")), 1))
         };
         let pooled = |kind: &str| {
-            let (deviation, freedom) = pool(told, t.year, kind)?;
+            let (deviation, freedom) = pool(answers, t.year, kind)?;
             let f = finding(h, kind)?;
             let (value, units) = (number(f, &["size", "value"])?, number(f, &["units"])?);
             let half = t_quantile(freedom) * deviation / units.sqrt();
@@ -155,7 +164,7 @@ fn documented(text: &mut String, told: &[Told<'_>]) {
             events.join("; ")
         );
     }
-    let n = told.iter().filter(|t| t.answer.and_then(|a| a.get("history")).is_some()).count();
+    let n = answers.iter().filter(|t| t.answer.and_then(|a| a.get("history")).is_some()).count();
     let _ = writeln!(
         text,
         "\nFirst filling low: {} of {n} by its own mountings, {} of {n} pooled. Creep with memory: {} of {n}. Gap: {} of {n} by its own \
@@ -165,9 +174,9 @@ fn documented(text: &mut String, told: &[Told<'_>]) {
 }
 
 /// Standard deviation between mountings pooled over the muscles of a set, and its degrees of freedom.
-fn pool(told: &[Told<'_>], year: &str, kind: &str) -> Option<(f64, usize)> {
+fn pool(answers: &[MuscleAnswer<'_>], year: &str, kind: &str) -> Option<(f64, usize)> {
     let mut sum = (0.0, 0);
-    for h in told.iter().filter(|t| t.year == year).filter_map(|t| t.answer?.get("history")) {
+    for h in answers.iter().filter(|t| t.year == year).filter_map(|t| t.answer?.get("history")) {
         let Some(f) = finding(h, kind) else { continue };
         let by_mounting = f.get("size").and_then(|s| s.get("unit_of_uncertainty")).and_then(Value::as_str)
             == Some("mounting");
@@ -181,16 +190,12 @@ fn pool(told: &[Told<'_>], year: &str, kind: &str) -> Option<(f64, usize)> {
 }
 
 /// The slope of force over pressure at full length against the inverse length: ends that do not pull.
-fn end_effect(text: &mut String, told: &[Told<'_>]) {
-    text.push_str(
-        "\n### End effect\n\nSlope of the force over pressure at full length near the highest pressures, `A = A_0 (1 − ℓ/L0)`, over the lengths \
-         of a set: ends of length ℓ in all that do not pull. Unit of uncertainty: muscle.\n\n\
-         | set | muscles | ℓ, mm (± standard error) | t | found |\n| --- | --- | --- | --- | --- |\n",
-    );
-    let mut years: Vec<&str> = told.iter().map(|t| t.year).collect();
+fn end_effect(text: &mut String, answers: &[MuscleAnswer<'_>]) {
+    let _ = writeln!(text, "\n{END_EFFECT}| --- | --- | --- | --- | --- |");
+    let mut years: Vec<&str> = answers.iter().map(|t| t.year).collect();
     years.dedup();
     for year in years {
-        let points: Vec<(f64, f64)> = told
+        let points: Vec<(f64, f64)> = answers
             .iter()
             .filter(|t| t.year == year)
             .filter_map(|t| {
@@ -250,12 +255,15 @@ mod tests {
     #[test]
     fn what_the_muscles_share_is_pooled_and_the_end_effect_comes_out() {
         let answers = [100.0, 150.0, 220.0, 300.0].map(|l| muscle(l, 3.0));
-        let told: Vec<Told<'_>> =
-            answers.iter().map(|a| Told { year: "2022", label: "x", answer: Some(a) }).collect();
+        let answers: Vec<MuscleAnswer<'_>> =
+            answers.iter().map(|a| MuscleAnswer { year: "2022", label: "x", answer: Some(a) }).collect();
         // Eight of squares in two degrees of freedom each: a deviation of 2, eight degrees in all.
-        assert_eq!(pool(&told, "2022", "creep"), Some((2.0, 8)));
-        let text = section(&told);
-        assert!(text.contains("3.0 ± 2.7") && text.contains("Lower by 35 % or more on 4 of 4"), "{text}");
+        assert_eq!(pool(&answers, "2022", "creep"), Some((2.0, 8)));
+        let text = section(&answers);
+        assert!(
+            text.contains("3.0 ± 2.7") && text.contains("Error lower by 35 % or more on 4 of 4"),
+            "{text}"
+        );
         assert!(text.contains("| 2022 | 4 | 20.0 ±") && text.contains("| yes |"), "{text}");
     }
 

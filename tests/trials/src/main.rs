@@ -1,12 +1,15 @@
-//! `trials`: make sealed trials, have the tool answer them, open the seals and judge.
+//! `trials`: makes sealed trials, has the tool answer them, opens the seals and scores the answers.
 
 mod again;
 mod answer;
 mod baselines;
+#[cfg(test)]
+mod book;
 mod campaign;
 mod clopper;
 mod festo;
 mod festo_history;
+mod figures;
 mod fitted;
 mod generate;
 mod inject;
@@ -16,11 +19,14 @@ mod locate;
 mod names;
 mod oracle;
 mod progress;
+mod proof_page;
 mod queue;
+mod rate;
 mod reference;
 mod report;
 mod residuals;
 mod score;
+mod scoring;
 mod semi;
 mod sensitivity;
 mod sensors;
@@ -28,7 +34,6 @@ mod spec;
 mod tool;
 
 use clap::{Args, Parser, Subcommand};
-use rayon::prelude::*;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -51,7 +56,7 @@ struct Set {
     /// How many trials; the mixture of the final set is kept.
     #[arg(long, default_value_t = 330)]
     n: usize,
-    /// Make and judge only this number of first trials: a stratified share, where time is short.
+    /// Make and score only this number of first trials: a stratified share, where time is short.
     #[arg(long)]
     take: Option<usize>,
     /// Seed instead of the set's own.
@@ -60,7 +65,7 @@ struct Set {
     /// Real recordings whose residuals half of the trials get as noise, where they are.
     #[arg(long, default_value = "../shared/data")]
     data: PathBuf,
-    /// Where to. What an earlier run has done there is gone on with.
+    /// Directory of the set; an interrupted run there is continued.
     #[arg(short, long)]
     output: PathBuf,
 }
@@ -95,7 +100,7 @@ struct Real {
     /// Directory that holds aarl-festo-10mm-2021 and -2022.
     #[arg(long, default_value = "../shared/data")]
     data: PathBuf,
-    /// Where to.
+    /// Directory of the results.
     #[arg(short, long)]
     output: PathBuf,
     /// The tool.
@@ -134,7 +139,7 @@ enum Command {
         tool: Tool,
     },
     /// Give the tool the hidden effects of an answered set, and evaluate the true structure, refitted, on held-out
-    /// recordings: what gains are measured against.
+    /// recordings: the reference of all gains.
     Oracle {
         /// The set's directory.
         set: PathBuf,
@@ -151,7 +156,7 @@ enum Command {
         /// Leave the held-out recordings alone (quicker).
         #[arg(long)]
         no_held_out: bool,
-        /// End the answering of a set of which a part only is answered, permanently, and judge that part.
+        /// End the answers of an incomplete set permanently, and score those that exist.
         #[arg(long)]
         close: bool,
         /// Write the report as this page of the book, too.
@@ -174,9 +179,9 @@ enum Command {
     },
     /// Add effects to the real recordings of the 10 mm fluidic muscle and diagnose them.
     Semi(Real),
-    /// Diagnose the real recordings of the 10 mm fluidic muscle as they are, and compare the answers with the published findings.
+    /// Diagnose the unchanged real recordings of the 10 mm fluidic muscle, and compare the answers with the published findings.
     Festo(Real),
-    /// The same for settled points only: writes the section of the page on what the muscles remember.
+    /// The same for settled points only: writes the section of the page on the memory of the bladder.
     FestoHistory(Real),
     /// Answer a development set again with each criterion at half and at double its value.
     Sensitivity(sensitivity::Study),
@@ -184,9 +189,9 @@ enum Command {
     Sensors(sensors::Sensors),
     /// Diagnose changes: changes added to later runs of real recordings, untouched pairs, a cylinder whose seal was replaced.
     Reference(reference::Reference),
-    /// Campaigns that choose their own steps, beside protocol C for the same time, a random menu, and the proposal of today.
+    /// Campaigns that choose their own steps, compared with protocol C for the same time, random steps, and single proposals.
     Campaign(campaign::Campaigns),
-    /// Generate, answer and score in one go; each continues where an earlier run was interrupted.
+    /// Generate, answer and score; each step continues where an earlier run was interrupted.
     Prove {
         /// dev or final.
         #[arg(long, default_value = "final")]
@@ -208,7 +213,9 @@ fn main() -> ExitCode {
     let _ = rayon::ThreadPoolBuilder::new().num_threads(cli.jobs.max(1)).build_global();
     let done = match cli.command {
         Command::Generate { set, what } => generate(&set, &what),
-        Command::Answer { set, tool } => answer::ask(&set, &tool.asking()).map(|all| told(&set, all)),
+        Command::Answer { set, tool } => {
+            answer::ask(&set, &tool.asking()).map(|all| report_missing(&set, all))
+        }
         Command::Oracle { set, tool } => oracle::ask(&set, &tool.asking()).map(|all| {
             if !all {
                 println!("not every trial has its oracle; `oracle` continues");
@@ -216,8 +223,8 @@ fn main() -> ExitCode {
         }),
         Command::Score { set, host, no_held_out, close, page } => {
             let closed = if close { answer::close(&set).map(|_| ()) } else { Ok(()) };
-            closed.and_then(|()| score(&set, &host, !no_held_out)).and_then(|_| match &page {
-                Some(page) => write_page(&set, page),
+            closed.and_then(|()| scoring::score(&set, &host, !no_held_out)).and_then(|_| match &page {
+                Some(page) => proof_page::write(&set, page),
                 None => Ok(()),
             })
         }
@@ -250,10 +257,10 @@ fn main() -> ExitCode {
     }
 }
 
-fn told(set: &Path, all: bool) {
+fn report_missing(set: &Path, all: bool) {
     if !all {
         println!(
-            "not every trial is answered; `answer` continues, `score --close {}` judges what there is",
+            "not every trial is answered; `answer` continues, `score --close {}` scores the existing answers",
             set.display()
         );
     }
@@ -265,54 +272,14 @@ fn prove(set: &str, what: &Set, tool: &Tool, check: bool) -> Result<(), Box<dyn 
         generate(set, what)?;
     }
     if ledger::read_ledger(output)?.answers.is_empty() && !answer::ask(output, &tool.asking())? {
-        told(output, false);
+        report_missing(output, false);
         return Ok(());
     }
     if !check {
         oracle::ask(output, &tool.asking())?;
     }
-    let all = score(output, &tool.host, !check)?;
-    if check { short(&all) } else { Ok(()) }
-}
-
-/// The report as a page of the book: what it is, how it came about, and the whole of it.
-fn write_page(set: &Path, page: &Path) -> Result<(), Box<dyn Error>> {
-    let ledger = ledger::read_ledger(set)?;
-    let report = std::fs::read_to_string(set.join("report.md"))?;
-    let body = report.split_once('\n').map_or("", |(_, rest)| rest).replace("\n## ", "\n### ");
-    let title = report.lines().next().unwrap_or("").trim_start_matches("# ");
-    let text = format!(
-        "# The proof: sealed trials\n\n\
-         Muscles of a bench that shares no equation with the model conceal one effect of the catalogue, two, none, or something that no \
-         name describes. Truths are sealed by their hashes before the tool runs, answers are frozen by theirs before a seal is \
-         opened; the seed of the final set comes from the operating system. Half of the trials carry noise resampled from residuals of \
-         real recordings, where these are. Protocol A is the classic one (ascending levels, one slow speed), D the extended one \
-         (shuffled levels, one of them twice, three speeds, dwells, nested loops, tares). C is the complete one (more of each, tares \
-         between levels, half an hour of rest, checks of the bench); `tests/trials/README.md` and `host/virtual-bench/src/campaigns.rs` describe \
-         them in full.\n\n\
-         ```text\n\
-         cargo run --release -p trials -- prove -o DIR\n\
-         cargo run --release -p trials -- oracle DIR\n\
-         cargo run --release -p trials -- again DIR\n\
-         python3 tests/trials/baselines.py DIR\n\
-         cargo run --release -p trials -- score DIR --page docs/src/proof.md\n\
-         ```\n\n\
-         wrote this page; nothing on it is typed by hand. A trial's bound is the one that was set before the seed was drawn; what misses it \
-         stands here as missed. Rates have exact 95 % intervals. An effect counts as visible where a base with one bladder for all \
-         pressures leaves half a noise deviation of it; where it is not, silence is right. Held-out gain is \
-         (plain − diagnosed)/(plain − oracle), rms errors on recordings at other pressures and speeds, where the oracle is the true \
-         structure refitted: the same tool, told what is hidden (`host diagnose --with`) after the answers were frozen. It is taken over \
-         visible effects of the muscle where the oracle takes a tenth of the plain error or more. Beside it stands the stricter figure \
-         against a plain table of the same muscle without the effect, to which nothing is missing, and which no refit can pass; and what \
-         the oracle itself reaches of that.\n\n\
-         ## {title}\n\nSHA-256 of the seed: `{}`; the hashes of all truths and answers lie in the set's `ledger.json` (SHA-256 of \
-         that file: `{}`).\n{body}",
-        ledger.seed_sha256,
-        ledger::sha256(&std::fs::read(set.join("ledger.json"))?),
-    );
-    std::fs::write(page, text)?;
-    println!("{}", page.display());
-    Ok(())
+    let all = scoring::score(output, &tool.host, !check)?;
+    if check { scoring::check(&all) } else { Ok(()) }
 }
 
 /// The development set's seed is public.
@@ -341,94 +308,5 @@ fn generate(set: &str, what: &Set) -> Result<(), Box<dyn Error>> {
     let start = Instant::now();
     ledger::write_set(output, &ledger::Plan { set, seed, drawn, residuals: &residuals }, &specs)?;
     println!("{} trials in {} ({:.1} s)", specs.len(), output.display(), start.elapsed().as_secs_f64());
-    Ok(())
-}
-
-fn score(set: &Path, host: &Path, held_out: bool) -> Result<Vec<report::Scored>, Box<dyn Error>> {
-    let ledger = ledger::read_ledger(set)?;
-    if ledger.answers.is_empty() {
-        return Err("the set has not been answered: seals stay closed until the answers are frozen".into());
-    }
-    let mut scored: Vec<report::Scored> = Vec::new();
-    let mut truths = Vec::new();
-    for id in 0..ledger.answers.len() {
-        let answer = answer::frozen(set, &ledger, id)?;
-        let truth = ledger::open(set, &ledger, id)?;
-        let seconds = ledger.seconds.get(id).copied().unwrap_or(0.0);
-        let located = answer.as_ref().ok().and_then(|a| locate::judge(set, id, &a.regions));
-        scored.push((score::judge(&truth, &answer, seconds, located), None));
-        truths.push(truth);
-    }
-    if held_out {
-        let tables: Vec<Result<fitted::HeldOut, String>> =
-            truths.par_iter().map(|t| fitted::held_out(set, host, t)).collect();
-        for (s, t) in scored.iter_mut().zip(tables) {
-            match t {
-                Ok(h) => s.1 = Some(h),
-                Err(e) => eprintln!("trial {}: no held-out errors: {e}", s.0.id),
-            }
-        }
-    }
-    let baselines = baselines::all(set, &truths, &scored)?;
-    let drawn = ledger.drawn.max(ledger.truths.len());
-    let share = if truths.len() < drawn { format!(" (the first of {drawn} drawn)") } else { String::new() };
-    let title = format!(
-        "Sealed trials: set \"{}\", {} trials{share}, tool {}",
-        ledger.set,
-        truths.len(),
-        ledger.tool
-    );
-    let mut text = report::markdown(&title, &scored, &baselines);
-    if let Some((process, tool, n)) = baselines::Others::read(set).and_then(|o| o.gains(&scored)) {
-        let at = text.find("\n## Calibration").unwrap_or(text.len());
-        let line = format!(
-            "\nHeld-out gain on the {n} single effects where something could be gained, median: a Gaussian process over pressure, \
-             contraction, direction and speed {process:.2}, this tool {tool:.2}. The process names nothing.\n"
-        );
-        text.insert_str(at, &line);
-    }
-    if let Some(second) = again::read(set) {
-        let at = text.find("\n## Every failure").unwrap_or(text.len());
-        text.insert_str(at, &again::markdown(&second));
-    }
-    std::fs::write(set.join("report.md"), &text)?;
-    let every: Vec<&report::Scored> = scored.iter().collect();
-    let per = |p: &str| report::Figures::of(&scored.iter().filter(|s| s.0.protocol == p).collect::<Vec<_>>());
-    let json = serde_json::json!({
-        "schema": "pam-trials/1",
-        "set": ledger.set,
-        "tool": ledger.tool,
-        "all": report::Figures::of(&every),
-        "A": per("A"),
-        "D": per("D"),
-        "C": per("C"),
-        "trials": scored.iter().map(|(o, h)| serde_json::json!({ "outcome": o, "held_out": h })).collect::<Vec<_>>(),
-    });
-    std::fs::write(set.join("report.json"), serde_json::to_string_pretty(&json)?)?;
-    let end = text.find("\n## Every failure").unwrap_or(text.len());
-    println!("{}", &text[..end]);
-    println!("Failures one by one: {}", set.join("report.md").display());
-    Ok(scored)
-}
-
-/// What must hold in the short version, whatever else improves or not.
-fn short(all: &[report::Scored]) -> Result<(), Box<dyn Error>> {
-    let f = report::Figures::of(&all.iter().collect::<Vec<_>>());
-    let silent = all.iter().filter(|s| s.0.verdict.starts_with("failed")).count();
-    let wrong = [
-        ("clean nulls were given a name", f.false_alarms_clean.k),
-        ("effects outside the library were named with confidence", f.outside_confident.k),
-        ("campaigns got no answer", silent),
-    ];
-    if let Some((what, n)) = wrong.iter().find(|w| w.1 > 0) {
-        return Err(format!("{n} {what}").into());
-    }
-    // Silence alone is no proof.
-    let named = f.class_right_when_named;
-    if f.class_right.k == 0 || 2 * named.k < named.n {
-        return Err(
-            format!("of the large visible effects that were named the class is right in {named}").into()
-        );
-    }
     Ok(())
 }

@@ -104,7 +104,7 @@ impl Outcome {
                 self.named.iter().any(|n| n.1 > 0.8).then_some("confident name outside the library")
             }
             _ if !self.visible => {
-                (!self.named.is_empty() && !self.class_right).then_some("named what cannot be seen")
+                (!self.named.is_empty() && !self.class_right).then_some("named an invisible effect")
             }
             _ if self.named.is_empty() => Some("not named"),
             _ if !self.class_right => Some("wrong class"),

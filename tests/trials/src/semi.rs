@@ -189,6 +189,15 @@ fn names(a: &Answer) -> Vec<&str> {
     a.missing.iter().map(|m| m.effect.as_str()).collect()
 }
 
+/// Beginning of the page, and the head of its table.
+const INTRODUCTION: &str = "# Trials on real recordings\n\nWritten by `cargo run --release -p trials -- semi -o DIR --page \
+    docs/src/proof-real.md`; nothing here is typed by hand. Effects are added to the columns of real recordings: isometric pressure \
+    staircases of a commercial 10 mm muscle, six lengths, four mountings, three runs each (`../shared/data`). Their own physics is not \
+    synthetic. \"New\" marks names that the unchanged recordings did not get. The muscle is never moved under pressure, so speed, viscous \
+    friction and strokes cannot be judged. The recordings have a misfit of their own: a gap between filling and emptying that grows with \
+    contraction, a low first run, mounting errors. It is larger than most of the added effects.\n\n\
+    | muscle | effect | size, % of largest force | verdict | named | new | class right | in the set |\n";
+
 /// Make the recordings, ask, and write semi.md.
 pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>> {
     let muscles = read(data)?;
@@ -209,19 +218,11 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
         })
         .collect();
     let answers = answers?;
-    let mut text = String::from(
-        "# The proof on real recordings\n\nWritten by `cargo run --release -p trials -- semi -o DIR --page docs/src/proof-real.md`; nothing \
-         here is typed by hand. Effects are added to the columns of real recordings: isometric pressure staircases of a commercial 10 mm \
-         muscle, six lengths, four mountings, three runs each (`../shared/data`). Their own physics is not synthetic. \"New\" marks names that \
-         the unchanged recordings did not get. The muscle is never moved under pressure, so speed, viscous friction and strokes cannot be \
-         judged. The recordings have a misfit of their own: a gap between filling and emptying that grows with contraction, a low first \
-         run, mounting errors. It is larger than most of the added effects.\n\n\
-         | muscle | effect | size, % of largest force | verdict | named | new | class right | in the set |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
-    );
+    let mut text = format!("{INTRODUCTION}| --- | --- | --- | --- | --- | --- | --- | --- |\n");
     let (mut right, mut in_set, mut asked) = (0, 0, 0);
     let mut plain: Vec<String> = Vec::new();
     for ((i, effect), answer) in cases.iter().zip(&answers) {
-        let label = effect.map_or("(as it is)".to_string(), |e| e.0.to_string());
+        let label = effect.map_or("(unchanged)".to_string(), |e| e.0.to_string());
         let a = match answer {
             Ok(a) => a,
             Err(e) => {
@@ -279,6 +280,11 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_page_in_the_book_has_this_introduction() {
+        crate::book::contains("proof-real.md", &[INTRODUCTION]);
+    }
 
     fn muscle() -> Muscle {
         let rows = (0..400)

@@ -16,7 +16,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::answer::{self, Asking};
 use crate::ledger::{self, Ledger};
-use crate::report::{Rate, big_and_visible};
+use crate::figures::big_and_visible;
+use crate::rate::Rate;
 use crate::score::{self, Outcome};
 
 /// Scale criteria one by one and count false alarms, right classes and changed answers.

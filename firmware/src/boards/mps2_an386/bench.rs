@@ -24,8 +24,8 @@ const SUPPLY_LOW: u8 = 8;
 /// Ticks between two questions whether there is a second bench.
 const LOOK_EVERY: u8 = 100;
 
-/// How long an answer may take before the tick goes by without one. The bench is another process of a machine that may be
-/// busy, and time does not move with it; so only a bench that is gone is silent.
+/// How long an answer may take before the tick passes without one. The bench is another process on a machine that may be
+/// busy, and bench time stops while it waits. Only a bench that has ended stays silent for this long.
 const PATIENCE: Duration = Duration::from_secs(3);
 /// The same before the bench has answered at all: it may have been started later than the board.
 const FIRST_PATIENCE: Duration = Duration::from_millis(100);

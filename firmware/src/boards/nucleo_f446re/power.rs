@@ -121,7 +121,7 @@ pub fn flush_caches() {
     FLASH_ACR.write(on);
 }
 
-/// Watches the crystal: should it fail, the processor continues with its own oscillator and the most urgent interrupt there is.
+/// Watches the crystal: when it fails, the processor continues with its own oscillator and raises the non-maskable interrupt.
 pub fn watch_crystal() {
     RCC_CR.set(CLOCK_SECURITY);
 }

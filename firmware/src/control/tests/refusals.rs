@@ -1,4 +1,4 @@
-//! Orders that are refused in the wrong state, and what the host is told.
+//! Orders that are refused in the wrong state, and the refusal that the host receives.
 
 use model_core::link::messages::{Event, Reference, ReferenceOrder};
 

@@ -133,7 +133,7 @@ pub(super) struct Parsed {
 }
 
 impl Fault {
-    /// Whether a cell stands for a value that is missing: empty, not finite, or signs without digits.
+    /// Whether a cell marks a missing value: empty, not finite, or signs without digits.
     fn is_missing(&self, value: &str) -> bool {
         match self {
             Self::Empty | Self::NotFinite => true,

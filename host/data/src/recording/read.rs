@@ -6,24 +6,28 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::assemble::{Job, LookupTable, assemble};
-use super::blocks::{BlockError, Blocks, Rows, RowsError, read_rows};
+use super::blocks::{BlockError, Blocks, Rows, read_rows};
 use super::campaign::Campaign;
-use super::cells::{Dialect, Fault, LineError, only_signs};
 use super::column_plan::{ColumnPlan, Context, plan};
 use super::column_table::select;
 use super::columns::Recording;
 use super::container::{self, Container};
 use super::header::Header;
-use super::import::{Decimal, Import, Missing, Value, pattern as pattern_of};
-use super::line::Cells;
+use super::import::{Decimal, Import, Missing, Value};
+use super::lookup::read_lookup;
 use super::quantity::{Named, named};
 use super::source;
-use crate::bounds::{self, Budget};
+use crate::bounds::Budget;
 use crate::error::{DataCode, Error, Result};
 use crate::file_kind::FileKind;
 use crate::muscle_description::MuscleDescription;
-use crate::pluralise::pluralise;
 use crate::progress::Progress;
+
+mod constants;
+mod error_messages;
+
+use constants::Constants;
+use error_messages::{block_error, rows_error};
 
 /// How to read recordings, and what is known of the muscle that made them.
 #[derive(Debug, Clone, Default)]
@@ -73,7 +77,7 @@ const LOOKED_BELOW: usize = 100;
 #[cfg(feature = "excel")]
 use super::workbook::is_one as workbook_magic;
 
-/// Workbooks are told from text also where they are not read.
+/// Distinguishes workbooks from text in builds that do not read workbooks.
 #[cfg(not(feature = "excel"))]
 fn workbook_magic(magic: &[u8]) -> bool {
     magic.starts_with(b"PK\x03\x04") || magic.starts_with(b"\xd0\xcf\x11\xe0")
@@ -339,147 +343,4 @@ struct Layout {
     filters: Vec<(String, Value)>,
     lookup: Option<LookupTable>,
     labels: Vec<(String, String)>,
-}
-
-fn block_error(error: BlockError) -> Error {
-    match error {
-        BlockError::LongLine => {
-            Error::new(DataCode::RecordingNotText, "the file has a line of more than 4 MiB")
-                .help("this is not a table of text: give a CSV or tab-separated file with one header line")
-        }
-        BlockError::Io(e) if e.kind() == std::io::ErrorKind::NotFound => Error::unreadable("", &e),
-        BlockError::Io(e) if matches!(e.kind(), std::io::ErrorKind::PermissionDenied) => {
-            Error::new(DataCode::FileUnreadable, format!("cannot be read: {e}"))
-        }
-        BlockError::Io(e) => {
-            // What follows a colon is the unpacker's own, written for its authors.
-            let reason = e.to_string();
-            let reason = reason.split(':').next().unwrap_or_default();
-            Error::new(DataCode::RecordingContainer, format!("cannot be read to its end: {reason}"))
-                .help("the file may be damaged or incomplete: copy it again")
-        }
-    }
-}
-
-fn rows_error(error: RowsError, header: &Header, import: &Import) -> Error {
-    let LineError { line, cell, value, fault } = match error {
-        RowsError::Block(e) => return block_error(e),
-        RowsError::TooMany(e) => return e,
-        RowsError::Line(e) => *e,
-    };
-    let separator = match header.dialect.delimiter {
-        b'\t' => "tabs",
-        b';' => "semicolons",
-        b' ' => "blanks",
-        _ => "commas",
-    };
-    let error = match &fault {
-        Fault::Empty => Error::new(DataCode::RecordingNotANumber, "empty cell")
-            .help("every row needs a number in every column that is used; --missing skip leaves incomplete rows out"),
-        Fault::NotFinite => Error::new(DataCode::RecordingNotFinite, "not a finite number")
-            .help("--missing skip leaves such rows out; missing values are never filled in"),
-        Fault::NotANumber => {
-            let comma =
-                value.contains(',') && value.chars().all(|c| c.is_ascii_digit() || ",.-+ ".contains(c));
-            let of_a_clock = value.contains(':') || value.matches(['-', '/']).count() == 2;
-            let help = if of_a_clock && value.starts_with(|c: char| c.is_ascii_digit()) {
-                "dates and times of day are not read: write seconds or milliseconds from some beginning (in a spreadsheet \
-                 =(A2-A$2)*86400), or give sample_interval_s in an import description"
-            } else if value.contains(',') && value.contains('.') {
-                "write numbers without thousands separators"
-            } else if comma && !header.dialect.decimal_comma {
-                "use a decimal point, or an import description with decimal = \"comma\""
-            } else if header.dialect.decimal_comma && value.contains('.') && import.decimal == Decimal::Comma
-            {
-                "the import description specifies decimal commas"
-            } else if header.dialect.decimal_comma && value.contains('.') {
-                "this file's first row has decimal commas: write numbers without thousands separators"
-            } else if only_signs(&value) {
-                "signs without digits usually mark a missing value: --missing skip leaves such rows out"
-            } else {
-                "every cell of a column that is used must be a number"
-            };
-            Error::new(DataCode::RecordingNotANumber, "not a number").help(help)
-        }
-        Fault::Width { found, expected } => {
-            let cells = pluralise(found, "cell");
-            let help = if *found == 2 * expected && separator == "commas" {
-                "these look like decimal commas: use a decimal point, or an import description with decimal = \"comma\""
-                    .to_owned()
-            } else {
-                format!("cells are separated by {separator}; the line may be incomplete or damaged")
-            };
-            Error::new(DataCode::RecordingWrongWidth, format!("{cells} where {expected} are expected"))
-                .help(help)
-        }
-        Fault::OpenQuote => {
-            Error::new(DataCode::RecordingWrongWidth, "a quotation mark is not closed on its line")
-                .help("cells that hold line breaks are not supported")
-        }
-    };
-    let error = error.line(header.lines + line + 1).value(value);
-    match cell.and_then(|c| header.names.get(c)) {
-        Some(name) => error.column(name.clone()),
-        None => error,
-    }
-}
-
-/// Values that are constant over a file, from its name or the lines above its table.
-#[derive(Default)]
-struct Constants {
-    quantities: Vec<(String, f64)>,
-    labels: Vec<(String, String)>,
-}
-
-impl Constants {
-    /// Takes what the named groups of `pattern` catch in `text`.
-    fn catch(&mut self, what: &str, key: &str, pattern: Option<&str>, text: &str) -> Result<()> {
-        let Some(pattern) = pattern_of(key, pattern)? else { return Ok(()) };
-        let Some(captures) = pattern.captures(text) else {
-            return Err(Error::new(
-                DataCode::ImportInvalid,
-                format!("{what} not of the form in the import description"),
-            )
-            .value(text)
-            .help(format!("{key} must match {}", pattern.as_str())));
-        };
-        for group in pattern.capture_names().flatten() {
-            let Some(caught) = captures.name(group).map(|m| m.as_str()) else { continue };
-            if super::import::constant(group).is_err() {
-                self.labels.push((group.to_owned(), caught.to_owned()));
-                continue;
-            }
-            let value = caught.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
-                Error::new(DataCode::ImportInvalid, format!("{key} matches no number for {group}"))
-                    .value(caught)
-            })?;
-            self.quantities.push((group.to_owned(), value));
-        }
-        Ok(())
-    }
-}
-
-pub(super) fn read_lookup(recording: &Path, file: &str) -> Result<LookupTable> {
-    let path = recording.parent().unwrap_or(Path::new("")).join(file);
-    let text = bounds::read(&path, bounds::WRITTEN).map_err(|e| {
-        e.help("the lookup table of an import description belongs in the folder of the recording")
-    })?;
-    let text = &text[source::check_text(&text).map_err(|e| e.file(&path))?..];
-    let mut lines = text.split(|b| *b == b'\n').enumerate().filter(|(_, l)| !l.trim_ascii().is_empty());
-    let mut table = LookupTable::default();
-    let Some((_, header)) = lines.next() else {
-        return Err(Error::new(DataCode::RecordingEmpty, "the lookup table is empty").file(&path));
-    };
-    let delimiter = if header.contains(&b'\t') { b'\t' } else { b',' };
-    let dialect = Dialect { delimiter, comment: None, decimal_comma: false, skip_missing: false };
-    let open = |line: usize| {
-        Error::new(DataCode::RecordingWrongWidth, "a quotation mark is not closed")
-            .file(&path)
-            .line(line as u64 + 1)
-    };
-    table.header = Cells::split(header, dialect).map_err(|()| open(0))?;
-    for (n, line) in lines {
-        table.rows.push(Cells::split(line, dialect).map_err(|()| open(n))?);
-    }
-    Ok(table)
 }

@@ -1,4 +1,4 @@
-//! An axis that moves the muscle's free end as it is told, at the speed that it is told.
+//! An axis that moves the muscle's free end to a target position at a set speed.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -55,12 +55,12 @@ impl Axis {
         course.now_m
     }
 
-    /// Lets the bench stand still, or go on: an emulated muscle need not wait for a program that computes.
+    /// Pauses the bench, or lets it continue: an emulated muscle need not change while a program computes.
     pub fn wait(&self, waits: bool) {
         self.waits.store(waits, Ordering::Relaxed);
     }
 
-    /// Returns when the bench may go on.
+    /// Returns when the bench may continue.
     pub(super) fn until_due(&self) {
         while self.waits.load(Ordering::Relaxed) {
             std::thread::sleep(Duration::from_millis(1));

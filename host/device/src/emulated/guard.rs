@@ -2,7 +2,7 @@
 //!
 //! A destructor ends a child of a program that ends in order. One that is stopped by `SIGKILL`, or by a machine without memory, runs
 //! none, and a child that waits for no one would continue without end. So the child is started by a shell that holds the reading end of a
-//! pipe, whose other end only this process has: when that closes, for whatever reason, the shell kills the child.
+//! pipe, whose other end only this process has: when that closes, for any reason, the shell ends the child.
 
 use std::process::{Command, Stdio};
 

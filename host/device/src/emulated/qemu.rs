@@ -47,9 +47,9 @@ pub fn board(image: &Path, lines: &[Line]) -> io::Result<Command> {
             Line::Port(port) => format!("socket,id=line{number},host=127.0.0.1,port={port},nodelay=on"),
             Line::Pipes(path) => format!("pipe,id=line{number},path={}", path.display()),
         };
-        // The UART holds one byte. Each further one would cost a turn of the emulator's main loop after the processor has read the
-        // one before, some twenty of them in each tick. A multiplexer with a single user keeps up to 32 bytes beside the UART
-        // and hands over the next at the very reading of the last.
+        // The UART holds one byte. Each further byte would cost an iteration of the emulator's main loop after the processor has read
+        // the one before: about twenty in each tick. A multiplexer with a single user buffers up to 32 bytes before the UART, and passes
+        // on the next as soon as the last is read.
         command.args(["-chardev", &format!("{place},mux=on"), "-serial", &format!("chardev:line{number}")]);
     }
     Ok(command)

@@ -1,8 +1,8 @@
 //! A serial line between QEMU and this process.
 //!
-//! The board sends byte by byte, and each byte is a call of the system: into a named pipe it costs a tenth of what it costs into a TCP
-//! connection, and a pipe that no one reads for a while holds a second of telemetry where a connection, which spends most of its
-//! room on the edges of one-byte pieces, holds some tens of milliseconds. Where there are no named pipes it is TCP.
+//! The board sends byte by byte, and each byte is a system call. Into a named pipe it costs a tenth of what it costs into a TCP
+//! connection. A pipe that is not read for a while holds a second of telemetry; a connection holds some tens of milliseconds, because
+//! most of its buffer goes to the headers of one-byte packets. On systems without named pipes the line is a TCP connection.
 
 use std::io::{self, Read, Write};
 use std::net::TcpListener;
@@ -45,7 +45,7 @@ fn until_there<T>(child: &mut Child, mut come: impl FnMut() -> io::Result<Option
             return Ok(there);
         }
         if let Ok(Some(status)) = child.try_wait() {
-            return Err(format!("QEMU ended at once ({status})"));
+            return Err(format!("QEMU ended immediately ({status})"));
         }
         if Instant::now() > deadline {
             return Err("QEMU does not connect within 20 s".to_owned());

@@ -75,7 +75,7 @@ macro_rules! column {
     };
 }
 
-/// Columns of every recording. The measured ones are those that `host fit` reads; the rest is what the controller thought.
+/// Columns of every recording. The measured ones are those that `host fit` reads; the rest is the state of the controller.
 pub(super) const COLUMNS: &[Column] = &[
     column!("time_s", "time of the device, s", |s| Cell::Time(s.time_us)),
     column!("pressure_Pa", "measured gauge pressure, Pa", |s| side(s, 0, |x| x.pressure_pa)),
@@ -86,7 +86,7 @@ pub(super) const COLUMNS: &[Column] = &[
         .pressure_demand_pa)),
     column!("table_N", "force by the table at the measured pressure and stroke, N", |s| side(s, 0, |x| x
         .model_n)),
-    column!("asked", "what was asked for, in the SI unit of the mode", |s| Cell::Number(s.setpoint)),
+    column!("asked", "setpoint, in the SI unit of the mode", |s| Cell::Number(s.setpoint)),
     column!("state", "disarmed, armed, running or fault", |s| Cell::Word(messages::state(s.state))),
     column!("mode", "what is controlled", |s| Cell::Word(messages::mode(s.mode))),
     column!("tick", "number of the control loop's tick", |s| Cell::Count(s.tick)),
@@ -100,7 +100,7 @@ pub(super) const SECOND: &[Column] = &[
     column!("second_force_N", "second muscle: measured force, N", |s| side(s, 1, |x| x.force_n)),
     column!("second_command_Pa", "second muscle: command to the regulator, Pa", |s| side(s, 1, |x| x
         .command_pa)),
-    column!("second_asked", "a pair's second value", |s| Cell::Number(s.setpoint_second)),
+    column!("second_asked", "second setpoint of a pair", |s| Cell::Number(s.setpoint_second)),
 ];
 
 /// The columns of a sample.

@@ -162,7 +162,7 @@ fn event_schema() -> Value {
         "properties": {
             "time_s": { "type": ["number", "null"], "description": "time of the device, s" },
             "event": { "type": "string", "description": "state, fault or trace-full" },
-            "text": { "type": "string", "description": "what happened, in words" },
+            "text": { "type": "string", "description": "description of the event" },
             "remedy": { "type": "string", "description": "what to do about a fault" },
         },
         "required": ["event", "text"],

@@ -26,7 +26,7 @@ impl Part {
         let file = File::create(&part).map_err(|e| {
             Error::unwritable(&part, &e).help("check that the folder exists and may be written to")
         })?;
-        // Anyone who finds this file must be able to tell that it still grows.
+        // The lock shows other programs that this file still grows.
         let _ = file.try_lock();
         Ok((Self { path: path.to_owned(), part, file, whole: 0, last: 0 }, recovered))
     }

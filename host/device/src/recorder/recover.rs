@@ -80,7 +80,7 @@ pub fn recover(path: &Path) -> Result<Recovered> {
     let file = OpenOptions::new().read(true).write(true).open(path).or_else(|_| File::open(path));
     let file = file.map_err(unreadable)?;
     if !file.metadata().map_err(unreadable)?.is_file() {
-        return Err(Error::new(DataCode::CallInvalid, "this is no file").file(path));
+        return Err(Error::new(DataCode::CallInvalid, "this is not a file").file(path));
     }
     if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
         return Err(Error::new(DataCode::FileUnwritable, "another program is recording to this file")

@@ -4,7 +4,7 @@ pam_data::criteria! {
     "Held-out rows, intervals, probabilities":
     /// Held-out error with an effect must be less than this share of the error without it.
     HELD_OUT_LEAVES: f64 = 0.96, "e_with/e_without", "1", Derived("an effect that takes a third of the excess lowers the whole by more");
-    /// ... and less by more than this many of the difference's standard errors, over whole groups that are left out (over held lengths, where the length is held), unless a test by whole blocks supports the effect.
+    /// ... and less by more than this many standard errors of the difference, over whole groups that are left out (over held lengths, where the length is held). A test by whole blocks that supports the effect is sufficient too.
     HELD_OUT_ERRORS: f64 = 1.0, "n_held", "1", Published("the one-standard-error rule: L. Breiman, J. H. Friedman, R. A. Olshen, C. J. Stone, Classification and Regression Trees, 1984");
     /// Groups from which a difference has a standard error.
     FEWEST_UNITS: usize = 3, "n_unit,min", "1", Derived("two degrees of freedom");

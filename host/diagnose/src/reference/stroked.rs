@@ -32,7 +32,7 @@ pub(crate) struct StrokeRepeats {
     pub friction_along: f64,
 }
 
-/// The changes that are weighed for strokes at regulated pressures.
+/// The changes that are tested for strokes at regulated pressures.
 pub(super) const ASKED: [Change; 4] =
     [Change::ForceOffset, Change::ForceGain, Change::CoulombFriction, Change::PressureFriction];
 /// Sets of them that are weighed against each other, by index.

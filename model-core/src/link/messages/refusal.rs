@@ -153,7 +153,7 @@ pub enum StoreFault {
     Medium,
     /// No room.
     Full,
-    /// There is nothing to go back to.
+    /// No previous table to go back to.
     NoPrevious,
     /// The bytes read back are not those written.
     Verify,

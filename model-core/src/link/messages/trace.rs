@@ -62,7 +62,7 @@ codes! {
     /// When a trace begins.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
     pub enum Trigger {
-        /// At once.
+        /// Immediately.
         #[default]
         Now,
         /// With the next start of a mode or reference.

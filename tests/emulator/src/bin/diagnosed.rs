@@ -1,8 +1,8 @@
-//! Writes `docs/src/closed-loop.md`: what a diagnosis is worth to the controller.
+//! Writes `docs/src/closed-loop.md`: the effect of a diagnosis on the errors of the controller.
 
 use std::fmt::Write as _;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use emulator_tests::diagnosed::{self, Case};
 
@@ -31,24 +31,41 @@ fn row(case: &Case, out: &mut String) -> bool {
     true
 }
 
+fn page() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/closed-loop.md")
+}
+
+/// Beginning of the page, and the head of its table.
+const INTRODUCTION: &str = "# Diagnosis in closed loop\n\n\
+    Written by `cargo run --release -p emulator-tests --bin diagnosed`; nothing here is typed by hand.\n\n\
+    In each row a muscle of the virtual bench has a concealed effect. It is recorded by protocol D, fitted without effects (plain \
+    table) and diagnosed (`host diagnose -o`, diagnosed table). The controller's image in QEMU then follows a force by feed-forward \
+    alone while the bench moves the muscle: a sine of 0.5 Hz and two steps. For an effect that grows during a rest, the force is \
+    constant, and the bench makes eight small moves back and forth: a rest of 1.5 s, then two hundredths of the free stroke within a \
+    second. Each muscle is controlled with the plain and with the diagnosed table. The last column is the best that can be reached: \
+    the same muscle without the effect, with a plain table of its own. Force errors are root mean square by the load cell, in % of \
+    blocked force.\n\n\
+    | concealed | muscle | named (probability) | error on the recordings, plain → diagnosed, N | control, plain table, % | control, \
+    diagnosed table, % | control without the effect, % |\n";
+
 fn main() -> io::Result<()> {
-    let mut out = String::from(
-        "# What a diagnosis is worth to the controller\n\n\
-         Written by `cargo run --release -p emulator-tests --bin diagnosed`; nothing here is typed by hand.\n\n\
-         In each row a muscle of the virtual bench conceals an effect. It is recorded by protocol D, fitted plainly and diagnosed \
-         (`host diagnose -o`). The controller's image in QEMU then follows a force, a sine of 0.5 Hz and two steps, by feed-forward \
-         alone while the bench moves the muscle; what grows during a rest is tried on one force, while the bench rests a second and \
-         a half and moves by two hundredths of the free stroke within a second, eight times to and fro: with the plain table, with the diagnosed one, and, for what can be had at best, \
-         on the same muscle without the effect with a plain table of its own. Force errors are root mean square by the load \
-         cell, in % of blocked force.\n\n\
-         | concealed | muscle | named (probability) | error on the recordings, plain → diagnosed, N | control, plain table, % | control, \
-         diagnosed table, % | control without the effect, % |\n| --- | --- | --- | --- | --- | --- | --- |\n",
-    );
+    let mut out = format!("{INTRODUCTION}| --- | --- | --- | --- | --- | --- | --- |\n");
     for case in diagnosed::cases() {
         if !row(&case, &mut out) {
             return Ok(());
         }
     }
     print!("{out}");
-    std::fs::write(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/closed-loop.md"), out)
+    std::fs::write(page(), out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_in_the_book_has_this_introduction() {
+        let written = std::fs::read_to_string(page()).expect("the page");
+        assert!(written.starts_with(INTRODUCTION), "{INTRODUCTION}");
+    }
 }

@@ -48,7 +48,7 @@ impl Method {
             Self::Chosen => "steps chosen by expected information",
             Self::Complete => "protocol C for the same time, with its checks",
             Self::Random => "the same menu at random",
-            Self::Proposed => "protocol A, then today's proposal",
+            Self::Proposed => "protocol A, then single proposals",
         }
     }
 }

@@ -1,26 +1,30 @@
 //! The results as a page of the book.
 
 use super::{BENCH_S, BOUNDS, Method, SEED, Said, Trial};
-use crate::report::Rate;
+use crate::rate::Rate;
 use std::fmt::Write as _;
 
-/// The page; `drawn` muscles were to be tried.
+/// Beginning of the page.
+const INTRODUCTION: &str = "# Trials of automatic campaigns\n\nThis command wrote this page; nothing on it is typed by hand:\n\n\
+    ```text\ncargo run --release -p trials -- campaign -o DIR --page docs/src/proof-campaign.md\n```\n\n";
+
+/// The section on the diagnosis; the first column of its table counts resolved campaigns.
+const DIAGNOSIS: &str = "## Diagnosis\n\n\"Only the right name\": at least one effect is named, every name is without competitors, and every \
+    name is a hidden effect; of two hidden effects one may be missing.\n\n\
+    | method | only the right name | class right | truth in the set, where a name is given | nothing named | false alarms |\n";
+
+/// The page; `drawn` is the number of muscles in the whole set.
 pub fn page(all: &[Trial], drawn: usize) -> String {
     let mut m = format!(
-        "# The proof: campaigns that choose their own steps\n\n\
-         ```text\ncargo run --release -p trials -- campaign -o DIR --page docs/src/proof-campaign.md\n```\n\n\
-         wrote this page; nothing on it is typed by hand. Muscles of the virtual bench conceal one effect, two, or none, of 1 to 6 % of the \
-         blocked force (seed {SEED}). Each method has {:.0} minutes of bench time, and the same diagnosis reads what it recorded. The \
-         bounds and the seed were committed before the first scored run. Rates have exact 95 % intervals. {} of {drawn} muscles of the \
-         set were tried.\n\n## Diagnosis\n\nOne name left and right: at least one effect is named, every name stands without competitors, and every \
-         name is hidden; of two hidden effects one may be missing.\n\n",
+        "{INTRODUCTION}The muscles of the virtual bench have one hidden effect, two, or none, of 1 to 6 % of the blocked force (seed {SEED}). \
+         Each method has {:.0} minutes of bench time, and all recordings get the same diagnosis. The bounds and the seed were committed before \
+         the first scored run. Rates have exact 95 % intervals. {} of {drawn} muscles of the set were tested.\n\n{DIAGNOSIS}",
         BENCH_S / 60.0,
         all.len()
     );
     let with: Vec<&Trial> = all.iter().filter(|t| !t.truth.is_empty()).collect();
     let without: Vec<&Trial> = all.iter().filter(|t| t.truth.is_empty()).collect();
-    m += "| method | one name left and right | class right | truth in the set, where a name is given | nothing named | false alarms |\n\
-          | --- | --- | --- | --- | --- | --- |\n";
+    m += "| --- | --- | --- | --- | --- | --- |\n";
     // Writing to a string cannot fail.
     let _ =
         writeln!(m, "| bound | {} | {} | {} | | {} |", BOUNDS[0].1, BOUNDS[1].1, BOUNDS[2].1, BOUNDS[3].1);
@@ -71,7 +75,7 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 /// Table errors over bench time, and how much of the thesis's time the chosen steps need.
 pub fn errors(nulls: &[&Trial]) -> String {
     let mut m = String::from(
-        "\n## Table error on unseen pressures and strokes\n\nMuscles without hidden effects; rms against the bench's own friction-free \
+        "\n## Table error on held-out pressures and strokes\n\nMuscles without hidden effects; rms against the bench's own friction-free \
          force between the levels, median over the muscles, percent of the blocked force. Bound: the error of the thesis's protocol in at \
          most a third of its time.\n\n| minutes | chosen steps | thesis's protocol | muscles |\n| --- | --- | --- | --- |\n",
     );
@@ -134,4 +138,14 @@ fn missed(with: &[&Trial]) -> String {
         }
     }
     m
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_in_the_book_has_these_texts() {
+        crate::book::contains("proof-campaign.md", &[INTRODUCTION, DIAGNOSIS]);
+    }
 }

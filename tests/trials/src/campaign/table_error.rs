@@ -1,4 +1,4 @@
-//! The table's error on unseen motion after some minutes, beside the thesis's protocol for as long.
+//! The table's error on held-out motion after some minutes, compared with the thesis's protocol for the same time.
 
 use crate::campaign::methods::until;
 use crate::spec::Spec;

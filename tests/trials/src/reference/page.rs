@@ -1,4 +1,4 @@
-//! The page: what was tried, what came out, what is not tested.
+//! The page of the book: tests, results, and what is not tested.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -13,6 +13,10 @@ use super::injection::EFFECTS;
 use super::staircases::{Half, Muscle, Run};
 use super::{Trial, class};
 use crate::clopper::interval;
+
+mod texts;
+
+use texts::{BOUNDS, COMPARISON, CYLINDER, HEAD, INJECTED, INTRODUCTION, TABLES, UNCHANGED, UNTESTED};
 
 /// Rows of either side in the measurement of speed.
 const SPEED_ROWS: usize = 30_000;
@@ -106,20 +110,12 @@ fn line(text: &mut String, label: &str, trials: &[&Trial]) {
     );
 }
 
-const HEAD: &str = "| | n | class right | exact | in the set | names in the set | size within 20 % | in the stated 95 % | missed (\"none\") | a name of a false class |\n\
-                    | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
-
 fn injected(text: &mut String, trials: &[Trial]) {
-    let _ = write!(
-        text,
-        "## Changes put into later runs\n\nOf each muscle the runs from some number on get one change, with a sign by hash; the runs before stay as they \
-         are. Every split that leaves two runs a side (2021), and both splits of three runs (2022, one run on one side). \"Class\", \"exact\": \
-         the most probable cause. Sizes: of those named exactly. Rates with exact 95 % intervals.\n"
-    );
+    let _ = write!(text, "{INJECTED}");
     for half in [Half::Final, Half::Development] {
         let title = match half {
-            Half::Final => "Muscles that no constant was chosen on",
-            Half::Development => "Muscles on which constants were chosen",
+            Half::Final => "Muscles that were not used to choose constants",
+            Half::Development => "Muscles that were used to choose constants",
         };
         let _ = write!(text, "\n### {title}\n\n{HEAD}");
         for year in ["2021", "2022"] {
@@ -176,7 +172,7 @@ fn bounds(text: &mut String, trials: &[Trial], pairs: &[Pair], speed: Option<(us
     row("truth in the set", "≥ 95 %", (in_set, n), share(in_set, n) >= 0.95);
     let near = sized.iter().filter(|e| **e < 0.2).count();
     row("size within 20 %", "≥ 90 %", (near, sized.len()), share(near, sized.len()) >= 0.9);
-    row("untouched pairs named", "≤ 2 %", (named, same.len()), share(named, same.len()) <= 0.02);
+    row("unchanged pairs named", "≤ 2 %", (named, same.len()), share(named, same.len()) <= 0.02);
     let right = changed.iter().filter(|p| p.right()).count();
     row(
         "seals: main class right, nothing false",
@@ -206,25 +202,20 @@ fn below(text: &mut String, at_three: &[&Trial]) {
     if !weak.is_empty() {
         let _ = writeln!(
             text,
-            "\nBelow 85 % by themselves: {}. Compliance of the rig shows where the force and its slope over the length are largest, in one or two \
-             mountings; a name must stand without any single mounting, so that a mounting that slipped is not taken for a change of the actuator. It is \
-             then in the set, and not named.",
+            "\nBelow 85 % on their own: {}. Compliance of the rig shows where the force and its slope over the length are largest, in one or two \
+             mountings. A name must hold when any single mounting is left out, so that a slipped mounting is not reported as a change of the \
+             actuator. Compliance is then in the set, and not named.",
             weak.join(", ")
         );
     }
     text.push('\n');
 }
 
-/// The diagnosis beside a simpler method on the same pairs.
-fn beside(text: &mut String, trials: &[Trial]) {
+/// The diagnosis compared with a simpler method on the same pairs.
+fn comparison(text: &mut String, trials: &[Trial]) {
     let simple =
         |t: &Trial| t.effect.is_some_and(|e| class(&t.simple).is_some() && class(&t.simple) == class(e));
-    text.push_str(
-        "\n## Beside a simpler method\n\nThe one effect whose least squares lower the BIC most, by more than ten: differences of mean force by mounting, \
-         direction and bin of pressure, cells taken as independent. It gets the very slopes by which changes were put in. McNemar's test counts pairs \
-         that only one of both gets right.\n\n| | n | class right, diagnosis | class right, largest ΔBIC | only the diagnosis | only ΔBIC |\n\
-         | --- | --- | --- | --- | --- | --- |\n",
-    );
+    let _ = writeln!(text, "\n{COMPARISON}| --- | --- | --- | --- | --- | --- |");
     for percent in [1.0, 2.0, 3.0, 5.0] {
         let own: Vec<&Trial> = trials.iter().filter(|t| t.effect.is_some() && t.percent == percent).collect();
         if own.is_empty() {
@@ -246,7 +237,7 @@ fn beside(text: &mut String, trials: &[Trial]) {
     let by_bic = same.iter().filter(|t| t.simple != "none").count();
     let _ = writeln!(
         text,
-        "\nUntouched pairs named: {} by the diagnosis, {} by ΔBIC.",
+        "\nUnchanged pairs named: {} by the diagnosis, {} by ΔBIC.",
         rate(named, same.len()),
         rate(by_bic, same.len())
     );
@@ -259,12 +250,7 @@ pub fn tables(trials: &[Trial]) -> String {
     if trials.is_empty() {
         return text;
     }
-    let _ = write!(
-        text,
-        "\n## Nothing but the table of then\n\nThe table is fitted to the first half of the runs (dimensions and mounted lengths, too) and is the only \
-         reference of the later ones. The error of the table counts as part of what repeats, and the later runs decide its size. The later runs count as mounted \
-         anew (± 1 mm), which hides offsets of the stroke, gains and compliance of that size. The form of this error was chosen after a look at both halves, its constants on the development half: these windows are not a clean test.\n\n{HEAD}"
-    );
+    let _ = write!(text, "\n{TABLES}{HEAD}");
     for percent in [3.0, 5.0, 10.0] {
         let own: Vec<&Trial> = trials.iter().filter(|t| t.effect.is_some() && t.percent == percent).collect();
         line(&mut text, &format!("{percent} %"), &own);
@@ -279,7 +265,7 @@ pub fn tables(trials: &[Trial]) -> String {
     let alarmed = same.iter().filter(|t| t.answer.none < 0.5).count();
     let _ = writeln!(
         text,
-        "\nUntouched windows of the later runs: named {}, probability of no change below one half {}.",
+        "\nUnchanged windows of the later runs: named {}, probability of no change below one half {}.",
         rate(named, same.len()),
         rate(alarmed, same.len())
     );
@@ -287,12 +273,7 @@ pub fn tables(trials: &[Trial]) -> String {
 }
 
 fn untouched(text: &mut String, trials: &[Trial]) {
-    let _ = write!(
-        text,
-        "\n## Untouched pairs\n\nEvery contiguous window of runs, parted once. Windows of one muscle share runs: errors come in clusters, so the intervals \
-         are too narrow. \"Not none\": probability of no change below one half.\n\n\
-         | | pairs | named | not none |\n| --- | --- | --- | --- |\n"
-    );
+    let _ = write!(text, "\n{UNCHANGED}| --- | --- | --- | --- |\n");
     let mut groups: BTreeMap<(Half, &str), Vec<&Trial>> = BTreeMap::new();
     for t in trials.iter().filter(|t| t.effect.is_none()) {
         groups.entry((t.half, &t.muscle[..4])).or_default().push(t);
@@ -334,8 +315,7 @@ fn cylinder(text: &mut String, pairs: &[Pair]) {
     let (nc, ns) = (changed.len(), same.len());
     let _ = write!(
         text,
-        "\n## A cylinder with its seal swapped\n\nOne rig, another seal or bore: another seal is other friction, the larger bore a larger gain. Main class: gain \
-         where the bore differs, else friction.\n\n| | pairs | |\n| --- | --- | --- |\n\
+        "\n{CYLINDER}| --- | --- | --- |\n\
          | main class named, nothing false | {nc} | {right}: {} |\n| all known classes named | {nc} | {all}: {} |\n\
          | reruns in which nothing changed, named | {ns} | {named}: {} |\n\n\
          | before | after | known | named | p(none) |\n| --- | --- | --- | --- | --- |\n",
@@ -361,20 +341,6 @@ fn cylinder(text: &mut String, pairs: &[Pair]) {
     }
 }
 
-const UNTESTED: &str = "\n## What is not tested\n\n\
-    - Two simultaneous changes in staircases, several campaigns in the reference of strokes, \"since when\" and leaks: computed or \
-    specified, not measured here. A leak has no shape yet and is never named.\n\
-    - A lag beside another change is never named: the rows that show a lag hold the other change, too.\n\
-    - Lengths between those of the reference are not interpolated; they are reported as not comparable.\n\
-    - Length and pressure that move together, and a controller at work: tested on an emulated one only (`cargo test -p host --test change_watch`).\n\
-    - Stroked *muscles*: the same route as the cylinder, not measured; gauge offset, stroke offset, compliance, slip and lags are not asked of strokes.\n\
-    - All staircases are of one laboratory and one type of muscle, and the constants of what repeats come from six of the eleven. A second rig is missing.\n\
-    - Injected drift and slip run through AFTER by run, then mounting. Lags of the 12 Hz recordings are put in by the same interpolation that the analysis \
-    assumes.\n\
-    - Mounting anew (± 1 mm) is modelled but not tried here; it hides stroke offsets and compliance of that size.\n\
-    - The prior of the cylinder was reshaped once after a first look at these pairs (friction repeats to a share of friction): they are no clean test.\n\
-    - Other methods than the largest ΔBIC were not run on these pairs.\n";
-
 /// The page as Markdown.
 pub fn page(
     trials: &[Trial],
@@ -383,25 +349,18 @@ pub fn page(
     speed: Option<(usize, f64)>,
     short: bool,
 ) -> String {
-    let mut text = String::from(
-        "# The proof: what changed\n\n`host diagnose AFTER… --reference BEFORE…` asked about real recordings: changes that were put into them, pairs in which \
-         nothing changed, and a cylinder whose seal was swapped. Nothing on this page is typed by hand:\n\n\
-         ```text\ncargo run --release -p trials -- reference -o DIR --page docs/src/proof-reference.md\n```\n\n",
-    );
+    let mut text = INTRODUCTION.to_owned();
     if short {
         text.push_str("**This is the short version: a stratified share of the trials.**\n\n");
     }
-    text.push_str(
-        "Bounds set beforehand, at 3 %: class 85 %, exact 75 %, truth in the set 95 %, size within 20 % in 90 %; untouched pairs named in 2 % at most; \
-         pairs of seals: main class in 80 %, no rerun named; 60,000 rows in 5 s on two cores.\n\n",
-    );
+    text.push_str(BOUNDS);
     if trials.is_empty() {
-        text.push_str("The staircases were not there.\n");
+        text.push_str("The recordings of the staircases are not available.\n");
     } else {
         bounds(&mut text, trials, pairs, speed);
         injected(&mut text, trials);
         untouched(&mut text, trials);
-        beside(&mut text, trials);
+        comparison(&mut text, trials);
         text.push_str(&tables(against_tables));
     }
     cylinder(&mut text, pairs);

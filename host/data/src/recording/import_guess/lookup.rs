@@ -6,7 +6,7 @@ use super::names::{Name, Score};
 use super::sample::SampleColumn;
 use crate::recording::Quantity;
 use crate::recording::assemble::{LookupTable, same};
-use crate::recording::read::read_lookup;
+use crate::recording::lookup::read_lookup;
 
 /// Files in a folder that are looked at, and their size in bytes: a list of runs is short.
 const FILES: usize = 200;

@@ -171,7 +171,7 @@ fn index(body: &[u8]) -> bool {
     length.is_some_and(|length| length % 16 == 0 && length as usize + 6 == body.len())
 }
 
-/// Goes on to the next chunk that is whole, or to the end: bytes passed over, and messages that can be counted among them.
+/// Skips to the next complete chunk, or to the end; returns the bytes skipped, and the messages that can be counted among them.
 fn skip_to_chunk<R: Read>(source: &mut Window<R>) -> io::Result<(u64, u64)> {
     let (mut bytes, mut samples) = (0, 0);
     loop {

@@ -34,7 +34,7 @@ impl<R: Read> Window<R> {
         Ok(&self.bytes[self.at..end])
     }
 
-    /// Goes on by n bytes that were seen.
+    /// Skips n bytes that were seen.
     pub fn skip(&mut self, count: usize) {
         self.at = self.bytes.len().min(self.at + count);
     }

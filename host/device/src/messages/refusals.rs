@@ -1,0 +1,168 @@
+//! Refused requests as errors: what was refused, why, and the remedy.
+
+use model_core::link::endpoints::{ClearFault, Endpoint};
+use model_core::link::messages::{Field, Refusal, State, StoreFault, TableFault};
+use pam_data::error::Error;
+use pam_data::pluralise::pluralise;
+
+use super::{fault, mode, side, state};
+use crate::error::DeviceCode;
+
+/// A refusal as an error: what was refused, why, what to do.
+#[must_use]
+pub fn refused(request: &str, refusal: Refusal) -> Error {
+    let (why, help) = match refusal {
+        Refusal::UnknownEndpoint => {
+            ("it does not support this request".to_owned(), "flash the firmware of this release".to_owned())
+        }
+        Refusal::Malformed => (
+            "it could not decode the request".to_owned(),
+            "the device and the program use the same schema, so this is a defect in one of them: report it"
+                .to_owned(),
+        ),
+        Refusal::WrongState(now) => (
+            format!("it is {}", state(now)),
+            match now {
+                State::Disarmed if request == ClearFault::NAME => "there is no fault to clear".to_owned(),
+                State::Disarmed => "arm it first".to_owned(),
+                State::Armed | State::Running => "stop it first: host vent --port PORT".to_owned(),
+                State::Fault => "see `host device faults`, then clear it with --clear".to_owned(),
+            },
+        ),
+        Refusal::Latched(latched) => {
+            let message = fault(latched);
+            (
+                format!("a fault is latched: {}", message.cause),
+                format!("{}; then `host device faults --clear`", message.remedy),
+            )
+        }
+        Refusal::StillFaulty(still) => {
+            let message = fault(still);
+            (format!("the fault is still present: {}", message.cause), message.remedy.to_owned())
+        }
+        Refusal::NoTable(which) => (
+            format!("the {} has no table", side(which)),
+            "send one: host flash TABLE.pam --port PORT".to_owned(),
+        ),
+        Refusal::WrongMode(running) => (
+            format!("it is in {} mode", mode(running)),
+            "setpoints and references must match the running mode".to_owned(),
+        ),
+        Refusal::Value(field) => (
+            format!("{} is out of range or not a number", field_name(field)),
+            "`host device settings` shows the values in force".to_owned(),
+        ),
+        Refusal::Table(why) => return table_refused(why),
+        Refusal::Store(why) => (
+            match why {
+                StoreFault::Medium => "its memory failed while reading or writing".to_owned(),
+                StoreFault::Full => "its memory is full".to_owned(),
+                StoreFault::NoPrevious => "it has no previous table".to_owned(),
+                StoreFault::Verify => "its memory does not retain what is written".to_owned(),
+            },
+            match why {
+                StoreFault::NoPrevious => "a rollback restores the previous table only".to_owned(),
+                _ => "try again; if the refusal returns, the flash memory is worn out".to_owned(),
+            },
+        ),
+        Refusal::Range => ("the request reaches past the end of the data".to_owned(), "request less".to_owned()),
+        Refusal::NotSupported => {
+            ("this board cannot do that".to_owned(), "`host device info` shows what it can".to_owned())
+        }
+        Refusal::Stiffness { low_nm_per_rad: low, high_nm_per_rad: high } => (
+            format!(
+                "with both muscles taut the joint stiffness is {low:.1} to {high:.1} N·m/rad at this angle"
+            ),
+            "choose a value in this range; another radius or rest stroke of the joint moves them (the settings' `joint`)"
+                .to_owned(),
+        ),
+        Refusal::Angle { low_rad, high_rad } => (
+            format!(
+                "both muscles of the joint are taut from {:.1}° to {:.1}° only",
+                low_rad.to_degrees(),
+                high_rad.to_degrees()
+            ),
+            "choose an angle in this range; a smaller radius or another rest stroke of the joint moves them (the settings' `joint`)"
+                .to_owned(),
+        ),
+        Refusal::OtherSession => return in_use(request),
+    };
+    Error::new(DeviceCode::DeviceRefused, format!("the device refuses `{request}`: {why}")).help(help)
+}
+
+/// The error of a program that asks for what belongs to another one.
+#[must_use]
+pub fn in_use(request: &str) -> Error {
+    Error::new(
+        DeviceCode::DeviceInUse,
+        format!("the device refuses `{request}`: another program has armed it or started its mode"),
+    )
+    .help("end the other program; `host vent --port PORT` ends its run")
+}
+
+fn table_refused(why: TableFault) -> Error {
+    let cause = match why {
+        TableFault::NotBegun => "a piece arrived before the upload was started".to_owned(),
+        TableFault::Gap(there) => format!("a piece is missing after byte {there}"),
+        TableFault::TooLong(fits) => format!("it is longer than the {fits} bytes that the device keeps"),
+        TableFault::Incomplete(there) => format!("only {} arrived", pluralise(there, "byte")),
+        TableFault::Check => "its checksum is wrong".to_owned(),
+        TableFault::Version { found, known } => {
+            format!("it has format version {found}, the device reads version {known}")
+        }
+        TableFault::Malformed => "it cannot be decoded".to_owned(),
+        TableFault::NotFinite => "a number in it is not finite".to_owned(),
+        TableFault::NotOrdered => "its pressures are not in rising order".to_owned(),
+        TableFault::OutOfRange => "a number in it is out of range".to_owned(),
+        TableFault::UnknownEffect => "it contains an effect that this firmware does not support".to_owned(),
+    };
+    let help = match why {
+        TableFault::NotBegun | TableFault::Gap(_) | TableFault::Incomplete(_) | TableFault::Check => {
+            "bytes were lost on the line: try again, and check the cable"
+        }
+        TableFault::Version { .. } | TableFault::UnknownEffect => {
+            "flash the firmware of this release: host flash --firmware ELF --chip CHIP"
+        }
+        _ => "check it with `host table check`, and fit again",
+    };
+    Error::new(
+        DeviceCode::DeviceRefused,
+        format!("the device refuses the table: {cause}; the previous table stays in use"),
+    )
+    .help(help)
+}
+
+const fn field_name(field: Field) -> &'static str {
+    match field {
+        Field::SetPoint => "a setpoint",
+        Field::Reference => "a parameter of the reference",
+        Field::ForceLoop => "the setting `force_loop`",
+        Field::StrokeLoop => "the setting `stroke_loop`",
+        Field::Joint => "the setting `joint`",
+        Field::Regulator => "the setting `regulator`",
+        Field::Limits => "the setting `limits`",
+        Field::SensorWatch => "a sensor monitor in the settings",
+        Field::Watch => "the setting `watch`",
+        Field::Bands => "a band of motion in the settings",
+        Field::Rate => "the rate of telemetry or of a trace",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model_core::link::messages::Side;
+
+    #[test]
+    fn a_refusal_names_request_cause_and_remedy() {
+        let error = refused("start", Refusal::NoTable(Side::Agonist));
+        assert_eq!(error.to_string(), "the device refuses `start`: the agonist has no table");
+        assert_eq!(error.advice(), Some("send one: host flash TABLE.pam --port PORT"));
+        assert_eq!(error.exit_status(), 1);
+        let error =
+            refused("set_point", Refusal::Stiffness { low_nm_per_rad: 25.04, high_nm_per_rad: 29.96 });
+        assert!(error.to_string().ends_with("stiffness is 25.0 to 30.0 N·m/rad at this angle"), "{error}");
+        let error = refused("set_point", Refusal::Angle { low_rad: -0.1, high_rad: 0.1 });
+        assert!(error.to_string().ends_with("taut from -5.7° to 5.7° only"), "{error}");
+    }
+}
