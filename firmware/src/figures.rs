@@ -85,7 +85,7 @@ impl Sweep {
     }
 }
 
-/// The formulas as they be in the thesis, with libm's `powf` and `sqrtf`: what the run-time form is compared with.
+/// The formulas as the thesis prints them, with libm's `powf` and `sqrtf`: what the run-time form is compared with.
 struct Direct {
     rest_length: f32,
     fibre: f32,

@@ -315,8 +315,8 @@ impl Health {
             return;
         }
         self.enough = true;
-        let explained = beta.abs() * (shape / self.weight).sqrt();
-        let excess = (explained - TOLERANCE) / (variance / independent).sqrt();
+        let explained = beta.abs() * (shape / self.weight).at_least(0.0).sqrt();
+        let excess = (explained - TOLERANCE) / (variance / independent).at_least(0.0).sqrt();
         if excess > self.best.1 {
             self.best = (Shape::ALL[row], excess);
         }

@@ -15,8 +15,8 @@
 //! | tables and settings in flash | [`store`] |
 //! | answers to the host | [`server`] |
 //! | what the tasks share | [`shared`] |
-//! | what waits to be said to the host | [`spoken`] |
-//! | places for what is large | [`room`], [`shared_buffer`] |
+//! | messages that wait to be sent to the host | [`outbox`] |
+//! | static memory for large values | [`placement`], [`shared_buffer`] |
 //! | the tasks that a board starts | [`tasks`] |
 //! | the length of a tick | [`tick`] |
 //! | what a board must give | [`board`] |

@@ -13,7 +13,7 @@
 //! | pressure for a demanded force | [`inverse`] |
 //! | which way friction points | [`motion`] |
 //! | physics beyond the base model | [`effects`] |
-//! | all of it as a controller calls it | [`single`] |
+//! | all of it as a controller calls it | [`single_precision`] |
 //! | what host and controller say to each other | [`link`] |
 //!
 //! Source of the model: E. G. Hocking, thesis on miniature and push-type pneumatic artificial muscles, University of

@@ -134,7 +134,7 @@ impl Controller {
     /// The owner's program is alive.
     ///
     /// # Errors
-    /// As [`Controller::obeys`].
+    /// [`Refusal::OtherSession`] where another session owns the device.
     pub fn keep_alive(&mut self, session: Session) -> Result<(), Refusal> {
         self.obeys(session)?;
         if session == self.owner {

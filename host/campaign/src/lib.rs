@@ -7,7 +7,7 @@
 //! | what is a step expected to tell | [`information`] |
 //! | what to do next, and when to stop | [`engine`] |
 //! | is the recording good | [`watch`] |
-//! | who carries it out | [`actuation`]: [`bench`], [`controller`] |
+//! | who carries it out | [`actuation`]: [`mod@bench`], [`controller`] |
 //! | what was done, also after an interruption | [`journal`], [`campaign`] |
 //!
 //! ```

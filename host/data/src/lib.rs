@@ -9,7 +9,7 @@
 //! | recognising files, writing them atomically | [`file_kind`], [`output`] |
 //! | comparing two recordings | [`compare`] |
 //! | order statistics | [`statistics`] |
-//! | thresholds with symbol, unit, meaning and source | [`criteria`] |
+//! | thresholds with symbol, unit, meaning and source | [`mod@criteria`] |
 //! | progress reports, dates, plurals | [`progress`], [`date`], [`pluralise`] |
 //! | numbers in messages | [`short_number`] |
 //!

@@ -27,12 +27,13 @@ pub(crate) mod reference;
 pub(crate) mod rest_friction;
 pub(crate) mod rows;
 pub(crate) mod selection;
+pub(crate) mod table_health;
 pub(crate) mod timeline;
 pub(crate) mod uncertainty;
 pub(crate) mod valve_pulses;
 
 /// The whole page, stage by stage in the order in which they decide.
-pub const PAGE: [Stage; 15] = [
+pub const PAGE: [Stage; 16] = [
     motion::CRITERIA,
     valve_pulses::STAGE,
     rows::STAGE,
@@ -48,6 +49,7 @@ pub const PAGE: [Stage; 15] = [
     history::STAGE,
     reference::STAGE,
     timeline::STAGE,
+    table_health::STAGE,
 ];
 
 /// The page as Markdown tables.

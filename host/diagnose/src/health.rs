@@ -12,16 +12,9 @@
 use model_core::link::messages::{COLUMNS, HealthSums, LAGGED, SHAPES, SUMS, Shape, TableHealth, WATCHED};
 use nalgebra::{DMatrix, DVector};
 
+use crate::criteria::table_health::{DISTINCT_CHANGES, HEALTH_CORRELATION, SECOND_CHANGE};
+use crate::criteria::uncertainty::NORMAL_95;
 use crate::reference::shapes::Change;
-
-/// Normal quantile of a 95 % interval.
-const QUANTILE: f64 = 1.959_964;
-/// Changes are not distinguished below this difference of χ²: odds of 20 to 1.
-const DISTINCT: f64 = 5.99;
-/// A second change must explain this much χ² beyond the first: five standard errors.
-const SECOND: f64 = 25.0;
-/// The highest serial correlation that is believed.
-const CORRELATION: f64 = 0.99;
 
 /// What is known of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -163,7 +156,7 @@ impl<'a> Equations<'a> {
         }
         let (own, cross) = (at(3 * shape), at(3 * shape + 1) + at(3 * shape + 2));
         let covariance = (at(LAGGED - 2) - beta[0] * cross + beta[0] * beta[0] * own) / pairs;
-        let rho = (covariance / (left / self.weight)).clamp(0.0, CORRELATION);
+        let rho = (covariance / (left / self.weight)).clamp(0.0, HEALTH_CORRELATION);
         Some((1.0 + rho) / (1.0 - rho))
     }
 
@@ -181,7 +174,7 @@ impl<'a> Equations<'a> {
         let Some(inflation) = self.inflation(first) else { return Vec::new() };
         let Some((_, _, left)) = self.fit(&[first]) else { return Vec::new() };
         let noise = left / self.weight * inflation;
-        let alike = |k: &&(usize, f64)| k.0 != first && (explained - k.1) / noise < DISTINCT;
+        let alike = |k: &&(usize, f64)| k.0 != first && (explained - k.1) / noise < DISTINCT_CHANGES;
         let confusable: Vec<usize> = ranking.iter().filter(alike).map(|k| k.0).collect();
         let mut chosen = vec![first];
         let second = (0..SHAPES)
@@ -190,7 +183,7 @@ impl<'a> Equations<'a> {
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let tolerance = f64::from(self.sums.tolerance);
         if let Some((shape, gain)) = second
-            && gain / noise > SECOND
+            && gain / noise > SECOND_CHANGE
             && (gain / self.weight).sqrt() > tolerance
         {
             chosen.push(shape);
@@ -204,7 +197,7 @@ impl<'a> Equations<'a> {
             .map(|(at, shape)| {
                 let (change, scale) = meaning(Shape::ALL[*shape], self.sums);
                 let (size, half) =
-                    (scale * beta[at], QUANTILE * scale.abs() * (variance * covariance[(at, at)]).sqrt());
+                    (scale * beta[at], NORMAL_95 * scale.abs() * (variance * covariance[(at, at)]).sqrt());
                 let energy = beta[at] * beta[at] * self.matrix[(*shape, *shape)];
                 Finding {
                     change,

@@ -25,7 +25,7 @@
 //! | | `intervals`, `change_point` | confidence intervals |
 //! | | `location`, `spectrum`, `table_evidence` | where the error is: along coordinates, in time, in the tables |
 //! | | [`history`] | what the muscle remembers over a campaign of isometric staircases, before the search |
-//! | over campaigns | [`reference`], [`timeline`] | what changed since a reference; quantities and change points over several campaigns |
+//! | over campaigns | [`mod@reference`], [`timeline`] | what changed since a reference; quantities and change points over several campaigns |
 //! | answer | [`verdict`], [`outcome`], [`remark`], [`why`], [`why_not`], [`experiment`], [`reserve`] | the answer as values; the report writes the sentences |
 //! | | [`refitted_table`] | the table refitted beside the selected effects |
 //! | | [`next_experiment`], [`isolability`], [`protocol_simulation`] | the experiment that decides; what a planned protocol can show |

@@ -81,7 +81,7 @@ pub struct Options {
     pub fit_lengths: bool,
     /// Whether the bladder's stress is constrained to rise with strain.
     pub physical: bool,
-    /// Whether dimensions and lengths stay as described where recordings at held lengths ask for others; see [`held_lengths`].
+    /// Whether dimensions and lengths stay as described where recordings at held lengths ask for others; see `held_lengths`.
     pub as_described: bool,
 }
 

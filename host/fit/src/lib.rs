@@ -7,7 +7,7 @@
 //! | a table as CSV, C header or MATLAB file | [`table_export`] |
 //! | force predicted from a table | [`predict`] |
 //! | confidence band of the force | [`confidence_band`] |
-//! | corrections of sensors and frame | [`bench`] |
+//! | corrections of sensors and frame | [`mod@bench`] |
 //! | recordings of the bench without its muscle | [`checks`] |
 //! | least squares, jackknife, splines, order statistics | [`numerics`] |
 //!

@@ -28,7 +28,7 @@ const POINTS: usize = 1_500;
 /// Reports that can still be opened; older ones are forgotten.
 const REPORTS: usize = 8;
 
-/// The folder, and what is known of the files in it. Nothing is computed, read or written while [`Known`] is locked: who waits for
+/// The folder, and what is known of the files in it. Nothing is computed, read or written while `Known` is locked: who waits for
 /// it waits for microseconds.
 #[derive(Debug)]
 pub struct Analysis {

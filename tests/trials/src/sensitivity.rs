@@ -15,8 +15,8 @@ use pam_diagnose::criteria::{Criterion, PAGE, Source};
 use serde::{Deserialize, Serialize};
 
 use crate::answer::{self, Asking};
-use crate::ledger::{self, Ledger};
 use crate::figures::big_and_visible;
+use crate::ledger::{self, Ledger};
 use crate::rate::Rate;
 use crate::score::{self, Outcome};
 

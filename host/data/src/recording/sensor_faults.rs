@@ -7,9 +7,9 @@
 //!
 //! | fault | reading | contradiction | file |
 //! | --- | --- | --- | --- |
-//! | frozen, saturated | one exact value for many rows | the expected force, or the residual, changes meanwhile | [`constant_runs`] |
-//! | dead | one value through a recording | a force that this value excludes | [`dead_channels`] |
-//! | drop-out | a step away, and back | no other reading steps | [`jumps`] |
+//! | frozen, saturated | one exact value for many rows | the expected force, or the residual, changes meanwhile | `constant_runs` |
+//! | dead | one value through a recording | a force that this value excludes | `dead_channels` |
+//! | drop-out | a step away, and back | no other reading steps | `jumps` |
 //!
 //! Drop-outs of the pressure are those of [`super::dropouts`].
 

@@ -206,7 +206,7 @@ pam_data::criteria! {
     COMBINED_SHAPE_ERROR: f64 = 0.2, "combined_shape_error", "1", Judgement;
     /// A table is compared where it gives more than this share of its largest force: it is fitted where the muscle pulls.
     COMBINED_PULLS: f64 = 0.05, "combined_pulls", "1", Judgement;
-    /// After a turn the stroke must come back by this share of its range before friction counts as turned.
+    /// After a reversal the stroke must come back by this share of its range before friction counts as turned.
     COMBINED_TURNED: f64 = 0.1, "combined_turned", "1", Judgement;
     /// Mean square of the stroke's steps from row to row over its variance, below which it is a motion; of white noise it is 2.
     COMBINED_SMOOTH: f64 = 0.2, "combined_smooth", "1", Derived("white noise gives 2");

@@ -1,6 +1,6 @@
 //! Small dense symmetric systems: the normal equations of a fit.
 //!
-//! Columns are orthonormalised before they come here (see [`super::basis`]), so squaring the condition number costs no
+//! Columns are orthonormalised before they come here (see `fit::basis`), so squaring the condition number costs no
 //! digits that matter.
 
 /// A symmetric matrix, stored whole, row after row.
