@@ -34,7 +34,7 @@ use crate::progress::ProgressLine;
         --force 'sine mean=60 amplitude=20 frequency=0.5'\n  \
     host run --force 'steps 40 60 80 hold=2' --seconds 12 -o steps.mcap\n  \
     host run --stroke @profile.csv --seconds 30 -o stroke.csv\n  \
-    host run --force 'sine mean=60 amplitude=20 frequency=0.2' --seconds 120 --reference commissioning.csv\n  \
+    host run --force 'sine mean=60 amplitude=20' --reference reference.csv\n  \
     host run --angle 'sine mean=0 amplitude=5 frequency=0.5' --stiffness 12\n\n\
     Setpoint profiles (frequencies in Hz, times in s):\n  \
     VALUE\n  \
