@@ -17,6 +17,7 @@ use super::findings::{considered, missing};
 use super::known_effects;
 use super::linear::energy;
 use super::location::{block_ranges, locate};
+use super::noise::Noise;
 use super::options::Options;
 use super::preconditions::{blocked_force, limitations, not_judged, unmet_precondition};
 use super::remark::{Remark, Unjudgeable};
@@ -162,6 +163,8 @@ struct Excess {
     admitted: f64,
     /// Whether the force does not repeat, more than instruments scatter, and nothing explains it.
     restless: bool,
+    /// Whether more is left than the model admits, without a name, and remembers longer than the noise of an instrument.
+    lasts: bool,
 }
 
 impl Excess {
@@ -188,7 +191,8 @@ impl Excess {
         if restless {
             remarks.push(Remark::NotRepeatable(selection.noise.scatter(blocked)));
         }
-        Self { explained, left, admitted, restless }
+        let lasts = missing.is_empty() && left > admitted && selection.noise.remembers(step);
+        Self { explained, left, admitted, restless, lasts }
     }
 }
 
@@ -215,6 +219,11 @@ impl Located {
             (Some(l), _) => Pattern::Periodic(l.hertz),
             (None, Some(r)) if excess.left > excess.admitted => Pattern::Region(Box::new(r.clone())),
             _ if excess.restless => Pattern::NotRepeatable(selection.noise.scatter(blocked)),
+            // It stands above the noise of repeats, has no place and no period, and no effect fits: noise that lasts.
+            _ if excess.lasts => {
+                let sigma = excess.left.hypot(sigma);
+                Pattern::NotRepeatable(Noise { sigma, ..selection.noise }.scatter(blocked))
+            }
             _ => Pattern::None,
         };
         regions.extend(line.as_ref().map(|l| Region {
