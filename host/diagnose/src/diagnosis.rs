@@ -13,6 +13,7 @@ use super::criteria::judgement::{
     PARTLY_EXPLAINED, TRACE_POINTS,
 };
 use super::criteria::rows::{SLACK_MENTIONED, SLACK_ROUNDS};
+use super::cross_validation::HeldOutRows;
 use super::findings::{considered, missing};
 use super::known_effects;
 use super::linear::energy;
@@ -121,6 +122,8 @@ struct SelectionResult {
     library: Vec<Candidate>,
     selection: Selection,
     held_out: HeldOut,
+    /// The error on held-out rows with the first effect, the first two, and so on, N.
+    steps: Vec<f64>,
     missing: Vec<Missing>,
 }
 
@@ -150,7 +153,19 @@ fn select(
         known_effects::judge(&mut missing, &selection, &held_out);
     }
     remarks.extend(missing.iter().filter_map(implausible_size));
-    SelectionResult { library, selection, held_out, missing }
+    let steps = steps_on_held_out(&selection, &held_out);
+    SelectionResult { library, selection, held_out, steps, missing }
+}
+
+/// The error on held-out rows with the first effect, the first two, and so on, each beside the base refitted, N.
+fn steps_on_held_out(selection: &Selection, held_out: &HeldOut) -> Vec<f64> {
+    let Selection { rows, joint, traces, .. } = selection;
+    if traces.len() < 2 {
+        return vec![held_out.rms_after_N; traces.len()];
+    }
+    let unseen = HeldOutRows::new(rows, joint.kind, traces);
+    let before_last = (1..traces.len()).map(|n| unseen.error(&traces[..n]));
+    before_last.chain([held_out.rms_after_N]).collect()
 }
 
 /// The error above the noise, and what became of it.
@@ -283,14 +298,15 @@ fn answer(
     remarks: Vec<Remark>,
 ) -> Diagnosis {
     let Measures { blocked, misfit, excess } = measures;
-    let SelectionResult { library, selection, held_out, missing } = selected;
+    let SelectionResult { library, selection, held_out, steps, missing } = selected;
     let sigma = selection.noise.sigma;
     let consistent = verdict == Verdict::Consistent;
     let considered = considered(&selection, &library, &missing, sigma, blocked);
     let name = |candidate: usize| library[candidate].name().to_owned();
-    let path = selection.selected.iter().map(|t| PathStep {
+    let path = selection.selected.iter().zip(steps).map(|(t, step)| PathStep {
         effect: name(t.fit.candidate),
         rms_N: t.rms,
+        held_out_rms_N: Some(step),
         p: t.p,
         runners_up: t.competitors.iter().map(|r| (name(r.0), r.1)).collect(),
     });
