@@ -16,6 +16,8 @@ mod inject;
 mod ledger;
 mod limits;
 mod locate;
+mod maps;
+mod martens;
 mod names;
 mod oracle;
 mod progress;
@@ -183,6 +185,8 @@ enum Command {
     Festo(Real),
     /// The same for settled points only: writes the section of the page on the memory of the bladder.
     FestoHistory(Real),
+    /// Fit static force maps of commercial muscles and predict them between lengths and pressures, beside published models.
+    Maps(Real),
     /// Answer a development set again with each criterion at half and at double its value.
     Sensitivity(sensitivity::Study),
     /// Spoil one recording of clean campaigns in every way that sensors and loggers fail, and count what is found.
@@ -238,6 +242,9 @@ fn main() -> ExitCode {
         }
         Command::Festo(real) => {
             festo::run(&real.data, &real.output, &real.host).and_then(|()| real.copy_to_book("festo.md"))
+        }
+        Command::Maps(real) => {
+            maps::run(&real.data, &real.output, &real.host).and_then(|()| real.copy_to_book("force-maps.md"))
         }
         Command::FestoHistory(real) => {
             festo::run_history(&real.data, &real.output, &real.host, real.page.as_deref())
