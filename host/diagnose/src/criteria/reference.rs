@@ -40,6 +40,8 @@ pam_data::criteria! {
     CELLS: usize = 6, "cells", "1", Judgement;
     /// Strokes nearer than this are one mounting (tape measure).
     SAME_STROKE: f64 = 1e-3, "same_stroke", "m", Convention("tape measure, 1 mm");
+    /// Lengths of the reference from which on the force between two of them is interpolated: fewer do not show an error.
+    INTERPOLATE_FROM: usize = 3, "interpolate_from", "1", Judgement;
     /// Fewer common cells and a mounting is not comparable.
     FEWEST_CELLS: usize = 4, "fewest_cells", "1", Judgement;
     /// More cells are joined in pairs of runs, so that the covariance stays quick.
@@ -105,6 +107,8 @@ pam_data::criteria! {
     SET: f64 = 0.95, "set", "1", Convention("95 %");
     /// Error of the slopes ∂F/∂P and ∂F/∂x, share of the size: by principle, they are estimated from the same recordings.
     SLOPE_ERROR: f64 = 0.05, "slope_error", "1", Judgement;
+    /// The same where the reference is a table and the slopes are those of AFTER, which the change itself has altered.
+    OWN_SLOPE_ERROR: f64 = 0.15, "own_slope_error", "1", Judgement;
     /// The same where the slopes are a table's.
     TABLE_SLOPE_ERROR: f64 = 0.2, "table_slope_error", "1", Measured("development half, sizes of changes put in");
     /// The same over the length, along which a table was fitted at three to five lengths.
@@ -194,6 +198,22 @@ pam_data::criteria! {
     TABLE_ERROR_ZERO: f64 = 0.3, "table_error_zero", "1", Measured("development half");
     /// Step of the slope over the length, m.
     TABLE_SURFACE_STEP: f64 = 1e-4, "table_surface_step", "1", Judgement;
+    /// Strokes of a described muscle: parts of the contraction of a level.
+    CATALOGUE_BINS: usize = 8, "catalogue_bins", "1", Judgement;
+    /// Fewer common cells cannot be compared.
+    CATALOGUE_FEWEST_CELLS: usize = 24, "catalogue_fewest_cells", "1", Judgement;
+    /// Error of a cell's mean that is always allowed, share of the largest force: what a load cell of 0.02 % resolves.
+    CATALOGUE_FLOOR: f64 = 2e-4, "catalogue_floor", "1", Convention("load cell, 0.02 %");
+    /// The shortest rest, s; longer ones count by decades.
+    CATALOGUE_REST: f64 = 1.0, "catalogue_rest", "s", Judgement;
+    /// Speeds that differ by less than about this factor count as one.
+    CATALOGUE_SPEED_STEP: f64 = 4.0, "catalogue_speed_step", "1", Judgement;
+    /// What campaigns usually differ by without a change, share of the largest force: a load cell's zero, gain, gauge and friction.
+    CATALOGUE_USUAL: f64 = 5e-4, "catalogue_usual", "1", Judgement;
+    /// How inexact the law of an effect is, share of its trace.
+    CATALOGUE_LAW_ERROR: f64 = 0.1, "catalogue_law_error", "1", Judgement;
+    /// Steps of the refinement of shapes.
+    CATALOGUE_REFINED: usize = 6, "catalogue_refined", "1", Cost;
     /// Length and pressure move together: parts of the stroke, each of which counts as a held length.
     COMBINED_LENGTHS: usize = 5, "combined_lengths", "1", Judgement;
     /// The same: spans of time, whose differences show how far the actuator repeats.

@@ -18,6 +18,8 @@ pub(super) struct Cell {
     pub means: Means,
     /// Effective number of rows, 1/Σw².
     pub rows: f64,
+    /// No recording: what the reference's other lengths say, with their error.
+    pub interpolated: bool,
 }
 
 /// What is averaged.
@@ -158,10 +160,30 @@ pub(super) fn cells(all: &Runs, surface: &Surface, lag: Option<LagTrace<'_>>) ->
                 bin,
                 means,
                 rows: 1.0 / rows.iter().map(|(_, w)| w * w).sum::<f64>(),
+                interpolated: false,
             });
         }
     }
-    join(cells)
+    let mut cells = join(cells);
+    let made = interpolated(&cells, all);
+    cells.extend(made);
+    cells
+}
+
+/// For every cell of AFTER at a length that the reference does not have, one of BEFORE without a difference: its error is that of the
+/// interpolation.
+fn interpolated(cells: &[Cell], all: &Runs) -> Vec<Cell> {
+    let mut made: std::collections::BTreeMap<(usize, bool, usize), Cell> = std::collections::BTreeMap::new();
+    for cell in cells.iter().filter(|c| c.after && all.is_interpolated(c.mounting)) {
+        made.entry((cell.mounting, cell.direction < 0.0, cell.bin)).or_insert_with(|| Cell {
+            run: all.runs.len() + cell.mounting,
+            after: false,
+            means: Means { residual: 0.0, lag: 0.0, ..cell.means },
+            interpolated: true,
+            ..cell.clone()
+        });
+    }
+    made.into_values().collect()
 }
 
 /// Joins neighbouring runs of a mounting in pairs until few enough cells are left.

@@ -12,7 +12,8 @@ use super::staircase_answer::staircases;
 use super::stroke_answer::strokes;
 use super::stroked;
 use super::surface::Surface;
-use super::{combined, sides, table_surface, units};
+use super::{catalogue, combined, sides, table_surface, units};
+use model_core::braid::Geometry;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::{self, Campaign, Recording};
 use pam_fit::predict::predict;
@@ -36,6 +37,8 @@ pub struct Options {
     pub muscle: Option<String>,
     /// L0, m, where it is known.
     pub rest_length: Option<f64>,
+    /// The muscle's dimensions, where they are described: then strokes are asked about every effect of the catalogue.
+    pub geometry: Option<Geometry>,
     /// Whether AFTER was mounted anew.
     pub mounted: Mounted,
     /// Prior probability that something changed, instead of the usual.
@@ -126,7 +129,11 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
     for r in &after.recordings {
         r.require_force()?;
     }
-    let kind = protocol(after, "AFTER")?;
+    let kind = match (protocol(after, "AFTER"), &options.geometry) {
+        // Strokes with readings at rest between them: a described muscle is compared row by row.
+        (Err(_), Some(_)) if matches!(against, Against::Recordings(_)) => Protocol::Combined,
+        (kind, _) => kind?,
+    };
     let mut report = match (against, kind) {
         (Against::Recordings(before), _) => {
             for r in &before.recordings {
@@ -135,7 +142,16 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
             sides::apart(before, after)?;
             let mut remarks = units::check(before, after)?;
             remarks.extend(sides::order(before, after));
-            let mut report = match (protocol(before, "the reference")?, kind) {
+            let described = options.geometry.as_ref().filter(|_| kind != Protocol::Held);
+            let old = match described {
+                Some(_) => Protocol::Combined,
+                None => protocol(before, "the reference")?,
+            };
+            let mut report = match (old, kind) {
+                (_, _) if described.is_some() => {
+                    let geometry = described.ok_or_else(|| Error::new(DataCode::MuscleInvalid, "no dimensions"))?;
+                    catalogue::compare(before, after, geometry, options)?
+                }
                 (Protocol::Held, Protocol::Held) => held(before, after, options)?,
                 (Protocol::Stroked, Protocol::Stroked) => {
                     let compared = stroked::compare(before, after, 0.0)?;
@@ -229,18 +245,22 @@ fn held(before: &Campaign, after: &Campaign, options: &Options) -> Result<Change
 
 /// Runs on both sides.
 fn recorded(runs: Runs, surface: Surface, options: &Options) -> Result<ChangeReport> {
-    let reference = isometric::Reference { surface, error: 0.0, recorded: true };
+    let reference = isometric::Reference { surface, error: 0.0, recorded: true, own: None };
     let analysis = isometric::analyse(runs, reference, prior(options, PRIOR_NONE))?;
     Ok(staircases(&analysis, options))
 }
 
 fn against_table(table: &TableFile, after: &Campaign, runs: Runs, options: &Options) -> Result<ChangeReport> {
     units::check_pressure(after, f64::from(table.table.tested.pressure_high.pascals()))?;
-    let surface = table_surface::of(table, &runs)?;
+    let mut surface = table_surface::of(table, &runs)?;
     units::check_force(after, surface.largest)?;
+    let own = if runs.moving || std::env::var("OWN").is_ok_and(|v| v == "no") { None } else { table_surface::of_after(&runs) };
+    if let Some(own) = &own {
+        surface = surface.with_slopes_of(own);
+    }
     let stated = table.about.fit.rms_newtons;
     let error = if stated > 0.0 { stated } else { UNSTATED_ERROR * surface.largest };
-    let reference = isometric::Reference { surface, error, recorded: false };
+    let reference = isometric::Reference { surface, error, recorded: false, own };
     let analysis = isometric::analyse(runs, reference, prior(options, PRIOR_NONE))?;
     let mut report = staircases(&analysis, options);
     report.remarks.push(table_remark(table, analysis.reference_error));

@@ -7,7 +7,8 @@ use super::answer::{
     Repeatability, Size, Split, Verdict, WhyNot, size,
 };
 use super::criteria::{
-    CELLS, COMBINED_SHAPE_ERROR, FEWEST_CELLS, GATE, NAMED, PRIOR_NONE, SCALE_PRIOR, SIZES, SLOPE_ERROR,
+    CELLS, COMBINED_SHAPE_ERROR, FEWEST_CELLS, GATE, NAMED, OWN_SLOPE_ERROR, PRIOR_NONE, SCALE_PRIOR, SIZES,
+    SLOPE_ERROR,
     TABLE_SLOPE_ERROR, TABLE_SLOPE_OVER_LENGTH,
 };
 use super::held_out;
@@ -91,6 +92,13 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
 
 fn remarks(analysis: &Analysis, verdict: Verdict) -> Vec<Remark> {
     let mut remarks = Vec::new();
+    for (m, stroke) in analysis.runs.strokes.iter().enumerate().filter(|(m, _)| analysis.runs.is_interpolated(*m)) {
+        let variances = analysis.cells.iter().filter(|c| c.interpolated && c.mounting == m).map(|c| c.means.variance);
+        let (sum, count) = variances.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+        if count > 0.0 {
+            remarks.push(Remark::Interpolated { stroke: *stroke, error: f64::sqrt(sum / count) });
+        }
+    }
     let like = |a: &Accepted| matches!(a.change.class(), Class::Gain | Class::Zero);
     if analysis.runs.moving && analysis.accepted.iter().any(like) {
         remarks.push(Remark::GaugeOfMotion);
@@ -182,6 +190,7 @@ fn slope_error(analysis: &Analysis, change: Change) -> f64 {
         Change::ForceOffset | Change::ForceDrift | Change::CoulombFriction => SLOPE_ERROR,
         _ if analysis.recorded && analysis.runs.moving => COMBINED_SHAPE_ERROR,
         _ if analysis.recorded => SLOPE_ERROR,
+        _ if analysis.own_slopes => OWN_SLOPE_ERROR,
         Change::DisplacementOffset | Change::RigCompliance | Change::EndSlip => TABLE_SLOPE_OVER_LENGTH,
         _ => TABLE_SLOPE_ERROR,
     }

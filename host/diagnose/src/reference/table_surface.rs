@@ -17,6 +17,34 @@ fn offset(table: &TableFile, held: f64) -> f64 {
     nearest.map_or(0.0, |m| m.offset)
 }
 
+/// The curves of AFTER itself, for slopes: what a table is wrong by in its slopes, these recordings are not. `None` where they are too
+/// few for curves of their own.
+pub(super) fn of_after(runs: &Runs) -> Option<Surface> {
+    let mut alone = runs.clone();
+    alone.runs.iter_mut().for_each(|r| r.after = false);
+    Surface::of(&alone).ok()
+}
+
+impl Surface {
+    /// With the slopes of another surface of the same mountings; those over the length only where it has several.
+    pub(super) fn with_slopes_of(mut self, own: &Self) -> Self {
+        let step = (self.high - self.low) / (GRID - 1) as f64;
+        for (curve, from) in self.curves.iter_mut().zip(&own.curves) {
+            for g in 0..GRID {
+                let p = self.low + step * g as f64;
+                if let Some(slope) = curve.by_pressure.get_mut(g) {
+                    *slope = own.at(&from.by_pressure, p);
+                }
+                if let Some(slope) = curve.by_stroke.get_mut(g).filter(|_| own.curves.len() > 1) {
+                    *slope = own.at(&from.by_stroke, p);
+                }
+            }
+        }
+        self.find_usual_slope();
+        self
+    }
+}
+
 /// A table's surface at the mountings of AFTER, over the pressures that AFTER has and the table was made for.
 ///
 /// # Errors
