@@ -32,6 +32,8 @@ pub(super) struct Means {
     pub force: f64,
     pub by_pressure: f64,
     pub by_stroke: f64,
+    /// The slope that a step within AFTER counts with.
+    pub step_by_stroke: f64,
     /// ln(1 + time since mounting).
     pub mounted: f64,
     /// ln(1 + time in the run).
@@ -58,6 +60,7 @@ impl Means {
             (&mut self.force, o.force),
             (&mut self.by_pressure, o.by_pressure),
             (&mut self.by_stroke, o.by_stroke),
+            (&mut self.step_by_stroke, o.step_by_stroke),
             (&mut self.mounted, o.mounted),
             (&mut self.begun, o.begun),
             (&mut self.clock, o.clock),
@@ -87,6 +90,7 @@ fn row(run: &Run, i: usize, surface: &Surface, duration: f64) -> Means {
         force,
         by_pressure,
         by_stroke,
+        step_by_stroke: if c.own_by_stroke.is_empty() { by_stroke } else { at(&c.own_by_stroke) },
         mounted: ((run.since_mounted + t) / CREEP_START).ln_1p(),
         begun: (t / CREEP_START).ln_1p(),
         clock: if run.after { (run.since_after + t) / duration.max(1e-9) } else { 0.0 },

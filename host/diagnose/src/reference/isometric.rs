@@ -5,7 +5,7 @@ use nalgebra::DVector;
 use super::cells::{Cell, cells};
 use super::contrast::{Contrast, evidence};
 use super::criteria::{
-    COMBINED_SHAPE_ERROR, DIRECTIONS_PER_RUN, LAG_FLOOR, MOST_CHANGES, NAMED, SIZES, TABLE_ERROR_FACTORS,
+    COMBINED_SHAPE_ERROR, DIRECTIONS_PER_RUN, LAG_FLOOR, LAGS, MOST_CHANGES, NAMED, SIZES, TABLE_ERROR_FACTORS, TABLE_LAGS,
 };
 use super::gate::{self, Asked};
 use super::lag::{self, Shift};
@@ -86,8 +86,6 @@ pub(super) struct Analysis {
     pub last: Posterior,
     /// Whether the reference is recordings, and no table.
     pub recorded: bool,
-    /// Whether slopes are those of AFTER itself.
-    pub own_slopes: bool,
     /// The likeliest error of a table in a cell, N; zero for recordings.
     pub reference_error: f64,
 }
@@ -114,8 +112,6 @@ pub(super) struct Reference {
     pub error: f64,
     /// Whether BEFORE has cells of its own.
     pub recorded: bool,
-    /// Beside a table, the curves of AFTER itself: delays between its channels are looked for about these.
-    pub own: Option<Surface>,
 }
 
 /// Weighs everything.
@@ -123,17 +119,15 @@ pub(super) struct Reference {
 /// # Errors
 /// Recordings that leave no common cells, or numbers that cannot be used.
 pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Result<Analysis> {
-    let Reference { surface, error, recorded, own } = reference;
-    let own_slopes = own.is_some();
-    let about = own.as_ref().filter(|_| !std::env::var("OWNLAG").is_ok_and(|v| v == "no")).unwrap_or(&surface);
+    let Reference { surface, error, recorded } = reference;
     use rayon::prelude::*;
     // Rows of one part of a motion do not follow one another: they say nothing about lags.
+    let tried: &[f64] = if recorded { &LAGS } else { &TABLE_LAGS };
     let shift = (!runs.moving).then(|| {
-        let scores: Vec<_> = runs.runs.par_iter().map(|r| lag::score(r, about)).collect();
+        let scores: Vec<_> = runs.runs.par_iter().map(|r| lag::score(r, &surface, tried)).collect();
         lag::shift(&runs, &scores)
     });
     let late = shift.as_ref().map_or(0.0, |s| s.lag);
-    if std::env::var("LAGS").is_ok() { eprintln!("LAG {late:.4} {:.4}", shift.as_ref().map_or(0.0, |s| s.variance.sqrt())); }
     let traced = |run: &Run| lag::effect(run, &surface, late);
     let lag = (late.abs() > LAG_FLOOR).then_some(&traced as &dyn Fn(&Run) -> Vec<f64>);
     let cells = cells(&runs, &surface, lag);
@@ -189,7 +183,6 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
                 accepted,
                 last,
                 recorded,
-                own_slopes,
                 reference_error,
             });
         };

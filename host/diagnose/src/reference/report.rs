@@ -245,7 +245,7 @@ fn held(before: &Campaign, after: &Campaign, options: &Options) -> Result<Change
 
 /// Runs on both sides.
 fn recorded(runs: Runs, surface: Surface, options: &Options) -> Result<ChangeReport> {
-    let reference = isometric::Reference { surface, error: 0.0, recorded: true, own: None };
+    let reference = isometric::Reference { surface, error: 0.0, recorded: true };
     let analysis = isometric::analyse(runs, reference, prior(options, PRIOR_NONE))?;
     Ok(staircases(&analysis, options))
 }
@@ -254,13 +254,12 @@ fn against_table(table: &TableFile, after: &Campaign, runs: Runs, options: &Opti
     units::check_pressure(after, f64::from(table.table.tested.pressure_high.pascals()))?;
     let mut surface = table_surface::of(table, &runs)?;
     units::check_force(after, surface.largest)?;
-    let own = if runs.moving || std::env::var("OWN").is_ok_and(|v| v == "no") { None } else { table_surface::of_after(&runs) };
-    if let Some(own) = &own {
-        surface = surface.with_slopes_of(own);
+    if !runs.moving {
+        table_surface::fill_own_slopes(&mut surface, &runs);
     }
     let stated = table.about.fit.rms_newtons;
     let error = if stated > 0.0 { stated } else { UNSTATED_ERROR * surface.largest };
-    let reference = isometric::Reference { surface, error, recorded: false, own };
+    let reference = isometric::Reference { surface, error, recorded: false };
     let analysis = isometric::analyse(runs, reference, prior(options, PRIOR_NONE))?;
     let mut report = staircases(&analysis, options);
     report.remarks.push(table_remark(table, analysis.reference_error));

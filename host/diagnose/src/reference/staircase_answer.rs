@@ -8,7 +8,7 @@ use super::answer::{
 };
 use super::criteria::{
     CELLS, COMBINED_SHAPE_ERROR, FEWEST_CELLS, GATE, NAMED, OWN_SLOPE_ERROR, PRIOR_NONE, SCALE_PRIOR, SIZES,
-    SLOPE_ERROR,
+    SLOPE_ERROR, TABLE_INTERVAL,
     TABLE_SLOPE_ERROR, TABLE_SLOPE_OVER_LENGTH,
 };
 use super::held_out;
@@ -161,9 +161,9 @@ fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
         parameters: vec![size(
             about.parameter,
             accepted.size,
-            accepted.std,
+            accepted.std * widened(analysis),
             freedom,
-            slope_error(analysis, accepted.change),
+            slope_error(analysis, accepted.change) * widened(analysis),
         )],
         confusable_with: confusable(analysis, accepted),
         since: localise::since(analysis, accepted),
@@ -184,13 +184,18 @@ fn confusable(analysis: &Analysis, accepted: &Accepted) -> Vec<String> {
     all.into_iter().map(|c| c.name().to_owned()).collect()
 }
 
+/// What intervals are widened by.
+fn widened(analysis: &Analysis) -> f64 {
+    if analysis.recorded { 1.0 } else { TABLE_INTERVAL }
+}
+
 /// How inexact the shape of a change is, share of its size.
 fn slope_error(analysis: &Analysis, change: Change) -> f64 {
     match change {
         Change::ForceOffset | Change::ForceDrift | Change::CoulombFriction => SLOPE_ERROR,
         _ if analysis.recorded && analysis.runs.moving => COMBINED_SHAPE_ERROR,
         _ if analysis.recorded => SLOPE_ERROR,
-        _ if analysis.own_slopes => OWN_SLOPE_ERROR,
+        Change::EndSlip if analysis.surface.curves.iter().any(|c| !c.own_by_stroke.is_empty()) => OWN_SLOPE_ERROR,
         Change::DisplacementOffset | Change::RigCompliance | Change::EndSlip => TABLE_SLOPE_OVER_LENGTH,
         _ => TABLE_SLOPE_ERROR,
     }
@@ -203,7 +208,13 @@ fn alone(analysis: &Analysis) -> Vec<(String, Size)> {
         let about = e.change.about();
         (
             about.name.to_owned(),
-            size(about.parameter, e.size, e.std, freedom, slope_error(analysis, e.change)),
+            size(
+                about.parameter,
+                e.size,
+                e.std * widened(analysis),
+                freedom,
+                slope_error(analysis, e.change) * widened(analysis),
+            ),
         )
     };
     analysis.first.estimates.iter().map(one).collect()

@@ -17,6 +17,8 @@ pub(super) struct Curves {
     pub by_pressure: Vec<f64>,
     /// ∂F/∂x, N/m; zeros where there is one length.
     pub by_stroke: Vec<f64>,
+    /// The same as AFTER shows it, beside a table; empty elsewhere.
+    pub own_by_stroke: Vec<f64>,
     /// Variance of filling and of emptying, N².
     pub variance: [Vec<f64>; 2],
 }
@@ -100,6 +102,7 @@ impl Surface {
                 gap: along(&|p| spline.gap(p)),
                 by_pressure: along(&|p| spline.slope(p)),
                 by_stroke: Vec::new(),
+                own_by_stroke: Vec::new(),
                 variance: [along(&|p| spline.variance(p, 1.0)), along(&|p| spline.variance(p, -1.0))],
             });
         }

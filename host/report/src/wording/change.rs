@@ -135,7 +135,9 @@ pub fn pattern(left: &Left) -> String {
 #[must_use]
 pub fn place(p: &Place) -> String {
     let range = if p.from == p.to {
-        format!("{:.4} {}", p.from, p.unit)
+        // Four decimals are for contractions; a pressure is a whole number of kilopascals.
+        let decimals = if p.unit.is_empty() { 4 } else { 0 };
+        format!("{:.decimals$} {}", p.from, p.unit)
     } else {
         format!("{:.0} to {:.0} {}", p.from, p.to, p.unit)
     };

@@ -13,6 +13,7 @@ use super::super::criteria::{
 };
 use super::super::held_out::Unseen;
 use super::super::report::left;
+use super::super::shapes::Change;
 use super::cells::Cells;
 use super::weigh::{Accepted, Fit, Weighed};
 
@@ -51,9 +52,20 @@ fn unseen(cells: &Cells, accepted: &[&Accepted]) -> Unseen {
 
 /// Since when: the change as it is, from one recording on, or growing over AFTER.
 fn since(cells: &Cells, fit: &Fit) -> Since {
-    use super::super::shapes::Change;
-    if matches!(fit.change, Change::ForceDrift | Change::EndSlip) || fit.change.remembers() {
-        return Since::NotDetermined;
+    match fit.change {
+        Change::ForceDrift => return Since::Gradual,
+        Change::EndSlip => {
+            // Its law has the moment as a parameter.
+            let begin = cells.rows.contexts().first().map_or(0.0, |c| c.time);
+            let time = fit.parameters.iter().find(|p| p.1 == "s").map(|p| p.2 - begin);
+            let recording = |moment: f64| {
+                let from = cells.cells.iter().filter(|c| c.time >= moment).map(|c| c.recording).min();
+                from.and_then(|r| cells.names.get(r)).cloned().unwrap_or_default()
+            };
+            return time.map_or(Since::NotDetermined, |moment| Since::From { recording: recording(moment), moment });
+        }
+        change if change.remembers() => return Since::NotDetermined,
+        _ => {}
     }
     let weigh = |factor: &dyn Fn(usize) -> f64| {
         let column = DVector::from_fn(cells.cells.len(), |i, _| fit.trace[i] * factor(i));
@@ -114,6 +126,8 @@ fn places(cells: &Cells) -> Vec<Place> {
 fn changed(cells: &Cells, accepted: &Accepted) -> Changed {
     let about = accepted.fit.change.about();
     let alone = unseen(cells, &[accepted]);
+    // The catalogue counts the pressure that the reading lacks, a change what the gauge reads too much.
+    let sign = if accepted.fit.change == Change::GaugeGain { -1.0 } else { 1.0 };
     let parameters = accepted.fit.parameters.iter();
     Changed {
         change: accepted.fit.change,
@@ -123,7 +137,7 @@ fn changed(cells: &Cells, accepted: &Accepted) -> Changed {
         class: accepted.fit.change.stroke_class(),
         share_explained: alone.share().clamp(0.0, 1.0),
         parameters: parameters
-            .map(|(name, unit, value, std)| size((name, unit), *value, *std, 1e6, CATALOGUE_LAW_ERROR))
+            .map(|(name, unit, value, std)| size((name, unit), sign * *value, *std, 1e6, CATALOGUE_LAW_ERROR))
             .collect(),
         confusable_with: accepted.competitors.iter().map(|c| c.name().to_owned()).collect(),
         since: since(cells, &accepted.fit),

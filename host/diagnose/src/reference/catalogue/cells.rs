@@ -35,6 +35,10 @@ pub(super) struct Cell {
 /// The cells of AFTER with what they differ by.
 pub(super) struct Cells {
     pub cells: Vec<Cell>,
+    /// Which state each cell is of, counted from 0.
+    pub group: Vec<usize>,
+    /// Number of states.
+    pub groups: usize,
     /// N.
     pub difference: DVector<f64>,
     /// N².
@@ -206,6 +210,7 @@ impl Cells {
             fitted = baselines::fit(&screened, Kind::Flexible(ORDERS), &[]);
         }
         let residual = fitted.raw_residual.clone();
+        let (joint, _) = baselines::without_slack(&joint, &fitted);
         let joint = baselines::linearised(&joint, &fitted);
         let states = States::of(&joint, first_after);
         let old = gathered(&joint, &states, 0..first_after);
@@ -252,8 +257,13 @@ impl Cells {
             )
             .help("record the same pressures over the same stroke"));
         }
-        cells.iter().for_each(|c| debug_assert!(!c.rows.is_empty()));
+        let mut states: Vec<Key> = cells.iter().map(|c| c.key).collect();
+        states.sort_unstable();
+        states.dedup();
+        let group = cells.iter().map(|c| states.binary_search(&c.key).unwrap_or(0)).collect();
         Ok(Self {
+            group,
+            groups: states.len(),
             difference: DVector::from_vec(difference),
             variance: DVector::from_vec(spread),
             rows,

@@ -1,13 +1,11 @@
 //! How strongly the cells support each effect of the catalogue as the change.
 
-use std::collections::BTreeMap;
-
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
 use super::super::contrast::{log_mean, log_sum};
 use super::super::criteria::{
-    CATALOGUE_LAW_ERROR, CATALOGUE_REFINED, CATALOGUE_USUAL, MOST_CHANGES, NAMED, PRIOR_UNKNOWN, SIZES,
+    CATALOGUE_INDEPENDENT, CATALOGUE_LAW_ERROR, CATALOGUE_REFINED, CATALOGUE_USUAL, MOST_CHANGES, NAMED, PRIOR_UNKNOWN, SIZES,
 };
 use super::super::shapes::{Change, Class};
 use super::cells::Cells;
@@ -50,71 +48,113 @@ pub(super) struct Weighed {
     pub alone: Vec<Fit>,
 }
 
-/// The metric of the cells: `Π = D⁻¹ − D⁻¹Z(I + Z'D⁻¹Z)⁻¹Z'D⁻¹`, D the cells' own variance, Z what may differ without a change.
-struct Metric {
+/// The metric of the cells: the inverse of `D + s²GG' + ZZ'`, freed of what was named before. `D` is the cells' own variance; `G` gives
+/// each state a difference of its own, of deviation `s`, which no law describes; `Z` is what campaigns usually differ by.
+struct Metric<'a> {
+    cells: &'a Cells,
     inverse: DVector<f64>,
+    /// By group, 1/(1/s² + Σ 1/d).
+    shrunk: Vec<f64>,
     z: DMatrix<f64>,
+    images: DMatrix<f64>,
     factor: Option<Cholesky<f64, Dyn>>,
+    /// Log density of the difference without an effect, up to a constant.
+    density: f64,
+    projected: DVector<f64>,
 }
 
-impl Metric {
-    fn of(cells: &Cells, taken: &[DVector<f64>]) -> Self {
+impl<'a> Metric<'a> {
+    fn of(cells: &'a Cells, usual: &[DVector<f64>], deviation: f64) -> Self {
         let n = cells.cells.len();
-        let mut columns: Vec<DVector<f64>> = Vec::new();
-        let unit = CATALOGUE_USUAL * cells.largest;
-        let recordings = cells.cells.iter().map(|c| c.recording + 1).max().unwrap_or(0);
-        for recording in 0..recordings {
-            let own =
-                |i: usize, _| if cells.cells[i].recording == recording { unit } else { 0.0 };
-            columns.push(DVector::from_fn(n, own));
-        }
-        // The whole campaign: gain, zero of the gauge, stroke, friction; each by the usual difference.
-        let contexts = cells.rows.contexts();
-        let of_rows = |value: &dyn Fn(usize) -> f64| {
-            let column: Vec<f64> = (0..contexts.len()).map(value).collect();
-            cells.means(&column)
-        };
-        let usual = [
-            of_rows(&|i| contexts[i].quasi),
-            of_rows(&|i| contexts[i].pull_per_pressure()),
-            of_rows(&|i| contexts[i].stiffness),
-            of_rows(&|i| contexts[i].quasi * contexts[i].direction),
-        ];
-        for column in usual {
-            let peak = column.amax();
-            if peak > 0.0 && peak.is_finite() {
-                columns.push(column * (unit / peak));
-            }
-        }
-        for column in taken {
-            let size = column.amax();
-            if size > 0.0 {
-                columns.push(column * (1e3 * cells.largest / size));
-            }
-        }
-        let z = if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) };
         let inverse = cells.variance.map(|v| 1.0 / v);
-        let mut weighted = z.clone();
+        let mut sums = vec![0.0; cells.groups];
         for (i, w) in inverse.iter().enumerate() {
-            weighted.row_mut(i).scale_mut(*w);
+            sums[cells.group[i]] += w;
         }
-        let inner = DMatrix::identity(z.ncols(), z.ncols()) + z.tr_mul(&weighted);
-        Self { inverse, z, factor: inner.cholesky() }
+        let s2 = deviation * deviation;
+        let shrunk = sums.iter().map(|w| 1.0 / (1.0 / s2 + w)).collect();
+        let z = if usual.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(usual) };
+        let spread: f64 = cells.variance.iter().map(|v| v.ln()).sum::<f64>()
+            + sums.iter().map(|w| (s2 * w).ln_1p()).sum::<f64>();
+        let mut metric = Self {
+            cells,
+            inverse,
+            shrunk,
+            images: z.clone(),
+            z,
+            factor: None,
+            density: 0.0,
+            projected: DVector::zeros(n),
+        };
+        for k in 0..metric.z.ncols() {
+            let image = metric.own(&metric.z.column(k).into_owned());
+            metric.images.set_column(k, &image);
+        }
+        let inner = DMatrix::identity(metric.z.ncols(), metric.z.ncols()) + metric.z.tr_mul(&metric.images);
+        metric.factor = inner.cholesky();
+        let of_z: f64 =
+            metric.factor.as_ref().map_or(0.0, |f| f.l_dirty().diagonal().iter().map(|v| 2.0 * v.ln()).sum());
+        metric.projected = metric.apply(&cells.difference);
+        metric.density = -0.5 * (spread + of_z + cells.difference.dot(&metric.projected));
+        metric
+    }
+
+    /// Without `Z`.
+    fn own(&self, v: &DVector<f64>) -> DVector<f64> {
+        let mut weighted = v.component_mul(&self.inverse);
+        let mut sums = vec![0.0; self.shrunk.len()];
+        for (i, w) in weighted.iter().enumerate() {
+            sums[self.cells.group[i]] += w;
+        }
+        for i in 0..weighted.len() {
+            let g = self.cells.group[i];
+            weighted[i] -= self.inverse[i] * self.shrunk[g] * sums[g];
+        }
+        weighted
     }
 
     fn apply(&self, v: &DVector<f64>) -> DVector<f64> {
-        let weighted = v.component_mul(&self.inverse);
-        let Some(factor) = &self.factor else { return weighted };
-        let back = &self.z * factor.solve(&self.z.tr_mul(&weighted));
-        weighted - back.component_mul(&self.inverse)
+        let own = self.own(v);
+        let Some(factor) = &self.factor else { return own };
+        let back = factor.solve(&self.images.tr_mul(v));
+        own - &self.images * back
     }
+}
+
+/// What campaigns usually differ by without a change, as columns of one standard deviation; and what was named before, at any size.
+fn usual(cells: &Cells, taken: &[DVector<f64>]) -> Vec<DVector<f64>> {
+    let n = cells.cells.len();
+    let unit = CATALOGUE_USUAL * cells.largest;
+    let recordings = cells.cells.iter().map(|c| c.recording + 1).max().unwrap_or(0);
+    let zero = |recording: usize| {
+        DVector::from_fn(n, |i, _| if cells.cells[i].recording == recording { unit } else { 0.0 })
+    };
+    let mut columns: Vec<DVector<f64>> = (0..recordings).map(zero).collect();
+    let contexts = cells.rows.contexts();
+    let of_rows = |value: &dyn Fn(usize) -> f64| {
+        let column: Vec<f64> = (0..contexts.len()).map(value).collect();
+        cells.means(&column)
+    };
+    // The whole campaign: gain, zero of the gauge, stroke, friction.
+    let whole = [
+        of_rows(&|i| contexts[i].quasi),
+        of_rows(&|i| contexts[i].pull_per_pressure()),
+        of_rows(&|i| contexts[i].stiffness),
+        of_rows(&|i| contexts[i].quasi * contexts[i].direction),
+    ];
+    let scaled = |column: &DVector<f64>, size: f64| {
+        let peak = column.amax();
+        (peak > 0.0 && peak.is_finite()).then(|| column * (size / peak))
+    };
+    columns.extend(whole.iter().filter_map(|c| scaled(c, unit)));
+    columns.extend(taken.iter().filter_map(|c| scaled(c, 30.0 * cells.largest)));
+    columns
 }
 
 /// An effect at one set of shapes; `None` where the cells do not show it.
 fn fit(
     cells: &Cells,
-    metric: &Metric,
-    projected: &DVector<f64>,
+    metric: &Metric<'_>,
     candidate: &Candidate,
     shapes: &[f64],
 ) -> Option<Fit> {
@@ -130,7 +170,7 @@ fn fit(
     let u = DMatrix::from_columns(&unit);
     let images: Vec<DVector<f64>> = unit.iter().map(|c| metric.apply(c)).collect();
     let g = u.tr_mul(&DMatrix::from_columns(&images));
-    let b = u.tr_mul(projected);
+    let b = u.tr_mul(&metric.projected);
     let k = live.len();
     let prior = |size: f64| (size * cells.largest).powi(2) / k as f64;
     let mut each = Vec::new();
@@ -169,15 +209,10 @@ fn fit(
 }
 
 /// The best shape of one effect, and its evidence as a mean over the grid.
-fn scan(
-    cells: &Cells,
-    metric: &Metric,
-    projected: &DVector<f64>,
-    candidate: &Candidate,
-) -> Option<Fit> {
+fn scan(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate) -> Option<Fit> {
     let grid = candidate.grid();
     let fits: Vec<Fit> =
-        grid.iter().filter_map(|shapes| fit(cells, metric, projected, candidate, shapes)).collect();
+        grid.iter().filter_map(|shapes| fit(cells, metric, candidate, shapes)).collect();
     let logs: Vec<f64> = fits.iter().map(|f| f.log).collect();
     let mean = log_sum(&logs) - (grid.len().max(1) as f64).ln();
     let mut best = fits.into_iter().max_by(|a, b| a.log.total_cmp(&b.log))?;
@@ -186,7 +221,7 @@ fn scan(
         let near = candidate.neighbours(&best.shapes, step);
         let better = near
             .iter()
-            .filter_map(|shapes| fit(cells, metric, projected, candidate, shapes))
+            .filter_map(|shapes| fit(cells, metric, candidate, shapes))
             .max_by(|a, b| a.log.total_cmp(&b.log))
             .filter(|f| f.log > best.log);
         match better {
@@ -199,65 +234,37 @@ fn scan(
     Some(best)
 }
 
-/// A change of each state by itself, which no law ties together.
-fn unknown(cells: &Cells, difference: &DVector<f64>) -> f64 {
-    let mut groups: BTreeMap<_, (f64, f64)> = BTreeMap::new();
-    for (i, cell) in cells.cells.iter().enumerate() {
-        let (level, sign, bin, _) = cell.key;
-        let g = groups.entry((level, sign, bin)).or_insert((0.0, 0.0));
-        *g = (g.0 + 1.0 / cells.variance[i], g.1 + difference[i] / cells.variance[i]);
-    }
-    let own = (CATALOGUE_USUAL * cells.largest).powi(2);
-    let each: Vec<f64> = SIZES[..3]
-        .iter()
-        .map(|size| {
-            let t = (size * cells.largest).powi(2);
-            let one = |(w, s): &(f64, f64)| {
-                let (v, d) = (1.0 / w + own, s / w);
-                -0.5 * (t / v).ln_1p() + 0.5 * d * d * t / (v * (v + t))
-            };
-            groups.values().map(one).sum()
-        })
-        .collect();
-    log_mean(&each)
-}
-
 /// One weighing.
 struct Round {
     none: f64,
     unknown: f64,
     fits: Vec<(Fit, f64)>,
-    /// Log evidence of the best, before tempering.
-    best: f64,
 }
 
 impl Round {
+    /// `first`: rms of what was named before, N.
     fn of(cells: &Cells, candidates: &[Candidate], taken: &[DVector<f64>], none: f64, first: f64) -> Self {
-        let metric = Metric::of(cells, taken);
-        let projected = metric.apply(&cells.difference);
-        let mut fits: Vec<Fit> =
-            candidates.par_iter().filter_map(|c| scan(cells, &metric, &projected, c)).collect();
+        let columns = usual(cells, taken);
+        // What a law leaves of what it explains, no law describes.
+        let least = (CATALOGUE_USUAL * cells.largest).hypot(CATALOGUE_LAW_ERROR * first);
+        let still = Metric::of(cells, &columns, least);
+        let size = (cells.difference.norm_squared() / cells.cells.len().max(1) as f64).sqrt();
+        let metric = Metric::of(cells, &columns, least.hypot(CATALOGUE_LAW_ERROR * size));
+        let mut fits: Vec<Fit> = candidates.par_iter().filter_map(|c| scan(cells, &metric, c)).collect();
+        fits.iter_mut().for_each(|f| f.log += metric.density - still.density);
         fits.sort_by(|a, b| b.log.total_cmp(&a.log).then(a.change.cmp(&b.change)));
-        let best = fits.first().map_or(0.0, |f| f.log);
-        // A law that is wrong by a share of its size leaves that share of what it explains: evidence counts as with a variance larger
-        // by so much.
-        let factor = 1.0 + 2.0 * CATALOGUE_LAW_ERROR * CATALOGUE_LAW_ERROR * best.max(first).max(0.0);
-        let unknown_log = if taken.is_empty() { unknown(cells, &cells.difference) } else { f64::NEG_INFINITY };
-        let top = best.max(unknown_log).max(0.0);
-        let tempered = |log: f64| top - (top - log) / factor;
+        let free = SIZES.map(|s| Metric::of(cells, &columns, s * cells.largest).density - still.density);
+        let unknown = log_mean(&free);
+        // States differ from a law together, not each by itself.
+        let factor = (cells.groups as f64 / CATALOGUE_INDEPENDENT).max(1.0);
         let share = (1.0 - none - PRIOR_UNKNOWN).max(1e-3) / fits.len().max(1) as f64;
-        let logs: Vec<f64> = [none.ln() + tempered(0.0), PRIOR_UNKNOWN.ln() + tempered(unknown_log)]
+        let logs: Vec<f64> = [none.ln(), PRIOR_UNKNOWN.ln() + unknown / factor]
             .into_iter()
-            .chain(fits.iter().map(|f| share.ln() + tempered(f.log)))
+            .chain(fits.iter().map(|f| share.ln() + f.log / factor))
             .collect();
         let total = log_sum(&logs);
         let p: Vec<f64> = logs.iter().map(|l| (l - total).exp()).collect();
-        Self {
-            none: p[0],
-            unknown: p[1],
-            fits: fits.into_iter().zip(p[2..].iter().copied()).collect(),
-            best,
-        }
+        Self { none: p[0], unknown: p[1], fits: fits.into_iter().zip(p[2..].iter().copied()).collect() }
     }
 
     fn class(&self, class: Class) -> f64 {
@@ -300,7 +307,8 @@ pub(super) fn weigh(cells: &Cells, none: f64) -> Weighed {
     probabilities.push(("none".into(), first.none));
     probabilities.push(("unknown".into(), first.unknown));
     probabilities.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    let (first_none, strongest) = (first.none, first.best);
+    let first_none = first.none;
+    let mut explained = 0.0_f64;
     let alone = first.fits.iter().map(|(f, _)| f.clone()).collect();
     let mut round = first;
     while accepted.len() < MOST_CHANGES {
@@ -310,8 +318,9 @@ pub(super) fn weigh(cells: &Cells, none: f64) -> Weighed {
             break;
         }
         taken.extend(next.fit.columns.iter().cloned());
+        explained = explained.hypot((next.fit.trace.norm_squared() / cells.cells.len() as f64).sqrt());
         accepted.push(next);
-        round = Round::of(cells, &candidates, &taken, none, strongest);
+        round = Round::of(cells, &candidates, &taken, none, explained);
     }
     Weighed { probabilities, none: first_none, last_none: round.none, accepted, alone }
 }
