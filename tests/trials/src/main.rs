@@ -25,6 +25,7 @@ mod proof_page;
 mod queue;
 mod rate;
 mod reference;
+mod reference_bench;
 mod report;
 mod residuals;
 mod score;
@@ -50,6 +51,16 @@ struct Cli {
     jobs: usize,
     #[command(subcommand)]
     command: Command,
+}
+
+/// Which set of which kind.
+#[derive(Args)]
+struct Kind {
+    /// dev (public seed) or final (secret seed from the system, or --seed).
+    #[arg(long = "set", default_value = "dev")]
+    kind: String,
+    #[command(flatten)]
+    what: Set,
 }
 
 /// Which set.
@@ -193,6 +204,8 @@ enum Command {
     Sensors(sensors::Sensors),
     /// Diagnose changes: changes added to later runs of real recordings, untouched pairs, a cylinder whose seal was replaced.
     Reference(reference::Reference),
+    /// Diagnose changes between two campaigns of the virtual bench, of which the later one has one effect: a sealed set.
+    ReferenceBench(reference_bench::Options),
     /// Campaigns that choose their own steps, compared with protocol C for the same time, random steps, and single proposals.
     Campaign(campaign::Campaigns),
     /// Generate, answer and score; each step continues where an earlier run was interrupted.
@@ -253,6 +266,10 @@ fn main() -> ExitCode {
         Command::Sensitivity(study) => sensitivity::run(&study),
         Command::Sensors(what) => sensors::run(&what),
         Command::Reference(what) => reference::run(&what),
+        Command::ReferenceBench(what) => {
+            let specs = specs(&what.set.kind, &what.set.what);
+            specs.and_then(|(seed, specs)| reference_bench::run(&what, seed, specs))
+        }
         Command::Prove { set, what, tool, check } => prove(&set, &what, &tool, check),
     };
     match done {
@@ -296,7 +313,8 @@ fn composition(n: usize) -> spec::Composition {
     if n == 330 { spec::Composition::FINAL } else { spec::Composition::scaled(n) }
 }
 
-fn generate(set: &str, what: &Set) -> Result<(), Box<dyn Error>> {
+/// The seed of a set and its trials.
+fn specs(set: &str, what: &Set) -> Result<(u64, Vec<spec::Spec>), Box<dyn Error>> {
     let output = &what.output;
     let seed = match (what.seed, set) {
         (Some(s), _) => s,
@@ -308,6 +326,13 @@ fn generate(set: &str, what: &Set) -> Result<(), Box<dyn Error>> {
     let mut specs = spec::draw(seed, set, composition(what.n));
     let drawn = specs.len();
     specs.truncate(what.take.unwrap_or(drawn).max(1));
+    Ok((seed, specs))
+}
+
+fn generate(set: &str, what: &Set) -> Result<(), Box<dyn Error>> {
+    let output = &what.output;
+    let (seed, specs) = specs(set, what)?;
+    let drawn = what.n;
     let residuals = residuals::Residuals::read(&what.data);
     if residuals.is_empty() {
         eprintln!("no real recordings in {}: all noise is synthetic", what.data.display());
