@@ -18,6 +18,7 @@
 //! | messages that wait to be sent to the host | [`outbox`] |
 //! | static memory for large values | [`placement`], [`shared_buffer`] |
 //! | the tasks that a board starts | [`tasks`] |
+//! | signals to readings, filters | [`signals`] |
 //! | the length of a tick | [`tick`] |
 //! | what a board must give | [`board`] |
 //! | log lines on their way to the host | `log` (feature of that name) |
@@ -45,6 +46,7 @@ pub mod safety;
 pub mod server;
 pub mod shared;
 pub mod shared_buffer;
+pub mod signals;
 pub mod store;
 pub mod tasks;
 pub mod tick;

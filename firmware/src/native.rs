@@ -10,7 +10,7 @@
 //! let plant = |outputs: &Outputs| {
 //!     let pressure_pa = outputs.sides[0].pressure_pa;
 //!     let readings = Readings { pressure_pa, ..Readings::default() };
-//!     Inputs { sides: [Some(readings), None], ..Inputs::default() }
+//!     Inputs { sides: [Some(readings.into()), None], ..Inputs::default() }
 //! };
 //! let device = Device::start("127.0.0.1:0", Options::default(), plant)?;
 //! let mut port = std::net::TcpStream::connect(device.address())?;

@@ -69,6 +69,7 @@ mod tests {
         published::<super::device::Ports>("pam-ports-1");
         published::<super::device::Regulator>("pam-regulator-1");
         published::<super::device::Rollback>("pam-rollback-1");
+        published::<super::device::Sensors>("pam-sensors-1");
         published::<super::device::Settings>("pam-device-settings-1");
         published::<super::device::Trace<'_>>("pam-trace-1");
         published::<super::device::Vent>("pam-vent-1");

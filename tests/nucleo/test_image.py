@@ -104,6 +104,97 @@ class Control(unittest.TestCase):
         self.assertLessEqual(total / ticks, MOST_INSTRUCTIONS)
 
 
+class Inputs(unittest.TestCase):
+    """Scales, second pressure sensor, supply air, enable input, output to the regulator, status light."""
+
+    def run_at(self, board, pascals):
+        board.start(PRESSURE_MODE)
+        board.link.set_point(0, pascals)
+        board.run(0.4)
+        self.assertEqual(board.link.status()["fault"], None)
+
+    def assert_vented_within(self, board, seconds, fault):
+        self.assertTrue(board.run(seconds, lambda: board.chip.valve_open), f"not vented within {seconds * 1e3} ms")
+        board.run(0.01)
+        self.assertEqual(board.link.status()["fault"], fault)
+
+    def test_signals_are_the_volts_at_the_pins(self):
+        board = Board()
+        board.link.signals()
+        board.run(0.5)
+        ticks, volts, enabled = board.link.signals()
+        self.assertAlmostEqual(ticks, 500, delta=15)
+        for found, expected in zip(volts, (125e3 / 375e3, 0.0043 / 0.016848, 1.65, 125e3 / 375e3, 925e3 / 375e3)):
+            self.assertAlmostEqual(found, expected, delta=0.003)
+        self.assertTrue(enabled)
+
+    def test_another_pressure_sensor_is_a_matter_of_settings(self):
+        # 0–16 bar as 0–3 V; the range and limit of the settings lie within.
+        board = Board()
+        board.to_volts = lambda pascals: 0.2 + pascals * 1.5e-6
+        board.link.change(scales__pressure__at_zero=-0.2 / 1.5e-6, scales__pressure__per_unit=1 / 1.5e-6)
+        self.run_at(board, 300e3)
+        self.assertAlmostEqual(board.pressure_pa, 300e3, delta=3e3)
+
+    def test_a_scale_with_which_no_limit_could_be_crossed_is_refused(self):
+        board = Board()
+        with self.assertRaises(Refused):
+            board.link.change(scales__pressure__per_unit=375e2)
+        with self.assertRaises(Refused):
+            board.link.change(scales__pressure__per_unit=float("nan"))
+
+    def test_a_regulator_with_a_current_input_begins_at_a_fifth(self):
+        board = Board()
+        board.regulator = lambda volts: max(0.0, volts / 3.3 - 0.2) / 0.8 * 1e6
+        board.link.change(command__low=0.2)
+        board.run(0.01)
+        self.assertAlmostEqual(board.chip.command_volts, 0.66, delta=0.002)
+        self.run_at(board, 300e3)
+        self.assertAlmostEqual(board.chip.command_volts, 0.44 * 3.3, delta=0.01)
+        self.assertAlmostEqual(board.pressure_pa, 300e3, delta=3e3)
+
+    def test_a_second_pressure_sensor_that_says_something_else_vents(self):
+        board = Board()
+        board.link.change(watch__second_pressure_pa=20e3)
+        self.run_at(board, 300e3)
+        board.second_error_pa = 30e3
+        self.assert_vented_within(board, 0.21, "pressure-sensors-disagree")
+
+    def test_supply_air_that_is_low_vents(self):
+        board = Board()
+        board.link.change(watch__supply_low_pa=500e3)
+        self.run_at(board, 300e3)
+        board.supply_pa = 400e3
+        self.assert_vented_within(board, 0.21, "supply-pressure-low")
+
+    def test_an_open_enable_input_vents_within_three_ticks(self):
+        board = Board()
+        board.link.change(enable_input=True)
+        self.run_at(board, 300e3)
+        board.enabled = False
+        self.assert_vented_within(board, 0.0035, "enable-open")
+        board.run(0.5)
+        with self.assertRaises(Refused):
+            board.link.ask(CLEAR_FAULT)
+
+    def test_the_light_tells_the_state(self):
+        board = Board()
+
+        def changes(seconds):
+            lights = []
+            for _ in range(int(seconds * 100)):
+                board.run(0.01)
+                lights.append(board.chip.porta.drives_high(5))
+            return sum(a != b for a, b in zip(lights, lights[1:])), sum(lights) / len(lights)
+
+        self.assertLess(changes(2.0)[1], 0.1, "disarmed: a short flash")
+        self.run_at(board, 300e3)
+        self.assertEqual(changes(0.5), (0, 1.0), "running: on")
+        board.cable = False
+        board.run(0.02)
+        self.assertGreater(changes(0.5)[0], 8, "fault: ten flashes a second")
+
+
 class Line(unittest.TestCase):
     def test_no_byte_is_lost_while_something_is_controlled(self):
         # Slow memory: two cycles for each instruction.

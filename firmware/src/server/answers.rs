@@ -5,10 +5,10 @@ use model_core::effects::Memory;
 use model_core::image::{self, ImageError};
 use model_core::link::endpoints::Service;
 use model_core::link::messages::{
-    DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, HealthRead, HealthSums, PIECE,
-    PastFault, ReferenceOrder, ReferencePoints, Refusal, RollBack, Session, SetPointOrder, Side, Start,
-    State, Status, TableBegin, TableInfo, TablePiece, TableRead, TelemetryRate, TraceArm, TraceInfo,
-    TracePiece, TraceRead, Value,
+    DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, HealthRead, HealthSums, MeanSignals,
+    PIECE, PastFault, ReferenceOrder, ReferencePoints, Refusal, RollBack, Session, SetPointOrder, Side,
+    SignalsRead, Start, State, Status, TableBegin, TableInfo, TablePiece, TableRead, TelemetryRate, TraceArm,
+    TraceInfo, TracePiece, TraceRead, Value,
 };
 use model_core::link::settings::Settings;
 use model_core::muscle::AtStroke;
@@ -268,6 +268,17 @@ impl<F: NorFlash> Service for Answers<'_, F> {
 
     fn health(&mut self, request: &HealthRead, answer: &mut HealthSums) -> Result<(), Refusal> {
         self.shared.with(|controller| controller.health(request.side).describe(answer));
+        Ok(())
+    }
+
+    fn signals(&mut self, request: &SignalsRead, answer: &mut MeanSignals) -> Result<(), Refusal> {
+        self.drives(request.side)?;
+        self.shared.with(|controller| controller.take_signals(request.side, answer));
+        Ok(())
+    }
+
+    fn board_settings(&mut self, (): &(), answer: &mut Settings) -> Result<(), Refusal> {
+        *answer = self.shared.with(|controller| controller.hardware()).settings;
         Ok(())
     }
 

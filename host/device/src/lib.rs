@@ -10,6 +10,7 @@
 //! | a run from start to vent | [`mod@run`] |
 //! | venting while the conversation waits for something else | [`VentLine`] |
 //! | the pressure regulator, found from steps | [`regulator`] |
+//! | scales of sensors from known values | [`calibration`] |
 //! | log lines of the firmware as text | [`log_table`] |
 //! | telemetry to a recording | [`recorder`] |
 //! | messages about refusals and faults, with their remedy | [`messages`] |
@@ -17,6 +18,7 @@
 //! | why a setpoint could not be reached | [`reachability`] |
 
 mod address;
+pub mod calibration;
 mod client;
 #[cfg(feature = "emulated")]
 pub mod emulated;

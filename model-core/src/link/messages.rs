@@ -25,7 +25,7 @@ pub use self::table::{
     Evaluate, Evaluated, ForgetMemory, PIECE, POINTS, Point, RollBack, TableBegin, TableInfo, TablePiece,
     TableRead, Value,
 };
-pub use self::telemetry::{Event, SideSample, Telemetry, TelemetryRate};
+pub use self::telemetry::{Event, MeanSignals, SideSample, Signals, SignalsRead, Telemetry, TelemetryRate};
 pub use self::trace::{
     TRACE_PIECE, TRACE_VARIABLES, TraceArm, TraceInfo, TracePiece, TraceRead, Trigger, Variable,
 };

@@ -144,6 +144,8 @@ const fn field_name(field: Field) -> &'static str {
         Field::SensorWatch => "a sensor monitor in the settings",
         Field::Watch => "the setting `watch`",
         Field::Bands => "a band of motion in the settings",
+        Field::Scale => "the scale or the filter of a sensor",
+        Field::Command => "the output to the pressure regulator",
         Field::Rate => "the rate of telemetry or of a trace",
     }
 }
