@@ -20,6 +20,7 @@
 //! | the tasks that a board starts | [`tasks`] |
 //! | signals to readings, filters | [`signals`] |
 //! | the length of a tick | [`tick`] |
+//! | another firmware over the link | [`update`] |
 //! | what a board must give | [`board`] |
 //! | log lines on their way to the host | `log` (feature of that name) |
 //! | all of it in a host's own process | `native` (feature of that name) |
@@ -51,4 +52,5 @@ pub mod store;
 pub mod tasks;
 pub mod tick;
 pub mod trace;
+pub mod update;
 pub mod watch;

@@ -57,9 +57,11 @@ impl Filters {
     }
 }
 
-/// Sums of a muscle's signals over the first second after they were read.
+/// Sums of a muscle's signals over the first second after they were last taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
+    /// Whether someone reads them: a tick in which nobody does costs nothing.
+    read: bool,
     ticks: u16,
     sums: [f32; 5],
     second_pressure: bool,
@@ -68,11 +70,17 @@ pub struct Sums {
 
 impl Sums {
     /// Adds one tick, until the mean is complete.
+    #[inline]
     pub fn add(&mut self, now: &Signals, supply: Option<f32>) {
-        if self.ticks >= COMPLETE {
-            return;
+        if self.read {
+            self.add_read(now, supply);
         }
+    }
+
+    #[inline(never)]
+    fn add_read(&mut self, now: &Signals, supply: Option<f32>) {
         self.ticks += 1;
+        self.read = self.ticks < COMPLETE;
         self.second_pressure = now.second_pressure.is_some();
         self.supply = supply.is_some();
         let second = now.second_pressure.unwrap_or(0.0);
@@ -84,7 +92,8 @@ impl Sums {
 
     /// Gives the means and begins anew.
     pub fn take(&mut self, answer: &mut MeanSignals) {
-        let Self { ticks, sums, second_pressure, supply } = core::mem::take(self);
+        let Self { ticks, sums, second_pressure, supply, .. } =
+            core::mem::replace(self, Self { read: true, ..Self::default() });
         let [pressure, stroke, force, second, air] = sums.map(|sum| sum / f32::from(ticks.max(1)));
         answer.ticks = ticks;
         answer.mean = Signals { pressure, stroke, force, second_pressure: second_pressure.then_some(second) };
@@ -114,6 +123,8 @@ mod tests {
     fn means_are_those_of_the_first_second_after_they_were_read() {
         let mut sums = Sums::default();
         let mut answer = MeanSignals::default();
+        sums.take(&mut answer);
+        assert_eq!(answer.ticks, 0, "nobody has read them before");
         for tick in 0..3_000_u16 {
             let force = if tick < 1_000 { 1.6 + 1e-3 * f32::from(tick % 2) } else { 99.0 };
             let now = Signals { pressure: 0.3, stroke: 1.0, force, second_pressure: Some(0.31) };

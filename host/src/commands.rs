@@ -29,3 +29,4 @@ pub mod settings;
 pub mod stock;
 pub mod studio;
 pub mod table;
+pub mod update;

@@ -7,7 +7,7 @@ from chip import Chip
 from link import HEARTBEAT_S, Link
 
 ROOT = Path(__file__).resolve().parents[2]
-IMAGE = ROOT / "target/firmware/nucleo-f446re.elf"
+IMAGE = ROOT / "target/firmware/nucleo-f446re-test.elf"
 TABLE = Path(__file__).resolve().parent / "example-table.bin"
 
 LAG_S = 0.03

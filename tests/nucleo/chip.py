@@ -235,7 +235,9 @@ class Chip:
         self.active.append(line)
         self.uc.reg_write(UC_ARM_REG_SP, stack)
         self.uc.reg_write(UC_ARM_REG_LR, RETURN)
-        handler = struct.unpack("<I", self.uc.mem_read(FLASH + 4 * (16 + line), 4))[0]
+        # The vector table is where VTOR says: the boot loader has set it.
+        table = self.words.get(0xE000ED08, 0) or FLASH
+        handler = struct.unpack("<I", self.uc.mem_read(table + 4 * (16 + line), 4))[0]
         self.uc.reg_write(UC_ARM_REG_PC, handler | 1)
         self.now += 12 / self.hz
 

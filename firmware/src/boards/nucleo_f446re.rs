@@ -17,7 +17,7 @@
 //! starts its pins are open, so that they alone keep the valve open and the command at zero.
 //!
 //! The control loop runs on an interrupt of its own above all other tasks, at 1 kHz, and feeds the watchdog; if it stops for
-//! 20 ms, the chip restarts, vented, with the fault latched. The store is the last two flash sectors of 128 KiB. Erasing one stops the
+//! 20 ms, the chip restarts, vented, with the fault latched. Flash: see `slots.rs`. Erasing a sector stops the
 //! processor for up to two seconds, which is why the store is only written while every muscle is vented.
 //!
 //! | priority | interrupts |
@@ -33,6 +33,7 @@ mod flash;
 mod outputs;
 mod power;
 mod sampling;
+mod slots;
 mod status_light;
 mod uart;
 mod watchdog;
@@ -52,6 +53,7 @@ use firmware::server::Server;
 use firmware::shared::Shared;
 use firmware::tasks;
 use firmware::tick::TICK_US;
+use firmware::update::Updater;
 use model_core::link::hello::Board;
 use model_core::link::messages::{Fault, StartedBy};
 use model_core::link::settings::{
@@ -61,6 +63,7 @@ use static_cell::StaticCell;
 
 use self::flash::StoreFlash;
 use self::outputs::dump;
+use self::slots::Slots;
 use self::status_light::StatusLight;
 use self::uart::{Receiver, Sender};
 
@@ -248,8 +251,14 @@ fn spawn(spawner: Spawner, start: &Start) -> Option<()> {
     };
     // In a place of its own: a task would keep it twice, as its argument and as its variable.
     static SERVER: StaticCell<Server<StoreFlash>> = StaticCell::new();
+    // SAFETY: the store and the slots use different sectors, and only the link's task uses either.
+    let slots_flash = Flash::new_blocking(unsafe { embassy_stm32::peripherals::FLASH::steal() });
     let flash = StoreFlash::new(Flash::new_blocking(p.FLASH));
     let server = SERVER.init(Server::start(identity, flash, shared).ok()?);
+    if let Some(key) = slots::KEY {
+        static UPDATER: StaticCell<Updater<Slots>> = StaticCell::new();
+        server.take_updates(UPDATER.init(Updater::new(Slots::new(slots_flash), key)));
+    }
     CONTROL.start(interrupt::UART5).spawn(control(shared).ok()?);
     spawner.spawn(telemetry(port, shared).ok()?);
     spawner.spawn(link(Receiver::new(shared), port, shared, server).ok()?);

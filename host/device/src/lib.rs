@@ -7,6 +7,7 @@
 //! | hello, typed calls, topics, losses | [`Client`] |
 //! | tables: upload in pieces, read back | [`tables`] |
 //! | setpoints over time | [`setpoint_profile`] |
+//! | firmware over the link | [`mod@update`] |
 //! | a run from start to vent | [`mod@run`] |
 //! | venting while the conversation waits for something else | [`VentLine`] |
 //! | the pressure regulator, found from steps | [`regulator`] |
@@ -36,6 +37,7 @@ pub mod run;
 pub mod setpoint_profile;
 pub mod table_diff;
 pub mod tables;
+pub mod update;
 mod vent_line;
 
 pub use address::Address;

@@ -133,6 +133,27 @@ pub(crate) struct Regulator {
     pub kept: bool,
 }
 
+/// `host update --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Firmware {
+    pub schema: &'static str,
+    /// The slot that runs.
+    pub running: u8,
+    pub slots: Vec<Option<FirmwareSlot>>,
+}
+
+/// Firmware in a slot.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct FirmwareSlot {
+    pub release: String,
+    pub bytes: u32,
+    pub crc: String,
+    /// Whether a host has talked to it; without that it is given up after three starts.
+    pub confirmed: bool,
+}
+
 /// `host device sensors --json`.
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]

@@ -5,7 +5,7 @@ use super::messages::{
     DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, HealthRead, HealthSums, MeanSignals,
     PastFault, ReferenceOrder, ReferencePoints, Refusal, RollBack, Session, SetPointOrder, SignalsRead,
     Start, Status, TableBegin, TableInfo, TablePiece, TableRead, TelemetryRate, TraceArm, TraceInfo,
-    TracePiece, TraceRead,
+    TracePiece, TraceRead, UpdateBegin, UpdatePiece, UpdateStatus,
 };
 use super::messages::{Event, Telemetry};
 use super::settings::Settings;
@@ -191,6 +191,18 @@ endpoints! {
     29 signals ReadSignals: SignalsRead => MeanSignals;
     /// The board's own settings: those of a new device.
     30 board_settings GetBoardSettings: () => Settings;
+    /// What is in the two slots for firmware; refused where a board has none, or the firmware has no key.
+    31 update GetUpdate: () => UpdateStatus;
+    /// Begins an installation of another firmware; only while every muscle is vented.
+    32 update_begin BeginUpdate: UpdateBegin => UpdateStatus;
+    /// The next piece of the program; the answer is how many bytes are there. Only while every muscle is vented.
+    33 update_piece SendUpdatePiece: UpdatePiece => u32;
+    /// Checks the whole program and makes it the one of the next start; only while every muscle is vented.
+    34 update_commit CommitUpdate: () => UpdateStatus;
+    /// Confirms the program that runs: it stays, whatever happens at the next starts. Only while every muscle is vented.
+    35 update_confirm ConfirmUpdate: () => UpdateStatus;
+    /// Makes the other program the one of the next start; only while every muscle is vented.
+    36 update_revert RevertUpdate: () => UpdateStatus;
 }
 
 /// Topic of [`Telemetry`].

@@ -8,6 +8,7 @@ mod safety;
 mod table;
 mod telemetry;
 mod trace;
+mod update;
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -29,6 +30,7 @@ pub use self::telemetry::{Event, MeanSignals, SideSample, Signals, SignalsRead, 
 pub use self::trace::{
     TRACE_PIECE, TRACE_VARIABLES, TraceArm, TraceInfo, TracePiece, TraceRead, Trigger, Variable,
 };
+pub use self::update::{Installed, UpdateBegin, UpdateFault, UpdatePiece, UpdateStatus};
 
 codes! {
     /// Which muscle of the board.

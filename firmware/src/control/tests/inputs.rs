@@ -145,12 +145,13 @@ fn the_output_is_a_part_of_its_range_from_its_low_end_on() {
 #[test]
 fn signals_are_read_as_means_before_any_scale() {
     let mut bench = Bench::new(|settings| settings.scales.force.per_unit = 1_000.0);
+    let mut answer = MeanSignals::default();
+    bench.controller.take_signals(Side::Agonist, &mut answer);
     bench.pass_with(50, |now, inputs| {
         now.force_n = 0.25;
         second(inputs, Some(0.5));
         inputs.supply_air = Some(1.5);
     });
-    let mut answer = MeanSignals::default();
     bench.controller.take_signals(Side::Agonist, &mut answer);
     assert_eq!((answer.ticks, answer.mean.force, answer.mean.second_pressure), (50, 0.25, Some(0.5)));
     assert_eq!((answer.supply, answer.enabled), (Some(1.5), true));

@@ -3,7 +3,7 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use super::{Fault, Mode, Side, State};
+use super::{Fault, Mode, Side, State, UpdateFault};
 use crate::fields::one_of;
 
 /// Why a device refuses a request.
@@ -49,6 +49,8 @@ pub enum Refusal {
     },
     /// Another session armed the device or started its mode.
     OtherSession,
+    /// Another firmware is refused.
+    Update(UpdateFault),
 }
 
 one_of!(Refusal {
@@ -67,6 +69,7 @@ one_of!(Refusal {
     12 Stiffness { low_nm_per_rad: low, high_nm_per_rad: high },
     13 Angle { low_rad: low, high_rad: high },
     14 OtherSession {},
+    15 Update { 0: fault },
 });
 
 /// The setting or value that a refusal is about.
