@@ -27,6 +27,7 @@
 //! | | `location`, `spectrum`, `table_evidence` | where the error is: along coordinates, in time, in the tables |
 //! | | [`history`] | what the muscle remembers over a campaign of isometric staircases, before the search |
 //! | over campaigns | [`mod@reference`], [`timeline`] | what changed since a reference; quantities and change points over several campaigns |
+//! | over muscles | [`mod@stock`] | what muscles of one stock share, and what each has of its own |
 //! | answer | [`verdict`], [`outcome`], [`remark`], [`why`], [`why_not`], [`experiment`], [`reserve`] | the answer as values; the report writes the sentences |
 //! | | [`refitted_table`] | the table refitted beside the selected effects |
 //! | | [`next_experiment`], [`isolability`], [`protocol_simulation`] | the experiment that decides; what a planned protocol can show |
@@ -70,6 +71,7 @@ mod rest_friction;
 mod rows;
 mod selection_step;
 mod spectrum;
+pub mod stock;
 mod table_evidence;
 #[cfg(test)]
 mod tests;

@@ -16,6 +16,8 @@ mod inject;
 mod ledger;
 mod limits;
 mod locate;
+mod maps;
+mod martens;
 mod names;
 mod oracle;
 mod progress;
@@ -23,6 +25,7 @@ mod proof_page;
 mod queue;
 mod rate;
 mod reference;
+mod reference_bench;
 mod report;
 mod residuals;
 mod score;
@@ -49,6 +52,16 @@ struct Cli {
     jobs: usize,
     #[command(subcommand)]
     command: Command,
+}
+
+/// Which set of which kind.
+#[derive(Args)]
+struct Kind {
+    /// dev (public seed) or final (secret seed from the system, or --seed).
+    #[arg(long = "set", default_value = "dev")]
+    kind: String,
+    #[command(flatten)]
+    what: Set,
 }
 
 /// Which set.
@@ -188,12 +201,16 @@ enum Command {
     Festo(Real),
     /// The same for settled points only: writes the section of the page on the memory of the bladder.
     FestoHistory(Real),
+    /// Fit static force maps of commercial muscles and predict them between lengths and pressures, beside published models.
+    Maps(Real),
     /// Answer a development set again with each criterion at half and at double its value.
     Sensitivity(sensitivity::Study),
     /// Spoil one recording of clean campaigns in every way that sensors and loggers fail, and count what is found.
     Sensors(sensors::Sensors),
     /// Diagnose changes: changes added to later runs of real recordings, untouched pairs, a cylinder whose seal was replaced.
     Reference(reference::Reference),
+    /// Diagnose changes between two campaigns of the virtual bench, of which the later one has one effect: a sealed set.
+    ReferenceBench(reference_bench::Options),
     /// Campaigns that choose their own steps, compared with protocol C for the same time, random steps, and single proposals.
     Campaign(campaign::Campaigns),
     /// Generate, answer and score; each step continues where an earlier run was interrupted.
@@ -244,6 +261,9 @@ fn main() -> ExitCode {
         Command::Festo(real) => {
             festo::run(&real.data, &real.output, &real.host).and_then(|()| real.copy_to_book("festo.md"))
         }
+        Command::Maps(real) => {
+            maps::run(&real.data, &real.output, &real.host).and_then(|()| real.copy_to_book("force-maps.md"))
+        }
         Command::FestoHistory(real) => {
             festo::run_history(&real.data, &real.output, &real.host, real.page.as_deref())
         }
@@ -251,6 +271,10 @@ fn main() -> ExitCode {
         Command::Sensitivity(study) => sensitivity::run(&study),
         Command::Sensors(what) => sensors::run(&what),
         Command::Reference(what) => reference::run(&what),
+        Command::ReferenceBench(what) => {
+            let specs = specs(&what.set.kind, &what.set.what);
+            specs.and_then(|(seed, _, specs)| reference_bench::run(&what, seed, specs))
+        }
         Command::Prove { set, what, tool, check } => prove(&set, &what, &tool, check),
     };
     match done {
@@ -290,7 +314,8 @@ fn prove(set: &str, what: &Set, tool: &Tool, check: bool) -> Result<(), Box<dyn 
 /// The development set's seed is public.
 const DEVELOPMENT: u64 = 20_261_121;
 
-fn generate(set: &str, what: &Set) -> Result<(), Box<dyn Error>> {
+/// The seed of a set, its size, and those of its trials that are taken.
+fn specs(set: &str, what: &Set) -> Result<(u64, usize, Vec<spec::Spec>), Box<dyn Error>> {
     let output = &what.output;
     let seed = match (what.seed, set) {
         (Some(s), _) => s,
@@ -307,6 +332,12 @@ fn generate(set: &str, what: &Set) -> Result<(), Box<dyn Error>> {
     };
     let drawn = specs.len();
     specs.truncate(what.take.unwrap_or(drawn).max(1));
+    Ok((seed, drawn, specs))
+}
+
+fn generate(set: &str, what: &Set) -> Result<(), Box<dyn Error>> {
+    let output = &what.output;
+    let (seed, drawn, specs) = specs(set, what)?;
     let residuals = residuals::Residuals::read(&what.data);
     if residuals.is_empty() {
         eprintln!("no real recordings in {}: all noise is synthetic", what.data.display());
