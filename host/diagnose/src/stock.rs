@@ -85,6 +85,8 @@ pub struct Considered {
     pub law: Option<Law>,
     /// Its parameter: m, m, m/N.
     pub parameter: Option<Interval>,
+    /// Its standard error by the jackknife over muscles, for comparison.
+    pub jackknife: Option<f64>,
     /// Error on left-out muscles, rms, as a share of the largest force of each.
     pub error: f64,
     /// Why it is not named, as text; empty where it is.
@@ -201,6 +203,7 @@ fn considered(fitted: &Stock, freedom: usize) -> Vec<Considered> {
             Considered {
                 law,
                 parameter: t.values.first().map(|v| Interval::new(*v, t_quantile(freedom))),
+                jackknife: t.jackknife.first().copied(),
                 error: t.error,
                 why_not: why(t, law),
             }

@@ -137,7 +137,7 @@ impl Arguments {
         }
         let lengths = (0..cases.len()).map(|i| by_others(&cases, i)).collect::<Result<Vec<_>>>()?;
         let stock = with_stock(&cases, console)?;
-        self.write_report(console, &cases, &lengths, hashes)?;
+        self.write_report(console, &cases, (&lengths, &stock), hashes)?;
         if let Some(path) = &self.json {
             let muscles = cases
                 .iter()
@@ -165,7 +165,7 @@ impl Arguments {
         &self,
         console: &Console,
         cases: &[Case],
-        lengths: &[Option<LengthTransfer>],
+        (lengths, stock): (&[Option<LengthTransfer>], &[StockTransfer]),
         hashes: Vec<String>,
     ) -> Result<()> {
         let from = cases.iter().fold(reports::provenance(), |from, case| from.muscle(&case.muscle));
@@ -174,11 +174,13 @@ impl Arguments {
             let found: Vec<Evaluated<'_>> = cases
                 .iter()
                 .zip(lengths)
-                .map(|(case, length)| Evaluated {
+                .enumerate()
+                .map(|(i, (case, length))| Evaluated {
                     muscle: &case.muscle.name,
                     runs: case.runs.as_ref(),
                     contractions: case.contractions.as_ref(),
                     length: length.as_ref(),
+                    stock: stock.get(i),
                 })
                 .collect();
             evaluate_page::page(&found, self.published.as_deref())

@@ -169,7 +169,9 @@ impl Tool<'_> {
         let mut lines = text.lines().filter(|l| !l.starts_with('#'));
         let head: Vec<&str> = lines.next().unwrap_or("").split(',').collect();
         let column = |name: &str| {
-            head.iter().position(|h| h.starts_with(name)).ok_or(format!("no column {name} in {}", head.join(",")))
+            head.iter()
+                .position(|h| h.starts_with(name))
+                .ok_or(format!("no column {name} in {}", head.join(",")))
         };
         let (measured, model) = (column("force_N")?, column("force_model_N")?);
         let pressure = column("pressure_")?;
@@ -256,7 +258,11 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
         }
         row(&mut text, map.name, "their coefficients, second hand", &others[..1], force);
         row(&mut text, map.name, "the laboratory's formula", &others[1..], force);
-        let _ = writeln!(stated, "- {}: largest error below {} %, as the authors state of their model fitted to this map.", map.name, map.stated);
+        let _ = writeln!(
+            stated,
+            "- {}: largest error below {} %, as the authors state of their model fitted to this map.",
+            map.name, map.stated
+        );
     }
     let _ = write!(text, "\n{OTHERS}\n{stated}");
     std::fs::write(output.join("force-maps.md"), &text)?;

@@ -71,7 +71,8 @@ impl Form {
         let rows = DMatrix::from_fn(pulling.len(), 4, |i, k| {
             form.parts(pulling[i].0, pulling[i].1).1 * 1e6 * scaled(pulling[i].1).powi(k as i32)
         });
-        let right = DVector::from_fn(pulling.len(), |i, _| pulling[i].2 - form.parts(pulling[i].0, pulling[i].1).0);
+        let right =
+            DVector::from_fn(pulling.len(), |i, _| pulling[i].2 - form.parts(pulling[i].0, pulling[i].1).0);
         let found = rows.svd(true, true).solve(&right, 1e-9).ok()?;
         let mut modulus = [0.0; 4];
         for (k, m) in modulus.iter_mut().enumerate() {
