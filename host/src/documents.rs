@@ -63,6 +63,7 @@ mod tests {
         published::<super::bench::SettingsFiles<'_>>("pam-settings-1");
         published::<super::bench::Studio<'_>>("pam-studio-1");
         published::<super::device::Faults>("pam-faults-1");
+        published::<super::device::Firmware>("pam-firmware-1");
         published::<super::device::Flash>("pam-flash-1");
         published::<super::device::Forget>("pam-forget-1");
         published::<super::device::Info>("pam-device-1");
@@ -70,6 +71,7 @@ mod tests {
         published::<super::device::Ports>("pam-ports-1");
         published::<super::device::Regulator>("pam-regulator-1");
         published::<super::device::Rollback>("pam-rollback-1");
+        published::<super::device::Sensors>("pam-sensors-1");
         published::<super::device::Settings>("pam-device-settings-1");
         published::<super::device::Trace<'_>>("pam-trace-1");
         published::<super::device::Vent>("pam-vent-1");

@@ -17,6 +17,7 @@
 //! | | `noise` | estimates noise from repeats; tests by whole blocks |
 //! | candidates | `candidates` | the library of effects as columns |
 //! | | `candidate_fit`, `candidate_scoring` | one candidate fitted beside a base; all of them scanned and refined |
+//! | | `renewed_laws` | memories of the turn, seen from a base that was fitted beside them |
 //! | | `likelihood` | how strongly the recordings support a candidate |
 //! | selection | `forward_selection`, `selection_step` | which effects are selected, and when none is |
 //! | | `cross_validation`, `confirmation` | the error on held-out rows, which a selected effect must reduce |
@@ -64,6 +65,7 @@ pub mod protocol_simulation;
 pub mod reference;
 pub mod refitted_table;
 pub mod remark;
+mod renewed_laws;
 pub mod reserve;
 mod rest_friction;
 mod rows;

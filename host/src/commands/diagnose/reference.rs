@@ -178,6 +178,7 @@ pub fn run(arguments: &Arguments, console: &Console, taken: bool) -> Result<()> 
     let asked = Asked {
         muscle: muscle.as_ref().map(|m| m.name.clone()),
         rest_length: muscle.as_ref().map(MuscleDescription::rest_length),
+        geometry: muscle.as_ref().map(MuscleDescription::geometry),
         mounted: arguments.changed.mounted(),
         prior_changed: arguments.changed.prior_changed,
     };
