@@ -2,7 +2,7 @@
 
 use crate::inject::{Injection, Parameter, Scale};
 use crate::residuals::Residuals;
-use crate::spec::{Operator, Spec, Stratum};
+use crate::spec::{Operator, Size, Spec, Stratum};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use virtual_bench::bench::{Bench, BenchSpec};
@@ -401,11 +401,15 @@ fn sized(spec: &Spec) -> Sized {
     let mut bench = spec.bench.clone();
     let mut effects = Vec::new();
     for (injection, wanted) in &spec.effects {
-        let mut s = injection.strongest().min(1.0) * 0.5;
+        let mut s = match wanted {
+            Size::Peak(_) => injection.strongest().min(1.0) * 0.5,
+            Size::Strength(s) => *s,
+        };
         let (mut is, mut d) = size(injection, s);
         // Most effects are straight in their strength; those that are not get there by secants in the logarithm.
         let mut power = 1.0;
         for _ in 0..9 {
+            let Size::Peak(wanted) = wanted else { break };
             if is <= 0.0 || (is / wanted - 1.0).abs() < 0.1 {
                 break;
             }

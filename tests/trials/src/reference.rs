@@ -215,8 +215,7 @@ fn write_pairs(
         let (effect, percent) = job.put_in.map_or((None, 0.0), |p| (Some(p.0), p.1));
         let about = (job.muscle.name.clone(), Some(job.muscle.half), effect, percent, job.runs);
         let pair = pairs::table((&before, &after), own, own.largest(), about);
-        let line =
-            AnsweredPair { pair, diagnosis: trial.answer.top.clone(), simple: trial.simple.clone() };
+        let line = AnsweredPair { pair, diagnosis: trial.answer.top.clone(), simple: trial.simple.clone() };
         text += &serde_json::to_string(&line)?;
         text.push('\n');
     }

@@ -108,7 +108,8 @@ impl Outcome {
 }
 
 fn recording(made: &virtual_bench::recording::Recording) -> Recording {
-    let column = |of: &dyn Fn(&virtual_bench::recording::Row) -> f64| made.rows.iter().map(of).collect::<Vec<f64>>();
+    let column =
+        |of: &dyn Fn(&virtual_bench::recording::Row) -> f64| made.rows.iter().map(of).collect::<Vec<f64>>();
     Recording {
         name: made.name.clone(),
         source: made.name.clone().into(),

@@ -22,7 +22,9 @@ fn left_out(x: &[f64], y: &[f64]) -> f64 {
     let count = inner.len().max(1) as f64;
     let square: f64 = inner
         .map(|k| {
-            let pick = |v: &[f64]| v.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, v)| *v).collect::<Vec<f64>>();
+            let pick = |v: &[f64]| {
+                v.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, v)| *v).collect::<Vec<f64>>()
+            };
             (cubic(&pick(x), &pick(y), x[k]).0 - y[k]).powi(2)
         })
         .sum();
@@ -35,7 +37,8 @@ pub(super) fn curves(all: &[Curves], strokes: &[f64], recorded: &[usize], mounti
     let at = strokes[mounting];
     let mut made = Curves::default();
     for g in 0..GRID {
-        let of = |curve: &dyn Fn(&Curves) -> f64| recorded.iter().map(|m| curve(&all[*m])).collect::<Vec<f64>>();
+        let of =
+            |curve: &dyn Fn(&Curves) -> f64| recorded.iter().map(|m| curve(&all[*m])).collect::<Vec<f64>>();
         let forces = of(&|c| c.force[g]);
         let (force, slope) = cubic(&x, &forces, at);
         made.force.push(force);
@@ -60,7 +63,11 @@ mod tests {
         let x = [0.0, 1.0, 2.0, 3.0];
         let y = x.map(|v: f64| 10.0 - v * v);
         let (value, slope) = cubic(&x, &y, 1.5);
-        assert!((value - 7.75).abs() < left_out(&x, &y) && left_out(&x, &y) < 1.0, "{value} {}", left_out(&x, &y));
+        assert!(
+            (value - 7.75).abs() < left_out(&x, &y) && left_out(&x, &y) < 1.0,
+            "{value} {}",
+            left_out(&x, &y)
+        );
         assert!((slope + 3.0).abs() < 0.5, "{slope}");
         assert!((cubic(&x, &x, 2.25).0 - 2.25).abs() < 1e-12 && left_out(&x, &x) < 1e-12);
     }

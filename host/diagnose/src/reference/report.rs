@@ -2,8 +2,7 @@
 
 use super::answer::{ChangeReport, Left, NotComparable, Place, Remark, Repeatability, Verdict};
 use super::criteria::{
-    COMBINED_UNREST, HELD, LEFT_BY_NAMES, NAMED, OTHER_ACTUATOR, OTHER_LENGTH, PRIOR_NONE, REPORT_REGULATED,
-    UNSTATED_ERROR,
+    COMBINED_UNREST, HELD, NAMED, OTHER_LENGTH, PRIOR_NONE, REPORT_REGULATED, UNSTATED_ERROR,
 };
 use super::held_out::Unseen;
 use super::isometric;
@@ -12,7 +11,8 @@ use super::staircase_answer::staircases;
 use super::stroke_answer::strokes;
 use super::stroked;
 use super::surface::Surface;
-use super::{catalogue, combined, sides, table_surface, units};
+use super::withdrawal::withdraw;
+use super::{catalogue, combined, sides, stages, table_surface, units};
 use model_core::braid::Geometry;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::{self, Campaign, Recording};
@@ -129,6 +129,8 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
     for r in &after.recordings {
         r.require_force()?;
     }
+    let given = after;
+    let after = &stages::parted(given);
     let kind = match (protocol(after, "AFTER"), &options.geometry) {
         // Strokes with readings at rest between them: a described muscle is compared row by row.
         (Err(_), Some(_)) if matches!(against, Against::Recordings(_)) => Protocol::Combined,
@@ -139,7 +141,9 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
             for r in &before.recordings {
                 r.require_force()?;
             }
-            sides::apart(before, after)?;
+            sides::apart(before, given)?;
+            let whole = before;
+            let before = &stages::parted(whole);
             let mut remarks = units::check(before, after)?;
             remarks.extend(sides::order(before, after));
             let described = options.geometry.as_ref().filter(|_| kind != Protocol::Held);
@@ -149,8 +153,9 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
             };
             let mut report = match (old, kind) {
                 (_, _) if described.is_some() => {
-                    let geometry = described.ok_or_else(|| Error::new(DataCode::MuscleInvalid, "no dimensions"))?;
-                    catalogue::compare(before, after, geometry, options)?
+                    let geometry =
+                        described.ok_or_else(|| Error::new(DataCode::MuscleInvalid, "no dimensions"))?;
+                    catalogue::compare(whole, given, geometry, options)?
                 }
                 (Protocol::Held, Protocol::Held) => held(before, after, options)?,
                 (Protocol::Stroked, Protocol::Stroked) => {
@@ -173,7 +178,7 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
                 }
             };
             report.reference.files = files(before);
-            report.reference.samples = before.samples();
+            report.reference.samples = whole.samples();
             report.remarks.splice(0..0, remarks);
             report
         }
@@ -193,19 +198,9 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
             report
         }
     };
-    report.samples = after.samples();
+    report.samples = given.samples();
     report.muscle.clone_from(&options.muscle);
-    if report.misfit_rms_N > OTHER_ACTUATOR * report.largest_force_N {
-        report.remarks.push(Remark::OtherActuator);
-        if report.held_out.rms_after_N > LEFT_BY_NAMES * report.largest_force_N && !report.missing.is_empty()
-        {
-            // Of another actuator everything differs, and the nearest shape is no change.
-            report.missing.clear();
-            report.verdict = Verdict::Unexplained;
-            report.held_out.rms_after_N = report.held_out.rms_before_N;
-            report.unexplained = Left { share: 1.0, place: report.r#where.first().cloned() };
-        }
-    }
+    withdraw(&mut report);
     Ok(report)
 }
 

@@ -8,8 +8,7 @@ use super::answer::{
 };
 use super::criteria::{
     CELLS, COMBINED_SHAPE_ERROR, FEWEST_CELLS, GATE, NAMED, OWN_SLOPE_ERROR, PRIOR_NONE, SCALE_PRIOR, SIZES,
-    SLOPE_ERROR, TABLE_INTERVAL,
-    TABLE_SLOPE_ERROR, TABLE_SLOPE_OVER_LENGTH,
+    SLOPE_ERROR, TABLE_INTERVAL, TABLE_SLOPE_ERROR, TABLE_SLOPE_OVER_LENGTH, UNSEEN_EXPLAINED,
 };
 use super::held_out;
 use super::isometric::{Accepted, Analysis, Estimate};
@@ -30,7 +29,7 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
     let verdict = verdict(
         first.probability(Cause::None),
         analysis.accepted.len(),
-        analysis.last.probability(Cause::None) < NAMED,
+        analysis.last.probability(Cause::None) < NAMED || (unseen.held && unseen.share() < UNSEEN_EXPLAINED),
     );
     let mut remarks = remarks(analysis, verdict);
     let not = incomparable(analysis);
@@ -92,8 +91,11 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
 
 fn remarks(analysis: &Analysis, verdict: Verdict) -> Vec<Remark> {
     let mut remarks = Vec::new();
-    for (m, stroke) in analysis.runs.strokes.iter().enumerate().filter(|(m, _)| analysis.runs.is_interpolated(*m)) {
-        let variances = analysis.cells.iter().filter(|c| c.interpolated && c.mounting == m).map(|c| c.means.variance);
+    for (m, stroke) in
+        analysis.runs.strokes.iter().enumerate().filter(|(m, _)| analysis.runs.is_interpolated(*m))
+    {
+        let variances =
+            analysis.cells.iter().filter(|c| c.interpolated && c.mounting == m).map(|c| c.means.variance);
         let (sum, count) = variances.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
         if count > 0.0 {
             remarks.push(Remark::Interpolated { stroke: *stroke, error: f64::sqrt(sum / count) });
@@ -195,7 +197,9 @@ fn slope_error(analysis: &Analysis, change: Change) -> f64 {
         Change::ForceOffset | Change::ForceDrift | Change::CoulombFriction => SLOPE_ERROR,
         _ if analysis.recorded && analysis.runs.moving => COMBINED_SHAPE_ERROR,
         _ if analysis.recorded => SLOPE_ERROR,
-        Change::EndSlip if analysis.surface.curves.iter().any(|c| !c.own_by_stroke.is_empty()) => OWN_SLOPE_ERROR,
+        Change::EndSlip if analysis.surface.curves.iter().any(|c| !c.own_by_stroke.is_empty()) => {
+            OWN_SLOPE_ERROR
+        }
         Change::DisplacementOffset | Change::RigCompliance | Change::EndSlip => TABLE_SLOPE_OVER_LENGTH,
         _ => TABLE_SLOPE_ERROR,
     }

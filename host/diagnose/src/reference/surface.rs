@@ -110,7 +110,8 @@ impl Surface {
         let recorded: Vec<usize> = (0..all.strokes.len()).filter(|m| !all.is_interpolated(*m)).collect();
         surface.slopes_along(&all.strokes, &recorded);
         for mounting in (0..all.strokes.len()).filter(|m| all.is_interpolated(*m)) {
-            surface.curves[mounting] = interpolate::curves(&surface.curves, &all.strokes, &recorded, mounting);
+            surface.curves[mounting] =
+                interpolate::curves(&surface.curves, &all.strokes, &recorded, mounting);
         }
         surface.find_usual_slope();
         Ok(surface)

@@ -87,6 +87,7 @@ pub fn why_not(why: WhyNot) -> &'static str {
     match why {
         WhyNot::NotComparable => "these recordings cannot show it",
         WhyNot::LessProbable => "possible, but another cause is more probable",
+        WhyNot::HeldOutWorse => "the nearest shape, but it does not describe held-out recordings",
         WhyNot::OtherShape => "the difference does not have its shape, or is too small",
     }
 }
@@ -119,7 +120,9 @@ pub fn remedy(change: Change) -> &'static str {
         Change::Effect(_) => match (change.about().owner, change.class()) {
             (Owner::Rig, _) => "look at the load path between muscle and load cell",
             (_, Class::RateOrPhase) => "look at hoses, valves and filters, then refit the table",
-            (_, Class::Softening | Class::Relaxation) => "let the muscle rest, repeat the first recording, then refit the table",
+            (_, Class::Softening | Class::Relaxation) => {
+                "let the muscle rest, repeat the first recording, then refit the table"
+            }
             _ => "look at the muscle and its end fittings, then refit the table",
         },
     }

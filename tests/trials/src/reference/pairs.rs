@@ -105,7 +105,8 @@ fn simulated(seed: u64) -> Vec<Run> {
         let files = Bench::new(&bench).run(&protocol).unwrap_or_default();
         for (mounting, file) in files.iter().enumerate() {
             let begin = file.rows.first().map_or(0.0, |r| r.time);
-            let column = |of: &dyn Fn(&virtual_bench::recording::Row) -> f64| file.rows.iter().map(of).collect();
+            let column =
+                |of: &dyn Fn(&virtual_bench::recording::Row) -> f64| file.rows.iter().map(of).collect();
             all.push(Run {
                 source: file.name.clone().into(),
                 mounting,

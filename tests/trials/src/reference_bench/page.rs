@@ -77,7 +77,10 @@ pub(super) fn page(all: &[Outcome], drawn: usize, hash: &str) -> String {
     let refused = all.iter().filter(|o| o.refused.is_some()).count();
     let _ = writeln!(t, "| without an answer | {} | | {refused} | |", all.len());
     let _ = writeln!(t, "\n## Wrong answers, single effects that count\n");
-    let _ = writeln!(t, "| pair | protocol | effect | size, % | named | most probable |\n| --- | --- | --- | --- | --- | --- |");
+    let _ = writeln!(
+        t,
+        "| pair | protocol | effect | size, % | named | most probable |\n| --- | --- | --- | --- | --- | --- |"
+    );
     for o in singles.iter().filter(|o| !o.class_right()) {
         let list = |of: &[(String, f64)]| {
             of.iter().take(3).map(|(n, p)| format!("{n} {p:.2}")).collect::<Vec<_>>().join(", ")
@@ -98,7 +101,10 @@ pub(super) fn page(all: &[Outcome], drawn: usize, hash: &str) -> String {
         let e = by.entry(class(o.truth())).or_default();
         *e = (e.0 + usize::from(o.class_right()), e.1 + 1);
     }
-    let _ = writeln!(t, "\n## By class, single effects that count\n\n| class | right | of |\n| --- | --- | --- |");
+    let _ = writeln!(
+        t,
+        "\n## By class, single effects that count\n\n| class | right | of |\n| --- | --- | --- |"
+    );
     for (name, (right, of)) in by {
         let _ = writeln!(t, "| {name} | {right} | {of} |");
     }

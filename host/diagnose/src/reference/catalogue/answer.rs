@@ -62,7 +62,8 @@ fn since(cells: &Cells, fit: &Fit) -> Since {
                 let from = cells.cells.iter().filter(|c| c.time >= moment).map(|c| c.recording).min();
                 from.and_then(|r| cells.names.get(r)).cloned().unwrap_or_default()
             };
-            return time.map_or(Since::NotDetermined, |moment| Since::From { recording: recording(moment), moment });
+            return time
+                .map_or(Since::NotDetermined, |moment| Since::From { recording: recording(moment), moment });
         }
         change if change.remembers() => return Since::NotDetermined,
         _ => {}
@@ -106,7 +107,14 @@ fn places(cells: &Cells) -> Vec<Place> {
         let share = members.iter().map(|i| cells.difference[*i].powi(2)).sum::<f64>() / total;
         let rows = members.len() as f64 / count;
         if share > LOCALISE_STANDS_OUT * rows && rows < 1.0 {
-            all.push(Place { coordinate: coordinate.into(), from: at, to: at, share, rows, unit: unit.into() });
+            all.push(Place {
+                coordinate: coordinate.into(),
+                from: at,
+                to: at,
+                share,
+                rows,
+                unit: unit.into(),
+            });
         }
     };
     for (level, pressure) in cells.levels.iter().enumerate() {
@@ -195,7 +203,9 @@ pub(super) fn answer(cells: &Cells, weighed: &Weighed, prior: f64) -> ChangeRepo
     let z = (2.0 * (prior / share).ln() + 6.0).max(0.0).sqrt() + 1.28;
     let mut not = vec![];
     if cells.unmatched > 0 {
-        not.push(NotComparable::States { share: cells.unmatched as f64 / (cells.unmatched + cells.cells.len()) as f64 });
+        not.push(NotComparable::States {
+            share: cells.unmatched as f64 / (cells.unmatched + cells.cells.len()) as f64,
+        });
     }
     ChangeReport {
         muscle: None,

@@ -5,7 +5,8 @@ use rayon::prelude::*;
 
 use super::super::contrast::{log_mean, log_sum};
 use super::super::criteria::{
-    CATALOGUE_INDEPENDENT, CATALOGUE_LAW_ERROR, CATALOGUE_REFINED, CATALOGUE_USUAL, MOST_CHANGES, NAMED, PRIOR_UNKNOWN, SIZES,
+    CATALOGUE_INDEPENDENT, CATALOGUE_LAW_ERROR, CATALOGUE_REFINED, CATALOGUE_USUAL, MOST_CHANGES, NAMED,
+    PRIOR_UNKNOWN, SIZES,
 };
 use super::super::shapes::{Change, Class};
 use super::cells::Cells;
@@ -152,12 +153,7 @@ fn usual(cells: &Cells, taken: &[DVector<f64>]) -> Vec<DVector<f64>> {
 }
 
 /// An effect at one set of shapes; `None` where the cells do not show it.
-fn fit(
-    cells: &Cells,
-    metric: &Metric<'_>,
-    candidate: &Candidate,
-    shapes: &[f64],
-) -> Option<Fit> {
+fn fit(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate, shapes: &[f64]) -> Option<Fit> {
     let columns: Vec<DVector<f64>> =
         candidate.columns(shapes, &cells.rows).iter().map(|c| cells.means(c)).collect();
     let n = cells.cells.len() as f64;
@@ -193,13 +189,13 @@ fn fit(
     }
     let trace = &u * &mean;
     let mut parameters: Vec<_> = Vec::new();
-    let amplitudes = candidate.info.parameters.iter().filter(|p| {
-        matches!(p.role, model_core::effects::Role::Amplitude)
-    });
+    let amplitudes =
+        candidate.info.parameters.iter().filter(|p| matches!(p.role, model_core::effects::Role::Amplitude));
     for (i, p) in amplitudes.enumerate() {
-        let (value, std) = live.iter().position(|l| *l == i).map_or((0.0, 0.0), |j| {
-            (mean[j] / rms[i], covariance[(j, j)].max(0.0).sqrt() / rms[i])
-        });
+        let (value, std) = live
+            .iter()
+            .position(|l| *l == i)
+            .map_or((0.0, 0.0), |j| (mean[j] / rms[i], covariance[(j, j)].max(0.0).sqrt() / rms[i]));
         parameters.push((p.name, p.unit, value, std));
     }
     parameters.extend(candidate.shapes().zip(shapes).map(|(p, s)| (p.name, p.unit, *s, 0.0)));
@@ -211,8 +207,7 @@ fn fit(
 /// The best shape of one effect, and its evidence as a mean over the grid.
 fn scan(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate) -> Option<Fit> {
     let grid = candidate.grid();
-    let fits: Vec<Fit> =
-        grid.iter().filter_map(|shapes| fit(cells, metric, candidate, shapes)).collect();
+    let fits: Vec<Fit> = grid.iter().filter_map(|shapes| fit(cells, metric, candidate, shapes)).collect();
     let logs: Vec<f64> = fits.iter().map(|f| f.log).collect();
     let mean = log_sum(&logs) - (grid.len().max(1) as f64).ln();
     let mut best = fits.into_iter().max_by(|a, b| a.log.total_cmp(&b.log))?;
@@ -274,9 +269,7 @@ impl Round {
     /// The best name of the class that is more probable than not.
     fn leader(&self) -> Option<Accepted> {
         let (fit, probability) = self.fits.iter().max_by(|a, b| {
-            let weight = |(f, p): &(Fit, f64)| {
-                (self.class(f.change.stroke_class()) >= NAMED, *p)
-            };
+            let weight = |(f, p): &(Fit, f64)| (self.class(f.change.stroke_class()) >= NAMED, *p);
             let (a, b) = (weight(a), weight(b));
             a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
         })?;
