@@ -19,6 +19,7 @@ const SYMBOLS: [(&str, &str); 53] = [
     ("g", "pull per pascal of the cylinder, (3L² − B²)/(4πN²), m²"),
     ("g_n", "weight of a kilogram, 9.807 N/kg"),
     ("∂F/∂x", "slope of the base model's force over the stroke, negative, N/m"),
+    ("∂F_quasi/∂x", "slope of the friction-free force over the stroke, negative, N/m"),
     ("x", "stroke, positive in contraction, m"),
     ("ΔL", "stroke, positive in contraction, m"),
     ("y", "stroke of the muscle behind the play, m"),
