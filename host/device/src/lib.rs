@@ -8,6 +8,7 @@
 //! | tables: upload in pieces, read back | [`tables`] |
 //! | setpoints over time | [`setpoint_profile`] |
 //! | a run from start to vent | [`mod@run`] |
+//! | a controller that is only watched | [`mod@watch`] |
 //! | venting while the conversation waits for something else | [`VentLine`] |
 //! | the pressure regulator, found from steps | [`regulator`] |
 //! | log lines of the firmware as text | [`log_table`] |
@@ -35,6 +36,7 @@ pub mod setpoint_profile;
 pub mod table_diff;
 pub mod tables;
 mod vent_line;
+pub mod watch;
 
 pub use address::Address;
 pub use client::{Client, Losses, Patience, Topic};
