@@ -5,7 +5,7 @@ use model_core::effects::Info;
 use super::Table;
 
 /// Symbols that mean the same in every equation. Where a parameter has one of them, it is the parameter.
-const SYMBOLS: [(&str, &str); 53] = [
+const SYMBOLS: &[(&str, &str)] = &[
     ("F_quasi", "pull of the base model without friction, N"),
     ("F_b", "elastic force of the bladder: the base model's without friction less P·g, N"),
     ("F_G", "Gaylord's force of the effective pressure, P′·g, N"),
@@ -108,7 +108,7 @@ pub fn symbols(info: &Info) -> Table {
     if names.iter().any(|n| n == "F") {
         table.row(["F on the right", "force of the base model with its friction, (1 − s·k_F)·F_quasi, N"]);
     }
-    for (letter, what) in SYMBOLS {
+    for &(letter, what) in SYMBOLS {
         if occurs(letter, &names) && info.parameters.iter().all(|p| p.letter != letter) {
             table.row([letter, what]);
         }
