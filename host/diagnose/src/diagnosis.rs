@@ -10,7 +10,7 @@ use super::confirmation::select_and_confirm;
 use super::criteria::baseline::TABLE_ORDER;
 use super::criteria::judgement::{
     EXPLAINED, EXPLAINED_UNSEEN, LACK_OF_FIT, LACK_OF_FIT_NOISE, LINE_ALPHA, LINE_SHARE, LINE_UNEXPLAINED,
-    PARTLY_EXPLAINED, TRACE_POINTS,
+    PARTLY_EXPLAINED, PLACE_SHARE, TRACE_POINTS,
 };
 use super::criteria::rows::{SLACK_MENTIONED, SLACK_ROUNDS};
 use super::cross_validation::HeldOutRows;
@@ -234,7 +234,10 @@ impl Located {
         let (left_regions, _) = locate(rows, &selection.joint.residual, &selection.joint.residual, sigma, 8);
         let pattern = match (&line, left_regions.first()) {
             (Some(l), _) => Pattern::Periodic(l.hertz),
-            (None, Some(r)) if excess.left > excess.admitted => Pattern::Region(Box::new(r.clone())),
+            // Noise that lasts is larger in one place than in another by chance.
+            (None, Some(r)) if excess.left > excess.admitted && !(excess.lasts && r.share < PLACE_SHARE) => {
+                Pattern::Region(Box::new(r.clone()))
+            }
             _ if excess.restless => Pattern::NotRepeatable(selection.noise.scatter(blocked)),
             // It exceeds the noise of repeats, has no place and no period, and no effect fits: noise that lasts.
             _ if excess.lasts => {

@@ -9,7 +9,8 @@ use model_core::units::Length;
 use pam_data::error::Result;
 use pam_fit::stock::{Law, LawError, Member, Place, Stock, Value, stock};
 
-use crate::criteria::stock::{EXCHANGEABLE, NORMAL_95, ONSET, ONSET_STEPS, PLACES, SLOPE_RANGE};
+use crate::criteria::stock::{EXCHANGEABLE, ONSET, ONSET_STEPS, PLACES, SLOPE_RANGE};
+use crate::criteria::uncertainty::NORMAL_95;
 use crate::history::answer::{Estimate, FindingKind};
 use crate::history::{history, t_quantile};
 

@@ -30,6 +30,8 @@ pam_data::criteria! {
     LINE_SHARE: f64 = 0.15, "q_line", "1", Judgement;
     /// A line of this share makes a verdict of consistent impossible.
     LINE_UNEXPLAINED: f64 = 0.3, "q_line,max", "1", Judgement;
+    /// A region is the place of an error that lasts like noise from this share of its energy on.
+    PLACE_SHARE: f64 = 0.25, "q_place", "1", Convention("a quarter");
     /// A fault that a check of the bench measured matters from this peak on, in blocked forces.
     MATERIAL_FAULT: f64 = 2.5e-3, "F_fault/F_b", "1", Measured("data sheets of good instruments allow as much");
     /// Probability of a name that a check of the bench measured.

@@ -11,8 +11,6 @@ pam_data::criteria! {
     PLACES: usize = 5, "n", "1", Derived("quarters of the recorded range");
     /// The slope of the blocked force over pressure is taken over this share of the range of pressure, below the highest one.
     SLOPE_RANGE: f64 = 0.25, "ΔP/P", "1", Derived("away from the onset, where the curve bends");
-    /// Half of a 95 % interval, in standard errors, where the number of independent values is not known.
-    NORMAL_95: f64 = 1.96, "z", "1", Derived("97.5 % quantile of the normal distribution");
     /// Intervals of pressure in which the onset of the pull is looked for.
     ONSET_STEPS: u32 = 400, "n", "1", Derived("a quarter of a percent of the range");
 }
