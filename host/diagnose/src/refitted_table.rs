@@ -131,7 +131,7 @@ fn parts(diagnosis: &Diagnosis) -> (Vec<FittedEffect>, Vec<Correction>) {
         match Candidate::from_name(&m.effect) {
             // The memory found by the history layer has another law than the catalogue's effect of that name.
             Some(Candidate::Muscle(_)) if history::is_from_history(m) => {}
-            // A table carries so many; those that were found first explain the most.
+            // A table carries no more than that; those that were found first explain the most.
             Some(Candidate::Muscle(effect)) if effects.len() < MAX_EFFECTS => {
                 effects.push(FittedEffect::new(effect, &values));
             }
