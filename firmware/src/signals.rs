@@ -40,15 +40,31 @@ impl Filter {
 /// The filters of one muscle's sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Filters {
+    /// Whether any of them filters.
+    filters: bool,
     pressure: Filter,
     stroke: Filter,
     force: Filter,
 }
 
 impl Filters {
+    /// At the first reading, with these scales.
+    pub fn new(scales: &Scales) -> Self {
+        let filters = [scales.pressure, scales.stroke, scales.force].iter().any(|scale| scale.filter_s > 0.0);
+        Self { filters, ..Self::default() }
+    }
+
     /// The readings that the control laws use.
     #[inline]
     pub fn next(&mut self, now: &Readings, scales: &Scales) -> Readings {
+        if !self.filters {
+            return *now;
+        }
+        self.filtered(now, scales)
+    }
+
+    #[inline(never)]
+    fn filtered(&mut self, now: &Readings, scales: &Scales) -> Readings {
         Readings {
             pressure_pa: self.pressure.next(now.pressure_pa, &scales.pressure),
             stroke_m: self.stroke.next(now.stroke_m, &scales.stroke),
