@@ -12,6 +12,7 @@ pub(crate) mod health;
 pub(crate) mod history;
 pub(crate) mod import;
 pub(crate) mod predict;
+pub(crate) mod stock;
 pub(crate) mod table;
 
 use pam_data::error::{DataCode, Error, Result};
@@ -86,6 +87,7 @@ mod tests {
         published::<super::fleet::Fleet<'_>>("pam-fleet-1");
         published::<super::fleet::Stock<'_>>("pam-stock-1");
         published::<super::predict::Predict>("pam-predict-1");
+        published::<super::stock::StockDocument>("pam-diagnose-stock-1");
         published::<super::table::Check>("pam-check-1");
         published::<super::table::Export>("pam-export-1");
         published::<super::table::TableDocument<'_>>("pam-table-1");
