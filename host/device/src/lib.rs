@@ -9,6 +9,7 @@
 //! | setpoints over time | [`setpoint_profile`] |
 //! | firmware over the link | [`mod@update`] |
 //! | a run from start to vent | [`mod@run`] |
+//! | a controller that is only watched | [`mod@watch`] |
 //! | venting while the conversation waits for something else | [`VentLine`] |
 //! | the pressure regulator, found from steps | [`regulator`] |
 //! | scales of sensors from known values | [`calibration`] |
@@ -39,6 +40,7 @@ pub mod table_diff;
 pub mod tables;
 pub mod update;
 mod vent_line;
+pub mod watch;
 
 pub use address::Address;
 pub use client::{Client, Losses, Patience, Topic};

@@ -2,11 +2,10 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
 
 use clap::Args;
-use model_core::link::endpoints::{GetInfo, GetStatus, SetTelemetry};
-use model_core::link::messages::{Event, Telemetry, TelemetryRate};
+use model_core::link::endpoints::{GetInfo, SetTelemetry};
+use model_core::link::messages::TelemetryRate;
 use serde_json::json;
 
 use super::interrupt::interrupts;
@@ -18,9 +17,10 @@ use crate::documents::{bench, text};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::pluralise::pluralise;
 use pam_data::progress::Progress;
-use pam_device::error::DeviceCode;
+use pam_device::messages;
 use pam_device::recorder::{about_losses, about_start, recover};
-use pam_device::{Client, Topic, messages};
+use pam_device::run::Ending;
+use pam_device::watch::{Happened, watch};
 
 use crate::progress::ProgressLine;
 use pam_data::date::now_utc;
@@ -58,15 +58,6 @@ pub struct Arguments {
     json: bool,
     #[command(flatten)]
     changed: ReferenceOptions,
-}
-
-/// Silence of the telemetry after which the device's faults are read.
-const SILENCE: Duration = Duration::from_secs(2);
-
-/// How a recording ended.
-enum Ending {
-    Time,
-    Interrupt,
 }
 
 impl Arguments {
@@ -119,8 +110,8 @@ impl Arguments {
         let losses = client.losses();
         about["losses"] = about_losses(losses);
         about["ended_by"] = json!(match &watched {
-            Ok(Ending::Time) => "time".to_owned(),
-            Ok(Ending::Interrupt) => "interrupt".to_owned(),
+            Ok(Ending::Done) => "time".to_owned(),
+            Ok(Ending::Stopped) => "interrupt".to_owned(),
             Err(e) => e.to_string(),
         });
         let changed = change_watch::finish(changed);
@@ -151,60 +142,6 @@ impl Arguments {
         }
         Ok(())
     }
-}
-
-/// What a device sends.
-enum Happened<'a> {
-    /// A sample, and the time since the first one, ms.
-    Sample(&'a Telemetry, u64),
-    Event(&'a Event),
-}
-
-/// Hands on every sample and event.
-fn watch(
-    client: &mut Client,
-    every_ticks: u16,
-    seconds: Option<f64>,
-    mut take: impl FnMut(Happened<'_>) -> Result<()>,
-    stop: impl Fn() -> bool,
-) -> Result<Ending> {
-    client
-        .try_call::<SetTelemetry>(&TelemetryRate { every_ticks })?
-        .map_err(|refusal| messages::refused("telemetry", refusal))?;
-    let (mut first, mut last) = (None, 0);
-    let mut heard = Instant::now();
-    while !stop() {
-        match client.topic(Duration::from_millis(50))? {
-            Some(Topic::Telemetry(sample)) => {
-                heard = Instant::now();
-                if sample.time_us < last {
-                    return Err(Error::new(
-                        DeviceCode::DeviceSilent,
-                        "the device restarted during the recording",
-                    )
-                    .help("`host device faults` shows whether a fault caused it; check the power supply"));
-                }
-                last = sample.time_us;
-                let elapsed = last - *first.get_or_insert(last);
-                if seconds.is_some_and(|end| elapsed as f64 * 1e-6 >= end) {
-                    return Ok(Ending::Time);
-                }
-                take(Happened::Sample(&sample, elapsed / 1000))?;
-            }
-            Some(Topic::Event(event)) => take(Happened::Event(&event))?,
-            Some(Topic::Log(_)) => {}
-            None if heard.elapsed() > SILENCE => {
-                let status = client.call::<GetStatus>(&())?;
-                return Err(Error::new(
-                    DeviceCode::DeviceSilent,
-                    format!("the device answers, but sends no telemetry; it is {}", messages::state(status.state)),
-                )
-                .help("it may have restarted: `host device info` shows its time since start and whether ticks advance"));
-            }
-            None => {}
-        }
-    }
-    Ok(Ending::Interrupt)
 }
 
 /// Arguments of `host recover`.
