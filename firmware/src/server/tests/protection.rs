@@ -46,7 +46,7 @@ fn nothing_that_writes_flash_is_done_while_a_mode_runs() {
     assert_eq!(shared.with(|c| c.state()), State::Running);
 }
 
-/// An updater that must not be asked.
+/// An updater that fails the test if it is used.
 struct Untouched;
 
 impl Update for Untouched {
