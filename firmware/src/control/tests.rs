@@ -7,8 +7,11 @@ use super::Controller;
 use crate::board::{Inputs, Outputs, Readings};
 use crate::watch::Finding;
 
+mod exact;
+mod joint;
 mod ownership;
 mod refusals;
+mod tracking;
 
 /// The session that arms and starts in these tests.
 const OWNER: Session = Session { id: 7 };

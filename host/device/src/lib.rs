@@ -8,6 +8,7 @@
 //! | tables: upload in pieces, read back | [`tables`] |
 //! | setpoints over time | [`setpoint_profile`] |
 //! | a run from start to vent | [`mod@run`] |
+//! | telemetry beside other programs | [`Subscription`] |
 //! | venting while the conversation waits for something else | [`VentLine`] |
 //! | the pressure regulator, found from steps | [`regulator`] |
 //! | log lines of the firmware as text | [`log_table`] |
@@ -32,6 +33,7 @@ pub mod recorder;
 pub mod regulator;
 pub mod run;
 pub mod setpoint_profile;
+mod subscription;
 pub mod table_diff;
 pub mod tables;
 mod vent_line;
@@ -39,4 +41,5 @@ mod vent_line;
 pub use address::Address;
 pub use client::{Client, Losses, Patience, Topic};
 pub use port::{Port, available, plugged_in};
+pub use subscription::Subscription;
 pub use vent_line::VentLine;

@@ -5,8 +5,8 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use model_core::link::endpoints::{GetInfo, GetStatus, SetTelemetry};
-use model_core::link::messages::{Event, Telemetry, TelemetryRate};
+use model_core::link::endpoints::{GetInfo, GetStatus};
+use model_core::link::messages::{Event, Telemetry};
 use serde_json::json;
 
 use super::port::PortOption;
@@ -19,7 +19,7 @@ use pam_data::pluralise::pluralise;
 use pam_data::progress::Progress;
 use pam_device::error::DeviceCode;
 use pam_device::recorder::{about_losses, about_start, recover};
-use pam_device::{Client, Topic, messages};
+use pam_device::{Client, Subscription, Topic, messages};
 
 use crate::progress::ProgressLine;
 use pam_data::date::now_utc;
@@ -31,7 +31,7 @@ use pam_data::date::now_utc;
     host record --seconds 60 -o run.csv -o run.mcap\n  \
     host record --rate 100 --folder campaign\n  \
     host record --reference commissioning.csv\n\n\
-    It only watches: it does not keep the run of another program alive. Every 0.1 s goes to the disk; a program that is killed, a cable \
+    It only watches: it does not keep the run of another program alive, and leaves that program's telemetry as it is. Every 0.1 s goes to the disk; a program that is killed, a cable \
     that is pulled or a disk that fills leaves everything until then. CSV and MCAP are read by `host fit` and all others; \
     MCAP opens in the viewers of robotics. OUT.json says which versions, table and settings the controller had.")]
 pub struct Arguments {
@@ -97,9 +97,10 @@ impl Arguments {
         console.note(format!("recording to {names}; Ctrl-C ends it"));
         let progress = ProgressLine::new(console, "record");
         progress.total(self.seconds.map_or(0, |s| (s * 1e3) as u64));
+        let mut stream = Subscription::begin(&mut client, every_ticks)?;
         let watched = watch(
             &mut client,
-            every_ticks,
+            &mut stream,
             self.seconds,
             |happened| match happened {
                 Happened::Sample(sample, elapsed) => {
@@ -129,7 +130,7 @@ impl Arguments {
         about["files"] = json!(output.iter().map(|f| f.display().to_string()).collect::<Vec<_>>());
         let kept = end(recorder, &about, console);
         // A device that is gone cannot stop its telemetry; the recording is complete nevertheless.
-        let quiet = client.try_call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 });
+        let quiet = stream.end(&mut client);
         if let Err(error) = &watched
             && kept.is_ok()
         {
@@ -138,7 +139,7 @@ impl Arguments {
         }
         watched?;
         kept?;
-        quiet?.map_err(|refusal| messages::refused("telemetry", refusal))?;
+        quiet?;
         warn_of(losses, console);
         console.result(if self.json {
             format!("{about:#}")
@@ -162,14 +163,12 @@ enum Happened<'a> {
 /// Hands on every sample and event.
 fn watch(
     client: &mut Client,
-    every_ticks: u16,
+    stream: &mut Subscription,
     seconds: Option<f64>,
     mut take: impl FnMut(Happened<'_>) -> Result<()>,
     stop: impl Fn() -> bool,
 ) -> Result<Ending> {
-    client
-        .try_call::<SetTelemetry>(&TelemetryRate { every_ticks })?
-        .map_err(|refusal| messages::refused("telemetry", refusal))?;
+    let silence = stream.silence(SILENCE);
     let (mut first, mut last) = (None, 0);
     let mut heard = Instant::now();
     while !stop() {
@@ -188,11 +187,13 @@ fn watch(
                 if seconds.is_some_and(|end| elapsed as f64 * 1e-6 >= end) {
                     return Ok(Ending::Time);
                 }
-                take(Happened::Sample(&sample, elapsed / 1000))?;
+                if stream.takes(&sample) {
+                    take(Happened::Sample(&sample, elapsed / 1000))?;
+                }
             }
             Some(Topic::Event(event)) => take(Happened::Event(&event))?,
             Some(Topic::Log(_)) => {}
-            None if heard.elapsed() > SILENCE => {
+            None if heard.elapsed() > silence => {
                 let status = client.call::<GetStatus>(&())?;
                 return Err(Error::new(
                     DeviceCode::DeviceSilent,
@@ -200,7 +201,7 @@ fn watch(
                 )
                 .help("it may have restarted: `host device info` shows its time since start and whether ticks advance"));
             }
-            None => {}
+            None => stream.renew(client)?,
         }
     }
     Ok(Ending::Interrupt)
