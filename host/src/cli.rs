@@ -108,7 +108,7 @@ enum Command {
     /// Make a whole recording of one that was cut off.
     Recover(commands::record::RecoverArguments),
     /// Vent the muscle and disarm the controller.
-    Vent(commands::run::VentArguments),
+    Vent(commands::vent::Arguments),
     /// Say whether the table on a controller still describes its muscle, and name what has changed.
     Health(commands::health::Arguments),
     /// The live view in the browser: connect, run, fit, flash, compare.

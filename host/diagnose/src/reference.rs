@@ -8,6 +8,7 @@
 //! | --- | --- |
 //! | [`crate::criteria`] | every constant with its meaning and source |
 //! | `runs` | recordings as runs: mountings, run numbers, what cannot be compared |
+//! | `stages` | lengths held one after another in one recording |
 //! | `motion` | settled rows; which way the pressure or the stroke moves |
 //! | `spline`, `surface` | the force before, over pressure and direction, by mounting; its slopes |
 //! | `table_surface` | the same from a table file |
@@ -20,6 +21,7 @@
 //! | `slip` | a step within AFTER |
 //! | `unknown` | a smooth change that no name describes |
 //! | `gate` | a change must show without any single mounting |
+//! | `withdrawal` | names that are withdrawn: another actuator, held-out recordings that get worse |
 //! | `posterior` | probabilities, set, verdict |
 //! | `isometric` | all of this for pressure staircases at held lengths |
 //! | `combined` | length and pressure that move together, taken apart into runs at nearly held lengths |
@@ -54,6 +56,7 @@ pub mod shapes;
 mod sides;
 mod slip;
 mod spline;
+mod stages;
 mod staircase_answer;
 mod stroke_answer;
 pub(crate) mod stroked;
@@ -66,6 +69,7 @@ mod table_surface;
 mod tests;
 mod units;
 mod unknown;
+mod withdrawal;
 
 pub(crate) use crate::criteria::reference as criteria;
 pub use answer::{ChangeReport, Verdict};

@@ -9,8 +9,9 @@ use model_core::link::endpoints::{GetInfo, GetStatus};
 use model_core::link::messages::{Event, Telemetry};
 use serde_json::json;
 
+use super::interrupt::interrupts;
 use super::port::PortOption;
-use super::run::{begin, end, interrupts, not_there, positive, warn_of};
+use super::recording_files::{begin, end, positive, refuse_existing, warn_of_losses};
 use crate::change_watch::{self, ReferenceOptions};
 use crate::console::Console;
 use crate::documents::{bench, text};
@@ -81,7 +82,7 @@ impl Arguments {
         } else {
             self.output.clone()
         };
-        not_there(&output, self.replace)?;
+        refuse_existing(&output, self.replace)?;
         let mut changed = self.changed.start(console)?;
         let mut said = String::new();
         let interrupted = interrupts()?;
@@ -140,7 +141,7 @@ impl Arguments {
         watched?;
         kept?;
         quiet?;
-        warn_of(losses, console);
+        warn_of_losses(losses, console);
         console.result(if self.json {
             format!("{about:#}")
         } else {

@@ -200,9 +200,8 @@ fn round(number: u32, fault: Fault, rig: &mut Rig, row: &mut Row) {
 /// What a program that has ended printed.
 fn said(run: &mut Child) -> String {
     let mut text = String::new();
-    if let Some(stderr) = &mut run.stderr
-        && run.try_wait().is_ok_and(|ended| ended.is_some())
-    {
+    let ended = run.try_wait().is_ok_and(|ended| ended.is_some());
+    if let Some(stderr) = run.stderr.as_mut().filter(|_| ended) {
         let _ = stderr.read_to_string(&mut text);
     }
     text

@@ -127,6 +127,10 @@ pam_data::criteria! {
     SHARED_ROWS: f64 = 0.1, "shared_rows", "1", Judgement;
     /// Rest lengths that differ by more than this share are of two actuators: a tape measure errs by less.
     OTHER_LENGTH: f64 = 0.02, "other_length", "1", Judgement;
+    /// Share of the difference's energy on held-out recordings that names must remove; below it they describe something else.
+    UNSEEN_LEAST: f64 = 0.1, "unseen_least", "1", Convention("as FURTHER_SHARE of the forward selection");
+    /// The same from which on the names explain the difference; below it they explain a part.
+    UNSEEN_EXPLAINED: f64 = 0.5, "unseen_explained", "1", Convention("the larger part");
     /// With a difference that suspects another actuator, names that leave more than this share of the largest force are withdrawn.
     LEFT_BY_NAMES: f64 = 0.1, "left_by_names", "1", Judgement;
     /// Strokes: bins over the middle of the stroke.
@@ -139,6 +143,10 @@ pam_data::criteria! {
     LEVEL: f64 = 0.04, "level", "1", Judgement;
     /// A recording whose stroke stays within this is held.
     HELD: f64 = 1e-3, "held", "m", Judgement;
+    /// Rows of a hold that counts as a recording at a held length.
+    STAGES_FEWEST_ROWS: usize = 20, "stages_fewest_rows", "1", Judgement;
+    /// Share of a recording's time in such holds from which it counts as one of held lengths.
+    STAGES_SHARE: f64 = 0.5, "stages_share", "1", Convention("the larger part");
     /// What repeats between campaigns of strokes: shares of the largest force, or of friction.
     STROKE_REPEATS: (StrokeRepeats) = StrokeRepeats {
         zero: 0.002,

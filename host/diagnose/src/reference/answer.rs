@@ -133,6 +133,8 @@ pub enum WhyNot {
     LessProbable,
     /// The difference does not have its shape, or is too small.
     OtherShape,
+    /// The best name for the difference, but held-out recordings get worse with it, or the difference is that of another actuator.
+    HeldOutWorse,
 }
 
 impl WhyNot {

@@ -209,7 +209,9 @@ fn contrasts(
     let y = DVector::from_iterator(cells.len(), cells.iter().map(|c| c.means.residual));
     let Some(error) = table_error else {
         let used: std::collections::BTreeSet<usize> = runs.runs.iter().map(|r| r.mounting).collect();
-        let taught = DIRECTIONS_PER_RUN * (runs.runs.len() as f64 - 2.0 * used.len() as f64).max(1.0);
+        // Runs repeated on one side, or else lengths beyond the first: what a single change leaves of their differences does not repeat.
+        let repeated = runs.runs.len() as f64 - 2.0 * used.len() as f64;
+        let taught = DIRECTIONS_PER_RUN * repeated.max(used.len() as f64 - 1.0).max(1.0);
         return Ok(vec![Contrast::new(repeats, Some(&levels(cells)), y, taught).ok_or_else(unusable)?]);
     };
     // What the error's size adapts to, the scale of what repeats must not take once more.

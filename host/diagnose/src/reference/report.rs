@@ -2,8 +2,7 @@
 
 use super::answer::{ChangeReport, Left, NotComparable, Place, Remark, Repeatability, Verdict};
 use super::criteria::{
-    COMBINED_UNREST, HELD, LEFT_BY_NAMES, NAMED, OTHER_ACTUATOR, OTHER_LENGTH, PRIOR_NONE, REPORT_REGULATED,
-    UNSTATED_ERROR,
+    COMBINED_UNREST, HELD, NAMED, OTHER_LENGTH, PRIOR_NONE, REPORT_REGULATED, UNSTATED_ERROR,
 };
 use super::held_out::Unseen;
 use super::isometric;
@@ -12,7 +11,8 @@ use super::staircase_answer::staircases;
 use super::stroke_answer::strokes;
 use super::stroked;
 use super::surface::Surface;
-use super::{combined, sides, table_surface, units};
+use super::withdrawal::withdraw;
+use super::{combined, sides, stages, table_surface, units};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::{self, Campaign, Recording};
 use pam_fit::predict::predict;
@@ -126,13 +126,17 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
     for r in &after.recordings {
         r.require_force()?;
     }
+    let given = after;
+    let after = &stages::parted(given);
     let kind = protocol(after, "AFTER")?;
     let mut report = match (against, kind) {
         (Against::Recordings(before), _) => {
             for r in &before.recordings {
                 r.require_force()?;
             }
-            sides::apart(before, after)?;
+            sides::apart(before, given)?;
+            let whole = before.samples();
+            let before = &stages::parted(before);
             let mut remarks = units::check(before, after)?;
             remarks.extend(sides::order(before, after));
             let mut report = match (protocol(before, "the reference")?, kind) {
@@ -157,7 +161,7 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
                 }
             };
             report.reference.files = files(before);
-            report.reference.samples = before.samples();
+            report.reference.samples = whole;
             report.remarks.splice(0..0, remarks);
             report
         }
@@ -177,19 +181,9 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
             report
         }
     };
-    report.samples = after.samples();
+    report.samples = given.samples();
     report.muscle.clone_from(&options.muscle);
-    if report.misfit_rms_N > OTHER_ACTUATOR * report.largest_force_N {
-        report.remarks.push(Remark::OtherActuator);
-        if report.held_out.rms_after_N > LEFT_BY_NAMES * report.largest_force_N && !report.missing.is_empty()
-        {
-            // Of another actuator everything differs, and the nearest shape is no change.
-            report.missing.clear();
-            report.verdict = Verdict::Unexplained;
-            report.held_out.rms_after_N = report.held_out.rms_before_N;
-            report.unexplained = Left { share: 1.0, place: report.r#where.first().cloned() };
-        }
-    }
+    withdraw(&mut report);
     Ok(report)
 }
 

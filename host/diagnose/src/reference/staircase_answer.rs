@@ -8,7 +8,7 @@ use super::answer::{
 };
 use super::criteria::{
     CELLS, COMBINED_SHAPE_ERROR, FEWEST_CELLS, GATE, NAMED, PRIOR_NONE, SCALE_PRIOR, SIZES, SLOPE_ERROR,
-    TABLE_SLOPE_ERROR, TABLE_SLOPE_OVER_LENGTH,
+    TABLE_SLOPE_ERROR, TABLE_SLOPE_OVER_LENGTH, UNSEEN_EXPLAINED,
 };
 use super::held_out;
 use super::isometric::{Accepted, Analysis, Estimate};
@@ -29,7 +29,7 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
     let verdict = verdict(
         first.probability(Cause::None),
         analysis.accepted.len(),
-        analysis.last.probability(Cause::None) < NAMED,
+        analysis.last.probability(Cause::None) < NAMED || (unseen.held && unseen.share() < UNSEEN_EXPLAINED),
     );
     let mut remarks = remarks(analysis, verdict);
     let not = incomparable(analysis);

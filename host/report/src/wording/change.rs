@@ -83,6 +83,7 @@ pub fn why_not(why: WhyNot) -> &'static str {
     match why {
         WhyNot::NotComparable => "these recordings cannot show it",
         WhyNot::LessProbable => "possible, but another cause is more probable",
+        WhyNot::HeldOutWorse => "the nearest shape, but it does not describe held-out recordings",
         WhyNot::OtherShape => "the difference does not have its shape, or is too small",
     }
 }

@@ -13,6 +13,9 @@ use emulator_tests::machine::Folder;
 use emulator_tests::program;
 use firmware::board::{Inputs, Outputs, Readings};
 use firmware::native::{Device, Options};
+use model_core::link::endpoints::{ClearFault, GetStatus};
+use model_core::link::messages::State;
+use pam_device::{Address, Client};
 use rustix::process::{Pid, Signal, kill_process};
 
 use super::recording::{Recorded, recorded};
@@ -45,9 +48,11 @@ pub struct Needs {
 fn needs(program: &Child) -> Needs {
     let of = |name: &str| format!("/proc/{}/{name}", program.id());
     let count = |name: &str| std::fs::read_dir(of(name)).map_or(0, Iterator::count);
-    let pages = std::fs::read_to_string(of("statm")).ok();
-    let pages = pages.and_then(|text| text.split_whitespace().nth(1)?.parse::<u64>().ok()).unwrap_or(0);
-    Needs { memory: pages * rustix::param::page_size() as u64, files: count("fd"), threads: count("task") }
+    let status = std::fs::read_to_string(of("status")).unwrap_or_default();
+    let kib = |line: &str| line.strip_prefix("VmRSS:")?.trim().split(' ').next()?.parse::<u64>().ok();
+    let memory = status.lines().find_map(kib).unwrap_or(0) << 10;
+    Needs { memory, files: count("fd"), threads: count("task") }
+}
 }
 
 /// What the muscle is doing, as one sees it beside it.
@@ -333,10 +338,16 @@ impl Rig {
 
     /// Forgets the latched fault, once its cause has gone.
     pub fn clear(&mut self) {
+        let line = self.line.address();
+        let address = Address::Tcp { host: line.ip().to_string(), port: line.port() };
+        let mut client = Client::open(&address).expect("a controller answers");
         until("the fault is cleared", || {
-            let cleared =
-                self.host(&["device", "faults", "--clear"], None).wait_with_output().expect("it ends");
-            cleared.status.success()
+            let state = client.call::<GetStatus>(&()).expect("an answer").state;
+            if state == State::Fault {
+                // Refused while the cause is present.
+                let _ = client.try_call::<ClearFault>(&()).expect("an answer");
+            }
+            state != State::Fault
         });
     }
 }
