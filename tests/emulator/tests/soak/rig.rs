@@ -53,7 +53,6 @@ fn needs(program: &Child) -> Needs {
     let memory = status.lines().find_map(kib).unwrap_or(0) << 10;
     Needs { memory, files: count("fd"), threads: count("task") }
 }
-}
 
 /// What the muscle is doing, as one sees it beside it.
 #[derive(Debug, Default)]
