@@ -358,7 +358,7 @@ fn setpoint_profiles() {
 /// Each target of `cargo fuzz` is run here, too, and each has seeds there.
 #[test]
 fn every_target_is_listed() {
-    let here = include_str!("fuzz.rs");
+    let here: String = include_str!("fuzz.rs").split_whitespace().collect();
     let manifest = include_str!("../fuzz/Cargo.toml");
     let targets = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/fuzz_targets");
     let mut count = 0;
@@ -369,5 +369,5 @@ fn every_target_is_listed() {
         assert!(manifest.contains(&format!("name = \"{target}\"")), "{target} is not in the manifest");
         count += 1;
     }
-    assert_eq!(here.matches("    run(\"").count(), count, "a target is missing in host/fuzz/fuzz_targets");
+    assert_eq!(here.matches("run(\"").count(), count, "a target is missing there");
 }

@@ -194,8 +194,10 @@ fn follow(
                 if takes {
                     sample(&s)?;
                 }
-                if s.state == State::Fault {
-                    return Err(fault(client)?);
+                match s.state {
+                    State::Running => {}
+                    State::Fault => return Err(fault(client)?),
+                    State::Armed | State::Disarmed => return Err(ended_by_another()),
                 }
                 steps.advance(client, plan.quantity, elapsed)?;
                 if let Some(value) = next(elapsed) {
@@ -218,6 +220,12 @@ fn follow(
             None => stream.renew(client)?,
         }
     }
+}
+
+/// The error where the device no longer runs, without a fault and without this program's doing.
+fn ended_by_another() -> Error {
+    Error::new(DeviceCode::DeviceRefused, "another program has vented the controller during the run")
+        .help("start the run again when the muscle may move")
 }
 
 /// The fault that holds a device, as an error.

@@ -171,6 +171,19 @@ fn a_run_that_ends_leaves_the_stream_of_a_recording_that_began_before() {
     assert!(ticks.windows(2).all(|pair| pair[1] - pair[0] == 1), "samples are missing");
 }
 
+#[test]
+fn a_run_that_another_program_vents_ends_with_an_error() {
+    let device = device();
+    let line = shared_line::share(device.address()).expect("a line");
+    let folder = Folder::new();
+    let first = running(line, &folder, "60");
+    let vent = host(line, &folder, &["vent"]).output().expect("the program starts");
+    assert!(vent.status.success(), "{}", error_of(&vent));
+    let first = first.wait_with_output().expect("it ends");
+    assert_eq!(first.status.code(), Some(1));
+    assert!(error_of(&first).contains("another program has vented"), "{}", error_of(&first));
+}
+
 #[cfg(unix)]
 #[test]
 fn a_studio_that_only_watches_ends_without_venting_the_run_of_another_program() {

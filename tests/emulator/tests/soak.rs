@@ -124,7 +124,8 @@ fn happens(fault: Fault, rig: &mut Rig, run: &mut Child) -> (u64, bool) {
             (rig.vented_after(rig.plant.ticks()), false)
         }
         Fault::TwoHosts => {
-            let second = rig.host(&["run", "--pressure", "300", "--seconds", "1", "-o", "second.csv"], None);
+            let second = rig
+                .host(&["run", "--pressure", "300", "--seconds", "1", "-o", "second.csv", "--replace"], None);
             let refused = second.wait_with_output().expect("it ends");
             let said = String::from_utf8_lossy(&refused.stderr);
             assert!(said.contains("device::in-use"), "a second run: {said}");
