@@ -101,6 +101,8 @@ enum Command {
     Table(commands::table::Arguments),
     /// Send a table to a controller, or program its chip.
     Flash(commands::flash::Arguments),
+    /// Send signed firmware to a controller over its link, with a way back.
+    Update(commands::update::Arguments),
     /// Let a controller follow a setpoint profile of force, pressure or stroke, and record it.
     Run(commands::run::Arguments),
     /// Record what a controller measures, as CSV or MCAP.
@@ -145,6 +147,7 @@ impl Command {
             Self::Compare(a) => a.run(console),
             Self::Table(a) => a.run(console),
             Self::Flash(a) => a.run(console),
+            Self::Update(a) => a.run(console),
             Self::Run(a) => a.run(console),
             Self::Record(a) => a.run(console),
             Self::Recover(a) => a.run(console),

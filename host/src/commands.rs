@@ -31,4 +31,5 @@ pub mod settings;
 pub mod stock;
 pub mod studio;
 pub mod table;
+pub mod update;
 pub mod vent;

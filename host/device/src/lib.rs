@@ -7,10 +7,12 @@
 //! | hello, typed calls, topics, losses | [`Client`] |
 //! | tables: upload in pieces, read back | [`tables`] |
 //! | setpoints over time | [`setpoint_profile`] |
+//! | firmware over the link | [`mod@update`] |
 //! | a run from start to vent | [`mod@run`] |
 //! | telemetry beside other programs | [`Subscription`] |
 //! | venting while the conversation waits for something else | [`VentLine`] |
 //! | the pressure regulator, found from steps | [`regulator`] |
+//! | scales of sensors from known values | [`calibration`] |
 //! | log lines of the firmware as text | [`log_table`] |
 //! | telemetry to a recording | [`recorder`] |
 //! | messages about refusals and faults, with their remedy | [`messages`] |
@@ -18,6 +20,7 @@
 //! | why a setpoint could not be reached | [`reachability`] |
 
 mod address;
+pub mod calibration;
 mod client;
 #[cfg(feature = "emulated")]
 pub mod emulated;
@@ -36,6 +39,7 @@ pub mod setpoint_profile;
 mod subscription;
 pub mod table_diff;
 pub mod tables;
+pub mod update;
 mod vent_line;
 
 pub use address::Address;

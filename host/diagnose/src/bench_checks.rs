@@ -147,6 +147,7 @@ impl BenchChecks {
         let step = |j: &Judged| PathStep {
             effect: j.measured.fault.info().name.into(),
             rms_N: is.sqrt(),
+            held_out_rms_N: None,
             p: chance(&j.measured),
             runners_up: Vec::new(),
         };

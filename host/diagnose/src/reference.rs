@@ -11,6 +11,7 @@
 //! | `stages` | lengths held one after another in one recording |
 //! | `motion` | settled rows; which way the pressure or the stroke moves |
 //! | `spline`, `surface` | the force before, over pressure and direction, by mounting; its slopes |
+//! | `interpolate` | the same at a length between those of the reference |
 //! | `table_surface` | the same from a table file |
 //! | `table_error` | what a table is wrong by where nothing changed |
 //! | `cells` | residuals and shapes as means over cells of pressure |
@@ -25,6 +26,7 @@
 //! | `posterior` | probabilities, set, verdict |
 //! | `isometric` | all of this for pressure staircases at held lengths |
 //! | `combined` | length and pressure that move together, taken apart into runs at nearly held lengths |
+//! | `catalogue` | strokes of a described muscle: every effect of the catalogue as a change |
 //! | `strokes`, `stroked` | the same question for strokes at regulated pressures |
 //! | `sweeps` | runs at the reference's lengths, for quantities that are followed over campaigns |
 //! | `localise` | which cells, since which file, abruptly or gradually |
@@ -38,12 +40,14 @@
 //! The same recordings give the same answer on any number of threads.
 
 pub mod answer;
+mod catalogue;
 mod cells;
 mod combined;
 mod contrast;
 pub mod correction;
 mod gate;
 mod held_out;
+mod interpolate;
 mod isometric;
 mod lag;
 mod localise;

@@ -70,7 +70,7 @@ impl Device {
 
     fn step(&mut self, readings: Readings) {
         self.tick = self.tick.wrapping_add(1);
-        let inputs = Inputs { sides: [Some(readings), None], ..Inputs::default() };
+        let inputs = Inputs { sides: [Some(readings.into()), None], ..Inputs::default() };
         self.outputs = self.shared.step(&inputs);
         let (state, settings) = self.shared.with(|controller| (controller.state(), *controller.settings()));
         if !self.states.contains(&state) {

@@ -404,7 +404,7 @@ fn looked_at(d: &Diagnosis) -> Section {
     if !d.path.is_empty() {
         let mut table = Table::new(
             "Forward selection",
-            &["selected", "residual after it (N)", "p (chance)", "next best"],
+            &["selected", "residual after it (N)", "held-out error after it (N)", "p (chance)", "next best"],
         );
         for step in &d.path {
             let competitors: Vec<String> =
@@ -412,6 +412,7 @@ fn looked_at(d: &Diagnosis) -> Section {
             table.row([
                 format!("`{}`", step.effect),
                 figures(step.rms_N, 3),
+                step.held_out_rms_N.map_or_else(|| "–".to_owned(), |e| figures(e, 3)),
                 figures(step.p, 2),
                 competitors.join(", "),
             ]);

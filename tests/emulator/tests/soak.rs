@@ -182,7 +182,11 @@ fn round(number: u32, fault: Fault, rig: &mut Rig, row: &mut Row) {
         assert!(!ended, "{fault:?}: the run does not start: {}", said(&mut run));
         !rig.plant.is_vented() && rig.plant.pressure_pa() > 150e3
     });
-    std::thread::sleep(Duration::from_millis(700));
+    // Some thousand samples are on the disk.
+    let part = rig.folder().join(format!("{name}.part"));
+    until(&format!("{fault:?}: samples are recorded"), || {
+        std::fs::metadata(&part).is_ok_and(|file| file.len() > 100_000)
+    });
     let (ticks, succeeds) = happens(fault, rig, &mut run);
     assert!(ticks <= fault.within(), "{fault:?}: vented after {ticks} ticks");
     let ended = run.wait().expect("it ends");

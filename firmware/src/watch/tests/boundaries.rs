@@ -20,6 +20,7 @@ fn still(pressure_pa: f32, stroke_m: f32, force_n: f32) -> Seen {
         command: Command { pressure_pa: 200e3, vent: false },
         expected_pa: pressure_pa,
         model_n: None,
+        second_pa: None,
     }
 }
 

@@ -25,6 +25,7 @@ use crate::progress::Progress;
 
 mod constants;
 mod error_messages;
+mod grid;
 
 use constants::Constants;
 use error_messages::{block_error, rows_error};
@@ -203,6 +204,9 @@ impl<'a> Reader<'a> {
         source: source::Source,
         description: Cow<'_, Import>,
     ) -> Result<Vec<Recording>> {
+        if let Some(grid) = &description.grid {
+            return self.grid(path, source, &description, grid);
+        }
         let mut blocks = Blocks::new(source.reader);
         let mut first = Vec::new();
         let start = match blocks.next(&mut first) {

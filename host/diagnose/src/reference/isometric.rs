@@ -5,7 +5,8 @@ use nalgebra::DVector;
 use super::cells::{Cell, cells};
 use super::contrast::{Contrast, evidence};
 use super::criteria::{
-    COMBINED_SHAPE_ERROR, DIRECTIONS_PER_RUN, LAG_FLOOR, MOST_CHANGES, NAMED, SIZES, TABLE_ERROR_FACTORS,
+    COMBINED_SHAPE_ERROR, DIRECTIONS_PER_RUN, LAG_FLOOR, LAGS, MOST_CHANGES, NAMED, SIZES,
+    TABLE_ERROR_FACTORS, TABLE_LAGS,
 };
 use super::gate::{self, Asked};
 use super::lag::{self, Shift};
@@ -122,8 +123,9 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
     let Reference { surface, error, recorded } = reference;
     use rayon::prelude::*;
     // Rows of one part of a motion do not follow one another: they say nothing about lags.
+    let tried: &[f64] = if recorded { &LAGS } else { &TABLE_LAGS };
     let shift = (!runs.moving).then(|| {
-        let scores: Vec<_> = runs.runs.par_iter().map(|r| lag::score(r, &surface)).collect();
+        let scores: Vec<_> = runs.runs.par_iter().map(|r| lag::score(r, &surface, tried)).collect();
         lag::shift(&runs, &scores)
     });
     let late = shift.as_ref().map_or(0.0, |s| s.lag);

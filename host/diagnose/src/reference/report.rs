@@ -12,7 +12,8 @@ use super::stroke_answer::strokes;
 use super::stroked;
 use super::surface::Surface;
 use super::withdrawal::withdraw;
-use super::{combined, sides, stages, table_surface, units};
+use super::{catalogue, combined, sides, stages, table_surface, units};
+use model_core::braid::Geometry;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::{self, Campaign, Recording};
 use pam_fit::predict::predict;
@@ -36,6 +37,8 @@ pub struct Options {
     pub muscle: Option<String>,
     /// L0, m, where it is known.
     pub rest_length: Option<f64>,
+    /// The muscle's dimensions, where they are described: then strokes are asked about every effect of the catalogue.
+    pub geometry: Option<Geometry>,
     /// Whether AFTER was mounted anew.
     pub mounted: Mounted,
     /// Prior probability that something changed, instead of the usual.
@@ -128,18 +131,32 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
     }
     let given = after;
     let after = &stages::parted(given);
-    let kind = protocol(after, "AFTER")?;
+    let kind = match (protocol(after, "AFTER"), &options.geometry) {
+        // Strokes with readings at rest between them: a described muscle is compared row by row.
+        (Err(_), Some(_)) if matches!(against, Against::Recordings(_)) => Protocol::Combined,
+        (kind, _) => kind?,
+    };
     let mut report = match (against, kind) {
         (Against::Recordings(before), _) => {
             for r in &before.recordings {
                 r.require_force()?;
             }
             sides::apart(before, given)?;
-            let whole = before.samples();
-            let before = &stages::parted(before);
+            let whole = before;
+            let before = &stages::parted(whole);
             let mut remarks = units::check(before, after)?;
             remarks.extend(sides::order(before, after));
-            let mut report = match (protocol(before, "the reference")?, kind) {
+            let described = options.geometry.as_ref().filter(|_| kind != Protocol::Held);
+            let old = match described {
+                Some(_) => Protocol::Combined,
+                None => protocol(before, "the reference")?,
+            };
+            let mut report = match (old, kind) {
+                (_, _) if described.is_some() => {
+                    let geometry =
+                        described.ok_or_else(|| Error::new(DataCode::MuscleInvalid, "no dimensions"))?;
+                    catalogue::compare(whole, given, geometry, options)?
+                }
                 (Protocol::Held, Protocol::Held) => held(before, after, options)?,
                 (Protocol::Stroked, Protocol::Stroked) => {
                     let compared = stroked::compare(before, after, 0.0)?;
@@ -161,7 +178,7 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
                 }
             };
             report.reference.files = files(before);
-            report.reference.samples = whole;
+            report.reference.samples = whole.samples();
             report.remarks.splice(0..0, remarks);
             report
         }
@@ -230,8 +247,11 @@ fn recorded(runs: Runs, surface: Surface, options: &Options) -> Result<ChangeRep
 
 fn against_table(table: &TableFile, after: &Campaign, runs: Runs, options: &Options) -> Result<ChangeReport> {
     units::check_pressure(after, f64::from(table.table.tested.pressure_high.pascals()))?;
-    let surface = table_surface::of(table, &runs)?;
+    let mut surface = table_surface::of(table, &runs)?;
     units::check_force(after, surface.largest)?;
+    if !runs.moving {
+        table_surface::fill_own_slopes(&mut surface, &runs);
+    }
     let stated = table.about.fit.rms_newtons;
     let error = if stated > 0.0 { stated } else { UNSTATED_ERROR * surface.largest };
     let reference = isometric::Reference { surface, error, recorded: false };

@@ -98,7 +98,7 @@ impl Plant {
                 stroke_m: 1e-7 * wiggle,
                 force_n: 1e-3 * wiggle,
             };
-            Inputs { sides: [Some(now), None], ..Inputs::default() }
+            Inputs { sides: [Some(now.into()), None], ..Inputs::default() }
         };
         Device::start("127.0.0.1:0", Options::default(), exchange).expect("a controller")
     }
