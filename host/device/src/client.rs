@@ -260,18 +260,11 @@ impl Client {
         /// Gaps of which the least is the rate: lost samples make some of them longer.
         const GAPS: usize = 4;
         let deadline = Instant::now() + patience;
-        self.topics.retain(|topic| !matches!(topic, Topic::Telemetry(_)));
+        self.topics.forget_samples();
         loop {
-            let ticks: Vec<u64> = self
-                .topics
-                .iter()
-                .filter_map(
-                    |topic| if let Topic::Telemetry(sample) = topic { Some(sample.tick) } else { None },
-                )
-                .collect();
             let left = deadline.saturating_duration_since(Instant::now());
-            if ticks.len() > GAPS || left.is_zero() {
-                let least = ticks.windows(2).filter_map(|pair| pair[1].checked_sub(pair[0])).min();
+            let (gaps, least) = self.topics.gaps();
+            if gaps >= GAPS || left.is_zero() {
                 return Ok(least.and_then(|ticks| u16::try_from(ticks).ok()).filter(|ticks| *ticks > 0));
             }
             self.pump(left, &mut LineActivity::default())?;
