@@ -10,6 +10,7 @@
 //! | firmware over the link | [`mod@update`] |
 //! | a run from start to vent | [`mod@run`] |
 //! | telemetry beside other programs | [`Subscription`] |
+//! | a controller that is only watched | [`mod@watch`] |
 //! | venting while the conversation waits for something else | [`VentLine`] |
 //! | the pressure regulator, found from steps | [`regulator`] |
 //! | scales of sensors from known values | [`calibration`] |
@@ -41,6 +42,7 @@ pub mod table_diff;
 pub mod tables;
 pub mod update;
 mod vent_line;
+pub mod watch;
 
 pub use address::Address;
 pub use client::{Client, Losses, Patience, Topic};

@@ -2,11 +2,9 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
 
 use clap::Args;
-use model_core::link::endpoints::{GetInfo, GetStatus};
-use model_core::link::messages::{Event, Telemetry};
+use model_core::link::endpoints::GetInfo;
 use serde_json::json;
 
 use super::interrupt::interrupts;
@@ -18,9 +16,9 @@ use crate::documents::{bench, text};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::pluralise::pluralise;
 use pam_data::progress::Progress;
-use pam_device::error::DeviceCode;
 use pam_device::recorder::{about_losses, about_start, recover};
-use pam_device::{Client, Subscription, Topic, messages};
+use pam_device::run::Ending;
+use pam_device::watch::{Happened, watch};
 
 use crate::progress::ProgressLine;
 use pam_data::date::now_utc;
@@ -60,15 +58,6 @@ pub struct Arguments {
     changed: ReferenceOptions,
 }
 
-/// Silence of the telemetry after which the device's faults are read.
-const SILENCE: Duration = Duration::from_secs(2);
-
-/// How a recording ended.
-enum Ending {
-    Time,
-    Interrupt,
-}
-
 impl Arguments {
     /// Records until the time is over, Ctrl-C, or the device is gone.
     ///
@@ -98,10 +87,9 @@ impl Arguments {
         console.note(format!("recording to {names}; Ctrl-C ends it"));
         let progress = ProgressLine::new(console, "record");
         progress.total(self.seconds.map_or(0, |s| (s * 1e3) as u64));
-        let mut stream = Subscription::begin(&mut client, every_ticks)?;
         let watched = watch(
             &mut client,
-            &mut stream,
+            every_ticks,
             self.seconds,
             |happened| match happened {
                 Happened::Sample(sample, elapsed) => {
@@ -120,8 +108,8 @@ impl Arguments {
         let losses = client.losses();
         about["losses"] = about_losses(losses);
         about["ended_by"] = json!(match &watched {
-            Ok(Ending::Time) => "time".to_owned(),
-            Ok(Ending::Interrupt) => "interrupt".to_owned(),
+            Ok(Ending::Done) => "time".to_owned(),
+            Ok(Ending::Stopped) => "interrupt".to_owned(),
             Err(e) => e.to_string(),
         });
         let changed = change_watch::finish(changed);
@@ -130,8 +118,6 @@ impl Arguments {
         about["rows"] = json!(rows);
         about["files"] = json!(output.iter().map(|f| f.display().to_string()).collect::<Vec<_>>());
         let kept = end(recorder, &about, console);
-        // A device that is gone cannot stop its telemetry; the recording is complete nevertheless.
-        let quiet = stream.end(&mut client);
         if let Err(error) = &watched
             && kept.is_ok()
         {
@@ -140,7 +126,6 @@ impl Arguments {
         }
         watched?;
         kept?;
-        quiet?;
         warn_of_losses(losses, console);
         console.result(if self.json {
             format!("{about:#}")
@@ -152,60 +137,6 @@ impl Arguments {
         }
         Ok(())
     }
-}
-
-/// What a device sends.
-enum Happened<'a> {
-    /// A sample, and the time since the first one, ms.
-    Sample(&'a Telemetry, u64),
-    Event(&'a Event),
-}
-
-/// Hands on every sample and event.
-fn watch(
-    client: &mut Client,
-    stream: &mut Subscription,
-    seconds: Option<f64>,
-    mut take: impl FnMut(Happened<'_>) -> Result<()>,
-    stop: impl Fn() -> bool,
-) -> Result<Ending> {
-    let silence = stream.silence(SILENCE);
-    let (mut first, mut last) = (None, 0);
-    let mut heard = Instant::now();
-    while !stop() {
-        match client.topic(Duration::from_millis(50))? {
-            Some(Topic::Telemetry(sample)) => {
-                heard = Instant::now();
-                if sample.time_us < last {
-                    return Err(Error::new(
-                        DeviceCode::DeviceSilent,
-                        "the device restarted during the recording",
-                    )
-                    .help("`host device faults` shows whether a fault caused it; check the power supply"));
-                }
-                last = sample.time_us;
-                let elapsed = last - *first.get_or_insert(last);
-                if seconds.is_some_and(|end| elapsed as f64 * 1e-6 >= end) {
-                    return Ok(Ending::Time);
-                }
-                if stream.takes(&sample) {
-                    take(Happened::Sample(&sample, elapsed / 1000))?;
-                }
-            }
-            Some(Topic::Event(event)) => take(Happened::Event(&event))?,
-            Some(Topic::Log(_)) => {}
-            None if heard.elapsed() > silence => {
-                let status = client.call::<GetStatus>(&())?;
-                return Err(Error::new(
-                    DeviceCode::DeviceSilent,
-                    format!("the device answers, but sends no telemetry; it is {}", messages::state(status.state)),
-                )
-                .help("it may have restarted: `host device info` shows its time since start and whether ticks advance"));
-            }
-            None => stream.renew(client)?,
-        }
-    }
-    Ok(Ending::Interrupt)
 }
 
 /// Arguments of `host recover`.
