@@ -10,10 +10,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use model_core::image;
-use model_core::link::endpoints::{
-    ClearFault, GetFaults, GetInfo, GetSettings, GetStatus, SetSettings,
-};
-use model_core::link::messages::{Side, Telemetry, TelemetryRate};
+use model_core::link::endpoints::{ClearFault, GetFaults, GetInfo, GetSettings, GetStatus, SetSettings};
+use model_core::link::messages::{Side, Telemetry};
 use model_core::link::settings::Settings;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::json_of;
