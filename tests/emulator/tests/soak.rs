@@ -193,7 +193,7 @@ fn round(number: u32, fault: Fault, rig: &mut Rig, row: &mut Row) {
     assert_eq!(ended.success(), succeeds, "{fault:?}: {}", said(&mut run));
     let path = rig.folder().join(&name);
     let found = if path.exists() { recorded(&path) } else { rig.recovered(&name) };
-    let Recorded { samples, missing, told } = found;
+    let Recorded { samples, missing, told, .. } = found;
     assert!(samples > 300, "{fault:?}: {samples} samples");
     assert!(missing <= told, "{fault:?}: {missing} samples are missing, the recording tells of {told}");
     row.add(ticks, samples, missing);

@@ -2,12 +2,17 @@
 
 use std::path::Path;
 
+/// A stream that another program has ended is requested again after half a second.
+const INTERRUPTED: u64 = 450;
+
 /// Samples of a recording.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Recorded {
     pub samples: u64,
     /// Ticks between the first and the last sample that have none.
     pub missing: u64,
+    /// Of these, ticks in gaps that last as long as a stream which another program has ended, until it is requested again.
+    pub interrupted: u64,
     /// Samples that its side file, or the program that recovered it, says are lost.
     pub told: u64,
 }
@@ -23,7 +28,9 @@ pub fn recorded(path: &Path) -> Recorded {
         (cell.unwrap_or_else(|| panic!("{}: no time in {row}", path.display())) * 1e3).round() as u64
     };
     let ticks: Vec<u64> = rows.map(tick).collect();
-    let missing = ticks.windows(2).map(|pair| pair[1] - pair[0] - 1).sum();
+    let gaps = || ticks.windows(2).map(|pair| pair[1] - pair[0] - 1);
+    let missing = gaps().sum();
+    let interrupted = gaps().filter(|gap| *gap >= INTERRUPTED).sum();
     let mut side = path.as_os_str().to_owned();
     side.push(".json");
     let told = std::fs::read(side)
@@ -32,5 +39,5 @@ pub fn recorded(path: &Path) -> Recorded {
         .map_or(0, |about| {
             ["samples", "unread"].iter().filter_map(|name| about["losses"][name].as_u64()).sum()
         });
-    Recorded { samples: ticks.len() as u64, missing, told }
+    Recorded { samples: ticks.len() as u64, missing, interrupted, told }
 }

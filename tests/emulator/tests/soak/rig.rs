@@ -328,10 +328,16 @@ impl Rig {
 
     fn judge(&mut self) {
         let path = self.folder.path().join(format!("watched-{}.csv", self.recorder.number));
-        let Recorded { samples, missing, told } = if path.exists() { recorded(&path) } else { return };
-        assert!(missing <= told, "{}: {missing} samples are missing, it tells of {told}", path.display());
+        let Recorded { samples, missing, interrupted, told } =
+            if path.exists() { recorded(&path) } else { return };
+        assert!(
+            missing - interrupted <= told,
+            "{}: {missing} samples are missing, it tells of {told}",
+            path.display()
+        );
         self.watched.samples += samples;
         self.watched.missing += missing;
+        self.watched.interrupted += interrupted;
         self.watched.told += told;
     }
 
