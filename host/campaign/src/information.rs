@@ -410,7 +410,9 @@ fn weights(campaign: &Campaign, independent_s: f64) -> Vec<f64> {
 /// Effects that a campaign checks for: all but those that only the order of the polynomial imitates.
 #[must_use]
 pub fn asked() -> Vec<Candidate> {
-    Candidate::all().filter(|l| l.traits().imitates != Some(Imitates::ElasticOrders)).collect()
+    Candidate::all()
+        .filter(|l| l.traits().imitates != Some(Imitates::ElasticOrders) && !l.traits().between_recordings)
+        .collect()
 }
 
 /// State of an effect that has no past.

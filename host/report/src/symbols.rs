@@ -5,9 +5,10 @@ use model_core::effects::Info;
 use super::Table;
 
 /// Symbols that mean the same in every equation. Where a parameter has one of them, it is the parameter.
-const SYMBOLS: [(&str, &str); 53] = [
+const SYMBOLS: [(&str, &str); 55] = [
     ("F_quasi", "pull of the base model without friction, N"),
     ("F_b", "elastic force of the bladder: the base model's without friction less P·g, N"),
+    ("F_w", "what the bladder takes from the pull of the gas: −F_b, between 0 and P·g, N"),
     ("F_G", "Gaylord's force of the effective pressure, P′·g, N"),
     ("k_F", "friction factor of the table at this pressure"),
     ("s", "direction: +1 while shortening, −1 while lengthening, held at rest"),
@@ -50,6 +51,7 @@ const SYMBOLS: [(&str, &str); 53] = [
     ("d", "damage so far, from 0 to 1"),
     ("q", "decaying over-stress due to the drive u, the expression in the brackets behind it"),
     ("q_i", "part i of the over-stress due to the drive u, the expression in the brackets behind it"),
+    ("r_i", "the expression in the brackets behind it, low-pass filtered with time constant τ_i"),
     ("z", "state of friction, from −1 to 1"),
     ("z_i", "state of friction element i, from −1 to 1"),
     ("m", "1 in motion, 0 at rest"),

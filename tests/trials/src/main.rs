@@ -9,6 +9,7 @@ mod campaign;
 mod clopper;
 mod festo;
 mod festo_history;
+mod festo_tables;
 mod figures;
 mod fitted;
 mod generate;
@@ -183,6 +184,8 @@ enum Command {
     Festo(Real),
     /// The same for settled points only: writes the section of the page on the memory of the bladder.
     FestoHistory(Real),
+    /// Unseen runs of these recordings through the table only: writes that section of the page.
+    FestoTables(Real),
     /// Answer a development set again with each criterion at half and at double its value.
     Sensitivity(sensitivity::Study),
     /// Spoil one recording of clean campaigns in every way that sensors and loggers fail, and count what is found.
@@ -242,6 +245,7 @@ fn main() -> ExitCode {
         Command::FestoHistory(real) => {
             festo::run_history(&real.data, &real.output, &real.host, real.page.as_deref())
         }
+        Command::FestoTables(real) => festo::run_tables(&real.data, &real.output, real.page.as_deref()),
         Command::Campaign(what) => campaign::run(&what),
         Command::Sensitivity(study) => sensitivity::run(&study),
         Command::Sensors(what) => sensors::run(&what),
