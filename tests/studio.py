@@ -130,6 +130,156 @@ def reads_where_one_points(page):
     passed("reads_values_where_one_points_and_by_keys")
 
 
+# Twenty minutes of samples, then what the pictures show of them. In one go, so that no sample of the controller falls between.
+HISTORY = """
+    const begin = ring.last("t") + 1, fed = (from, seconds, F) => {
+      for (let b = 0; b < seconds * 10; b++) {
+        const t = Array.from({length: 100}, (_, i) => from + (100 * b + i) * 1e-3);
+        const of = (f) => t.map(f);
+        take({k: "t", t, F: of(F), P: of(() => 300), x: of((x) => 2 * Math.abs(((x - begin) % 4) - 2)), c: of(() => 310), m: of(() => 40), a: of(() => 50), mode: "force"});
+      }
+    };
+    const sine = (x) => 45 + 20 * Math.sin(2 * Math.PI * 5 * x);
+    fed(begin, 1200, (x) => (x - begin < 600 ? 10 : sine(x)));
+    const found = {}, end = ring.last("t");
+    const least = (name) => { const s = scopes[0].lastDrawn; let low = Infinity; s.each((slot) => { low = Math.min(low, s.curves[name].least[slot]); }); return low; };
+    document.getElementById("window").value = "1800"; view.moved(); draw();
+    found.whole = [end - scopes[0].from, least("F")];
+    view.zoom(60 / 1800, end); draw();
+    found.minute = [scopes[0].to - scopes[0].from, least("F")];
+    view.pan(-900); draw();
+    found.earlier = [end - scopes[0].to, least("F"), document.getElementById("newest").disabled];
+    const lines = seenAsCsv().trim().split("\\n");
+    found.thinned = [lines.length - 1, lines[0]];
+    const canvas = document.getElementById("p-force"), box = canvas.getBoundingClientRect();
+    canvas.dispatchEvent(new WheelEvent("wheel", {deltaY: -300, clientX: box.left + box.width / 2, clientY: box.top + 50, bubbles: true, cancelable: true}));
+    found.wheel = view.seconds;
+    document.getElementById("newest").click(); document.getElementById("window").value = "10"; view.moved(); draw();
+    found.newest = [end - scopes[0].to, view.live];
+    mark = end - 1; cursor = 1; readings();
+    found.measured = [document.getElementById("cursor-time").textContent, document.querySelector("[data-of=x]").textContent];
+    mark = null; cursor = null;
+    found.exact = seenAsCsv().trim().split("\\n").length - 1;
+    const panel = addPanel("F", "spectrum"), speed = addPanel("v", "time"), against = addPanel("F", "x");
+    draw();
+    found.peak = [panel.scope.peak.frequency, panel.scope.peak.amplitude, panel.told.textContent];
+    found.speed = ring.last("v"); found.error = ring.last("e"); found.gap = ring.last("r");
+    found.kept = localStorage.getItem("studio-pictures");
+    const picture = seenAsPicture(); found.picture = [picture.width, picture.height];
+    return found;
+"""
+
+
+def shows_any_stretch_and_any_signal(page):
+    found = page.js(HISTORY)
+    # In the whole, the quiet minutes and what was before them are seen, too; in the last minute only the sine.
+    assert found["whole"][0] > 1200 and found["whole"][1] < 10.01, found
+    assert abs(found["minute"][0] - 60) < 0.01 and abs(found["minute"][1] - 25) < 0.5, found
+    assert abs(found["earlier"][0] - 900) < 1 and abs(found["earlier"][1] - 10) < 0.01 and not found["earlier"][2], found
+    assert 595 <= found["thinned"][0] <= 605 and found["thinned"][1].startswith("time_s,pressure_kPa,displacement_mm,force_N,"), found
+    assert 25 < found["wheel"] < 45, found
+    assert found["newest"] == [0, True] and 9990 <= found["exact"] <= 10001, found
+    assert "1.000 s from the mark (1.00 Hz)" in found["measured"][0] and found["measured"][1].endswith("(+2.00)"), found
+    frequency, amplitude, told = found["peak"]
+    assert abs(frequency - 5) < 0.15 and abs(amplitude - 20) < 3 and "N at" in told, found
+    # The stroke moves by 2 mm/s; the setpoint is 50 N, the command 10 kPa above the pressure.
+    assert abs(found["speed"] - 2) < 0.01 and abs(found["gap"] - 10) < 1e-6, found
+    assert found["kept"] == '[["F","spectrum"],["v","time"],["F","x"]]', found
+    assert found["picture"][0] > 100 and found["picture"][1] > 700, found
+    page.until("ring.length > 500")
+    page.shot(SHOTS, "added")
+    page.js("while (panels.length) panels[0].figure.querySelector('button').click()")
+    assert page.js("return document.querySelectorAll('#pictures figure').length") == 0
+    passed("shows_any_stretch_of_time_and_any_signal")
+
+
+def drags(page):
+    """The pointer itself: a drag moves in time, a click marks, a double click goes back."""
+    page.until("ring.last('t') - ring.get('t', 0) > 12", 240)
+    element = page.ask("POST", page.path + "/element", {"using": "css selector", "value": "#p-force"})
+
+    def actions(*moves):
+        page.ask("POST", page.path + "/actions", {"actions": [{"type": "pointer", "id": "p", "actions": list(moves)}]})
+
+    at = lambda x: {"type": "pointerMove", "duration": 100, "x": x, "y": 0, "origin": element}
+    down, up = {"type": "pointerDown", "button": 0}, {"type": "pointerUp", "button": 0}
+    actions(at(-50), down, at(0), at(50), up)
+    assert page.js("return view.end !== null && view.end < ring.last('t') && mark === null"), "a drag moves"
+    actions(at(20), down, up)
+    assert page.js("return mark !== null && mark > scopes[0].from && mark < scopes[0].to"), "a click marks"
+    page.click("newest")
+    page.js("mark = null; redraw()")
+    page.over("h1")
+    passed("is_moved_by_a_drag_and_marked_by_a_click")
+
+
+def edits_settings_with_units(page):
+    page.click("show")
+    page.until("entries.length > 50")
+    entry = "entries.find((e) => e.key === 'limits.pressure_pa')"
+    shown = page.js(f"const e = {entry}; return [e.value(), e.row.children[2].textContent, document.getElementById('set').disabled]")
+    assert shown[1] == "kPa" and 100 < float(shown[0]) < 2000 and shown[2], shown
+    page.js(f"const e = {entry}; e.input.value = '555.5'; e.input.dispatchEvent(new Event('input'))")
+    assert page.text("set") == "Write 1 change and read back" and page.js(f"return {entry}.row.classList.contains('changed')")
+    page.shot(SHOTS, "settings")
+    page.click("set")
+    page.until(f"{entry}.stored === '555.5'")
+    note = page.js(f"return {entry}.row.children[3].textContent")
+    assert note == f"default {shown[0]}", note
+    page.js(f"const e = {entry}; e.input.value = ''; e.input.dispatchEvent(new Event('input'))")
+    assert page.js("return document.getElementById('set').disabled"), "an empty entry can be written"
+    page.js(f"const e = {entry}; e.input.value = '{shown[0]}'; e.input.dispatchEvent(new Event('input'))")
+    page.click("set")
+    page.until(f"{entry}.stored === '{shown[0]}'")
+    page.js("document.getElementById('settings').closest('details').open = false")
+    passed("edits_settings_with_units_and_marks_differences")
+
+
+def writes_profiles_by_a_form(page):
+    page.js("const s = document.getElementById('shape'); s.value = 'steps'; s.dispatchEvent(new Event('change'))")
+    assert page.js("return document.getElementById('profile').value") == "steps 35 45 55 hold=1"
+    page.js("const i = document.querySelector('#shape-fields input[data-name=hold]'); i.value = '2.5'; i.dispatchEvent(new Event('input', {bubbles: true}))")
+    assert page.js("return document.getElementById('profile').value") == "steps 35 45 55 hold=2.5"
+    text = "sine mean=45 amplitude=20 frequency=0.5"
+    page.js(f"const p = document.getElementById('profile'); p.value = '{text}'; p.dispatchEvent(new Event('input'))")
+    found = page.js("return [document.getElementById('shape').value, formValues()]")
+    assert found == ["sine", {"mean": "45", "amplitude": "20", "frequency": "0.5"}], found
+    passed("writes_setpoint_profiles_by_a_form")
+
+
+def report_is_read(driver, url):
+    """A report, which is one file for itself: values under the pointer, layers on and off, buttons on a phone."""
+    page = Browser(driver, url, "1300,1000")
+    read = """const place = [...document.querySelectorAll('figure .wide rect.read')][0], box = place.getBoundingClientRect();
+      const at = (x, y) => place.dispatchEvent(new PointerEvent('pointermove', {clientX: box.left + x * box.width, clientY: box.top + y * box.height, bubbles: true}));
+      const reading = document.getElementById('reading'), figure = place.closest('figure'), told = [];
+      for (let i = 1; i < 20; i++) for (let j = 1; j < 20; j++) { at(i / 20, j / 20); told.push(reading.textContent); }
+      return {told, hidden: reading.hidden, title: [place.dataset.xTitle, place.dataset.yTitle], rows: numbers(figure), layers: [...figure.querySelectorAll('.wide g.entry')].map((g) => g.dataset.layer)}"""
+    found = page.js(read)
+    assert not found["hidden"] and all(title in text for title in found["title"] for text in found["told"]), found["told"][0]
+    # A value that is shown with the name of a layer is one of the numbers behind the picture.
+    named = [text.split("\n") for text in found["told"] if text.count("\n") == 2]
+    assert len(named) > 20, "no points are found"
+    for layer, x, y in named:
+        x, y = (float(text.rsplit(": ", 1)[1]) for text in (x, y) if " to " not in text) if " to " not in y else (None, None)
+        close = lambda a, b: a is None or (b is not None and abs(a - b) <= 1e-3 * abs(b) + 1e-12)
+        assert y is None or any(r["layer"] == layer and close(x, r["x"]) and close(y, r["y"]) for r in found["rows"]), (layer, x, y)
+    hide = """const entry = [...document.querySelectorAll('figure .wide g.entry[role]')][0], name = entry.dataset.layer, figure = entry.closest('figure');
+      const seen = () => [...figure.querySelectorAll('g.layer')].filter((g) => g.dataset.layer === name && getComputedStyle(g).display !== 'none').length;
+      const before = seen(); entry.dispatchEvent(new MouseEvent('click', {bubbles: true}));
+      const during = [seen(), entry.getAttribute('aria-pressed')]; entry.dispatchEvent(new KeyboardEvent('keydown', {key: 'Enter', bubbles: true}));
+      return [before, during, seen()]"""
+    before, during, after = page.js(hide)
+    assert before > 0 and during == [0, "false"] and after == before, (before, during, after)
+    page.shot(SHOTS, "report")
+    page.cdp("Emulation.setDeviceMetricsOverride", width=390, height=844, deviceScaleFactor=2, mobile=True)
+    phone = page.js("""const buttons = [...document.querySelectorAll('.save button')];
+      return [document.documentElement.scrollWidth <= innerWidth, buttons.length, buttons.filter((b) => b.getBoundingClientRect().width > 10 && b.getBoundingClientRect().right <= innerWidth).length]""")
+    assert phone[0] and phone[1] > 0 and phone[1] == phone[2], phone
+    page.close()
+    passed("reads_a_report_under_the_pointer_and_hides_layers")
+
+
 def glimpse(url):
     """The state of the controller, queried without a page."""
     base, token = url.split("/?token=")
@@ -143,6 +293,10 @@ def story(url, driver):
     page.state("disarmed")
     passed("connects_to_an_emulated_controller")
     ten_minutes(page)
+    shows_any_stretch_and_any_signal(page)
+    drags(page)
+    edits_settings_with_units(page)
+    writes_profiles_by_a_form(page)
     page.click("example")
     page.until("document.querySelectorAll('#list li').length == 6")
     page.click("fit")
@@ -151,6 +305,7 @@ def story(url, driver):
     assert "<svg" in page.js("""let r = new XMLHttpRequest(); r.open("GET", document.querySelector("#fit-report a").href, false); r.send();
         return r.status === 200 ? r.responseText : String(r.status)""")
     passed("fits_recordings")
+    report_is_read(driver, url.split("/?")[0] + page.js("return document.querySelector('#fit-report a').getAttribute('href')"))
     page.click("difference")
     page.until("!document.getElementById('difference-text').hidden")
     assert "no table yet" in page.text("difference-text")
@@ -210,9 +365,12 @@ def story(url, driver):
     page.state("armed")
     page.key("f")
     page.state("running")
+    page.until("state.recording > 200")
     page.key("v")
     page.state("disarmed")
-    passed("is_worked_by_keys_alone")
+    page.until("document.querySelectorAll('#list li').length == 8")
+    assert page.js("return JSON.parse(localStorage.getItem('studio-profiles')).length") >= 1, "followed profiles are offered again"
+    passed("is_worked_by_keys_alone_and_records_each_run")
     page.click("arm")
     page.state("armed")
     page.click("follow")
@@ -237,6 +395,7 @@ def story(url, driver):
     page = Browser(driver, url, "500,900")
     page.state("disarmed")
     assert page.js("return document.documentElement.scrollWidth <= innerWidth"), "the page is wider than a phone"
+    assert page.js("return document.querySelector('.live').offsetTop < document.getElementById('connect').offsetTop"), "controls above the pictures"
     page.close()
     passed("closing_the_page_leaves_the_controller_safe")
 

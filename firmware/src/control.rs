@@ -7,7 +7,7 @@
 //! ```
 //! Watches look at every tick before the command is made, so a fault changes the command of the tick it is noticed in.
 
-use model_core::link::messages::{Fault, FaultReport, Mode, Session, Side, State};
+use model_core::link::messages::{Fault, FaultReport, MeanSignals, Mode, Session, Side, State};
 use model_core::link::settings::{Reaction, Settings};
 use model_core::motion::{MotionSettings, MotionTracker};
 use model_core::single_precision;
@@ -20,9 +20,10 @@ use crate::pair::PairState;
 use crate::reference::Generator;
 use crate::regulator;
 use crate::safety::{self, Machine};
+use crate::signals::{self, Filters};
 use crate::tick::{TICK_S, TICK_US};
 use crate::trace::Trace;
-use crate::watch::Finding;
+use crate::watch::{Finding, InARow};
 
 mod actuator;
 mod arming;
@@ -81,6 +82,9 @@ pub struct Controller {
     tick: u64,
     overruns: u32,
     missed_in_a_row: u16,
+    /// Ticks in a row of too little supply air, and of an open enable input.
+    supply_low: InARow,
+    enable_open: InARow,
     saturated_ticks: u32,
     telemetry_every: u16,
     telemetry_countdown: u16,
@@ -122,6 +126,8 @@ impl Controller {
             tick: 0,
             overruns: 0,
             missed_in_a_row: 0,
+            supply_low: InARow::default(),
+            enable_open: InARow::default(),
             saturated_ticks: 0,
             telemetry_every: 0,
             telemetry_countdown: 0,
@@ -198,6 +204,7 @@ impl Controller {
         self.settings = *settings;
         for side in &mut self.sides {
             side.motion = MotionTracker::new(motion_settings(settings));
+            side.filters = Filters::default();
             side.watch.restart();
         }
     }
@@ -239,6 +246,12 @@ impl Controller {
         let actuator = &mut self.sides[side.index()];
         actuator.health = Health::new(Scales::of(table));
         actuator.model.fill(table)
+    }
+
+    /// Means of a muscle's signals since they were last taken.
+    pub fn take_signals(&mut self, side: Side, answer: &mut MeanSignals) {
+        self.sides[side.index()].sums.take(answer);
+        answer.enabled = !self.enable_open.is_counting();
     }
 
     /// Whether a muscle's table still describes it.
@@ -332,7 +345,7 @@ impl Controller {
                 self.ask();
                 self.drive();
             }
-            (State::Disarmed, Arming::Filling(_) | Arming::Dumping(_)) => self.test_valves(inputs),
+            (State::Disarmed, Arming::Filling(_) | Arming::Dumping(_)) => self.test_valves(),
             _ => {
                 self.disarm_when_silent();
                 self.rest();
@@ -361,7 +374,15 @@ impl Controller {
     /// Takes one muscle's readings; the force that its table gives at them.
     fn take_readings(&mut self, side: Side, inputs: &Inputs) -> Option<f32> {
         let actuator = &mut self.sides[side.index()];
-        let Readings { pressure_pa, stroke_m, force_n } = inputs.sides[side.index()]?;
+        let scales = &self.settings.scales;
+        actuator.readings = None;
+        actuator.second_pa = None;
+        let now = inputs.sides[side.index()].as_ref()?;
+        actuator.sums.add(now, inputs.supply_air);
+        let readings = signals::readings(now, scales);
+        actuator.readings = Some(readings);
+        actuator.second_pa = now.second_pressure.map(|signal| scales.second_pressure.reading(signal));
+        let Readings { pressure_pa, stroke_m, force_n } = actuator.filters.next(&readings, scales);
         actuator.sample.pressure_pa = pressure_pa;
         actuator.sample.stroke_m = stroke_m;
         actuator.sample.force_n = force_n;

@@ -186,7 +186,7 @@ fn whole_step(table: &MuscleTable) {
         return;
     }
     let inputs = |pressure_pa, stroke_m, force_n| Inputs {
-        sides: [Some(Readings { pressure_pa, stroke_m, force_n }), None],
+        sides: [Some(Readings { pressure_pa, stroke_m, force_n }.into()), None],
         ..Inputs::default()
     };
     // Empty, as it must be to be armed.

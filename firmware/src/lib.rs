@@ -18,7 +18,9 @@
 //! | messages that wait to be sent to the host | [`outbox`] |
 //! | static memory for large values | [`placement`], [`shared_buffer`] |
 //! | the tasks that a board starts | [`tasks`] |
+//! | signals to readings, filters | [`signals`] |
 //! | the length of a tick | [`tick`] |
+//! | another firmware over the link | [`update`] |
 //! | what a board must give | [`board`] |
 //! | log lines on their way to the host | `log` (feature of that name) |
 //! | all of it in a host's own process | `native` (feature of that name) |
@@ -45,8 +47,10 @@ pub mod safety;
 pub mod server;
 pub mod shared;
 pub mod shared_buffer;
+pub mod signals;
 pub mod store;
 pub mod tasks;
 pub mod tick;
 pub mod trace;
+pub mod update;
 pub mod watch;

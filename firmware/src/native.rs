@@ -10,7 +10,7 @@
 //! let plant = |outputs: &Outputs| {
 //!     let pressure_pa = outputs.sides[0].pressure_pa;
 //!     let readings = Readings { pressure_pa, ..Readings::default() };
-//!     Inputs { sides: [Some(readings), None], ..Inputs::default() }
+//!     Inputs { sides: [Some(readings.into()), None], ..Inputs::default() }
 //! };
 //! let device = Device::start("127.0.0.1:0", Options::default(), plant)?;
 //! let mut port = std::net::TcpStream::connect(device.address())?;
@@ -42,11 +42,14 @@ use crate::board::{Identity, Inputs, Outputs};
 use crate::control::Controller;
 use crate::server::Server;
 use crate::shared::Shared;
+use crate::update::{Key, Updater};
 
 mod memory_flash;
+mod memory_slots;
 mod pace;
 
 pub use memory_flash::{MemoryError, MemoryFlash};
+pub use memory_slots::MemorySlots;
 pub use pace::Pace;
 
 /// How a native device runs.
@@ -58,11 +61,13 @@ pub struct Options {
     pub store: Option<PathBuf>,
     /// Muscles that the plant gives readings of.
     pub muscles: u8,
+    /// Public key of who may send firmware; without one, the device takes none.
+    pub update_key: Option<Key>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { speed: 1.0, store: None, muscles: 1 }
+        Self { speed: 1.0, store: None, muscles: 1, update_key: None }
     }
 }
 
@@ -97,8 +102,11 @@ impl Device {
             started_by: StartedBy::Power,
             fault: None,
         };
-        let server = Server::start(identity, flash, &shared)
+        let mut server = Server::start(identity, flash, &shared)
             .map_err(|fault| io::Error::other(format!("the store cannot be opened: {fault:?}")))?;
+        if let Some(key) = options.update_key {
+            server.take_updates(Box::new(Updater::new(MemorySlots::probed(), key)));
+        }
         let stop = Arc::new(AtomicBool::new(false));
         let connected = Arc::new(AtomicBool::new(false));
         let link = {
@@ -178,6 +186,7 @@ fn serve(
         }
         if server.wants_restart() {
             shared.with(|controller| *controller = Controller::new(&Settings::default()));
+            server.boot();
             match server.restarted(shared) {
                 Ok(again) => server = again,
                 Err(_) => return,

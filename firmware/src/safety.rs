@@ -96,6 +96,9 @@ pub const RULES: [Rule; Fault::ALL.len()] = [
     rule(Fault::HoldEnded, Watched::Running, false),
     rule(Fault::ClockFailed, Watched::Always, false),
     rule(Fault::ValveTest, Watched::Always, false),
+    rule(Fault::PressureSensorsDisagree, Watched::Armed, false),
+    rule(Fault::SupplyPressureLow, Watched::Armed, true),
+    rule(Fault::EnableOpen, Watched::Armed, false),
 ];
 
 /// The rule of a fault.

@@ -19,11 +19,19 @@ use crate::control;
 use crate::modes::Model;
 use crate::shared::Shared;
 use crate::store::{self, Kept, Store};
+use crate::update::Update;
 use crate::watch::Finding;
 
 use self::answers::Answers;
 use self::upload::Upload;
 use self::wear::Wear;
+
+/// What takes another firmware: on a board in a static of its own.
+#[cfg(any(test, feature = "std"))]
+pub type Updates = std::boxed::Box<dyn Update + Send>;
+/// What takes another firmware: on a board in a static of its own.
+#[cfg(not(any(test, feature = "std")))]
+pub type Updates = &'static mut (dyn Update + Send);
 
 /// The link's server: one request at a time.
 pub struct Server<F: NorFlash> {
@@ -34,6 +42,7 @@ pub struct Server<F: NorFlash> {
     wear: Wear,
     counts: frame::Counts,
     restart: bool,
+    update: Option<Updates>,
 }
 
 /// Turns an image's error into the wire's.
@@ -79,6 +88,7 @@ impl<F: NorFlash> Server<F> {
             wear: Wear::default(),
             counts,
             restart: false,
+            update: None,
         };
         for side in Side::ALL {
             damaged |= server.use_kept(side, shared).is_err();
@@ -93,6 +103,19 @@ impl<F: NorFlash> Server<F> {
             shared.with(|controller| controller.raise(Side::Agonist, &finding));
         }
         Ok(server)
+    }
+
+    /// Takes another firmware from now on.
+    pub fn take_updates(&mut self, update: Updates) {
+        self.update = Some(update);
+    }
+
+    /// The device restarts: see [`Update::restarted`].
+    #[cfg(feature = "std")]
+    pub fn boot(&mut self) {
+        if let Some(update) = &mut self.update {
+            update.restarted();
+        }
     }
 
     /// Has the controller use the kept table of a muscle, its effects with the memories that were kept. In two functions that are not
@@ -197,7 +220,9 @@ impl<F: NorFlash> Server<F> {
     /// As [`Server::start`].
     pub fn restarted(self, shared: &Shared) -> Result<Self, StoreFault> {
         let identity = Identity { started_by: StartedBy::Request, ..self.identity };
-        Self::start(identity, self.store.close(), shared)
+        let mut again = Self::start(identity, self.store.close(), shared)?;
+        again.update = self.update;
+        Ok(again)
     }
 
     /// Whether the host requested a restart, once the answer is out.

@@ -201,7 +201,7 @@ mod tests {
     #[test]
     fn a_change_of_state_wakes_the_link_to_keep_what_must_not_be_lost() {
         let shared = Shared::new(Settings::default());
-        let inputs = Inputs { sides: [Some(Readings::default()), None], ..Inputs::default() };
+        let inputs = Inputs { sides: [Some(Readings::default().into()), None], ..Inputs::default() };
         shared.step(&inputs);
         assert!(!shared.has_changed());
         assert_eq!(shared.with(|controller| controller.arm(Session::default())), Ok(()));

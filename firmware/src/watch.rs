@@ -6,6 +6,9 @@
 //! | sensor stuck | `stuck_ticks` of bit-equal readings while the command moved by 20 kPa |
 //! | sensor noisy | the last of `noisy_jumps` jumps within 256 ticks |
 //! | sensors disagree | `disagree_ticks` of table and load cell apart by `disagree_n` |
+//! | pressure sensors disagree | `follow_ticks` of the two apart by `second_pressure_pa` |
+//! | supply pressure low | `follow_ticks` below `supply_low_pa` |
+//! | enable open | `debounce_ticks` |
 //! | pressure not following | `follow_ticks` of pressure and regulator's model apart by `follow_pa` |
 //! | not vented | `debounce_ticks` above `vented_pa` once the command has been to vent for `vent_ticks` |
 //! | hold ended | `hold_ticks` of a held command |
@@ -39,13 +42,18 @@ pub struct Finding {
 
 /// A count of ticks in a row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct InARow(u16);
+pub(crate) struct InARow(u16);
 
 impl InARow {
     /// Counts, or begins again; returns whether there have been enough.
-    fn count(&mut self, bad: bool, enough: u16) -> bool {
+    pub(crate) fn count(&mut self, bad: bool, enough: u16) -> bool {
         self.0 = if bad { self.0.saturating_add(1) } else { 0 };
         bad && self.0 >= enough.max(1)
+    }
+
+    /// Whether the last tick was bad.
+    pub(crate) fn is_counting(self) -> bool {
+        self.0 > 0
     }
 }
 
@@ -141,6 +149,7 @@ pub struct SideWatch {
     low: InARow,
     high: InARow,
     not_vented: InARow,
+    second: InARow,
     /// Ticks since the command is to vent.
     vented_ticks: u32,
     /// Ticks of the slice in which jumps are being counted, none before the first readings.
@@ -150,8 +159,10 @@ pub struct SideWatch {
 /// What one muscle's watches look at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
-    /// Readings of this tick.
+    /// Readings of this tick, before any filter.
     pub readings: Option<Readings>,
+    /// Reading of the second pressure sensor, Pa.
+    pub second_pa: Option<f32>,
     /// Filtered speed, m/s.
     pub speed_m_per_s: f32,
     /// Command of the last tick.
@@ -182,7 +193,8 @@ impl SideWatch {
         };
         self.next_tick();
         self.check_sensors(&now, seen.command, settings, report);
-        self.check_limits(&now, seen.speed_m_per_s, settings, report);
+        self.check_limits(&now, seen, settings, report);
+        self.check_second(now.pressure_pa, seen.second_pa, settings, report);
         self.check_pressure(now.pressure_pa, seen.expected_pa, settings, report);
         let miss = seen.model_n.map_or(0.0, |model| (model - now.force_n).abs());
         let apart = settings.force.fitted && watch.disagree_n > 0.0 && miss > watch.disagree_n;
@@ -221,26 +233,27 @@ impl SideWatch {
     fn check_limits(
         &mut self,
         now: &Readings,
-        speed_m_per_s: f32,
+        seen: &Seen,
         settings: &Settings,
         report: &mut dyn FnMut(Finding),
     ) {
+        let speed_m_per_s = seen.speed_m_per_s;
         let (limits, debounce) = (&settings.limits, settings.watch.debounce_ticks);
         let (has_stroke, stroke) = (settings.stroke.fitted, now.stroke_m);
         let stroke_limit =
             if stroke < limits.stroke_min_m { limits.stroke_min_m } else { limits.stroke_max_m };
         let out_of_stroke = stroke < limits.stroke_min_m || stroke > limits.stroke_max_m;
-        let over_pressure = settings.pressure.fitted && now.pressure_pa > limits.pressure_pa;
+        // The higher of two pressure sensors counts: one that reads low hides nothing.
+        let second_pa = seen.second_pa.filter(|_| settings.watch.second_pressure_pa > 0.0);
+        let pressure_pa = match second_pa {
+            Some(second_pa) if second_pa > now.pressure_pa => second_pa,
+            _ => now.pressure_pa,
+        };
+        let over_pressure = settings.pressure.fitted && pressure_pa > limits.pressure_pa;
         let over_force = settings.force.fitted && now.force_n > limits.force_n;
         let over_speed = has_stroke && speed_m_per_s.abs() > limits.speed_m_per_s;
         let rows = [
-            (
-                &mut self.over_pressure,
-                over_pressure,
-                Fault::OverPressure,
-                now.pressure_pa,
-                limits.pressure_pa,
-            ),
+            (&mut self.over_pressure, over_pressure, Fault::OverPressure, pressure_pa, limits.pressure_pa),
             (&mut self.over_force, over_force, Fault::OverForce, now.force_n, limits.force_n),
             (&mut self.over_stroke, has_stroke && out_of_stroke, Fault::OverStroke, stroke, stroke_limit),
             (&mut self.over_speed, over_speed, Fault::OverSpeed, speed_m_per_s, limits.speed_m_per_s),
@@ -249,6 +262,24 @@ impl SideWatch {
             if row.count(over, debounce) {
                 report(Finding { fault, sensor: None, value, limit });
             }
+        }
+    }
+
+    /// Both pressure sensors of a muscle say the same. A second one that does not say anything, or is not a number, disagrees.
+    fn check_second(
+        &mut self,
+        pressure_pa: f32,
+        second_pa: Option<f32>,
+        settings: &Settings,
+        report: &mut dyn FnMut(Finding),
+    ) {
+        let watch = &settings.watch;
+        let limit = watch.second_pressure_pa;
+        let miss = second_pa.map_or(f32::INFINITY, |second_pa| (second_pa - pressure_pa).abs());
+        let apart = settings.pressure.fitted && limit > 0.0 && !(miss <= limit);
+        if self.second.count(apart, watch.follow_ticks) {
+            let (fault, sensor) = (Fault::PressureSensorsDisagree, Some(Sensor::Pressure));
+            report(Finding { fault, sensor, value: miss, limit });
         }
     }
 

@@ -99,6 +99,8 @@ enum Command {
     Table(commands::table::Arguments),
     /// Send a table to a controller, or program its chip.
     Flash(commands::flash::Arguments),
+    /// Send signed firmware to a controller over its link, with a way back.
+    Update(commands::update::Arguments),
     /// Let a controller follow a setpoint profile of force, pressure or stroke, and record it.
     Run(commands::run::Arguments),
     /// Record what a controller measures, as CSV or MCAP.
@@ -106,7 +108,7 @@ enum Command {
     /// Make a whole recording of one that was cut off.
     Recover(commands::record::RecoverArguments),
     /// Vent the muscle and disarm the controller.
-    Vent(commands::run::VentArguments),
+    Vent(commands::vent::Arguments),
     /// Say whether the table on a controller still describes its muscle, and name what has changed.
     Health(commands::health::Arguments),
     /// The live view in the browser: connect, run, fit, flash, compare.
@@ -143,6 +145,7 @@ impl Command {
             Self::Compare(a) => a.run(console),
             Self::Table(a) => a.run(console),
             Self::Flash(a) => a.run(console),
+            Self::Update(a) => a.run(console),
             Self::Run(a) => a.run(console),
             Self::Record(a) => a.run(console),
             Self::Recover(a) => a.run(console),

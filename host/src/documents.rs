@@ -12,6 +12,7 @@ pub(crate) mod health;
 pub(crate) mod history;
 pub(crate) mod import;
 pub(crate) mod predict;
+pub(crate) mod stock;
 pub(crate) mod table;
 
 use pam_data::error::{DataCode, Error, Result};
@@ -62,6 +63,7 @@ mod tests {
         published::<super::bench::SettingsFiles<'_>>("pam-settings-1");
         published::<super::bench::Studio<'_>>("pam-studio-1");
         published::<super::device::Faults>("pam-faults-1");
+        published::<super::device::Firmware>("pam-firmware-1");
         published::<super::device::Flash>("pam-flash-1");
         published::<super::device::Forget>("pam-forget-1");
         published::<super::device::Info>("pam-device-1");
@@ -69,6 +71,7 @@ mod tests {
         published::<super::device::Ports>("pam-ports-1");
         published::<super::device::Regulator>("pam-regulator-1");
         published::<super::device::Rollback>("pam-rollback-1");
+        published::<super::device::Sensors>("pam-sensors-1");
         published::<super::device::Settings>("pam-device-settings-1");
         published::<super::device::Trace<'_>>("pam-trace-1");
         published::<super::device::Vent>("pam-vent-1");
@@ -82,6 +85,7 @@ mod tests {
         published::<super::fleet::Fleet<'_>>("pam-fleet-1");
         published::<super::fleet::Stock<'_>>("pam-stock-1");
         published::<super::predict::Predict>("pam-predict-1");
+        published::<super::stock::StockDocument>("pam-diagnose-stock-1");
         published::<super::table::Check>("pam-check-1");
         published::<super::table::Export>("pam-export-1");
         published::<super::table::TableDocument<'_>>("pam-table-1");

@@ -307,6 +307,73 @@ fn settings_are_read_back_and_wrong_ones_refused_by_name() {
     assert!(trace.starts_with("time_s,pressure_Pa,command_Pa\n") && trace.lines().count() > 100);
 }
 
+/// A load cell whose zero is 12 N off, in a muscle without pressure: calibrated, it reads what it did before, and the recording says
+/// with which scale.
+#[test]
+fn a_sensor_is_calibrated_with_known_values_and_a_recording_holds_its_scale() {
+    let bench = Bench::start("sensors");
+    let force = |said: &str| {
+        let said: serde_json::Value = serde_json::from_str(said).unwrap();
+        let row = said["sensors"].as_array().unwrap().iter().find(|row| row["sensor"] == "force").unwrap();
+        row["reading"].as_f64().unwrap()
+    };
+    let json = |arguments: &[&str]| {
+        let output = bench.host(arguments);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let before = force(&json(&["device", "sensors", "--json"]));
+    bench.done(&[
+        "device",
+        "settings",
+        "--set",
+        "scales.force.at_zero=12",
+        "--set",
+        "scales.force.filter_s=0.002",
+    ]);
+    assert!((force(&json(&["device", "sensors", "--json"])) - before - 12.0).abs() < 0.5);
+    let known = format!("{before}");
+    let dry = json(&["device", "sensors", "--calibrate", "force", "--known", &known, "--dry-run", "--json"]);
+    assert!(dry.contains("\"kept\": false"), "{dry}");
+    assert!((force(&json(&["device", "sensors", "--json"])) - before - 12.0).abs() < 0.5, "left as it was");
+    bench.done(&["device", "sensors", "--calibrate", "force", "--known", &known]);
+    assert!((force(&json(&["device", "sensors", "--json"])) - before).abs() < 0.5);
+    bench.done(&["record", "--seconds", "0.5", "-o", "scaled.csv"]);
+    let side = std::fs::read(side_file(&bench.folder.join("scaled.csv"))).unwrap();
+    let side: serde_json::Value = serde_json::from_slice(&side).unwrap();
+    let scale = &side["device"]["settings"]["scales"]["force"];
+    assert!(scale["at_zero"].as_f64().unwrap().abs() < 0.5 && scale["per_unit"] == 1.0, "{scale}");
+    assert!((scale["filter_s"].as_f64().unwrap() - 0.002).abs() < 1e-9);
+    // From a data sheet: the slope changes, and the device takes it.
+    let said = bench.done(&[
+        "device",
+        "sensors",
+        "--calibrate",
+        "pressure",
+        "--point",
+        "0=0",
+        "--point",
+        "1e6=1100",
+    ]);
+    assert!(said.contains("0.0011 × signal"), "{said}");
+    // A sensor that could never read the limit is refused, by its name.
+    let (status, said) = bench.refused(&[
+        "device",
+        "sensors",
+        "--calibrate",
+        "pressure",
+        "--point",
+        "0=0",
+        "--point",
+        "10e6=100",
+    ]);
+    assert!(status == 1 && (said.contains("limits") || said.contains("scale")), "{said}");
+    let (status, said) = bench.refused(&["device", "sensors", "--calibrate", "supply", "--known", "0"]);
+    assert!(status == 1 && said.contains("no signal of the supply sensor"), "{said}");
+    bench.done(&["device", "settings", "--defaults"]);
+    assert!((force(&json(&["device", "sensors", "--json"])) - before).abs() < 0.5);
+}
+
 /// `host demo` is the first thing a new user runs: every run of it must be there from its first second to its last.
 #[test]
 fn the_demo_tells_the_whole_story() {

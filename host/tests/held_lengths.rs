@@ -71,6 +71,28 @@ fn mountings_of_equal_length_are_kept_apart_by_their_labels() {
     assert_eq!(fitted.summary.recordings[4].recording, "second1, run 1");
 }
 
+#[test]
+fn the_report_draws_the_fitted_lengths() {
+    let spec = presets::contractile();
+    let mut campaign = staircases(&spec, 3);
+    // The tape measure is off by 0.8 mm at one length.
+    campaign.recordings[1].stroke.iter_mut().for_each(|x| *x += 0.8e-3);
+    let options = Options { fit_lengths: true, ..Options::default() };
+    let fitted = fit(&campaign, &description(&spec), &options).unwrap();
+    let page = pam_report::fit_page::page(&fitted, &campaign, &options);
+    let figure = |id: &str| page.figures().find(|f| f.id == id).unwrap();
+    assert!(figure("load-lines").reading.contains("fitted ones"));
+    let csv = figure("residuals").csv();
+    let rows = csv.lines().filter(|l| l.starts_with("against contraction,each point,"));
+    let residuals: Vec<f64> = rows.map(|l| l.rsplit(',').next().unwrap().parse().unwrap()).collect();
+    let rms = (residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64).sqrt();
+    assert!(
+        residuals.len() > 20 && rms < 2.0 * fitted.summary.rms_N,
+        "{rms} N drawn, {} N fitted",
+        fitted.summary.rms_N
+    );
+}
+
 fn host(folder: &Path, arguments: &[&str]) -> (i32, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_host"))
         .args(arguments)

@@ -26,6 +26,7 @@ pub mod braid;
 pub mod check;
 pub mod effects;
 pub mod fields;
+pub mod firmware_image;
 pub mod image;
 pub mod inverse;
 pub mod link;

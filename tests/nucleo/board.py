@@ -7,7 +7,7 @@ from chip import Chip
 from link import HEARTBEAT_S, Link
 
 ROOT = Path(__file__).resolve().parents[2]
-IMAGE = ROOT / "target/firmware/nucleo-f446re.elf"
+IMAGE = ROOT / "target/firmware/nucleo-f446re-test.elf"
 TABLE = Path(__file__).resolve().parent / "example-table.bin"
 
 LAG_S = 0.03
@@ -21,6 +21,11 @@ class Board:
         self.chip = Chip(IMAGE, cycles)
         self.random = random.Random(1)
         self.pressure_pa, self.cable = 0.0, True
+        # Volts of the pressure sensor, that of the second one, and that of the supply air; whether the enable input is closed.
+        self.to_volts = lambda pascals: (pascals + 125e3) / 375e3
+        self.second_error_pa, self.supply_pa, self.enabled = 0.0, 800e3, True
+        # Regulator's pressure at a voltage of the command.
+        self.regulator = lambda volts: volts / 3.3 * 1e6
         if prepare:
             prepare(self.chip)
         self.chip.at(0.0, self.step)
@@ -32,14 +37,18 @@ class Board:
         """A millisecond of the muscle; survives restarts of the chip."""
         chip = self.chip
         volts = 0.0 if chip.valve_open else chip.command_volts
-        self.pressure_pa += (volts / 3.3 * 1e6 - self.pressure_pa) * TICK_S / LAG_S
+        wanted_pa = 0.0 if chip.valve_open else self.regulator(volts)
+        self.pressure_pa += (wanted_pa - self.pressure_pa) * TICK_S / LAG_S
         noise = self.random.uniform
         force_n = max(0.0, (self.pressure_pa - 76.5e3) * 1.5e-4)
         volt = {
-            0: (self.pressure_pa + noise(-300, 300) + 125e3) / 375e3 if self.cable else 0.0,
+            0: self.to_volts(self.pressure_pa + noise(-300, 300)) if self.cable else 0.0,
             1: (0.0015 + noise(-2e-5, 2e-5) + 0.0028) / (0.050 / 3.3 * 1.112),
             8: (force_n + noise(-0.5, 0.5) + 1100.0) / (1000.0 / 1.5),
+            10: self.to_volts(self.pressure_pa + self.second_error_pa + noise(-300, 300)),
+            11: (self.supply_pa + 125e3) / 375e3,
         }
+        chip.portc.inputs = 1 << 7 if self.enabled else 0
         chip.adc.codes = {channel: round(value / 3.3 * 4095) for channel, value in volt.items()}
         chip.at(chip.now + TICK_S, self.step)
 

@@ -77,7 +77,7 @@ class Chip:
         self.flash = peripherals.Flash(self)
         self.uart2, self.adc = peripherals.Uart(self), peripherals.Adc(self)
         self.dac = peripherals.Dac(self)
-        self.porta, self.portb = peripherals.Gpio(self), peripherals.Gpio(self)
+        self.porta, self.portb, self.portc = (peripherals.Gpio(self) for _ in range(3))
         self.dma1, self.dma2 = peripherals.Dma(self, {6: 17}), peripherals.Dma(self, {})
         self.tim3 = peripherals.Timer(self, 29, 16, self.adc.trigger)
         self.tim5 = peripherals.Timer(self, 50, 32)
@@ -85,7 +85,7 @@ class Chip:
         self.blocks = {
             0x40000400: self.tim3, 0x40000C00: self.tim5, 0x40003000: self.watchdog, 0x40004400: self.uart2,
             0x40007000: self.power, 0x40007400: self.dac, 0x40012000: self.adc, 0x40013C00: self.exti,
-            0x40020000: self.porta, 0x40020400: self.portb, 0x40023800: self.rcc, 0x40023C00: self.flash,
+            0x40020000: self.porta, 0x40020400: self.portb, 0x40020800: self.portc, 0x40023800: self.rcc, 0x40023C00: self.flash,
             0x40026000: self.dma1, 0x40026400: self.dma2,
         }
         self.hz = self.rcc.hclk()
@@ -235,7 +235,9 @@ class Chip:
         self.active.append(line)
         self.uc.reg_write(UC_ARM_REG_SP, stack)
         self.uc.reg_write(UC_ARM_REG_LR, RETURN)
-        handler = struct.unpack("<I", self.uc.mem_read(FLASH + 4 * (16 + line), 4))[0]
+        # The vector table is where VTOR says: the boot loader has set it.
+        table = self.words.get(0xE000ED08, 0) or FLASH
+        handler = struct.unpack("<I", self.uc.mem_read(table + 4 * (16 + line), 4))[0]
         self.uc.reg_write(UC_ARM_REG_PC, handler | 1)
         self.now += 12 / self.hz
 

@@ -6,6 +6,7 @@ import zlib
 HELLO, INFO, STATUS, ARM, START, STOP, DISARM, SET_POINT = 0, 1, 2, 3, 4, 5, 6, 7
 FAULTS, CLEAR_FAULT, SETTINGS, SET_SETTINGS = 11, 13, 14, 15
 TABLE_BEGIN, TABLE_PIECE, TABLE_COMMIT, TABLE_READ, RESTART, KEEP_ALIVE = 16, 17, 18, 19, 26, 27
+SIGNALS = 29
 REQUEST, RESPONSE, REFUSAL = 0, 1, 2
 STATES = ("disarmed", "armed", "running", "fault")
 PRESSURE_MODE, FORCE_MODE = 1, 2
@@ -14,7 +15,7 @@ SESSION, HEARTBEAT_S = 300, 0.1
 FAULT_NAMES = (
     "sensor-range sensor-stuck sensor-noisy sensors-disagree sensors-silent pressure-not-rising pressure-not-falling over-pressure "
     "over-stroke over-speed over-force set-point-silence loop-overrun table-missing table-invalid brown-out watchdog not-a-number "
-    "host-silence settings-invalid not-vented hold-ended clock-failed valve-test"
+    "host-silence settings-invalid not-vented hold-ended clock-failed valve-test pressure-sensors-disagree supply-pressure-low enable-open"
 ).split()
 
 
@@ -48,6 +49,16 @@ def frame(kind, number, sequence, body=b""):
     return stuffed(raw + struct.pack("<I", zlib.crc32(raw))) + b"\0"
 
 
+# Places of settings from the end of the message; a varint before them has one byte.
+SETTING = {
+    "command.low": -8, "command.full_pa": -4,
+    "scales.pressure.at_zero": -68, "scales.pressure.per_unit": -64, "scales.pressure.filter_s": -60,
+    "scales.second_pressure.at_zero": -32, "scales.second_pressure.per_unit": -28,
+    "watch.second_pressure_pa": -86, "watch.supply_low_pa": -82,
+}
+ENABLE_INPUT = -78
+
+
 def varint(number):
     out = bytearray()
     while number > 127:
@@ -65,6 +76,10 @@ class Reader:
     def byte(self):
         self.at += 1
         return self.data[self.at - 1]
+
+    def float(self):
+        self.at += 4
+        return struct.unpack("<f", self.data[self.at - 4 : self.at])[0]
 
     def varint(self):
         number, shift = 0, 0
@@ -139,6 +154,25 @@ class Link:
         fault = FAULT_NAMES[reader.byte()] if reader.byte() else None
         names = "time_us ticks overruns frames_good frames_bad dropped saturated line_errors".split()
         return {"state": state, "mode": mode, "fault": fault} | {name: reader.varint() for name in names}
+
+    def change(self, **values):
+        """Sends the settings with others of these values; names have `__` for each dot."""
+        settings = bytearray(self.ask(SETTINGS))
+        for name, value in values.items():
+            if name == "enable_input":
+                settings[ENABLE_INPUT] = int(value)
+            else:
+                at = len(settings) + SETTING[name.replace("__", ".")]
+                settings[at : at + 4] = struct.pack("<f", value)
+        self.ask(SET_SETTINGS, bytes(settings), wait=5.0)
+
+    def signals(self):
+        """Means of the signals of the first muscle: ticks, volts, and whether the enable input is closed."""
+        reader = Reader(self.ask(SIGNALS, b"\0"))
+        ticks = reader.varint()
+        volts = [reader.float() for _ in range(3)]
+        volts += [reader.float() if reader.byte() else None for _ in range(2)]
+        return ticks, volts, bool(reader.byte())
 
     def hello(self):
         return self.ask(HELLO)

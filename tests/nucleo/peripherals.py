@@ -349,7 +349,7 @@ class Adc(Registers):
 
     def __init__(self, chip):
         super().__init__(chip)
-        self.codes = {0: 0, 1: 0, 8: 0}
+        self.codes = {}
         self.fails = False
 
     def write(self, offset, value):
@@ -359,6 +359,10 @@ class Adc(Registers):
         count = (self.get(0x2C) >> 20 & 15) + 1
         return [self.get(0x34) >> 5 * n & 31 for n in range(count)]
 
+    def sampling(self, channel):
+        """SMPR2 holds channels 0 to 9, SMPR1 those from 10 on."""
+        return self.get(0x10) >> 3 * channel & 7 if channel < 10 else self.get(0x0C) >> 3 * (channel - 10) & 7
+
     def trigger(self):
         control = self.get(0x08)
         on = control & 1 and control >> 28 & 3 == 1 and control >> 24 & 15 == 8
@@ -366,7 +370,7 @@ class Adc(Registers):
             return
         clock = self.chip.rcc.apb2() / (2 * ((self.get(0x304) >> 16 & 3) + 1))
         assert clock <= 36e6, f"the converter runs at {clock} Hz"
-        cycles = sum(self.SAMPLING[self.get(0x10) >> 3 * n & 7] + 12 for n in self.sequence())
+        cycles = sum(self.SAMPLING[self.sampling(n)] + 12 for n in self.sequence())
         self.chip.at(self.chip.now + cycles / clock, self.scanned)
 
     def scanned(self):
@@ -397,7 +401,14 @@ class Dac(Registers):
 
 
 class Gpio(Registers):
-    """Port (chapter 7): outputs that are set and reset bit by bit."""
+    """Port (chapter 7): outputs that are set and reset bit by bit, inputs that are read as they are."""
+
+    def __init__(self, chip):
+        super().__init__(chip)
+        self.inputs = 0
+
+    def read(self, offset):
+        return self.inputs if offset == 0x10 else self.get(offset)
 
     def write(self, offset, value):
         if offset == 0x18:

@@ -13,7 +13,7 @@ import zlib
 from board import TABLE, Board
 from link import TABLE_READ, Reader, varint
 
-STORE, STORE_SIZE = 0x08040000, 0x40000
+STORE, STORE_SIZE = 0x08004000, 0xC000
 STEP = 1 if os.environ.get("PAM_LONG") else 9
 
 

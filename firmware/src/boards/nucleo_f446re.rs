@@ -6,6 +6,10 @@
 //! | PA0 | A0 | pressure sensor, see [`PRESSURE`]; 100 kΩ to ground |
 //! | PA1 | A1 | stroke sensor, see [`STROKE`]; 100 kΩ to ground |
 //! | PB0 | A3 | load cell amplifier, see [`LOAD`]; 100 kΩ to ground |
+//! | PC0 | A5 | second pressure sensor like the first, optional; 100 kΩ to ground |
+//! | PC1 | A4 | pressure sensor of the supply air, optional; 100 kΩ to ground |
+//! | PC7 | D9 | enable input, optional: 3.3 V through all contacts of the emergency stop; 10 kΩ to ground |
+//! | PA5 | D13 | status light LD2, on the board |
 //! | PA4 | A2 | analogue command (DAC 1) to the regulator's 0–10 V stage, whose input takes no current; 1 MΩ to ground |
 //! | PB5 | D4 | dump valve: low opens it, so that a board without power vents; 10 kΩ to ground |
 //!
@@ -13,7 +17,7 @@
 //! starts its pins are open, so that they alone keep the valve open and the command at zero.
 //!
 //! The control loop runs on an interrupt of its own above all other tasks, at 1 kHz, and feeds the watchdog; if it stops for
-//! 20 ms, the chip restarts, vented, with the fault latched. The store is the last two flash sectors of 128 KiB. Erasing one stops the
+//! 20 ms, the chip restarts, vented, with the fault latched. Flash: see `slots.rs`. Erasing a sector stops the
 //! processor for up to two seconds, which is why the store is only written while every muscle is vented.
 //!
 //! | priority | interrupts |
@@ -29,6 +33,8 @@ mod flash;
 mod outputs;
 mod power;
 mod sampling;
+mod slots;
+mod status_light;
 mod uart;
 mod watchdog;
 
@@ -41,58 +47,64 @@ use embassy_stm32::interrupt::{self, Interrupt, InterruptExt, Priority};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::mutex::Mutex;
 use embassy_time::Timer;
-use firmware::board::{Hardware, Identity, Inputs, Outputs, Plant, Readings, Span};
+use firmware::board::{Hardware, Identity, Inputs, Outputs, Plant, Signals, Span};
 use firmware::modes::Seat;
 use firmware::server::Server;
 use firmware::shared::Shared;
 use firmware::tasks;
 use firmware::tick::TICK_US;
+use firmware::update::Updater;
 use model_core::link::hello::Board;
 use model_core::link::messages::{Fault, StartedBy};
-use model_core::link::settings::{Limits, SensorWatch, Settings, StrokeLoop, Watch};
+use model_core::link::settings::{
+    CommandOutput, Limits, Scales, SensorScale, SensorWatch, Settings, StrokeLoop, Watch,
+};
 use static_cell::StaticCell;
 
 use self::flash::StoreFlash;
 use self::outputs::dump;
+use self::slots::Slots;
+use self::status_light::StatusLight;
 use self::uart::{Receiver, Sender};
 
 /// Supply of the converters, V, and their highest code.
 const REFERENCE: f32 = 3.3;
 const FULL_SCALE: f32 = 4095.0;
 
-/// A straight line between the converter's voltage and a quantity.
-struct Line {
-    /// Quantity at 0 V.
-    at_zero: f32,
-    /// Quantity per volt at the pin.
-    per_volt: f32,
+/// Voltage at a pin.
+fn volts(code: u16) -> f32 {
+    f32::from(code) * (REFERENCE / FULL_SCALE)
 }
 
-impl Line {
-    fn value(&self, code: u16) -> f32 {
-        self.at_zero + self.per_volt * (REFERENCE / FULL_SCALE) * f32::from(code)
-    }
+/// Signals of every input, V.
+const VOLTS: Span = Span { low: 0.0, high: REFERENCE };
 
-    /// What the converter can deliver.
-    const fn span(&self) -> Span {
-        Span { low: self.at_zero, high: self.at_zero + self.per_volt * REFERENCE }
-    }
-}
-
-/// Gauge pressure: 0–10 bar as 0.5–4.5 V behind a divider of 2/3.
-const PRESSURE: Line = Line { at_zero: -125e3, per_volt: 375e3 };
+/// Scales of a new device. Gauge pressure: 0–10 bar as 0.5–4.5 V behind a divider of 2/3.
+const PRESSURE: SensorScale = SensorScale { at_zero: -125e3, per_unit: 375e3, filter_s: 0.0 };
 /// Stroke: a potentiometer of 50 mm and 10 kΩ between two resistors of 560 Ω, so that its ends are 0.17 V from the converter's.
-const STROKE: Line = Line { at_zero: -0.0028, per_volt: 0.050 / 3.3 * 1.112 };
+const STROKE: SensorScale = SensorScale { at_zero: -0.0028, per_unit: 0.050 / 3.3 * 1.112, filter_s: 0.0 };
 /// Force: ±1 kN as 1.65 V ± 1.5 V.
-const LOAD: Line = Line { at_zero: -1100.0, per_volt: 1000.0 / 1.5 };
+const LOAD: SensorScale = SensorScale { at_zero: -1100.0, per_unit: 1000.0 / 1.5, filter_s: 0.0 };
 
 /// What these converters can deliver, the highest pressure that this board ever commands, and settings whose watches lie within.
 static HARDWARE: Hardware = Hardware {
-    pressure: PRESSURE.span(),
-    stroke: STROKE.span(),
-    force: LOAD.span(),
+    pressure: VOLTS,
+    stroke: VOLTS,
+    force: VOLTS,
+    second_pressure: Some(VOLTS),
+    supply: Some(VOLTS),
+    enable_input: true,
     command_ceiling_pa: 700e3,
     settings: Settings {
+        scales: Scales {
+            pressure: PRESSURE,
+            stroke: STROKE,
+            force: LOAD,
+            second_pressure: PRESSURE,
+            supply: PRESSURE,
+        },
+        // A 0–10 V stage: 3.3 V become 10 V, and those 10 bar.
+        command: CommandOutput { low: 0.0, full_pa: 1e6 },
         stroke_loop: StrokeLoop { force_limit_n: 1000.0, ..Settings::DEFAULT.stroke_loop },
         limits: Limits {
             stroke_min_m: -0.001,
@@ -115,12 +127,14 @@ struct Muscle {
     began_us: u32,
     /// Whether a step has been made since the loop began.
     stepped: bool,
+    light: StatusLight,
 }
 
 impl Plant for Muscle {
     async fn exchange(&mut self, outputs: &Outputs) -> Inputs {
         let command = outputs.sides[0];
-        outputs::command(command.pressure_pa, command.vent);
+        outputs::command(outputs.levels[0], command.vent);
+        outputs::light(self.light.tick(outputs.state));
         let step_us = clock::micros().wrapping_sub(self.began_us);
         if self.stepped {
             watchdog::feed();
@@ -132,13 +146,17 @@ impl Plant for Muscle {
         // 64 would take a third of a tick's instructions.
         let ticks = (now.wrapping_sub(self.began_us) + TICK_US as u32 / 2) / TICK_US as u32;
         self.began_us = now;
-        let readings = sampling::take().map(|[pressure, stroke, load]| Readings {
-            pressure_pa: PRESSURE.value(pressure),
-            stroke_m: STROKE.value(stroke),
-            force_n: LOAD.value(load),
+        let scan = sampling::take().map(|codes| codes.map(volts));
+        let signals = scan.map(|[pressure, stroke, force, second, _]| Signals {
+            pressure,
+            stroke,
+            force,
+            second_pressure: Some(second),
         });
         Inputs {
-            sides: [readings, None],
+            sides: [signals, None],
+            supply_air: scan.map(|[.., supply]| supply),
+            enable_open: !sampling::enable_is_closed(),
             missed_ticks: ticks.saturating_sub(1).min(u32::from(u16::MAX)) as u16,
             supply_low: power::supply_is_low(),
             step_us: step_us as f32,
@@ -151,7 +169,7 @@ async fn control(shared: &'static Shared) {
     sampling::start();
     sampling::TICK.wait().await;
     watchdog::be_short();
-    let mut muscle = Muscle { began_us: clock::micros(), stepped: false };
+    let mut muscle = Muscle { began_us: clock::micros(), stepped: false, light: StatusLight::default() };
     tasks::control(&mut muscle, shared).await
 }
 
@@ -233,8 +251,14 @@ fn spawn(spawner: Spawner, start: &Start) -> Option<()> {
     };
     // In a place of its own: a task would keep it twice, as its argument and as its variable.
     static SERVER: StaticCell<Server<StoreFlash>> = StaticCell::new();
+    // SAFETY: the store and the slots use different sectors, and only the link's task uses either.
+    let slots_flash = Flash::new_blocking(unsafe { embassy_stm32::peripherals::FLASH::steal() });
     let flash = StoreFlash::new(Flash::new_blocking(p.FLASH));
     let server = SERVER.init(Server::start(identity, flash, shared).ok()?);
+    if let Some(key) = slots::KEY {
+        static UPDATER: StaticCell<Updater<Slots>> = StaticCell::new();
+        server.take_updates(UPDATER.init(Updater::new(Slots::new(slots_flash), key)));
+    }
     CONTROL.start(interrupt::UART5).spawn(control(shared).ok()?);
     spawner.spawn(telemetry(port, shared).ok()?);
     spawner.spawn(link(Receiver::new(shared), port, shared, server).ok()?);

@@ -5,10 +5,11 @@ use model_core::link::settings::{Regulator, Settings};
 use model_core::motion::MotionTracker;
 
 use super::motion_settings;
-use crate::board::Command;
+use crate::board::{Command, Readings};
 use crate::health::{Health, Sample};
 use crate::modes::{Integral, Model, Seat};
 use crate::regulator::{Air, RegulatorState};
+use crate::signals::{Filters, Sums};
 use crate::tick::TICK_S;
 use crate::watch::SideWatch;
 
@@ -24,6 +25,12 @@ pub(super) struct Actuator {
     pub(super) guess_pa: f32,
     /// Sign of what the limits took from the last demand.
     pub(super) saturation: f32,
+    /// Readings of this tick before the filters, which the watches judge.
+    pub(super) readings: Option<Readings>,
+    /// The same of the second pressure sensor, Pa.
+    pub(super) second_pa: Option<f32>,
+    pub(super) filters: Filters,
+    pub(super) sums: Sums,
     pub(super) sample: SideSample,
     pub(super) command: Command,
     pub(super) force_demand_n: f32,
@@ -47,6 +54,10 @@ impl Actuator {
             stroke_loop: Integral::default(),
             guess_pa: 0.0,
             saturation: 0.0,
+            readings: None,
+            second_pa: None,
+            filters: Filters::default(),
+            sums: Sums::default(),
             sample: SideSample::default(),
             command: Command::VENT,
             force_demand_n: 0.0,

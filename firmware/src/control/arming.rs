@@ -1,7 +1,7 @@
 //! Arming: only an empty muscle is armed, and where the settings ask for it only behind a dump valve that has been tried.
 //!
 //! ```text
-//! filling    dump valve closed, regulator at the test's pressure     until half of it is in the muscle
+//! filling    dump valve closed, regulator at the test's pressure     until the pressure stands, above half of it and below twice
 //! dumping    dump valve open, regulator still at that pressure       until less than half is: the valve alone lets it out
 //! ```
 //! The test is best made below the deadband, where the muscle does not move. The device is disarmed while it lasts.
@@ -10,8 +10,9 @@ use model_core::link::messages::{Fault, Refusal, Session, Side, State};
 use model_core::scalar::Scalar;
 
 use super::Controller;
-use crate::board::{Command, Inputs};
+use crate::board::Command;
 use crate::safety::Cause;
+use crate::tick::TICK_S;
 use crate::watch::Finding;
 
 /// Where the way from disarmed to armed is.
@@ -30,6 +31,10 @@ pub(super) enum Arming {
 const PATIENCE_TICKS: u16 = 1_000;
 /// Part of the test's pressure that must come, and go again.
 const PART: f32 = 0.5;
+/// Time constants of regulator and line after which the pressure stands: it lacks 2 % then. At most half of the patience.
+const SETTLED: f32 = 4.0;
+/// Pressure at which the test ends with a fault, as a multiple of the test's pressure: more than a regulator overshoots.
+const MOST: f32 = 2.0;
 
 impl Controller {
     /// Arms for a session, or begins the test that arms when it has passed.
@@ -45,6 +50,9 @@ impl Controller {
                 return Err(Refusal::StillFaulty(Fault::SettingsInvalid));
             }
             let watch = &self.settings.watch;
+            if watch.enable_input && self.enable_open.is_counting() {
+                return Err(Refusal::StillFaulty(Fault::EnableOpen));
+            }
             // With `!(…)`, a pressure that is not a number counts as pressure in the muscle.
             let pressurised = |pressure_pa: f32| !(pressure_pa <= watch.vented_pa);
             if self.settings.pressure.fitted
@@ -82,15 +90,27 @@ impl Controller {
     }
 
     /// One tick of the test, on every muscle that has readings.
-    pub(super) fn test_valves(&mut self, inputs: &Inputs) {
+    pub(super) fn test_valves(&mut self) {
         let regulator = self.settings.regulator;
         let pressure_pa = self.settings.watch.valve_test_pa;
         let enough_pa = PART * pressure_pa;
         let filling = matches!(self.arming, Arming::Filling(_));
+        // The regulator has time to go where its command is, so that one that goes too far is noticed.
+        let settled_s = SETTLED * (regulator.lag_s + regulator.line_s);
+        let early = match self.arming {
+            Arming::Filling(ticks) => ticks < PATIENCE_TICKS / 2 && f32::from(ticks) * TICK_S < settled_s,
+            _ => false,
+        };
         let mut waits_for = None;
         for side in Side::ALL {
-            let Some(now) = inputs.sides[side.index()] else { continue };
-            let filled = now.pressure_pa >= enough_pa;
+            let Some(now) = self.sides[side.index()].readings else { continue };
+            // More than twice the commanded pressure: the scale of the sensor or of the command is wrong.
+            let most_pa = MOST * pressure_pa;
+            if !(now.pressure_pa <= most_pa) {
+                let (fault, value) = (Fault::ValveTest, now.pressure_pa);
+                return self.raise(side, &Finding { fault, sensor: None, value, limit: most_pa });
+            }
+            let filled = now.pressure_pa >= enough_pa && !(filling && early);
             if filled != filling {
                 waits_for = waits_for.or(Some((side, now.pressure_pa)));
             }

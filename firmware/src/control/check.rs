@@ -4,9 +4,9 @@
 //! board's converters can deliver is [`Hardware`]'s.
 
 use model_core::link::messages::{Field, Refusal};
-use model_core::link::settings::{Joint, Limits, Regulator, Settings, Watch};
+use model_core::link::settings::{Joint, Regulator, SensorScale, Settings};
 
-use crate::board::Hardware;
+use crate::board::{Hardware, Span};
 
 /// A value and the range that it must be in.
 type Bound = (f32, f32, f32);
@@ -42,13 +42,16 @@ const MOST_RATE: f32 = 1e9;
 /// [`Refusal::Value`] with the group that a wrong number is in.
 pub fn check_settings(settings: &Settings, hardware: &Hardware) -> Result<(), Refusal> {
     let groups = [
+        // First: the spans of all others depend on them.
+        (Field::Scale, scales(settings, hardware)),
         (Field::ForceLoop, force_loop(settings, hardware)),
         (Field::StrokeLoop, stroke_loop(settings)),
         (Field::Joint, joint(&settings.joint)),
         (Field::Regulator, regulator(&settings.regulator, hardware)),
-        (Field::Limits, limits(&settings.limits, hardware)),
+        (Field::Command, command(settings)),
+        (Field::Limits, limits(settings, hardware)),
         (Field::SensorWatch, sensors(settings, hardware)),
-        (Field::Watch, watch(&settings.watch, hardware)),
+        (Field::Watch, watch(settings, hardware)),
         (Field::Bands, all(&[(settings.motion_band_m, 1e-9, 0.1), (settings.pressure_band_pa, 1e-3, 1e6)])),
     ];
     match groups.into_iter().find(|(_, good)| !good) {
@@ -61,8 +64,8 @@ pub fn check_settings(settings: &Settings, hardware: &Hardware) -> Result<(), Re
 pub fn repair_settings(settings: &mut Settings, hardware: &Hardware) -> bool {
     let own = &hardware.settings;
     let mut repaired = false;
-    // Each iteration repairs one of eight groups.
-    for _ in 0..8 {
+    // Each iteration repairs one of ten groups; a repaired scale may spoil limits and watches.
+    for _ in 0..10 {
         let Err(Refusal::Value(field)) = check_settings(settings, hardware) else { break };
         match field {
             Field::ForceLoop => settings.force_loop = own.force_loop,
@@ -78,6 +81,8 @@ pub fn repair_settings(settings: &mut Settings, hardware: &Hardware) -> bool {
                 (settings.motion_band_m, settings.pressure_band_pa) =
                     (own.motion_band_m, own.pressure_band_pa);
             }
+            Field::Scale => settings.scales = own.scales,
+            Field::Command => settings.command = own.command,
             Field::SetPoint | Field::Reference | Field::Rate => *settings = *own,
         }
         repaired = true;
@@ -138,9 +143,53 @@ fn regulator(r: &Regulator, hardware: &Hardware) -> bool {
     ])
 }
 
+/// Spans of readings that any scale may give: a sensor for less or more belongs to no muscle.
+const PRESSURE_SPAN: (f32, f32) = (20e3, 20e6);
+const STROKE_SPAN: (f32, f32) = (1e-3, 10.0);
+const FORCE_SPAN: (f32, f32) = (1.0, 1e6);
+/// Slowest filter, s: a tenth of a second delays a control law by more than any regulator does.
+const MOST_FILTER: f32 = 0.1;
+
+/// A scale gives a span that a sensor can have, and zero pressure lies within the span of a pressure sensor.
+fn scale(scale: &SensorScale, signals: &Span, (least, most): (f32, f32), zero: bool) -> bool {
+    let span = signals.scaled(scale);
+    all(&[
+        (span.high - span.low, least, most),
+        (span.low, -most, most),
+        (span.high, -most, most),
+        (scale.filter_s, 0.0, MOST_FILTER),
+    ]) && (!zero || (span.low < 0.0 && span.high > 0.0))
+}
+
+fn scales(settings: &Settings, hardware: &Hardware) -> bool {
+    let s = &settings.scales;
+    let optional = |one: &SensorScale, signals: &Option<Span>| {
+        signals.as_ref().is_none_or(|signals| scale(one, signals, PRESSURE_SPAN, true))
+            && one.at_zero.is_finite()
+            && one.per_unit.is_finite()
+            && all(&[(one.filter_s, 0.0, MOST_FILTER)])
+    };
+    scale(&s.pressure, &hardware.pressure, PRESSURE_SPAN, true)
+        && scale(&s.stroke, &hardware.stroke, STROKE_SPAN, false)
+        && scale(&s.force, &hardware.force, FORCE_SPAN, false)
+        && optional(&s.second_pressure, &hardware.second_pressure)
+        && optional(&s.supply, &hardware.supply)
+}
+
+/// The end of the output's range is a pressure that a regulator can have, and the largest command lies within the range.
+fn command(settings: &Settings) -> bool {
+    let c = &settings.command;
+    // 4–20 mA begins at 0.2; more than half the range below no pressure is a mistake.
+    all(&[(c.low, 0.0, 0.5), (c.full_pa, 10e3, MOST_PRESSURE)])
+        && settings.regulator.command_max_pa <= c.full_pa
+}
+
 /// A limit beyond what its converter can deliver would never be crossed.
-fn limits(l: &Limits, hardware: &Hardware) -> bool {
-    let Hardware { pressure, stroke, force, .. } = hardware;
+fn limits(settings: &Settings, hardware: &Hardware) -> bool {
+    let l = &settings.limits;
+    let pressure = hardware.pressure.scaled(&settings.scales.pressure);
+    let stroke = hardware.stroke.scaled(&settings.scales.stroke);
+    let force = hardware.force.scaled(&settings.scales.force);
     all(&[
         (l.speed_m_per_s, 1e-4, 100.0),
         (l.slew_pa_per_s, 1e3, MOST_RATE),
@@ -156,9 +205,9 @@ fn limits(l: &Limits, hardware: &Hardware) -> bool {
 /// The ends of a watch lie within the converter's, so that a wire that pulls it to either end is noticed.
 fn sensors(settings: &Settings, hardware: &Hardware) -> bool {
     let sensors = [
-        (&settings.pressure, hardware.pressure),
-        (&settings.stroke, hardware.stroke),
-        (&settings.force, hardware.force),
+        (&settings.pressure, hardware.pressure.scaled(&settings.scales.pressure)),
+        (&settings.stroke, hardware.stroke.scaled(&settings.scales.stroke)),
+        (&settings.force, hardware.force.scaled(&settings.scales.force)),
     ];
     sensors.into_iter().all(|(watch, span)| {
         let width = span.high - span.low;
@@ -171,13 +220,21 @@ fn sensors(settings: &Settings, hardware: &Hardware) -> bool {
     })
 }
 
-fn watch(w: &Watch, hardware: &Hardware) -> bool {
+fn watch(settings: &Settings, hardware: &Hardware) -> bool {
+    let w = &settings.watch;
     let least_test_pa = 2.0 * w.vented_pa;
+    let pressure = hardware.pressure.scaled(&settings.scales.pressure);
+    let supply_high = hardware.supply.map_or(0.0, |span| span.scaled(&settings.scales.supply).high);
+    let second_most = hardware.second_pressure.map_or(0.0, |_| pressure.high);
     all(&[
-        (w.disagree_n, 0.0, hardware.force.high),
-        (w.follow_pa, 1e3, hardware.pressure.high),
+        (w.disagree_n, 0.0, hardware.force.scaled(&settings.scales.force).high),
+        (w.follow_pa, 1e3, pressure.high),
         (w.vented_pa, 100.0, 100e3),
-    ]) && (w.valve_test_pa == 0.0 || all(&[(w.valve_test_pa, least_test_pa, 200e3)]))
+        // An input that the board does not have cannot be watched.
+        (w.second_pressure_pa, 0.0, second_most),
+        (w.supply_low_pa, 0.0, supply_high),
+    ]) && (!w.enable_input || hardware.enable_input)
+        && (w.valve_test_pa == 0.0 || all(&[(w.valve_test_pa, least_test_pa, 200e3)]))
         && (1..=MOST_DEBOUNCE).contains(&w.debounce_ticks)
         && (1..=MOST_JUMPS).contains(&w.noisy_jumps)
         && (1..=MOST_FOLLOW).contains(&w.disagree_ticks)
@@ -210,7 +267,7 @@ mod tests {
     fn the_defaults_can_be_used_and_no_field_takes_what_is_no_number_or_has_no_bound() {
         assert_eq!(refused(|_| ()), None);
         type Set = fn(&mut Settings, f32);
-        let fields: [(Field, Set); 38] = [
+        let fields: [(Field, Set); 47] = [
             (Field::ForceLoop, |s, v| s.force_loop.proportional_pa_per_n = v),
             (Field::ForceLoop, |s, v| s.force_loop.integral_pa_per_n_s = v),
             (Field::ForceLoop, |s, v| s.force_loop.trim_limit_pa = v),
@@ -249,6 +306,15 @@ mod tests {
             (Field::Watch, |s, v| s.watch.valve_test_pa = v),
             (Field::Bands, |s, v| s.motion_band_m = v),
             (Field::Bands, |s, v| s.pressure_band_pa = v),
+            (Field::Scale, |s, v| s.scales.pressure.at_zero = v),
+            (Field::Scale, |s, v| s.scales.pressure.per_unit = v),
+            (Field::Scale, |s, v| s.scales.stroke.per_unit = v),
+            (Field::Scale, |s, v| s.scales.force.filter_s = v),
+            (Field::Scale, |s, v| s.scales.force.at_zero = v),
+            (Field::Command, |s, v| s.command.low = v),
+            (Field::Command, |s, v| s.command.full_pa = v),
+            (Field::Watch, |s, v| s.watch.second_pressure_pa = v),
+            (Field::Watch, |s, v| s.watch.supply_low_pa = v),
         ];
         for (at, (field, set)) in fields.into_iter().enumerate() {
             for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 3.4e38, 1e30, -1e30] {

@@ -45,13 +45,14 @@ impl Controller {
         };
         for side in Side::ALL {
             let used = self.uses(side);
-            let readings = inputs.sides[side.index()];
+            let actuator = &mut self.sides[side.index()];
+            let readings = actuator.readings;
             if !used && readings.is_none() {
                 continue;
             }
-            let actuator = &mut self.sides[side.index()];
             let seen = Seen {
                 readings,
+                second_pa: actuator.second_pa,
                 speed_m_per_s: actuator.motion.motion().speed,
                 command: actuator.command,
                 expected_pa: actuator.regulator.model_pa(),
@@ -66,6 +67,15 @@ impl Controller {
         let watch = &self.settings.watch;
         if inputs.supply_low {
             note(Fault::BrownOut, 0.0, 0.0);
+        }
+        let least_pa = watch.supply_low_pa;
+        let supply_pa = inputs.supply_air.map_or(0.0, |signal| self.settings.scales.supply.reading(signal));
+        let low = least_pa > 0.0 && !(supply_pa >= least_pa);
+        if self.supply_low.count(low, watch.follow_ticks) {
+            note(Fault::SupplyPressureLow, supply_pa, least_pa);
+        }
+        if self.enable_open.count(inputs.enable_open, watch.debounce_ticks) && watch.enable_input {
+            note(Fault::EnableOpen, 0.0, 0.0);
         }
         self.overruns = self.overruns.saturating_add(u32::from(inputs.missed_ticks));
         self.missed_in_a_row = if inputs.missed_ticks > 0 {

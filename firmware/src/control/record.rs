@@ -20,6 +20,8 @@ impl Controller {
         }
         Outputs {
             sides: [self.sides[0].command, self.sides[1].command],
+            levels: [0, 1].map(|at| self.settings.command.part(self.sides[at].command.pressure_pa)),
+            state,
             setpoint: if self.mode == Mode::Force { self.setpoint } else { self.sides[0].force_demand_n },
         }
     }

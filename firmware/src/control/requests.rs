@@ -282,7 +282,8 @@ mod tests {
                 stroke_m: 1e-3 + 1e-7 * wiggle,
                 force_n: 1e-3 * wiggle,
             };
-            let command = controller.step(&Inputs { sides: [Some(now), None], ..Inputs::default() }).sides[0];
+            let command =
+                controller.step(&Inputs { sides: [Some(now.into()), None], ..Inputs::default() }).sides[0];
             let target = if command.vent { 0.0 } else { command.pressure_pa };
             *pressure_pa += (target - *pressure_pa) / 31.0;
             assert_eq!(controller.keep_alive(Session::default()), Ok(()));

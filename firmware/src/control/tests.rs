@@ -4,9 +4,10 @@ use model_core::link::messages::{Fault, Mode, Refusal, Session, SetPoint, SetPoi
 use model_core::link::settings::Settings;
 
 use super::Controller;
-use crate::board::{Inputs, Outputs, Readings};
+use crate::board::{Inputs, Outputs, Readings, Signals};
 use crate::watch::Finding;
 
+mod inputs;
 mod ownership;
 mod refusals;
 
@@ -60,7 +61,8 @@ impl Bench {
             };
             let mut inputs = Inputs::default();
             change(&mut now, &mut inputs);
-            inputs.sides[0] = Some(now);
+            let second_pressure = inputs.sides[0].and_then(|signals| signals.second_pressure);
+            inputs.sides[0] = Some(Signals { second_pressure, ..now.into() });
             self.last = self.controller.step(&inputs);
             if self.hears_host {
                 assert_eq!(self.controller.keep_alive(OWNER), Ok(()));

@@ -5,10 +5,10 @@ use model_core::effects::Memory;
 use model_core::image::{self, ImageError};
 use model_core::link::endpoints::Service;
 use model_core::link::messages::{
-    DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, HealthRead, HealthSums, PIECE,
-    PastFault, ReferenceOrder, ReferencePoints, Refusal, RollBack, Session, SetPointOrder, Side, Start,
-    State, Status, TableBegin, TableInfo, TablePiece, TableRead, TelemetryRate, TraceArm, TraceInfo,
-    TracePiece, TraceRead, Value,
+    DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, HealthRead, HealthSums, MeanSignals,
+    PIECE, PastFault, ReferenceOrder, ReferencePoints, Refusal, RollBack, Session, SetPointOrder, Side,
+    SignalsRead, Start, State, Status, TableBegin, TableInfo, TablePiece, TableRead, TelemetryRate, TraceArm,
+    TraceInfo, TracePiece, TraceRead, UpdateBegin, UpdatePiece, UpdateStatus, Value,
 };
 use model_core::link::settings::Settings;
 use model_core::muscle::AtStroke;
@@ -21,6 +21,7 @@ use crate::reference;
 use crate::shared::Shared;
 use crate::shared_buffer::{Incoming, TRACE_CAPACITY};
 use crate::tick::TICKS_PER_S;
+use crate::update::Update;
 
 /// A server and the controller that it asks.
 pub(super) struct Answers<'a, F: NorFlash> {
@@ -55,6 +56,13 @@ impl<F: NorFlash> Answers<'_, F> {
         self.shared.with(|controller| {
             if controller.is_vented() { Ok(()) } else { Err(Refusal::WrongState(controller.state())) }
         })
+    }
+
+    fn updater(&mut self) -> Result<&mut (dyn Update + Send + 'static), Refusal> {
+        match &mut self.server.update {
+            Some(update) => Ok(&mut **update),
+            None => Err(Refusal::NotSupported),
+        }
     }
 
     fn drives(&self, side: Side) -> Result<(), Refusal> {
@@ -269,6 +277,51 @@ impl<F: NorFlash> Service for Answers<'_, F> {
     fn health(&mut self, request: &HealthRead, answer: &mut HealthSums) -> Result<(), Refusal> {
         self.shared.with(|controller| controller.health(request.side).describe(answer));
         Ok(())
+    }
+
+    fn signals(&mut self, request: &SignalsRead, answer: &mut MeanSignals) -> Result<(), Refusal> {
+        self.drives(request.side)?;
+        self.shared.with(|controller| controller.take_signals(request.side, answer));
+        Ok(())
+    }
+
+    fn board_settings(&mut self, (): &(), answer: &mut Settings) -> Result<(), Refusal> {
+        *answer = self.shared.with(|controller| controller.hardware()).settings;
+        Ok(())
+    }
+
+    fn update(&mut self, (): &(), answer: &mut UpdateStatus) -> Result<(), Refusal> {
+        self.updater()?.status(answer)
+    }
+
+    fn update_begin(&mut self, request: &UpdateBegin, answer: &mut UpdateStatus) -> Result<(), Refusal> {
+        self.at_rest()?;
+        self.updater()?.begin(&request.header)?;
+        self.updater()?.status(answer)
+    }
+
+    fn update_piece(&mut self, request: &UpdatePiece, answer: &mut u32) -> Result<(), Refusal> {
+        self.at_rest()?;
+        *answer = self.updater()?.piece(request)?;
+        Ok(())
+    }
+
+    fn update_commit(&mut self, (): &(), answer: &mut UpdateStatus) -> Result<(), Refusal> {
+        self.at_rest()?;
+        self.updater()?.commit()?;
+        self.updater()?.status(answer)
+    }
+
+    fn update_confirm(&mut self, (): &(), answer: &mut UpdateStatus) -> Result<(), Refusal> {
+        self.at_rest()?;
+        self.updater()?.confirm()?;
+        self.updater()?.status(answer)
+    }
+
+    fn update_revert(&mut self, (): &(), answer: &mut UpdateStatus) -> Result<(), Refusal> {
+        self.at_rest()?;
+        self.updater()?.revert()?;
+        self.updater()?.status(answer)
     }
 
     fn keep_alive(&mut self, request: &Session, (): &mut ()) -> Result<(), Refusal> {

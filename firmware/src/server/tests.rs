@@ -44,7 +44,7 @@ fn step(shared: &Shared, tick: u32, pressure_pa: &mut f32) {
         stroke_m: 1e-3 + 1e-7 * wiggle,
         force_n: 1e-3 * wiggle,
     };
-    let outputs = shared.step(&Inputs { sides: [Some(readings), None], ..Inputs::default() });
+    let outputs = shared.step(&Inputs { sides: [Some(readings.into()), None], ..Inputs::default() });
     let command = outputs.sides[0];
     *pressure_pa += ((if command.vent { 0.0 } else { command.pressure_pa }) - *pressure_pa) / 31.0;
 }

@@ -14,10 +14,11 @@ use model_core::link::settings::Settings;
 
 use super::{FORMAT, Store};
 
-/// Key of the settings; 0x30 to 0x33 held those of the layouts 1 to 4.
-const SETTINGS: u8 = 0x35;
+/// Key of the settings; 0x30 to 0x33 and 0x35 held those of the layouts 1 to 5.
+const SETTINGS: u8 = 0x36;
 const SEAL: u8 = 0x34;
 const LAYOUT: u8 = 0x3F;
+const SETTINGS_5: u8 = 0x35;
 const SETTINGS_4: u8 = 0x33;
 const SETTINGS_3: u8 = 0x32;
 const SETTINGS_2: u8 = 0x31;
@@ -57,7 +58,8 @@ fn sum_of(bytes: Option<&[u8]>) -> u32 {
 /// Settings of an older layout.
 struct Older<'s> {
     settings: &'s mut Settings,
-    /// Number of the layout: the regulator has a line since 3, a hold and a vent have their watches since 4.
+    /// Number of the layout: the regulator has a line since 3, a hold and a vent have their watches since 4, an armed device since 5.
+    /// Sensors and command have scales since 6.
     layout: u16,
 }
 
@@ -77,6 +79,8 @@ impl Fields for Older<'_> {
             hold_on,
             motion_band_m,
             pressure_band_pa,
+            scales: _,
+            command: _,
         } = &mut *self.settings;
         feed_forward.walk(walk);
         force_loop.walk(walk);
@@ -112,6 +116,9 @@ impl Fields for Older<'_> {
             watch.vent_ticks.walk(walk);
             watch.valve_test_pa.walk(walk);
         }
+        if self.layout >= 5 {
+            watch.armed_silence_ticks.walk(walk);
+        }
         hold_on.walk(walk);
         motion_band_m.walk(walk);
         pressure_band_pa.walk(walk);
@@ -144,14 +151,16 @@ impl<F: NorFlash> Store<F> {
         if layout.is_some_and(|layout| layout >= FORMAT) {
             return Ok(Kept::Untrusted);
         }
-        let fourth = self.bytes(SETTINGS_4)?;
-        if fourth.is_none() && (layout.is_some() || (seal.is_some() && !sealed(None))) {
+        // The layouts 4 and 5 have a seal.
+        let last = if self.bytes(SETTINGS_5)?.is_some() { SETTINGS_5 } else { SETTINGS_4 };
+        let bytes = self.bytes(last)?;
+        if bytes.is_none() && (layout.is_some() || (seal.is_some() && !sealed(None))) {
             return Ok(Kept::Untrusted);
         }
-        if fourth.is_some_and(|bytes| !sealed(Some(bytes))) {
+        if bytes.is_some_and(|bytes| !sealed(Some(bytes))) {
             return Ok(Kept::Untrusted);
         }
-        for (key, layout) in [(SETTINGS_4, 4), (SETTINGS_3, 3), (SETTINGS_2, 2)] {
+        for (key, layout) in [(SETTINGS_5, 5), (SETTINGS_4, 4), (SETTINGS_3, 3), (SETTINGS_2, 2)] {
             if let Some(bytes) = self.bytes(key)? {
                 if fields::read(bytes, &mut Older { settings, layout }) {
                     return Ok(Kept::Older);
@@ -171,10 +180,12 @@ impl<F: NorFlash> Store<F> {
         let mut room = [0; ROOM];
         let length = fields::write(settings, &mut room).ok_or(StoreFault::Full)?;
         let bytes = &room[..length];
-        let before = match self.bytes(SETTINGS)? {
-            Some(bytes) => sum_of(Some(bytes)),
-            None => sum_of(self.bytes(SETTINGS_4)?),
-        };
+        let mut before = 0;
+        for key in [SETTINGS_4, SETTINGS_5, SETTINGS] {
+            if let Some(bytes) = self.bytes(key)? {
+                before = sum_of(Some(bytes));
+            }
+        }
         let current = sum_of(Some(bytes));
         self.put_value(SEAL, &mut Seal { current, previous: Some(before) })?;
         self.put_bytes(SETTINGS, bytes)?;

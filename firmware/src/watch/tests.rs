@@ -5,6 +5,7 @@ use super::*;
 fn good() -> Seen {
     Seen {
         readings: Some(Readings { pressure_pa: 200e3, stroke_m: 0.002, force_n: 40.0 }),
+        second_pa: None,
         speed_m_per_s: 0.0,
         command: Command { pressure_pa: 200e3, vent: false },
         expected_pa: 200e3,

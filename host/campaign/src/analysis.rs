@@ -13,7 +13,7 @@ use pam_fit::bench::Candidate;
 use pam_fit::checks::Checks;
 use pam_fit::{Fit, Options, fit};
 
-use crate::information::Hypothesis;
+use crate::hypothesis::Hypothesis;
 
 /// Recordings of one muscle, and what is known of it.
 #[derive(Debug)]

@@ -1,12 +1,16 @@
 //! The loop of a campaign: choose a step, record it, check it, update the estimates, until a stopping rule holds.
 
-use std::path::{Path, PathBuf};
+mod resume;
+mod sink;
+
+use std::path::Path;
 
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::output::write_whole;
 use pam_data::recording::{Reader, Recording};
 
+use self::resume::resume;
+use self::sink::{InMemory, OnDisk, Sink};
 use crate::actuation::{Actuation, Ending, Reading};
 use crate::bench::VirtualBench;
 use crate::course::Course;
@@ -66,84 +70,6 @@ pub enum Outcome {
 
 /// Bench time that must be left for an ended campaign to continue, s: less fits no step.
 const LEAST_MORE_S: f64 = 60.0;
-
-/// Where rows and events go.
-trait Sink {
-    fn begin(&mut self, number: u32, name: &str) -> Result<()>;
-    fn row(&mut self, reading: &Reading) -> Result<()>;
-    fn finish(&mut self, suffix: &str, rows: &[Reading]) -> Result<(String, u64)>;
-    fn event(&mut self, event: Event) -> Result<()>;
-    fn recording(&self, file: &str, rows: &[Reading]) -> Result<Recording>;
-    fn table(&mut self, name: &str, csv: &str) -> Result<Option<PathBuf>>;
-}
-
-/// Rows and events on the disk.
-struct OnDisk<'a> {
-    journal: &'a mut Journal,
-    muscle: MuscleDescription,
-}
-
-impl Sink for OnDisk<'_> {
-    fn begin(&mut self, number: u32, name: &str) -> Result<()> {
-        self.journal.begin(number, name)
-    }
-
-    fn row(&mut self, reading: &Reading) -> Result<()> {
-        self.journal.row(reading)
-    }
-
-    fn finish(&mut self, suffix: &str, _rows: &[Reading]) -> Result<(String, u64)> {
-        self.journal.finish(suffix)
-    }
-
-    fn event(&mut self, event: Event) -> Result<()> {
-        self.journal.write(event)
-    }
-
-    fn recording(&self, file: &str, _rows: &[Reading]) -> Result<Recording> {
-        read(&self.journal.folder().join(file), &self.muscle)
-    }
-
-    fn table(&mut self, name: &str, csv: &str) -> Result<Option<PathBuf>> {
-        let path = self.journal.folder().join(name);
-        write_whole(&path, csv.as_bytes())?;
-        Ok(Some(path))
-    }
-}
-
-/// Rows in memory, checks in a folder where there is one.
-struct InMemory<'a> {
-    checks: Option<&'a Path>,
-}
-
-impl Sink for InMemory<'_> {
-    fn begin(&mut self, _number: u32, _name: &str) -> Result<()> {
-        Ok(())
-    }
-
-    fn row(&mut self, _reading: &Reading) -> Result<()> {
-        Ok(())
-    }
-
-    fn finish(&mut self, suffix: &str, rows: &[Reading]) -> Result<(String, u64)> {
-        Ok((suffix.to_owned(), rows.len() as u64))
-    }
-
-    fn event(&mut self, _event: Event) -> Result<()> {
-        Ok(())
-    }
-
-    fn recording(&self, file: &str, rows: &[Reading]) -> Result<Recording> {
-        Ok(recording(file, rows))
-    }
-
-    fn table(&mut self, name: &str, csv: &str) -> Result<Option<PathBuf>> {
-        let Some(folder) = self.checks else { return Ok(None) };
-        let path = folder.join(name);
-        write_whole(&path, csv.as_bytes())?;
-        Ok(Some(path))
-    }
-}
 
 /// Readings as a recording.
 #[must_use]
@@ -219,64 +145,6 @@ pub fn run(
 
 fn last_time(engine: &Engine) -> f64 {
     engine.recordings().iter().filter_map(|r| r.time.last()).copied().fold(0.0, f64::max)
-}
-
-/// Teaches an engine what the log of an earlier program holds; gives the course and the bench time so far.
-fn resume(engine: &mut Engine, journal: &Journal, muscle: &MuscleDescription) -> Result<(Vec<Done>, f64)> {
-    let mut chosen: Option<Chosen> = None;
-    let mut course: Vec<Done> = Vec::new();
-    let mut spoiled = Vec::new();
-    let mut spent = 0.0;
-    for event in journal.events() {
-        match event {
-            Event::Chosen(c) => (chosen, spoiled) = (Some(c.clone()), Vec::new()),
-            Event::Spoiled { reason, .. } => spoiled.push(*reason),
-            Event::Cut { file, rows, .. } => {
-                // A recording has at least this many rows.
-                if *rows >= 20 {
-                    engine.add_rows(read(&journal.folder().join(file), muscle)?);
-                }
-            }
-            Event::Recorded { file, rows, begin_s, end_s, .. } => {
-                let Some(chosen) = chosen.take() else { continue };
-                engine.add(chosen.step, Some(read(&journal.folder().join(file), muscle)?));
-                spent += end_s - begin_s;
-                course.push(Done {
-                    chosen,
-                    file: file.clone(),
-                    rows: *rows,
-                    clock_s: (*begin_s, *end_s),
-                    spoiled: std::mem::take(&mut spoiled),
-                    told: String::new(),
-                });
-            }
-            Event::Checked { check, file, end_s, .. } => {
-                let Some(chosen) = chosen.take() else { continue };
-                engine.add_check(*check, journal.folder().join(file));
-                spent += chosen.expected_s;
-                let clock_s = (end_s - chosen.expected_s, *end_s);
-                let spoiled = Vec::new();
-                course.push(Done {
-                    chosen,
-                    file: file.clone(),
-                    rows: 0,
-                    clock_s,
-                    spoiled,
-                    told: String::new(),
-                });
-            }
-            Event::Told { words, .. } => {
-                if let Some(last) = course.last_mut() {
-                    last.told.clone_from(words);
-                }
-            }
-            Event::Begin { .. } | Event::Ended { .. } => {}
-        }
-    }
-    if !course.is_empty() {
-        engine.fit();
-    }
-    Ok((course, spent))
 }
 
 fn go(

@@ -9,7 +9,7 @@ use pam_fit::bench::{Candidate, Span};
 use pam_fit::numerics::spline_basis::SplineBasis;
 
 use crate::criteria::{PRIOR_BEND, PRIOR_COLUMN};
-use crate::information::{Hypothesis, NO_PAST, asked};
+use crate::hypothesis::{Hypothesis, NO_PAST, candidates};
 use crate::places::Places;
 
 /// Elastic orders of the table.
@@ -172,7 +172,7 @@ impl Library {
     /// All effects that a campaign checks for; those of the sets with more shapes.
     pub(crate) fn new(sets: &[Vec<Hypothesis>]) -> Self {
         let open = |law: Candidate| sets.iter().any(|s| s.iter().take(LARGEST_SET).any(|h| h.law == law));
-        let mut named = asked();
+        let mut named = candidates();
         for h in sets.iter().flatten() {
             if !named.contains(&h.law) {
                 named.push(h.law);

@@ -8,7 +8,6 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Recording;
 use pam_diagnose::Diagnosis;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use crate::analysis::{Findings, diagnosed, fitted, names, sets};
 use crate::criteria::{
@@ -19,22 +18,10 @@ use crate::information::{Design, Gain, Knowledge};
 use crate::journal::Chosen;
 use crate::menu::{menu, opening};
 use crate::places::Places;
+pub use crate::purpose::Purpose;
 use crate::rig::Rig;
 use crate::step::{CheckKind, Step};
 use crate::words;
-
-/// What a campaign is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Purpose {
-    /// The force table.
-    Fit,
-    /// What the model leaves out.
-    Diagnosis,
-    /// Both.
-    #[default]
-    Both,
-}
 
 /// What to do next.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,7 +8,7 @@
 //! tables and effect h' can imitate, over everything recorded so far and the step. `exp(−d²/8)` is the Bhattacharyya coefficient of two
 //! normal distributions (K. Chaloner and I. Verdinelli, Statist. Sci. 10 (1995) 273, doi 10.1214/ss/1177009939, for designs of this kind).
 
-use model_core::effects::{Context, Imitates, MEMORY};
+use model_core::effects::Context;
 use model_core::muscle::Muscle;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use pam_data::recording::{Campaign, Recording};
@@ -18,19 +18,9 @@ use pam_fit::bench::{Candidate, Span};
 use crate::columns::{Library, Table, columns_of_rows};
 use crate::course::Course;
 use crate::criteria::{EFFECT_SIZE, PAST_ROWS, PRIOR_NOTHING, SAMPLE_HZ, STEP_ROWS, WANTED_ERROR};
+use crate::hypothesis::{DECIDED, Hypothesis, entropy};
 use crate::places::Places;
 use crate::step::{CheckKind, Step};
-
-/// One effect that the diagnosis holds possible, and how probable it is.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Hypothesis {
-    /// The effect.
-    pub law: Candidate,
-    /// Its probability within its set.
-    pub weight: f64,
-    /// Its parameters where they were fitted: amplitudes, then shapes.
-    pub parameters: Option<Vec<f64>>,
-}
 
 /// What is known when a step is chosen.
 #[derive(Debug, Clone)]
@@ -81,9 +71,6 @@ impl Gain {
         Self { table: self.table / by, set: self.set / by, unseen: self.unseen / by, ..self }
     }
 }
-
-/// Distance of hypotheses that a check of the bench decides between: certainty, for all purposes.
-const DECIDED: f64 = 64.0;
 
 /// The design that all candidates are judged on.
 #[derive(Debug)]
@@ -352,25 +339,6 @@ fn rms(variances: &[f64]) -> f64 {
     (variances.iter().sum::<f64>() / variances.len().max(1) as f64).sqrt()
 }
 
-/// Expected entropy of a set whose members lie so far apart.
-fn entropy(set: &[Hypothesis], apart: impl Fn(usize, usize) -> f64) -> f64 {
-    let n = set.len();
-    let mut sum = 0.0;
-    for i in 0..n {
-        let own = set[i].weight.max(1e-6);
-        let mut others = 1.0;
-        for j in 0..n {
-            if i != j {
-                // As far apart as the nearer view says: either may be the truth.
-                let d = apart(i, j).min(apart(j, i));
-                others += set[j].weight.max(1e-6) / own * (-d / 8.0).exp();
-            }
-        }
-        sum += own * others.ln();
-    }
-    sum
-}
-
 /// How much less doubt there is, over all effects; those that a check settles are no longer among them.
 fn less(before: &[f64], after: &[f64]) -> f64 {
     (before.iter().sum::<f64>() - after.iter().sum::<f64>()).max(0.0)
@@ -405,31 +373,4 @@ fn weights(campaign: &Campaign, independent_s: f64) -> Vec<f64> {
             std::iter::repeat_n((step / independent_s.max(1e-3)).min(1.0), r.len())
         })
         .collect()
-}
-
-/// Effects that a campaign checks for: all but those that only the order of the polynomial imitates.
-#[must_use]
-pub fn asked() -> Vec<Candidate> {
-    Candidate::all()
-        .filter(|l| l.traits().imitates != Some(Imitates::ElasticOrders) && !l.traits().between_recordings)
-        .collect()
-}
-
-/// State of an effect that has no past.
-pub(crate) const NO_PAST: [f64; MEMORY] = [0.0; MEMORY];
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_step_that_separates_leaves_less_doubt() {
-        let set: Vec<Hypothesis> = ["viscous-damping", "sensor-delay"]
-            .iter()
-            .map(|n| Hypothesis { law: Candidate::from_name(n).unwrap(), weight: 0.5, parameters: None })
-            .collect();
-        let open = entropy(&set, |_, _| 0.0);
-        assert!((open - 2.0_f64.ln()).abs() < 1e-12);
-        assert!(entropy(&set, |_, _| 10.0) < 0.6 * open && entropy(&set, |_, _| DECIDED) < 1e-3);
-    }
 }

@@ -3,8 +3,8 @@
 use pam_diagnose::Diagnosis;
 
 use crate::analysis::{Findings, names};
-use crate::engine::Purpose;
 use crate::information::Gain;
+use crate::purpose::Purpose;
 use crate::step::Step;
 
 /// Why a campaign ends with a tare.

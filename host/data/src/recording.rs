@@ -40,6 +40,7 @@ mod unit_check;
 mod workbook;
 
 pub use campaign::{Campaign, Clock, largest_force};
+pub use column_table::Column as TableColumn;
 pub use columns::{HELD, Recording};
 pub use follow::{Follower, UNKNOWN_PAUSE};
 pub use header::has_decimal_commas;

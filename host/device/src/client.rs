@@ -1,81 +1,31 @@
 //! A conversation with a controller: hello, typed calls, topics, and what was lost on the way.
 
-use std::collections::VecDeque;
+mod patience;
+mod topics;
+
 use std::hash::{BuildHasher, RandomState};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use model_core::link::endpoints::{
-    Arm, Disarm, EVENT, Endpoint, KeepAlive, LOG, SetReference, SetTo, StartMode, TELEMETRY,
-};
+use model_core::link::endpoints::{Arm, Disarm, Endpoint, KeepAlive, SetReference, SetTo, StartMode};
 use model_core::link::frame::{Accumulator, Header, Kind, MAX_BODY, MAX_WIRE, encode, encode_bytes};
 use model_core::link::hello::{self, Hello};
 use model_core::link::messages::{
-    Event, Reference, ReferenceOrder, Refusal, Session, SetPoint, SetPointOrder, Status, Telemetry,
+    Reference, ReferenceOrder, Refusal, Session, SetPoint, SetPointOrder, Status,
 };
 use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 
+pub use self::patience::Patience;
+use self::topics::Topics;
+pub use self::topics::{Losses, Topic};
 use super::line_activity::{LineActivity, lost, version_error};
 use super::{Address, Port, VentLine, messages};
 use crate::error::DeviceCode;
 use pam_data::error::{DataCode, Error, Result};
 
-/// Telemetry that no one fetches is kept up to this many samples: a minute at 1 kHz.
-const BACKLOG: usize = 60_000;
-
 /// Time between two keep-alive requests of the session that armed the controller. Without them, the controller vents after
 /// `watch.host_silence_ticks` (1 s by default).
 const HEARTBEAT: Duration = Duration::from_millis(100);
-
-/// How long to wait for answers.
-#[derive(Debug, Clone, Copy)]
-pub struct Patience {
-    /// Time for one answer.
-    pub answer: Duration,
-    /// Time for an answer that waits for flash memory to be erased.
-    pub slow_answer: Duration,
-    /// Times that a question is queried, when asking twice does no harm and the line is silent.
-    pub tries: u32,
-    /// The same on a line that is not silent but noisy: frames arrive and fail their check.
-    pub noisy_tries: u32,
-}
-
-impl Default for Patience {
-    fn default() -> Self {
-        Self {
-            answer: Duration::from_millis(600),
-            slow_answer: Duration::from_secs(6),
-            tries: 3,
-            noisy_tries: 60,
-        }
-    }
-}
-
-/// What a device says without a request.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Topic {
-    /// A sample.
-    Telemetry(Telemetry),
-    /// Something that happened.
-    Event(Event),
-    /// A log line, for [`LogTable`](super::log_table::LogTable).
-    Log(Vec<u8>),
-}
-
-/// What did not arrive.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Losses {
-    /// Samples of telemetry that the sequence numbers miss.
-    pub samples: u64,
-    /// Gaps in which they were lost.
-    pub gaps: u64,
-    /// Frames whose check failed, and bytes between frames that were none.
-    pub bad_frames: u64,
-    /// Questions that had to be queried again.
-    pub repeats: u64,
-    /// Samples that arrived and were never fetched.
-    pub unread: u64,
-}
 
 struct Answer {
     header: Header,
@@ -88,9 +38,7 @@ pub struct Client {
     accumulator: Accumulator,
     sequence: u16,
     hello: Hello,
-    topics: VecDeque<Topic>,
-    expected: Option<u16>,
-    losses: Losses,
+    topics: Topics,
     patience: Patience,
     session: Session,
     /// Whether this session armed the controller or started its mode, and has not disarmed it since.
@@ -154,9 +102,7 @@ impl Client {
             // Programs that share a line must not take each other's answers for their own.
             sequence: session.id as u16,
             hello: unknown,
-            topics: VecDeque::new(),
-            expected: None,
-            losses: Losses::default(),
+            topics: Topics::default(),
             patience,
             session,
             controls: false,
@@ -179,8 +125,7 @@ impl Client {
             match Hello::from_bytes(&answer.body) {
                 Ok(hello) if answer.header.kind == Kind::Response => {
                     client.hello = hello;
-                    client.topics.clear();
-                    client.losses = Losses::default();
+                    client.topics = Topics::default();
                     return Ok(client);
                 }
                 _ => {
@@ -219,10 +164,10 @@ impl Client {
     /// What did not arrive so far.
     #[must_use]
     pub fn losses(&self) -> Losses {
-        Losses { bad_frames: u64::from(self.accumulator.counts().bad), ..self.losses }
+        Losses { bad_frames: u64::from(self.accumulator.counts().bad), ..self.topics.losses }
     }
 
-    /// Asks once more when no answer comes: for questions that may be queried twice.
+    /// Sends a request, again when no answer comes: for requests that may be repeated.
     ///
     /// # Errors
     /// [`DeviceCode::DeviceSilent`], [`DeviceCode::DeviceInUse`] when another session owns the device, or
@@ -334,7 +279,7 @@ impl Client {
     pub fn topic(&mut self, patience: Duration) -> Result<Option<Topic>> {
         let deadline = Instant::now() + patience;
         loop {
-            if let Some(topic) = self.topics.pop_front() {
+            if let Some(topic) = self.topics.pop() {
                 return Ok(Some(topic));
             }
             let left = deadline.saturating_duration_since(Instant::now());
@@ -360,7 +305,7 @@ impl Client {
         let bad = self.accumulator.counts().bad;
         let mut attempt = 0;
         while attempt < self.allowed(tries, bad) {
-            self.losses.repeats += u64::from(attempt > 0);
+            self.topics.losses.repeats += u64::from(attempt > 0);
             let sequence = self.next_sequence();
             let header = Header { kind: Kind::Request, id: E::ID, sequence };
             let length = encode(header, request, &mut wire).map_err(|e| {
@@ -387,7 +332,7 @@ impl Client {
             ))
     }
 
-    /// How often a question may be queried, when n frames were bad before it was queried first.
+    /// How often a request may be sent, given the number of bad frames before its first attempt.
     fn allowed(&self, tries: u32, bad_before: u32) -> u32 {
         if tries > 1 && self.accumulator.counts().bad != bad_before {
             self.patience.noisy_tries
@@ -442,7 +387,7 @@ impl Client {
         let count = match self.port.read(&mut buffer, patience) {
             Ok(count) => count,
             Err(e) => {
-                // A other peer often hangs up on bytes it does not understand; what it said until then is the better news.
+                // Another program often hangs up on bytes that it does not understand: what it sent before tells more.
                 return Err(if heard.bytes > 0 { heard.error(&self.port) } else { lost(&self.port, &e) });
             }
         };
@@ -458,32 +403,10 @@ impl Client {
                 Kind::Response | Kind::Refusal => {
                     answers.push(Answer { header: frame.header, body: frame.body.to_vec() });
                 }
-                Kind::Topic if frame.header.id == TELEMETRY => {
-                    if let Ok(sample) = postcard::from_bytes::<Telemetry>(frame.body) {
-                        let missing =
-                            self.expected.map_or(0, |expected| frame.header.sequence.wrapping_sub(expected));
-                        self.losses.samples += u64::from(missing);
-                        self.losses.gaps += u64::from(missing > 0);
-                        self.expected = Some(frame.header.sequence.wrapping_add(1));
-                        self.topics.push_back(Topic::Telemetry(sample));
-                    }
-                }
-                Kind::Topic if frame.header.id == EVENT => {
-                    if let Ok(event) = postcard::from_bytes::<Event>(frame.body) {
-                        self.topics.push_back(Topic::Event(event));
-                    }
-                }
-                Kind::Topic if frame.header.id == LOG => {
-                    self.topics.push_back(Topic::Log(frame.body.to_vec()));
-                }
+                Kind::Topic => self.topics.take(frame.header, frame.body),
                 // A controller never asks: what arrives as a request is our own, sent back.
                 Kind::Request => heard.echoes += 1,
-                Kind::Topic => {}
             }
-        }
-        while self.topics.len() > BACKLOG {
-            self.topics.pop_front();
-            self.losses.unread += 1;
         }
         Ok(answers)
     }

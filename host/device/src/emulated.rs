@@ -199,7 +199,7 @@ impl Emulated {
                 stroke_m: readings.stroke,
                 force_n: readings.force,
             };
-            Inputs { sides: [Some(now), None], ..Inputs::default() }
+            Inputs { sides: [Some(now.into()), None], ..Inputs::default() }
         };
         let options = Options { speed, ..Options::default() };
         let device = Device::start("127.0.0.1:0", options, plant).map_err(|e| {

@@ -7,9 +7,12 @@
 //! | hello, typed calls, topics, losses | [`Client`] |
 //! | tables: upload in pieces, read back | [`tables`] |
 //! | setpoints over time | [`setpoint_profile`] |
+//! | firmware over the link | [`mod@update`] |
 //! | a run from start to vent | [`mod@run`] |
+//! | a controller that is only watched | [`mod@watch`] |
 //! | venting while the conversation waits for something else | [`VentLine`] |
 //! | the pressure regulator, found from steps | [`regulator`] |
+//! | scales of sensors from known values | [`calibration`] |
 //! | log lines of the firmware as text | [`log_table`] |
 //! | telemetry to a recording | [`recorder`] |
 //! | messages about refusals and faults, with their remedy | [`messages`] |
@@ -17,6 +20,7 @@
 //! | why a setpoint could not be reached | [`reachability`] |
 
 mod address;
+pub mod calibration;
 mod client;
 #[cfg(feature = "emulated")]
 pub mod emulated;
@@ -34,7 +38,9 @@ pub mod run;
 pub mod setpoint_profile;
 pub mod table_diff;
 pub mod tables;
+pub mod update;
 mod vent_line;
+pub mod watch;
 
 pub use address::Address;
 pub use client::{Client, Losses, Patience, Topic};

@@ -38,9 +38,26 @@ pub(crate) struct CandidateFit {
     pub size: f64,
     /// The largest force that it makes at any row, N.
     pub peak: f64,
+    /// The rows about the base that its law is made from, where that is another than the present one.
+    pub about: Option<Rows>,
 }
 
 impl CandidateFit {
+    /// The same, made from the base that these rows are linearised about.
+    pub(super) fn seen_from(self, rows: Rows) -> Self {
+        Self { about: Some(rows), ..self }
+    }
+
+    /// The rows that its law is made from.
+    pub(super) fn source<'a>(&'a self, rows: &'a Rows) -> &'a Rows {
+        self.about.as_ref().unwrap_or(rows)
+    }
+
+    /// Its force per unit of each amplitude, N.
+    pub(crate) fn columns(&self, library: &[Candidate], rows: &Rows) -> Vec<Vec<f64>> {
+        library[self.candidate].columns(&self.shapes, self.source(rows))
+    }
+
     /// Whether it stays within what is known of the effect: no shape at the low end of its range, where a law becomes a simpler one (a
     /// memory a rate, a breakaway plain friction), and no lag beyond its known range. Other sizes depend on muscle and bench.
     pub(super) fn is_within_known_range(&self, candidate: &Candidate) -> bool {
@@ -53,7 +70,7 @@ impl CandidateFit {
 
 /// The fitted trace of a candidate over the rows, N.
 pub(crate) fn trace(fit: &CandidateFit, library: &[Candidate], rows: &Rows) -> Vec<f64> {
-    let columns = library[fit.candidate].columns(&fit.shapes, rows);
+    let columns = fit.columns(library, rows);
     (0..rows.len()).map(|i| fit.amplitudes.iter().zip(&columns).map(|(a, c)| a * c[i]).sum()).collect()
 }
 

@@ -144,6 +144,7 @@ impl<'a> Scorer<'a> {
             singles: Vec::new(),
             size: 0.0,
             peak: 0.0,
+            about: None,
         };
         if fit.visible < INVISIBLE {
             self.measure(&mut fit, &columns, rows);
@@ -237,7 +238,7 @@ impl<'a> Scorer<'a> {
         prior: PriorDeviations,
     ) -> (f64, f64) {
         let candidate = &library[fit.candidate];
-        let (_, products, _) = self.products(candidate, &fit.shapes, rows);
+        let (_, products, _) = self.products(candidate, &fit.shapes, fit.source(rows));
         let most = if candidate.info.alternatives { 1 } else { MOST_AMPLITUDES };
         let w = likelihood_at(&self.scale, &self.target, &products, &candidate.signs(), most, prior);
         ((w.before - w.gain).max(0.0), w.before)

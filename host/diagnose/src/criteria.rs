@@ -27,13 +27,14 @@ pub(crate) mod reference;
 pub(crate) mod rest_friction;
 pub(crate) mod rows;
 pub(crate) mod selection;
+pub(crate) mod stock;
 pub(crate) mod table_health;
 pub(crate) mod timeline;
 pub(crate) mod uncertainty;
 pub(crate) mod valve_pulses;
 
 /// The whole page, stage by stage in the order in which they decide.
-pub const PAGE: [Stage; 16] = [
+pub const PAGE: [Stage; 17] = [
     motion::CRITERIA,
     valve_pulses::STAGE,
     rows::STAGE,
@@ -49,6 +50,7 @@ pub const PAGE: [Stage; 16] = [
     history::STAGE,
     reference::STAGE,
     timeline::STAGE,
+    stock::STAGE,
     table_health::STAGE,
 ];
 

@@ -13,10 +13,12 @@ use super::criteria::judgement::{
     PARTLY_EXPLAINED, TRACE_POINTS,
 };
 use super::criteria::rows::{SLACK_MENTIONED, SLACK_ROUNDS};
+use super::cross_validation::HeldOutRows;
 use super::findings::{considered, missing};
 use super::known_effects;
 use super::linear::energy;
 use super::location::{block_ranges, locate};
+use super::noise::Noise;
 use super::options::Options;
 use super::preconditions::{blocked_force, limitations, not_judged, unmet_precondition};
 use super::remark::{Remark, Unjudgeable};
@@ -44,18 +46,20 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     }
     let known = BenchChecks::of(&options.checks, campaign, &braid)?;
     let freed = known.free(campaign);
-    let answer = ask(&freed, &braid, options, &known)?;
-    known.enter(answer, &options.given, &freed, &braid)
+    let as_read = known.corrects_the_stroke().then_some(campaign);
+    let answer = ask(&freed, as_read, &braid, options, &known)?;
+    known.enter(answer, &options.given, (&freed, as_read), &braid)
 }
 
 /// The answer of the recordings, corrected for what checks of the bench measured; with the kind of the last baseline.
 fn ask(
     campaign: &Campaign,
+    as_read: Option<&Campaign>,
     braid: &Braid<f64>,
     options: &Options,
     known: &BenchChecks,
 ) -> Result<(Diagnosis, Kind)> {
-    let (rows, mut remarks) = rows::prepare(campaign, braid)?;
+    let (rows, mut remarks) = rows::prepare_corrected(campaign, as_read, braid)?;
     let rows = rows.watched(options.progress.clone());
     let (blocked, step) = (blocked_force(&rows), rows::typical_step(&rows));
     remarks.extend(limitations(&rows));
@@ -120,6 +124,8 @@ struct SelectionResult {
     library: Vec<Candidate>,
     selection: Selection,
     held_out: HeldOut,
+    /// The error on held-out rows with the first effect, the first two, and so on, N.
+    steps: Vec<f64>,
     missing: Vec<Missing>,
 }
 
@@ -149,7 +155,19 @@ fn select(
         known_effects::judge(&mut missing, &selection, &held_out);
     }
     remarks.extend(missing.iter().filter_map(implausible_size));
-    SelectionResult { library, selection, held_out, missing }
+    let steps = steps_on_held_out(&selection, &held_out);
+    SelectionResult { library, selection, held_out, steps, missing }
+}
+
+/// The error on held-out rows with the first effect, the first two, and so on, each beside the base refitted, N.
+fn steps_on_held_out(selection: &Selection, held_out: &HeldOut) -> Vec<f64> {
+    let Selection { rows, joint, traces, .. } = selection;
+    if traces.len() < 2 {
+        return vec![held_out.rms_after_N; traces.len()];
+    }
+    let unseen = HeldOutRows::new(rows, joint.kind, traces);
+    let before_last = (1..traces.len()).map(|n| unseen.error(&traces[..n]));
+    before_last.chain([held_out.rms_after_N]).collect()
 }
 
 /// The error above the noise, and what became of it.
@@ -162,6 +180,8 @@ struct Excess {
     admitted: f64,
     /// Whether the force does not repeat, more than instruments scatter, and nothing explains it.
     restless: bool,
+    /// Whether more is left than the model admits, without a name, and remembers longer than the noise of an instrument.
+    lasts: bool,
 }
 
 impl Excess {
@@ -188,7 +208,8 @@ impl Excess {
         if restless {
             remarks.push(Remark::NotRepeatable(selection.noise.scatter(blocked)));
         }
-        Self { explained, left, admitted, restless }
+        let lasts = missing.is_empty() && left > admitted && selection.noise.remembers(step);
+        Self { explained, left, admitted, restless, lasts }
     }
 }
 
@@ -215,6 +236,11 @@ impl Located {
             (Some(l), _) => Pattern::Periodic(l.hertz),
             (None, Some(r)) if excess.left > excess.admitted => Pattern::Region(Box::new(r.clone())),
             _ if excess.restless => Pattern::NotRepeatable(selection.noise.scatter(blocked)),
+            // It stands above the noise of repeats, has no place and no period, and no effect fits: noise that lasts.
+            _ if excess.lasts => {
+                let sigma = excess.left.hypot(sigma);
+                Pattern::NotRepeatable(Noise { sigma, ..selection.noise }.scatter(blocked))
+            }
             _ => Pattern::None,
         };
         regions.extend(line.as_ref().map(|l| Region {
@@ -274,14 +300,15 @@ fn answer(
     remarks: Vec<Remark>,
 ) -> Diagnosis {
     let Measures { blocked, misfit, excess } = measures;
-    let SelectionResult { library, selection, held_out, missing } = selected;
+    let SelectionResult { library, selection, held_out, steps, missing } = selected;
     let sigma = selection.noise.sigma;
     let consistent = verdict == Verdict::Consistent;
     let considered = considered(&selection, &library, &missing, sigma, blocked);
     let name = |candidate: usize| library[candidate].name().to_owned();
-    let path = selection.selected.iter().map(|t| PathStep {
+    let path = selection.selected.iter().zip(steps).map(|(t, step)| PathStep {
         effect: name(t.fit.candidate),
         rms_N: t.rms,
+        held_out_rms_N: Some(step),
         p: t.p,
         runners_up: t.competitors.iter().map(|r| (name(r.0), r.1)).collect(),
     });

@@ -49,7 +49,7 @@ struct ForwardSelection<'a> {
     /// The middle distance in time between rows, s.
     step: f64,
     noise: Noise,
-    /// What the likelihood is scaled with; fixed at the beginning.
+    /// What the likelihood is scaled with: the weight of the rows is fixed at the beginning, the noise falls with what is explained.
     scale: Scale,
     kind: Kind,
     base_alone: Baseline,
@@ -58,7 +58,8 @@ struct ForwardSelection<'a> {
     chosen: Vec<CandidateFit>,
     selected: Vec<SelectedEffect>,
     traces: Vec<Vec<f64>>,
-    /// The energy above noise before any effect, N².
+    /// The energy before any effect, N², and what of it is above the noise.
+    energy_before: f64,
     excess_energy: f64,
     first_scan: Option<(Vec<CandidateFit>, Vec<f64>)>,
     /// Candidates that are not eligible.
@@ -103,12 +104,14 @@ impl<'a> ForwardSelection<'a> {
             chosen: Vec::new(),
             selected: Vec::new(),
             traces: Vec::new(),
+            energy_before: 0.0,
             excess_energy: 0.0,
             first_scan: None,
             excluded: refused.to_vec(),
             remarks: Vec::new(),
         };
-        search.excess_energy = search.excess_of(energy(&search.base_alone.residual));
+        search.energy_before = energy(&search.base_alone.residual);
+        search.excess_energy = search.excess_of(search.energy_before);
         search
     }
 
@@ -119,13 +122,14 @@ impl<'a> ForwardSelection<'a> {
     /// One step: selects or excludes a candidate, or ends the selection.
     fn next(&mut self) -> ControlFlow<()> {
         let scorer = Scorer::new(&self.joint, self.scale);
-        let (best, p) = scan_step(self.library, &self.rows, &scorer, self.blocked);
+        let (best, p) = scan_step(self.library, &self.rows, &scorer, self.blocked, &self.chosen);
         if self.first_scan.is_none() {
             self.first_scan = Some((best.clone(), p.clone()));
         }
         let Some(at) = self.winner(&best, &scorer) else { return ControlFlow::Break(()) };
         if self.chosen.is_empty() {
-            self.excess_energy = self.excess_of(best[at].before);
+            self.energy_before = best[at].before;
+            self.excess_energy = self.excess_of(self.energy_before);
         }
         if !self.is_sufficient(&best[at], p[at]) {
             return ControlFlow::Break(());
@@ -277,10 +281,15 @@ impl<'a> ForwardSelection<'a> {
         self.kind = beside;
         self.base_alone = metric;
         self.joined(joint);
-        self.noise = Noise { sigma: self.noise.sigma, ..left };
+        // What changed from cycle to cycle was not noise where the effect explains it.
+        let sigma = if left.from_repeats { left.sigma.min(self.noise.sigma) } else { self.noise.sigma };
+        self.noise = Noise { sigma, from_repeats: self.noise.from_repeats, ..left };
+        self.scale.sigma = sigma.max(LEAST_SIGMA * self.blocked);
+        self.excess_energy = self.excess_of(self.energy_before);
         let share = winner.gain / self.excess_energy;
+        let about = self.chosen.last().and_then(|c| c.about.clone());
         self.selected.push(SelectedEffect {
-            fit: winner,
+            fit: CandidateFit { about, ..winner },
             p,
             share,
             competitors,
@@ -314,7 +323,9 @@ impl<'a> ForwardSelection<'a> {
                 .max_by(|a, b| a.score.total_cmp(&b.score));
             if let Some(c) = challenger {
                 let refined = scorer.refine(c, self.library, rows);
-                let (mine, _) = scorer.left_under(&self.chosen[position], self.library, rows, refined.prior);
+                // The present one is seen from the base beside all of them.
+                let seen = self.chosen[position].clone().seen_from(self.rows.clone());
+                let (mine, _) = scorer.left_under(&seen, self.library, rows, refined.prior);
                 // It must leave clearly less than the present one does.
                 if refined.score > own + LEAST_SCORE && refined.before - refined.gain < EXCHANGE_LEAVES * mine
                 {
@@ -347,6 +358,7 @@ impl<'a> ForwardSelection<'a> {
         for (t, c) in self.selected.iter_mut().zip(&self.chosen) {
             t.fit.amplitudes.clone_from(&c.amplitudes);
             t.fit.shapes.clone_from(&c.shapes);
+            t.fit.about.clone_from(&c.about);
         }
         let (first_scan, first_p) = self.first_scan.unwrap_or_default();
         let Self { rows, base_alone, joint, selected, excess_energy, traces, noise, remarks, .. } = self;
@@ -389,7 +401,7 @@ mod tests {
         assert_eq!(before.len(), 1);
         // Whatever takes most of the rest, without evidence.
         let scorer = Scorer::new(&search.joint, search.scale);
-        let (best, _) = scan_step(&library, &search.rows, &scorer, blocked);
+        let (best, _) = scan_step(&library, &search.rows, &scorer, blocked, &search.chosen);
         let others = best.iter().filter(|t| t.candidate != search.chosen[0].candidate);
         let most = others.max_by(|a, b| a.gain.total_cmp(&b.gain)).expect("another candidate");
         let weak = CandidateFit { score: 0.0, ..most.clone() };

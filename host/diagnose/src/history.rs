@@ -44,6 +44,7 @@ mod unseen;
 
 pub use answer::History;
 pub use enter::{diagnose, is_from_history};
+pub(crate) use student::t_quantile;
 
 use model_core::braid::Geometry;
 use pam_data::recording::Campaign;

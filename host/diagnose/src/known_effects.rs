@@ -86,7 +86,7 @@ pub(super) fn fitted(
         let (best, p) = if chosen.is_empty() {
             (selection.first_scan.clone(), selection.first_p.clone())
         } else {
-            scan_step(library, rows, &scorer, blocked)
+            scan_step(library, rows, &scorer, blocked, &chosen)
         };
         let place = best.iter().position(|t| t.candidate == index);
         let fit = place

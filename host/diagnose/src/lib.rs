@@ -17,6 +17,7 @@
 //! | | `noise` | estimates noise from repeats; tests by whole blocks |
 //! | candidates | `candidates` | the library of effects as columns |
 //! | | `candidate_fit`, `candidate_scoring` | one candidate fitted beside a base; all of them scanned and refined |
+//! | | `renewed_laws` | memories of the turn, seen from a base that was fitted beside them |
 //! | | `likelihood` | how strongly the recordings support a candidate |
 //! | selection | `forward_selection`, `selection_step` | which effects are selected, and when none is |
 //! | | `cross_validation`, `confirmation` | the error on held-out rows, which a selected effect must reduce |
@@ -26,6 +27,7 @@
 //! | | `location`, `spectrum`, `table_evidence` | where the error is: along coordinates, in time, in the tables |
 //! | | [`history`] | what the muscle remembers over a campaign of isometric staircases, before the search |
 //! | over campaigns | [`mod@reference`], [`timeline`] | what changed since a reference; quantities and change points over several campaigns |
+//! | over muscles | [`mod@stock`] | what muscles of one stock share, and what each has of its own |
 //! | answer | [`verdict`], [`outcome`], [`remark`], [`why`], [`why_not`], [`experiment`], [`reserve`] | the answer as values; the report writes the sentences |
 //! | | [`refitted_table`] | the table refitted beside the selected effects |
 //! | | [`next_experiment`], [`isolability`], [`protocol_simulation`] | the experiment that decides; what a planned protocol can show |
@@ -63,11 +65,13 @@ pub mod protocol_simulation;
 pub mod reference;
 pub mod refitted_table;
 pub mod remark;
+mod renewed_laws;
 pub mod reserve;
 mod rest_friction;
 mod rows;
 mod selection_step;
 mod spectrum;
+pub mod stock;
 mod table_evidence;
 #[cfg(test)]
 mod tests;

@@ -28,7 +28,12 @@ impl Noise {
     /// Whether it is larger and lasts longer than what instruments scatter: then strokes under the same conditions differ by physics.
     /// `step` is the time between rows, s, `blocked` the blocked force, N.
     pub(crate) fn exceeds_instruments(&self, step: f64, blocked: f64) -> bool {
-        self.sigma > INSTRUMENT_NOISE * blocked && self.memory > INSTRUMENT_MEMORY * step
+        self.sigma > INSTRUMENT_NOISE * blocked && self.remembers(step)
+    }
+
+    /// Whether it lasts longer than the noise of an instrument.
+    pub(crate) fn remembers(&self, step: f64) -> bool {
+        self.memory > INSTRUMENT_MEMORY * step
     }
 
     /// How strokes under the same conditions differ.

@@ -8,8 +8,10 @@
 //! | --- | --- |
 //! | [`crate::criteria`] | every constant with its meaning and source |
 //! | `runs` | recordings as runs: mountings, run numbers, what cannot be compared |
+//! | `stages` | lengths held one after another in one recording |
 //! | `motion` | settled rows; which way the pressure or the stroke moves |
 //! | `spline`, `surface` | the force before, over pressure and direction, by mounting; its slopes |
+//! | `interpolate` | the same at a length between those of the reference |
 //! | `table_surface` | the same from a table file |
 //! | `table_error` | what a table is wrong by where nothing changed |
 //! | `cells` | residuals and shapes as means over cells of pressure |
@@ -20,9 +22,11 @@
 //! | `slip` | a step within AFTER |
 //! | `unknown` | a smooth change that no name describes |
 //! | `gate` | a change must show without any single mounting |
+//! | `withdrawal` | names that are withdrawn: another actuator, held-out recordings that get worse |
 //! | `posterior` | probabilities, set, verdict |
 //! | `isometric` | all of this for pressure staircases at held lengths |
 //! | `combined` | length and pressure that move together, taken apart into runs at nearly held lengths |
+//! | `catalogue` | strokes of a described muscle: every effect of the catalogue as a change |
 //! | `strokes`, `stroked` | the same question for strokes at regulated pressures |
 //! | `sweeps` | runs at the reference's lengths, for quantities that are followed over campaigns |
 //! | `localise` | which cells, since which file, abruptly or gradually |
@@ -36,12 +40,14 @@
 //! The same recordings give the same answer on any number of threads.
 
 pub mod answer;
+mod catalogue;
 mod cells;
 mod combined;
 mod contrast;
 pub mod correction;
 mod gate;
 mod held_out;
+mod interpolate;
 mod isometric;
 mod lag;
 mod localise;
@@ -54,6 +60,7 @@ pub mod shapes;
 mod sides;
 mod slip;
 mod spline;
+mod stages;
 mod staircase_answer;
 mod stroke_answer;
 pub(crate) mod stroked;
@@ -66,6 +73,7 @@ mod table_surface;
 mod tests;
 mod units;
 mod unknown;
+mod withdrawal;
 
 pub(crate) use crate::criteria::reference as criteria;
 pub use answer::{ChangeReport, Verdict};

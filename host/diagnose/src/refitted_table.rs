@@ -1,6 +1,6 @@
 //! The diagnosed model: the table refitted beside the effects that were named, and the bench's corrections apart from it.
 
-use model_core::effects::{FittedEffect, MEMORY};
+use model_core::effects::{FittedEffect, MAX_EFFECTS, MEMORY};
 use model_core::muscle::Muscle;
 
 use super::criteria::judgement::{CHECKED_COST, PREDICTIVE_COST, REFIT_ROUNDS};
@@ -156,13 +156,14 @@ fn parts(diagnosis: &Diagnosis) -> (Vec<FittedEffect>, Vec<Correction>) {
         match Candidate::from_name(&m.effect) {
             // The memory found by the history layer goes into a table by its own fit, or not at all.
             Some(Candidate::Muscle(_)) if history::is_from_history(m) => {}
-            Some(Candidate::Muscle(effect)) => {
+            // A table carries so many; those that were found first explain the most.
+            Some(Candidate::Muscle(effect)) if effects.len() < MAX_EFFECTS => {
                 effects.push(FittedEffect::new(effect, &values));
             }
             Some(Candidate::Bench(_)) => {
                 corrections.push(Correction { effect: m.effect.clone(), parameters: values });
             }
-            None => {}
+            Some(Candidate::Muscle(_)) | None => {}
         }
     }
     (effects, corrections)

@@ -15,6 +15,7 @@ use super::likelihood::Scale;
 use super::linear::{Sign, add_scaled, energy};
 use super::noise::{Noise, family_p};
 use super::remark::Remark;
+use super::renewed_laws;
 use super::rows::Rows;
 
 /// A selected effect, with its weight among its competitors at that step.
@@ -101,6 +102,7 @@ pub(crate) fn scan_step(
     rows: &Rows,
     scorer: &Scorer<'_>,
     blocked: f64,
+    chosen: &[CandidateFit],
 ) -> (Vec<CandidateFit>, Vec<f64>) {
     let mut all = scorer.scan(library, rows);
     reject_cancelling(&mut all, blocked);
@@ -118,6 +120,7 @@ pub(crate) fn scan_step(
             };
         }
     }
+    renewed_laws::renew(&mut best, chosen, library, rows, scorer);
     reject_cancelling(&mut best, blocked);
     rows.progress().stage("weighing them against chance and each other", 0);
     let p = p_values(&best, &all);
@@ -153,7 +156,8 @@ pub(crate) struct JointFit {
 pub(crate) fn refit(rows: &Rows, kind: Kind, fits: Vec<CandidateFit>, library: &[Candidate]) -> JointFit {
     let first = fitted_beside(rows, kind, fits, library);
     let renewed = baselines::linearised(rows, &first.base);
-    let second = fitted_beside(&renewed, kind, first.fits.clone(), library);
+    let fits = first.fits.iter().map(|f| CandidateFit { about: None, ..f.clone() }).collect();
+    let second = fitted_beside(&renewed, kind, fits, library);
     if energy(&second.base.residual) <= WORSE * energy(&first.base.residual) {
         let rows = baselines::linearised(&second.rows, &second.base);
         return JointFit { rows, ..second };
@@ -166,7 +170,7 @@ fn fitted_beside(rows: &Rows, kind: Kind, mut fits: Vec<CandidateFit>, library: 
     let mut columns = Vec::new();
     let mut owner = Vec::new();
     for (t, fit) in fits.iter().enumerate() {
-        for (k, column) in library[fit.candidate].columns(&fit.shapes, rows).into_iter().enumerate() {
+        for (k, column) in fit.columns(library, rows).into_iter().enumerate() {
             if fit.amplitudes.get(k).is_some_and(|a| *a != 0.0) {
                 columns.push(column);
                 owner.push((t, k));

@@ -3,6 +3,7 @@
 //! The force comes from a table muscle, friction and faults from plain formulas below, not from the library of effects.
 
 pub(crate) mod added;
+mod plays;
 
 use model_core::braid::Geometry;
 use model_core::muscle::Muscle;
@@ -301,7 +302,8 @@ fn what_the_base_holds_already_cannot_be_given() {
     assert!(refused(&["gauge-offset"]).contains("deadband"));
     assert!(refused(&["higher-order-elasticity"]).contains("offered before"));
     assert!(refused(&["backlash", "backlash"]).contains("twice"));
-    assert!(refused(&["backlash", "leak", "inertia", "gravity"]).contains("most that recordings can bear"));
+    let six = ["backlash", "leak", "inertia", "gravity", "log-creep", "end-slip"];
+    assert!(refused(&six).contains("most that recordings can bear"));
 }
 
 #[test]

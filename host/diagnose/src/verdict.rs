@@ -158,6 +158,8 @@ pub struct PathStep {
     pub effect: String,
     /// Root mean square of the misfit after it, N.
     pub rms_N: f64,
+    /// Error on held-out rows with the effects up to this one, N; absent of one that a check of the bench measured.
+    pub held_out_rms_N: Option<f64>,
     /// Family-wise p.
     pub p: f64,
     /// The next best at this step and their misfit, N.

@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | cross-validation: each run, or each held length, predicted from the others | [`cross_validation`] |
 //! | a muscle of another length predicted from others of its stock | [`length_transfer`] |
+//! | a muscle, or a contraction of it, predicted with its stock | [`stock_transfer`] |
 //! | published force formulas | [`published`] |
 //!
 //! ```
@@ -25,3 +26,4 @@
 pub mod cross_validation;
 pub mod length_transfer;
 pub mod published;
+pub mod stock_transfer;

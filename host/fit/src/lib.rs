@@ -9,6 +9,7 @@
 //! | confidence band of the force | [`confidence_band`] |
 //! | corrections of sensors and frame | [`mod@bench`] |
 //! | recordings of the bench without its muscle | [`checks`] |
+//! | muscles of one stock, fitted together | [`stock`] |
 //! | least squares, jackknife, splines, order statistics | [`numerics`] |
 //!
 //! It builds on `pam-data` (recordings in SI units) and `model-core` (the model's equations), and knows no report and no device.
@@ -60,6 +61,7 @@ pub mod error;
 mod fit;
 pub mod numerics;
 pub mod predict;
+pub mod stock;
 pub mod table_export;
 pub mod table_faults;
 pub mod table_file;

@@ -7,13 +7,15 @@ use pam_data::pluralise::pluralise;
 use pam_data::recording::{Campaign as HostCampaign, Import, Reader};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
+use pyo3::types::PyCapsule;
 
 use crate::error::raised;
+use crate::frames;
 use crate::muscle::Muscle;
 use crate::recording::Recording;
 
 /// Recordings of one muscle in chronological order.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "pamtools")]
 #[derive(Clone)]
 pub(crate) struct Campaign(pub(crate) HostCampaign);
 
@@ -34,6 +36,33 @@ impl Campaign {
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.0.warnings.clone()
+    }
+
+    /// For libraries that read the Arrow PyCapsule interface, with the recordings one below the other and their names in the first column.
+    #[pyo3(signature = (requested_schema = None))]
+    fn __arrow_c_stream__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        let _ = requested_schema;
+        frames::stream(py, &self.0.recordings, true)
+    }
+
+    /// A pandas data frame with the recordings one below the other; the column `recording` has their names.
+    fn to_pandas<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        frames::pandas(py, &self.0.recordings, true)
+    }
+
+    /// A polars data frame with the recordings one below the other; the column `recording` has their names.
+    fn to_polars<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        frames::polars(slf)
+    }
+
+    /// Draws force against stroke of every recording with matplotlib; returns the axes.
+    #[pyo3(signature = (axes = None))]
+    fn plot<'py>(slf: &Bound<'py, Self>, axes: Option<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        frames::plot(slf, "campaign", axes)
     }
 
     fn __len__(&self) -> usize {

@@ -2,35 +2,65 @@
 
 use std::path::PathBuf;
 
+use pam_data::date;
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::Campaign as HostCampaign;
 use pam_diagnose as diagnosis;
-use pam_report::diagnose_page;
+use pam_report::{diagnose_page, document};
 use pyo3::prelude::*;
 
-use crate::arrays::loads;
 use crate::campaign::Campaign;
 use crate::error::raised;
 use crate::muscle::Muscle;
 use crate::report::write_report;
+use crate::table::Table;
 
-/// Finds out what the model leaves out. Returns the JSON of `host diagnose` as a dict; `report` names an HTML file to write.
+/// The answer of a diagnosis with what it was made from.
+#[pyclass(frozen, module = "pamtools._native")]
+pub(crate) struct DiagnosisResult {
+    answer: diagnosis::Diagnosis,
+    campaign: HostCampaign,
+    muscle: MuscleDescription,
+}
+
+#[pymethods]
+impl DiagnosisResult {
+    /// The JSON of `host diagnose`.
+    fn json(&self) -> String {
+        document::diagnosis_json(&self.answer)
+    }
+
+    /// The table refitted beside the named effects.
+    fn corrected_table(&self, py: Python<'_>) -> PyResult<Table> {
+        let mut refitted = py
+            .detach(|| diagnosis::refitted_table::refit(&self.campaign, &self.muscle, &self.answer))
+            .map_err(raised)?;
+        refitted.file.about.tool = format!("pamtools {}", env!("CARGO_PKG_VERSION"));
+        refitted.file.about.date = date::now_utc();
+        Ok(Table(refitted.file))
+    }
+
+    /// Writes the report, one HTML file.
+    fn report(&self, path: PathBuf) -> PyResult<()> {
+        write_report(&diagnose_page::page(&self.answer, &self.muscle.geometry(), &self.campaign), &path)
+    }
+}
+
+/// Finds the effects that the model lacks.
 #[pyfunction]
-#[pyo3(signature = (campaign, muscle, report = None))]
-pub(crate) fn diagnose<'py>(
-    py: Python<'py>,
-    campaign: PyRef<'py, Campaign>,
-    muscle: PyRef<'py, Muscle>,
-    report: Option<PathBuf>,
-) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn diagnose(
+    py: Python<'_>,
+    campaign: PyRef<'_, Campaign>,
+    muscle: PyRef<'_, Muscle>,
+) -> PyResult<DiagnosisResult> {
     let (campaign, muscle) = (campaign.0.clone(), muscle.0.clone());
     let geometry = muscle.geometry();
     let options = diagnosis::Options { muscle: muscle.name.clone(), ..Default::default() };
-    let mut answer = py.detach(|| diagnosis::diagnose(&campaign, &geometry, &options)).map_err(raised)?;
+    let mut answer =
+        py.detach(|| diagnosis::history::diagnose(&campaign, &geometry, &options)).map_err(raised)?;
     // One blocked force for one campaign: that of `fit`.
     if let Ok(plain) = py.detach(|| pam_fit::fit(&campaign, &muscle, &pam_fit::Options::default())) {
         answer.blocked_force_N = plain.summary.blocked_force_N;
     }
-    if let Some(path) = &report {
-        write_report(&diagnose_page::page(&answer, &geometry, &campaign), path)?;
-    }
-    loads(py, &pam_report::document::diagnosis_json(&answer))
+    Ok(DiagnosisResult { answer, campaign, muscle })
 }

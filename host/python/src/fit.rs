@@ -12,12 +12,13 @@ use pyo3::prelude::*;
 use crate::arrays::loads;
 use crate::campaign::Campaign;
 use crate::error::{raised, wrong};
+use crate::frames;
 use crate::muscle::Muscle;
 use crate::report::write_report;
 use crate::table::Table;
 
 /// A finished fit.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "pamtools")]
 pub(crate) struct Fit {
     fit: HostFit,
     campaign: HostCampaign,
@@ -48,9 +49,21 @@ impl Fit {
         Table(TableFile { table: self.fit.table.clone(), about })
     }
 
+    /// The recordings that were fitted.
+    #[getter]
+    fn campaign(&self) -> Campaign {
+        Campaign(self.campaign.clone())
+    }
+
     /// Writes the report, one HTML file.
     fn report(&self, path: PathBuf) -> PyResult<()> {
         write_report(&fit_page::page(&self.fit, &self.campaign, &self.options), &path)
+    }
+
+    /// Draws the measured and the fitted force against stroke with matplotlib; returns the axes.
+    #[pyo3(signature = (axes = None))]
+    fn plot<'py>(slf: &Bound<'py, Self>, axes: Option<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        frames::plot(slf, "fit", axes)
     }
 
     fn __repr__(&self) -> String {

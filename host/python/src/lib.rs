@@ -6,10 +6,12 @@ use pyo3::prelude::*;
 
 mod arrays;
 mod campaign;
+mod device;
 mod diagnosis;
 mod error;
 mod evaluation;
 mod fit;
+mod frames;
 mod muscle;
 mod prediction;
 mod recording;
@@ -19,7 +21,8 @@ mod warnings;
 
 /// Fit, predict and diagnose pneumatic artificial muscles.
 #[pymodule]
-fn pamtools(module: &Bound<'_, PyModule>) -> PyResult<()> {
+#[pyo3(name = "_native")]
+fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("PamError", module.py().get_type::<error::PamError>())?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<muscle::Muscle>()?;
@@ -28,6 +31,9 @@ fn pamtools(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<prediction::Prediction>()?;
     module.add_class::<table::Table>()?;
     module.add_class::<fit::Fit>()?;
+    module.add_class::<diagnosis::DiagnosisResult>()?;
+    module.add_class::<device::Link>()?;
+    module.add_function(wrap_pyfunction!(frames::from_frame, module)?)?;
     module.add_function(wrap_pyfunction!(campaign::read, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::evaluate, module)?)?;

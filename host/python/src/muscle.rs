@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use pam_data::muscle_description::{Kind, MuscleDescription};
 use pyo3::prelude::*;
 
-use crate::error::raised;
+use crate::error::{raised, wrong};
 
 /// A muscle as its maker or a calliper describes it: lengths in mm, the braid angle in degrees from the radial plane.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "pamtools")]
 #[derive(Clone)]
 pub(crate) struct Muscle(pub(crate) MuscleDescription);
 
@@ -48,6 +48,32 @@ impl Muscle {
     #[staticmethod]
     fn read(path: PathBuf) -> PyResult<Self> {
         MuscleDescription::read(path).map(Self).map_err(raised)
+    }
+
+    /// A description from the text of its file (TOML).
+    #[staticmethod]
+    fn from_toml(text: &str) -> PyResult<Self> {
+        MuscleDescription::parse(text).map(Self).map_err(raised)
+    }
+
+    /// The text of its file (TOML). Descriptions can be pickled, copied and compared.
+    fn to_toml(&self) -> PyResult<String> {
+        toml::to_string(&self.0).map_err(|e| wrong(e.to_string()))
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        Ok((py.get_type::<Self>().getattr("from_toml")?, (self.to_toml()?,)))
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.extract::<PyRef<'_, Self>>().is_ok_and(|other| other.0 == self.0)
+    }
+
+    fn __hash__(&self) -> u64 {
+        use std::hash::{DefaultHasher, Hash, Hasher};
+        let mut hasher = DefaultHasher::new();
+        self.0.name.hash(&mut hasher);
+        hasher.finish()
     }
 
     /// What it is called.

@@ -5,8 +5,10 @@ use pam_data::pluralise::pluralise;
 use pam_fit::predict::Predicted;
 use pyo3::prelude::*;
 
+use crate::frames;
+
 /// The prediction of a table for one recording.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "pamtools")]
 pub(crate) struct Prediction(pub(crate) Predicted);
 
 #[pymethods]
@@ -37,6 +39,12 @@ impl Prediction {
 
     fn __len__(&self) -> usize {
         self.0.force.len()
+    }
+
+    /// Draws the predicted force by row with matplotlib, and its band; returns the axes.
+    #[pyo3(signature = (axes = None))]
+    fn plot<'py>(slf: &Bound<'py, Self>, axes: Option<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        frames::plot(slf, "prediction", axes)
     }
 
     fn __repr__(&self) -> String {

@@ -4,12 +4,14 @@ use numpy::{IntoPyArray, PyArray1};
 use pam_data::pluralise::pluralise;
 use pam_data::recording::Recording as HostRecording;
 use pyo3::prelude::*;
+use pyo3::types::PyCapsule;
 
 use crate::arrays::column;
 use crate::error::raised;
+use crate::frames;
 
 /// One recording, columns in SI units.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "pamtools")]
 #[derive(Clone)]
 pub(crate) struct Recording(pub(crate) HostRecording);
 
@@ -72,6 +74,34 @@ impl Recording {
     #[getter]
     fn temperature<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         self.0.temperature.clone().map(|t| t.into_pyarray(py))
+    }
+
+    /// For libraries that read the Arrow PyCapsule interface: `polars.DataFrame(recording)`, `pyarrow.table(recording)`.
+    #[pyo3(signature = (requested_schema = None))]
+    fn __arrow_c_stream__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        // A wish of the consumer, which the interface permits to be passed over.
+        let _ = requested_schema;
+        frames::stream(py, std::slice::from_ref(&self.0), false)
+    }
+
+    /// A pandas data frame, columns named as in a file.
+    fn to_pandas<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        frames::pandas(py, std::slice::from_ref(&self.0), false)
+    }
+
+    /// A polars data frame, columns named as in a file.
+    fn to_polars<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        frames::polars(slf)
+    }
+
+    /// Draws pressure, stroke and force over time with matplotlib; returns the axes.
+    #[pyo3(signature = (axes = None))]
+    fn plot<'py>(slf: &Bound<'py, Self>, axes: Option<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        frames::plot(slf, "recording", axes)
     }
 
     fn __len__(&self) -> usize {

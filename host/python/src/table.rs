@@ -17,11 +17,12 @@ use pyo3::types::PyBytes;
 use crate::arrays::broadcast;
 use crate::campaign::Campaign;
 use crate::error::{raised, wrong};
+use crate::frames;
 use crate::prediction::Prediction;
 use crate::warnings::warn;
 
 /// A fitted table.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "pamtools")]
 #[derive(Clone)]
 pub(crate) struct Table(pub(crate) TableFile);
 
@@ -48,6 +49,14 @@ impl Table {
     #[getter]
     fn nodes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.0.table.nodes.iter().map(|p| f64::from(*p)).collect::<Vec<_>>().into_pyarray(py)
+    }
+
+    /// Least and greatest stroke of the recordings that were fitted, m.
+    #[getter]
+    fn tested_stroke(&self) -> (f64, f64) {
+        let tested = &self.0.table.tested;
+        let length = f64::from(self.0.table.geometry.rest_length.metres());
+        (f64::from(tested.contraction_low) * length, f64::from(tested.contraction_high) * length)
     }
 
     /// The curves `E_1 …` at the nodes, Pa.
@@ -158,6 +167,12 @@ impl Table {
         let prediction = py.detach(move || predict_with_bands(&table, &campaign)).map_err(raised)?;
         warn(py, &prediction.warnings)?;
         Ok(prediction.recordings.into_iter().map(Prediction).collect())
+    }
+
+    /// Draws force against stroke at each node with matplotlib, shortening and lengthening; returns the axes.
+    #[pyo3(signature = (axes = None))]
+    fn plot<'py>(slf: &Bound<'py, Self>, axes: Option<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        frames::plot(slf, "table", axes)
     }
 
     fn __repr__(&self) -> String {

@@ -9,6 +9,7 @@ PAM_BENCH names it for pytest.
 import ast
 import os
 import pathlib
+import pickle
 import sys
 import tempfile
 import warnings
@@ -207,7 +208,7 @@ def test_the_listing_of_the_book_runs():
 
 
 def test_stubs_and_help_name_what_there_is():
-    stubs = ast.parse((pathlib.Path(__file__).parent.parent / "pamtools.pyi").read_text())
+    stubs = ast.parse((pathlib.Path(__file__).parent.parent / "python/pamtools/_native.pyi").read_text())
     public = lambda names: {n for n in names if not n.startswith("_")}
     told = {}
     for node in stubs.body:
@@ -215,14 +216,19 @@ def test_stubs_and_help_name_what_there_is():
             told[node.name] = public(n.name for n in node.body if isinstance(n, ast.FunctionDef))
         elif isinstance(node, ast.FunctionDef):
             told[node.name] = set()
-    # Of a package, the extension itself lies one deeper under the same name.
-    assert public(vars(pam)) - {"pamtools"} == set(told)
+    native = pam.fit.__module__ and __import__("pamtools._native", fromlist=["_native"])
+    assert public(vars(native)) == set(told)
     for name, members in told.items():
-        thing = getattr(pam, name)
+        thing = getattr(native, name)
         assert thing.__doc__, f"{name} has no docstring"
         if name not in {"PamError"} and isinstance(thing, type):
             assert public(vars(thing)) == members, name
             assert all(getattr(thing, m).__doc__ for m in members), name
+    for name in pam.__all__:
+        thing = getattr(pam, name)
+        assert thing.__doc__, f"{name} has no docstring"
+        if isinstance(thing, type) and thing.__module__ != "pamtools._native":
+            assert all(getattr(thing, m).__doc__ for m in public(vars(thing))), name
 
 
 def test_a_diagnosis_is_a_dict_and_a_report():
@@ -233,12 +239,56 @@ def test_a_diagnosis_is_a_dict_and_a_report():
         assert answer["schema"] == "pam-diagnose/1"
         assert answer["verdict"] in {"consistent", "explained", "partly-explained", "unexplained"}
         assert open(report, encoding="utf-8").read().startswith("<!DOCTYPE html>")
+        assert pickle.loads(pickle.dumps(answer)) == answer
+
+
+def test_a_diagnosis_gives_the_corrected_table():
+    muscle, campaign = everything()
+    # A load cell that reads 8 % too much.
+    late = [pam.Recording(r.name, r.time, r.pressure, r.stroke, r.force * 1.08) for r in campaign]
+    answer = pam.diagnose(pam.Campaign(late), muscle)
+    corrected = answer.corrected_table()
+    assert isinstance(corrected, pam.Table)
+    predicted = corrected.predict(pam.Campaign(late))
+    rms = np.sqrt(np.mean(np.concatenate([r.force - f for r, f in zip(late, predicted)]) ** 2))
+    assert rms < 1.0, rms
+
+
+def test_the_examples_in_the_docstrings_hold():
+    import doctest
+    import importlib
+
+    found = 0
+    for name in ["pamtools", "pamtools.device", "pamtools.diagnosis", "pamtools.plots", "pamtools.regression"]:
+        result = doctest.testmod(importlib.import_module(name), raise_on_error=False)
+        assert result.failed == 0, name
+        found += result.attempted
+    page = pathlib.Path(__file__).resolve().parents[3] / "docs/src/python.md"
+    here = os.getcwd()
+    with tempfile.TemporaryDirectory() as work:
+        os.symlink(bench().resolve(), os.path.join(work, "bench"))
+        os.chdir(work)
+        try:
+            blocks = [part.split("```")[0] for part in page.read_text(encoding="utf-8").split("```pycon\n")[1:]]
+            examples = doctest.DocTestParser().get_doctest("\n".join(blocks), {}, page.name, str(page), 0)
+            runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+            runner.run(examples)
+            result = runner.summarize()
+        finally:
+            os.chdir(here)
+    assert result.failed == 0
+    assert found + result.attempted >= 15, "the page has examples"
+
+
+def main(names):
+    """Runs every test of a module; the first argument of the call names the folder of recordings."""
+    if len(sys.argv) > 1:
+        os.environ["PAM_BENCH"] = sys.argv[1]
+    for name, test in list(names.items()):
+        if name.startswith("test_"):
+            test()
+            print(name, "ok", flush=True)
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        os.environ["PAM_BENCH"] = sys.argv[1]
-    for name, test in list(globals().items()):
-        if name.startswith("test_"):
-            test()
-            print(name, "ok")
+    main(globals())

@@ -78,7 +78,7 @@ fn changes(r: &ChangeReport) -> Section {
     for m in &r.missing {
         let sizes: Vec<String> = m.parameters.iter().map(words::size).collect();
         section.text(format!(
-            "**{}** ({}): {}. Probability {}, of its class {}. Law: {}. Since when: {}. It is {}.",
+            "*{}* ({}): {}. Probability {}, of its class {}. Law: {}. Since when: {}. It is {}.",
             m.effect,
             sizes.join(", "),
             words::remedy(m.change),

@@ -1,6 +1,7 @@
 //! A report as one HTML file: no other file, no network, readable without scripts.
 //!
-//! The only script saves a picture or its numbers to a file; both are already in the page.
+//! The script saves a picture or its numbers to a file, shows the values under the pointer, and hides layers whose name in the legend is
+//! clicked. It needs nothing that is not in the page already.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -10,7 +11,7 @@ use super::page::{Block, Page, Section, Table, Tone};
 use super::svg::{self, Layout};
 
 const STYLE: &str = include_str!("page.css");
-const SCRIPT: &str = include_str!("page.js");
+const SCRIPT: &str = concat!(include_str!("page.js"), include_str!("reading.js"));
 
 impl Page {
     /// The report as one HTML file that needs no other.

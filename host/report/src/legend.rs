@@ -8,12 +8,15 @@ use super::colour::Colour;
 use super::figure::{Figure, Layer, Mark, Style};
 use super::inline_markup;
 use super::marks;
+use super::svg::attribute;
 
 const ROW: f64 = 20.0;
 const SWATCH: f64 = 22.0;
 
 /// The legend and the height it takes; empty where there is nothing to distinguish.
-pub(crate) fn draw(figure: &Figure, width: f64) -> (String, f64) {
+///
+/// Where the picture is interactive, each entry is a group that a page's script makes a button of.
+pub(crate) fn draw(figure: &Figure, width: f64, interactive: bool) -> (String, f64) {
     let mut out = String::new();
     let (mut x, mut y) = (0.0, 0.0);
     let layers = figure.legend();
@@ -33,8 +36,14 @@ pub(crate) fn draw(figure: &Figure, width: f64) -> (String, f64) {
     };
     for layer in shown {
         let (a, b) = room(SWATCH + 6.0 + inline_markup::width(&layer.name) * FONT_SIZE);
+        if interactive {
+            let _ = write!(out, "<g class=\"entry\" data-layer=\"{}\">", attribute(&layer.name));
+        }
         swatch(&mut out, layer, a, b + 10.0);
         text(&mut out, a + SWATCH + 6.0, b + 14.0, "start", Colour::Ink, "", &layer.name);
+        if interactive {
+            out.push_str("</g>");
+        }
     }
     let mut named: Vec<&String> = Vec::new();
     for (values, label) in heats {

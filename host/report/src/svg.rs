@@ -93,7 +93,9 @@ fn draw(figure: &Figure, layout: Layout, style: Option<&str>) -> String {
     let rows = figure.panels.len().div_ceil(columns);
     let gap = 22.0;
     let cell_width = (width - gap * (columns as f64 - 1.0)) / columns as f64;
-    let (legend, legend_height) = legend::draw(figure, width);
+    // A page's script reads values and hides layers; a file of its own has no script.
+    let interactive = style.is_none();
+    let (legend, legend_height) = legend::draw(figure, width, interactive);
     let suffix = if layout == Layout::Narrow { "n" } else { "w" };
     let id = format!("{}-{suffix}", figure.id);
     let (x_ends, y_ends) = (ends(figure, false), ends(figure, true));
@@ -107,8 +109,8 @@ fn draw(figure: &Figure, layout: Layout, style: Option<&str>) -> String {
             let left = (i % columns) as f64 * (cell_width + gap);
             let clip = format!("{id}-{i}");
             let place = (left, top, cell_width);
-            let height =
-                panel(&mut body, &figure.panels[i], place, (x_ends[i], y_ends[i]), &clip, columns > 1);
+            let ends = (x_ends[i], y_ends[i]);
+            let height = panel(&mut body, &figure.panels[i], place, ends, &clip, (columns > 1, interactive));
             tallest = tallest.max(height);
         }
         top += tallest + if row + 1 < rows { 14.0 } else { 0.0 };
@@ -157,7 +159,7 @@ fn panel(
     place: (f64, f64, f64),
     (x_ends, y_ends): ((f64, f64), (f64, f64)),
     clip: &str,
-    small: bool,
+    (small, interactive): (bool, bool),
 ) -> f64 {
     let (left, top, cell_width) = place;
     let named_rows = if let Scale::Names(names) = &panel.y.scale { names.len() } else { 0 };
@@ -200,14 +202,53 @@ fn panel(
         px(frame.height + 5.0)
     );
     for stage in 0..3 {
-        panel
-            .layers
-            .iter()
-            .filter(|l| marks::stage(&l.mark) == stage)
-            .for_each(|l| marks::draw(out, l, &frame));
+        for layer in panel.layers.iter().filter(|l| marks::stage(&l.mark) == stage) {
+            let group = interactive && !layer.name.is_empty();
+            if group {
+                let _ = write!(out, "<g class=\"layer\" data-layer=\"{}\">", attribute(&layer.name));
+            }
+            marks::draw(out, layer, &frame);
+            if group {
+                out.push_str("</g>");
+            }
+        }
     }
     out.push_str("</g>");
+    if interactive {
+        sensitive(out, panel, &frame);
+    }
     frame.top + frame.height + below - top
+}
+
+/// Mark-up as the value of an attribute, without formatting.
+pub(crate) fn attribute(text: &str) -> String {
+    inline_markup::escape(&inline_markup::plain(text)).replace('"', "&quot;")
+}
+
+/// The part of a panel where a page's script reads values, with what it needs to turn pixels into numbers. Panels whose axes have names
+/// instead of numbers have their values written beside them.
+fn sensitive(out: &mut String, panel: &Panel, frame: &Frame) {
+    if frame.y_down || matches!(panel.x.scale, Scale::Names(_)) {
+        return;
+    }
+    let _ = write!(
+        out,
+        "<rect class=\"read\" fill=\"none\" pointer-events=\"all\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" data-x=\"{} {}\" data-y=\"{} {}\" \
+         data-log=\"{}{}\" data-panel=\"{}\" data-x-title=\"{}\" data-y-title=\"{}\"/>",
+        px(frame.left),
+        px(frame.top),
+        px(frame.width),
+        px(frame.height),
+        frame.x_ends.0,
+        frame.x_ends.1,
+        frame.y_ends.0,
+        frame.y_ends.1,
+        if frame.x_log { "x" } else { "" },
+        if frame.y_log { "y" } else { "" },
+        attribute(&panel.title),
+        attribute(&panel.x.title()),
+        attribute(&panel.y.title()),
+    );
 }
 
 /// Draws grid, ticks and axis titles; returns how much room they take below the frame.

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
+use super::interrupt::interrupts;
 use super::port::PortOption;
-use super::run::{interrupts, positive};
+use super::recording_files::positive;
 use crate::campaign::page::page;
 use crate::campaign::results::{Told, document, pages, table};
 use crate::campaign::rigging::{Rigging, emulated, real, tracked};

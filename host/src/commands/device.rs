@@ -5,6 +5,7 @@ mod identify;
 mod info;
 mod list;
 mod log;
+mod sensors;
 mod settings;
 mod trace;
 
@@ -64,6 +65,15 @@ enum Action {
             --set watch.silence_ticks=200\n  \
         host device settings --from settings.toml")]
     Settings(settings::Arguments),
+    /// Signals and readings of every sensor; calibrate a sensor with known values.
+    #[command(after_help = "Examples:\n  \
+        host device sensors\n  \
+        host device sensors --calibrate force --known 0\n  \
+        host device sensors --calibrate force --known 0 --known 49.05 --known 98.1\n  \
+        host device sensors --calibrate pressure --point 0.333=0 --point 3=1000 --dry-run\n\n\
+        reading = at_zero + per_unit · signal. The device refuses a scale with which a limit or a range lies outside what the \
+        sensor can read.")]
+    Sensors(sensors::Arguments),
     /// Find the pressure regulator's gain, offset, lag, rate and deadband by steps, and keep them in the settings.
     #[command(after_help = "Examples:\n  \
         host device identify --low 100 --high 250\n  \
@@ -118,6 +128,7 @@ impl Arguments {
             Action::Log(arguments) => log::run(&arguments, console),
             Action::Trace(arguments) => trace::run(&arguments, console),
             Action::Settings(arguments) => settings::run(&arguments, console),
+            Action::Sensors(arguments) => sensors::run(&arguments, console),
             Action::Identify(arguments) => identify::run(&arguments, console),
             Action::Faults { port, clear, json } => faults::run(&port, clear, json, console),
             Action::Rollback { port, muscle, json } => {

@@ -1,6 +1,8 @@
-//! `host diagnose`: which effects the model lacks, where it is wrong, and how certain that is; with `--reference`, what has changed.
+//! `host diagnose`: which effects the model lacks, where it is wrong, and how certain that is; with `--reference`, what has changed; with several
+//! muscles, what a stock shares.
 
 pub(crate) mod reference;
+pub(crate) mod stock;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -37,12 +39,12 @@ use pam_report::{diagnose_page, document, history_text, wording};
     host diagnose --muscle mini.toml loops/*.csv -o corrected.pam \\\n      \
         --report answer.html --json answer.json\n  \
     host diagnose --muscle mini.toml loops/*.csv --with backlash,force-offset\n  \
+    host diagnose --muscle a.toml a/*.csv --muscle b.toml b/*.csv --muscle c.toml c/*.csv\n  \
     host diagnose today/*.csv --reference march/*.csv --report changed.html\n  \
     host diagnose --muscle mini.toml today/*.csv --reference mini.pam")]
 pub struct Arguments {
-    /// The muscle's description. With --reference it may be left out: any pneumatic actuator can be compared with itself.
-    #[arg(long, value_name = "M.toml", required_unless_present = "reference")]
-    muscle: Option<PathBuf>,
+    #[command(flatten)]
+    muscles: stock::Muscles,
     #[command(flatten)]
     changed: reference::Options,
     #[command(flatten)]
@@ -95,12 +97,15 @@ impl Arguments {
             ("--report", self.reports.file()),
             ("--next", self.next.as_deref()),
         ])?;
+        if self.muscles.several() {
+            return stock::run(&self, console, taken);
+        }
         if !self.changed.reference.is_empty() {
             return reference::run(&self, console, taken);
         }
         let start = Instant::now();
         let given = self.with.iter().map(|name| effects::named(name.trim())).collect::<Result<Vec<_>>>()?;
-        let Some(path) = &self.muscle else {
+        let Some(path) = self.muscles.first() else {
             return Err(Error::new(DataCode::CallInvalid, "the muscle's description is missing")
                 .help("give --muscle M.toml"));
         };

@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 
-use super::run::{interrupts, positive};
+use super::interrupt::interrupts;
+use super::recording_files::positive;
 use crate::console::Console;
 use crate::demo::campaign::muscle;
 use crate::documents::{bench, line};

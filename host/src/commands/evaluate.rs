@@ -14,7 +14,10 @@ use pam_data::progress::Progress;
 use pam_evaluate::cross_validation::{CrossValidation, Score, Split, Spot, cross_validate};
 use pam_evaluate::length_transfer::{LengthTransfer, predict_unseen_length};
 use pam_evaluate::published::Published;
+use pam_evaluate::stock_transfer::{StockTransfer, predict_with_stock};
 use pam_fit::Fit;
+use pam_fit::stock::Member;
+use pam_fit::stock::criteria::FEWEST_MUSCLES;
 use pam_fit::{Options, recording_table};
 
 use crate::progress::ProgressLine;
@@ -133,16 +136,22 @@ impl Arguments {
             return Err(e);
         }
         let lengths = (0..cases.len()).map(|i| by_others(&cases, i)).collect::<Result<Vec<_>>>()?;
-        self.write_report(console, &cases, &lengths, hashes)?;
+        let stock = with_stock(&cases, console)?;
+        self.write_report(console, &cases, (&lengths, &stock), hashes)?;
         if let Some(path) = &self.json {
-            let muscles = cases.iter().zip(&lengths).map(|(c, l)| to_document(c, l.as_ref())).collect();
+            let muscles = cases
+                .iter()
+                .zip(&lengths)
+                .enumerate()
+                .map(|(i, (c, l))| to_document(c, l.as_ref(), stock.get(i)))
+                .collect();
             let json = text(&document::Evaluate { schema: "pam-evaluate/1", muscles })?;
             write_whole(path, (json + "\n").as_bytes())?;
             if path.as_os_str() == "-" {
                 return Ok(());
             }
         }
-        let words = to_text(&cases, &lengths, self.published.as_deref());
+        let words = to_text(&cases, &lengths, &stock, self.published.as_deref());
         // If the report goes to standard output, nothing else does.
         if self.reports.file() == Some(Path::new("-")) {
             console.note(words)
@@ -156,7 +165,7 @@ impl Arguments {
         &self,
         console: &Console,
         cases: &[Case],
-        lengths: &[Option<LengthTransfer>],
+        (lengths, stock): (&[Option<LengthTransfer>], &[StockTransfer]),
         hashes: Vec<String>,
     ) -> Result<()> {
         let from = cases.iter().fold(reports::provenance(), |from, case| from.muscle(&case.muscle));
@@ -165,11 +174,13 @@ impl Arguments {
             let found: Vec<Evaluated<'_>> = cases
                 .iter()
                 .zip(lengths)
-                .map(|(case, length)| Evaluated {
+                .enumerate()
+                .map(|(i, (case, length))| Evaluated {
                     muscle: &case.muscle.name,
                     runs: case.runs.as_ref(),
                     contractions: case.contractions.as_ref(),
                     length: length.as_ref(),
+                    stock: stock.get(i),
                 })
                 .collect();
             evaluate_page::page(&found, self.published.as_deref())
@@ -196,11 +207,34 @@ fn by_others(cases: &[Case], index: usize) -> Result<Option<LengthTransfer>> {
     predict_unseen_length(&others, &cases[index].campaign, &cases[index].muscle, clip).map(Some)
 }
 
+/// Every muscle, and every contraction, predicted with the stock; empty with too few muscles.
+fn with_stock(cases: &[Case], console: &Console) -> Result<Vec<StockTransfer>> {
+    if cases.len() < FEWEST_MUSCLES {
+        return Ok(Vec::new());
+    }
+    let members: Vec<Member<'_>> =
+        cases.iter().map(|c| Member { muscle: &c.muscle, campaign: &c.campaign }).collect();
+    let clip = |c: &Case| pam_fit::clip(&c.campaign).0.map(|c| c.force);
+    let clips: Vec<Option<f64>> = cases.iter().map(clip).collect();
+    match predict_with_stock(&members, &clips) {
+        Ok(all) => Ok(all),
+        Err(e) => {
+            console.warning(format!("the muscles as one stock: {e}"));
+            Ok(Vec::new())
+        }
+    }
+}
+
 fn percent(score: &Score, blocked: f64) -> (f64, f64) {
     (100.0 * score.mean() / blocked, 100.0 * score.rms() / blocked)
 }
 
-fn to_text(cases: &[Case], lengths: &[Option<LengthTransfer>], published: Option<&str>) -> String {
+fn to_text(
+    cases: &[Case],
+    lengths: &[Option<LengthTransfer>],
+    stock: &[StockTransfer],
+    published: Option<&str>,
+) -> String {
     let mut text = format!(
         "Errors on held-out data: mean |F − F_model| in N, and in percent of the largest measured force (F_max).\n\
          {:<22} {:>8} {:>8} {:>17} {:>17} {:>17} {:>17}\n",
@@ -251,6 +285,7 @@ fn to_text(cases: &[Case], lengths: &[Option<LengthTransfer>], published: Option
             }
         }
     }
+    text += &stock_text(cases, stock);
     text += "\nWhere the error is: mean of F − F_model, N, at contractions (filling or shortening / emptying or lengthening)\n";
     for (case, length) in cases.iter().zip(lengths) {
         text += &format!("{}\n", case.muscle.name);
@@ -269,6 +304,48 @@ fn to_text(cases: &[Case], lengths: &[Option<LengthTransfer>], published: Option
         }
     }
     text
+}
+
+/// The errors with the stock, one line for each muscle. Behind each: the mean error that unknown lengths, zeros and scale alone would give.
+fn stock_text(cases: &[Case], stock: &[StockTransfer]) -> String {
+    if stock.is_empty() {
+        return String::new();
+    }
+    let mut text = format!(
+        "\nAll muscles fitted together, without what is predicted (expected: from unknown lengths, zeros and scale alone)\n\
+         {:<22} {:>17} {:>9} {:>17} {:>9} {:>14}\n",
+        "muscle", "held-out contr.", "expected", "other lengths", "expected", "ends by others"
+    );
+    let mut sums = [(0.0, 0.0); 4];
+    for (case, of) in cases.iter().zip(stock) {
+        let Some(any) = case.runs.as_ref().or(case.contractions.as_ref()) else { continue };
+        let share = |newtons: f64| 100.0 * newtons / any.largest;
+        let held = of.contractions.rows > 0.0;
+        let numbers = [
+            held.then(|| of.contractions.mean()),
+            held.then_some(of.contractions_expected),
+            Some(of.length.mean()),
+            Some(of.length_expected),
+        ];
+        for (sum, n) in sums.iter_mut().zip(&numbers) {
+            if let Some(n) = n {
+                *sum = (sum.0 + share(*n), sum.1 + 1.0);
+            }
+        }
+        let whole = |n: Option<f64>| n.map_or("–".to_owned(), |n| format!("{n:.2} N  {:.2} %", share(n)));
+        let pct = |n: Option<f64>| n.map_or("–".to_owned(), |n| format!("{:.2} %", share(n)));
+        text += &format!(
+            "{:<22} {:>17} {:>9} {:>17} {:>9} {:>11.1} mm\n",
+            case.muscle.name,
+            whole(numbers[0]),
+            pct(numbers[1]),
+            whole(numbers[2]),
+            pct(numbers[3]),
+            of.ends * 1e3
+        );
+    }
+    let means = sums.map(|(s, n)| if n > 0.0 { format!("{:.2} %", s / n) } else { "–".into() });
+    text + &format!("{:<22} {:>17} {:>9} {:>17} {:>9}\n", "mean", means[0], means[1], means[2], means[3])
 }
 
 /// A line for everything that was left out: the mean error with its sign at each contraction.
@@ -306,7 +383,11 @@ fn places(what: &str, spots: &[Spot]) -> String {
     text
 }
 
-fn to_document(case: &Case, length: Option<&LengthTransfer>) -> document::Muscle {
+fn to_document(
+    case: &Case,
+    length: Option<&LengthTransfer>,
+    stock: Option<&StockTransfer>,
+) -> document::Muscle {
     let any = case.runs.as_ref().or(case.contractions.as_ref());
     let (blocked, largest) = any.map_or((f64::NAN, f64::NAN), |h| (h.blocked, h.largest));
     let score = |s: &Score| {
@@ -346,6 +427,15 @@ fn to_document(case: &Case, length: Option<&LengthTransfer>) -> document::Muscle
             end_effect_mm: l.end_effect * 1e3,
             table: score(&l.score),
             r#where: spots(&l.spots),
+        }),
+        with_stock: stock.map(|s| document::WithStock {
+            ends_mm: s.ends * 1e3,
+            unseen_length: score(&s.length),
+            length_expected_pct: 100.0 * s.length_expected / largest,
+            length_where: spots(&s.length_spots),
+            unseen_contractions: (s.contractions.rows > 0.0).then(|| score(&s.contractions)),
+            contractions_expected_pct: 100.0 * s.contractions_expected / largest,
+            contractions_where: spots(&s.contraction_spots),
         }),
     }
 }

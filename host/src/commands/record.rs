@@ -2,24 +2,25 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
 
 use clap::Args;
-use model_core::link::endpoints::{GetInfo, GetStatus, SetTelemetry};
-use model_core::link::messages::{Event, Telemetry, TelemetryRate};
+use model_core::link::endpoints::{GetInfo, SetTelemetry};
+use model_core::link::messages::TelemetryRate;
 use serde_json::json;
 
+use super::interrupt::interrupts;
 use super::port::PortOption;
-use super::run::{begin, end, interrupts, not_there, positive, warn_of};
+use super::recording_files::{begin, end, positive, refuse_existing, warn_of_losses};
 use crate::change_watch::{self, ReferenceOptions};
 use crate::console::Console;
 use crate::documents::{bench, text};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::pluralise::pluralise;
 use pam_data::progress::Progress;
-use pam_device::error::DeviceCode;
+use pam_device::messages;
 use pam_device::recorder::{about_losses, about_start, recover};
-use pam_device::{Client, Topic, messages};
+use pam_device::run::Ending;
+use pam_device::watch::{Happened, watch};
 
 use crate::progress::ProgressLine;
 use pam_data::date::now_utc;
@@ -59,15 +60,6 @@ pub struct Arguments {
     changed: ReferenceOptions,
 }
 
-/// Silence of the telemetry after which the device's faults are read.
-const SILENCE: Duration = Duration::from_secs(2);
-
-/// How a recording ended.
-enum Ending {
-    Time,
-    Interrupt,
-}
-
 impl Arguments {
     /// Records until the time is over, Ctrl-C, or the device is gone.
     ///
@@ -81,7 +73,7 @@ impl Arguments {
         } else {
             self.output.clone()
         };
-        not_there(&output, self.replace)?;
+        refuse_existing(&output, self.replace)?;
         let mut changed = self.changed.start(console)?;
         let mut said = String::new();
         let interrupted = interrupts()?;
@@ -118,8 +110,8 @@ impl Arguments {
         let losses = client.losses();
         about["losses"] = about_losses(losses);
         about["ended_by"] = json!(match &watched {
-            Ok(Ending::Time) => "time".to_owned(),
-            Ok(Ending::Interrupt) => "interrupt".to_owned(),
+            Ok(Ending::Done) => "time".to_owned(),
+            Ok(Ending::Stopped) => "interrupt".to_owned(),
             Err(e) => e.to_string(),
         });
         let changed = change_watch::finish(changed);
@@ -139,7 +131,7 @@ impl Arguments {
         watched?;
         kept?;
         quiet?.map_err(|refusal| messages::refused("telemetry", refusal))?;
-        warn_of(losses, console);
+        warn_of_losses(losses, console);
         console.result(if self.json {
             format!("{about:#}")
         } else {
@@ -150,60 +142,6 @@ impl Arguments {
         }
         Ok(())
     }
-}
-
-/// What a device sends.
-enum Happened<'a> {
-    /// A sample, and the time since the first one, ms.
-    Sample(&'a Telemetry, u64),
-    Event(&'a Event),
-}
-
-/// Hands on every sample and event.
-fn watch(
-    client: &mut Client,
-    every_ticks: u16,
-    seconds: Option<f64>,
-    mut take: impl FnMut(Happened<'_>) -> Result<()>,
-    stop: impl Fn() -> bool,
-) -> Result<Ending> {
-    client
-        .try_call::<SetTelemetry>(&TelemetryRate { every_ticks })?
-        .map_err(|refusal| messages::refused("telemetry", refusal))?;
-    let (mut first, mut last) = (None, 0);
-    let mut heard = Instant::now();
-    while !stop() {
-        match client.topic(Duration::from_millis(50))? {
-            Some(Topic::Telemetry(sample)) => {
-                heard = Instant::now();
-                if sample.time_us < last {
-                    return Err(Error::new(
-                        DeviceCode::DeviceSilent,
-                        "the device restarted during the recording",
-                    )
-                    .help("`host device faults` shows whether a fault caused it; check the power supply"));
-                }
-                last = sample.time_us;
-                let elapsed = last - *first.get_or_insert(last);
-                if seconds.is_some_and(|end| elapsed as f64 * 1e-6 >= end) {
-                    return Ok(Ending::Time);
-                }
-                take(Happened::Sample(&sample, elapsed / 1000))?;
-            }
-            Some(Topic::Event(event)) => take(Happened::Event(&event))?,
-            Some(Topic::Log(_)) => {}
-            None if heard.elapsed() > SILENCE => {
-                let status = client.call::<GetStatus>(&())?;
-                return Err(Error::new(
-                    DeviceCode::DeviceSilent,
-                    format!("the device answers, but sends no telemetry; it is {}", messages::state(status.state)),
-                )
-                .help("it may have restarted: `host device info` shows its time since start and whether ticks advance"));
-            }
-            None => {}
-        }
-    }
-    Ok(Ending::Interrupt)
 }
 
 /// Arguments of `host recover`.

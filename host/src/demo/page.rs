@@ -9,7 +9,7 @@ use pam_data::recording::Campaign;
 use pam_fit::Fit;
 use pam_report::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, fixed};
 
-/// What the page tells.
+/// Contents of the page.
 #[derive(Debug)]
 pub struct Story<'a> {
     /// The muscle's name.
@@ -63,6 +63,18 @@ pub fn page(story: &Story<'_>) -> Result<Page> {
     );
     page.fact("tracking", format!("{:.2} %", percent(best)), "fitted table, sine and steps, rms", Tone::Good);
 
+    page.push(tracking_section(story, &percent));
+    page.push(lines_section(story)?);
+    page.push(telemetry_section(story, &percent));
+    page.origin("controller", story.controller);
+    page.origin("device", story.device.clone());
+    page.origin("program", format!("host {}", env!("CARGO_PKG_VERSION")));
+    page.origin("duration", format!("{:.1} s", story.seconds));
+    Ok(page)
+}
+
+/// Force errors of every feed-forward as a table and pictures.
+fn tracking_section(story: &Story<'_>, percent: &impl Fn(f64) -> f64) -> Section {
     let mut tracking = Section::new("Force tracking").summarised();
     tracking.text(format!(
         "The controller is {}. The virtual bench moves the muscle in lock-step with the control ticks. Each feed-forward runs the \
@@ -98,31 +110,32 @@ pub fn page(story: &Story<'_>) -> Result<Page> {
         tracking.figure(force_figure(story.tracks, task));
     }
     tracking.figure(error_figure(story.tracks, story.blocked_force));
-    page.push(tracking);
+    tracking
+}
 
+/// The loops of the bench with the fitted force.
+fn lines_section(story: &Story<'_>) -> Result<Section> {
     let mut lines = Section::new("Load lines");
     lines.text(format!(
         "{} rows of the thesis's test protocol: at each pressure three slow loops from blocked to free and back. One fit over \
          all pressures gives E_{{k}}(P), k_{{F}}(P) and P_{{0}} together.",
-        fixed(summary.samples as f64, 0)
+        fixed(story.fit.summary.samples as f64, 0)
     ));
     lines.figure(load_lines(story.campaign, story.fit)?);
-    page.push(lines);
+    Ok(lines)
+}
 
-    let mut back = Section::new("Telemetry as a recording");
-    back.text(format!(
+/// The error of the table on the telemetry of the controller.
+fn telemetry_section(story: &Story<'_>, percent: &impl Fn(f64) -> f64) -> Section {
+    let mut telemetry = Section::new("Telemetry as a recording");
+    telemetry.text(format!(
         "The controller's telemetry is a recording like any other. On its {} rows inside the tested range, which were not fitted, the \
          table's error is {:.2} N rms ({:.2} % of blocked force).",
         fixed(story.telemetry.1 as f64, 0),
         story.telemetry.0,
         percent(story.telemetry.0),
     ));
-    page.push(back);
-    page.origin("controller", story.controller);
-    page.origin("device", story.device.clone());
-    page.origin("program", format!("host {}", env!("CARGO_PKG_VERSION")));
-    page.origin("duration", format!("{:.1} s", story.seconds));
-    Ok(page)
+    telemetry
 }
 
 /// Root mean square over the chosen tracks, N.
@@ -149,11 +162,11 @@ fn force_figure(tracks: &[Track], task: Task) -> Figure {
         .iter()
         .filter(|t| t.task == task)
         .map(|track| {
-            let (time, asked, measured) = curves(track);
+            let (time, setpoint, measured) = curves(track);
             Panel::new(Axis::new("time", "s"), Axis::new("force F", "N"))
                 .titled(track.law.name())
                 .line("measured", Colour::Series(0), &time, &measured)
-                .dashes("setpoint", Colour::Ink, &time, &asked)
+                .dashes("setpoint", Colour::Ink, &time, &setpoint)
         })
         .collect();
     let title = match task {
@@ -172,9 +185,10 @@ fn force_figure(tracks: &[Track], task: Task) -> Figure {
 fn error_figure(tracks: &[Track], blocked: f64) -> Figure {
     let mut panel = Panel::new(Axis::new("time", "s"), Axis::new("error of force", "% of blocked force"));
     for (i, track) in tracks.iter().filter(|t| t.task == Task::Sine).enumerate() {
-        let (time, asked, measured) = curves(track);
+        let (time, setpoint, measured) = curves(track);
         let judged = time.iter().position(|t| *t >= SETTLE).unwrap_or(0);
-        let error: Vec<f64> = measured.iter().zip(&asked).map(|(m, a)| 100.0 * (m - a) / blocked).collect();
+        let error: Vec<f64> =
+            measured.iter().zip(&setpoint).map(|(m, a)| 100.0 * (m - a) / blocked).collect();
         panel = panel.line(track.law.name(), Colour::Series(i), &time[judged..], &error[judged..]);
     }
     Figure::new(

@@ -133,6 +133,67 @@ pub(crate) struct Regulator {
     pub kept: bool,
 }
 
+/// `host update --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Firmware {
+    pub schema: &'static str,
+    /// The slot that runs.
+    pub running: u8,
+    pub slots: Vec<Option<FirmwareSlot>>,
+}
+
+/// Firmware in a slot.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct FirmwareSlot {
+    pub release: String,
+    pub bytes: u32,
+    pub crc: String,
+    /// Whether a host has talked to it; without that it is given up after three starts.
+    pub confirmed: bool,
+}
+
+/// `host device sensors --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Sensors {
+    pub schema: &'static str,
+    pub sensors: Vec<Sensor>,
+    /// Whether the enable input is closed; none after a calibration.
+    pub enable_closed: Option<bool>,
+    /// The sensor that was calibrated.
+    pub calibrated: Option<&'static str>,
+    pub pairs: Vec<SensorPair>,
+    /// Whether the new scale is in the settings of the device.
+    pub kept: bool,
+}
+
+/// A sensor: `reading = at_zero + per_unit · signal`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Sensor {
+    pub sensor: &'static str,
+    /// What the board measures: volts at the pin of a board with converters.
+    pub signal: f32,
+    /// In its unit.
+    pub reading: f64,
+    pub unit: &'static str,
+    pub at_zero: f64,
+    pub per_unit: f64,
+    pub filter_s: f32,
+}
+
+/// A known value and the signal at it.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct SensorPair {
+    pub signal: f64,
+    pub value: f64,
+    /// Reading by the new scale, less the value.
+    pub error: f64,
+}
+
 /// `host device settings --json`.
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]

@@ -26,6 +26,8 @@ pub(crate) struct Muscle {
     pub unseen_runs: Option<HeldOut>,
     pub unseen_contractions: Option<HeldOut>,
     pub unseen_length: Option<OtherLength>,
+    /// With all muscles fitted together; null with fewer than three.
+    pub with_stock: Option<WithStock>,
 }
 
 /// Everything of one kind left out in turn.
@@ -49,6 +51,24 @@ pub(crate) struct OtherLength {
     pub end_effect_mm: f64,
     pub table: Score,
     pub r#where: Vec<Spot>,
+}
+
+/// Predicted with all muscles fitted together, without what is predicted.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct WithStock {
+    /// Total length of the ends that do not pull, by the other muscles.
+    pub ends_mm: f64,
+    /// The whole muscle left out.
+    pub unseen_length: Score,
+    /// Mean error that unknown lengths, zero and scale alone would give, percent of the largest force.
+    pub length_expected_pct: f64,
+    pub length_where: Vec<Spot>,
+    /// Each held contraction left out; null for a muscle that moves.
+    pub unseen_contractions: Option<Score>,
+    /// Mean error that the unknown length and zero of each mounting alone would give, percent of the largest force.
+    pub contractions_expected_pct: f64,
+    pub contractions_where: Vec<Spot>,
 }
 
 /// Errors of measured minus computed force.

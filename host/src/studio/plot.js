@@ -46,7 +46,7 @@ class Ring {
 // A sample that is infinite is a reading that its sensor cannot give: on which side it left is kept, and nothing else. One that is not a
 // number is none, and leaves a gap.
 class Stretches {
-  constructor(ring) { this.ring = ring; this.step = 0; this.room = 0; }
+  constructor(ring, names) { this.ring = ring; this.names = names; this.step = 0; this.room = 0; }
   // Takes in what came since the last time; begins anew where the window, the width or the recording is another.
   follow(seconds, width) {
     const r = this.ring, step = seconds / width, room = width + 2;
@@ -54,7 +54,7 @@ class Stretches {
       this.step = step; this.room = room; this.cleared = r.cleared; this.seen = r.pushed - r.length; this.newest = -1;
       this.number = new Float64Array(room).fill(-1);
       const parts = () => ({ least: new Float64Array(room), most: new Float64Array(room), first: new Float64Array(room), last: new Float64Array(room), left: new Int8Array(room) });
-      this.curves = Object.fromEntries(r.names.filter((n) => n !== "t").map((n) => [n, parts()]));
+      this.curves = Object.fromEntries(this.names.map((n) => [n, parts()]));
     }
     const fresh = Math.min(r.pushed - this.seen, r.length), start = r.index(r.length - fresh), size = r.size, times = r.columns.t;
     for (let k = 0, i = start; k < fresh; k++) {
@@ -148,16 +148,20 @@ function extent(...lists) {
 // Where a picture's data begin and end, beside its labels.
 const LEFT = 46, RIGHT = 8;
 
-// Curves of a ring over the last seconds. Where a reading left what its sensor can give, the curve has a gap and the picture's edge a
+// Curves over time. Where a reading left what its sensor can give, the curve has a gap and the picture's edge a
 // mark, on the side to which it left; the axis is set by the other readings.
 class Scope {
-  constructor(canvas, ring, curves) { this.axes = new Axes(canvas); this.ring = ring; this.curves = curves; this.stretches = new Stretches(ring); }
+  constructor(canvas, ring, curves, names = curves.map((c) => c[0])) { this.axes = new Axes(canvas); this.curves = curves; this.names = names; this.show(ring); }
   // Another ring from now on.
-  show(ring) { this.ring = ring; this.stretches = new Stretches(ring); }
-  draw(seconds) {
-    const s = this.stretches, end = this.ring.last("t"), x0 = Math.max(0, end - seconds), x1 = Math.max(end, seconds);
+  show(ring) { this.ring = ring; this.stretches = new Stretches(ring, this.names); }
+  // The newest samples by the quick way, which looks at each sample once; any other stretch of time from all that is in it.
+  draw(view) {
+    const [x0, x1] = view.range(), width = Math.max(1, this.axes.canvas.clientWidth - LEFT - RIGHT);
     this.from = x0; this.to = x1;
-    s.follow(seconds, Math.max(1, this.axes.canvas.clientWidth - LEFT - RIGHT));
+    let s = this.stretches;
+    if (view.live) s.follow(view.seconds, width);
+    else s = new Span(this.ring, past, this.names, x0, x1, width);
+    this.lastDrawn = s;
     let low = Infinity, high = -Infinity;
     for (const [name] of this.curves) {
       const { least, most } = s.curves[name];
@@ -179,6 +183,9 @@ class Scope {
       });
       g.stroke();
     }
+    if (mark !== null && mark >= x0 && mark <= x1) {
+      g.strokeStyle = colour("--s1"); g.lineWidth = 1; g.setLineDash([4, 3]); g.beginPath(); g.moveTo(X(mark), top); g.lineTo(X(mark), bottom); g.stroke(); g.setLineDash([]);
+    }
     this.axes.end();
   }
 }
@@ -188,12 +195,12 @@ class Scope {
 class Loop {
   constructor(canvas, ring, x, y, shade) { this.axes = new Axes(canvas); this.ring = ring; this.x = x; this.y = y; this.shade = shade; this.most = 2000; }
   show(ring) { this.ring = ring; }
-  draw(seconds) {
-    const r = this.ring, xs = r.columns[this.x], ys = r.columns[this.y], from = r.since(r.last("t") - seconds);
-    const every = Math.max(1, Math.ceil((r.length - from) / this.most)), oldest = r.pushed - r.length;
+  drawSpan(begins, ends) {
+    const r = this.ring, xs = r.columns[this.x], ys = r.columns[this.y], from = r.since(begins), until = r.since(ends + 1e-6);
+    const every = Math.max(1, Math.ceil((until - from) / this.most)), oldest = r.pushed - r.length;
     const begin = Math.ceil((oldest + from) / every) * every - oldest, start = r.index(begin);
     let x0 = Infinity, x1 = -Infinity, y0 = Infinity, y1 = -Infinity;
-    for (let k = begin, i = start; k < r.length; k += every) {
+    for (let k = begin, i = start; k < until; k += every) {
       const x = xs[i], y = ys[i];
       if (!Number.isFinite(x + y)) { i += every; if (i >= r.size) i -= r.size; continue; }
       if (x < x0) x0 = x; if (x > x1) x1 = x; if (y < y0) y0 = y; if (y > y1) y1 = y;
@@ -202,7 +209,7 @@ class Loop {
     if (x0 > x1) { x0 = y0 = 0; x1 = y1 = 1; }
     const { X, Y } = this.axes.begin(x0, x1, y0, y1), g = this.axes.g;
     g.strokeStyle = colour(this.shade); g.lineWidth = 1.2; g.beginPath();
-    for (let k = begin, i = start, begun = false; k < r.length; k += every) {
+    for (let k = begin, i = start, begun = false; k < until; k += every) {
       if (!Number.isFinite(xs[i] + ys[i])) begun = false;
       else if (begun) g.lineTo(X(xs[i]), Y(ys[i]));
       else { g.moveTo(X(xs[i]), Y(ys[i])); begun = true; }

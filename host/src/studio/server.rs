@@ -36,8 +36,17 @@ use pam_device::error::DeviceCode;
 
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("studio.css");
-const SCRIPT: &str = include_str!("studio.js");
-const PLOT: &str = include_str!("plot.js");
+/// The parts of the page's program, each by its path.
+const SCRIPTS: [(&str, &str); 8] = [
+    ("/signals.js", include_str!("signals.js")),
+    ("/plot.js", include_str!("plot.js")),
+    ("/history.js", include_str!("history.js")),
+    ("/view.js", include_str!("view.js")),
+    ("/panels.js", include_str!("panels.js")),
+    ("/studio.js", include_str!("studio.js")),
+    ("/setpoint.js", include_str!("setpoint.js")),
+    ("/settings.js", include_str!("settings.js")),
+];
 
 /// Batches that a page may lag behind before it loses some: half a minute.
 const BACKLOG: usize = 2048;
@@ -140,11 +149,13 @@ fn router(shared: Shared, hosts: Arc<[String]>) -> Router {
         move || async move { ([(header::CONTENT_TYPE, kind)], body) }
     };
     let access = Access { hosts: Arc::clone(&hosts), origins: hosts };
-    Router::new()
+    let mut scripts = Router::new();
+    for (path, script) in SCRIPTS {
+        scripts = scripts.route(path, get(text("text/javascript; charset=utf-8", script)));
+    }
+    scripts
         .route("/", get(page))
         .route("/studio.css", get(text("text/css; charset=utf-8", STYLE)))
-        .route("/studio.js", get(text("text/javascript; charset=utf-8", SCRIPT)))
-        .route("/plot.js", get(text("text/javascript; charset=utf-8", PLOT)))
         .route("/report/{name}", get(report))
         .route("/api/stream", get(stream))
         .route("/api/order", post(order))

@@ -28,14 +28,17 @@ const counted = (number, one) => `${number} ${one}${number === 1 ? "" : "s"}`;
 const order = (what, more = {}) => send("/api/order", JSON.stringify({ do: what, ...more }));
 
 // Live.
-const ring = new Ring(40000, ["t", "F", "P", "x", "c", "a", "m"]);
+const ring = new Ring(40000, ["t", ...Object.keys(SIGNALS)]);
+const past = new Past(Object.keys(SIGNALS));
 const scopes = [
   new Scope($("p-force"), ring, [["m", "--s2"], ["a", "--s1"], ["F", "--s0"]]),
-  new Scope($("p-pressure"), ring, [["c", "--s1"], ["P", "--s0"]]),
-  new Scope($("p-stroke"), ring, [["x", "--s0"]]),
+  new Scope($("p-pressure"), ring, [["c", "--s1"], ["P", "--s0"]], ["a", "c", "P"]),
+  new Scope($("p-stroke"), ring, [["x", "--s0"]], ["a", "x"]),
 ];
 const loop = new Loop($("p-loop"), ring, "x", "F", "--s0");
 // What the pictures show: the ring, or what it held when they were held.
+// Whether the present recording began with a run, to end with it, or by hand.
+let ownRecording = false, handRecording = false;
 let shown = ring, fresh = false, mode = "", samples = 0, state = {};
 
 // How long the last pictures took to draw and how far apart they were, in ms: rings again, so that they cannot grow.
@@ -45,9 +48,10 @@ const perf = { frames: 0, draw: new Float64Array(512), gap: new Float64Array(512
 // the time that the next one needs. Less than two frames of a screen of 60 Hz, so that every second one of these is drawn.
 const APART = 24;
 
+// A picture of minutes changes slowly and is drawn from more samples; one that stays where it was moved to is drawn when it is moved.
 function frame(now) {
   requestAnimationFrame(frame);
-  if (!fresh || shown !== ring || now - perf.last < APART) return;
+  if (!fresh || shown !== ring || view.end !== null || now - perf.last < (view.live ? APART : 10 * APART)) return;
   const begun = performance.now();
   draw();
   perf.draw[perf.frames % perf.draw.length] = performance.now() - begun;
@@ -56,20 +60,21 @@ function frame(now) {
 }
 function draw() {
   fresh = false;
-  const seconds = Number($("window").value);
+  const [from, to] = view.range();
   scopes[0].curves = mode === "force" ? [["m", "--s2"], ["a", "--s1"], ["F", "--s0"]] : [["m", "--s2"], ["F", "--s0"]];
   scopes[1].curves = mode === "pressure" ? [["a", "--s2"], ["c", "--s1"], ["P", "--s0"]] : [["c", "--s1"], ["P", "--s0"]];
   scopes[2].curves = mode === "stroke" ? [["a", "--s1"], ["x", "--s0"]] : [["x", "--s0"]];
-  for (const s of scopes) s.draw(seconds);
+  for (const s of scopes) s.draw(view);
   scopes.forEach((s, i) => { const [text, name] = outside[i]; $(text).hidden = !s.left; if (s.left) $(text).textContent = unbelievable[name]; });
-  loop.draw(seconds);
+  loop.drawSpan(from, to);
+  drawPanels(from, to, !view.live);
 }
 requestAnimationFrame(frame);
 
 // Pictures that are drawn once are drawn again when the page's size or its colours change.
 const stills = new Map();
 function picture(canvas, paint) { stills.set(canvas, paint); paint(new Axes($(canvas))); }
-function redraw() { ink.clear(); fresh = ring.length > 0; if (shown !== ring) draw(); point(cursor); for (const [canvas, paint] of stills) paint(new Axes($(canvas))); }
+function redraw() { ink.clear(); fresh = ring.length > 0; if (shown !== ring || view.end !== null) draw(); point(cursor); for (const [canvas, paint] of stills) paint(new Axes($(canvas))); }
 addEventListener("resize", redraw);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 
@@ -91,8 +96,9 @@ function disbelieve(m) {
 function take(m) {
   if (m.k === "t") {
     disbelieve(m);
-    if (ring.length && m.t[0] < ring.last("t")) ring.clear();
-    ring.push(m, m.t.length); samples += m.t.length; mode = m.mode; fresh = true;
+    if (ring.length && m.t[0] < ring.last("t")) { ring.clear(); past.clear(); mark = null; view.end = null; }
+    derive(m, ring);
+    ring.push(m, m.t.length); past.push(m, m.t.length); samples += m.t.length; mode = m.mode; fresh = true;
   } else if (m.k === "s") show(m);
   else if (m.k === "c") { $("changed").textContent = m.text; $("changed").classList.toggle("alarm", m.changed); }
   else if (m.k === "e") message(m.text + (m.help ? "\n→ " + m.help : ""));
@@ -114,12 +120,16 @@ function read() {
 const DECIMALS = { F: 1, m: 1, P: 1, c: 1, x: 2, a: 1 };
 const keys = [...document.querySelectorAll("[data-of]")].map((place) => ({ place, word: place.textContent, ...place.dataset }));
 function readings() {
-  const at = read();
-  $("cursor-time").textContent = cursor === null ? "" : `at ${cursorTime().toFixed(3)} s`;
+  const at = read(), from = markTime(), apart = cursorTime() - from;
+  const marked = mark !== null && shown.length && mark >= shown.get("t", 0) && mark <= shown.last("t") ? Math.min(shown.since(mark), shown.length - 1) : -1;
+  $("cursor-time").textContent = cursor === null ? (mark === null ? "" : `mark at ${from.toFixed(3)} s`)
+    : `at ${cursorTime().toFixed(3)} s` + (mark === null ? "" : `, ${apart.toFixed(3)} s from the mark (${(1 / Math.abs(apart)).toPrecision(3)} Hz)`);
   for (const k of keys) {
     const value = at < 0 ? NaN : shown.get(k.of, at), digits = k.mode === "stroke" ? 2 : DECIMALS[k.of];
     k.place.hidden = k.mode !== undefined && k.mode !== mode;
-    k.place.textContent = Number.isFinite(value) ? `${k.word} ${value.toFixed(digits)}` : k.word;
+    const change = cursor !== null && marked >= 0 ? value - shown.get(k.of, marked) : NaN;
+    k.place.textContent = !Number.isFinite(value) ? k.word
+      : `${k.word} ${value.toFixed(digits)}` + (Number.isFinite(change) ? ` (${change < 0 ? "−" : "+"}${Math.abs(change).toFixed(digits)})` : "");
   }
 }
 readings();
@@ -136,23 +146,16 @@ function point(to) {
     canvas.setAttribute("aria-valuetext", [$("cursor-time").textContent, ...values.map((v) => v.textContent)].join(" "));
   }
 }
-for (const { axes: { canvas } } of scopes) {
-  const under = (event) => point((event.offsetX - LEFT) / (canvas.clientWidth - LEFT - RIGHT));
-  for (const moved of ["pointerdown", "pointermove"]) canvas.addEventListener(moved, under);
-  for (const left of ["pointerleave", "blur"]) canvas.addEventListener(left, () => point(null));
-  canvas.addEventListener("keydown", (event) => {
-    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-    if (!step) return;
-    event.preventDefault();
-    point((cursor ?? 1) + step * (event.shiftKey ? 0.1 : 0.01));
-  });
-}
+for (const { axes: { canvas } } of scopes) steer(canvas);
 point(null);
 
 setInterval(() => { $("rate").textContent = state.connected ? `${samples} samples/s, ${state.lost || 0} lost` : ""; samples = 0; }, 1000);
 
 function show(s) {
   state = s;
+  // Samples from before the start may still say that it is armed.
+  if (!s.connected) ownRecording = handRecording = false;
+  else if (["disarmed", "fault"].includes(s.state)) endOwnRecording();
   const running = s.state === "running" ? `running, ${s.mode}` : s.state;
   $("state").textContent = s.connected ? running : "not connected";
   $("state").className = "state " + (s.connected ? s.state : "");
@@ -161,7 +164,7 @@ function show(s) {
   const on = (id, yes) => { $(id).disabled = !yes; };
   on("disconnect", s.connected); on("arm", s.state === "disarmed"); on("follow", s.state === "armed" || s.state === "running");
   $("mishap-label").hidden = !s.emulated;
-  on("record", s.connected); on("mishap", !!s.emulated); on("set", s.connected); on("show", s.connected); on("difference", s.connected);
+  on("record", s.connected); on("mishap", !!s.emulated); on("show", s.connected); if (!s.connected) on("set", false); on("difference", s.connected);
   if (!s.connected) on("flash", false);
   $("record").firstChild.textContent = s.recording === null || s.recording === undefined ? "Record " : `Stop (${counted(s.recording, "row")}) `;
 }
@@ -212,26 +215,44 @@ click("disconnect", () => order("disconnect"));
 click("emulate", async () => { unseen(); message("starting …"); const r = await order("emulate", { muscle: $("bench").value }); if (r) message("connected: " + r.controller); });
 $("mishap").addEventListener("change", () => order("mishap", { code: Number($("mishap").value) }));
 click("arm", () => order("arm"));
-click("follow", () => order("follow", { quantity: $("quantity").value, profile: $("profile").value }));
-click("record", async () => { if (typeof state.recording === "number") { const r = await order("end-record"); if (r) recordings(r); } else order("record"); });
+click("follow", async () => {
+  // Each run is recorded unless that is switched off; a recording that was begun by hand goes on.
+  if ($("record-runs").checked && !handRecording && typeof state.recording !== "number") ownRecording = (await order("record")) !== null;
+  const followed = await order("follow", { quantity: $("quantity").value, profile: $("profile").value });
+  if (followed) keepProfile($("profile").value); else endOwnRecording();
+});
+async function endOwnRecording() {
+  if (!ownRecording) return;
+  ownRecording = false;
+  const r = await order("end-record");
+  if (r) recordings(r);
+}
+click("record", async () => {
+  ownRecording = false; handRecording = typeof state.recording !== "number";
+  if (!handRecording) { const r = await order("end-record"); if (r) recordings(r); } else order("record");
+});
 click("clear", () => order("clear"));
 click("hold", () => {
   shown = shown === ring ? ring.copy() : ring;
-  for (const picture of [...scopes, loop]) picture.show(shown);
+  for (const picture of [...scopes, loop, ...panels.map((p) => p.scope)]) picture.show(shown);
   $("hold").firstChild.textContent = shown === ring ? "Hold picture " : "Go on ";
   redraw();
 });
-$("window").addEventListener("change", redraw);
+$("window").addEventListener("change", () => view.moved());
+click("newest", () => view.newest());
+click("zoom-in", () => view.zoom(0.5, view.range()[1]));
+click("zoom-out", () => view.zoom(2, view.range()[1]));
+click("earlier", () => view.pan(-0.5 * view.seconds));
+click("later", () => view.pan(0.5 * view.seconds));
+click("add", () => addPanel());
+click("save-csv", () => save(new Blob([seenAsCsv()], { type: "text/csv" }), "seen.csv"));
+click("save-png", () => seenAsPicture().toBlob((blob) => save(blob, "seen.png")));
 $("watch").addEventListener("change", async () => {
   const reference = $("watch").value, ordered = await order("watch", { reference });
   if (!ordered) $("watch").value = "nothing";
   $("changed").hidden = !ordered || reference === "nothing";
   $("changed").classList.remove("alarm"); $("changed").textContent = "no comparison yet: 25 s of motion under pressure are needed";
 });
-const settings = async (set) => { const r = await order("settings", { set }); if (r) { $("settings").hidden = false; $("settings").textContent = JSON.stringify(r, null, 1); if (set.length) message("written and read back"); } };
-click("set", () => settings([$("key").value + "=" + $("value").value]));
-click("show", () => settings([]));
-
 document.addEventListener("keydown", (event) => {
   // Escape vents wherever the cursor is; letters only where nothing is being written.
   if (event.key === "Escape") { event.preventDefault(); vent(); return; }
@@ -244,13 +265,13 @@ document.addEventListener("keydown", (event) => {
 function recordings(r) {
   $("list").replaceChildren(...r.recordings.map((name, number) => {
     const item = document.createElement("li"), button = document.createElement("button");
-    button.type = "button"; button.textContent = name; button.addEventListener("click", () => view(number)); item.append(button); return item;
+    button.type = "button"; button.textContent = name; button.addEventListener("click", () => showRecording(number)); item.append(button); return item;
   }));
   for (const id of ["a", "b"]) $(id).replaceChildren(...r.recordings.map((name, number) => new Option(name, number)));
   if (r.recordings.length > 1) $("b").value = "1";
   if (r.muscle) $("muscle").value = r.muscle;
 }
-async function view(number) {
+async function showRecording(number) {
   const r = await order("curves", { number });
   if (!r) return;
   $("view-figure").hidden = false; $("view-title").textContent = `${r.name}: ${counted(r.rows, "row")}, ${r.F ? "force (N)" : "pressure (kPa)"} over time (s)`;
@@ -302,3 +323,4 @@ click("difference", async () => { const r = await order("difference"); if (r) { 
 click("flash", async () => { const r = await order("flash", { table: compared }); if (r) { $("flash").disabled = true; message(`written and read back: ${r.bytes} bytes, check sum ${r.crc}`); } });
 order("recordings").then((r) => { if (r) recordings(r); });
 order("ports").then((r) => { if (Array.isArray(r)) $("ports").replaceChildren(...r.map((p) => new Option(p))); });
+try { for (const [y, x] of JSON.parse(localStorage.getItem(CHOICE)) || []) addPanel(y, x); } catch { /* an older page's choice */ }

@@ -2,9 +2,10 @@
 
 use super::frame::{Exchange, Kind};
 use super::messages::{
-    DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, HealthRead, HealthSums, PastFault,
-    ReferenceOrder, ReferencePoints, Refusal, RollBack, Session, SetPointOrder, Start, Status, TableBegin,
-    TableInfo, TablePiece, TableRead, TelemetryRate, TraceArm, TraceInfo, TracePiece, TraceRead,
+    DeviceInfo, Evaluate, Evaluated, FaultReport, Faults, ForgetMemory, HealthRead, HealthSums, MeanSignals,
+    PastFault, ReferenceOrder, ReferencePoints, Refusal, RollBack, Session, SetPointOrder, SignalsRead,
+    Start, Status, TableBegin, TableInfo, TablePiece, TableRead, TelemetryRate, TraceArm, TraceInfo,
+    TracePiece, TraceRead, UpdateBegin, UpdatePiece, UpdateStatus,
 };
 use super::messages::{Event, Telemetry};
 use super::settings::Settings;
@@ -186,6 +187,22 @@ endpoints! {
     27 keep_alive KeepAlive: Session => ();
     /// Sums of the load cell against the table, from which the host names a change.
     28 health ReadHealth: HealthRead => HealthSums;
+    /// Means of a muscle's sensor signals since the last such request, before any scale, for calibration.
+    29 signals ReadSignals: SignalsRead => MeanSignals;
+    /// The board's own settings: those of a new device.
+    30 board_settings GetBoardSettings: () => Settings;
+    /// What is in the two slots for firmware; refused where a board has none, or the firmware has no key.
+    31 update GetUpdate: () => UpdateStatus;
+    /// Begins an installation of another firmware; only while every muscle is vented.
+    32 update_begin BeginUpdate: UpdateBegin => UpdateStatus;
+    /// The next piece of the program; the answer is how many bytes are there. Only while every muscle is vented.
+    33 update_piece SendUpdatePiece: UpdatePiece => u32;
+    /// Checks the whole program and makes it the one of the next start; only while every muscle is vented.
+    34 update_commit CommitUpdate: () => UpdateStatus;
+    /// Confirms the program that runs: it stays, whatever happens at the next starts. Only while every muscle is vented.
+    35 update_confirm ConfirmUpdate: () => UpdateStatus;
+    /// Makes the other program the one of the next start; only while every muscle is vented.
+    36 update_revert RevertUpdate: () => UpdateStatus;
 }
 
 /// Topic of [`Telemetry`].
@@ -233,7 +250,7 @@ mod tests {
     /// and write the new hash here.
     #[test]
     fn the_schema_changes_only_on_purpose() {
-        assert_eq!(SCHEMA_HASH, 0x269f_2b8b_992c_f534, "{SCHEMA_HASH:#018x}");
+        assert_eq!(SCHEMA_HASH, 0x2d63_2e23_498f_a14f, "{SCHEMA_HASH:#018x}");
     }
 
     #[test]

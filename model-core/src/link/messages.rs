@@ -8,6 +8,7 @@ mod safety;
 mod table;
 mod telemetry;
 mod trace;
+mod update;
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -25,10 +26,11 @@ pub use self::table::{
     Evaluate, Evaluated, ForgetMemory, PIECE, POINTS, Point, RollBack, TableBegin, TableInfo, TablePiece,
     TableRead, Value,
 };
-pub use self::telemetry::{Event, SideSample, Telemetry, TelemetryRate};
+pub use self::telemetry::{Event, MeanSignals, SideSample, Signals, SignalsRead, Telemetry, TelemetryRate};
 pub use self::trace::{
     TRACE_PIECE, TRACE_VARIABLES, TraceArm, TraceInfo, TracePiece, TraceRead, Trigger, Variable,
 };
+pub use self::update::{Installed, UpdateBegin, UpdateFault, UpdatePiece, UpdateStatus};
 
 codes! {
     /// Which muscle of the board.

@@ -158,6 +158,73 @@ pub struct SensorWatch {
 
 fields!(SensorWatch { fitted, low, high, jump, stuck_ticks });
 
+/// How a sensor's signal becomes a reading: `reading = at_zero + per_unit · signal`, then a first-order low-pass filter for the
+/// control laws. Watches judge readings before the filter, so that it delays none of them. A signal is what the board measures: volts
+/// at the pin on a board with converters; on an emulated board the sensor's own value.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct SensorScale {
+    /// Reading at a signal of zero, in the sensor's unit (Pa, m or N).
+    pub at_zero: f32,
+    /// Change of the reading with the signal, in the sensor's unit per unit of the signal; negative for a sensor that falls.
+    pub per_unit: f32,
+    /// Time constant of the filter, s; zero for none.
+    pub filter_s: f32,
+}
+
+impl SensorScale {
+    /// The signal is the reading.
+    pub const SAME: Self = Self { at_zero: 0.0, per_unit: 1.0, filter_s: 0.0 };
+
+    /// The reading of a signal, before the filter.
+    #[inline]
+    #[must_use]
+    pub fn reading(&self, signal: f32) -> f32 {
+        self.at_zero + self.per_unit * signal
+    }
+}
+
+fields!(SensorScale { at_zero, per_unit, filter_s });
+
+/// Scales of all sensors. Both muscles of a pair have the same kind.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Scales {
+    /// Pressure at the muscle, Pa.
+    pub pressure: SensorScale,
+    /// Stroke, m.
+    pub stroke: SensorScale,
+    /// Load cell, N.
+    pub force: SensorScale,
+    /// Second pressure sensor at the same muscle, Pa; its filter is not used.
+    pub second_pressure: SensorScale,
+    /// Pressure of the supply air, Pa; its filter is not used.
+    pub supply: SensorScale,
+}
+
+fields!(Scales { pressure, stroke, force, second_pressure, supply });
+
+/// Signal to the pressure regulator, as a part of the range of the board's output: `low` at no pressure, 1 at `full_pa`. An output of
+/// 0–10 V has a low of 0, one of 4–20 mA a low of 0.2.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct CommandOutput {
+    /// Part of the range at no pressure.
+    pub low: f32,
+    /// Pressure of the regulator at the end of the range, Pa.
+    pub full_pa: f32,
+}
+
+impl CommandOutput {
+    /// Part of the output's range for a pressure, 0 to 1; a pressure that is not a number gives `low`.
+    #[inline]
+    #[must_use]
+    pub fn part(&self, pressure_pa: f32) -> f32 {
+        let wanted = pressure_pa / self.full_pa;
+        let part = if wanted > 0.0 { wanted } else { 0.0 };
+        self.low + (1.0 - self.low) * if part > 1.0 { 1.0 } else { part }
+    }
+}
+
+fields!(CommandOutput { low, full_pa });
+
 /// The remaining watches.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Watch {
@@ -191,6 +258,12 @@ pub struct Watch {
     pub valve_test_pa: f32,
     /// How long the device stays armed without a keep-alive request of the session that armed it, ticks; then it is disarmed.
     pub armed_silence_ticks: u32,
+    /// Largest difference between the two pressure sensors of a muscle, Pa; zero where there is only one.
+    pub second_pressure_pa: f32,
+    /// Least pressure of the supply air from arming on, Pa; zero where it is not measured.
+    pub supply_low_pa: f32,
+    /// Whether the enable input must be closed; open, it is a fault. An emergency stop interrupts its circuit.
+    pub enable_input: bool,
 }
 
 fields!(Watch {
@@ -208,7 +281,10 @@ fields!(Watch {
     vented_pa,
     vent_ticks,
     valve_test_pa,
-    armed_silence_ticks
+    armed_silence_ticks,
+    second_pressure_pa,
+    supply_low_pa,
+    enable_input
 });
 
 /// Everything a user may choose. One for the device; both muscles of a pair share it.
@@ -240,6 +316,10 @@ pub struct Settings {
     pub motion_band_m: f32,
     /// Band of pressure within which a reversal at held length is noise, Pa.
     pub pressure_band_pa: f32,
+    /// Scales, filters and calibration of the sensors.
+    pub scales: Scales,
+    /// Signal to the pressure regulator.
+    pub command: CommandOutput,
 }
 
 fields!(Settings {
@@ -255,7 +335,9 @@ fields!(Settings {
     watch,
     hold_on,
     motion_band_m,
-    pressure_band_pa
+    pressure_band_pa,
+    scales,
+    command
 });
 
 impl Settings {
@@ -319,10 +401,21 @@ impl Settings {
             valve_test_pa: 0.0,
             // Time to look at the muscle between arming and starting; nothing is under pressure meanwhile.
             armed_silence_ticks: 60_000,
+            second_pressure_pa: 0.0,
+            supply_low_pa: 0.0,
+            enable_input: false,
         },
         hold_on: 0,
         motion_band_m: 20e-6,
         pressure_band_pa: 2e3,
+        scales: Scales {
+            pressure: SensorScale::SAME,
+            stroke: SensorScale::SAME,
+            force: SensorScale::SAME,
+            second_pressure: SensorScale::SAME,
+            supply: SensorScale::SAME,
+        },
+        command: CommandOutput { low: 0.0, full_pa: 2e6 },
     };
 }
 

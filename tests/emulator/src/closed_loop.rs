@@ -69,7 +69,7 @@ impl Loop {
         let r = self.plant.step(f64::from(TICK_S), pressure);
         let readings =
             Readings { pressure_pa: r.pressure as f32, stroke_m: r.stroke as f32, force_n: r.force as f32 };
-        let inputs = Inputs { sides: [Some(readings), None], ..Inputs::default() };
+        let inputs = Inputs { sides: [Some(readings.into()), None], ..Inputs::default() };
         self.outputs = self.controller.step(&inputs);
         self.controller.take_sample()
     }

@@ -93,7 +93,10 @@ impl PairLoop {
         }
         let sides = [0, 1].map(|side| {
             let answer = self.joint.answer(side);
-            Some(Readings { pressure_pa: answer.pressure, stroke_m: answer.stroke, force_n: answer.force })
+            Some(
+                Readings { pressure_pa: answer.pressure, stroke_m: answer.stroke, force_n: answer.force }
+                    .into(),
+            )
         });
         self.outputs = self.controller.step(&Inputs { sides, ..Inputs::default() });
     }

@@ -49,7 +49,7 @@ fn device(table: &MuscleTable, sensors: Sensors) -> Device {
             stroke_m: stroke_m + noise(2e-6),
             force_n: sensors.force_gain * force.newtons() + noise(0.5),
         };
-        Inputs { sides: [Some(now), None], ..Inputs::default() }
+        Inputs { sides: [Some(now.into()), None], ..Inputs::default() }
     };
     Device::start("127.0.0.1:0", Options { speed: f64::INFINITY, ..Options::default() }, plant)
         .expect("a controller")

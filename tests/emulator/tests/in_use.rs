@@ -26,7 +26,7 @@ fn device() -> Device {
         let wiggle = (tick % 7) as f32 - 3.0;
         let now =
             Readings { pressure_pa: pressure_pa + wiggle, stroke_m: 1e-7 * wiggle, force_n: 1e-3 * wiggle };
-        Inputs { sides: [Some(now), None], ..Inputs::default() }
+        Inputs { sides: [Some(now.into()), None], ..Inputs::default() }
     };
     Device::start("127.0.0.1:0", Options::default(), plant).expect("a controller")
 }

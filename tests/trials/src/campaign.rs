@@ -7,7 +7,7 @@ mod table_error;
 use crate::names::class;
 use crate::progress::Progress;
 use crate::queue::in_order;
-use crate::spec::{Composition, Spec, Stratum, draw};
+use crate::spec::{Composition, Size, Spec, Stratum, draw};
 use clap::Args;
 use serde::{Deserialize, Serialize};
 use std::error::Error;
@@ -114,12 +114,21 @@ impl Said {
 fn specs(muscles: usize) -> Vec<Spec> {
     let pairs = muscles / 3;
     let nulls = (3 * muscles).div_ceil(10);
-    let composition =
-        Composition { clean: nulls, nasty: 0, single: muscles - pairs, pair: pairs, decoy: 0, outside: 0 };
+    let composition = Composition {
+        clean: nulls,
+        nasty: 0,
+        single: muscles - pairs,
+        pair: pairs,
+        triple: 0,
+        decoy: 0,
+        outside: 0,
+    };
     let mut specs = draw(SEED, "campaign", composition);
     for spec in &mut specs {
         for (injection, size) in &mut spec.effects {
-            *size = size.clamp(SIZES.0, SIZES.1);
+            if let Size::Peak(size) = size {
+                *size = size.clamp(SIZES.0, SIZES.1);
+            }
             debug_assert!(!injection.name.is_empty());
         }
         // The program holds the crosshead and the recorder itself: no person's mistakes; and all noise is the bench's own.
@@ -219,7 +228,11 @@ mod tests {
         let set = specs(200);
         let with = |n: usize| set.iter().filter(|s| s.effects.len() == n).count();
         assert_eq!((with(0), with(1), with(2)), (60, 134, 66));
-        assert!(set.iter().flat_map(|s| &s.effects).all(|e| (0.01..=0.06).contains(&e.1)));
+        assert!(
+            set.iter()
+                .flat_map(|s| &s.effects)
+                .all(|e| matches!(e.1, Size::Peak(p) if (0.01..=0.06).contains(&p)))
+        );
     }
 
     #[test]

@@ -41,6 +41,10 @@ pub struct Figures {
     pub pair_one_right: Rate,
     /// Pairs: both classes right.
     pub pair_both_right: Rate,
+    /// Triples: at least two classes right.
+    pub triple_two_right: Rate,
+    /// Triples: all three classes right.
+    pub triple_all_right: Rate,
     /// Outside the library: named with more than 0.8.
     pub outside_confident: Rate,
     /// Outside the library: nothing named.
@@ -167,6 +171,12 @@ impl Figures {
             }),
             pair_one_right: Rate::of(it().filter(|o| o.stratum == Stratum::Pair), |o| right_classes(o) >= 1),
             pair_both_right: Rate::of(it().filter(|o| o.stratum == Stratum::Pair), |o| {
+                right_classes(o) == o.truth.len()
+            }),
+            triple_two_right: Rate::of(it().filter(|o| o.stratum == Stratum::Triple), |o| {
+                right_classes(o) >= 2
+            }),
+            triple_all_right: Rate::of(it().filter(|o| o.stratum == Stratum::Triple), |o| {
                 right_classes(o) == o.truth.len()
             }),
             outside_confident: Rate::of(it().filter(|o| o.stratum == Stratum::Outside), |o| {

@@ -2,7 +2,7 @@
 
 use crate::inject::{Injection, Parameter, Scale};
 use crate::residuals::Residuals;
-use crate::spec::{Operator, Spec, Stratum};
+use crate::spec::{Operator, Size, Spec, Stratum};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use virtual_bench::bench::{Bench, BenchSpec};
@@ -364,8 +364,22 @@ pub fn after(spec: &Spec, bench: &BenchSpec, residuals: &Residuals, next: &Proto
     files
 }
 
-/// Make one trial.
-pub fn make(spec: &Spec, residuals: &Residuals) -> Trial {
+/// What the search for the strength of the effects gives.
+struct Sized {
+    scale: Scale,
+    protocol: Protocol,
+    levels: Vec<f64>,
+    speed: f64,
+    /// Rows of the silent bench without the effects; empty where there are none.
+    without: Vec<Vec<Row>>,
+    /// The bench with its effects.
+    bench: BenchSpec,
+    /// Peak of each effect as a part of the blocked force, what it adds to each row, and its parameters.
+    effects: Vec<(f64, Vec<f64>, Vec<Parameter>)>,
+}
+
+/// Finds how strong the effects of a trial have to be.
+fn sized(spec: &Spec) -> Sized {
     let muscle = Muscle::new(spec.bench.muscle.clone());
     let levels = campaigns::levels(&muscle);
     let speed = campaigns::slow(&muscle, &levels);
@@ -386,13 +400,16 @@ pub fn make(spec: &Spec, residuals: &Residuals) -> Trial {
     };
     let mut bench = spec.bench.clone();
     let mut effects = Vec::new();
-    let mut together: Vec<Vec<f64>> = without.iter().map(|f| vec![0.0; f.len()]).collect();
     for (injection, wanted) in &spec.effects {
-        let mut s = injection.strongest().min(1.0) * 0.5;
+        let mut s = match wanted {
+            Size::Peak(_) => injection.strongest().min(1.0) * 0.5,
+            Size::Strength(s) => *s,
+        };
         let (mut is, mut d) = size(injection, s);
         // Most effects are straight in their strength; those that are not get there by secants in the logarithm.
         let mut power = 1.0;
         for _ in 0..9 {
+            let Size::Peak(wanted) = wanted else { break };
             if is <= 0.0 || (is / wanted - 1.0).abs() < 0.1 {
                 break;
             }
@@ -409,6 +426,60 @@ pub fn make(spec: &Spec, residuals: &Residuals) -> Trial {
             }
         }
         let parameters = injection.apply(&mut bench, &scale, s);
+        effects.push((is, d, parameters));
+    }
+    Sized { scale, protocol, levels, speed, without, bench, effects }
+}
+
+/// A pair of campaigns of one muscle, of which the later one has the effects of a trial.
+pub struct Pair {
+    /// Muscle description as an engineer would measure it.
+    pub description: String,
+    /// The campaign without effects, with noise and mistakes of its own.
+    pub before: Vec<Recording>,
+    /// The campaign with the effects.
+    pub after: Vec<Recording>,
+    /// Name and peak of each effect, percent of the blocked force.
+    pub effects: Vec<(String, f64)>,
+}
+
+/// Makes the pair of a trial.
+pub fn pair(spec: &Spec, residuals: &Residuals) -> Pair {
+    let Sized { scale, protocol, bench, effects, .. } = sized(spec);
+    let real = spec.real_noise && !residuals.is_empty();
+    let campaign = |b: &BenchSpec, seed: u64| {
+        let coloured = b.instruments.force.coloured.0;
+        let mut b = BenchSpec { seed, ..b.clone() };
+        if real {
+            b.instruments.force.coloured.0 = 0.0;
+        }
+        let mut files = Bench::new(&b).run(&protocol).unwrap_or_default();
+        if real {
+            resample(&mut files, residuals, coloured, seed);
+        }
+        disturb(&mut files, spec.uneven_noise * b.instruments.force.white, seed);
+        mishandle(&mut files, &spec.operator, scale.force, seed);
+        thin(&mut files, spec.lost_rows, seed);
+        files
+    };
+    // Another day: other noise, and other mistakes of the same operator.
+    let other = Rng::stream(spec.seed, "before").bits();
+    Pair {
+        description: spec.bench.muscle.description(),
+        before: campaign(&spec.bench, other),
+        after: campaign(&bench, spec.seed),
+        effects: spec.effects.iter().zip(&effects).map(|((i, _), e)| (i.name.into(), 100.0 * e.0)).collect(),
+    }
+}
+
+/// Make one trial.
+pub fn make(spec: &Spec, residuals: &Residuals) -> Trial {
+    let muscle = Muscle::new(spec.bench.muscle.clone());
+    let geometry = spec.bench.muscle.geometry;
+    let Sized { scale, protocol, levels, speed, without, bench, effects: strengths } = sized(spec);
+    let mut effects = Vec::new();
+    let mut together: Vec<Vec<f64>> = without.iter().map(|f| vec![0.0; f.len()]).collect();
+    for ((injection, _), (is, d, parameters)) in spec.effects.iter().zip(strengths) {
         let friction = &spec.bench.muscle.friction;
         let base =
             Base { stroke: scale.stroke, force: scale.force, geometry, friction, flexible: true, rubs: true };

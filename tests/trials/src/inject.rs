@@ -58,6 +58,9 @@ pub struct Parameter {
     pub unit: String,
 }
 
+/// Width of a play of strength 1, in parts of the free stroke.
+const PLAY: f64 = 0.008;
+
 /// An effect whose shape is drawn and whose strength is still open.
 #[derive(Debug, Clone)]
 pub struct Injection {
@@ -88,6 +91,11 @@ impl Injection {
             "clipped-cell" => 1.0,
             _ => 60.0,
         }
+    }
+
+    /// Of a play at strength 1: its width in parts of the free stroke.
+    pub const fn share_of_stroke(&self) -> f64 {
+        PLAY
     }
 
     /// Put the effect on a bench at strength `s` (about 1 for an effect of 1 to 2 % of the blocked force); gives its
@@ -269,7 +277,7 @@ impl Injection {
                 say("stiffness", rig.stiffness, "N/m");
             }
             "backlash" => {
-                rig.play = 0.008 * x * s;
+                rig.play = PLAY * x * s;
                 say("width", rig.play, "m");
             }
             "force-offset" => {

@@ -17,6 +17,8 @@ mod inject;
 mod ledger;
 mod limits;
 mod locate;
+mod maps;
+mod martens;
 mod names;
 mod oracle;
 mod progress;
@@ -24,14 +26,17 @@ mod proof_page;
 mod queue;
 mod rate;
 mod reference;
+mod reference_bench;
 mod report;
 mod residuals;
 mod score;
 mod scoring;
+mod selective_risk;
 mod semi;
 mod sensitivity;
 mod sensors;
 mod spec;
+mod stock;
 mod tool;
 
 use clap::{Args, Parser, Subcommand};
@@ -51,12 +56,25 @@ struct Cli {
     command: Command,
 }
 
+/// Which set of which kind.
+#[derive(Args)]
+struct Kind {
+    /// dev (public seed) or final (secret seed from the system, or --seed).
+    #[arg(long = "set", default_value = "dev")]
+    kind: String,
+    #[command(flatten)]
+    what: Set,
+}
+
 /// Which set.
 #[derive(Args)]
 struct Set {
     /// How many trials; the mixture of the final set is kept.
-    #[arg(long, default_value_t = 330)]
+    #[arg(long, default_value_t = 345)]
     n: usize,
+    /// Single effects and pairs of the set are these, in turn: names, or two names joined by +. For development.
+    #[arg(long, value_delimiter = ',')]
+    effects: Vec<String>,
     /// Make and score only this number of first trials: a stratified share, where time is short.
     #[arg(long)]
     take: Option<usize>,
@@ -126,7 +144,8 @@ impl Real {
 enum Command {
     /// Make a set: trials/ID for the tool, sealed/ID for the judge, ledger.json with the seals' hashes.
     Generate {
-        /// dev (public seed) or final (secret seed from the system, or --seed).
+        /// dev (public seed), or with a secret seed from the system (or --seed): final; nulls (no effects); plays (backlash of 0.02 to
+        /// 2 % of the stroke, alone and beside thermal softening).
         #[arg(long, default_value = "dev")]
         set: String,
         #[command(flatten)]
@@ -186,17 +205,23 @@ enum Command {
     FestoHistory(Real),
     /// Unseen runs of these recordings through the table only: writes that section of the page.
     FestoTables(Real),
+    /// Diagnose the real sets of the 10 mm fluidic muscle as stocks, and predict unseen contractions and lengths with them.
+    Stock(Real),
+    /// Fit static force maps of commercial muscles and predict them between lengths and pressures, beside published models.
+    Maps(Real),
     /// Answer a development set again with each criterion at half and at double its value.
     Sensitivity(sensitivity::Study),
     /// Spoil one recording of clean campaigns in every way that sensors and loggers fail, and count what is found.
     Sensors(sensors::Sensors),
     /// Diagnose changes: changes added to later runs of real recordings, untouched pairs, a cylinder whose seal was replaced.
     Reference(reference::Reference),
+    /// Diagnose changes between two campaigns of the virtual bench, of which the later one has one effect: a sealed set.
+    ReferenceBench(reference_bench::Options),
     /// Campaigns that choose their own steps, compared with protocol C for the same time, random steps, and single proposals.
     Campaign(campaign::Campaigns),
     /// Generate, answer and score; each step continues where an earlier run was interrupted.
     Prove {
-        /// dev or final.
+        /// dev, final, nulls or plays.
         #[arg(long, default_value = "final")]
         set: String,
         #[command(flatten)]
@@ -232,7 +257,7 @@ fn main() -> ExitCode {
             })
         }
         Command::Again { set, host, data, minutes } => {
-            let draw = |seed, set: &str, n| spec::draw(seed, set, composition(n));
+            let draw = |seed, set: &str, n| spec::draw(seed, set, spec::Composition::of(set, n));
             let until = minutes.map(|m| Instant::now() + Duration::from_secs_f64(60.0 * m.max(0.0)));
             again::run(&set, &host, &residuals::Residuals::read(&data), until, draw)
         }
@@ -242,6 +267,12 @@ fn main() -> ExitCode {
         Command::Festo(real) => {
             festo::run(&real.data, &real.output, &real.host).and_then(|()| real.copy_to_book("festo.md"))
         }
+        Command::Stock(real) => {
+            stock::run(&real.data, &real.output, &real.host).and_then(|()| real.copy_to_book("stock.md"))
+        }
+        Command::Maps(real) => {
+            maps::run(&real.data, &real.output, &real.host).and_then(|()| real.copy_to_book("force-maps.md"))
+        }
         Command::FestoHistory(real) => {
             festo::run_history(&real.data, &real.output, &real.host, real.page.as_deref())
         }
@@ -250,6 +281,10 @@ fn main() -> ExitCode {
         Command::Sensitivity(study) => sensitivity::run(&study),
         Command::Sensors(what) => sensors::run(&what),
         Command::Reference(what) => reference::run(&what),
+        Command::ReferenceBench(what) => {
+            let specs = specs(&what.set.kind, &what.set.what);
+            specs.and_then(|(seed, _, specs)| reference_bench::run(&what, seed, specs))
+        }
         Command::Prove { set, what, tool, check } => prove(&set, &what, &tool, check),
     };
     match done {
@@ -289,22 +324,30 @@ fn prove(set: &str, what: &Set, tool: &Tool, check: bool) -> Result<(), Box<dyn 
 /// The development set's seed is public.
 const DEVELOPMENT: u64 = 20_261_121;
 
-fn composition(n: usize) -> spec::Composition {
-    if n == 330 { spec::Composition::FINAL } else { spec::Composition::scaled(n) }
-}
-
-fn generate(set: &str, what: &Set) -> Result<(), Box<dyn Error>> {
+/// The seed of a set, its size, and those of its trials that are taken.
+fn specs(set: &str, what: &Set) -> Result<(u64, usize, Vec<spec::Spec>), Box<dyn Error>> {
     let output = &what.output;
     let seed = match (what.seed, set) {
         (Some(s), _) => s,
         (None, "dev") => DEVELOPMENT,
         // A final set that was begun keeps its seed.
-        (None, "final") => ledger::begun(output).map_or_else(ledger::secret_seed, Ok)?,
-        (None, other) => return Err(format!("no set \"{other}\": take dev or final").into()),
+        (None, "final" | "nulls" | "plays") => ledger::begun(output).map_or_else(ledger::secret_seed, Ok)?,
+        (None, other) => return Err(format!("no set \"{other}\": take dev, final, nulls or plays").into()),
     };
-    let mut specs = spec::draw(seed, set, composition(what.n));
+    let composition = spec::Composition::of(set, what.n);
+    let mut specs = if what.effects.is_empty() {
+        spec::draw(seed, set, composition)
+    } else {
+        spec::draw_of(seed, set, what.n, &spec::named(&what.effects)?)
+    };
     let drawn = specs.len();
     specs.truncate(what.take.unwrap_or(drawn).max(1));
+    Ok((seed, drawn, specs))
+}
+
+fn generate(set: &str, what: &Set) -> Result<(), Box<dyn Error>> {
+    let output = &what.output;
+    let (seed, drawn, specs) = specs(set, what)?;
     let residuals = residuals::Residuals::read(&what.data);
     if residuals.is_empty() {
         eprintln!("no real recordings in {}: all noise is synthetic", what.data.display());

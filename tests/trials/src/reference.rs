@@ -4,6 +4,7 @@
 mod cylinder;
 mod injection;
 mod page;
+mod pairs;
 mod single_effects;
 mod staircases;
 mod tables;
@@ -38,6 +39,13 @@ pub struct Reference {
     /// A stratified share: one split a muscle at 3 %, every seventh untouched pair, the cylinder's five configurations.
     #[arg(long)]
     short: bool,
+    /// Also write the pairs at 3 % and the untouched ones as tables, DIR/pairs.jsonl, and as many simulated muscles for training,
+    /// DIR/training.jsonl: for `reference_baselines.py`.
+    #[arg(long, value_name = "MUSCLES")]
+    pairs: Option<u64>,
+    /// Only the trials against a table and the cylinder: their sections of the page are written anew, the others stay.
+    #[arg(long, requires = "page", conflicts_with_all = ["short", "pairs"])]
+    sections: bool,
     /// Only the trials against a table, without a page.
     #[arg(long, conflicts_with = "page")]
     tables: bool,
@@ -166,7 +174,8 @@ fn injected(muscles: &[Muscle], short: bool) -> Vec<Job<'_>> {
     jobs
 }
 
-fn ask(job: &Job<'_>, slopes: &Slopes) -> Result<Trial, String> {
+/// The runs of both sides, and the size of the change.
+fn sides(job: &Job<'_>, slopes: &Slopes) -> (Vec<staircases::Run>, Vec<staircases::Run>, f64) {
     let (a, b, c) = job.runs;
     let before = job.muscle.between(a, b);
     let mut after = job.muscle.between(b + 1, c);
@@ -177,6 +186,50 @@ fn ask(job: &Job<'_>, slopes: &Slopes) -> Result<Trial, String> {
         let moment = 0.35 + 0.3 * ((job.number * 37 % 10) as f64 / 10.0);
         (after, size) = inject(&after, effect, percent, slopes, &job.muscle.name, b, moment);
     }
+    (before, after, size)
+}
+
+/// One pair as a table, with what the diagnosis named.
+#[derive(Serialize)]
+struct AnsweredPair {
+    #[serde(flatten)]
+    pair: pairs::Pair,
+    /// The most probable cause.
+    diagnosis: String,
+    /// What the largest ΔBIC names.
+    simple: String,
+}
+
+fn write_pairs(
+    what: &Reference,
+    jobs: &[Job<'_>],
+    trials: &[Trial],
+    slopes: &BTreeMap<&str, Slopes>,
+    muscles: u64,
+) -> Result<(), Box<dyn Error>> {
+    let mut text = String::new();
+    let wanted = |j: &Job<'_>| j.put_in.is_none_or(|(_, percent)| percent == 3.0);
+    for (job, trial) in jobs.iter().zip(trials).filter(|(j, _)| wanted(j)) {
+        let own = &slopes[job.muscle.name.as_str()];
+        let (before, after, _) = sides(job, own);
+        let (effect, percent) = job.put_in.map_or((None, 0.0), |p| (Some(p.0), p.1));
+        let about = (job.muscle.name.clone(), Some(job.muscle.half), effect, percent, job.runs);
+        let pair = pairs::table((&before, &after), own, own.largest(), about);
+        let line = AnsweredPair { pair, diagnosis: trial.answer.top.clone(), simple: trial.simple.clone() };
+        text += &serde_json::to_string(&line)?;
+        text.push('\n');
+    }
+    write(&what.output, "pairs.jsonl", &text)?;
+    let mut text = String::new();
+    for pair in pairs::of_the_bench(muscles) {
+        text += &serde_json::to_string(&pair)?;
+        text.push('\n');
+    }
+    write(&what.output, "training.jsonl", &text)
+}
+
+fn ask(job: &Job<'_>, slopes: &Slopes) -> Result<Trial, String> {
+    let (before, after, size) = sides(job, slopes);
     let simple = single_effects::name(&before, &after, slopes);
     let campaign =
         |runs: &[staircases::Run]| Campaign::new(runs.iter().map(staircases::Run::recording).collect());
@@ -214,10 +267,20 @@ pub fn run(what: &Reference) -> Result<(), Box<dyn Error>> {
         print!("{text}");
         return write(&what.output, "tables.md", &text);
     }
+    if let Some(path) = what.page.as_ref().filter(|_| what.sections) {
+        let trials = tables::run(&muscles, &slopes, false);
+        let pairs = cylinder::run(&what.data, false)?;
+        write(&what.output, "sections.json", &serde_json::to_string_pretty(&(&trials, &pairs))?)?;
+        std::fs::write(path, page::replaced(&std::fs::read_to_string(path)?, &trials, &pairs))?;
+        return Ok(());
+    }
     let mut jobs = untouched(&muscles, if what.short { SHORT_STEP } else { 1 });
     jobs.extend(injected(&muscles, what.short));
     let trials: Vec<Trial> =
         jobs.par_iter().map(|j| ask(j, &slopes[j.muscle.name.as_str()])).collect::<Result<_, _>>()?;
+    if let Some(muscles) = what.pairs {
+        return write_pairs(what, &jobs, &trials, &slopes, muscles);
+    }
     let against_tables = tables::run(&muscles, &slopes, what.short);
     let cylinder = cylinder::run(&what.data, what.short)?;
     let speed = page::speed(&muscles)?;

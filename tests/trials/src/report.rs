@@ -5,18 +5,19 @@ use crate::limits::said;
 use crate::names::{CLASSES, class};
 use crate::rate::{Median, Rate};
 use crate::score::{Interval, Outcome};
+use crate::selective_risk;
 use crate::spec::Stratum;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 type Line = (&'static str, &'static str, fn(&Figures) -> String);
 
-const LINES: [Line; 34] = [
-    ("False alarms, clean nulls", "≤ 3 of 60 together", |f| f.false_alarms_clean.to_string()),
-    ("False alarms, nasty nulls", "", |f| f.false_alarms_nasty.to_string()),
+const LINES: [Line; 36] = [
+    ("False alarms, clean nulls", "0", |f| f.false_alarms_clean.to_string()),
+    ("False alarms, nasty nulls", "0", |f| f.false_alarms_nasty.to_string()),
     ("Nulls not called consistent", "", |f| f.nulls_not_consistent.to_string()),
     ("Detected (visible, ≥ 2 %)", "", |f| f.noticed.to_string()),
-    ("Exact name first", "", |f| f.exact.to_string()),
+    ("Exact name first", "≥ 75 % on A, ≥ 80 % on D, ≥ 85 % on C", |f| f.exact.to_string()),
     ("Class right", "≥ 80 % on A, ≥ 92 % on D and C", |f| f.class_right.to_string()),
     ("Class right, of those named", "", |f| f.class_right_when_named.to_string()),
     ("Truth in the reported set", "≥ 95 %", |f| f.in_set.to_string()),
@@ -24,7 +25,9 @@ const LINES: [Line; 34] = [
     ("Exact name, all single effects", "", |f| f.exact_all.to_string()),
     ("Invisible effects named wrongly", "", |f| f.invisible_wrong.to_string()),
     ("Pairs, one class right", "", |f| f.pair_one_right.to_string()),
-    ("Pairs, both classes right", "", |f| f.pair_both_right.to_string()),
+    ("Pairs, both classes right", "≥ 75 %", |f| f.pair_both_right.to_string()),
+    ("Triples, two classes right", "", |f| f.triple_two_right.to_string()),
+    ("Triples, all three classes right", "≥ 50 %", |f| f.triple_all_right.to_string()),
     ("Outside the library, confident name", "≤ 5 %", |f| f.outside_confident.to_string()),
     ("Outside the library, nothing named", "", |f| f.outside_silent.to_string()),
     ("Concealed effect in the set or admitted as possible", "≥ 90 %", |f| f.concealed_admitted.to_string()),
@@ -37,7 +40,7 @@ const LINES: [Line; 34] = [
     ("Region overlaps the true one by more than half", "", |f| f.overlapping.to_string()),
     ("Mean overlap of regions", "", |f| format!("{:.2}", f.overlap)),
     ("Parameter intervals that contain the truth", "90–98 %", |f| f.parameters.to_string()),
-    ("Calibration error", "≤ 0.08", |f| format!("{:.3} of {}", f.calibration_error, f.probabilities)),
+    ("Calibration error", "≤ 0.06", |f| format!("{:.3} of {}", f.calibration_error, f.probabilities)),
     ("… by class", "", |f| format!("{:.3}", f.calibration_error_class)),
     ("Brier score", "", |f| format!("{:.3}", f.brier)),
     ("Log score", "", |f| format!("{:.3}", f.log_score)),
@@ -47,7 +50,7 @@ const LINES: [Line; 34] = [
     }),
     ("Stricter: median gain against the muscle without the effect", "", |f| f.gain_against_twin.to_string()),
     ("… the oracle's gain by this measure", "", |f| f.oracle_against_twin.to_string()),
-    ("Diagnosed table worse than the plain one", "≤ 3 %", |f| f.harmed.to_string()),
+    ("Diagnosed table worse than the plain one", "≤ 1 %", |f| f.harmed.to_string()),
 ];
 
 fn size(of: Option<(f64, f64, f64)>) -> String {
@@ -104,14 +107,7 @@ pub fn markdown(title: &str, all: &[Scored], baselines: &[(String, Rate, Rate)])
     for (stated, exact, near, n) in &columns[0].1.reliability {
         let _ = writeln!(m, "| {stated:.2} | {exact:.2} | {near:.2} | {n} |");
     }
-    m.push_str("\n## Answers by probability (all trials with a name)\n\n| most confident | right class |\n| --- | --- |\n");
-    let mut sure: Vec<&Outcome> = all.iter().map(|s| &s.0).filter(|o| !o.named.is_empty()).collect();
-    sure.sort_by(|a, b| b.named[0].1.total_cmp(&a.named[0].1));
-    for part in [0.25, 0.5, 0.75, 1.0] {
-        let n = (sure.len() as f64 * part).round() as usize;
-        let rate = Rate::of(sure.iter().take(n).copied(), |o| o.class_right);
-        let _ = writeln!(m, "| {:.0} % | {rate} |", 100.0 * part);
-    }
+    selective_risk::write(&mut m, &all.iter().map(|s| &s.0).collect::<Vec<_>>());
     m.push_str("\n## By class (single and decoy, 2 % and more, visible)\n\n| hidden class | detected | class right | classes named first |\n| --- | --- | --- | --- |\n");
     let judged: Vec<&Outcome> = all.iter().map(|s| &s.0).filter(|o| big_and_visible(o)).collect();
     let mut classes: Vec<&str> = judged.iter().filter_map(|o| o.truth.first()).map(|t| class(&t.0)).collect();

@@ -21,10 +21,21 @@ pub enum Stratum {
     Single,
     /// Two effects.
     Pair,
+    /// Three effects.
+    Triple,
     /// One effect in the shape of another.
     Decoy,
     /// Something that no name describes.
     Outside,
+}
+
+/// How large an effect is requested to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Size {
+    /// Peak of its force, in parts of the blocked force.
+    Peak(f64),
+    /// Strength of its injection.
+    Strength(f64),
 }
 
 /// One trial, drawn.
@@ -36,8 +47,8 @@ pub struct Spec {
     pub stratum: Stratum,
     /// `A`, `D` or `C`.
     pub protocol: &'static str,
-    /// What is hidden: the effect and its requested size, in parts of the blocked force.
-    pub effects: Vec<(Injection, f64)>,
+    /// What is hidden: the effect and its requested size.
+    pub effects: Vec<(Injection, Size)>,
     /// For a decoy, what it looks like.
     pub looks_like: Option<&'static str>,
     /// The bench without the effects.
@@ -106,6 +117,8 @@ pub struct Composition {
     pub single: usize,
     /// Pairs.
     pub pair: usize,
+    /// Triples.
+    pub triple: usize,
     /// Decoys.
     pub decoy: usize,
     /// Outside the library.
@@ -113,22 +126,40 @@ pub struct Composition {
 }
 
 impl Composition {
-    /// The set of proof: 330 trials.
-    pub const FINAL: Self = Self { clean: 30, nasty: 30, single: 180, pair: 45, decoy: 15, outside: 30 };
+    /// The set of proof: 345 trials.
+    pub const FINAL: Self =
+        Self { clean: 30, nasty: 30, single: 180, pair: 45, triple: 15, decoy: 15, outside: 30 };
+    /// Of `n` trials of a set.
+    pub fn of(set: &str, n: usize) -> Self {
+        let none = Self { clean: 0, nasty: 0, single: 0, pair: 0, triple: 0, decoy: 0, outside: 0 };
+        match set {
+            // No effects at all: what false alarms are counted on.
+            "nulls" => Self { clean: n.div_ceil(2), nasty: n / 2, ..none },
+            "plays" => Self { single: n.div_ceil(2), pair: n / 2, ..none },
+            _ if n == Self::FINAL.total() => Self::FINAL,
+            _ => Self::scaled(n),
+        }
+    }
+
+    /// How many trials that is.
+    pub const fn total(&self) -> usize {
+        self.clean + self.nasty + self.single + self.pair + self.triple + self.decoy + self.outside
+    }
 
     /// The same mixture in `n` trials, every stratum at least once.
     pub fn scaled(n: usize) -> Self {
-        let part = |of: usize| ((of * n) as f64 / 330.0).round().max(1.0) as usize;
         let f = Self::FINAL;
+        let part = |of: usize| ((of * n) as f64 / f.total() as f64).round().max(1.0) as usize;
         let mut c = Self {
             clean: part(f.clean),
             nasty: part(f.nasty),
             single: 0,
             pair: part(f.pair),
+            triple: part(f.triple),
             decoy: part(f.decoy),
             outside: part(f.outside),
         };
-        c.single = n.saturating_sub(c.clean + c.nasty + c.pair + c.decoy + c.outside);
+        c.single = n.saturating_sub(c.total());
         c
     }
 
@@ -138,6 +169,7 @@ impl Composition {
             (Stratum::NullNasty, self.nasty),
             (Stratum::Single, self.single),
             (Stratum::Pair, self.pair),
+            (Stratum::Triple, self.triple),
             (Stratum::Decoy, self.decoy),
             (Stratum::Outside, self.outside),
         ]
@@ -160,6 +192,10 @@ const DECOYS: [(&str, &str); 5] = [
 ///
 /// Strata are mixed, so that the first trials of a set are a stratified share of it, and a number carries no information.
 pub fn draw(seed: u64, family: &str, composition: Composition) -> Vec<Spec> {
+    if family == "plays" {
+        let lists = [vec!["backlash"], vec!["backlash", "thermal-softening"]];
+        return draw_of(seed, family, composition.total(), &lists);
+    }
     let mut r = Rng::stream(seed, &format!("{family} set"));
     let mut singles: Vec<usize> = (0..SINGLES.len()).collect();
     let mut strata = mixed(composition.strata(), &mut r);
@@ -180,6 +216,7 @@ pub fn draw(seed: u64, family: &str, composition: Composition) -> Vec<Spec> {
                 vec![SINGLES[singles[(single - 1) % singles.len()]].0]
             }
             Stratum::Pair => pair(&mut mine, n.is_multiple_of(2)),
+            Stratum::Triple => triple(&mut mine),
             Stratum::Decoy => vec![DECOYS[*n % DECOYS.len()].0],
             Stratum::Outside => vec![OUTSIDE[*n % OUTSIDE.len()]],
         };
@@ -188,6 +225,34 @@ pub fn draw(seed: u64, family: &str, composition: Composition) -> Vec<Spec> {
         specs.push(one(id, stratum, protocol, &names, looks_like, &mut mine));
     }
     specs
+}
+
+/// Single effects and pairs, in turn those of `lists`. Plays of the set of plays have a share of the stroke as their size.
+pub fn draw_of(seed: u64, family: &str, n: usize, lists: &[Vec<&'static str>]) -> Vec<Spec> {
+    (0..n)
+        .map(|id| {
+            let names = &lists[id % lists.len()];
+            let protocol = ["A", "D", "C"][(id / lists.len()) % 3];
+            let mut mine = Rng::stream(seed, &format!("{family} trial {id}"));
+            let stratum = if names.len() > 1 { Stratum::Pair } else { Stratum::Single };
+            let mut spec = one(id, stratum, protocol, names, None, &mut mine);
+            if family == "plays" {
+                for (injection, size) in spec.effects.iter_mut().filter(|e| e.0.name == "backlash") {
+                    *size = Size::Strength(mine.log_range(2e-4, 2e-2) / injection.share_of_stroke());
+                }
+            }
+            spec
+        })
+        .collect()
+}
+
+/// Effects by name, two joined by a plus.
+pub fn named(lists: &[String]) -> Result<Vec<Vec<&'static str>>, String> {
+    let known = |name: &str| {
+        let all = SINGLES.iter().map(|s| s.0).chain(OUTSIDE);
+        all.into_iter().find(|k| *k == name).ok_or(format!("no effect \"{name}\""))
+    };
+    lists.iter().map(|l| l.split('+').map(known).collect()).collect()
 }
 
 /// Every stratum spread evenly over the set.
@@ -215,6 +280,18 @@ fn pair(r: &mut Rng, same_class: bool) -> Vec<&'static str> {
         }
     }
     vec!["viscous-damping", "sensor-delay"]
+}
+
+/// Three effects of three classes.
+fn triple(r: &mut Rng) -> Vec<&'static str> {
+    let mut names: Vec<&'static str> = Vec::new();
+    while names.len() < 3 {
+        let name = SINGLES[r.index(SINGLES.len())].0;
+        if names.iter().all(|n| class(n) != class(name)) {
+            names.push(name);
+        }
+    }
+    names
 }
 
 fn one(
@@ -278,10 +355,10 @@ fn one(
             let size = match stratum {
                 Stratum::Outside => r.log_range(0.01, 0.06),
                 Stratum::Decoy => r.log_range(0.01, 0.06),
-                Stratum::Pair => r.log_range(0.008, 0.06),
+                Stratum::Pair | Stratum::Triple => r.log_range(0.008, 0.06),
                 _ => r.log_range(0.003, 0.08),
             };
-            (Injection::new(name, r.bits()), size)
+            (Injection::new(name, r.bits()), Size::Peak(size))
         })
         .collect();
     let operator = if nasty { Operator::careless(r) } else { Operator::careful(r) };
@@ -308,10 +385,10 @@ mod tests {
     #[test]
     fn the_final_set_is_composed_as_registered() {
         let specs = draw(1, "final", Composition::FINAL);
-        assert_eq!(specs.len(), 330);
+        assert_eq!(specs.len(), 345);
         for protocol in ["A", "C", "D"] {
             let n = specs.iter().filter(|s| s.protocol == protocol).count();
-            assert!((108..=112).contains(&n), "{protocol}: {n}");
+            assert!((113..=117).contains(&n), "{protocol}: {n}");
         }
         for (name, _) in SINGLES {
             let n =
@@ -322,12 +399,18 @@ mod tests {
             s.stratum == Stratum::Pair && class(s.effects[0].0.name) == class(s.effects[1].0.name)
         });
         assert_eq!(same.count(), 23);
+        for triple in specs.iter().filter(|s| s.stratum == Stratum::Triple) {
+            let mut classes: Vec<&str> = triple.effects.iter().map(|e| class(e.0.name)).collect();
+            classes.sort_unstable();
+            classes.dedup();
+            assert_eq!(classes.len(), 3);
+        }
     }
 
     #[test]
     fn the_first_trials_are_a_stratified_share_and_families_differ() {
         let specs = draw(1, "final", Composition::FINAL);
-        let half = &specs[..165];
+        let half = &specs[..172];
         let count = |s: Stratum| half.iter().filter(|t| t.stratum == s).count();
         for (stratum, whole) in [(Stratum::NullClean, 30), (Stratum::NullNasty, 30), (Stratum::Single, 180)] {
             assert!((whole / 2 - 3..=whole / 2 + 3).contains(&count(stratum)), "{stratum:?}");

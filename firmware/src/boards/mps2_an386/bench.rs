@@ -9,7 +9,7 @@ use embassy_futures::select::{Either, select};
 use embassy_futures::yield_now;
 use embassy_time::{Duration, Instant, Timer};
 use embedded_io_async::{Read, Write};
-use firmware::board::{Command, Inputs, Outputs, Plant, Readings};
+use firmware::board::{Command, Inputs, Outputs, Plant, Readings, Signals};
 
 use super::uart::{Receiver, Sender, Uart};
 use super::watchdog;
@@ -197,8 +197,9 @@ impl Plant for Benches {
         Inputs {
             missed_ticks: said().map(|one| one.missed).max().unwrap_or(0),
             supply_low: said().any(|one| one.supply_low),
-            sides: benches.each_ref().map(|one| one.as_ref().map(|one| one.readings)),
+            sides: benches.each_ref().map(|one| one.as_ref().map(|one| Signals::from(one.readings))),
             step_us,
+            ..Inputs::default()
         }
     }
 }

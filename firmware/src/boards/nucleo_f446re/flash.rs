@@ -1,4 +1,4 @@
-//! The store's flash: the last two sectors of 128 KiB. Erasing one stops the processor for up to two seconds.
+//! The store's flash: three sectors of 16 KiB. Erasing one stops the processor for up to 0.8 s.
 
 use embassy_stm32::flash::{Blocking, Error, Flash};
 use embedded_storage_async::nor_flash::{
@@ -7,10 +7,10 @@ use embedded_storage_async::nor_flash::{
 
 use super::{power, watchdog};
 
-const STORE_AT: u32 = 256 * 1024;
-const SECTOR: usize = 128 * 1024;
+const STORE_AT: u32 = 16 * 1024;
+const SECTOR: usize = 16 * 1024;
 
-/// The last two sectors.
+/// Sectors 1 to 3.
 pub struct StoreFlash(Flash<'static, Blocking>);
 
 impl StoreFlash {
@@ -52,7 +52,7 @@ impl ReadNorFlash for StoreFlash {
     }
 
     fn capacity(&self) -> usize {
-        2 * SECTOR
+        3 * SECTOR
     }
 }
 

@@ -1,9 +1,9 @@
-//! The control tick: TIM3 starts a scan of the three sensors each millisecond, a DMA stream takes it to memory, and the control loop's
+//! The control tick: TIM3 starts a scan of the five sensors each millisecond, a DMA stream takes it to memory, and the control loop's
 //! interrupt comes when it is there. Nothing waits for a converter.
 //!
 //! ```text
-//! TIM3   0 µs: update → ADC1 scans channels 0, 1 and 8 (96 cycles of 22.5 MHz each: 12.8 µs) → DMA2 stream 0
-//!       20 µs: compare → interrupt → one control step
+//! TIM3   0 µs: update → ADC1 scans channels 0, 1, 8, 10, 11 (96 cycles of 22.5 MHz each: 21.3 µs) → DMA2 stream 0
+//!       25 µs: compare → interrupt → one control step
 //! ```
 
 use core::cell::UnsafeCell;
@@ -22,11 +22,16 @@ const APB1ENR: Register = Register::at(0x4002_3840);
 const APB2ENR: Register = Register::at(0x4002_3844);
 const GPIOA_MODER: Register = Register::at(0x4002_0000);
 const GPIOB_MODER: Register = Register::at(0x4002_0400);
+const GPIOC_MODER: Register = Register::at(0x4002_0800);
+const GPIOC_IDR: Register = Register::at(0x4002_0810);
+/// Pin of the enable input.
+const ENABLE: u32 = 7;
 
 const ADC1: usize = 0x4001_2000;
 const ADC_SR: Register = Register::at(ADC1);
 const ADC_CR1: Register = Register::at(ADC1 + 0x04);
 const ADC_CR2: Register = Register::at(ADC1 + 0x08);
+const ADC_SMPR1: Register = Register::at(ADC1 + 0x0C);
 const ADC_SMPR2: Register = Register::at(ADC1 + 0x10);
 const ADC_SQR1: Register = Register::at(ADC1 + 0x2C);
 const ADC_SQR3: Register = Register::at(ADC1 + 0x34);
@@ -57,10 +62,10 @@ const TIM_ARR: Register = Register::at(TIM3 + 0x2C);
 const TIM_CCR1: Register = Register::at(TIM3 + 0x34);
 const COMPARED: u32 = 1 << 1;
 /// From the scan's start to the control step, µs.
-const SCAN_US: u32 = 20;
+const SCAN_US: u32 = 25;
 
 /// Sensors of a scan.
-pub const SENSORS: usize = 3;
+pub const SENSORS: usize = 5;
 
 /// Where the stream puts a scan.
 struct Scan(UnsafeCell<[u16; SENSORS]>);
@@ -73,17 +78,19 @@ pub static TICK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
 /// Sets converter, stream and timer up; the timer's interrupt must still be disabled.
 pub fn start() {
-    AHB1ENR.set(0b11 | 1 << 22);
+    AHB1ENR.set(0b111 | 1 << 22);
     APB1ENR.set(1 << 1);
     APB2ENR.set(1 << 8);
-    // PA0, PA1 and PB0 are analogue.
+    // PA0, PA1, PB0, PC0 and PC1 are analogue; PC7 is an input as it is.
     GPIOA_MODER.set(0b1111);
     GPIOB_MODER.set(0b11);
-    // Clock: APB2 / 4. Channels 0, 1 and 8 sample for 84 cycles.
+    GPIOC_MODER.set(0b1111);
+    // Clock: APB2 / 4. All channels sample for 84 cycles.
     ADC_CCR.write(0b01 << 16);
+    ADC_SMPR1.write(0b100 | 0b100 << 3);
     ADC_SMPR2.write(0b100 | 0b100 << 3 | 0b100 << 24);
     ADC_SQR1.write((SENSORS as u32 - 1) << 20);
-    ADC_SQR3.write(1 << 5 | 8 << 10);
+    ADC_SQR3.write(1 << 5 | 8 << 10 | 10 << 15 | 11 << 20);
     ADC_CR1.write(1 << 8);
     start_scans();
     TIM_PSC.write(TIMER_CLOCK_MHZ - 1);
@@ -113,6 +120,11 @@ fn start_scans() {
     S0CR.set(1);
     // On, DMA as long as there are scans, triggered by the rising edge of TIM3's update.
     ADC_CR2.write(0b01 << 28 | 8 << 24 | 1 << 9 | 1 << 8 | 1);
+}
+
+/// Whether the circuit of the enable input is closed.
+pub fn enable_is_closed() -> bool {
+    GPIOC_IDR.read() >> ENABLE & 1 != 0
 }
 
 /// The scan of this tick, if it is whole.

@@ -9,16 +9,14 @@ use crate::pluralise::pluralise;
 /// The columns of one file, in its order.
 pub(super) type ColumnTable = Vec<(String, Column)>;
 
-/// One column of a container.
+/// One column of a container, or of a table in memory.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Column {
+pub enum Column {
     /// Missing values are NaN.
     Numbers(Vec<f64>),
-    /// Only Parquet columns hold text.
-    #[cfg_attr(not(feature = "parquet"), allow(dead_code))]
+    /// Text, such as names of runs.
     Texts(Vec<String>),
     /// What a recording has no use for, by what it is: reported only where such a column is requested.
-    #[cfg_attr(not(any(feature = "parquet", feature = "hdf5")), allow(dead_code))]
     Other(String),
 }
 

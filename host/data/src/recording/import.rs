@@ -36,6 +36,10 @@
 //! [lookup]                          # a table beside the file; its columns can be used like the file's own
 //! file = "runs.csv"
 //! match = { file = "{file}", run = "run" }   # column of the table = column of the file
+//!
+//! [grid]                            # a static map: a row for each pressure, a column of force for each length
+//! columns = 'F_(?<length_mm>[0-9.]+)mm'  # headings of its columns; what the named groups catch goes with the column
+//! values = "force_N"                # what its cells are
 //! ```
 //!
 //! A quantity that is not described is looked for in the header under its usual name.
@@ -137,6 +141,16 @@ pub struct Lookup {
     /// Column of the table = column of the recording, or `{file}` for the recording's file name.
     #[serde(rename = "match")]
     pub keys: BTreeMap<String, String>,
+}
+
+/// A static map: a row for each pressure, a column of force for each length. Each column is read as a recording.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Grid {
+    /// A regular expression for the headings of its columns. What its named groups catch goes with the column.
+    pub columns: String,
+    /// What its cells are: a name with its unit.
+    pub values: String,
 }
 
 /// How decimals are written.
@@ -258,6 +272,8 @@ pub struct Import {
     pub filters: BTreeMap<String, Value>,
     /// A table beside the file.
     pub lookup: Option<Lookup>,
+    /// A static map in place of a table over time.
+    pub grid: Option<Grid>,
 }
 
 impl Import {
@@ -324,6 +340,7 @@ impl Import {
         }
         pattern("file_name", self.file_name.as_deref())?;
         pattern("preamble", self.preamble.as_deref())?;
+        pattern("grid.columns", self.grid.as_ref().map(|g| g.columns.as_str()))?;
         self.delimiter()?;
         Ok(())
     }

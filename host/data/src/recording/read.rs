@@ -9,7 +9,7 @@ use super::assemble::{Job, LookupTable, assemble};
 use super::blocks::{BlockError, Blocks, Rows, read_rows};
 use super::campaign::Campaign;
 use super::column_plan::{ColumnPlan, Context, plan};
-use super::column_table::select;
+use super::column_table::{Column, ColumnTable, select};
 use super::columns::Recording;
 use super::container::{self, Container};
 use super::header::Header;
@@ -25,6 +25,7 @@ use crate::progress::Progress;
 
 mod constants;
 mod error_messages;
+mod grid;
 
 use constants::Constants;
 use error_messages::{block_error, rows_error};
@@ -203,6 +204,9 @@ impl<'a> Reader<'a> {
         source: source::Source,
         description: Cow<'_, Import>,
     ) -> Result<Vec<Recording>> {
+        if let Some(grid) = &description.grid {
+            return self.grid(path, source, &description, grid);
+        }
         let mut blocks = Blocks::new(source.reader);
         let mut first = Vec::new();
         let start = match blocks.next(&mut first) {
@@ -251,8 +255,35 @@ impl<'a> Reader<'a> {
         container: Container,
         mut source: source::Source,
     ) -> Result<Vec<Recording>> {
-        let description = self.description();
         let table = container::columns(path, container, &mut source)?;
+        self.take_columns(path, table)
+    }
+
+    /// Reads columns that are in memory by the rules of a file with this name: names that end in the unit, filters, splitting.
+    ///
+    /// ```
+    /// use pam_data::recording::{Reader, TableColumn};
+    ///
+    /// let numbers = |of: fn(f64) -> f64| TableColumn::Numbers((0..10).map(|i| of(f64::from(i))).collect());
+    /// let table = vec![
+    ///     ("time_ms".to_owned(), numbers(|i| 100.0 * i)),
+    ///     ("pressure_bar".to_owned(), numbers(|_| 3.0)),
+    ///     ("displacement_mm".to_owned(), numbers(|i| i)),
+    /// ];
+    /// let recording = &Reader::new().table("run 1", table)?[0];
+    /// assert!((recording.pressure[0] - 3e5).abs() < 1e-6 && (recording.time[9] - 0.9).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Reader::file`]; the place is the row, counted from 1.
+    pub fn table(&self, name: &str, columns: Vec<(String, Column)>) -> Result<Vec<Recording>> {
+        let path = Path::new(name);
+        self.take_columns(path, columns).map_err(|e| if e.place().file.is_none() { e.file(path) } else { e })
+    }
+
+    fn take_columns(&self, path: &Path, table: ColumnTable) -> Result<Vec<Recording>> {
+        let description = self.description();
         let names: Vec<String> = table.iter().map(|(n, _)| n.clone()).collect();
         let layout = self.layout(path, &names, &description, "")?;
         let rows = select(&table, &layout.plan.wanted, description.missing)?;

@@ -158,9 +158,29 @@ pub fn fault(fault: Fault) -> FaultMessage {
         ),
         Fault::ValveTest => (
             "valve-test",
-            "the regulator did not fill the muscle, or the dump valve did not empty it, in the test before arming",
-            "look at supply air, regulator and dump valve; the test's pressure is watch.valve_test_pa",
+            "the regulator did not fill the muscle, filled it too far, or the dump valve did not empty it, in the test before arming",
+            "look at supply air, regulator and dump valve, and at the scales of the pressure sensor (scales.pressure) and the command \
+             (command.full_pa); the test's pressure is watch.valve_test_pa",
             "Pa",
+        ),
+        Fault::PressureSensorsDisagree => (
+            "pressure-sensors-disagree",
+            "the two pressure sensors of a muscle disagree",
+            "compare both with a gauge (`host device sensors`), and calibrate or replace the wrong one; the largest difference is \
+             watch.second_pressure_pa",
+            "Pa",
+        ),
+        Fault::SupplyPressureLow => (
+            "supply-pressure-low",
+            "the supply air is below its least pressure",
+            "check compressor, valve and filter; the least pressure is watch.supply_low_pa",
+            "Pa",
+        ),
+        Fault::EnableOpen => (
+            "enable-open",
+            "the enable input is open: an emergency stop was pressed, or its wire is broken",
+            "release the emergency stop and check its circuit, then clear the fault",
+            "",
         ),
     };
     FaultMessage { name, cause, remedy, unit }

@@ -1,7 +1,7 @@
 //! Refused requests as errors: what was refused, why, and the remedy.
 
 use model_core::link::endpoints::{ClearFault, Endpoint};
-use model_core::link::messages::{Field, Refusal, State, StoreFault, TableFault};
+use model_core::link::messages::{Field, Refusal, State, StoreFault, TableFault, UpdateFault};
 use pam_data::error::Error;
 use pam_data::pluralise::pluralise;
 
@@ -86,6 +86,7 @@ pub fn refused(request: &str, refusal: Refusal) -> Error {
                 .to_owned(),
         ),
         Refusal::OtherSession => return in_use(request),
+        Refusal::Update(why) => return update_refused(why),
     };
     Error::new(DeviceCode::DeviceRefused, format!("the device refuses `{request}`: {why}")).help(help)
 }
@@ -98,6 +99,41 @@ pub fn in_use(request: &str) -> Error {
         format!("the device refuses `{request}`: another program has armed it or started its mode"),
     )
     .help("end the other program; `host vent --port PORT` ends its run")
+}
+
+fn update_refused(why: UpdateFault) -> Error {
+    let again = "send it again; if the refusal returns, the flash memory is failing";
+    let (cause, help) = match why {
+        UpdateFault::NotBegun => {
+            ("a piece arrived before the update was started".to_owned(), "send it again")
+        }
+        UpdateFault::Malformed => {
+            ("its header cannot be decoded".to_owned(), "pack it with `host update pack` of this release")
+        }
+        UpdateFault::Board => {
+            ("it is for another board".to_owned(), "build it for the board that `host device info` shows")
+        }
+        UpdateFault::Slot => (
+            "it is linked for another slot".to_owned(),
+            "pack images for both slots: build one of them with --slot-b",
+        ),
+        UpdateFault::TooLong => ("it is longer than the slot".to_owned(), "build it with --small"),
+        UpdateFault::Signature => (
+            "its signature is not that of the key in the device".to_owned(),
+            "sign it with the key whose public part the running firmware was built with, or program the board with a debug probe",
+        ),
+        UpdateFault::Gap(there) => (format!("a piece is missing after byte {there}"), "send it again"),
+        UpdateFault::Digest => ("what arrived is not what was signed".to_owned(), again),
+        UpdateFault::Medium => ("its flash memory failed".to_owned(), again),
+        UpdateFault::NoOther => {
+            ("the other slot has no whole firmware".to_owned(), "send one with `host update send`")
+        }
+    };
+    Error::new(
+        DeviceCode::DeviceRefused,
+        format!("the device refuses the firmware: {cause}; the one that runs stays in use"),
+    )
+    .help(help)
 }
 
 fn table_refused(why: TableFault) -> Error {
@@ -144,6 +180,8 @@ const fn field_name(field: Field) -> &'static str {
         Field::SensorWatch => "a sensor monitor in the settings",
         Field::Watch => "the setting `watch`",
         Field::Bands => "a band of motion in the settings",
+        Field::Scale => "the scale or the filter of a sensor",
+        Field::Command => "the output to the pressure regulator",
         Field::Rate => "the rate of telemetry or of a trace",
     }
 }

@@ -40,6 +40,8 @@ pam_data::criteria! {
     CELLS: usize = 6, "cells", "1", Judgement;
     /// Strokes nearer than this are one mounting (tape measure).
     SAME_STROKE: f64 = 1e-3, "same_stroke", "m", Convention("tape measure, 1 mm");
+    /// Lengths of the reference from which on the force between two of them is interpolated: fewer do not show an error.
+    INTERPOLATE_FROM: usize = 3, "interpolate_from", "1", Judgement;
     /// Fewer common cells and a mounting is not comparable.
     FEWEST_CELLS: usize = 4, "fewest_cells", "1", Judgement;
     /// More cells are joined in pairs of runs, so that the covariance stays quick.
@@ -60,6 +62,8 @@ pam_data::criteria! {
     LAG_FLOOR: f64 = 0.010, "lag_floor", "s", Judgement;
     /// Runs that `LAG_FLOOR` is worth.
     LAG_RUNS: f64 = 4.0, "lag_runs", "1", Judgement;
+    /// The same beside a table, which is often older: a filter of some seconds may have been added since.
+    TABLE_LAGS: ([f64; 16]) = [0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.17, 0.23, 0.3, 0.4, 0.55, 0.75, 1.0, 1.4, 2.0], "table_lags", "s", Judgement;
     /// The sizes of lags that are equally likely beforehand.
     LAG_SIZES: ([f64; 5]) = [0.02, 0.05, 0.1, 0.2, 0.4], "lag_sizes", "s", Judgement;
     /// Variance of a median over that of a mean.
@@ -105,8 +109,12 @@ pam_data::criteria! {
     SET: f64 = 0.95, "set", "1", Convention("95 %");
     /// Error of the slopes ∂F/∂P and ∂F/∂x, share of the size: by principle, they are estimated from the same recordings.
     SLOPE_ERROR: f64 = 0.05, "slope_error", "1", Judgement;
+    /// The same for a step within AFTER beside a table, by the slope that AFTER shows, which the step itself has altered.
+    OWN_SLOPE_ERROR: f64 = 0.15, "own_slope_error", "1", Judgement;
     /// The same where the slopes are a table's.
     TABLE_SLOPE_ERROR: f64 = 0.2, "table_slope_error", "1", Measured("development half, sizes of changes put in");
+    /// Widens intervals beside a table: its error is larger in some muscles than its four sizes allow.
+    TABLE_INTERVAL: f64 = 1.4, "table_interval", "1", Measured("development half, 34 of 43 sizes within without it");
     /// The same over the length, along which a table was fitted at three to five lengths.
     TABLE_SLOPE_OVER_LENGTH: f64 = 0.5, "table_slope_over_length", "1", Measured("development half, sizes of changes put in");
     /// Start points of a step that are tried, at most.
@@ -127,6 +135,10 @@ pam_data::criteria! {
     SHARED_ROWS: f64 = 0.1, "shared_rows", "1", Judgement;
     /// Rest lengths that differ by more than this share are of two actuators: a tape measure errs by less.
     OTHER_LENGTH: f64 = 0.02, "other_length", "1", Judgement;
+    /// Share of the difference's energy on held-out recordings that names must remove; below it they describe something else.
+    UNSEEN_LEAST: f64 = 0.1, "unseen_least", "1", Convention("as FURTHER_SHARE of the forward selection");
+    /// The same from which on the names explain the difference; below it they explain a part.
+    UNSEEN_EXPLAINED: f64 = 0.5, "unseen_explained", "1", Convention("the larger part");
     /// With a difference that suspects another actuator, names that leave more than this share of the largest force are withdrawn.
     LEFT_BY_NAMES: f64 = 0.1, "left_by_names", "1", Judgement;
     /// Strokes: bins over the middle of the stroke.
@@ -139,6 +151,10 @@ pam_data::criteria! {
     LEVEL: f64 = 0.04, "level", "1", Judgement;
     /// A recording whose stroke stays within this is held.
     HELD: f64 = 1e-3, "held", "m", Judgement;
+    /// Rows of a hold that counts as a recording at a held length.
+    STAGES_FEWEST_ROWS: usize = 20, "stages_fewest_rows", "1", Judgement;
+    /// Share of a recording's time in such holds from which it counts as one of held lengths.
+    STAGES_SHARE: f64 = 0.5, "stages_share", "1", Convention("the larger part");
     /// What repeats between campaigns of strokes: shares of the largest force, or of friction.
     STROKE_REPEATS: (StrokeRepeats) = StrokeRepeats {
         zero: 0.002,
@@ -194,6 +210,26 @@ pam_data::criteria! {
     TABLE_ERROR_ZERO: f64 = 0.3, "table_error_zero", "1", Measured("development half");
     /// Step of the slope over the length, m.
     TABLE_SURFACE_STEP: f64 = 1e-4, "table_surface_step", "1", Judgement;
+    /// Strokes of a described muscle: parts of the contraction of a level.
+    CATALOGUE_BINS: usize = 8, "catalogue_bins", "1", Judgement;
+    /// Fewer common cells cannot be compared.
+    CATALOGUE_FEWEST_CELLS: usize = 24, "catalogue_fewest_cells", "1", Judgement;
+    /// Error of a cell's mean that is always allowed, share of the largest force: what a load cell of 0.02 % resolves.
+    CATALOGUE_FLOOR: f64 = 2e-4, "catalogue_floor", "1", Convention("load cell, 0.02 %");
+    /// Cells that the spread of all kinds of motion is worth for that of one kind.
+    CATALOGUE_PRIOR: f64 = 10.0, "catalogue_prior", "1", Judgement;
+    /// The shortest rest, s; longer ones count by decades.
+    CATALOGUE_REST: f64 = 1.0, "catalogue_rest", "s", Judgement;
+    /// Speeds that differ by less than about this factor count as one.
+    CATALOGUE_SPEED_STEP: f64 = 4.0, "catalogue_speed_step", "1", Judgement;
+    /// What campaigns usually differ by without a change, share of the largest force: a load cell's zero, gain, gauge and friction.
+    CATALOGUE_USUAL: f64 = 5e-4, "catalogue_usual", "1", Judgement;
+    /// How inexact the law of an effect is, share of its trace.
+    CATALOGUE_LAW_ERROR: f64 = 0.15, "catalogue_law_error", "1", Judgement;
+    /// Independent pieces that the difference of a law from the actuator amounts to, at most.
+    CATALOGUE_INDEPENDENT: f64 = 24.0, "catalogue_independent", "1", Judgement;
+    /// Steps of the refinement of shapes.
+    CATALOGUE_REFINED: usize = 6, "catalogue_refined", "1", Cost;
     /// Length and pressure move together: parts of the stroke, each of which counts as a held length.
     COMBINED_LENGTHS: usize = 5, "combined_lengths", "1", Judgement;
     /// The same: spans of time, whose differences show how far the actuator repeats.

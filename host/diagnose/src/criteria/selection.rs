@@ -32,10 +32,10 @@ pam_data::criteria! {
     LARGEST_PEAK: f64 = 0.25, "F_cancel/F_b", "1", Judgement;
     /// An effect must explain this share of the excess error that it finds.
     LEAST_SHARE: f64 = 0.4, "q_first", "1", Judgement;
-    /// A further effect must also explain this share of all excess error.
-    FURTHER_SHARE: f64 = 0.1, "q_further", "1", Judgement;
+    /// A further effect must also explain this share of all excess error: more than the first law leaves by its inexactness.
+    FURTHER_SHARE: f64 = 0.03, "q_further", "1", Derived("17 % of the error; laws are off by 3 to 7 % of their traces");
     /// Effects that are selected at most.
-    MOST_SELECTED: usize = 3, "n_max", "1", Judgement;
+    MOST_SELECTED: usize = 5, "n_max", "1", Judgement;
     /// An effect is not selected where one that is concealed scores this many times as much.
     SHADOW: f64 = 2.0, "D_hidden/D", "1", Judgement;
     /// Independent rows of any campaign, at least.
@@ -48,6 +48,8 @@ pam_data::criteria! {
     FIRST_STROKES: f64 = 0.7, "q_strokes", "1", Judgement;
     /// Candidates whose shapes are refined at every step.
     REFINED: usize = 12, "n_refine", "1", Cost;
+    /// Rounds in which a law that stands in for a part of the base is refined about the base beside it.
+    RENEWALS: usize = 2, "n_renew", "1", Cost;
     /// A linearisation that leaves more than this times the error of the one before is rejected.
     WORSE: f64 = 1.25, "S_new/S_old", "1", Judgement;
     /// The joint fit must keep this share of the gain that the single fit promised.

@@ -12,7 +12,6 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Recording};
 use pam_fit::effect_columns::effect_columns;
 use pam_fit::numerics::median;
-use pam_fit::predict::predict;
 use pam_fit::table_file::{About, Correction, TableFile, stored_mountings};
 use pam_fit::{Options as FitOptions, fit, table_alone};
 
@@ -131,7 +130,7 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// Recordings that cannot be fitted.
     pub(super) fn table(&self, layers: Layers) -> Result<TableFile> {
-        let Self { muscle, used, loaded, .. } = self;
+        let Self { muscle, used, .. } = self;
         let everything = used.iter().all(|used| *used);
         // The contact depends on pressure and geometry alone, the wall's drive on the table.
         let rounds = if layers == Layers::Contact { 1 } else { TABLE_ROUNDS };
@@ -140,24 +139,37 @@ impl<'a> Prepared<'a> {
             let mut bare = file.clone();
             bare.table.effects.clear();
             let effect = self.amplitudes(&bare, layers)?;
-            let mut with = bare.clone();
-            let _ = with.table.effects.push(effect.clone());
-            let (full, base) = (predict(&with, loaded)?, predict(&bare, loaded)?);
-            let mut freed = loaded.clone();
-            for ((recording, full), base) in
-                freed.recordings.iter_mut().zip(&full.recordings).zip(&base.recordings)
-            {
-                for ((force, f), b) in recording.force.iter_mut().flatten().zip(&full.force).zip(&base.force)
-                {
-                    *force -= f - b;
-                }
-            }
-            let freed = chosen(&freed, used);
+            let freed = chosen(&self.freed(&bare, &effect)?, used);
             let last = round == rounds && everything;
             file = if last { complete(&freed, muscle)? } else { alone(&freed, muscle)? };
+            // Slack readings are not in that fit.
+            file.table.goes_slack = self.base.table.goes_slack;
             let _ = file.table.effects.push(effect);
         }
         Ok(self.zeroed(file))
+    }
+
+    /// The readings that pull, without the effect's force. What a slack muscle would pull without it is not known.
+    fn freed(&self, bare: &TableFile, effect: &FittedEffect) -> Result<Campaign> {
+        let values: Vec<f64> = effect.parameters.iter().map(|p| f64::from(*p)).collect();
+        let columns = effect_columns(bare, &self.loaded, effect.effect, &values[AMPLITUDES..])?;
+        let least = PULLS * self.points.largest_force();
+        let mut freed = self.loaded.clone();
+        let mut first = 0;
+        for recording in &mut freed.recordings {
+            let force = recording.force.take().unwrap_or_default();
+            let keep: Vec<usize> = (0..force.len()).filter(|i| force[*i] > least).collect();
+            let part = |i: usize| -> f64 { columns.iter().zip(&values).map(|(c, v)| c[first + i] * v).sum() };
+            recording.force = Some(keep.iter().map(|i| force[*i] - part(*i)).collect());
+            for column in [&mut recording.time, &mut recording.stroke, &mut recording.pressure] {
+                *column = keep.iter().map(|i| column[*i]).collect();
+            }
+            recording.direction = recording.direction.take().map(|d| keep.iter().map(|i| d[*i]).collect());
+            (recording.temperature, recording.pressure_command) = (None, None);
+            (recording.cycle, recording.rows) = (None, None);
+            first += force.len();
+        }
+        Ok(freed)
     }
 
     /// The effect beside a free curve for each mounting, at the width of the contact that leaves the least.
@@ -196,7 +208,9 @@ pub fn table(settled: &Campaign, muscle: &MuscleDescription) -> Result<Option<Ta
 
 /// The table of recordings with all that its file tells.
 fn complete(campaign: &Campaign, muscle: &MuscleDescription) -> Result<TableFile> {
-    let fitted = fit(campaign, muscle, &FitOptions::default())?;
+    let with =
+        |as_described: bool| fit(campaign, muscle, &FitOptions { as_described, ..FitOptions::default() });
+    let fitted = with(false).or_else(|_| with(true))?;
     let about = About {
         muscle: muscle.name.clone(),
         tool: format!("host {}", env!("CARGO_PKG_VERSION")),
@@ -208,14 +222,22 @@ fn complete(campaign: &Campaign, muscle: &MuscleDescription) -> Result<TableFile
     Ok(TableFile { table: fitted.table, about })
 }
 
-/// The same for a prediction only.
-pub(super) fn alone(campaign: &Campaign, muscle: &MuscleDescription) -> Result<TableFile> {
-    let (table, mountings) = table_alone(campaign, muscle, &FitOptions::default())?;
+/// The same for a prediction only. Few recordings may ask for dimensions that no table has: then those of the description stay.
+fn alone(campaign: &Campaign, muscle: &MuscleDescription) -> Result<TableFile> {
+    let with = |as_described: bool| {
+        table_alone(campaign, muscle, &FitOptions { as_described, ..FitOptions::default() })
+    };
+    let (table, mountings) = with(false).or_else(|_| with(true))?;
     Ok(TableFile { table, about: About { mountings, ..About::default() } })
 }
 
-pub(super) fn chosen(campaign: &Campaign, used: &[bool]) -> Campaign {
-    let recordings = campaign.recordings.iter().zip(used).filter(|(_, used)| **used).map(|(r, _)| r.clone());
+fn chosen(campaign: &Campaign, used: &[bool]) -> Campaign {
+    let recordings = campaign
+        .recordings
+        .iter()
+        .zip(used)
+        .filter(|(r, used)| **used && !r.is_empty())
+        .map(|(r, _)| r.clone());
     Campaign { recordings: recordings.collect(), clock: campaign.clock, warnings: Vec::new() }
 }
 

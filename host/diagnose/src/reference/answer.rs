@@ -54,6 +54,11 @@ pub enum NotComparable {
     Strokes,
     /// Changes that a motion of length and pressure together is not asked about.
     Moving,
+    /// Parts of strokes at levels, places or speeds that the reference does not have.
+    States {
+        /// Their share.
+        share: f64,
+    },
     /// Rows at lengths that the reference does not have.
     Lengths {
         /// Its name.
@@ -90,6 +95,13 @@ pub enum Remark {
     OtherActuator,
     /// Mounted anew, and one length only.
     OneLengthMountedAnew,
+    /// A length that the reference does not have, m: its force there is interpolated, with this error, N.
+    Interpolated {
+        /// Its stroke, m.
+        stroke: f64,
+        /// N.
+        error: f64,
+    },
     /// Nothing in the reference was recorded twice.
     NothingTwice,
     /// One mounting, m, differs alone, with this log Bayes factor.
@@ -133,6 +145,8 @@ pub enum WhyNot {
     LessProbable,
     /// The difference does not have its shape, or is too small.
     OtherShape,
+    /// The best name for the difference, but held-out recordings get worse with it, or the difference is that of another actuator.
+    HeldOutWorse,
 }
 
 impl WhyNot {

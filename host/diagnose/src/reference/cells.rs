@@ -18,6 +18,8 @@ pub(super) struct Cell {
     pub means: Means,
     /// Effective number of rows, 1/Σw².
     pub rows: f64,
+    /// No recording: what the reference's other lengths say, with their error.
+    pub interpolated: bool,
 }
 
 /// What is averaged.
@@ -30,6 +32,8 @@ pub(super) struct Means {
     pub force: f64,
     pub by_pressure: f64,
     pub by_stroke: f64,
+    /// The slope that a step within AFTER counts with.
+    pub step_by_stroke: f64,
     /// ln(1 + time since mounting).
     pub mounted: f64,
     /// ln(1 + time in the run).
@@ -56,6 +60,7 @@ impl Means {
             (&mut self.force, o.force),
             (&mut self.by_pressure, o.by_pressure),
             (&mut self.by_stroke, o.by_stroke),
+            (&mut self.step_by_stroke, o.step_by_stroke),
             (&mut self.mounted, o.mounted),
             (&mut self.begun, o.begun),
             (&mut self.clock, o.clock),
@@ -85,6 +90,7 @@ fn row(run: &Run, i: usize, surface: &Surface, duration: f64) -> Means {
         force,
         by_pressure,
         by_stroke,
+        step_by_stroke: if c.own_by_stroke.is_empty() { by_stroke } else { at(&c.own_by_stroke) },
         mounted: ((run.since_mounted + t) / CREEP_START).ln_1p(),
         begun: (t / CREEP_START).ln_1p(),
         clock: if run.after { (run.since_after + t) / duration.max(1e-9) } else { 0.0 },
@@ -158,10 +164,30 @@ pub(super) fn cells(all: &Runs, surface: &Surface, lag: Option<LagTrace<'_>>) ->
                 bin,
                 means,
                 rows: 1.0 / rows.iter().map(|(_, w)| w * w).sum::<f64>(),
+                interpolated: false,
             });
         }
     }
-    join(cells)
+    let mut cells = join(cells);
+    let made = interpolated(&cells, all);
+    cells.extend(made);
+    cells
+}
+
+/// For every cell of AFTER at a length that the reference does not have, one of BEFORE without a difference: its error is that of the
+/// interpolation.
+fn interpolated(cells: &[Cell], all: &Runs) -> Vec<Cell> {
+    let mut made: std::collections::BTreeMap<(usize, bool, usize), Cell> = std::collections::BTreeMap::new();
+    for cell in cells.iter().filter(|c| c.after && all.is_interpolated(c.mounting)) {
+        made.entry((cell.mounting, cell.direction < 0.0, cell.bin)).or_insert_with(|| Cell {
+            run: all.runs.len() + cell.mounting,
+            after: false,
+            means: Means { residual: 0.0, lag: 0.0, ..cell.means },
+            interpolated: true,
+            ..cell.clone()
+        });
+    }
+    made.into_values().collect()
 }
 
 /// Joins neighbouring runs of a mounting in pairs until few enough cells are left.

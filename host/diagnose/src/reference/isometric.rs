@@ -5,7 +5,8 @@ use nalgebra::DVector;
 use super::cells::{Cell, cells};
 use super::contrast::{Contrast, evidence};
 use super::criteria::{
-    COMBINED_SHAPE_ERROR, DIRECTIONS_PER_RUN, LAG_FLOOR, MOST_CHANGES, NAMED, SIZES, TABLE_ERROR_FACTORS,
+    COMBINED_SHAPE_ERROR, DIRECTIONS_PER_RUN, LAG_FLOOR, LAGS, MOST_CHANGES, NAMED, SIZES,
+    TABLE_ERROR_FACTORS, TABLE_LAGS,
 };
 use super::gate::{self, Asked};
 use super::lag::{self, Shift};
@@ -122,8 +123,9 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
     let Reference { surface, error, recorded } = reference;
     use rayon::prelude::*;
     // Rows of one part of a motion do not follow one another: they say nothing about lags.
+    let tried: &[f64] = if recorded { &LAGS } else { &TABLE_LAGS };
     let shift = (!runs.moving).then(|| {
-        let scores: Vec<_> = runs.runs.par_iter().map(|r| lag::score(r, &surface)).collect();
+        let scores: Vec<_> = runs.runs.par_iter().map(|r| lag::score(r, &surface, tried)).collect();
         lag::shift(&runs, &scores)
     });
     let late = shift.as_ref().map_or(0.0, |s| s.lag);
@@ -209,7 +211,9 @@ fn contrasts(
     let y = DVector::from_iterator(cells.len(), cells.iter().map(|c| c.means.residual));
     let Some(error) = table_error else {
         let used: std::collections::BTreeSet<usize> = runs.runs.iter().map(|r| r.mounting).collect();
-        let taught = DIRECTIONS_PER_RUN * (runs.runs.len() as f64 - 2.0 * used.len() as f64).max(1.0);
+        // Runs repeated on one side, or else lengths beyond the first: what a single change leaves of their differences does not repeat.
+        let repeated = runs.runs.len() as f64 - 2.0 * used.len() as f64;
+        let taught = DIRECTIONS_PER_RUN * repeated.max(used.len() as f64 - 1.0).max(1.0);
         return Ok(vec![Contrast::new(repeats, Some(&levels(cells)), y, taught).ok_or_else(unusable)?]);
     };
     // What the error's size adapts to, the scale of what repeats must not take once more.

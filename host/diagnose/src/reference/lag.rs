@@ -2,7 +2,7 @@
 
 use super::cells::Cell;
 use super::contrast::log_mean;
-use super::criteria::{CELLS, LAG_CLIP, LAG_FLOOR, LAG_GAP, LAG_RUNS, LAG_SIZES, LAGS, MEDIAN_VARIANCE};
+use super::criteria::{CELLS, LAG_CLIP, LAG_FLOOR, LAG_GAP, LAG_RUNS, LAG_SIZES, MEDIAN_VARIANCE};
 use super::runs::{Run, Runs};
 use super::surface::{Surface, bin};
 
@@ -142,18 +142,18 @@ fn lowest(x: [f64; 3], y: [f64; 3]) -> f64 {
     ((x[0] + x[1]) / 2.0 - a / (2.0 * curvature)).clamp(x[0], x[2])
 }
 
-/// The lag score of a run.
-pub(super) fn score(run: &Run, surface: &Surface) -> Score {
+/// The lag score of a run, by the lags that are tried, ascending.
+pub(super) fn score(run: &Run, surface: &Surface, lags: &[f64]) -> Score {
     let scorer = Scorer::new(run, surface);
     let expected = scorer.forces(&run.pressure);
     let later = |lag: f64| scorer.forces(&delayed(&run.time, &run.pressure, lag));
-    let mut tried: Vec<(f64, f64)> = LAGS
+    let mut tried: Vec<(f64, f64)> = lags
         .iter()
         .rev()
         .map(|lag| (-lag, scorer.cost(&low_pass(&run.time, &run.force, *lag), &expected)))
         .collect();
     tried.push((0.0, scorer.cost(&run.force, &expected)));
-    tried.extend(LAGS.iter().map(|lag| (*lag, scorer.cost(&run.force, &later(*lag)))));
+    tried.extend(lags.iter().map(|lag| (*lag, scorer.cost(&run.force, &later(*lag)))));
     let best = (0..tried.len()).min_by(|a, b| tried[*a].1.total_cmp(&tried[*b].1)).unwrap_or(0);
     let lag = if best > 0 && best + 1 < tried.len() {
         let near = &tried[best - 1..=best + 1];

@@ -101,6 +101,11 @@ pub(super) fn covariance(cells: &[Cell], setting: &Setting) -> DMatrix<f64> {
                 v += square(REMOUNT / unit) * clamped * side * a.means.by_stroke * b.means.by_stroke;
             }
             v += square(r.offset) * run;
+            if a.interpolated && b.interpolated && a.mounting == b.mounting && i != j {
+                // An interpolation is wrong smoothly over the pressure.
+                let both = (a.means.variance * b.means.variance).max(0.0).sqrt();
+                v += both / square(unit) * (-0.5 * apart * apart).exp() * way;
+            }
             if i == j {
                 v += square(r.cell) * (0.2 + a.means.active) * (1.0 + 2.0 / a.rows)
                     + a.means.variance / square(unit);

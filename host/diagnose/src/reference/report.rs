@@ -2,8 +2,7 @@
 
 use super::answer::{ChangeReport, Left, NotComparable, Place, Remark, Repeatability, Verdict};
 use super::criteria::{
-    COMBINED_UNREST, HELD, LEFT_BY_NAMES, NAMED, OTHER_ACTUATOR, OTHER_LENGTH, PRIOR_NONE, REPORT_REGULATED,
-    UNSTATED_ERROR,
+    COMBINED_UNREST, HELD, NAMED, OTHER_LENGTH, PRIOR_NONE, REPORT_REGULATED, UNSTATED_ERROR,
 };
 use super::held_out::Unseen;
 use super::isometric;
@@ -12,7 +11,9 @@ use super::staircase_answer::staircases;
 use super::stroke_answer::strokes;
 use super::stroked;
 use super::surface::Surface;
-use super::{combined, sides, table_surface, units};
+use super::withdrawal::withdraw;
+use super::{catalogue, combined, sides, stages, table_surface, units};
+use model_core::braid::Geometry;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::{self, Campaign, Recording};
 use pam_fit::predict::predict;
@@ -36,6 +37,8 @@ pub struct Options {
     pub muscle: Option<String>,
     /// L0, m, where it is known.
     pub rest_length: Option<f64>,
+    /// The muscle's dimensions, where they are described: then strokes are asked about every effect of the catalogue.
+    pub geometry: Option<Geometry>,
     /// Whether AFTER was mounted anew.
     pub mounted: Mounted,
     /// Prior probability that something changed, instead of the usual.
@@ -126,16 +129,34 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
     for r in &after.recordings {
         r.require_force()?;
     }
-    let kind = protocol(after, "AFTER")?;
+    let given = after;
+    let after = &stages::parted(given);
+    let kind = match (protocol(after, "AFTER"), &options.geometry) {
+        // Strokes with readings at rest between them: a described muscle is compared row by row.
+        (Err(_), Some(_)) if matches!(against, Against::Recordings(_)) => Protocol::Combined,
+        (kind, _) => kind?,
+    };
     let mut report = match (against, kind) {
         (Against::Recordings(before), _) => {
             for r in &before.recordings {
                 r.require_force()?;
             }
-            sides::apart(before, after)?;
+            sides::apart(before, given)?;
+            let whole = before;
+            let before = &stages::parted(whole);
             let mut remarks = units::check(before, after)?;
             remarks.extend(sides::order(before, after));
-            let mut report = match (protocol(before, "the reference")?, kind) {
+            let described = options.geometry.as_ref().filter(|_| kind != Protocol::Held);
+            let old = match described {
+                Some(_) => Protocol::Combined,
+                None => protocol(before, "the reference")?,
+            };
+            let mut report = match (old, kind) {
+                (_, _) if described.is_some() => {
+                    let geometry =
+                        described.ok_or_else(|| Error::new(DataCode::MuscleInvalid, "no dimensions"))?;
+                    catalogue::compare(whole, given, geometry, options)?
+                }
                 (Protocol::Held, Protocol::Held) => held(before, after, options)?,
                 (Protocol::Stroked, Protocol::Stroked) => {
                     let compared = stroked::compare(before, after, 0.0)?;
@@ -157,7 +178,7 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
                 }
             };
             report.reference.files = files(before);
-            report.reference.samples = before.samples();
+            report.reference.samples = whole.samples();
             report.remarks.splice(0..0, remarks);
             report
         }
@@ -177,19 +198,9 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
             report
         }
     };
-    report.samples = after.samples();
+    report.samples = given.samples();
     report.muscle.clone_from(&options.muscle);
-    if report.misfit_rms_N > OTHER_ACTUATOR * report.largest_force_N {
-        report.remarks.push(Remark::OtherActuator);
-        if report.held_out.rms_after_N > LEFT_BY_NAMES * report.largest_force_N && !report.missing.is_empty()
-        {
-            // Of another actuator everything differs, and the nearest shape is no change.
-            report.missing.clear();
-            report.verdict = Verdict::Unexplained;
-            report.held_out.rms_after_N = report.held_out.rms_before_N;
-            report.unexplained = Left { share: 1.0, place: report.r#where.first().cloned() };
-        }
-    }
+    withdraw(&mut report);
     Ok(report)
 }
 
@@ -236,8 +247,11 @@ fn recorded(runs: Runs, surface: Surface, options: &Options) -> Result<ChangeRep
 
 fn against_table(table: &TableFile, after: &Campaign, runs: Runs, options: &Options) -> Result<ChangeReport> {
     units::check_pressure(after, f64::from(table.table.tested.pressure_high.pascals()))?;
-    let surface = table_surface::of(table, &runs)?;
+    let mut surface = table_surface::of(table, &runs)?;
     units::check_force(after, surface.largest)?;
+    if !runs.moving {
+        table_surface::fill_own_slopes(&mut surface, &runs);
+    }
     let stated = table.about.fit.rms_newtons;
     let error = if stated > 0.0 { stated } else { UNSTATED_ERROR * surface.largest };
     let reference = isometric::Reference { surface, error, recorded: false };

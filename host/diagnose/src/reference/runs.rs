@@ -1,7 +1,7 @@
 //! Recordings as runs: which mounting, which run of it, when, and what cannot be compared.
 
 use super::answer::NotComparable;
-use super::criteria::{NEW_VISIT, PAUSE, SAME_STROKE};
+use super::criteria::{INTERPOLATE_FROM, NEW_VISIT, PAUSE, SAME_STROKE};
 use super::motion;
 use pam_data::error::Result;
 use pam_data::recording::{Campaign, Clock, Recording};
@@ -52,6 +52,8 @@ pub(super) struct Runs {
     pub runs: Vec<Run>,
     /// Strokes of the mountings, m, ascending.
     pub strokes: Vec<f64>,
+    /// Mountings that only AFTER has, between lengths of the reference: its force there is interpolated.
+    pub interpolated: Vec<bool>,
     /// Whether the AFTER runs of a mounting were mounted anew.
     pub remounted: bool,
     /// Whether the runs are parts of recordings in which length and pressure move together.
@@ -83,6 +85,18 @@ fn mountings(recordings: &[Recording]) -> Vec<f64> {
         }
     }
     groups.iter().map(|g| g.iter().sum::<f64>() / g.len() as f64).collect()
+}
+
+/// The reference's strokes and those of AFTER that lie between two of them, with a mark on the latter. From three lengths on the force
+/// over the length has a curvature that is known, and its error can be judged by leaving lengths out.
+fn with_interpolated(recorded: Vec<f64>, after: &[Recording]) -> (Vec<f64>, Vec<bool>) {
+    let mut all: Vec<(f64, bool)> = recorded.iter().map(|s| (*s, false)).collect();
+    if let ([first, .., last], true) = (recorded.as_slice(), recorded.len() >= INTERPOLATE_FROM) {
+        let new = mountings(after).into_iter().filter(|s| nearest(&recorded, *s).is_none());
+        all.extend(new.filter(|s| s > first && s < last).map(|s| (s, true)));
+    }
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    all.into_iter().unzip()
 }
 
 fn nearest(strokes: &[f64], stroke: f64) -> Option<usize> {
@@ -119,9 +133,9 @@ impl Runs {
     /// # Errors
     /// A recording without force.
     pub fn of(before: &Campaign, after: &Campaign, said: Mounted) -> Result<Self> {
-        let strokes = mountings(&before.recordings);
+        let (strokes, interpolated) = with_interpolated(mountings(&before.recordings), &after.recordings);
         let remounted = mounted_anew(before, after, said);
-        let mut all = Self { strokes, remounted, ..Self::default() };
+        let mut all = Self { strokes, interpolated, remounted, ..Self::default() };
         all.add(before, false)?;
         all.add(after, true)?;
         all.count();
@@ -191,6 +205,11 @@ impl Runs {
             }
         }
         self.duration = elapsed;
+    }
+
+    /// Whether the reference has no recording at this mounting's length.
+    pub fn is_interpolated(&self, mounting: usize) -> bool {
+        self.interpolated.get(mounting).copied().unwrap_or(false)
     }
 
     /// Runs of one side.

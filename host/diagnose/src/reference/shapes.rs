@@ -5,8 +5,7 @@ use serde::Serialize;
 use super::cells::Means;
 
 /// Changes that recordings often cannot distinguish; a class is right where the name may not be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Class {
     /// The load cell's zero.
     Zero,
@@ -22,6 +21,46 @@ pub enum Class {
     SensorDelay,
     /// The pressure reading is late.
     PressureSensorLag,
+    /// Friction that falls or grows slowly with speed.
+    SlowSpeed,
+    /// What grows with speed, or comes late.
+    RateOrPhase,
+    /// The actuator softens with cycles or warmth.
+    Softening,
+    /// Stress that relaxes, or creep.
+    Relaxation,
+    /// Friction that remembers reversals.
+    TurningMemory,
+    /// An effect that no other is often mistaken for.
+    Alone(&'static str),
+}
+
+impl Class {
+    /// Its name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Zero => "zero",
+            Self::Gain => "gain",
+            Self::GaugeOffset => "gauge-offset",
+            Self::Friction => "friction",
+            Self::EndSlip => "end-slip",
+            Self::SensorDelay => "sensor-delay",
+            Self::PressureSensorLag => "pressure-sensor-lag",
+            Self::SlowSpeed => "slow-speed",
+            Self::RateOrPhase => "rate-or-phase",
+            Self::Softening => "softening",
+            Self::Relaxation => "relaxation",
+            Self::TurningMemory => "turning-memory",
+            Self::Alone(name) => name,
+        }
+    }
+}
+
+impl Serialize for Class {
+    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(self.name())
+    }
 }
 
 /// Whose a change is.
@@ -59,6 +98,8 @@ pub enum Change {
     EndSlip,
     SensorDelay,
     PressureSensorLag,
+    /// Another effect of the catalogue, weighed for strokes of a described muscle.
+    Effect(&'static str),
 }
 
 /// One line of the table of changes.
@@ -178,11 +219,74 @@ pub const CHANGES: [About; 15] = [
     ),
 ];
 
+const fn effect(name: &'static str, class: Class, owner: Owner, law: &'static str) -> About {
+    about(Change::Effect(name), name, class, owner, ("size", ""), law)
+}
+
+/// The catalogue's further effects, which strokes of a described muscle can show. Classes as the catalogue computed them.
+pub const EFFECTS: [About; 24] = [
+    effect("pressure-lag", Class::RateOrPhase, Owner::RigOrMuscle, "pressure at the muscle lags"),
+    effect("leak", Class::Gain, Owner::RigOrMuscle, "air lost on the way costs pressure"),
+    effect("tip-effect", Class::Alone("tip-effect"), Owner::Muscle, "the ends are no cylinders"),
+    effect("braid-elasticity", Class::Gain, Owner::Muscle, "the braid's fibres stretch"),
+    effect(
+        "contact-loss",
+        Class::Alone("contact-loss"),
+        Owner::Muscle,
+        "the bladder does not touch the braid yet",
+    ),
+    effect(
+        "strand-jamming",
+        Class::Alone("strand-jamming"),
+        Owner::Muscle,
+        "strands lock at the stroke's end",
+    ),
+    effect(
+        "permanent-set",
+        Class::Alone("permanent-set"),
+        Owner::Muscle,
+        "the muscle stays longer with every cycle",
+    ),
+    effect(
+        "mullins-softening",
+        Class::Alone("mullins-softening"),
+        Owner::Muscle,
+        "the first stretch softens the bladder",
+    ),
+    effect("cyclic-softening", Class::Softening, Owner::Muscle, "the bladder softens with cycles"),
+    effect("thermal-softening", Class::Softening, Owner::Muscle, "the bladder softens as it warms"),
+    effect("stress-relaxation", Class::Relaxation, Owner::Muscle, "part of the bladder's stress relaxes"),
+    effect("log-creep", Class::Relaxation, Owner::Muscle, "force creeps with the logarithm of time"),
+    effect("friction-asymmetry", Class::Gain, Owner::Muscle, "friction differs between the directions"),
+    effect("seal-friction", Class::Friction, Owner::Muscle, "a rod's seal rubs"),
+    effect(
+        "breakaway-friction",
+        Class::Alone("breakaway-friction"),
+        Owner::Muscle,
+        "friction is higher after a rest",
+    ),
+    effect("stribeck-friction", Class::SlowSpeed, Owner::Muscle, "friction falls with speed"),
+    effect(
+        "presliding-hysteresis",
+        Class::TurningMemory,
+        Owner::Muscle,
+        "friction builds up after a reversal",
+    ),
+    effect("minor-loop-memory", Class::TurningMemory, Owner::Muscle, "small loops remember at the reversal"),
+    effect("viscous-damping", Class::RateOrPhase, Owner::Muscle, "friction proportional to speed"),
+    effect("rate-power", Class::SlowSpeed, Owner::Muscle, "friction by a power of speed"),
+    effect("inertia", Class::Alone("inertia"), Owner::Rig, "moving masses"),
+    effect("gravity", Class::Zero, Owner::Rig, "weight in the load path"),
+    effect("misalignment", Class::Friction, Owner::Rig, "muscle and cell out of line"),
+    effect("backlash", Class::Alone("backlash"), Owner::Rig, "a loose joint"),
+];
+
 impl Change {
     /// Its line of the table.
     #[must_use]
     pub fn about(self) -> &'static About {
-        CHANGES.iter().find(|a| a.change == self).unwrap_or(&CHANGES[0])
+        let all = CHANGES.iter().chain(&EFFECTS);
+        all.into_iter().find(|a| a.change == self).unwrap_or(&CHANGES[0])
     }
 
     /// Its name.
@@ -194,13 +298,33 @@ impl Change {
     /// The change of this name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
-        CHANGES.iter().find(|a| a.name == name).map(|a| a.change)
+        CHANGES.iter().chain(&EFFECTS).find(|a| a.name == name).map(|a| a.change)
     }
 
     /// Its class.
     #[must_use]
     pub fn class(self) -> Class {
         self.about().class
+    }
+
+    /// Its class among strokes, where a late channel and a force that grows with speed are alike.
+    #[must_use]
+    pub fn stroke_class(self) -> Class {
+        match self {
+            Self::SensorDelay => Class::RateOrPhase,
+            _ => self.class(),
+        }
+    }
+
+    /// Whether its law depends on what happened before: then it has no moment at which it began.
+    pub(super) fn remembers(self) -> bool {
+        matches!(
+            self.class(),
+            Class::Softening
+                | Class::Relaxation
+                | Class::TurningMemory
+                | Class::Alone("permanent-set" | "mullins-softening" | "breakaway-friction" | "backlash")
+        )
     }
 
     /// What it adds to the force of an AFTER cell per unit of its size; `None` for those that no settled cell shows by a fixed shape.
@@ -218,7 +342,7 @@ impl Change {
             Self::CoulombFriction => -direction,
             Self::PressureFriction => -direction * m.pressure,
             Self::FrictionFactor => -direction * m.force,
-            Self::EndSlip | Self::SensorDelay | Self::PressureSensorLag => return None,
+            Self::EndSlip | Self::SensorDelay | Self::PressureSensorLag | Self::Effect(_) => return None,
         })
     }
 
@@ -235,7 +359,7 @@ mod tests {
 
     #[test]
     fn every_change_has_its_own_line_and_name() {
-        for a in CHANGES {
+        for a in CHANGES.into_iter().chain(EFFECTS) {
             assert_eq!(a.change.about().name, a.name);
             assert_eq!(Change::from_name(a.name), Some(a.change));
         }

@@ -53,7 +53,7 @@ pub(super) fn search(cells: &[Cell], contrast: &Contrast, scale: f64, sizes: &[f
     let mut logs = Vec::new();
     let mut best: Option<(f64, f64, DVector<f64>)> = None;
     for start in starts(cells) {
-        let on = |c: &Cell| if c.after && c.means.clock >= start { c.means.by_stroke } else { 0.0 };
+        let on = |c: &Cell| if c.after && c.means.clock >= start { c.means.step_by_stroke } else { 0.0 };
         let shape = DVector::from_iterator(cells.len(), cells.iter().map(on));
         let rms = rms_after(cells, &shape);
         if !(rms > 0.0) {

@@ -7,8 +7,8 @@ use super::answer::{
     Repeatability, Size, Split, Verdict, WhyNot, size,
 };
 use super::criteria::{
-    CELLS, COMBINED_SHAPE_ERROR, FEWEST_CELLS, GATE, NAMED, PRIOR_NONE, SCALE_PRIOR, SIZES, SLOPE_ERROR,
-    TABLE_SLOPE_ERROR, TABLE_SLOPE_OVER_LENGTH,
+    CELLS, COMBINED_SHAPE_ERROR, FEWEST_CELLS, GATE, NAMED, OWN_SLOPE_ERROR, PRIOR_NONE, SCALE_PRIOR, SIZES,
+    SLOPE_ERROR, TABLE_INTERVAL, TABLE_SLOPE_ERROR, TABLE_SLOPE_OVER_LENGTH, UNSEEN_EXPLAINED,
 };
 use super::held_out;
 use super::isometric::{Accepted, Analysis, Estimate};
@@ -29,7 +29,7 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
     let verdict = verdict(
         first.probability(Cause::None),
         analysis.accepted.len(),
-        analysis.last.probability(Cause::None) < NAMED,
+        analysis.last.probability(Cause::None) < NAMED || (unseen.held && unseen.share() < UNSEEN_EXPLAINED),
     );
     let mut remarks = remarks(analysis, verdict);
     let not = incomparable(analysis);
@@ -91,6 +91,16 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
 
 fn remarks(analysis: &Analysis, verdict: Verdict) -> Vec<Remark> {
     let mut remarks = Vec::new();
+    for (m, stroke) in
+        analysis.runs.strokes.iter().enumerate().filter(|(m, _)| analysis.runs.is_interpolated(*m))
+    {
+        let variances =
+            analysis.cells.iter().filter(|c| c.interpolated && c.mounting == m).map(|c| c.means.variance);
+        let (sum, count) = variances.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+        if count > 0.0 {
+            remarks.push(Remark::Interpolated { stroke: *stroke, error: f64::sqrt(sum / count) });
+        }
+    }
     let like = |a: &Accepted| matches!(a.change.class(), Class::Gain | Class::Zero);
     if analysis.runs.moving && analysis.accepted.iter().any(like) {
         remarks.push(Remark::GaugeOfMotion);
@@ -153,9 +163,9 @@ fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
         parameters: vec![size(
             about.parameter,
             accepted.size,
-            accepted.std,
+            accepted.std * widened(analysis),
             freedom,
-            slope_error(analysis, accepted.change),
+            slope_error(analysis, accepted.change) * widened(analysis),
         )],
         confusable_with: confusable(analysis, accepted),
         since: localise::since(analysis, accepted),
@@ -176,12 +186,20 @@ fn confusable(analysis: &Analysis, accepted: &Accepted) -> Vec<String> {
     all.into_iter().map(|c| c.name().to_owned()).collect()
 }
 
+/// What intervals are widened by.
+fn widened(analysis: &Analysis) -> f64 {
+    if analysis.recorded { 1.0 } else { TABLE_INTERVAL }
+}
+
 /// How inexact the shape of a change is, share of its size.
 fn slope_error(analysis: &Analysis, change: Change) -> f64 {
     match change {
         Change::ForceOffset | Change::ForceDrift | Change::CoulombFriction => SLOPE_ERROR,
         _ if analysis.recorded && analysis.runs.moving => COMBINED_SHAPE_ERROR,
         _ if analysis.recorded => SLOPE_ERROR,
+        Change::EndSlip if analysis.surface.curves.iter().any(|c| !c.own_by_stroke.is_empty()) => {
+            OWN_SLOPE_ERROR
+        }
         Change::DisplacementOffset | Change::RigCompliance | Change::EndSlip => TABLE_SLOPE_OVER_LENGTH,
         _ => TABLE_SLOPE_ERROR,
     }
@@ -194,7 +212,13 @@ fn alone(analysis: &Analysis) -> Vec<(String, Size)> {
         let about = e.change.about();
         (
             about.name.to_owned(),
-            size(about.parameter, e.size, e.std, freedom, slope_error(analysis, e.change)),
+            size(
+                about.parameter,
+                e.size,
+                e.std * widened(analysis),
+                freedom,
+                slope_error(analysis, e.change) * widened(analysis),
+            ),
         )
     };
     analysis.first.estimates.iter().map(one).collect()

@@ -4,7 +4,7 @@ use super::answer::{
     ChangeReport, Changed, Considered, Curve, HeldOut, Place, Probability, Reference, Remark, Repeatability,
     Since, Split, Verdict, WhyNot, size,
 };
-use super::criteria::{NAMED, STROKE_PRIOR_NONE};
+use super::criteria::{NAMED, STROKE_PRIOR_NONE, UNSEEN_EXPLAINED};
 use super::held_out::Unseen;
 use super::report::{Options, left, prior};
 use super::shapes::{Change, Class};
@@ -25,8 +25,8 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
     } else if named.is_empty() {
         Verdict::Consistent
     } else {
-        let share = 1.0 - (after / before.max(f64::MIN_POSITIVE)).powi(2);
-        if share >= 0.5 { Verdict::Explained } else { Verdict::PartlyExplained }
+        let share = Unseen { before, after, held: true }.share();
+        if share >= UNSEEN_EXPLAINED { Verdict::Explained } else { Verdict::PartlyExplained }
     };
     let n = compared.keys.len();
     let noise = (compared.covariance.trace() / (2 * n) as f64).sqrt();

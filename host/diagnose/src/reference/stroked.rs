@@ -176,7 +176,8 @@ fn covariance(
         .map(|i| {
             let own = (0..n).filter(|j| keys[*j].0 == keys[i].0);
             let count = own.clone().count().max(1) as f64;
-            own.map(|j| before[j].half.abs()).sum::<f64>() / count
+            // If nothing changed, both sides show the same friction: which of them came first must not matter.
+            own.map(|j| (before[j].half.abs() + after[j].half.abs()) / 2.0).sum::<f64>() / count
         })
         .collect();
     let f2 = largest * largest;

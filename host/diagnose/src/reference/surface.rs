@@ -1,6 +1,7 @@
 //! The force before, tabulated: mean, gap between the directions, slopes and variance over pressure, for every mounting.
 
 use super::criteria::{GRID, POINT_BINS};
+use super::interpolate;
 use super::runs::{Run, Runs};
 use super::spline::{Point, Spline};
 use pam_data::error::{DataCode, Error, Result};
@@ -16,6 +17,8 @@ pub(super) struct Curves {
     pub by_pressure: Vec<f64>,
     /// ∂F/∂x, N/m; zeros where there is one length.
     pub by_stroke: Vec<f64>,
+    /// The same as AFTER shows it, beside a table; empty elsewhere.
+    pub own_by_stroke: Vec<f64>,
     /// Variance of filling and of emptying, N².
     pub variance: [Vec<f64>; 2],
 }
@@ -81,6 +84,10 @@ impl Surface {
         let grid: Vec<f64> = (0..GRID).map(|i| low + (high - low) * i as f64 / (GRID - 1) as f64).collect();
         let mut curves = Vec::new();
         for mounting in 0..all.strokes.len() {
+            if all.is_interpolated(mounting) {
+                curves.push(Curves::default());
+                continue;
+            }
             let runs = all.side(false).filter(|r| r.mounting == mounting);
             let points: Vec<Point> = runs.enumerate().flat_map(|(i, r)| points(r, i, low, high)).collect();
             let spline = Spline::fit(&points, low, high).ok_or_else(|| {
@@ -95,21 +102,28 @@ impl Surface {
                 gap: along(&|p| spline.gap(p)),
                 by_pressure: along(&|p| spline.slope(p)),
                 by_stroke: Vec::new(),
+                own_by_stroke: Vec::new(),
                 variance: [along(&|p| spline.variance(p, 1.0)), along(&|p| spline.variance(p, -1.0))],
             });
         }
         let mut surface = Self { low, high, curves, usual_slope: 0.0, largest };
-        surface.slopes_along(&all.strokes);
+        let recorded: Vec<usize> = (0..all.strokes.len()).filter(|m| !all.is_interpolated(*m)).collect();
+        surface.slopes_along(&all.strokes, &recorded);
+        for mounting in (0..all.strokes.len()).filter(|m| all.is_interpolated(*m)) {
+            surface.curves[mounting] =
+                interpolate::curves(&surface.curves, &all.strokes, &recorded, mounting);
+        }
         surface.find_usual_slope();
         Ok(surface)
     }
 
     /// ∂F/∂x of every mounting by a monotone piecewise cubic over the lengths.
-    fn slopes_along(&mut self, strokes: &[f64]) {
+    fn slopes_along(&mut self, strokes: &[f64], recorded: &[usize]) {
+        let own: Vec<f64> = recorded.iter().map(|m| strokes[*m]).collect();
         for g in 0..GRID {
-            let forces: Vec<f64> = self.curves.iter().map(|c| c.force[g]).collect();
-            for (m, slope) in monotone_slopes(strokes, &forces).into_iter().enumerate() {
-                self.curves[m].by_stroke.push(slope);
+            let forces: Vec<f64> = recorded.iter().map(|m| self.curves[*m].force[g]).collect();
+            for (m, slope) in recorded.iter().zip(monotone_slopes(&own, &forces)) {
+                self.curves[*m].by_stroke.push(slope);
             }
         }
     }
@@ -148,7 +162,7 @@ impl Surface {
 }
 
 /// Slopes at the nodes of a monotone piecewise cubic: Fritsch and Butland's weighted harmonic mean inside, one-sided at the ends.
-fn monotone_slopes(x: &[f64], y: &[f64]) -> Vec<f64> {
+pub(super) fn monotone_slopes(x: &[f64], y: &[f64]) -> Vec<f64> {
     let n = x.len();
     let secant: Vec<f64> = (1..n).map(|i| (y[i] - y[i - 1]) / (x[i] - x[i - 1])).collect();
     let h: Vec<f64> = (1..n).map(|i| x[i] - x[i - 1]).collect();

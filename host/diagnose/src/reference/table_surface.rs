@@ -17,6 +17,19 @@ fn offset(table: &TableFile, held: f64) -> f64 {
     nearest.map_or(0.0, |m| m.offset)
 }
 
+/// The slopes over the length as AFTER itself shows them, for a step within it: the lengths before and after the step are the same, so
+/// that the recordings know this slope better than the table does. Nothing is filled in where AFTER has one length, or too few rows.
+pub(super) fn fill_own_slopes(surface: &mut Surface, runs: &Runs) {
+    let mut alone = runs.clone();
+    alone.runs.iter_mut().for_each(|r| r.after = false);
+    let Some(own) = Surface::of(&alone).ok().filter(|own| own.curves.len() > 1) else { return };
+    let step = (surface.high - surface.low) / (GRID - 1) as f64;
+    let pressure: Vec<f64> = (0..GRID).map(|g| surface.low + step * g as f64).collect();
+    for (curve, from) in surface.curves.iter_mut().zip(&own.curves) {
+        curve.own_by_stroke = pressure.iter().map(|p| own.at(&from.by_stroke, *p)).collect();
+    }
+}
+
 /// A table's surface at the mountings of AFTER, over the pressures that AFTER has and the table was made for.
 ///
 /// # Errors
@@ -68,6 +81,7 @@ pub(super) fn of(table: &TableFile, runs: &Runs) -> Result<Surface> {
                 })
                 .collect(),
             variance: [vec![0.0; GRID], vec![0.0; GRID]],
+            own_by_stroke: Vec::new(),
         })
         .collect::<Vec<_>>();
     let largest = curves.iter().flat_map(|c| c.force.iter().copied()).fold(0.0, f64::max);

@@ -7,7 +7,7 @@ use super::{Against, ChangeReport, Mounted, Options, Verdict, compare};
 use pam_data::recording::{Campaign, Recording};
 
 /// Strokes of the mountings, m.
-const STROKES: [f64; 3] = [0.0, 0.008, 0.018];
+const STROKES: [f64; 5] = [0.0, 0.008, 0.018, 0.012, 0.024];
 
 /// A force that is slack below a threshold which grows with the stroke, N.
 fn force(pressure: f64, stroke: f64, direction: f64) -> f64 {
@@ -165,4 +165,34 @@ fn a_sensor_that_stands_still_and_a_lost_force_are_errors() {
     assert!(compare(&dead, Against::Recordings(&before), &Options::default()).is_err());
     dead.recordings.iter_mut().for_each(|r| r.force = None);
     assert!(compare(&dead, Against::Recordings(&before), &Options::default()).is_err());
+}
+
+/// AFTER at one length that the reference does not have, beside two that it has.
+fn at_another_length(mounting: usize, change: &dyn Fn(f64, f64, f64, f64) -> (f64, f64)) -> ChangeReport {
+    let before = campaign(3, 0..3, &untouched);
+    let runs = (3..6).flat_map(|n| [0, 2, mounting].map(|m| (m, n)));
+    let after = Campaign::new(runs.map(|(m, n)| run(m, n, change)).collect());
+    let options = Options { mounted: Mounted::Same, ..Options::default() };
+    compare(&after, Against::Recordings(&before), &options).unwrap()
+}
+
+#[test]
+fn a_length_between_those_of_the_reference_is_interpolated_with_its_error() {
+    let report = at_another_length(3, &untouched);
+    assert_eq!(report.verdict, Verdict::Consistent, "{:?}", report.probabilities);
+    let error = report.remarks.iter().find_map(|r| match r {
+        Remark::Interpolated { stroke, error } if (stroke - 0.012).abs() < 1e-6 => Some(*error),
+        _ => None,
+    });
+    assert!(error.is_some_and(|e| e > 0.1 && e < 80.0), "{error:?}");
+    assert!(!report.reference.not_comparable.iter().any(|n| matches!(n, NotComparable::Stroke { .. })));
+    let offset = size(&at_another_length(3, &|_, _, _, _| (0.0, 13.0)), "force-offset");
+    assert!((offset - 13.0).abs() < 3.0, "{offset}");
+}
+
+#[test]
+fn a_length_beyond_those_of_the_reference_is_not_compared() {
+    let report = at_another_length(4, &untouched);
+    assert!(report.reference.not_comparable.iter().any(|n| matches!(n, NotComparable::Stroke { .. })));
+    assert!(!report.remarks.iter().any(|r| matches!(r, Remark::Interpolated { .. })));
 }

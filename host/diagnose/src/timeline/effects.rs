@@ -22,6 +22,7 @@ pub(super) fn comparisons(visits: &[Visit], options: &Options<'_>) -> Result<Vec
         rest_length: options.muscle.map(MuscleDescription::rest_length),
         mounted: options.mounted,
         prior_changed: None,
+        geometry: None,
     };
     let one = |(i, visit): (usize, &Visit)| -> Result<Option<ChangeReport>> {
         if i == options.reference {

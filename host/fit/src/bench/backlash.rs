@@ -1,7 +1,7 @@
 //! Play between the stroke sensor and the muscle: after a reversal the sensor moves and the muscle does not.
 //!
 //! ```text
-//! F_add = κ · [∂F/∂x · (y − x) + k_F F_quasi (s − s_y)]        y = play_{b/2}(x)
+//! F_add = κ · [∂F_quasi/∂x · (1 − k_F s_y) · (y − x) + k_F F_quasi (s − s_y)]        y = play_{b/2}(x)
 //! ```
 //! `b`, m, is the width of the play, `y` its output: it is constant until the stroke has gone back by `b`. `κ` (dimensionless) is 1 for a joint
 //! that is free over all of `b`, less if it is tight at times. A preloaded joint has none. The side on which the play begins is
@@ -31,7 +31,7 @@ impl Effect for Backlash {
         alternatives: false,
         start: Start::Branch,
         fading: &[],
-        equation: "F = κ·[∂F/∂x·(y − x) + k_F·F_quasi·(s − s_y)], y = play of x, b wide, ds_y = (s − s_y)·|dy|/(η·b)",
+        equation: "F = κ·[∂F_quasi/∂x·(1 − k_F·s_y)·(y − x) + k_F·F_quasi·(s − s_y)], y = play of x, b wide, ds_y = (s − s_y)·|dy|/(η·b)",
         summary: "A joint has play: after every reversal the sensor moves before the muscle does.",
         source: "play operator; sensitivity of the base model",
     };
@@ -63,7 +63,9 @@ impl Effect for Backlash {
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
         let known = memory[3] != T::ZERO && context.direction != T::ZERO;
         let late = if known { context.direction - memory[3] } else { T::ZERO };
-        parameters[0] * (context.slope() * memory[0] + context.friction * context.quasi * late)
+        // What the muscle's place changes rubs as the muscle last moved, not as the sensor does.
+        let slope = context.slope() + context.stiffness * context.friction * late;
+        parameters[0] * (slope * memory[0] + context.friction * context.quasi * late)
     }
 }
 

@@ -133,6 +133,8 @@ struct ConsideredDocument<'a> {
 struct PathStepDocument<'a> {
     effect: &'a str,
     rms_N: f64,
+    /// Error on held-out rows with the effects up to this one, N.
+    held_out_rms_N: Option<f64>,
     p: f64,
     /// Name and residual, N.
     runners_up: &'a [(String, f64)],
@@ -299,7 +301,8 @@ fn considered(c: &Considered) -> ConsideredDocument<'_> {
 }
 
 fn path_step(s: &PathStep) -> PathStepDocument<'_> {
-    PathStepDocument { effect: &s.effect, rms_N: s.rms_N, p: s.p, runners_up: &s.runners_up }
+    let PathStep { effect, rms_N, held_out_rms_N, p, runners_up } = s;
+    PathStepDocument { effect, rms_N: *rms_N, held_out_rms_N: *held_out_rms_N, p: *p, runners_up }
 }
 
 fn profile(p: &Profile) -> ProfileDocument<'_> {

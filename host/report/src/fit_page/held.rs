@@ -65,10 +65,12 @@ pub(super) fn load_lines(view: &View<'_>) -> Figure {
         let name = if length == 0 { "table without friction" } else { "" };
         panel = panel.line(name, view.length_colour(length), &kpa(&at), &y);
     }
+    let reading = "Dots are measured, lines are the table without friction. In a good fit, each line runs through the middle of its dots.";
+    let lengths = if view.fitted_lengths() { " The lengths are the fitted ones." } else { "" };
     Figure::new(
         "load-lines",
         "Force against pressure, one line per length",
-        "Dots are measured, lines are the table without friction. In a good fit, each line runs through the middle of its dots.",
+        format!("{reading}{lengths}"),
         panel,
     )
 }

@@ -42,9 +42,13 @@ fn error(percent: f64) -> String {
 
 /// A model's forces with gaps where they are far beyond what was measured: one model that fails must not set the scale of all.
 pub(super) fn within_reach(view: &View<'_>, force: &[f64]) -> Vec<f64> {
-    const FAR: f64 = 1.5;
-    let largest = view.fit.midline.iter().fold(0.0_f64, |m, p| m.max(p.force.abs()));
-    force.iter().map(|f| if f.abs() <= FAR * largest { *f } else { f64::NAN }).collect()
+    /// How far above and below the measured forces a model is drawn, as a share of their range.
+    const FAR: f64 = 0.5;
+    let fold = |m: (f64, f64), p: &pam_fit::MidPoint| (m.0.min(p.force), m.1.max(p.force));
+    let (low, high) = view.fit.midline.iter().fold((0.0, 0.0), fold);
+    let room = FAR * (high - low);
+    let drawn = |f: &f64| if *f >= low - room && *f <= high + room { *f } else { f64::NAN };
+    force.iter().map(drawn).collect()
 }
 
 fn what(model: &str) -> &'static str {

@@ -22,6 +22,8 @@ pub(super) struct View<'a> {
     pub lengths: Vec<f64>,
     /// `F − F_model` of every point by the table itself, N.
     pub residual: Vec<f64>,
+    /// The points, their strokes with the correction of a fitted mounting: the table was fitted at these.
+    points: Vec<Point>,
     muscle: Option<model_core::muscle::Muscle<f64>>,
     band: Option<ConfidenceBand>,
 }
@@ -53,9 +55,12 @@ impl<'a> View<'a> {
         let uncertainty = Some(fit.stored_uncertainty());
         let about = About { uncertainty, ..About::default() };
         let band = ConfidenceBand::of(&TableFile { table: fit.table.clone(), about });
-        let lengths =
-            lengths(&fit.solution.problem.points.list, l0, fit.solution.problem.points.stroke_noise);
-        let mut view = Self { fit, campaign, levels, l0, lengths, residual: Vec::new(), muscle, band };
+        let problem = &fit.solution.problem;
+        let corrected = |(p, shift): (&Point, &f64)| Point { stroke: p.stroke + shift, ..*p };
+        let points: Vec<Point> = problem.points.list.iter().zip(&problem.shift).map(corrected).collect();
+        let lengths = lengths(&points, l0, problem.points.stroke_noise);
+        let mut view =
+            Self { fit, campaign, levels, l0, lengths, residual: Vec::new(), points, muscle, band };
         view.residual = view
             .points()
             .iter()
@@ -85,8 +90,13 @@ impl<'a> View<'a> {
         Colour::ordered(length, self.lengths.len())
     }
 
-    pub fn points(&self) -> &'a [Point] {
-        &self.fit.solution.problem.points.list
+    pub fn points(&self) -> &[Point] {
+        &self.points
+    }
+
+    /// Whether the lengths of the mountings were fitted, so that they differ from the recorded ones.
+    pub fn fitted_lengths(&self) -> bool {
+        !self.fit.solution.problem.mountings.is_empty()
     }
 
     fn direction(&self, p: &Point) -> f64 {

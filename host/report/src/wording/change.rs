@@ -7,7 +7,7 @@ use pam_diagnose::reference::answer::{
     ChangeReport, Changed, Left, NotComparable, Place, Remark, Repeatability, Since, Size, Split, Verdict,
     WhyNot,
 };
-use pam_diagnose::reference::shapes::{Change, Owner};
+use pam_diagnose::reference::shapes::{Change, Class, Owner};
 
 /// How recordings were held out.
 #[must_use]
@@ -67,6 +67,10 @@ pub fn remark(remark: &Remark) -> String {
             "the mounting at {:.1} mm differs alone (Bayes factor e^{log:.0}): clamped again, or slipped?",
             stroke * 1e3
         ),
+        Remark::Interpolated { stroke, error } => format!(
+            "the reference has no recording at {:.1} mm: its force there is interpolated between its other lengths, with an error of {error:.1} N",
+            1e3 * stroke
+        ),
         Remark::StrokesAssumed => "how far campaigns of strokes repeat is assumed (zero and level to 0.2 % of the largest force, gain to 0.5 %, friction to 5 to 10 %), not measured".into(),
         Remark::StrokesMarginal => "probabilities are those that a change is there at all; several changes can be present together".into(),
         Remark::NotAcquitted(none) => {
@@ -83,6 +87,7 @@ pub fn why_not(why: WhyNot) -> &'static str {
     match why {
         WhyNot::NotComparable => "these recordings cannot show it",
         WhyNot::LessProbable => "possible, but another cause is more probable",
+        WhyNot::HeldOutWorse => "the nearest shape, but it does not describe held-out recordings",
         WhyNot::OtherShape => "the difference does not have its shape, or is too small",
     }
 }
@@ -112,6 +117,14 @@ pub fn remedy(change: Change) -> &'static str {
         Change::PressureSensorLag => {
             "look for a long or throttled line to the pressure sensor, and at its filter"
         }
+        Change::Effect(_) => match (change.about().owner, change.class()) {
+            (Owner::Rig, _) => "look at the load path between muscle and load cell",
+            (_, Class::RateOrPhase) => "look at hoses, valves and filters, then refit the table",
+            (_, Class::Softening | Class::Relaxation) => {
+                "let the muscle rest, repeat the first recording, then refit the table"
+            }
+            _ => "look at the muscle and its end fittings, then refit the table",
+        },
     }
 }
 
@@ -125,7 +138,9 @@ pub fn pattern(left: &Left) -> String {
 #[must_use]
 pub fn place(p: &Place) -> String {
     let range = if p.from == p.to {
-        format!("{:.4} {}", p.from, p.unit)
+        // Four decimals are for contractions; a pressure is a whole number of kilopascals.
+        let decimals = if p.unit.is_empty() { 4 } else { 0 };
+        format!("{:.decimals$} {}", p.from, p.unit)
     } else {
         format!("{:.0} to {:.0} {}", p.from, p.to, p.unit)
     };
@@ -157,6 +172,10 @@ pub fn not_comparable(n: &NotComparable) -> String {
         NotComparable::Level { pressure } => {
             format!("strokes at {:.0} kPa: on one side only, or fewer than two each way", pressure / 1e3)
         }
+        NotComparable::States { share } => format!(
+            "{:.0} % of the strokes' parts are at pressures, places or speeds that the reference does not have",
+            100.0 * share
+        ),
         NotComparable::Moving => {
             "sensor-delay, pressure-sensor-lag: not asked of recordings in which length and pressure move together".into()
         }

@@ -4,8 +4,8 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 
+use crate::commands::interrupt::interrupts;
 use crate::commands::port::PortOption;
-use crate::commands::run::interrupts;
 use crate::console::Console;
 use crate::documents::{device::Regulator, text};
 use pam_data::error::{DataCode, Error, Result};

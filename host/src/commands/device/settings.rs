@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use model_core::link::endpoints::{GetSettings, SetSettings};
+use model_core::link::endpoints::{GetBoardSettings, GetSettings, SetSettings};
 use model_core::link::settings::Settings;
 
 use crate::commands::port::PortOption;
@@ -25,7 +25,7 @@ pub(super) struct Arguments {
     /// Take all settings from a file that `host device settings` printed.
     #[arg(long, value_name = "FILE.toml", conflicts_with = "defaults")]
     from: Option<PathBuf>,
-    /// Begin with the firmware's defaults.
+    /// Begin with the board's own settings, those of a new device; the calibration of its sensors is lost.
     #[arg(long)]
     defaults: bool,
     /// Print JSON.
@@ -47,9 +47,12 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
                     .help("the file must hold all settings, as `host device settings` prints them")
             })?)
         }
-        None => arguments.defaults.then(Settings::default),
+        None => None,
     };
     let mut client = arguments.port.connect(console)?;
+    if arguments.defaults {
+        wanted = Some(client.call::<GetBoardSettings>(&())?);
+    }
     let before = client.call::<GetSettings>(&())?;
     for assignment in &arguments.set {
         wanted = Some(changed(wanted.unwrap_or(before), assignment)?);

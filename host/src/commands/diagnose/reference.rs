@@ -143,7 +143,7 @@ fn check(arguments: &Arguments) -> Result<()> {
     if arguments.changed.prior_changed.is_some_and(|p| !(0.01..=0.99).contains(&p)) {
         return Err(Error::new(DataCode::CallInvalid, "--prior-changed must lie between 0.01 and 0.99"));
     }
-    if arguments.output.is_some() && arguments.muscle.is_none() {
+    if arguments.output.is_some() && arguments.muscles.first().is_none() {
         return Err(Error::new(
             DataCode::CallInvalid,
             "-o writes a muscle's table, and no muscle is described",
@@ -160,7 +160,7 @@ fn check(arguments: &Arguments) -> Result<()> {
 pub fn run(arguments: &Arguments, console: &Console, taken: bool) -> Result<()> {
     check(arguments)?;
     let start = Instant::now();
-    let muscle = arguments.muscle.as_ref().map(MuscleDescription::read).transpose()?;
+    let muscle = arguments.muscles.first().map(MuscleDescription::read).transpose()?;
     let watched = if arguments.json.is_some() { Console::silent() } else { console.clone() };
     let after = match before_table(arguments)? {
         // A table knows its rest length.
@@ -178,6 +178,7 @@ pub fn run(arguments: &Arguments, console: &Console, taken: bool) -> Result<()> 
     let asked = Asked {
         muscle: muscle.as_ref().map(|m| m.name.clone()),
         rest_length: muscle.as_ref().map(MuscleDescription::rest_length),
+        geometry: muscle.as_ref().map(MuscleDescription::geometry),
         mounted: arguments.changed.mounted(),
         prior_changed: arguments.changed.prior_changed,
     };

@@ -330,7 +330,7 @@ impl Connected {
             }
         }
         self.settings = settings;
-        Ok(json_of(&settings))
+        Ok(json!({ "stored": json_of(&settings), "defaults": json_of(&Settings::default()) }))
     }
 
     fn difference(&mut self, path: &std::path::Path) -> Result<Value> {

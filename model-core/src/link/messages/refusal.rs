@@ -3,7 +3,7 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use super::{Fault, Mode, Side, State};
+use super::{Fault, Mode, Side, State, UpdateFault};
 use crate::fields::one_of;
 
 /// Why a device refuses a request.
@@ -49,6 +49,8 @@ pub enum Refusal {
     },
     /// Another session armed the device or started its mode.
     OtherSession,
+    /// Another firmware is refused.
+    Update(UpdateFault),
 }
 
 one_of!(Refusal {
@@ -67,6 +69,7 @@ one_of!(Refusal {
     12 Stiffness { low_nm_per_rad: low, high_nm_per_rad: high },
     13 Angle { low_rad: low, high_rad: high },
     14 OtherSession {},
+    15 Update { 0: fault },
 });
 
 /// The setting or value that a refusal is about.
@@ -95,9 +98,13 @@ pub enum Field {
     Bands,
     /// Telemetry or trace.
     Rate,
+    /// Scale or filter of a sensor.
+    Scale,
+    /// Signal to the pressure regulator.
+    Command,
 }
 
-one_of!(Field { 0 SetPoint {}, 1 Reference {}, 2 ForceLoop {}, 3 StrokeLoop {}, 4 Joint {}, 5 Regulator {}, 6 Limits {}, 7 SensorWatch {}, 8 Watch {}, 9 Bands {}, 10 Rate {} });
+one_of!(Field { 0 SetPoint {}, 1 Reference {}, 2 ForceLoop {}, 3 StrokeLoop {}, 4 Joint {}, 5 Regulator {}, 6 Limits {}, 7 SensorWatch {}, 8 Watch {}, 9 Bands {}, 10 Rate {}, 11 Scale {}, 12 Command {} });
 
 /// Why a table is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]

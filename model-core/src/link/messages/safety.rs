@@ -78,6 +78,12 @@ codes! {
         ClockFailed,
         /// The test of regulator and dump valve before arming failed.
         ValveTest,
+        /// The two pressure sensors of a muscle disagree.
+        PressureSensorsDisagree,
+        /// The supply air is below the least pressure of the settings.
+        SupplyPressureLow,
+        /// The enable input is open: an emergency stop, or its wire is broken.
+        EnableOpen,
     }
 }
 

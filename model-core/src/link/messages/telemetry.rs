@@ -4,7 +4,7 @@ use heapless::Vec;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use super::{FaultReport, Mode, State};
+use super::{FaultReport, Mode, Side, State};
 use crate::fields::{fields, one_of};
 
 /// Sets the stream of telemetry.
@@ -55,6 +55,45 @@ pub struct Telemetry {
 }
 
 fields!(Telemetry { time_us, tick, state, mode, setpoint, setpoint_second, sides });
+
+/// What the board measures on one muscle before any scale: volts at the pins of a board with converters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Signals {
+    /// Pressure sensor.
+    pub pressure: f32,
+    /// Stroke sensor.
+    pub stroke: f32,
+    /// Load cell.
+    pub force: f32,
+    /// Second pressure sensor, where the board has an input for it.
+    pub second_pressure: Option<f32>,
+}
+
+fields!(Signals { pressure, stroke, force, second_pressure });
+
+/// Asks for the signals of a muscle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct SignalsRead {
+    /// The muscle.
+    pub side: Side,
+}
+
+fields!(SignalsRead { side });
+
+/// Means of all signals of a muscle since they were last read, for calibration; at most 10 s.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+pub struct MeanSignals {
+    /// Ticks with readings in the mean; without any, the rest is zero.
+    pub ticks: u16,
+    /// Means.
+    pub mean: Signals,
+    /// Mean of the supply air's signal, where the board has an input for it.
+    pub supply: Option<f32>,
+    /// Whether the enable input was closed in the last tick.
+    pub enabled: bool,
+}
+
+fields!(MeanSignals { ticks, mean, supply, enabled });
 
 /// Something that happened, told without being asked.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]

@@ -65,6 +65,11 @@ impl Slopes {
         Self { by_pressure: curves.iter().map(gradient).collect(), by_stroke, largest }
     }
 
+    /// Largest force, N.
+    pub fn largest(&self) -> f64 {
+        self.largest
+    }
+
     fn at(table: &[f64], pressure: f64) -> f64 {
         let z = ((pressure - ENDS.0) / (ENDS.1 - ENDS.0) * (NODES - 1) as f64).clamp(0.0, (NODES - 1) as f64);
         let i = (z as usize).min(NODES - 2);

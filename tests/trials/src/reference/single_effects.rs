@@ -7,7 +7,7 @@ use super::injection::{EFFECTS, Slopes, added, ways};
 use super::staircases::Run;
 
 /// Bins of pressure.
-const BINS: usize = 24;
+pub(super) const BINS: usize = 24;
 /// Pa: their width.
 const WIDTH: f64 = 27e3;
 /// An effect is named when it lowers the BIC by more: "very strong" (Kass and Raftery 1995).
@@ -16,7 +16,7 @@ const LEAD: f64 = 10.0;
 const MIDDLE: f64 = 0.5;
 
 /// Sums of a column by mounting, direction and bin.
-fn means(runs: &[Run], column: &dyn Fn(usize) -> Vec<f64>, mountings: usize) -> Vec<f64> {
+pub(super) fn means(runs: &[Run], column: &dyn Fn(usize) -> Vec<f64>, mountings: usize) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); mountings * 2 * BINS];
     for (k, run) in runs.iter().enumerate() {
         let ways = ways(&run.pressure);

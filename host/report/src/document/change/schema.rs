@@ -14,6 +14,19 @@ pub(super) enum Class {
     EndSlip,
     SensorDelay,
     PressureSensorLag,
+    SlowSpeed,
+    RateOrPhase,
+    Softening,
+    Relaxation,
+    TurningMemory,
+    TipEffect,
+    ContactLoss,
+    StrandJamming,
+    PermanentSet,
+    MullinsSoftening,
+    BreakawayFriction,
+    Inertia,
+    Backlash,
 }
 
 /// Whose a change is.

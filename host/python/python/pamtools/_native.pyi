@@ -1,7 +1,4 @@
-"""Fit, predict, and diagnose pneumatic artificial muscles.
-
-All arrays are in SI units: s, Pa (gauge), m, N, K. All errors are of the type PamError.
-"""
+"""The compiled part of pamtools; import its names from `pamtools`."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -49,6 +46,11 @@ class Muscle:
         """L0, m."""
     @property
     def kind(self) -> Literal["contractile", "push"]: ...
+    @staticmethod
+    def from_toml(text: str) -> Muscle:
+        """A description from the text of its file (TOML)."""
+    def to_toml(self) -> str:
+        """The text of its file (TOML). Descriptions can be pickled, copied, and compared."""
 
 @final
 class Recording:
@@ -80,6 +82,13 @@ class Recording:
     def temperature(self) -> _Array | None:
         """K, if it was measured."""
     def __len__(self) -> int: ...
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
+    def to_pandas(self) -> Any:
+        """A pandas data frame, columns named as in a file."""
+    def to_polars(self) -> Any:
+        """A polars data frame, columns named as in a file."""
+    def plot(self, axes: Any = None) -> Any:
+        """Draws pressure, stroke, and force over time. Needs matplotlib; returns the axes."""
 
 @final
 class Campaign:
@@ -93,6 +102,13 @@ class Campaign:
     def __len__(self) -> int: ...
     def __getitem__(self, index: int) -> Recording: ...
     def __iter__(self) -> Iterator[Recording]: ...
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
+    def to_pandas(self) -> Any:
+        """A pandas data frame, columns named as in a file; the column `recording` has the names."""
+    def to_polars(self) -> Any:
+        """A polars data frame, columns named as in a file; the column `recording` has the names."""
+    def plot(self, axes: Any = None) -> Any:
+        """Draws force against stroke, or against pressure where the length is held. Needs matplotlib; returns the axes."""
 
 @final
 class Prediction:
@@ -110,6 +126,8 @@ class Prediction:
     def inside(self) -> float | None:
         """The share of readings within the 95 % prediction interval, 0 to 1."""
     def __len__(self) -> int: ...
+    def plot(self, axes: Any = None) -> Any:
+        """Draws the predicted force by row and its band. Needs matplotlib; returns the axes."""
 
 @final
 class Table:
@@ -150,6 +168,11 @@ class Table:
         """The predicted reading of the load cell, N: one array per recording, with effects and their memory."""
     def predict_with_bands(self, campaign: Campaign) -> list[Prediction]:
         """The same with confidence bands and errors, as in `host predict`."""
+    @property
+    def tested_stroke(self) -> tuple[float, float]:
+        """Least and greatest stroke of the recordings that were fitted, m."""
+    def plot(self, axes: Any = None) -> Any:
+        """Draws force against stroke at each node, shortening and lengthening as a band. Needs matplotlib; returns the axes."""
 
 @final
 class Fit:
@@ -159,10 +182,20 @@ class Fit:
         """The results of the fit, as in the JSON of `host fit` (schema pam-fit/1)."""
     @property
     def table(self) -> Table: ...
+    @property
+    def campaign(self) -> Campaign:
+        """The recordings that were fitted."""
+    def plot(self, axes: Any = None) -> Any:
+        """Draws the recordings and the table's prediction for them. Needs matplotlib; returns the axes."""
     def report(self, path: _Path) -> None:
         """Writes the report, one HTML file."""
 
-def read(paths: _Path | Sequence[_Path], muscle: Muscle | None = None, import_description: _Path | None = None, filters: dict[str, str] | None = None) -> Campaign:
+def read(
+    paths: _Path | Sequence[_Path],
+    muscle: Muscle | None = None,
+    import_description: _Path | None = None,
+    filters: dict[str, str] | None = None,
+) -> Campaign:
     """Reads a file, or several in chronological order; import_description is a TOML file that describes another format."""
 
 def fit(
@@ -180,5 +213,53 @@ def fit(
 def evaluate(campaign: Campaign, muscle: Muscle, *, order: int = 4, leave_out: str = "runs") -> dict[str, Any]:
     """The error of a fit on recordings that it has not seen: each run (or each of the "contractions") is left out in turn. Percentages
     refer to the largest measured force."""
-def diagnose(campaign: Campaign, muscle: Muscle, report: _Path | None = None) -> dict[str, Any]:
-    """Reports the effects that the model lacks, as the JSON of `host diagnose` (schema pam-diagnose/1); report is an HTML file to write."""
+
+def from_frame(
+    frame: Any,
+    name: str = "frame",
+    muscle: Muscle | None = None,
+    *,
+    split_by: str | Sequence[str] | None = None,
+    filters: dict[str, str] | None = None,
+    missing: Literal["error", "skip"] = "error",
+) -> Campaign:
+    """A data frame as a campaign: pandas, polars, a dict of columns, or anything with the Arrow PyCapsule interface. The column names end
+    in the unit, as in a file; `split_by` names columns whose values tell the recordings apart."""
+
+@final
+class DiagnosisResult:
+    """The answer of a diagnosis with what it was made from; `pamtools.Diagnosis` contains it."""
+    def json(self) -> str: ...
+    def corrected_table(self) -> Table: ...
+    def report(self, path: _Path) -> None: ...
+
+def diagnose(campaign: Campaign, muscle: Muscle) -> DiagnosisResult: ...
+
+@final
+class Link:
+    """The connection of a `pamtools.Device`."""
+    def __new__(cls, port: str) -> Link: ...
+    @staticmethod
+    def ports() -> list[str]: ...
+    @property
+    def port(self) -> str: ...
+    def info(self) -> dict[str, Any]: ...
+    def settings(self) -> dict[str, Any]: ...
+    def write_settings(self, text: str) -> None: ...
+    def flash(self, table: Table) -> str: ...
+    def clear(self) -> None: ...
+    def arm(self) -> None: ...
+    def vent(self) -> None: ...
+    def follow(
+        self,
+        quantity: str,
+        profile: str,
+        seconds: float | None = None,
+        rate: float | None = None,
+        stiffness: float | None = None,
+        beyond: bool = False,
+    ) -> None: ...
+    def watch(self, seconds: float | None = None, rate: float | None = None) -> None: ...
+    def next_rows(self) -> list[tuple[float, float, float, float, float, float, float, str, str]] | None: ...
+    def stop(self) -> None: ...
+    def close(self) -> None: ...

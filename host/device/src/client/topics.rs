@@ -1,0 +1,73 @@
+//! What a controller sends without a request: telemetry, events, log lines; and what of it was lost.
+
+use std::collections::VecDeque;
+
+use model_core::link::endpoints::{EVENT, LOG, TELEMETRY};
+use model_core::link::frame::Header;
+use model_core::link::messages::{Event, Telemetry};
+
+/// Telemetry that no one fetches is kept up to this many samples: a minute at 1 kHz.
+const BACKLOG: usize = 60_000;
+
+/// What a device sends without a request.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Topic {
+    /// A sample.
+    Telemetry(Telemetry),
+    /// Something that happened.
+    Event(Event),
+    /// A log line, for [`LogTable`](crate::log_table::LogTable).
+    Log(Vec<u8>),
+}
+
+/// What did not arrive.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Losses {
+    /// Samples of telemetry that the sequence numbers miss.
+    pub samples: u64,
+    /// Gaps in which they were lost.
+    pub gaps: u64,
+    /// Frames whose check failed, and bytes between frames that were none.
+    pub bad_frames: u64,
+    /// Requests that were sent again.
+    pub repeats: u64,
+    /// Samples that arrived and were never fetched.
+    pub unread: u64,
+}
+
+/// Topics in the order of their arrival, until they are fetched.
+#[derive(Debug, Default)]
+pub(super) struct Topics {
+    queue: VecDeque<Topic>,
+    /// Sequence number of the next sample, once there was one.
+    expected: Option<u16>,
+    pub losses: Losses,
+}
+
+impl Topics {
+    /// The oldest one.
+    pub fn pop(&mut self) -> Option<Topic> {
+        self.queue.pop_front()
+    }
+
+    /// Takes a frame; one that cannot be decoded is dropped, and shows as a gap.
+    pub fn take(&mut self, header: Header, body: &[u8]) {
+        if header.id == TELEMETRY {
+            let Ok(sample) = postcard::from_bytes::<Telemetry>(body) else { return };
+            let missing = self.expected.map_or(0, |expected| header.sequence.wrapping_sub(expected));
+            self.losses.samples += u64::from(missing);
+            self.losses.gaps += u64::from(missing > 0);
+            self.expected = Some(header.sequence.wrapping_add(1));
+            self.queue.push_back(Topic::Telemetry(sample));
+        } else if header.id == EVENT {
+            let event = postcard::from_bytes::<Event>(body);
+            self.queue.extend(event.ok().map(Topic::Event));
+        } else if header.id == LOG {
+            self.queue.push_back(Topic::Log(body.to_vec()));
+        }
+        while self.queue.len() > BACKLOG {
+            self.queue.pop_front();
+            self.losses.unread += 1;
+        }
+    }
+}

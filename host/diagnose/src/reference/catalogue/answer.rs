@@ -1,0 +1,269 @@
+//! The answer for strokes of a described muscle.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::super::answer::{
+    ChangeReport, Changed, Considered, Curve, HeldOut, NotComparable, Place, Probability, Reference, Remark,
+    Repeatability, Since, Split, Verdict, WhyNot, size,
+};
+use super::super::criteria::{
+    CATALOGUE_BINS, CATALOGUE_LAW_ERROR, COURSE_LEAD, LOCALISE_STANDS_OUT, NAMED, SET, SIZES,
+};
+use super::super::held_out::Unseen;
+use super::super::report::left;
+use super::super::shapes::Change;
+use super::cells::Cells;
+use super::weigh::{Accepted, Fit, Weighed};
+
+fn rms(values: &DVector<f64>) -> f64 {
+    (values.norm_squared() / values.len().max(1) as f64).sqrt()
+}
+
+/// rms of the difference without and with the changes, their sizes fitted to every other recording and judged on the rest, N.
+fn unseen(cells: &Cells, accepted: &[&Accepted]) -> Unseen {
+    let before = rms(&cells.difference);
+    let columns: Vec<DVector<f64>> = accepted.iter().map(|a| a.fit.trace.clone()).collect();
+    let recordings = cells.cells.iter().map(|c| c.recording).max().unwrap_or(0) + 1;
+    let held = recordings > 1;
+    if columns.is_empty() {
+        return Unseen { before, after: before, held };
+    }
+    let x = DMatrix::from_columns(&columns);
+    let mut remaining = cells.difference.clone();
+    for side in 0..if held { 2 } else { 1 } {
+        let own = |i: usize| !held || cells.cells[i].recording % 2 == side;
+        let kept: Vec<usize> = (0..cells.cells.len()).filter(|i| !held || !own(*i)).collect();
+        let weights = |i: &usize| 1.0 / cells.variance[*i];
+        let (mut g, mut b) = (DMatrix::zeros(x.ncols(), x.ncols()), DVector::zeros(x.ncols()));
+        for i in &kept {
+            let row = x.row(*i).transpose();
+            g += &row * row.transpose() * weights(i);
+            b += &row * (cells.difference[*i] * weights(i));
+        }
+        let Some(sizes) = g.cholesky().map(|f| f.solve(&b)) else { continue };
+        for i in (0..cells.cells.len()).filter(|i| own(*i)) {
+            remaining[i] -= (x.row(i) * &sizes)[0];
+        }
+    }
+    Unseen { before, after: rms(&remaining), held }
+}
+
+/// Since when: the change as it is, from one recording on, or growing over AFTER.
+fn since(cells: &Cells, fit: &Fit) -> Since {
+    match fit.change {
+        Change::ForceDrift => return Since::Gradual,
+        Change::EndSlip => {
+            // Its law has the moment as a parameter.
+            let begin = cells.rows.contexts().first().map_or(0.0, |c| c.time);
+            let time = fit.parameters.iter().find(|p| p.1 == "s").map(|p| p.2 - begin);
+            let recording = |moment: f64| {
+                let from = cells.cells.iter().filter(|c| c.time >= moment).map(|c| c.recording).min();
+                from.and_then(|r| cells.names.get(r)).cloned().unwrap_or_default()
+            };
+            return time
+                .map_or(Since::NotDetermined, |moment| Since::From { recording: recording(moment), moment });
+        }
+        change if change.remembers() => return Since::NotDetermined,
+        _ => {}
+    }
+    let weigh = |factor: &dyn Fn(usize) -> f64| {
+        let column = DVector::from_fn(cells.cells.len(), |i, _| fit.trace[i] * factor(i));
+        let (mut a, mut b) = (0.0, 0.0);
+        for i in 0..column.len() {
+            a += column[i] * column[i] / cells.variance[i];
+            b += column[i] * cells.difference[i] / cells.variance[i];
+        }
+        super::super::contrast::evidence(a, b, 1.0, &SIZES.map(|s| s * 100.0))
+    };
+    let recordings = cells.cells.iter().map(|c| c.recording).max().unwrap_or(0) + 1;
+    let whole = weigh(&|_| 1.0);
+    let ramp = weigh(&|i| cells.cells[i].time / cells.duration);
+    let step = (1..recordings)
+        .map(|r| (r, weigh(&|i| f64::from(u8::from(cells.cells[i].recording >= r)))))
+        .fold((0, f64::NEG_INFINITY), |best, one| if one.1 > best.1 { one } else { best });
+    if whole > step.1.max(ramp) + COURSE_LEAD {
+        Since::Beginning
+    } else if step.1 > whole.max(ramp) + COURSE_LEAD {
+        let first = cells.cells.iter().filter(|c| c.recording == step.0);
+        Since::From {
+            recording: cells.names.get(step.0).cloned().unwrap_or_default(),
+            moment: first.map(|c| c.time).fold(f64::INFINITY, f64::min).min(cells.duration),
+        }
+    } else if ramp > whole.max(step.1) + COURSE_LEAD {
+        Since::Gradual
+    } else {
+        Since::NotDetermined
+    }
+}
+
+fn places(cells: &Cells) -> Vec<Place> {
+    let total = cells.difference.norm_squared();
+    let count = cells.cells.len() as f64;
+    let mut all = Vec::new();
+    let mut add = |coordinate: &str, unit: &str, at: f64, own: &dyn Fn(usize) -> bool| {
+        let members: Vec<usize> = (0..cells.cells.len()).filter(|i| own(*i)).collect();
+        let share = members.iter().map(|i| cells.difference[*i].powi(2)).sum::<f64>() / total;
+        let rows = members.len() as f64 / count;
+        if share > LOCALISE_STANDS_OUT * rows && rows < 1.0 {
+            all.push(Place {
+                coordinate: coordinate.into(),
+                from: at,
+                to: at,
+                share,
+                rows,
+                unit: unit.into(),
+            });
+        }
+    };
+    for (level, pressure) in cells.levels.iter().enumerate() {
+        add("pressure", "kPa", pressure / 1e3, &|i| cells.cells[i].key.0 as usize == level);
+    }
+    for direction in [1.0, -1.0] {
+        add("direction", "", direction, &|i| cells.cells[i].direction * direction > 0.0);
+    }
+    for recording in 0..cells.names.len() {
+        add("recording", "", (recording + 1) as f64, &|i| cells.cells[i].recording == recording);
+    }
+    all.sort_by(|a, b| b.share.total_cmp(&a.share));
+    all.truncate(6);
+    all
+}
+
+fn changed(cells: &Cells, accepted: &Accepted) -> Changed {
+    let about = accepted.fit.change.about();
+    let alone = unseen(cells, &[accepted]);
+    // The catalogue counts the pressure that the reading lacks, a change what the gauge reads too much.
+    let sign = if accepted.fit.change == Change::GaugeGain { -1.0 } else { 1.0 };
+    let parameters = accepted.fit.parameters.iter();
+    Changed {
+        change: accepted.fit.change,
+        effect: about.name.into(),
+        probability: accepted.probability,
+        class_probability: accepted.class_probability,
+        class: accepted.fit.change.stroke_class(),
+        share_explained: alone.share().clamp(0.0, 1.0),
+        parameters: parameters
+            .map(|(name, unit, value, std)| size((name, unit), sign * *value, *std, 1e6, CATALOGUE_LAW_ERROR))
+            .collect(),
+        confusable_with: accepted.competitors.iter().map(|c| c.name().to_owned()).collect(),
+        since: since(cells, &accepted.fit),
+        owner: about.owner,
+        correction: accepted.fit.change.is_bench(),
+        rms_N: rms(&accepted.fit.trace),
+    }
+}
+
+fn curves(cells: &Cells, accepted: &[Accepted]) -> Vec<Curve> {
+    let mut all = Vec::new();
+    for (level, pressure) in cells.levels.iter().enumerate() {
+        let mut sums: BTreeMap<usize, [[f64; 5]; 2]> = BTreeMap::new();
+        for (i, c) in cells.cells.iter().enumerate().filter(|(_, c)| c.key.0 as usize == level) {
+            let explained: f64 = accepted.iter().map(|a| a.fit.trace[i]).sum();
+            let s = &mut sums.entry(c.key.2.min(CATALOGUE_BINS)).or_default()[usize::from(!c.key.1)];
+            let row = [1.0, c.stroke, c.force, cells.difference[i], explained];
+            s.iter_mut().zip(row).for_each(|(to, v)| *to += v);
+        }
+        let mut curve = Curve { title: format!("{:.0} kPa", pressure / 1e3), ..Curve::default() };
+        for sides in sums.values() {
+            let n = sides[0][0] + sides[1][0];
+            curve.at.push((sides[0][1] + sides[1][1]) / n * 1e3);
+            for (side, s) in sides.iter().enumerate() {
+                let mean = |v: f64| if s[0] > 0.0 { v / s[0] } else { f64::NAN };
+                curve.after[side].push(mean(s[2]));
+                curve.before[side].push(mean(s[2]) - mean(s[3]));
+                curve.difference[side].push(mean(s[3]));
+                curve.explained[side].push(mean(s[4]));
+            }
+        }
+        if !curve.at.is_empty() {
+            all.push(curve);
+        }
+    }
+    all
+}
+
+/// Everything that was found, as the answer.
+pub(super) fn answer(cells: &Cells, weighed: &Weighed, prior: f64) -> ChangeReport {
+    let accepted: Vec<&Accepted> = weighed.accepted.iter().collect();
+    let unseen = unseen(cells, &accepted);
+    let verdict = super::super::report::verdict(weighed.none, accepted.len(), weighed.last_none < NAMED);
+    let places = if verdict == Verdict::Consistent { Vec::new() } else { places(cells) };
+    let noise = cells.spread;
+    let mut sum = 0.0;
+    let set = weighed.probabilities.iter().take_while(|(_, p)| {
+        let begun = sum < SET;
+        sum += p;
+        begun
+    });
+    let open = |f: &&Fit| !accepted.iter().any(|a| a.fit.change == f.change);
+    let p_of = |name: &str| weighed.probabilities.iter().find(|(n, _)| n == name).map_or(0.0, |(_, p)| *p);
+    let share = ((1.0 - prior) / weighed.alone.len().max(1) as f64).max(1e-6);
+    let z = (2.0 * (prior / share).ln() + 6.0).max(0.0).sqrt() + 1.28;
+    let mut not = vec![];
+    if cells.unmatched > 0 {
+        not.push(NotComparable::States {
+            share: cells.unmatched as f64 / (cells.unmatched + cells.cells.len()) as f64,
+        });
+    }
+    ChangeReport {
+        muscle: None,
+        samples: 0,
+        verdict,
+        noise_N: noise,
+        misfit_rms_N: unseen.before,
+        largest_force_N: cells.largest,
+        unexplained: left(verdict, &unseen, &places),
+        r#where: places,
+        missing: accepted.iter().map(|a| changed(cells, a)).collect(),
+        held_out: HeldOut {
+            split: if unseen.held { Split::OtherRecordings } else { Split::None },
+            rms_before_N: unseen.before,
+            rms_after_N: unseen.after,
+            noise_N: noise,
+        },
+        considered: weighed
+            .alone
+            .iter()
+            .filter(open)
+            .map(|f| {
+                let p = p_of(f.change.name());
+                let (_, unit, _, std) = f.parameters.first().copied().unwrap_or(("", "", 0.0, 0.0));
+                Considered {
+                    effect: f.change.name().into(),
+                    gain: p,
+                    why_not: WhyNot::of(true, p),
+                    detectable: Some(std * z).filter(|d| *d > 0.0 && d.is_finite()),
+                    unit: unit.into(),
+                }
+            })
+            .collect(),
+        set: set.map(|(n, _)| n.clone()).collect(),
+        probabilities: weighed
+            .probabilities
+            .iter()
+            .map(|(cause, p)| Probability { cause: cause.clone(), probability: *p })
+            .collect(),
+        remarks: vec![Remark::StrokesAssumed],
+        reference: Reference {
+            files: Vec::new(),
+            table: None,
+            samples: 0,
+            repeatability_N: noise,
+            repeatability_from: Repeatability::Measured,
+            mounted_anew: true,
+            not_comparable: not,
+        },
+        alone: weighed
+            .alone
+            .iter()
+            .filter_map(|f| {
+                let (name, unit, value, std) = f.parameters.first()?;
+                Some((f.change.name().to_owned(), size((name, unit), *value, *std, 1e6, CATALOGUE_LAW_ERROR)))
+            })
+            .collect(),
+        curves: curves(cells, &weighed.accepted),
+        abscissa: ("displacement", "mm"),
+    }
+}

@@ -1,0 +1,315 @@
+//! Both campaigns as cells: what AFTER differs by from BEFORE at the same level, place, direction and speed.
+
+use std::collections::BTreeMap;
+
+use model_core::braid::Braid;
+use nalgebra::DVector;
+
+use super::super::criteria::{
+    CATALOGUE_BINS, CATALOGUE_FEWEST_CELLS, CATALOGUE_FLOOR, CATALOGUE_PRIOR, CATALOGUE_REST,
+    CATALOGUE_SPEED_STEP,
+};
+use crate::baselines::{self, Kind};
+use crate::linear::energy;
+use crate::rows::{self, ORDERS, Rows};
+use pam_data::error::{DataCode, Error, Result};
+use pam_data::recording::{Campaign, Clock};
+
+/// Level, direction, place, and kind of motion.
+type Key = (u32, bool, usize, i32);
+
+/// Kinds of motion beside speeds: rests by decades from here on, and the vented muscle.
+const REST: i32 = 100;
+const VENTED: i32 = 2000;
+
+/// Rows of one half-stroke in one state.
+#[derive(Debug, Clone)]
+pub(super) struct Cell {
+    pub key: Key,
+    /// Recording of AFTER, counted from 0.
+    pub recording: usize,
+    /// Rows of `Cells::rows`.
+    pub rows: Vec<usize>,
+    /// s since AFTER began.
+    pub time: f64,
+    pub force: f64,
+    pub stroke: f64,
+    pub direction: f64,
+}
+
+/// The cells of AFTER with what they differ by.
+pub(super) struct Cells {
+    pub cells: Vec<Cell>,
+    /// Which state each cell is of, counted from 0.
+    pub group: Vec<usize>,
+    /// Number of states.
+    pub groups: usize,
+    /// N.
+    pub difference: DVector<f64>,
+    /// N².
+    pub variance: DVector<f64>,
+    /// Rows of AFTER with their own memory, linearised about the model of BEFORE.
+    pub rows: Rows,
+    /// Largest force before, N.
+    pub largest: f64,
+    /// Spread of a cell in BEFORE, N.
+    pub spread: f64,
+    /// Pressures of the levels, Pa.
+    pub levels: Vec<f64>,
+    /// Cells of AFTER that BEFORE has nothing of.
+    pub unmatched: usize,
+    pub names: Vec<String>,
+    /// s.
+    pub duration: f64,
+}
+
+/// A state of the muscle as far as the model's own error depends on it.
+struct States {
+    /// Ends of the contraction at each level.
+    ends: Vec<(f64, f64)>,
+    /// The usual speed, m/s.
+    speed: f64,
+}
+
+impl States {
+    fn of(rows: &Rows, first_after: usize) -> Self {
+        let mut ends = vec![(f64::INFINITY, f64::NEG_INFINITY); rows.levels.len()];
+        let mut speeds: Vec<f64> = Vec::new();
+        for i in (0..first_after).filter(|i| !rows.vented[*i]) {
+            let context = &rows.contexts()[i];
+            if let Some(end) = ends.get_mut(rows.level[i] as usize) {
+                *end = (end.0.min(context.contraction), end.1.max(context.contraction));
+            }
+            if rows.still[i] <= 0.0 && context.speed != 0.0 {
+                speeds.push(context.speed.abs());
+            }
+        }
+        speeds.sort_by(f64::total_cmp);
+        let speed = speeds.get(speeds.len() / 2).copied().unwrap_or(1.0);
+        Self { ends, speed }
+    }
+
+    fn key(&self, rows: &Rows, i: usize) -> Key {
+        let context = &rows.contexts()[i];
+        if rows.vented[i] {
+            return (u32::MAX, true, 0, VENTED);
+        }
+        let level = rows.level[i];
+        let (low, high) = self.ends.get(level as usize).copied().unwrap_or((0.0, 1.0));
+        let share = if high > low { (context.contraction - low) / (high - low) } else { 0.0 };
+        let bin = ((share * CATALOGUE_BINS as f64).max(0.0) as usize).min(CATALOGUE_BINS - 1);
+        let kind = if rows.still[i] > 0.0 {
+            // Rests by decade of their duration.
+            REST + (rows.still[i] / CATALOGUE_REST).max(1.0).log10().floor() as i32
+        } else {
+            let ratio = (context.speed.abs() / self.speed).max(1e-3);
+            (ratio.ln() / CATALOGUE_SPEED_STEP.ln()).round() as i32
+        };
+        (level, rows.sign[i] > 0.0, bin, kind)
+    }
+}
+
+/// Rows of each cell by recording, half-stroke and state.
+fn gathered(rows: &Rows, states: &States, range: std::ops::Range<usize>) -> BTreeMap<(u32, Key), Vec<usize>> {
+    let mut all: BTreeMap<(u32, Key), Vec<usize>> = BTreeMap::new();
+    for i in range {
+        if rows.root_weight()[i] > 0.0 {
+            all.entry((rows.block[i], states.key(rows, i))).or_default().push(i);
+        }
+    }
+    all
+}
+
+fn mean(values: &[f64], rows: &[usize]) -> f64 {
+    rows.iter().map(|i| values[*i]).sum::<f64>() / rows.len().max(1) as f64
+}
+
+/// What BEFORE says of its residual.
+struct Level {
+    /// By state: the mean and the number of cells.
+    means: BTreeMap<Key, (f64, f64)>,
+    /// Variance of a cell about the mean of its state, by class of motion; and of all.
+    variances: BTreeMap<i32, f64>,
+    variance: f64,
+}
+
+/// A variance in which single cells, as after a restart, do not count with all they have.
+fn robust(deviations: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let usual = 1.4826 * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+    let square: f64 = deviations.iter().map(|d| d.clamp(-4.0 * usual, 4.0 * usual).powi(2)).sum();
+    square / deviations.len().max(1) as f64
+}
+
+impl Level {
+    fn of(cells: &BTreeMap<(u32, Key), Vec<usize>>, residual: &[f64]) -> Self {
+        let mut by_key: BTreeMap<Key, Vec<f64>> = BTreeMap::new();
+        for ((_, key), rows) in cells {
+            by_key.entry(*key).or_default().push(mean(residual, rows));
+        }
+        let mut by_class: BTreeMap<i32, Vec<f64>> = BTreeMap::new();
+        let mut means = BTreeMap::new();
+        for (key, values) in &by_key {
+            let n = values.len() as f64;
+            let m = values.iter().sum::<f64>() / n;
+            let own = by_class.entry(key.3).or_default();
+            if values.len() > 1 {
+                own.extend(values.iter().map(|v| (v - m) * (n / (n - 1.0)).sqrt()));
+            }
+            means.insert(*key, (m, n));
+        }
+        let all: Vec<f64> = by_class.values().flatten().copied().collect();
+        let variance = robust(&all);
+        // A class of motion with few repeats counts as all do; one that has none, as the worst.
+        let shrunk = |own: &Vec<f64>| {
+            let n = own.len() as f64;
+            (n * robust(own) + CATALOGUE_PRIOR * variance) / (n + CATALOGUE_PRIOR)
+        };
+        let known = by_class.iter().filter(|(_, own)| !own.is_empty());
+        let mut variances: BTreeMap<i32, f64> = known.map(|(class, own)| (*class, shrunk(own))).collect();
+        let worst = variances.values().copied().fold(variance, f64::max);
+        by_class.keys().for_each(|class| {
+            variances.entry(*class).or_insert(worst);
+        });
+        Self { means, variances, variance }
+    }
+}
+
+/// The row of `own` that each joint row of AFTER is nearest to in time, recording by recording.
+fn matched(joint: &Rows, own: &Rows, first_after: usize, first_recording: u32) -> Vec<usize> {
+    let mut at = 0;
+    (first_after..joint.len())
+        .map(|j| {
+            let recording = joint.recording[j] - first_recording;
+            let time = joint.local_time[j];
+            while at + 1 < own.len()
+                && (own.recording[at + 1] < recording
+                    || (own.recording[at + 1] == recording
+                        && (own.recording[at] < recording
+                            || (own.local_time[at + 1] - time).abs() <= (own.local_time[at] - time).abs())))
+            {
+                at += 1;
+            }
+            at
+        })
+        .collect()
+}
+
+/// The rows of AFTER with the forces and slopes of the joint model.
+fn linearised(joint: &Rows, own: &Rows, first_after: usize, place: &[usize]) -> Rows {
+    let mut contexts = own.contexts().to_vec();
+    let mut from: Vec<Option<usize>> = vec![None; own.len()];
+    for (k, i) in place.iter().enumerate() {
+        from[*i].get_or_insert(first_after + k);
+    }
+    let mut last = first_after;
+    for (context, from) in contexts.iter_mut().zip(from) {
+        last = from.unwrap_or(last);
+        let model = &joint.contexts()[last];
+        context.corrected_pressure = context.pressure - (model.pressure - model.corrected_pressure);
+        context.friction = model.friction;
+        context.gaylord = model.gaylord;
+        context.quasi = model.quasi;
+        context.elastic = model.elastic;
+        context.stiffness = model.stiffness;
+        context.pressure_slope = model.pressure_slope;
+    }
+    own.with_contexts(contexts)
+}
+
+impl Cells {
+    /// Compares two campaigns.
+    ///
+    /// # Errors
+    /// Recordings without force, or campaigns that have too little in common.
+    pub fn of(before: &Campaign, after: &Campaign, braid: &Braid<f64>) -> Result<Self> {
+        let (own, _) = rows::prepare(after, braid)?;
+        let recordings = before.recordings.iter().chain(&after.recordings).cloned().collect();
+        let both = Campaign { recordings, clock: Clock::Separate, warnings: Vec::new() };
+        let (prepared, _) = rows::prepare(&both, braid)?;
+        // On a ramp of pressure at a held length friction turns by a share of its own: no state of the strokes is like it.
+        let joint = prepared.without(|i| prepared.on_ramp[i]);
+        let first_recording = (joint.names.len() - own.names.len().min(joint.names.len())) as u32;
+        let first_after = joint.recording.iter().position(|r| *r >= first_recording).unwrap_or(joint.len());
+        let reference_rows = joint.without(|i| i >= first_after);
+        let mut fitted = baselines::fit(&reference_rows, Kind::Flexible(ORDERS), &[]);
+        let (screened, _) = baselines::without_slack(&reference_rows, &fitted);
+        if energy(screened.root_weight()) > 0.0 {
+            fitted = baselines::fit(&screened, Kind::Flexible(ORDERS), &[]);
+        }
+        let residual = fitted.raw_residual.clone();
+        let (joint, _) = baselines::without_slack(&joint, &fitted);
+        let joint = baselines::linearised(&joint, &fitted);
+        let states = States::of(&joint, first_after);
+        let old = gathered(&joint, &states, 0..first_after);
+        let level = Level::of(&old, &residual);
+        let variance = level.variance;
+        let forces = joint.force[..first_after].iter();
+        let largest = forces.copied().fold(0.0, f64::max);
+        let floor = (CATALOGUE_FLOOR * largest).powi(2);
+        let new = gathered(&joint, &states, first_after..joint.len());
+        let mut shared: BTreeMap<Key, f64> = BTreeMap::new();
+        new.keys().for_each(|(_, key)| *shared.entry(*key).or_insert(0.0) += 1.0);
+        let place = matched(&joint, &own, first_after, first_recording);
+        let rows = linearised(&joint, &own, first_after, &place);
+        let begin = rows.contexts().first().map_or(0.0, |c| c.time);
+        let end = rows.contexts().last().map_or(1.0, |c| c.time);
+        let (mut cells, mut difference, mut spread, mut unmatched) = (Vec::new(), Vec::new(), Vec::new(), 0);
+        for ((_, key), members) in &new {
+            let Some((before, count)) = level.means.get(key) else {
+                unmatched += 1;
+                continue;
+            };
+            let own_rows: Vec<usize> = members.iter().map(|j| place[j - first_after]).collect();
+            let first = members.first().copied().unwrap_or(first_after);
+            let d = mean(&residual, members) - before;
+            if !d.is_finite() {
+                continue;
+            }
+            difference.push(d);
+            // Cells of AFTER share the mean of BEFORE: each counts with its part of that mean's error.
+            let own = level.variances.get(&key.3).copied().unwrap_or(variance);
+            spread.push((own + floor) * (1.0 + shared.get(key).copied().unwrap_or(1.0) / count));
+            cells.push(Cell {
+                key: *key,
+                recording: (joint.recording[first] - first_recording) as usize,
+                time: rows.contexts()[own_rows[0]].time - begin,
+                force: mean(&joint.force, members),
+                stroke: joint.contexts()[first].stroke,
+                direction: joint.sign[first],
+                rows: own_rows,
+            });
+        }
+        if cells.len() < CATALOGUE_FEWEST_CELLS || !(largest > 0.0) {
+            return Err(Error::new(
+                DataCode::RecordingOutOfRange,
+                "AFTER and the reference have too little in common: no strokes at the same pressures and lengths",
+            )
+            .help("record the same pressures over the same stroke"));
+        }
+        let mut states: Vec<Key> = cells.iter().map(|c| c.key).collect();
+        states.sort_unstable();
+        states.dedup();
+        let group = cells.iter().map(|c| states.binary_search(&c.key).unwrap_or(0)).collect();
+        Ok(Self {
+            group,
+            groups: states.len(),
+            difference: DVector::from_vec(difference),
+            variance: DVector::from_vec(spread),
+            rows,
+            largest,
+            spread: (variance + floor).sqrt(),
+            levels: joint.levels.clone(),
+            unmatched,
+            names: own.names.clone(),
+            duration: (end - begin).max(1e-9),
+            cells,
+        })
+    }
+
+    /// Means of a column of AFTER's rows over the cells.
+    pub fn means(&self, column: &[f64]) -> DVector<f64> {
+        DVector::from_iterator(self.cells.len(), self.cells.iter().map(|c| mean(column, &c.rows)))
+    }
+}
