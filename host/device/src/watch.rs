@@ -22,7 +22,7 @@ pub enum Happened<'a> {
     Event(&'a Event),
 }
 
-/// Hands on every sample and event until `seconds` of device time are over or `stop` says so. The telemetry goes on afterwards.
+/// Hands on every sample and event until `seconds` of device time are over or `stop` says so. The telemetry continues afterwards.
 ///
 /// # Errors
 /// A device that is silent, refuses, or restarts; what `take` returns.
