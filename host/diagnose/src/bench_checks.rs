@@ -44,7 +44,7 @@ impl BenchChecks {
         if checks.is_empty() {
             return Ok(known);
         }
-        let (rows, fitted) = as_read(campaign, braid)?;
+        let (rows, fitted) = one_bladder(campaign, None, braid)?;
         let rows = baselines::linearised(&rows, &fitted);
         let blocked = rows.force.iter().copied().fold(0.0, f64::max);
         for measured in checks.measured() {
@@ -86,6 +86,11 @@ impl BenchChecks {
         Cow::Owned(checks::freed(campaign, &faults))
     }
 
+    /// Whether the corrected stroke follows the force, as the muscle does in a frame that gives.
+    pub(super) fn corrects_the_stroke(&self) -> bool {
+        self.named.iter().any(|j| j.measured.fault == BenchName::RigCompliance)
+    }
+
     /// Whether a check of the bench settles an effect, so that the recordings need not.
     ///
     /// An effect that the user gives as known is fitted even where a check found it immaterial.
@@ -99,7 +104,7 @@ impl BenchChecks {
         self,
         (mut diagnosis, kind): (Diagnosis, Kind),
         given: &[Law],
-        freed: &Campaign,
+        (freed, as_read): (&Campaign, Option<&Campaign>),
         braid: &Braid<f64>,
     ) -> Result<Diagnosis> {
         for j in self.absent.iter().filter(|j| !given.contains(&Law::Bench(j.measured.fault))) {
@@ -125,7 +130,7 @@ impl BenchChecks {
             return Ok(diagnosis);
         }
         let Some((rows, before)) = self.before else { return Ok(diagnosis) };
-        let (freed_rows, after) = as_read(freed, braid)?;
+        let (freed_rows, after) = one_bladder(freed, as_read, braid)?;
         let (was, is) = (before.per_row(&rows), after.per_row(&freed_rows));
         let noise = diagnosis.noise_N.powi(2);
         let share =
@@ -170,9 +175,13 @@ impl BenchChecks {
     }
 }
 
-/// Recordings with one bladder for all pressures.
-fn as_read(campaign: &Campaign, braid: &Braid<f64>) -> Result<(Rows, Baseline)> {
-    let (rows, _) = rows::prepare(campaign, braid)?;
+/// Recordings with one bladder for all pressures; of corrected ones, with the readings as they were.
+fn one_bladder(
+    campaign: &Campaign,
+    as_read: Option<&Campaign>,
+    braid: &Braid<f64>,
+) -> Result<(Rows, Baseline)> {
+    let (rows, _) = rows::prepare_corrected(campaign, as_read, braid)?;
     let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
     let (rows, _) = baselines::without_slack(&rows, &fitted);
     let fitted = baselines::fit(&rows, Kind::Stiff, &[]);

@@ -46,18 +46,20 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     }
     let known = BenchChecks::of(&options.checks, campaign, &braid)?;
     let freed = known.free(campaign);
-    let answer = ask(&freed, &braid, options, &known)?;
-    known.enter(answer, &options.given, &freed, &braid)
+    let as_read = known.corrects_the_stroke().then_some(campaign);
+    let answer = ask(&freed, as_read, &braid, options, &known)?;
+    known.enter(answer, &options.given, (&freed, as_read), &braid)
 }
 
 /// The answer of the recordings, corrected for what checks of the bench measured; with the kind of the last baseline.
 fn ask(
     campaign: &Campaign,
+    as_read: Option<&Campaign>,
     braid: &Braid<f64>,
     options: &Options,
     known: &BenchChecks,
 ) -> Result<(Diagnosis, Kind)> {
-    let (rows, mut remarks) = rows::prepare(campaign, braid)?;
+    let (rows, mut remarks) = rows::prepare_corrected(campaign, as_read, braid)?;
     let rows = rows.watched(options.progress.clone());
     let (blocked, step) = (blocked_force(&rows), rows::typical_step(&rows));
     remarks.extend(limitations(&rows));

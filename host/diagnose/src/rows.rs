@@ -206,13 +206,23 @@ impl Rows {
 /// # Errors
 /// A recording without force.
 pub(crate) fn prepare(campaign: &Campaign, braid: &Braid<f64>) -> Result<(Rows, Vec<Remark>)> {
+    prepare_corrected(campaign, None, braid)
+}
+
+/// The same of a campaign that was corrected for faults of the bench, with the readings as they were. The bench moved as it was read: a
+/// length that was held stays held where a frame that gives made the muscle follow its own force.
+pub(crate) fn prepare_corrected(
+    campaign: &Campaign,
+    as_read: Option<&Campaign>,
+    braid: &Braid<f64>,
+) -> Result<(Rows, Vec<Remark>)> {
     let screened = Screened::of(campaign);
     let campaign = screened.campaign.as_ref();
     let pressures = pressure_range(campaign);
-    let motions = Motion::of_campaign(campaign);
+    let motions = Motion::of_campaign(as_read.map(Screened::of).as_ref().map_or(campaign, |s| &s.campaign));
     let isometric = motions.iter().all(|m| m.is_isometric);
     let ends = readings::ends(campaign);
-    let gathered = gather::gather(campaign, &screened, &motions, braid, &ends)?;
+    let gathered = gather::gather(campaign, &screened, &motions, as_read.is_some(), braid, &ends)?;
     let remarks = remarks(&screened, &ends, &gathered, campaign.samples());
     let levels = Levels::find(&gathered.contexts, &gathered.piece, pressures);
     let vented = tares::vented(&gathered.contexts);

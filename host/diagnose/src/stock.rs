@@ -1,8 +1,8 @@
-//! A stock of muscles at once: what they have in common, what each has of its own, and which effect of the catalogue differs with length.
+//! A stock of muscles together: what they have in common, what each has of its own, and which effect of the catalogue differs with length.
 //!
-//! The numbers are those of the joint fit ([`pam_fit::stock`]). A law between muscles is named where it foretells left-out muscles better than
-//! chance differences do, and where its parameter exceeds its standard error by the quantile of Student's t, with as many degrees of freedom as
-//! muscles less two. Unit of uncertainty: muscle.
+//! The numbers are those of the joint fit ([`pam_fit::stock`]). A law between muscles is named where it predicts left-out muscles better than
+//! chance differences do, and where its parameter exceeds its standard error by the quantile of Student's t. There are as many degrees of freedom
+//! as muscles less two. Unit of uncertainty: muscle.
 
 use model_core::braid::Braid;
 use model_core::units::Length;
@@ -83,8 +83,10 @@ pub struct SharedPlace {
 pub struct Considered {
     /// `None`: muscles differ by chance only.
     pub law: Option<Law>,
-    /// Its parameter: m, m, m/N.
+    /// Its parameter: m, or m/N for a compliance.
     pub parameter: Option<Interval>,
+    /// Its standard error by the jackknife over muscles, for comparison.
+    pub jackknife: Option<f64>,
     /// Error on left-out muscles, rms, as a share of the largest force of each.
     pub error: f64,
     /// Why it is not named, as text; empty where it is.
@@ -182,7 +184,7 @@ fn considered(fitted: &Stock, freedom: usize) -> Vec<Considered> {
         } else if !t.plausible() {
             "its parameter would be negative".to_owned()
         } else if !(t.error < none) {
-            "it does not foretell left-out muscles better than chance differences".to_owned()
+            "it does not predict left-out muscles better than chance differences".to_owned()
         } else if !(value.value > t_quantile(freedom) * value.std) {
             format!(
                 "its parameter is {:.1} standard errors from zero, {:.1} are needed",
@@ -190,7 +192,7 @@ fn considered(fitted: &Stock, freedom: usize) -> Vec<Considered> {
                 t_quantile(freedom)
             )
         } else {
-            "another law foretells left-out muscles better".to_owned()
+            "another law predicts left-out muscles better".to_owned()
         }
     };
     fitted
@@ -201,6 +203,7 @@ fn considered(fitted: &Stock, freedom: usize) -> Vec<Considered> {
             Considered {
                 law,
                 parameter: t.values.first().map(|v| Interval::new(*v, t_quantile(freedom))),
+                jackknife: t.jackknife.first().copied(),
                 error: t.error,
                 why_not: why(t, law),
             }

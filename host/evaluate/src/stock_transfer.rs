@@ -7,22 +7,27 @@
 use pam_data::error::{Error, Result};
 use pam_data::recording::motion::Motion;
 use pam_fit::error::FitCode;
+use pam_fit::stock::criteria::MEAN_SIZE;
 use pam_fit::stock::{Law, Member, Place, StockCells, StockFit, fit, stock_cells};
 use rayon::prelude::*;
 
 use crate::cross_validation::{Score, Spot, Tally};
 
-/// What the stock foretells of a muscle.
+/// What the stock predicts of a muscle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StockTransfer {
     /// The errors where the whole muscle was left out.
     pub length: Score,
+    /// Mean size of the error that unknown lengths, zeros and scale alone would give, N.
+    pub length_expected: f64,
     /// By place.
     pub length_spots: Vec<Spot>,
     /// Total length `λ` of the ends by the other muscles, m.
     pub ends: f64,
     /// The errors where each contraction was left out in turn; empty for a muscle that moves.
     pub contractions: Score,
+    /// Mean size of the error that the unknown length and zero of each mounting alone would give, N.
+    pub contractions_expected: f64,
     /// By place.
     pub contraction_spots: Vec<Spot>,
 }
@@ -44,9 +49,9 @@ pub fn predict_with_stock(members: &[Member<'_>], clips: &[Option<f64>]) -> Resu
     let one = |m: usize| -> Result<StockTransfer> {
         let clip = clips.get(m).copied().flatten();
         let without = fit(&cells.only(|c| c.member != m), &LAWS, Some(&whole)).ok_or_else(unusable)?;
-        let mut length = Tally::default();
+        let mut length = Predicted::default();
         add(&mut length, members, &cells, m, None, &without, clip)?;
-        let mut contractions = Tally::default();
+        let mut contractions = Predicted::default();
         let held: Vec<usize> =
             (0..cells.mountings[m].len()).filter(|k| cells.mountings[m][*k].stroke.is_some()).collect();
         for mounting in held.iter().filter(|_| held.len() > 1) {
@@ -55,19 +60,34 @@ pub fn predict_with_stock(members: &[Member<'_>], clips: &[Option<f64>]) -> Resu
             add(&mut contractions, members, &cells, m, Some(*mounting), &without, clip)?;
         }
         Ok(StockTransfer {
-            length: length.score,
-            length_spots: length.spots(),
+            length: length.tally.score,
+            length_expected: length.expected(),
+            length_spots: length.tally.spots(),
             ends: without.shared[0].value,
-            contractions: contractions.score,
-            contraction_spots: contractions.spots(),
+            contractions: contractions.tally.score,
+            contractions_expected: contractions.expected(),
+            contraction_spots: contractions.tally.spots(),
         })
     };
     (0..members.len()).into_par_iter().map(one).collect()
 }
 
+/// Errors of a prediction, and the sum of their expected sizes.
+#[derive(Debug, Clone, Default)]
+struct Predicted {
+    tally: Tally,
+    expected: f64,
+}
+
+impl Predicted {
+    fn expected(&self) -> f64 {
+        self.expected / self.tally.score.rows.max(1.0)
+    }
+}
+
 /// Adds the errors of a muscle's rows: of one mounting, with what is known of the muscle, or of all with nothing known.
 fn add(
-    tally: &mut Tally,
+    into: &mut Predicted,
     members: &[Member<'_>],
     cells: &StockCells,
     m: usize,
@@ -101,7 +121,8 @@ fn add(
                 Some(_) => format!("{:.1} mm", recording.stroke[i] * 1e3),
                 None => muscle.name.clone(),
             };
-            tally.add(&left_out, contraction, motion.direction[i], force - fit.force(&place));
+            into.expected += MEAN_SIZE * fit.unknown_deviation(&place);
+            into.tally.add(&left_out, contraction, motion.direction[i], force - fit.force(&place));
         }
     }
     Ok(())

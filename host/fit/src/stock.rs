@@ -21,6 +21,8 @@
 //! Linear mixed model and its equations: C. R. Henderson, Biometrics 31 (1975) 423, doi 10.2307/2529430; variances by expectation and maximisation:
 //! N. M. Laird, J. H. Ware, Biometrics 38 (1982) 963, doi 10.2307/2529876.
 
+use self::criteria::SLOPE_STEP;
+
 mod between;
 mod cells;
 pub mod criteria;
@@ -42,7 +44,7 @@ pub enum Law {
     Ends,
     /// `κ`: tapers at the ends that grow with contraction.
     Taper,
-    /// `1/K`: the frame gives way in proportion to the force.
+    /// `1/K`: the frame yields in proportion to the force.
     Compliance,
 }
 
@@ -102,7 +104,7 @@ pub struct Deviations {
     pub mounted: f64,
     /// Of the load cell's zero, N.
     pub zero: f64,
-    /// Of what remains, N.
+    /// Of the residuals, N.
     pub residual: f64,
 }
 
@@ -126,7 +128,7 @@ pub struct StockFit {
     pub rms: f64,
 }
 
-/// Where a force is wanted.
+/// Where a force is computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// Gauge pressure, Pa.
@@ -155,7 +157,7 @@ impl StockFit {
         let (scale, length) = own.map_or((0.0, 0.0), |o| (o.scale.value, o.length.value));
         let compliance = self.shared[2].value;
         let mut force = 0.0;
-        // The stroke depends on the force where the frame gives way; a few steps settle it.
+        // The stroke depends on the force where the frame yields; a few steps settle it.
         for _ in 0..if compliance == 0.0 { 1 } else { 30 } {
             let contraction = (at.stroke + length + mounted + compliance * force) / at.rest_length;
             let next = scale.exp()
@@ -165,6 +167,19 @@ impl StockFit {
             force += 0.5 * (next - force) * if compliance == 0.0 { 2.0 } else { 1.0 };
         }
         force
+    }
+
+    /// Standard deviation of the force at a place from what is not known there, N: length and zero of the mounting, and those of a muscle that was
+    /// not fitted.
+    #[must_use]
+    pub fn unknown_deviation(&self, at: &Place) -> f64 {
+        let beside = |by: f64| self.force(&Place { stroke: at.stroke + by, ..*at });
+        let slope = (beside(SLOPE_STEP) - beside(-SLOPE_STEP)) / (2.0 * SLOPE_STEP);
+        let d = &self.deviations;
+        let mounting = if at.mounting.is_none() { (slope * d.mounted).hypot(d.zero) } else { 0.0 };
+        let muscle =
+            if at.member.is_none() { (slope * d.length).hypot(d.scale * self.force(at)) } else { 0.0 };
+        mounting.hypot(muscle)
     }
 
     /// The shared force of the stock at a pressure (Pa), contraction and direction, N.

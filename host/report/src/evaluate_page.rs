@@ -2,6 +2,7 @@
 
 use pam_evaluate::cross_validation::{CrossValidation, Score, Spot};
 use pam_evaluate::length_transfer::LengthTransfer;
+use pam_evaluate::stock_transfer::StockTransfer;
 
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed, residual_table};
 
@@ -23,6 +24,8 @@ pub struct Evaluated<'a> {
     pub contractions: Option<&'a CrossValidation>,
     /// Predicted from the tables of the other muscles.
     pub length: Option<&'a LengthTransfer>,
+    /// Predicted with all muscles fitted together.
+    pub stock: Option<&'a StockTransfer>,
 }
 
 impl Evaluated<'_> {
@@ -221,6 +224,8 @@ fn scores(all: &[Evaluated<'_>], published: Option<&str>) -> Section {
             "published formula",
             "held-out contractions",
             "other lengths",
+            "held-out contractions, with the stock",
+            "other lengths, with the stock",
         ],
     );
     for one in all {
@@ -238,6 +243,8 @@ fn scores(all: &[Evaluated<'_>], published: Option<&str>) -> Section {
             cell(any.published.as_ref()),
             cell(one.contractions.map(|c| &c.table)),
             cell(one.length.map(|l| &l.score)),
+            cell(one.stock.map(|s| &s.contractions).filter(|s| s.rows > 0.0)),
+            cell(one.stock.map(|s| &s.length)),
         ]);
     }
     section.table(table);
@@ -245,6 +252,12 @@ fn scores(all: &[Evaluated<'_>], published: Option<&str>) -> Section {
         "The blocked force is friction-free, at rest length and the highest tested pressure, by the fit to all rows. The largest \
          measured force does not depend on a fit.",
     );
+    if all.iter().any(|one| one.stock.is_some()) {
+        section.text(
+            "With the stock: all muscles are fitted together without what is predicted; ends that do not pull, and errors of lengths and \
+             zeros, are estimated beside the shared force.",
+        );
+    }
     if let Some(name) = published {
         section.text(format!("The published formula is {name}, on the same rows as the held-out runs."));
     }

@@ -11,7 +11,7 @@ pub(crate) fn law(of: Option<Law>) -> (&'static str, f64, &'static str) {
         None => ("chance differences only", 1.0, ""),
         Some(Law::Ends) => ("ends of total length λ do not pull: F ∝ 1 − λ/L0", 1e3, "mm"),
         Some(Law::Taper) => ("tapers at the ends grow with contraction: F ∝ 1 − κ·ε/L0", 1e3, "mm"),
-        Some(Law::Compliance) => ("the frame gives way: x = x_read + F/K", 1e3, "mm/N"),
+        Some(Law::Compliance) => ("the frame yields: x = x_read + F/K", 1e3, "mm/N"),
     }
 }
 

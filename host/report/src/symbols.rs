@@ -5,7 +5,7 @@ use model_core::effects::Info;
 use super::Table;
 
 /// Symbols that mean the same in every equation. Where a parameter has one of them, it is the parameter.
-const SYMBOLS: [(&str, &str); 53] = [
+const SYMBOLS: &[(&str, &str)] = &[
     ("F_quasi", "pull of the base model without friction, N"),
     ("F_b", "elastic force of the bladder: the base model's without friction less P·g, N"),
     ("F_G", "Gaylord's force of the effective pressure, P′·g, N"),
@@ -19,6 +19,7 @@ const SYMBOLS: [(&str, &str); 53] = [
     ("g", "pull per pascal of the cylinder, (3L² − B²)/(4πN²), m²"),
     ("g_n", "weight of a kilogram, 9.807 N/kg"),
     ("∂F/∂x", "slope of the base model's force over the stroke, negative, N/m"),
+    ("∂F_quasi/∂x", "slope of the friction-free force over the stroke, negative, N/m"),
     ("x", "stroke, positive in contraction, m"),
     ("ΔL", "stroke, positive in contraction, m"),
     ("y", "stroke of the muscle behind the play, m"),
@@ -107,7 +108,7 @@ pub fn symbols(info: &Info) -> Table {
     if names.iter().any(|n| n == "F") {
         table.row(["F on the right", "force of the base model with its friction, (1 − s·k_F)·F_quasi, N"]);
     }
-    for (letter, what) in SYMBOLS {
+    for &(letter, what) in SYMBOLS {
         if occurs(letter, &names) && info.parameters.iter().all(|p| p.letter != letter) {
             table.row([letter, what]);
         }

@@ -137,7 +137,7 @@ impl Arguments {
         }
         let lengths = (0..cases.len()).map(|i| by_others(&cases, i)).collect::<Result<Vec<_>>>()?;
         let stock = with_stock(&cases, console)?;
-        self.write_report(console, &cases, &lengths, hashes)?;
+        self.write_report(console, &cases, (&lengths, &stock), hashes)?;
         if let Some(path) = &self.json {
             let muscles = cases
                 .iter()
@@ -165,7 +165,7 @@ impl Arguments {
         &self,
         console: &Console,
         cases: &[Case],
-        lengths: &[Option<LengthTransfer>],
+        (lengths, stock): (&[Option<LengthTransfer>], &[StockTransfer]),
         hashes: Vec<String>,
     ) -> Result<()> {
         let from = cases.iter().fold(reports::provenance(), |from, case| from.muscle(&case.muscle));
@@ -174,11 +174,13 @@ impl Arguments {
             let found: Vec<Evaluated<'_>> = cases
                 .iter()
                 .zip(lengths)
-                .map(|(case, length)| Evaluated {
+                .enumerate()
+                .map(|(i, (case, length))| Evaluated {
                     muscle: &case.muscle.name,
                     runs: case.runs.as_ref(),
                     contractions: case.contractions.as_ref(),
                     length: length.as_ref(),
+                    stock: stock.get(i),
                 })
                 .collect();
             evaluate_page::page(&found, self.published.as_deref())
@@ -304,37 +306,46 @@ fn to_text(
     text
 }
 
-/// The errors with the stock, one line for each muscle.
+/// The errors with the stock, one line for each muscle. Behind each: the mean error that unknown lengths, zeros and scale alone would give.
 fn stock_text(cases: &[Case], stock: &[StockTransfer]) -> String {
     if stock.is_empty() {
         return String::new();
     }
-    let mut text = "\nAll muscles fitted together, without what is predicted:\n".to_owned();
-    text += &format!(
-        "{:<22} {:>17} {:>17} {:>14}\n",
-        "muscle", "held-out contr.", "other lengths", "ends by others"
+    let mut text = format!(
+        "\nAll muscles fitted together, without what is predicted (expected: from unknown lengths, zeros and scale alone)\n\
+         {:<22} {:>17} {:>9} {:>17} {:>9} {:>14}\n",
+        "muscle", "held-out contr.", "expected", "other lengths", "expected", "ends by others"
     );
-    let mut sums = [(0.0, 0.0); 2];
+    let mut sums = [(0.0, 0.0); 4];
     for (case, of) in cases.iter().zip(stock) {
         let Some(any) = case.runs.as_ref().or(case.contractions.as_ref()) else { continue };
-        let cells = [&of.contractions, &of.length]
-            .map(|s| (s.rows > 0.0).then(|| (s.mean(), percent(s, any.largest).0)));
-        for (sum, cell) in sums.iter_mut().zip(&cells) {
-            if let Some((_, pct)) = cell {
-                *sum = (sum.0 + pct, sum.1 + 1.0);
+        let share = |newtons: f64| 100.0 * newtons / any.largest;
+        let held = of.contractions.rows > 0.0;
+        let numbers = [
+            held.then(|| of.contractions.mean()),
+            held.then_some(of.contractions_expected),
+            Some(of.length.mean()),
+            Some(of.length_expected),
+        ];
+        for (sum, n) in sums.iter_mut().zip(&numbers) {
+            if let Some(n) = n {
+                *sum = (sum.0 + share(*n), sum.1 + 1.0);
             }
         }
-        let shown = cells.map(|c| c.map_or("–".to_owned(), |(n, pct)| format!("{n:.2} N  {pct:.2} %")));
+        let whole = |n: Option<f64>| n.map_or("–".to_owned(), |n| format!("{n:.2} N  {:.2} %", share(n)));
+        let pct = |n: Option<f64>| n.map_or("–".to_owned(), |n| format!("{:.2} %", share(n)));
         text += &format!(
-            "{:<22} {:>17} {:>17} {:>11.1} mm\n",
+            "{:<22} {:>17} {:>9} {:>17} {:>9} {:>11.1} mm\n",
             case.muscle.name,
-            shown[0],
-            shown[1],
+            whole(numbers[0]),
+            pct(numbers[1]),
+            whole(numbers[2]),
+            pct(numbers[3]),
             of.ends * 1e3
         );
     }
     let means = sums.map(|(s, n)| if n > 0.0 { format!("{:.2} %", s / n) } else { "–".into() });
-    text + &format!("{:<22} {:>17} {:>17}\n", "mean", means[0], means[1])
+    text + &format!("{:<22} {:>17} {:>9} {:>17} {:>9}\n", "mean", means[0], means[1], means[2], means[3])
 }
 
 /// A line for everything that was left out: the mean error with its sign at each contraction.
@@ -420,8 +431,10 @@ fn to_document(
         with_stock: stock.map(|s| document::WithStock {
             ends_mm: s.ends * 1e3,
             unseen_length: score(&s.length),
+            length_expected_pct: 100.0 * s.length_expected / largest,
             length_where: spots(&s.length_spots),
             unseen_contractions: (s.contractions.rows > 0.0).then(|| score(&s.contractions)),
+            contractions_expected_pct: 100.0 * s.contractions_expected / largest,
             contractions_where: spots(&s.contraction_spots),
         }),
     }

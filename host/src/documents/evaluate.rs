@@ -61,9 +61,13 @@ pub(crate) struct WithStock {
     pub ends_mm: f64,
     /// The whole muscle left out.
     pub unseen_length: Score,
+    /// Mean error that unknown lengths, zero and scale alone would give, percent of the largest force.
+    pub length_expected_pct: f64,
     pub length_where: Vec<Spot>,
     /// Each held contraction left out; null for a muscle that moves.
     pub unseen_contractions: Option<Score>,
+    /// Mean error that the unknown length and zero of each mounting alone would give, percent of the largest force.
+    pub contractions_expected_pct: f64,
     pub contractions_where: Vec<Spot>,
 }
 

@@ -121,6 +121,8 @@ pub(crate) struct Tried {
     pub effect: Option<&'static str>,
     pub law: &'static str,
     pub parameter: Option<Estimate>,
+    /// Standard error of the parameter by the jackknife over muscles, for comparison.
+    pub jackknife_std: Option<f64>,
     /// Error on muscles that were left out, rms in percent of the largest force of each.
     pub left_out_error_pct: f64,
     /// Empty for the effect that is named.
@@ -176,6 +178,7 @@ fn tried(of: &Considered) -> Tried {
         effect: of.law.map(Law::effect),
         law: words,
         parameter: of.parameter.as_ref().map(|p| estimate(p, scale, unit)),
+        jackknife_std: of.jackknife.map(|j| j * scale),
         left_out_error_pct: 100.0 * of.error,
         why_not: of.why_not.clone(),
     }

@@ -35,6 +35,7 @@ mod semi;
 mod sensitivity;
 mod sensors;
 mod spec;
+mod stock;
 mod tool;
 
 use clap::{Args, Parser, Subcommand};
@@ -201,6 +202,8 @@ enum Command {
     Festo(Real),
     /// The same for settled points only: writes the section of the page on the memory of the bladder.
     FestoHistory(Real),
+    /// Diagnose the real sets of the 10 mm fluidic muscle as stocks, and predict unseen contractions and lengths with them.
+    Stock(Real),
     /// Fit static force maps of commercial muscles and predict them between lengths and pressures, beside published models.
     Maps(Real),
     /// Answer a development set again with each criterion at half and at double its value.
@@ -260,6 +263,9 @@ fn main() -> ExitCode {
         }
         Command::Festo(real) => {
             festo::run(&real.data, &real.output, &real.host).and_then(|()| real.copy_to_book("festo.md"))
+        }
+        Command::Stock(real) => {
+            stock::run(&real.data, &real.output, &real.host).and_then(|()| real.copy_to_book("stock.md"))
         }
         Command::Maps(real) => {
             maps::run(&real.data, &real.output, &real.host).and_then(|()| real.copy_to_book("force-maps.md"))

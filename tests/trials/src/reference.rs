@@ -43,6 +43,9 @@ pub struct Reference {
     /// DIR/training.jsonl: for `reference_baselines.py`.
     #[arg(long, value_name = "MUSCLES")]
     pairs: Option<u64>,
+    /// Only the trials against a table and the cylinder: their sections of the page are written anew, the others stay.
+    #[arg(long, requires = "page", conflicts_with_all = ["short", "pairs"])]
+    sections: bool,
     /// Only the trials against a table, without a page.
     #[arg(long, conflicts_with = "page")]
     tables: bool,
@@ -263,6 +266,13 @@ pub fn run(what: &Reference) -> Result<(), Box<dyn Error>> {
         let text = page::tables(&trials);
         print!("{text}");
         return write(&what.output, "tables.md", &text);
+    }
+    if let Some(path) = what.page.as_ref().filter(|_| what.sections) {
+        let trials = tables::run(&muscles, &slopes, false);
+        let pairs = cylinder::run(&what.data, false)?;
+        write(&what.output, "sections.json", &serde_json::to_string_pretty(&(&trials, &pairs))?)?;
+        std::fs::write(path, page::replaced(&std::fs::read_to_string(path)?, &trials, &pairs))?;
+        return Ok(());
     }
     let mut jobs = untouched(&muscles, if what.short { SHORT_STEP } else { 1 });
     jobs.extend(injected(&muscles, what.short));

@@ -216,6 +216,8 @@ pam_data::criteria! {
     CATALOGUE_FEWEST_CELLS: usize = 24, "catalogue_fewest_cells", "1", Judgement;
     /// Error of a cell's mean that is always allowed, share of the largest force: what a load cell of 0.02 % resolves.
     CATALOGUE_FLOOR: f64 = 2e-4, "catalogue_floor", "1", Convention("load cell, 0.02 %");
+    /// Cells that the spread of all kinds of motion is worth for that of one kind.
+    CATALOGUE_PRIOR: f64 = 10.0, "catalogue_prior", "1", Judgement;
     /// The shortest rest, s; longer ones count by decades.
     CATALOGUE_REST: f64 = 1.0, "catalogue_rest", "s", Judgement;
     /// Speeds that differ by less than about this factor count as one.

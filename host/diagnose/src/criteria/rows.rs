@@ -26,6 +26,10 @@ pam_data::criteria! {
     FLANK_STEP: f64 = 3.0, "n_flank", "1", Judgement;
     /// An error of this share of the largest force needs no weight taken from a row.
     NEGLIGIBLE_ERROR: f64 = 1e-3, "e_0/F_max", "1", Judgement;
+    /// A stroke that was corrected for a frame has turned once it has come back by this share of the least motion.
+    TURNED_BACK: f64 = 0.25, "dx_back/x_rev", "1", Judgement;
+    /// Readings after a reversal that are in doubt for it, at most.
+    TURN_SAMPLES: usize = 200, "m_turn", "1", Cost;
     /// A muscle is vented below this share of the highest pressure.
     VENTED_SHARE: f64 = 0.02, "P_vent/P_max", "1", Measured("zero errors of gauges, 0.1 to 0.5 % of full scale (catalogue, P1), with margin");
     /// ... and below this pressure.

@@ -8,11 +8,11 @@ use model_core::units::Length;
 use super::readings;
 use super::sleeve::{self, Shape};
 use crate::criteria::baseline::TABLE_ORDER;
-use crate::criteria::rows::TARGET_ROWS;
+use crate::criteria::rows::{TARGET_ROWS, TURN_SAMPLES, TURNED_BACK};
 use crate::valve_pulses;
 use pam_data::error::Result;
 use pam_data::recording::dropouts::Screened;
-use pam_data::recording::motion::{Motion, MotionState};
+use pam_data::recording::motion::{Cause, Motion, MotionState};
 use pam_data::recording::{Campaign, Follower, Recording};
 use pam_fit::Clip;
 
@@ -52,6 +52,7 @@ pub(super) fn gather(
     campaign: &Campaign,
     screened: &Screened<'_>,
     motions: &[Motion],
+    corrected: bool,
     braid: &Braid<f64>,
     ends: &[Clip],
 ) -> Result<Gathered> {
@@ -61,6 +62,7 @@ pub(super) fn gather(
         braid,
         ends,
         isometric: motions.iter().all(|m| m.is_isometric),
+        corrected,
         per_row: total.div_ceil(TARGET_ROWS).max(1),
         follower: Follower::of(campaign),
         pieces: 0,
@@ -78,6 +80,8 @@ struct Gathering<'a> {
     braid: &'a Braid<f64>,
     ends: &'a [Clip],
     isometric: bool,
+    /// Whether the stroke is corrected for a frame that gives, and the motion that of the frame.
+    corrected: bool,
     /// Samples in a row at most.
     per_row: usize,
     /// The motion as predictions see it, sample by sample.
@@ -117,6 +121,20 @@ struct Readings<'a> {
     read: &'a [bool],
 }
 
+/// A frame that gives takes a reversal before the muscle does: until that has come back from where it was, its direction is in doubt.
+fn doubt_until_the_muscle_turns(state: &mut MotionState, motion: &Motion, recording: &Recording) {
+    let stroke = &recording.stroke;
+    for turn in motion.turns.iter().filter(|t| t.cause == Cause::Stroke) {
+        let Some(last) = turn.index.checked_sub(1) else { continue };
+        let came_back = |i: &usize| {
+            (stroke[*i] - stroke[last]) * f64::from(turn.direction) > TURNED_BACK * motion.stroke_threshold
+        };
+        let end = (turn.index..stroke.len()).take(TURN_SAMPLES).find(came_back);
+        let end = end.unwrap_or((turn.index + TURN_SAMPLES).min(stroke.len()));
+        state.sure[turn.index..end].fill(false);
+    }
+}
+
 impl Gathering<'_> {
     /// Appends a recording, `pause` seconds after the one before where that is known. Samples whose pressure was not `read` do not count.
     ///
@@ -137,7 +155,10 @@ impl Gathering<'_> {
         self.rows.has_temperature &= recording.temperature.is_some();
         let samples = self.follower.follow(recording, motion, pause);
         let pressure_rate: Vec<f64> = samples.iter().map(|s| s.pressure_rate).collect();
-        let state = motion.state(recording, &pressure_rate);
+        let mut state = motion.state(recording, &pressure_rate);
+        if self.corrected {
+            doubt_until_the_muscle_turns(&mut state, motion, recording);
+        }
         // Where the muscle moves, its own motion changes the pressure as periodically as a valve.
         let ringing =
             if self.isometric { valve_pulses::ringing(recording) } else { vec![false; recording.len()] };

@@ -18,8 +18,11 @@ pub struct LawError {
     pub laws: Vec<Law>,
     /// Root mean square error on the cells of left-out muscles, as a share of the largest force of each.
     pub error: f64,
-    /// Estimates, one for each of the laws: standard errors are the larger of those of the joint fit and of the jackknife over muscles.
+    /// Estimates, one for each of the laws, with the standard errors of the joint fit.
     pub values: Vec<Value>,
+    /// Standard errors by the jackknife over muscles, for comparison: with few muscles, one of which is much shorter than the others, they
+    /// overstate the scatter, since the estimate rests on that muscle.
+    pub jackknife: Vec<f64>,
 }
 
 /// A stock: the joint fit, and what was compared.
@@ -97,18 +100,13 @@ fn tried(cells: &StockCells, laws: &[Law]) -> Option<(LawError, StockFit)> {
             sum.1 += 1.0 / cell.in_half;
         }
     }
-    let values = laws
-        .iter()
-        .map(|law| {
-            let k = Law::ALL.iter().position(|l| l == law).unwrap_or(0);
-            let joint = whole.shared[k];
-            let without: Vec<[f64; 1]> = without.iter().map(|f| [f.shared[k].value]).collect();
-            let over_muscles = variances(&without).first().map_or(0.0, |v| v.sqrt());
-            Value { value: joint.value, std: joint.std.max(over_muscles) }
-        })
-        .collect();
+    let numbers: Vec<usize> = laws.iter().filter_map(|law| Law::ALL.iter().position(|l| l == law)).collect();
+    let values = numbers.iter().map(|k| whole.shared[*k]).collect();
+    let left_out: Vec<Vec<f64>> =
+        without.iter().map(|f| numbers.iter().map(|k| f.shared[*k].value).collect()).collect();
+    let jackknife = variances(&left_out).iter().map(|v| v.sqrt()).collect();
     let error = (sum.0 / f64::max(sum.1, 1.0)).sqrt();
-    Some((LawError { laws: laws.to_vec(), error, values }, whole))
+    Some((LawError { laws: laws.to_vec(), error, values, jackknife }, whole))
 }
 
 impl Place {

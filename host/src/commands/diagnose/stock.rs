@@ -1,4 +1,4 @@
-//! `host diagnose` with several muscles: a stock at once. Each `--muscle` is followed by its recordings.
+//! `host diagnose` with several muscles: a stock. Each `--muscle` is followed by its recordings.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};

@@ -341,6 +341,28 @@ fn cylinder(text: &mut String, pairs: &[Pair]) {
     }
 }
 
+/// The page with its sections on tables and on the cylinder written anew, and the lines on seals in the table of bounds.
+pub fn replaced(page: &str, against_tables: &[Trial], pairs: &[Pair]) -> String {
+    let mut of_pairs = String::new();
+    cylinder(&mut of_pairs, pairs);
+    let mut rows = String::new();
+    bounds(&mut rows, &[], pairs, None);
+    let mut text = page.to_owned();
+    for section in [tables(against_tables), of_pairs] {
+        let section = section.trim_start_matches('\n');
+        let Some(heading) = section.lines().next().filter(|h| h.starts_with("## ")) else { continue };
+        let Some(begin) = text.find(heading) else { continue };
+        let end = text[begin + 1..].find("\n## ").map_or(text.len(), |e| begin + 1 + e);
+        text.replace_range(begin..end, section);
+    }
+    let lines = text.lines().map(|line| {
+        let label = |l: &str| l.split('|').nth(1).map(str::to_owned);
+        let new = rows.lines().find(|r| r.starts_with("| seals:") && label(r) == label(line));
+        new.unwrap_or(line)
+    });
+    lines.collect::<Vec<_>>().join("\n") + "\n"
+}
+
 /// The page as Markdown.
 pub fn page(
     trials: &[Trial],

@@ -16,12 +16,19 @@ fn rate(of: &[&Outcome], right: impl Fn(&Outcome) -> bool) -> Rate {
 pub(super) fn page(all: &[Outcome], drawn: usize, hash: &str) -> String {
     let mut t = String::new();
     let missed = |ok: bool| if ok { "met" } else { "**missed**" };
-    let _ = writeln!(t, "## Before and after on the virtual bench\n");
+    let _ = writeln!(t, "# Changes on the virtual bench\n");
     let _ = writeln!(
         t,
-        "{} of {drawn} pairs of a set whose seed has the SHA-256 {hash}: two campaigns of one simulated muscle with noise of their own, \
-         the later one with an effect that the earlier one had not. Counted: single effects of at least {LEAST} % of the blocked force \
-         (99.5 % quantile). The first name counts.\n",
+        "`host diagnose --muscle M.toml AFTER… --reference BEFORE…` is tested on simulated pairs: two campaigns of one muscle with noise of \
+         their own, the later one with an effect that the earlier one did not have. Strata and protocols are those of the \
+         [sealed trials](proof.md). Nothing on this page is typed by hand:\n\n\
+         ```text\ncargo run --release -p trials -- reference-bench --set final -o DIR --page docs/src/proof-reference-bench.md\n```\n"
+    );
+    let _ = writeln!(
+        t,
+        "{} pairs were answered, each once, of a set of 330 whose secret seed has the SHA-256 `{hash}`; strata are mixed evenly over the \
+         numbers, so that the first {drawn} are a stratified share. Counted are single effects of at least {LEAST} % of the blocked \
+         force (99.5 % quantile); the first name counts.\n",
         all.len()
     );
     let _ = writeln!(t, "| | n | bound | measured | |\n| --- | --- | --- | --- | --- |");
@@ -69,7 +76,7 @@ pub(super) fn page(all: &[Outcome], drawn: usize, hash: &str) -> String {
     let _ = writeln!(t, "| two effects: one class right | {} | | {r} | |", pairs.len());
     let refused = all.iter().filter(|o| o.refused.is_some()).count();
     let _ = writeln!(t, "| without an answer | {} | | {refused} | |", all.len());
-    let _ = writeln!(t, "\n### Wrong, single effects that count\n");
+    let _ = writeln!(t, "\n## Wrong answers, single effects that count\n");
     let _ = writeln!(
         t,
         "| pair | protocol | effect | size, % | named | most probable |\n| --- | --- | --- | --- | --- | --- |"
@@ -96,7 +103,7 @@ pub(super) fn page(all: &[Outcome], drawn: usize, hash: &str) -> String {
     }
     let _ = writeln!(
         t,
-        "\n### By class, single effects that count\n\n| class | right | of |\n| --- | --- | --- |"
+        "\n## By class, single effects that count\n\n| class | right | of |\n| --- | --- | --- |"
     );
     for (name, (right, of)) in by {
         let _ = writeln!(t, "| {name} | {right} | {of} |");

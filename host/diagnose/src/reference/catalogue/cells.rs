@@ -6,7 +6,8 @@ use model_core::braid::Braid;
 use nalgebra::DVector;
 
 use super::super::criteria::{
-    CATALOGUE_BINS, CATALOGUE_FEWEST_CELLS, CATALOGUE_FLOOR, CATALOGUE_REST, CATALOGUE_SPEED_STEP,
+    CATALOGUE_BINS, CATALOGUE_FEWEST_CELLS, CATALOGUE_FLOOR, CATALOGUE_PRIOR, CATALOGUE_REST,
+    CATALOGUE_SPEED_STEP,
 };
 use crate::baselines::{self, Kind};
 use crate::linear::energy;
@@ -16,6 +17,10 @@ use pam_data::recording::{Campaign, Clock};
 
 /// Level, direction, place, and kind of motion.
 type Key = (u32, bool, usize, i32);
+
+/// Kinds of motion beside speeds: rests by decades from here on, and the vented muscle.
+const REST: i32 = 100;
+const VENTED: i32 = 2000;
 
 /// Rows of one half-stroke in one state.
 #[derive(Debug, Clone)]
@@ -87,19 +92,15 @@ impl States {
     fn key(&self, rows: &Rows, i: usize) -> Key {
         let context = &rows.contexts()[i];
         if rows.vented[i] {
-            return (u32::MAX, true, 0, 0);
+            return (u32::MAX, true, 0, VENTED);
         }
         let level = rows.level[i];
         let (low, high) = self.ends.get(level as usize).copied().unwrap_or((0.0, 1.0));
         let share = if high > low { (context.contraction - low) / (high - low) } else { 0.0 };
         let bin = ((share * CATALOGUE_BINS as f64).max(0.0) as usize).min(CATALOGUE_BINS - 1);
-        let kind = if rows.on_ramp[i] {
-            // On a ramp of pressure the place is the pressure.
-            let top = rows.levels.last().copied().unwrap_or(1.0);
-            1000 + ((context.pressure / top * CATALOGUE_BINS as f64) as i32).clamp(0, 50)
-        } else if rows.still[i] > 0.0 {
+        let kind = if rows.still[i] > 0.0 {
             // Rests by decade of their duration.
-            100 + (rows.still[i] / CATALOGUE_REST).max(1.0).log10().floor() as i32
+            REST + (rows.still[i] / CATALOGUE_REST).max(1.0).log10().floor() as i32
         } else {
             let ratio = (context.speed.abs() / self.speed).max(1e-3);
             (ratio.ln() / CATALOGUE_SPEED_STEP.ln()).round() as i32
@@ -123,30 +124,56 @@ fn mean(values: &[f64], rows: &[usize]) -> f64 {
     rows.iter().map(|i| values[*i]).sum::<f64>() / rows.len().max(1) as f64
 }
 
-/// Means of BEFORE's residual by state, with the number of cells of each, and the variance of a cell about them.
-fn reference(cells: &BTreeMap<(u32, Key), Vec<usize>>, residual: &[f64]) -> (BTreeMap<Key, (f64, f64)>, f64) {
-    let mut by_key: BTreeMap<Key, Vec<f64>> = BTreeMap::new();
-    for ((_, key), rows) in cells {
-        by_key.entry(*key).or_default().push(mean(residual, rows));
-    }
-    let mut deviations: Vec<f64> = Vec::new();
-    let means = by_key
-        .iter()
-        .map(|(key, values)| {
-            let n = values.len() as f64;
-            let m = values.iter().sum::<f64>() / n;
-            if values.len() > 1 {
-                deviations.extend(values.iter().map(|v| (v - m) * (n / (n - 1.0)).sqrt()));
-            }
-            (*key, (m, n))
-        })
-        .collect();
-    // Robust: single half-strokes after a restart differ by far more than the others.
+/// What BEFORE says of its residual.
+struct Level {
+    /// By state: the mean and the number of cells.
+    means: BTreeMap<Key, (f64, f64)>,
+    /// Variance of a cell about the mean of its state, by class of motion; and of all.
+    variances: BTreeMap<i32, f64>,
+    variance: f64,
+}
+
+/// A variance in which single cells, as after a restart, do not count with all they have.
+fn robust(deviations: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
     sizes.sort_by(f64::total_cmp);
     let usual = 1.4826 * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
     let square: f64 = deviations.iter().map(|d| d.clamp(-4.0 * usual, 4.0 * usual).powi(2)).sum();
-    (means, square / deviations.len().max(1) as f64)
+    square / deviations.len().max(1) as f64
+}
+
+impl Level {
+    fn of(cells: &BTreeMap<(u32, Key), Vec<usize>>, residual: &[f64]) -> Self {
+        let mut by_key: BTreeMap<Key, Vec<f64>> = BTreeMap::new();
+        for ((_, key), rows) in cells {
+            by_key.entry(*key).or_default().push(mean(residual, rows));
+        }
+        let mut by_class: BTreeMap<i32, Vec<f64>> = BTreeMap::new();
+        let mut means = BTreeMap::new();
+        for (key, values) in &by_key {
+            let n = values.len() as f64;
+            let m = values.iter().sum::<f64>() / n;
+            let own = by_class.entry(key.3).or_default();
+            if values.len() > 1 {
+                own.extend(values.iter().map(|v| (v - m) * (n / (n - 1.0)).sqrt()));
+            }
+            means.insert(*key, (m, n));
+        }
+        let all: Vec<f64> = by_class.values().flatten().copied().collect();
+        let variance = robust(&all);
+        // A class of motion with few repeats counts as all do; one that has none, as the worst.
+        let shrunk = |own: &Vec<f64>| {
+            let n = own.len() as f64;
+            (n * robust(own) + CATALOGUE_PRIOR * variance) / (n + CATALOGUE_PRIOR)
+        };
+        let known = by_class.iter().filter(|(_, own)| !own.is_empty());
+        let mut variances: BTreeMap<i32, f64> = known.map(|(class, own)| (*class, shrunk(own))).collect();
+        let worst = variances.values().copied().fold(variance, f64::max);
+        by_class.keys().for_each(|class| {
+            variances.entry(*class).or_insert(worst);
+        });
+        Self { means, variances, variance }
+    }
 }
 
 /// The row of `own` that each joint row of AFTER is nearest to in time, recording by recording.
@@ -200,7 +227,9 @@ impl Cells {
         let (own, _) = rows::prepare(after, braid)?;
         let recordings = before.recordings.iter().chain(&after.recordings).cloned().collect();
         let both = Campaign { recordings, clock: Clock::Separate, warnings: Vec::new() };
-        let (joint, _) = rows::prepare(&both, braid)?;
+        let (prepared, _) = rows::prepare(&both, braid)?;
+        // On a ramp of pressure at a held length friction turns by a share of its own: no state of the strokes is like it.
+        let joint = prepared.without(|i| prepared.on_ramp[i]);
         let first_recording = (joint.names.len() - own.names.len().min(joint.names.len())) as u32;
         let first_after = joint.recording.iter().position(|r| *r >= first_recording).unwrap_or(joint.len());
         let reference_rows = joint.without(|i| i >= first_after);
@@ -214,7 +243,8 @@ impl Cells {
         let joint = baselines::linearised(&joint, &fitted);
         let states = States::of(&joint, first_after);
         let old = gathered(&joint, &states, 0..first_after);
-        let (means, variance) = reference(&old, &residual);
+        let level = Level::of(&old, &residual);
+        let variance = level.variance;
         let forces = joint.force[..first_after].iter();
         let largest = forces.copied().fold(0.0, f64::max);
         let floor = (CATALOGUE_FLOOR * largest).powi(2);
@@ -227,19 +257,20 @@ impl Cells {
         let end = rows.contexts().last().map_or(1.0, |c| c.time);
         let (mut cells, mut difference, mut spread, mut unmatched) = (Vec::new(), Vec::new(), Vec::new(), 0);
         for ((_, key), members) in &new {
-            let Some((level, count)) = means.get(key) else {
+            let Some((before, count)) = level.means.get(key) else {
                 unmatched += 1;
                 continue;
             };
             let own_rows: Vec<usize> = members.iter().map(|j| place[j - first_after]).collect();
             let first = members.first().copied().unwrap_or(first_after);
-            let d = mean(&residual, members) - level;
+            let d = mean(&residual, members) - before;
             if !d.is_finite() {
                 continue;
             }
             difference.push(d);
             // Cells of AFTER share the mean of BEFORE: each counts with its part of that mean's error.
-            spread.push((variance + floor) * (1.0 + shared.get(key).copied().unwrap_or(1.0) / count));
+            let own = level.variances.get(&key.3).copied().unwrap_or(variance);
+            spread.push((own + floor) * (1.0 + shared.get(key).copied().unwrap_or(1.0) / count));
             cells.push(Cell {
                 key: *key,
                 recording: (joint.recording[first] - first_recording) as usize,
