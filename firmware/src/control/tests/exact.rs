@@ -100,7 +100,9 @@ fn a_muscle_without_readings_is_a_fault_while_it_is_used_and_an_unused_one_is_wa
     let silent = |bench: &mut Bench, second: Option<Readings>| {
         let now = Readings { pressure_pa: bench.pressure_pa, stroke_m: 1e-3, force_n: 0.0 };
         let first = if second.is_some() { Some(now) } else { None };
-        bench.last = bench.controller.step(&Inputs { sides: [first, second].map(|side| side.map(Into::into)), ..Inputs::default() });
+        bench.last = bench
+            .controller
+            .step(&Inputs { sides: [first, second].map(|side| side.map(Into::into)), ..Inputs::default() });
     };
     silent(&mut bench, None);
     assert_eq!(bench.latched(), None);

@@ -75,7 +75,10 @@ impl Joint {
             force_n: 0.0,
         });
         spoil(&mut now);
-        let outputs = self.bench.controller.step(&Inputs { sides: now.map(|now| Some(now.into())), ..Inputs::default() });
+        let outputs = self
+            .bench
+            .controller
+            .step(&Inputs { sides: now.map(|now| Some(now.into())), ..Inputs::default() });
         assert_eq!(self.bench.controller.keep_alive(OWNER), Ok(()));
         for (pressure_pa, command) in self.pressures_pa.iter_mut().zip(outputs.sides) {
             let target = if command.vent { 0.0 } else { command.pressure_pa };

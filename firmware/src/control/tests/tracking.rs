@@ -106,7 +106,8 @@ impl Rig {
         };
         self.force_n = self.pulls(self.stroke_m);
         let now = Readings { pressure_pa: self.pressure_pa, stroke_m: self.stroke_m, force_n: self.force_n };
-        let outputs = self.bench.controller.step(&Inputs { sides: [Some(now.into()), None], ..Inputs::default() });
+        let outputs =
+            self.bench.controller.step(&Inputs { sides: [Some(now.into()), None], ..Inputs::default() });
         assert_eq!(self.bench.controller.keep_alive(OWNER), Ok(()));
         let command = outputs.sides[0];
         let target = if command.vent { 0.0 } else { command.pressure_pa + self.drift_pa };
