@@ -147,6 +147,13 @@ fn recommendation(d: &Diagnosis) -> Section {
             names(&bench)
         ));
     }
+    let memory: Vec<&Missing> = muscle.iter().copied().filter(|m| is_from_history(m)).collect();
+    if !memory.is_empty() {
+        steps.push(format!(
+            "Repeat a run at one mounting after a vented hour: it shows how {} recovers.",
+            names(&memory)
+        ));
+    }
     if !muscle.is_empty() {
         steps.push(format!(
             "Write a table with {} by `host diagnose … -o T2.pam`, and check it on new recordings.",
