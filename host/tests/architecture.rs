@@ -11,6 +11,7 @@ const ALLOWED: &[(&str, &str, &[&str])] = &[
     ("pam-protocol", "host/protocol", &[]),
     ("virtual-bench", "host/virtual-bench", &["pam-protocol"]),
     ("firmware", "firmware", &["model-core"]),
+    ("bootloader", "firmware/bootloader", &["model-core"]),
     ("pam-data", "host/data", &["model-core"]),
     ("pam-fit", "host/fit", &["model-core", "pam-data"]),
     ("pam-evaluate", "host/evaluate", &["model-core", "pam-data", "pam-fit"]),

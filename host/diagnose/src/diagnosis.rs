@@ -124,7 +124,7 @@ struct SelectionResult {
     library: Vec<Candidate>,
     selection: Selection,
     held_out: HeldOut,
-    /// The error on held-out rows with the first effect, the first two, and so on, N.
+    /// The error on held-out rows with the effects up to each of them, in the order of selection, N.
     steps: Vec<f64>,
     missing: Vec<Missing>,
 }
@@ -159,7 +159,7 @@ fn select(
     SelectionResult { library, selection, held_out, steps, missing }
 }
 
-/// The error on held-out rows with the first effect, the first two, and so on, each beside the base refitted, N.
+/// The error on held-out rows with the effects up to each of them, in the order of selection, beside the base refitted, N.
 fn steps_on_held_out(selection: &Selection, held_out: &HeldOut) -> Vec<f64> {
     let Selection { rows, joint, traces, .. } = selection;
     if traces.len() < 2 {
@@ -236,7 +236,7 @@ impl Located {
             (Some(l), _) => Pattern::Periodic(l.hertz),
             (None, Some(r)) if excess.left > excess.admitted => Pattern::Region(Box::new(r.clone())),
             _ if excess.restless => Pattern::NotRepeatable(selection.noise.scatter(blocked)),
-            // It stands above the noise of repeats, has no place and no period, and no effect fits: noise that lasts.
+            // It exceeds the noise of repeats, has no place and no period, and no effect fits: noise that lasts.
             _ if excess.lasts => {
                 let sigma = excess.left.hypot(sigma);
                 Pattern::NotRepeatable(Noise { sigma, ..selection.noise }.scatter(blocked))

@@ -1,8 +1,8 @@
-//! Laws that stand in for a part of the base model, seen from a base that was fitted beside them.
+//! Laws that replace a part of the base model, seen from a base that was fitted beside them.
 //!
 //! A play, or a friction that builds up over a distance, is a law in the base's own slope and friction. A base that was fitted without it
 //! has taken up a part of it: the friction of a loose joint's muscle then reads far too large, and the law, made from that friction, fits
-//! badly and has a wrong width. So each width is tried about a base that was fitted beside it, and once more about the base beside the best.
+//! badly and has a wrong width. Therefore each width is tried about a base that was fitted beside it, and once more about the base beside the best.
 
 use model_core::effects::Start;
 use rayon::prelude::*;

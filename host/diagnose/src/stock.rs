@@ -9,7 +9,7 @@ use model_core::units::Length;
 use pam_data::error::Result;
 use pam_fit::stock::{Law, LawError, Member, Place, Stock, Value, stock};
 
-use crate::criteria::stock::{ALIKE, NORMAL_95, ONSET, ONSET_STEPS, PLACES, SLOPE_RANGE};
+use crate::criteria::stock::{EXCHANGEABLE, NORMAL_95, ONSET, ONSET_STEPS, PLACES, SLOPE_RANGE};
 use crate::history::answer::{Estimate, FindingKind};
 use crate::history::{history, t_quantile};
 
@@ -167,7 +167,7 @@ fn confusable(fitted: &Stock, law: Law) -> Vec<String> {
     let Some(best) = fitted.tried.iter().find(|t| t.laws == [law]) else { return Vec::new() };
     let others = fitted.tried.iter().filter(|t| {
         t.plausible()
-            && t.error <= ALIKE * best.error
+            && t.error <= EXCHANGEABLE * best.error
             && t.laws.first().is_some_and(|l| l.effect() != law.effect())
     });
     others.filter_map(|t| t.laws.first().map(|l| l.effect().to_owned())).collect()

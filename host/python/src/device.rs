@@ -10,10 +10,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use model_core::image;
-use model_core::link::endpoints::{
-    ClearFault, GetFaults, GetInfo, GetSettings, GetStatus, SetSettings, SetTelemetry,
-};
-use model_core::link::messages::{Side, Telemetry, TelemetryRate};
+use model_core::link::endpoints::{ClearFault, GetFaults, GetInfo, GetSettings, GetStatus, SetSettings};
+use model_core::link::messages::{Side, Telemetry};
 use model_core::link::settings::Settings;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::json_of;
@@ -196,13 +194,6 @@ fn closed() -> Error {
     Error::new(DeviceCode::DeviceSilent, "the connection is closed").help("call pamtools.connect again")
 }
 
-fn quiet(client: &mut Client) -> Result<()> {
-    client
-        .try_call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 })?
-        .map(drop)
-        .map_err(|refusal| messages::refused("telemetry", refusal))
-}
-
 /// One sample every n ticks for a rate in Hz.
 fn every(client: &mut Client, rate: Option<f64>) -> Result<u16> {
     let ticks = f64::from(client.call::<GetInfo>(&())?.ticks_per_s);
@@ -378,9 +369,7 @@ impl Link {
                 Happened::Sample(sample, _) => exchange.push(sample, false),
                 Happened::Event(_) => Ok(()),
             };
-            let watched = watch(client, every_ticks, seconds, take, || exchange.stop.load(Ordering::Relaxed));
-            let quiet = quiet(client);
-            watched.and(quiet)
+            watch(client, every_ticks, seconds, take, || exchange.stop.load(Ordering::Relaxed)).map(drop)
         })
     }
 

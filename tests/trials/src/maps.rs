@@ -275,11 +275,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_page_in_the_book_has_these_texts() {
-        crate::book::contains("force-maps.md", &[HEAD, ERRORS, OTHERS]);
-    }
-
-    #[test]
     fn the_descriptions_of_the_maps_are_among_the_examples() {
         let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         for map in &MAPS {

@@ -48,7 +48,7 @@ pam_data::criteria! {
     FIRST_STROKES: f64 = 0.7, "q_strokes", "1", Judgement;
     /// Candidates whose shapes are refined at every step.
     REFINED: usize = 12, "n_refine", "1", Cost;
-    /// Rounds in which a law that stands in for a part of the base is refined about the base beside it.
+    /// Rounds in which a law that replaces a part of the base is refined about the base beside it.
     RENEWALS: usize = 2, "n_renew", "1", Cost;
     /// A linearisation that leaves more than this times the error of the one before is rejected.
     WORSE: f64 = 1.25, "S_new/S_old", "1", Judgement;

@@ -4,7 +4,7 @@ pam_data::criteria! {
     "Stock of muscles":
     /// A law between muscles cannot be distinguished from the one that is taken where its error on left-out muscles is at most this many times
     /// as large.
-    ALIKE: f64 = 1.05, "e/e_0", "1", Derived("exchanging one of four to ten muscles changes the ratio by about as much");
+    EXCHANGEABLE: f64 = 1.05, "e/e_0", "1", Derived("exchanging one of four to ten muscles changes the ratio by about as much");
     /// The pull begins where the shared force exceeds this share of the largest force.
     ONSET: f64 = 0.02, "F/F_max", "1", Derived("above the zero of a load cell");
     /// Contractions at which the shared force is described.

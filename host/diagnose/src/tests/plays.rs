@@ -3,8 +3,8 @@
 use super::*;
 use crate::outcome::Pattern;
 
-/// Loops on a bench with a play of this share of the stroke, with friction of 8 % by the muscle's own motion, a bladder that loses a share of
-/// its pull over some thousand seconds, and noise. With the width of the play, m.
+/// Loops on a bench with a play of this share of the stroke, and the width of the play, m. Friction of 8 % follows the muscle's own motion. The
+/// pull loses a share over some thousand seconds, and there is noise.
 fn loose(share: f64, softening: f64, seed: u64) -> (Campaign, f64) {
     let mut campaign = loops(&[0.2]);
     let strokes = campaign.recordings.iter().flat_map(|r| r.stroke.iter().copied());
@@ -51,7 +51,7 @@ fn a_play_is_found_beside_a_muscle_that_softens() {
     assert!(names(&d).contains(&"backlash") && d.missing.len() == 2, "{:?}", names(&d));
     // Cycles differed by the softening, not by noise.
     assert!(d.noise_N < 0.15, "{} N", d.noise_N);
-    // The path tells what each adds on held-out rows.
+    // The path reports the improvement by each on held-out rows.
     let steps: Vec<f64> = d.path.iter().filter_map(|s| s.held_out_rms_N).collect();
     assert_eq!(steps.len(), 2);
     assert!(steps[1] < 0.9 * steps[0] && steps[0] < d.held_out.rms_before_N, "{steps:?} {:?}", d.held_out);
