@@ -2,16 +2,19 @@
 # Packages of the host program: a static Linux binary in an archive, a Debian package, a Homebrew formula, or the archive of a binary that
 # was built elsewhere. Each contains both names of the program, shell completions, manual pages, and the licences.
 #
-#   packaging/package.sh [--binary FILE] [--platform NAME] [--output FOLDER] [--no-deb]
+# Beside them it writes the bill of materials (CycloneDX, also inside each package) and the provenance (in-toto) of the packages.
+#
+#   packaging/package.sh [--binary FILE] [--target TRIPLE] [--platform NAME] [--output FOLDER] [--no-deb]
 #
 # Without --binary a static binary is built for this machine: with the musl target where it is installed, else with a static glibc.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-binary="" platform="" output="dist" deb=yes
+binary="" target="" platform="" output="dist" deb=yes
 while [ $# -gt 0 ]; do
     case "$1" in
         --binary) binary="$2"; shift 2 ;;
+        --target) target="$2"; shift 2 ;;
         --platform) platform="$2"; shift 2 ;;
         --output) output="$2"; shift 2 ;;
         --no-deb) deb=no; shift ;;
@@ -21,6 +24,7 @@ done
 
 version=$(sed -n '/^\[workspace.package\]/,/^\[/s/^version = "\(.*\)"/\1/p' Cargo.toml)
 machine=$(uname -m)
+command -v python3 > /dev/null || { echo "packaging: no python3; install Python 3.11 or later" >&2; exit 1; }
 
 if [ -z "$binary" ]; then
     target="$machine-unknown-linux-musl"
@@ -55,6 +59,7 @@ done
 "$work/pam" --quiet man -o "$tree/share/man/man1"
 cp LICENSE-APACHE LICENSE-MIT README.md CHANGELOG.md "$tree/share/doc/pam/"
 echo "$version" > "$tree/share/doc/pam/VERSION"
+python3 packaging/sbom.py ${target:+--target "$target"} --output "$tree/share/doc/pam/sbom.cdx.json"
 
 mkdir -p "$output"
 tar -C "$work" --owner=0 --group=0 --sort=name -czf "$output/$name.tar.gz" "$name"
@@ -87,4 +92,9 @@ CONTROL
 fi
 
 sed -e "s/@VERSION@/$version/g" -e "s/@SHA256@/$sum/g" -e "s/@ARCHIVE@/$name.tar.gz/g" packaging/pam.rb.in > "$output/pam.rb"
+cp "$tree/share/doc/pam/sbom.cdx.json" "$output/$name.sbom.cdx.json"
+packages=("$output/$name.tar.gz")
+if [ -n "${arch:-}" ]; then packages+=("$output/pam_${version}_$arch.deb"); fi
+python3 packaging/provenance.py --platform "$platform" ${target:+--target "$target"} --output "$output/$name.provenance.json" \
+    "${packages[@]}"
 echo "$output/$name.tar.gz"

@@ -14,7 +14,7 @@ for called in pam host; do
     "$work/archive/bin/$called" --version | grep -q "^$called " || fail "$called does not run from the archive"
 done
 grep -q pam "$work/archive/share/bash-completion/completions/pam" || fail "no completions for bash"
-for file in LICENSE-MIT LICENSE-APACHE VERSION; do
+for file in LICENSE-MIT LICENSE-APACHE VERSION sbom.cdx.json; do
     test -s "$work/archive/share/doc/pam/$file" || fail "$file is missing in the archive"
 done
 if [ -z "${1:-}" ] && command -v ldd > /dev/null; then
@@ -28,5 +28,26 @@ if command -v dpkg-deb > /dev/null; then
     test -s "$work/deb/usr/share/doc/pam/copyright" || fail "the Debian package lacks its licences"
     test -s "$work/deb/usr/share/man/man1/pam-fit.1.gz" || fail "the Debian package lacks manual pages"
 fi
+# Each package is named in the provenance with its own check sum, and the bill of materials lists what is in the program.
+python3 - "$work/dist" <<'CHECK' || fail "bill of materials or provenance is wrong"
+import hashlib, json, pathlib, sys
+dist = pathlib.Path(sys.argv[1])
+(provenance,) = map(json.loads, (path.read_text() for path in dist.glob("*.provenance.json")))
+named = {one["name"]: one["digest"]["sha256"] for one in provenance["subject"]}
+packages = [*dist.glob("*.tar.gz"), *dist.glob("*.deb")]
+assert named == {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in packages}, named
+assert provenance["predicate"]["buildDefinition"]["resolvedDependencies"][0]["digest"], "no commit"
+(bill,) = map(json.loads, (path.read_text() for path in dist.glob("*.sbom.cdx.json")))
+components = {one["name"]: one for one in bill["components"]}
+listed = {one["bom-ref"] for one in [bill["metadata"]["component"], *bill["components"]]}
+for name in ["clap", "serialport", "nalgebra", "model-core"]:
+    assert components[name]["scope"] == "required", name
+assert components["serde_derive"]["scope"] == "excluded", "a macro is not in the program"
+assert not {"proptest", "insta", "criterion"} & components.keys(), "a library of the tests is not in the program"
+assert all("licenses" in one for one in components.values()), "a licence is missing"
+assert all("hashes" in one for one in components.values() if not one["name"].startswith("pam-")
+           and one["name"] not in ("firmware", "model-core", "virtual-bench")), "a check sum is missing"
+assert all(used in listed for one in bill["dependencies"] for used in one["dependsOn"]), "a crate that is used is not listed"
+CHECK
 grep -q "sha256 \"[0-9a-f]\{64\}\"" "$work/dist/pam.rb" || fail "the formula has no check sum"
-echo "packaging: archive, Debian package and formula are complete"
+echo "packaging: archive, Debian package, formula, bill of materials and provenance are complete"

@@ -134,7 +134,7 @@ else
 fi
 if [ $tier = long ]; then
     step "long tests" env PAM_LONG=1 cargo test --workspace --release --locked --no-fail-fast \
-        --test kills --test closed_loop --test commands --test batch
+        --test kills --test closed_loop --test commands --test batch --test soak
     if has cargo-llvm-cov; then
         step "coverage" bash tests/coverage.sh
     else

@@ -19,7 +19,7 @@ TESTS = {"benchmarks", "emulator-tests", "published-schemas", "trials"}
 # Columns in which no line crosses a box; a new crate is drawn in a column of its own until it has an entry here.
 COLUMN = {
     "host": 1, "pamtools": 3, "pam-report": 2, "pam-fleet": 1.2, "pam-evaluate": 0.6, "pam-diagnose": 2.6, "pam-device": 0.2, "pam-fit": 1.9,
-    "pam-campaign": 3.1, "firmware": 0, "virtual-bench": 1, "pam-data": 2, "model-core": 0.6, "pam-protocol": 3,
+    "pam-campaign": 3.1, "firmware": 0, "virtual-bench": 1, "bootloader": 4.1, "pam-data": 2, "model-core": 0.6, "pam-protocol": 3,
 }
 WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN = 132, 36, 28, 52, 16
 

@@ -221,6 +221,7 @@ def edits_settings_with_units(page):
     assert shown[1] == "kPa" and 100 < float(shown[0]) < 2000 and shown[2], shown
     page.js(f"const e = {entry}; e.input.value = '555.5'; e.input.dispatchEvent(new Event('input'))")
     assert page.text("set") == "Write 1 change and read back" and page.js(f"return {entry}.row.classList.contains('changed')")
+    page.js("document.getElementById('settings').closest('details').open = true")
     page.shot(SHOTS, "settings")
     page.click("set")
     page.until(f"{entry}.stored === '555.5'")

@@ -204,7 +204,7 @@ impl Controller {
         self.settings = *settings;
         for side in &mut self.sides {
             side.motion = MotionTracker::new(motion_settings(settings));
-            side.filters = Filters::default();
+            side.filters = Filters::new(&settings.scales);
             side.watch.restart();
         }
     }

@@ -169,6 +169,10 @@ impl Generator {
     /// The value of this tick and that of n ticks later (at most 15); `None` when setpoints come from the host. Moves on
     /// by one tick.
     pub fn step_ahead(&mut self, ticks: usize) -> Option<(f32, f32)> {
+        // Before anything is called: most ticks of most users have a setpoint.
+        if self.is_set_point() {
+            return None;
+        }
         self.look_ahead(ticks)?;
         let now = self.lookahead[self.given as usize % AHEAD];
         self.given = self.given.wrapping_add(1);

@@ -40,15 +40,31 @@ impl Filter {
 /// The filters of one muscle's sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Filters {
+    /// Whether any of them filters.
+    filters: bool,
     pressure: Filter,
     stroke: Filter,
     force: Filter,
 }
 
 impl Filters {
+    /// At the first reading, with these scales.
+    pub fn new(scales: &Scales) -> Self {
+        let filters = [scales.pressure, scales.stroke, scales.force].iter().any(|scale| scale.filter_s > 0.0);
+        Self { filters, ..Self::default() }
+    }
+
     /// The readings that the control laws use.
     #[inline]
     pub fn next(&mut self, now: &Readings, scales: &Scales) -> Readings {
+        if !self.filters {
+            return *now;
+        }
+        self.filtered(now, scales)
+    }
+
+    #[inline(never)]
+    fn filtered(&mut self, now: &Readings, scales: &Scales) -> Readings {
         Readings {
             pressure_pa: self.pressure.next(now.pressure_pa, &scales.pressure),
             stroke_m: self.stroke.next(now.stroke_m, &scales.stroke),
@@ -60,7 +76,7 @@ impl Filters {
 /// Sums of a muscle's signals over the first second after they were last taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
-    /// Whether someone reads them: a tick in which nobody does costs nothing.
+    /// Whether someone reads them: without a reader, a tick costs nothing.
     read: bool,
     ticks: u16,
     sums: [f32; 5],
@@ -124,7 +140,7 @@ mod tests {
         let mut sums = Sums::default();
         let mut answer = MeanSignals::default();
         sums.take(&mut answer);
-        assert_eq!(answer.ticks, 0, "nobody has read them before");
+        assert_eq!(answer.ticks, 0, "no one has read them before");
         for tick in 0..3_000_u16 {
             let force = if tick < 1_000 { 1.6 + 1e-3 * f32::from(tick % 2) } else { 99.0 };
             let now = Signals { pressure: 0.3, stroke: 1.0, force, second_pressure: Some(0.31) };

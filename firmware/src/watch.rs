@@ -275,8 +275,12 @@ impl SideWatch {
     ) {
         let watch = &settings.watch;
         let limit = watch.second_pressure_pa;
+        if !(limit > 0.0) {
+            self.second = InARow::default();
+            return;
+        }
         let miss = second_pa.map_or(f32::INFINITY, |second_pa| (second_pa - pressure_pa).abs());
-        let apart = settings.pressure.fitted && limit > 0.0 && !(miss <= limit);
+        let apart = settings.pressure.fitted && !(miss <= limit);
         if self.second.count(apart, watch.follow_ticks) {
             let (fault, sensor) = (Fault::PressureSensorsDisagree, Some(Sensor::Pressure));
             report(Finding { fault, sensor, value: miss, limit });

@@ -1,17 +1,34 @@
-//! What bytes from outside reach: one function for each door. `cargo fuzz` calls them without end, the ordinary tests for a moment
-//! with seeds of their own. They return for any bytes; a panic, or a value that breaks a promise, is a finding.
+//! What bytes from outside reach: one function for each kind of input. `cargo fuzz` calls them without end, the ordinary tests for some
+//! seconds. They return for any bytes; a panic, or a value that breaks a promise, is a finding.
 #![allow(clippy::unwrap_used, dead_code, reason = "a helper of tests: a failure here is a finding")]
 
 use std::io::Write;
 
+#[path = "entries/device.rs"]
+pub mod device;
+#[path = "entries/workbook.rs"]
+pub mod workbook;
+
 use model_core::image;
 use model_core::link::frame::{Accumulator, Header, MAX_BODY, MAX_WIRE, encode_bytes};
 use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::import_guess::guess;
 use pam_data::recording::{Import, Reader, Recording};
 use pam_device::log_table::LogTable;
 use pam_device::recorder::recover;
 use pam_device::setpoint_profile::{Quantity, SetpointProfile};
 use pam_fit::table_file::TableFile;
+
+/// Panics in the libraries that read HDF5, Parquet and workbooks end in an error of the program, which is what is promised; only the others
+/// are findings. Called once, after the fuzzer has installed its own handling.
+pub fn tolerate_caught_panics() {
+    let own = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        if !info.location().is_some_and(|place| place.file().contains("/registry/")) {
+            own(info);
+        }
+    }));
+}
 
 /// Frames on the wire: what is taken for a frame is encoded to the same bytes again.
 pub fn frame(bytes: &[u8]) {
@@ -59,7 +76,8 @@ fn sound(recordings: &[Recording]) {
     }
 }
 
-/// Recordings of any form: text, compressed text, MATLAB, HDF5, Parquet, MCAP.
+/// Recordings of any form, which is recognised by the first bytes: text, compressed text, MATLAB, HDF5, Parquet, MCAP, workbooks. Each form
+/// is a target with seeds of its own.
 pub fn reader(bytes: &[u8]) {
     if let Ok(recordings) = Reader::new().file(file(bytes, ".csv").path()) {
         sound(&recordings);
@@ -74,6 +92,18 @@ pub fn import(bytes: &[u8]) {
     if let Ok(import) = Import::parse(text)
         && let Ok(recordings) =
             Reader::new().import(Some(&import)).file(file(rows.get(1..).unwrap_or_default(), ".csv").path())
+    {
+        sound(&recordings);
+    }
+}
+
+/// A file to be described: the description can be read, and the file with it or not at all.
+pub fn import_guess(bytes: &[u8]) {
+    let file = file(bytes, ".csv");
+    let Ok(guessed) = guess(file.path(), None) else { return };
+    // A description says what is missing; what it does say can be read.
+    if let Ok(import) = Import::parse(&guessed.description)
+        && let Ok(recordings) = Reader::new().import(Some(&import)).file(file.path())
     {
         sound(&recordings);
     }

@@ -2,15 +2,17 @@
 //!
 //! Exit status 0: done. 1: the input or the device is at fault. 2: the call is at fault.
 
+use std::borrow::Cow;
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::commands;
-use crate::console::{Colour, Console, unprinted};
+use crate::console::{Colour, Console, printable, unprinted};
 use crate::program_name;
 use crate::settings::{all_settings, apply};
-use pam_data::error::Result;
+use pam_data::error::{DataCode, Error, Result};
 
 /// Recordings of pneumatic artificial muscles to tables, tables to controllers.
 #[derive(Debug, Parser)]
@@ -179,9 +181,28 @@ fn parse() -> Result<Cli> {
         }
         Err(error) => return Err(error),
     };
-    // clap itself prints usage errors and ends with status 2.
-    let matches = apply(program_name::renamed(Cli::command()), &settings).get_matches();
-    Ok(Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit()))
+    apply(program_name::renamed(Cli::command()), &settings)
+        .try_get_matches()
+        .and_then(|matches| Cli::from_arg_matches(&matches))
+        .or_else(|words| Err(ended(&words)))
+}
+
+/// Prints help or the version, or what is wrong with a call, and ends: with status 2 for the last.
+///
+/// A reader that stopped reading (`| head`) is no failure; a full disk is, and comes back as an error.
+fn ended(words: &clap::Error) -> Error {
+    // A name that a shell has put in the place of `*` may hold anything.
+    let plain = words.render().to_string();
+    let printed = match printable(&plain) {
+        Cow::Borrowed(_) => words.print().and_then(|()| std::io::stdout().flush()),
+        Cow::Owned(text) => std::io::stderr().write_all(text.as_bytes()),
+    };
+    match printed {
+        Err(e) if !words.use_stderr() && e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Error::new(DataCode::FileUnwritable, format!("standard output cannot be written: {e}"))
+        }
+        _ => std::process::exit(words.exit_code()),
+    }
 }
 
 /// Reads the command line, runs it, prints what went wrong, and gives the exit status.

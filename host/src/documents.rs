@@ -64,6 +64,8 @@ mod tests {
         published::<super::bench::Studio<'_>>("pam-studio-1");
         published::<super::device::Faults>("pam-faults-1");
         published::<super::device::Firmware>("pam-firmware-1");
+        published::<super::device::FirmwareFile>("pam-firmware-file-1");
+        published::<super::device::FirmwareKey>("pam-firmware-key-1");
         published::<super::device::Flash>("pam-flash-1");
         published::<super::device::Forget>("pam-forget-1");
         published::<super::device::Info>("pam-device-1");

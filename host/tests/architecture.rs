@@ -11,6 +11,7 @@ const ALLOWED: &[(&str, &str, &[&str])] = &[
     ("pam-protocol", "host/protocol", &[]),
     ("virtual-bench", "host/virtual-bench", &["pam-protocol"]),
     ("firmware", "firmware", &["model-core"]),
+    ("bootloader", "firmware/bootloader", &["model-core"]),
     ("pam-data", "host/data", &["model-core"]),
     ("pam-fit", "host/fit", &["model-core", "pam-data"]),
     ("pam-evaluate", "host/evaluate", &["model-core", "pam-data", "pam-fit"]),
@@ -43,7 +44,7 @@ const ALLOWED: &[(&str, &str, &[&str])] = &[
     (
         "pamtools",
         "host/python",
-        &["model-core", "pam-data", "pam-fit", "pam-evaluate", "pam-diagnose", "pam-report"],
+        &["model-core", "pam-data", "pam-fit", "pam-evaluate", "pam-diagnose", "pam-report", "pam-device"],
     ),
 ];
 
@@ -102,10 +103,11 @@ fn only_the_program_knows_the_command_line_and_the_web() {
     }
 }
 
+/// The bindings talk to controllers over the serial port, and contain no emulated controller and no probe.
 #[test]
-fn the_bindings_link_no_server_no_port_and_no_firmware() {
+fn the_bindings_link_no_server_no_probe_and_no_firmware() {
     let lock = fs::read_to_string(root().join("host/python/Cargo.lock")).expect("the bindings' lock file");
-    for library in ["axum", "clap", "serialport", "tokio", "firmware", "embassy-executor", "virtual-bench"] {
+    for library in ["axum", "clap", "tokio", "probe-rs", "firmware", "embassy-executor", "virtual-bench"] {
         assert!(!lock.contains(&format!("name = \"{library}\"\n")), "the bindings link {library}");
     }
 }

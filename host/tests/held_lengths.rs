@@ -82,9 +82,9 @@ fn the_report_draws_the_fitted_lengths() {
     let page = pam_report::fit_page::page(&fitted, &campaign, &options);
     let figure = |id: &str| page.figures().find(|f| f.id == id).unwrap();
     assert!(figure("load-lines").reading.contains("fitted ones"));
-    let csv = figure("residuals").csv();
-    let rows = csv.lines().filter(|l| l.starts_with("against contraction,each point,"));
-    let residuals: Vec<f64> = rows.map(|l| l.rsplit(',').next().unwrap().parse().unwrap()).collect();
+    let pam_report::Mark::Series { y: residuals, .. } = &figure("residuals").panels[0].layers[0].mark else {
+        panic!("each point is drawn");
+    };
     let rms = (residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64).sqrt();
     assert!(
         residuals.len() > 20 && rms < 2.0 * fitted.summary.rms_N,

@@ -57,6 +57,7 @@ mod traits;
 mod travel;
 mod work;
 
+mod bladder_creep;
 mod braid_elasticity;
 mod breakaway_friction;
 mod contact_loss;
@@ -141,6 +142,8 @@ crate::effect_list! {
     MinorLoopMemory = minor_loop_memory;
     /// Friction proportional to a power of speed.
     RatePower = rate_power;
+    /// The bladder's stress and its contact creep over decades.
+    BladderCreep = bladder_creep;
 }
 
 /// Where in the chain from the air to the reading an effect acts.

@@ -28,7 +28,7 @@ pub const VALID: u32 = 0x2A5C_96E1;
 pub const UNSUMMED: u32 = 0x0F0F_5AA5;
 /// A word of state that has not been written.
 pub const ERASED: u32 = u32::MAX;
-/// Starts of a program that nobody has confirmed.
+/// Starts of a program that no host has confirmed.
 pub const TRIES: usize = 3;
 
 const MAGIC: [u8; 4] = *b"PAMF";
@@ -253,7 +253,7 @@ pub enum Choice {
         /// Try to mark.
         mark: Option<usize>,
     },
-    /// There is no program.
+    /// Neither slot has a program.
     Nothing,
 }
 

@@ -12,7 +12,7 @@ use model_core::units::{Force, Length, Pressure};
 use proptest::prelude::*;
 
 /// The catalogue's names of what belongs to the muscle.
-const CATALOGUE: [&str; 24] = [
+const CATALOGUE: [&str; 25] = [
     "pressure-lag",
     "leak",
     "tip-effect",
@@ -37,6 +37,7 @@ const CATALOGUE: [&str; 24] = [
     "minor-loop-memory",
     "viscous-damping",
     "rate-power",
+    "bladder-creep",
 ];
 
 fn muscle() -> Muscle<f64> {

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -90,10 +91,23 @@ def generated(arguments):
     collected(output / "mutants.out/outcomes.json")
 
 
+def missed():
+    """The arguments that select the changes which no test has caught yet: lines move with every edit, so that they are not part of it."""
+    mutants = json.loads((RESULTS / "generated.json").read_text())
+    wanted = sorted({(one["file"], one["change"]) for one in mutants if one["outcome"] == "missed"})
+    return [part for file, change in wanted for part in ("--re", f"^{re.escape(file)}:[0-9]+:[0-9]+: {re.escape(change)}$")]
+
+
 def collected(outcomes):
-    """Adds the outcomes of a run to the kept ones, by mutant."""
+    """Adds the outcomes of a run to the kept ones. Those of the same changes are replaced, wherever they were."""
     kept = RESULTS / "generated.json"
-    known = {one["name"]: one for one in json.loads(kept.read_text())} if kept.exists() else {}
+    fresh = {
+        (mutant["file"], mutant["name"].split(": ", 1)[1])
+        for one in json.loads(outcomes.read_text())["outcomes"]
+        if isinstance(one["scenario"], dict) and (mutant := one["scenario"].get("Mutant"))
+    }
+    earlier = json.loads(kept.read_text()) if kept.exists() else []
+    known = {one["name"]: one for one in earlier if (one["file"], one["change"]) not in fresh}
     for one in json.loads(outcomes.read_text())["outcomes"]:
         mutant = one["scenario"].get("Mutant") if isinstance(one["scenario"], dict) else None
         if mutant:
@@ -103,6 +117,8 @@ def collected(outcomes):
             line = mutant["span"]["start"]["line"]
             known[mutant["name"]] = {
                 "name": mutant["name"], "file": mutant["file"], "line": line, "change": name,
+                # The same change may occur in several lines of a function.
+                "text": (ROOT / mutant["file"]).read_text().splitlines()[line - 1].strip(),
                 "outcome": summary.get(one["summary"], "missed"),
             }
     RESULTS.mkdir(exist_ok=True)
@@ -115,7 +131,12 @@ def page():
     kept = RESULTS / "generated.json"
     mutants = json.loads(kept.read_text()) if kept.exists() else []
     accepted = tomllib.loads((HERE / "equivalent.toml").read_text()).get("mutant", [])
-    reason = {(one["file"], one["change"]): one["reason"] for one in accepted}
+
+    def reason(mutant):
+        """Why nothing could notice a change; none where it is not in the list."""
+        fits = lambda one: (one["file"], one["change"]) == (mutant["file"], mutant["change"]) and one["text"] in mutant.get("text", "")
+        return next((one["reason"] for one in accepted if fits(one)), None)
+
     text = [
         "# Tests of the safety functions", "",
         "Would the tests notice if a safety function of the controller were broken? `bash tests/mutants.sh` breaks the controller on purpose,",
@@ -140,16 +161,16 @@ def page():
     for file in sorted({one["file"] for one in built}):
         here = [one for one in built if one["file"] == file]
         caught = sum(one["outcome"] == "caught" for one in here)
-        same = sum(one["outcome"] == "missed" and (file, one["change"]) in reason for one in here)
+        same = sum(one["outcome"] == "missed" and reason(one) is not None for one in here)
         row = [len(here), caught, same, len(here) - caught - same]
         total = [a + b for a, b in zip(total, row)]
         text.append(f"| `{file}` | " + " | ".join(map(str, row)) + " |")
     text.append("| **all** | " + " | ".join(f"**{n}**" for n in total) + " |")
     missed = [one for one in built if one["outcome"] == "missed"]
-    same = [one for one in missed if (one["file"], one["change"]) in reason]
+    same = [one for one in missed if reason(one) is not None]
     if same:
         text += ["", "## Equivalent changes", "", "These changes make no difference that a test could see.", "", "| change | reason |", "| --- | --- |"]
-        text += [f"| `{one['file']}`: {cell(one)} | {reason[one['file'], one['change']]} |" for one in same]
+        text += [f"| `{one['file']}`: {cell(one)} | {reason(one)} |" for one in same]
     rest = [one for one in missed if one not in same]
     if rest:
         text += ["", "## Changes that no test of the host catches", "", "| file | change |", "| --- | --- |"]
@@ -167,6 +188,8 @@ def main(arguments):
             sys.exit(not removed(*rest))
         case ["--generated", *rest]:
             generated(rest)
+        case ["--missed", *rest]:
+            generated([*missed(), *rest])
         case ["--collect", path]:
             collected(Path(path))
         case ["--page"]:
@@ -177,7 +200,7 @@ def main(arguments):
             page()
             sys.exit(not whole)
         case _:
-            sys.exit("tests/mutants.sh [--removed [NAME] | --generated [ARGUMENTS] | --page]")
+            sys.exit("tests/mutants.sh [--removed [NAME] | --generated [ARGUMENTS] | --missed | --page]")
 
 
 main(sys.argv[1:])

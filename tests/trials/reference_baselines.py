@@ -197,7 +197,7 @@ def emd(pair, rng):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         p = method.Bemd(method.make_empirical_risk_ppf(observed[0]), method.make_empirical_risk_ppf(observed[1]), synthetic, synthetic,
-                        c=1.0, res=5, M=64, max_M=64, progbarA=None, progbarB=None, use_multiprocessing=False)
+                        c=1.0, res=4, M=32, max_M=32, progbarA=None, progbarB=None, use_multiprocessing=False)
     return EFFECTS[best], float(p)
 
 
@@ -271,7 +271,7 @@ def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("directory", type=Path)
     arguments.add_argument("--page", type=Path)
-    arguments.add_argument("--emd", type=int, default=2, help="every n-th pair goes to emdcmp; 0: none")
+    arguments.add_argument("--emd", type=int, default=6, help="every n-th pair goes to emdcmp; 0: none")
     a = arguments.parse_args()
     pairs = read(a.directory / "pairs.jsonl")
     rows = [row("diagnosis", pairs, [p.diagnosis for p in pairs], "as shipped"),

@@ -56,7 +56,7 @@ impl Actuator {
             saturation: 0.0,
             readings: None,
             second_pa: None,
-            filters: Filters::default(),
+            filters: Filters::new(&settings.scales),
             sums: Sums::default(),
             sample: SideSample::default(),
             command: Command::VENT,

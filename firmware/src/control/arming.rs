@@ -10,6 +10,7 @@ use model_core::link::messages::{Fault, Refusal, Session, Side, State};
 use model_core::scalar::Scalar;
 
 use super::Controller;
+use super::actuator::Actuator;
 use crate::board::Command;
 use crate::safety::Cause;
 use crate::tick::TICK_S;
@@ -55,9 +56,12 @@ impl Controller {
             }
             // With `!(…)`, a pressure that is not a number counts as pressure in the muscle.
             let pressurised = |pressure_pa: f32| !(pressure_pa <= watch.vented_pa);
-            if self.settings.pressure.fitted
-                && self.sides.iter().any(|side| pressurised(side.sample.pressure_pa))
-            {
+            // The reading of this tick counts as well as the filtered one.
+            let stands = |side: &Actuator| {
+                pressurised(side.sample.pressure_pa)
+                    || side.readings.is_some_and(|now| pressurised(now.pressure_pa))
+            };
+            if self.settings.pressure.fitted && self.sides.iter().any(stands) {
                 return Err(Refusal::StillFaulty(Fault::NotVented));
             }
             if self.settings.pressure.fitted && watch.valve_test_pa > 0.0 {

@@ -6,6 +6,7 @@ use super::actuator::Actuator;
 use super::{Controller, Notice};
 use crate::board::Outputs;
 use crate::outbox::{SIDES, Sample};
+use crate::pair;
 
 impl Controller {
     pub(super) fn record(&mut self) -> Outputs {
@@ -20,7 +21,15 @@ impl Controller {
         }
         Outputs {
             sides: [self.sides[0].command, self.sides[1].command],
-            levels: [0, 1].map(|at| self.settings.command.part(self.sides[at].command.pressure_pa)),
+            levels: [
+                self.settings.command.part(self.sides[0].command.pressure_pa),
+                // A board for one muscle has no second output.
+                if pair::SUPPORTED {
+                    self.settings.command.part(self.sides[1].command.pressure_pa)
+                } else {
+                    0.0
+                },
+            ],
             state,
             setpoint: if self.mode == Mode::Force { self.setpoint } else { self.sides[0].force_demand_n },
         }

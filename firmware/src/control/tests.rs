@@ -7,9 +7,12 @@ use super::Controller;
 use crate::board::{Inputs, Outputs, Readings, Signals};
 use crate::watch::Finding;
 
+mod exact;
 mod inputs;
+mod joint;
 mod ownership;
 mod refusals;
+mod tracking;
 
 /// The session that arms and starts in these tests.
 const OWNER: Session = Session { id: 7 };

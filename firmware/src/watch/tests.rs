@@ -2,6 +2,8 @@
 
 use super::*;
 
+mod boundaries;
+
 fn good() -> Seen {
     Seen {
         readings: Some(Readings { pressure_pa: 200e3, stroke_m: 0.002, force_n: 40.0 }),

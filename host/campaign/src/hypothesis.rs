@@ -39,7 +39,9 @@ pub(crate) fn entropy(set: &[Hypothesis], apart: impl Fn(usize, usize) -> f64) -
 /// Effects that a campaign checks for: all but those that only the order of the polynomial imitates.
 #[must_use]
 pub fn candidates() -> Vec<Candidate> {
-    Candidate::all().filter(|l| l.traits().imitates != Some(Imitates::ElasticOrders)).collect()
+    Candidate::all()
+        .filter(|l| l.traits().imitates != Some(Imitates::ElasticOrders) && !l.traits().between_recordings)
+        .collect()
 }
 
 /// Memory of an effect that has no past.

@@ -25,6 +25,7 @@ mod lookup;
 mod matlab;
 mod mcap;
 pub mod motion;
+mod mountings;
 mod noise;
 #[cfg(feature = "parquet")]
 mod parquet;
@@ -44,6 +45,7 @@ pub use columns::{HELD, Recording};
 pub use follow::{Follower, UNKNOWN_PAUSE};
 pub use header::has_decimal_commas;
 pub use import::{Import, Missing};
+pub use mountings::{Rest, SAME_LENGTH, VENTING};
 pub use noise::white_noise;
 pub use quantity::{Named, Quantity, Unit, named};
 pub use read::{Hashes, Reader};

@@ -46,6 +46,8 @@ pub struct Client {
     /// The refusal of a keep-alive request, until [`Client::keep_alive`] reports it.
     displaced: Option<Refusal>,
     kept_alive: Instant,
+    /// Number of the last keep-alive request. Other programs on the line have theirs refused.
+    kept_sequence: Option<u16>,
     /// Held while a frame is written, so that those of a [`VentLine`] do not fall into its middle.
     writing: Arc<Mutex<()>>,
 }
@@ -108,6 +110,7 @@ impl Client {
             controls: false,
             displaced: None,
             kept_alive: Instant::now(),
+            kept_sequence: None,
             writing: Arc::default(),
         };
         let mut heard = LineActivity::default();
@@ -239,12 +242,43 @@ impl Client {
         self.heartbeat()
     }
 
+    /// Whether another session owns the device: what it has started is neither vented nor made silent by the way.
+    ///
+    /// # Errors
+    /// As [`Self::try_call`].
+    pub fn is_owned_by_another(&mut self) -> Result<bool> {
+        let session = self.session;
+        Ok(matches!(self.try_call::<KeepAlive>(&session)?, Err(Refusal::OtherSession)))
+    }
+
+    /// Ticks between two samples of the stream that another program has requested, after listening for at most `patience`; the
+    /// samples stay in their queue.
+    ///
+    /// # Errors
+    /// [`DeviceCode::DeviceSilent`] when the line is gone.
+    pub fn telemetry_rate(&mut self, patience: Duration) -> Result<Option<u16>> {
+        /// Gaps of which the least is the rate: lost samples make some of them longer.
+        const GAPS: usize = 4;
+        let deadline = Instant::now() + patience;
+        self.topics.forget_samples();
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            let (gaps, least) = self.topics.gaps();
+            if gaps >= GAPS || left.is_zero() {
+                return Ok(least.and_then(|ticks| u16::try_from(ticks).ok()).filter(|ticks| *ticks > 0));
+            }
+            self.pump(left, &mut LineActivity::default())?;
+        }
+    }
+
     fn heartbeat(&mut self) -> Result<()> {
         if !self.controls || self.kept_alive.elapsed() < HEARTBEAT {
             return Ok(());
         }
         self.kept_alive = Instant::now();
-        let header = Header { kind: Kind::Request, id: KeepAlive::ID, sequence: self.next_sequence() };
+        let sequence = self.next_sequence();
+        self.kept_sequence = Some(sequence);
+        let header = Header { kind: Kind::Request, id: KeepAlive::ID, sequence };
         let mut wire = [0; MAX_WIRE];
         let length = encode(header, &self.session, &mut wire)
             .map_err(|e| Error::new(DataCode::CallInvalid, format!("the request cannot be sent: {e}")))?;
@@ -397,7 +431,10 @@ impl Client {
             let Some(Ok(frame)) = self.accumulator.push(byte) else { continue };
             heard.frames += 1;
             match frame.header.kind {
-                Kind::Refusal if frame.header.id == KeepAlive::ID => {
+                Kind::Refusal
+                    if frame.header.id == KeepAlive::ID
+                        && self.kept_sequence == Some(frame.header.sequence) =>
+                {
                     self.displaced = postcard::from_bytes(frame.body).ok();
                 }
                 Kind::Response | Kind::Refusal => {

@@ -9,6 +9,7 @@
 //! | setpoints over time | [`setpoint_profile`] |
 //! | firmware over the link | [`mod@update`] |
 //! | a run from start to vent | [`mod@run`] |
+//! | telemetry beside other programs | [`Subscription`] |
 //! | a controller that is only watched | [`mod@watch`] |
 //! | venting while the conversation waits for something else | [`VentLine`] |
 //! | the pressure regulator, found from steps | [`regulator`] |
@@ -36,6 +37,7 @@ pub mod recorder;
 pub mod regulator;
 pub mod run;
 pub mod setpoint_profile;
+mod subscription;
 pub mod table_diff;
 pub mod tables;
 pub mod update;
@@ -45,4 +47,5 @@ pub mod watch;
 pub use address::Address;
 pub use client::{Client, Losses, Patience, Topic};
 pub use port::{Port, available, plugged_in};
+pub use subscription::Subscription;
 pub use vent_line::VentLine;

@@ -3,16 +3,13 @@
 use std::time::{Duration, Instant};
 
 use model_core::link::Endpoint;
-use model_core::link::endpoints::{
-    Arm, Disarm, GetFaults, GetStatus, SetReferencePoints, SetTelemetry, StartMode, Stop,
-};
+use model_core::link::endpoints::{Arm, Disarm, GetFaults, GetStatus, SetReferencePoints, StartMode, Stop};
 use model_core::link::messages::{
     Event, Fault, REFERENCE_PIECE, Reference, ReferencePoints, Refusal, Start, State, Status, Telemetry,
-    TelemetryRate,
 };
 
 use super::setpoint_profile::{Quantity, SetpointProfile};
-use super::{Client, Topic, messages};
+use super::{Client, Subscription, Topic, messages};
 use crate::error::DeviceCode;
 use pam_data::error::{DataCode, Error, Result};
 
@@ -62,9 +59,22 @@ pub fn vent(client: &mut Client) -> Result<Status> {
     }
 }
 
+/// Vents and disarms for a program that ends, unless another session owns the device: what that has started is its own to end.
+///
+/// # Errors
+/// As [`vent`].
+pub fn release(client: &mut Client) -> Result<Status> {
+    // A device that does not answer may be this session's.
+    if !client.controls() && client.is_owned_by_another().unwrap_or(false) {
+        return client.call::<GetStatus>(&());
+    }
+    vent(client)
+}
+
 /// Carries out a plan. `sample` is handed every sample from the start on; `stop` is queried between samples.
 ///
-/// Regardless of the outcome, the device is vented and disarmed at the end, and its telemetry stopped.
+/// Regardless of the outcome, the device is vented and disarmed at the end, unless another session has taken it over, and its telemetry
+/// is left as it was.
 ///
 /// # Errors
 /// Refusals, silence, the fault that stopped the device as text, or what `sample` returns.
@@ -91,12 +101,14 @@ pub fn run_asking(
 ) -> Result<Ending> {
     // What belongs to another program is neither vented nor made silent.
     claim(client)?;
-    let outcome = follow(client, plan, sample, stop, next);
-    let quiet = client.try_call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 });
-    let vented = vent(client);
+    let mut subscription = None;
+    let outcome = follow(client, plan, &mut subscription, sample, stop, next);
+    let taken_over = outcome.as_ref().is_err_and(|error| error.code() == DeviceCode::DeviceInUse);
+    let vented = if taken_over { Ok(()) } else { vent(client).map(drop) };
+    let quiet = subscription.map_or(Ok(()), |subscription| subscription.end(client));
     let ending = outcome?;
     vented?;
-    quiet?.map_err(|refusal| messages::refused("telemetry", refusal))?;
+    quiet?;
     Ok(ending)
 }
 
@@ -145,6 +157,7 @@ fn claim(client: &mut Client) -> Result<()> {
 fn follow(
     client: &mut Client,
     plan: &Plan,
+    subscription: &mut Option<Subscription>,
     mut sample: impl FnMut(&Telemetry) -> Result<()>,
     stop: impl Fn() -> bool,
     mut next: impl FnMut(f64) -> Option<f32>,
@@ -153,7 +166,8 @@ fn follow(
     if let SetpointProfile::Points { values, .. } = &plan.profile {
         send_points(client, values)?;
     }
-    client.call::<SetTelemetry>(&TelemetryRate { every_ticks: plan.every_ticks })?;
+    let stream = subscription.insert(Subscription::begin(client, plan.every_ticks)?);
+    let silence = stream.silence(SILENCE);
     client.call::<StartMode>(&Start { mode: plan.quantity.mode(), session: client.session() })?;
     let mut steps = Steps::begin(client, plan)?;
     let mut begun = None;
@@ -166,6 +180,7 @@ fn follow(
         match client.topic(Duration::from_millis(50))? {
             Some(Topic::Telemetry(s)) => {
                 heard = Instant::now();
+                let takes = stream.takes(&s);
                 // Samples from before the start may still be on the line, those of an earlier run too.
                 let early = s.state != State::Running || s.time_us <= status.time_us;
                 if early && begun.is_none() {
@@ -176,9 +191,13 @@ fn follow(
                 if plan.seconds.is_some_and(|end| elapsed >= end) {
                     return Ok(Ending::Done);
                 }
-                sample(&s)?;
-                if s.state == State::Fault {
-                    return Err(fault(client)?);
+                if takes {
+                    sample(&s)?;
+                }
+                match s.state {
+                    State::Running => {}
+                    State::Fault => return Err(fault(client)?),
+                    State::Armed | State::Disarmed => return Err(ended_by_another()),
                 }
                 steps.advance(client, plan.quantity, elapsed)?;
                 if let Some(value) = next(elapsed) {
@@ -187,7 +206,7 @@ fn follow(
             }
             Some(Topic::Event(Event::Fault(report))) => return Err(messages::stopped(&report)),
             Some(Topic::Event(_) | Topic::Log(_)) => {}
-            None if heard.elapsed() > SILENCE => {
+            None if heard.elapsed() > silence => {
                 let status = client.call::<GetStatus>(&())?;
                 if status.state == State::Fault {
                     return Err(fault(client)?);
@@ -198,9 +217,15 @@ fn follow(
                 )
                 .help("its control loop may be waiting for sensors: `host device info` shows whether ticks advance"));
             }
-            None => {}
+            None => stream.renew(client)?,
         }
     }
+}
+
+/// The error where the device no longer runs, without a fault and without this program's doing.
+fn ended_by_another() -> Error {
+    Error::new(DeviceCode::DeviceRefused, "another program has vented the controller during the run")
+        .help("start the run again when the muscle may move")
 }
 
 /// The fault that holds a device, as an error.

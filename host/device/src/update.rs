@@ -42,7 +42,7 @@ fn invalid(cause: impl Into<String>) -> Error {
 /// boot loader, the words of the slot) is left out.
 ///
 /// # Errors
-/// Bytes that are no ELF file, or an image whose vector table is in neither slot.
+/// Bytes that are not an ELF file, or an image whose vector table is in neither slot.
 pub fn program_of(elf: &[u8]) -> Result<(u8, Vec<u8>)> {
     let segments = placed(elf);
     if !elf.starts_with(b"\x7fELF\x01\x01") || segments.is_empty() {
@@ -191,7 +191,7 @@ fn from_bytes(bytes: &[u8]) -> Option<Vec<Image>> {
     (!images.is_empty()).then_some(images)
 }
 
-/// Sends the image for the slot that does not run; `progress` is told the bytes that are there.
+/// Sends the image for the slot that does not run; `progress` receives the number of bytes that have arrived.
 ///
 /// # Errors
 /// No image for this board and slot, and what the device refuses.

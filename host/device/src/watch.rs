@@ -2,12 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use model_core::link::endpoints::{GetStatus, SetTelemetry};
-use model_core::link::messages::{Event, Telemetry, TelemetryRate};
+use model_core::link::endpoints::GetStatus;
+use model_core::link::messages::{Event, Telemetry};
 
 use crate::error::DeviceCode;
 use crate::run::Ending;
-use crate::{Client, Topic, messages};
+use crate::{Client, Subscription, Topic, messages};
 use pam_data::error::{Error, Result};
 
 /// Silence of the telemetry after which the device's status is read.
@@ -22,7 +22,7 @@ pub enum Happened<'a> {
     Event(&'a Event),
 }
 
-/// Hands on every sample and event until `seconds` of device time are over or `stop` says so. The telemetry goes on afterwards.
+/// Hands on every sample and event until `seconds` of device time are over or `stop` says so. The telemetry is left as it was before.
 ///
 /// # Errors
 /// A device that is silent, refuses, or restarts; what `take` returns.
@@ -30,12 +30,26 @@ pub fn watch(
     client: &mut Client,
     every_ticks: u16,
     seconds: Option<f64>,
+    take: impl FnMut(Happened<'_>) -> Result<()>,
+    stop: impl Fn() -> bool,
+) -> Result<Ending> {
+    let mut stream = Subscription::begin(client, every_ticks)?;
+    let watched = follow(client, &mut stream, seconds, take, stop);
+    // A device that is gone cannot stop its telemetry; why it is gone is the better news.
+    let quiet = stream.end(client);
+    let ending = watched?;
+    quiet?;
+    Ok(ending)
+}
+
+fn follow(
+    client: &mut Client,
+    stream: &mut Subscription,
+    seconds: Option<f64>,
     mut take: impl FnMut(Happened<'_>) -> Result<()>,
     stop: impl Fn() -> bool,
 ) -> Result<Ending> {
-    client
-        .try_call::<SetTelemetry>(&TelemetryRate { every_ticks })?
-        .map_err(|refusal| messages::refused("telemetry", refusal))?;
+    let silence = stream.silence(SILENCE);
     // Samples that an earlier run left on the line have another rate.
     let begun = client.call::<GetStatus>(&())?.time_us;
     let (mut first, mut last) = (None, 0);
@@ -57,11 +71,13 @@ pub fn watch(
                 if seconds.is_some_and(|end| elapsed as f64 * 1e-6 >= end) {
                     return Ok(Ending::Done);
                 }
-                take(Happened::Sample(&sample, elapsed / 1000))?;
+                if stream.takes(&sample) {
+                    take(Happened::Sample(&sample, elapsed / 1000))?;
+                }
             }
             Some(Topic::Event(event)) => take(Happened::Event(&event))?,
             Some(Topic::Log(_)) => {}
-            None if heard.elapsed() > SILENCE => {
+            None if heard.elapsed() > silence => {
                 let status = client.call::<GetStatus>(&())?;
                 return Err(Error::new(
                     DeviceCode::DeviceSilent,
@@ -69,7 +85,7 @@ pub fn watch(
                 )
                 .help("it may have restarted: `host device info` shows its time since start and whether ticks advance"));
             }
-            None => {}
+            None => stream.renew(client)?,
         }
     }
     Ok(Ending::Stopped)

@@ -48,7 +48,7 @@ fn firmware_is_sent_tried_confirmed_and_gone_back_from() {
     assert_eq!(status.slots[1].unwrap().release, [2, 0, 0]);
     let status = restarted(&device).call_once::<ConfirmUpdate>(&()).unwrap();
     assert_eq!((status.running, status.slots[1].unwrap().confirmed), (1, true));
-    // The next one goes to the other slot, and nobody confirms it.
+    // The next one goes to the other slot, and no one confirms it.
     send(&mut client(&device), &images(3, 7), |_| ()).unwrap();
     let running: Vec<u8> =
         (0..5).map(|_| restarted(&device).call::<GetUpdate>(&()).unwrap().running).collect();

@@ -203,7 +203,7 @@ pub(super) fn unplace(p: &Parameter, value: f64) -> f64 {
 }
 
 /// All candidate effects, in the order of the library. What is part of the base model is no candidate: the gauge's offset is the
-/// deadband, and the baselines offer a higher elastic order.
+/// deadband, and the baselines offer a higher elastic order. What only differences between recordings show is found before the search.
 ///
 /// `added` are laws beyond the catalogue.
 pub(crate) fn library(rows: &Rows, added: &[Law]) -> Vec<Candidate> {
@@ -217,5 +217,6 @@ pub(crate) fn library(rows: &Rows, added: &[Law]) -> Vec<Candidate> {
         .chain(added.iter().copied())
         .map(|law| Candidate { law, info: law.info(), traits: law.traits(), span })
         .filter(|c| !matches!(c.traits.imitates, Some(Imitates::Deadband | Imitates::ElasticOrders)))
+        .filter(|c| !c.traits.between_recordings)
         .collect()
 }

@@ -10,6 +10,8 @@
 //! | `memory` | the relaxing states, stepped exactly |
 //! | `spline`, `shift_fit` | free curves on a shifted pressure |
 //! | `law` | threshold of each mounting, relaxed share, stress-free pressure, unrecorded times |
+//! | [`table_fit`] | the memory as an effect of a table |
+//! | [`table_unseen`] | each run predicted from the others by tables |
 //! | `unseen` | each run predicted from the others; jackknife over runs |
 //! | `run_offset` | slips and bad runs |
 //! | `findings` | documented contrasts with intervals over runs or mountings |
@@ -34,6 +36,8 @@ mod shift_fit;
 mod spline;
 mod staircase;
 mod student;
+pub mod table_fit;
+pub mod table_unseen;
 #[cfg(test)]
 mod tests;
 mod unseen;

@@ -68,8 +68,9 @@ pub fn isolability(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Vec<Isol
     let thin: Vec<Context<f64>> = keep.iter().map(|i| contexts[*i]).collect();
     let basis = tables(&thin);
     let span = pam_fit::bench::Span::of(&contexts);
-    let laws: Vec<Candidate> =
-        Candidate::all().filter(|l| l.traits().imitates != Some(Imitates::ElasticOrders)).collect();
+    let laws: Vec<Candidate> = Candidate::all()
+        .filter(|l| l.traits().imitates != Some(Imitates::ElasticOrders) && !l.traits().between_recordings)
+        .collect();
     let traces: Vec<(f64, Vec<f64>)> = laws
         .par_iter()
         .map(|law| {

@@ -5,6 +5,7 @@ use model_core::muscle::Muscle;
 
 use super::criteria::judgement::{CHECKED_COST, PREDICTIVE_COST, REFIT_ROUNDS};
 use super::history;
+use super::history::table_fit;
 use super::protocol_simulation::moments;
 use super::reserve::Reserve;
 use super::verdict::{Diagnosis, Verdict};
@@ -53,6 +54,9 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
     };
     let bare = TableFile { table: plain.table.clone(), about: about(&plain, Vec::new()) };
     let before = predict(&bare, campaign)?.rms.unwrap_or(0.0);
+    if let Some(remembering) = with_memory(campaign, muscle, diagnosis, before)? {
+        return Ok(remembering);
+    }
     let unseen = plain.summary.left_out_pressure_mean_error_pct;
     let mut warnings = plain.summary.warnings.clone();
     let (effects, corrections) = parts(diagnosis);
@@ -103,6 +107,27 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
     Ok(Refitted { file: with, rms_before: before, rms_after: after, left_out, warnings, reserve })
 }
 
+/// The table with the memory that the history of the campaign shows, where it predicts the recordings better than the plain one. Its
+/// static part has layers of its own (lengths of the mountings, zero of the load cell, contact), so that no other named effect is added.
+fn with_memory(
+    campaign: &Campaign,
+    muscle: &MuscleDescription,
+    diagnosis: &Diagnosis,
+    before: f64,
+) -> Result<Option<Refitted>> {
+    if !diagnosis.missing.iter().any(history::is_from_history) {
+        return Ok(None);
+    }
+    let settled = table_fit::settled(campaign);
+    let Some(file) = table_fit::table(&settled, muscle)? else { return Ok(None) };
+    let after = predict(&file, campaign)?.rms.unwrap_or(f64::INFINITY);
+    let better = after < before && file.table.check().is_ok();
+    let warnings = file.about.fit.warnings.clone();
+    let refitted =
+        Refitted { file, rms_before: before, rms_after: after, left_out: None, warnings, reserve: None };
+    Ok(better.then_some(refitted))
+}
+
 /// The plain table, as the result where no effect goes into it.
 fn without_effects(file: TableFile, rms: f64, warnings: Vec<String>, reserve: Option<Reserve>) -> Refitted {
     Refitted { file, rms_before: rms, rms_after: rms, left_out: None, warnings, reserve }
@@ -129,7 +154,7 @@ fn parts(diagnosis: &Diagnosis) -> (Vec<FittedEffect>, Vec<Correction>) {
     for m in &diagnosis.missing {
         let values: Vec<f64> = m.parameters.iter().map(|p| p.value).collect();
         match Candidate::from_name(&m.effect) {
-            // The memory found by the history layer has another law than the catalogue's effect of that name.
+            // The memory found by the history layer goes into a table by its own fit, or not at all.
             Some(Candidate::Muscle(_)) if history::is_from_history(m) => {}
             // A table carries no more than that; those that were found first explain the most.
             Some(Candidate::Muscle(effect)) if effects.len() < MAX_EFFECTS => {

@@ -90,8 +90,8 @@ pub enum Refusal {
 pub enum Remark {
     /// Beside a memory of the muscle, the static model between mountings leaves this error, N rms, without a name.
     StaticMisfit(f64),
-    /// The memory that was found is not written into a table.
-    MemoryNotInTable,
+    /// The memory that was found goes into the table, as an effect of its own.
+    MemoryInTable,
     /// Nothing can be judged.
     NotJudged(Unjudgeable),
     /// The length was held throughout.

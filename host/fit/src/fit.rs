@@ -60,10 +60,13 @@ pub(crate) mod uncertainty;
 mod warnings;
 mod weights;
 
+use model_core::table::MuscleTable;
 use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::progress::{Progress, Silent};
 use pam_data::recording::Campaign;
+
+use crate::table_file::{StoredMounting, stored_mountings};
 
 /// Options of a fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,6 +109,19 @@ impl Default for Options {
 /// [`CallInvalid`](pam_data::error::DataCode::CallInvalid) for options out of range.
 pub fn fit(campaign: &Campaign, muscle: &MuscleDescription, options: &Options) -> Result<result::Fit> {
     fit_with_progress(campaign, muscle, options, &Silent)
+}
+
+/// The table of [`fit`] and its mountings, without uncertainty, errors and comparisons: for those who fit many times.
+///
+/// # Errors
+/// As [`fit`].
+pub fn table_alone(
+    campaign: &Campaign,
+    muscle: &MuscleDescription,
+    options: &Options,
+) -> Result<(MuscleTable, Vec<StoredMounting>)> {
+    let solution = solve::solve(campaign, muscle, options, &Silent)?;
+    Ok((result::table(&solution, muscle)?, stored_mountings(&solution.problem)))
 }
 
 /// [`fit`], and reports its stages. Only stages of equal steps have a remaining time.

@@ -56,6 +56,7 @@
 pub mod bench;
 pub mod checks;
 pub mod confidence_band;
+pub mod effect_columns;
 pub mod error;
 mod fit;
 pub mod numerics;
@@ -64,6 +65,7 @@ pub mod stock;
 pub mod table_export;
 pub mod table_faults;
 pub mod table_file;
+pub mod vented_rest;
 
 pub use fit::basis::{Columns, columns};
 pub use fit::by_recording::{RecordingResidual, ResidualSums, by_recording, recording_table};
@@ -82,4 +84,4 @@ pub use fit::smoothing::Smoothing;
 pub use fit::solution::Solution;
 pub use fit::summary::{AtPressure, ModelError, OutlierRow, PhysicalCost, RowUse, Summary};
 pub use fit::uncertainty::{Uncertain, table_root};
-pub use fit::{Options, fit, fit_with_progress};
+pub use fit::{Options, fit, fit_with_progress, table_alone};

@@ -1,7 +1,8 @@
 //! Force predicted by a table on recordings: the base model, the table's effects, and corrections of the bench.
 //!
 //! Effects have a memory, which runs through the recordings in their order: earlier files are the muscle's history. Over a pause
-//! of known length the memories fade as they do in time; an unknown pause counts as a minute.
+//! of known length the memories fade as they do in time; an unknown pause counts as a minute. Between recordings at held lengths the
+//! muscle is vented ([`crate::vented_rest`]); a new mounting starts the memories of its load anew.
 
 use std::borrow::Cow;
 use std::fmt::Write;
@@ -18,6 +19,7 @@ use crate::bench::Candidate;
 use crate::confidence_band::{ConfidenceBand, HALF_95};
 use crate::fit::points::HeldMounting;
 use crate::table_file::{Correction, StoredMounting, TableFile};
+use crate::vented_rest;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::physical_limits::Contractions;
 use pam_data::recording::dropouts::Screened;
@@ -103,6 +105,7 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ConfidenceBand>) -> 
         campaign.recordings.iter().map(|r| with_true_length(file, r)).collect();
     check_contractions(&model.muscle, &corrected)?;
     let mut follower = Follower::of(campaign);
+    let rests = if vented_rest::matters(&file.table.effects) { campaign.rests() } else { None };
     let mut recordings = Vec::with_capacity(campaign.recordings.len());
     let (mut square, mut rows) = (0.0, 0.0);
     for (index, (recording, motion)) in
@@ -111,7 +114,13 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ConfidenceBand>) -> 
         let force = if model.is_plain() {
             model.plain(recording, &motion)
         } else {
-            model.with_effects(recording, &follower.follow(recording, &motion, campaign.pause_before(index)))
+            let mut motions = follower.follow(recording, &motion, campaign.pause_before(index));
+            if let Some(rest) = rests.as_ref().and_then(|rests| rests.get(index)) {
+                for context in vented_rest::contexts(&model.muscle, &mut motions, rest) {
+                    model.chain.step(&context);
+                }
+            }
+            model.with_effects(recording, &motions)
         };
         let read = screened.read(index);
         let measured = recording.force.as_ref().filter(|_| read.contains(&true));
@@ -132,7 +141,8 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ConfidenceBand>) -> 
         .iter()
         .flat_map(|r| r.pressure.iter().copied().zip(r.stroke.iter().copied()))
         .collect();
-    let warnings = screened.remark().into_iter().chain(beyond(&file.table, &places)).collect();
+    let assumed = rests.as_deref().and_then(vented_rest::remark);
+    let warnings = screened.remark().into_iter().chain(assumed).chain(beyond(&file.table, &places)).collect();
     Ok(Prediction { recordings, rms, warnings })
 }
 
@@ -216,7 +226,7 @@ impl Model<'_> {
 }
 
 /// The recording with the correction of its mounting, where the table knows the stroke that it was held at.
-fn with_true_length<'a>(file: &TableFile, recording: &'a Recording) -> Cow<'a, Recording> {
+pub(crate) fn with_true_length<'a>(file: &TableFile, recording: &'a Recording) -> Cow<'a, Recording> {
     match offset_of(&file.about.mountings, recording) {
         None => Cow::Borrowed(recording),
         Some(offset) => {

@@ -3,4 +3,4 @@
 #[path = "../entries.rs"]
 mod entries;
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| entries::setpoint_profile(bytes));
+libfuzzer_sys::fuzz_target!(init: entries::tolerate_caught_panics(), |bytes: &[u8]| entries::setpoint_profile(bytes));

@@ -1,4 +1,4 @@
-//! The link to a controller: one conversation, and at most one run or recording that goes on in a thread of its own.
+//! The link to a controller: one conversation, and at most one run or recording in progress, in a thread of its own.
 //!
 //! The thread keeps the controller's session alive and vents at the end of a run whatever ended it. A run ends, too, when Python does not
 //! take its samples: a program that hangs must not keep a muscle under pressure.
@@ -10,10 +10,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use model_core::image;
-use model_core::link::endpoints::{
-    ClearFault, GetFaults, GetInfo, GetSettings, GetStatus, SetSettings, SetTelemetry,
-};
-use model_core::link::messages::{Side, Telemetry, TelemetryRate};
+use model_core::link::endpoints::{ClearFault, GetFaults, GetInfo, GetSettings, GetStatus, SetSettings};
+use model_core::link::messages::{Side, Telemetry};
 use model_core::link::settings::Settings;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::json_of;
@@ -31,7 +29,7 @@ use crate::error::{raised, wrong};
 use crate::table::Table;
 use crate::warnings::warn;
 
-/// How long a run goes on while Python takes no samples. The studio allows a page that does not respond the same time.
+/// How long a run continues while Python takes no samples. The studio allows a page that does not respond the same time.
 const UNATTENDED: Duration = Duration::from_secs(2);
 /// Samples of a recording that Python may leave waiting: a minute at 1 kHz.
 const BACKLOG: usize = 60_000;
@@ -110,7 +108,7 @@ impl Exchange {
 #[pyclass(frozen, module = "pamtools._native")]
 pub(crate) struct Link {
     talk: Mutex<Talk>,
-    /// The exchange of the job that goes on, beside `talk`.
+    /// The exchange of the job in progress, beside `talk`.
     exchange: Mutex<Option<Arc<Exchange>>>,
     vent_line: Mutex<Option<VentLine>>,
     port: String,
@@ -126,7 +124,7 @@ struct Talk {
 impl Talk {
     fn client(&mut self) -> Result<&mut Client> {
         if self.job.is_some() {
-            return Err(Error::new(DataCode::CallInvalid, "a run or a recording goes on")
+            return Err(Error::new(DataCode::CallInvalid, "a run or a recording is in progress")
                 .help("take its samples to the end, or stop it"));
         }
         self.client.as_mut().ok_or_else(closed)
@@ -194,13 +192,6 @@ impl Link {
 
 fn closed() -> Error {
     Error::new(DeviceCode::DeviceSilent, "the connection is closed").help("call pamtools.connect again")
-}
-
-fn quiet(client: &mut Client) -> Result<()> {
-    client
-        .try_call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 })?
-        .map(drop)
-        .map_err(|refusal| messages::refused("telemetry", refusal))
 }
 
 /// One sample every n ticks for a rate in Hz.
@@ -308,7 +299,7 @@ impl Link {
         self.with(py, arm)
     }
 
-    /// Vents immediately, also while a run goes on and from another thread, ends the run, and confirms it.
+    /// Vents immediately, also during a run and from another thread, ends the run, and confirms it.
     fn vent(&self, py: Python<'_>) -> PyResult<()> {
         let vented = py.detach(|| {
             if let Some(exchange) = locked(&self.exchange).take() {
@@ -319,7 +310,7 @@ impl Link {
                 }
             }
             let mut talk = locked(&self.talk);
-            // How the run ended does not matter: that was asked for.
+            // How the run ended does not matter: the caller ended it.
             let _ = talk.end();
             vent(talk.client()?)
         });
@@ -378,9 +369,7 @@ impl Link {
                 Happened::Sample(sample, _) => exchange.push(sample, false),
                 Happened::Event(_) => Ok(()),
             };
-            let watched = watch(client, every_ticks, seconds, take, || exchange.stop.load(Ordering::Relaxed));
-            let quiet = quiet(client);
-            watched.and(quiet)
+            watch(client, every_ticks, seconds, take, || exchange.stop.load(Ordering::Relaxed)).map(drop)
         })
     }
 
@@ -404,12 +393,12 @@ impl Link {
         taken.map_err(raised)
     }
 
-    /// Ends the run or recording that goes on; a run vents.
+    /// Ends the run or recording in progress; a run vents.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
         py.detach(|| self.halt()).map_err(raised)
     }
 
-    /// Ends what goes on, vents if this session armed the controller, and closes the port.
+    /// Ends a run or recording in progress, vents if this session armed the controller, and closes the port.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
         let ended = py.detach(|| {
             let halted = self.halt();

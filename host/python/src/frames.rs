@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
-use arrow_array::ffi_stream::{ArrowArrayStreamReader, FFI_ArrowArrayStream};
+use arrow_array::ffi_stream::{FFI_ArrowArrayStream, RecordBatchStreamReader};
 use arrow_array::types::{
     Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type,
     UInt64Type,
 };
 use arrow_array::{
-    Array, ArrayRef, ArrowPrimitiveType, Float64Array, RecordBatch, RecordBatchIterator, StringArray,
+    ArrayRef, ArrowPrimitiveType, Float64Array, RecordBatch, RecordBatchIterator, StringArray,
 };
 use arrow_schema::{ArrowError, DataType};
 use numpy::IntoPyArray;
@@ -116,7 +116,7 @@ fn from_stream(capsule: &Bound<'_, PyAny>) -> PyResult<Vec<(String, TableColumn)
     let stream = capsule.pointer_checked(Some(STREAM))?.cast::<FFI_ArrowArrayStream>();
     // SAFETY: a capsule of this name holds a stream, by the definition of the interface; the reader takes it out of the capsule and
     // leaves a released one there.
-    let reader = unsafe { ArrowArrayStreamReader::from_raw(stream.as_ptr()) }.map_err(|e| arrow(&e))?;
+    let reader = unsafe { RecordBatchStreamReader::from_raw(stream.as_ptr()) }.map_err(|e| arrow(&e))?;
     let mut table: Vec<(String, TableColumn)> = Vec::new();
     let fields = arrow_array::RecordBatchReader::schema(&reader);
     for field in fields.fields() {
@@ -254,7 +254,7 @@ pub(crate) fn stream<'py>(
     let batch = RecordBatch::try_from_iter(arrays).map_err(|e| arrow(&e))?;
     let schema = batch.schema();
     let reader = RecordBatchIterator::new([Ok(batch)], schema);
-    PyCapsule::new(py, FFI_ArrowArrayStream::new(Box::new(reader)), Some(STREAM.to_owned()))
+    PyCapsule::new_with_value(py, FFI_ArrowArrayStream::new(Box::new(reader)), STREAM)
 }
 
 /// Recordings as a data frame of pandas, which may be there without Arrow.

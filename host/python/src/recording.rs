@@ -83,7 +83,7 @@ impl Recording {
         py: Python<'py>,
         requested_schema: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyCapsule>> {
-        // A wish of the consumer, which the interface permits to be passed over.
+        // The interface permits a producer to ignore it.
         let _ = requested_schema;
         frames::stream(py, std::slice::from_ref(&self.0), false)
     }

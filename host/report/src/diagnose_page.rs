@@ -13,7 +13,6 @@ use super::wording;
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
 use pam_data::recording::Campaign;
 use pam_diagnose::history::is_from_history;
-use pam_diagnose::remark::Remark;
 use pam_diagnose::verdict::{Diagnosis, Missing, Pattern, Verdict};
 use pam_fit::RecordingResidual;
 use pam_fit::bench::Candidate;
@@ -148,13 +147,10 @@ fn recommendation(d: &Diagnosis) -> Section {
             names(&bench)
         ));
     }
-    // A memory that no table takes is not to be written into one.
-    let untold = d.remarks.iter().any(|r| matches!(r, Remark::MemoryNotInTable));
-    let (memory, muscle): (Vec<&Missing>, Vec<&Missing>) =
-        muscle.into_iter().partition(|m| untold && is_from_history(m));
+    let memory: Vec<&Missing> = muscle.iter().copied().filter(|m| is_from_history(m)).collect();
     if !memory.is_empty() {
         steps.push(format!(
-            "Repeat a run at one mounting after a vented hour: it shows how {} recovers. A table does not contain it yet.",
+            "Repeat a run at one mounting after a vented hour: it shows how {} recovers.",
             names(&memory)
         ));
     }

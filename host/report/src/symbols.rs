@@ -8,6 +8,7 @@ use super::Table;
 const SYMBOLS: &[(&str, &str)] = &[
     ("F_quasi", "pull of the base model without friction, N"),
     ("F_b", "elastic force of the bladder: the base model's without friction less P·g, N"),
+    ("F_w", "what the bladder takes from the pull of the gas: −F_b, between 0 and P·g, N"),
     ("F_G", "Gaylord's force of the effective pressure, P′·g, N"),
     ("k_F", "friction factor of the table at this pressure"),
     ("s", "direction: +1 while shortening, −1 while lengthening, held at rest"),
@@ -51,6 +52,7 @@ const SYMBOLS: &[(&str, &str)] = &[
     ("d", "damage so far, from 0 to 1"),
     ("q", "decaying over-stress due to the drive u, the expression in the brackets behind it"),
     ("q_i", "part i of the over-stress due to the drive u, the expression in the brackets behind it"),
+    ("r_i", "the expression in the brackets behind it, low-pass filtered with time constant τ_i"),
     ("z", "state of friction, from −1 to 1"),
     ("z_i", "state of friction element i, from −1 to 1"),
     ("m", "1 in motion, 0 at rest"),

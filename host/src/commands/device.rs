@@ -70,7 +70,7 @@ enum Action {
         host device sensors\n  \
         host device sensors --calibrate force --known 0\n  \
         host device sensors --calibrate force --known 0 --known 49.05 --known 98.1\n  \
-        host device sensors --calibrate pressure --point 0.333=0 --point 3=1000 --dry-run\n\n\
+        host device sensors --calibrate pressure --point 0.333=0 --point 3=1000\n\n\
         reading = at_zero + per_unit · signal. The device refuses a scale with which a limit or a range lies outside what the \
         sensor can read.")]
     Sensors(sensors::Arguments),

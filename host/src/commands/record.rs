@@ -4,8 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
-use model_core::link::endpoints::{GetInfo, SetTelemetry};
-use model_core::link::messages::TelemetryRate;
+use model_core::link::endpoints::GetInfo;
 use serde_json::json;
 
 use super::interrupt::interrupts;
@@ -17,7 +16,6 @@ use crate::documents::{bench, text};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::pluralise::pluralise;
 use pam_data::progress::Progress;
-use pam_device::messages;
 use pam_device::recorder::{about_losses, about_start, recover};
 use pam_device::run::Ending;
 use pam_device::watch::{Happened, watch};
@@ -32,7 +30,7 @@ use pam_data::date::now_utc;
     host record --seconds 60 -o run.csv -o run.mcap\n  \
     host record --rate 100 --folder campaign\n  \
     host record --reference commissioning.csv\n\n\
-    It only watches: it does not keep the run of another program alive. Every 0.1 s goes to the disk; a program that is killed, a cable \
+    It only watches: it does not keep the run of another program alive, and leaves that program's telemetry as it is. Every 0.1 s goes to the disk; a program that is killed, a cable \
     that is pulled or a disk that fills leaves everything until then. CSV and MCAP are read by `host fit` and all others; \
     MCAP opens in the viewers of robotics. OUT.json says which versions, table and settings the controller had.")]
 pub struct Arguments {
@@ -120,8 +118,6 @@ impl Arguments {
         about["rows"] = json!(rows);
         about["files"] = json!(output.iter().map(|f| f.display().to_string()).collect::<Vec<_>>());
         let kept = end(recorder, &about, console);
-        // A device that is gone cannot stop its telemetry; the recording is complete nevertheless.
-        let quiet = client.try_call::<SetTelemetry>(&TelemetryRate { every_ticks: 0 });
         if let Err(error) = &watched
             && kept.is_ok()
         {
@@ -130,7 +126,6 @@ impl Arguments {
         }
         watched?;
         kept?;
-        quiet?.map_err(|refusal| messages::refused("telemetry", refusal))?;
         warn_of_losses(losses, console);
         console.result(if self.json {
             format!("{about:#}")

@@ -14,7 +14,8 @@ use pam_data::error::{DataCode, Error, Result};
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  host studio\n  host studio --port /dev/ttyACM0\n  host studio --emulate\n\n\
-    The page is for this machine only. Escape vents. When the last page closes, the controller is vented and disarmed."
+    The page is for this machine only. Escape vents. When the last page closes, the controller is vented and disarmed, \
+    unless another program has started its run."
 )]
 pub struct Arguments {
     /// Connect to this device immediately, unless an emulated one is requested.
@@ -59,12 +60,12 @@ impl Arguments {
             } else {
                 console.result(format!("open {address}"));
             }
-            console.note("Ctrl-C here, or closing the last page, vents and disarms the controller");
+            console.note("Ctrl-C here, or closing the last page, vents what this page has started");
         };
         serve(self.web_port, self.output, first, ready, async {
             let _ = stop.await;
         })?;
-        console.note("ended; the controller is vented");
+        console.note("ended; what this page had started is vented");
         Ok(())
     }
 }

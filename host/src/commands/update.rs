@@ -9,7 +9,7 @@ use model_core::link::messages::UpdateStatus;
 
 use super::port::PortOption;
 use crate::console::Console;
-use crate::documents::device::{Firmware, FirmwareSlot};
+use crate::documents::device::{Firmware, FirmwareFile, FirmwareImage, FirmwareKey, FirmwareSlot};
 use crate::documents::text;
 use crate::progress::ProgressLine;
 use pam_data::error::{DataCode, Error, Result};
@@ -39,12 +39,17 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Action {
     /// Make a key for signing firmware, and print its public part for `firmware/build --key`.
+    #[command(after_help = "Example:\n  host update key -o update.key")]
     Key {
         /// The file for the private key; it must not exist.
         #[arg(short, long, value_name = "FILE.key")]
         output: PathBuf,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
     },
     /// Sign images for both slots and write them into one file.
+    #[command(after_help = "Example:\n  host update pack a.elf b.elf --key update.key -o firmware.pamfw")]
     Pack {
         /// Images of `firmware/build`, one with and one without --slot-b.
         #[arg(value_name = "ELF", required = true)]
@@ -55,8 +60,12 @@ enum Action {
         /// The file.
         #[arg(short, long, value_name = "FILE.pamfw")]
         output: PathBuf,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
     },
     /// Send firmware into the slot that does not run, restart, and confirm the new one when it answers.
+    #[command(after_help = "Example:\n  host update send firmware.pamfw --port /dev/ttyACM0")]
     Send {
         /// A file of `host update pack`.
         #[arg(value_name = "FILE.pamfw")]
@@ -71,6 +80,7 @@ enum Action {
         json: bool,
     },
     /// Show what is in both slots.
+    #[command(after_help = "Example:\n  host update status")]
     Status {
         #[command(flatten)]
         port: PortOption,
@@ -79,6 +89,7 @@ enum Action {
         json: bool,
     },
     /// Confirm the firmware that runs.
+    #[command(after_help = "Example:\n  host update confirm")]
     Confirm {
         #[command(flatten)]
         port: PortOption,
@@ -87,6 +98,7 @@ enum Action {
         json: bool,
     },
     /// Go back to the firmware in the other slot, and restart.
+    #[command(after_help = "Example:\n  host update revert")]
     Revert {
         #[command(flatten)]
         port: PortOption,
@@ -103,8 +115,8 @@ impl Arguments {
     /// A file that is not firmware, a device that is silent or refuses, firmware that does not start.
     pub fn run(self, console: &Console) -> Result<()> {
         match self.action {
-            Action::Key { output } => make_key(&output, console),
-            Action::Pack { images, key, output } => pack(&images, &key, &output, console),
+            Action::Key { output, json } => make_key(&output, json, console),
+            Action::Pack { images, key, output, json } => pack(&images, &key, &output, json, console),
             Action::Send { file, port, no_restart, json } => send(&file, &port, no_restart, json, console),
             Action::Status { port, json } => {
                 let status = greet(&port)?.call::<GetUpdate>(&())?;
@@ -149,7 +161,7 @@ fn restarted(mut client: Client, port: &PortOption) -> Result<Client> {
     }
 }
 
-fn make_key(path: &Path, console: &Console) -> Result<()> {
+fn make_key(path: &Path, json: bool, console: &Console) -> Result<()> {
     let mut bytes = [0; 32];
     getrandom::fill(&mut bytes)
         .map_err(|error| Error::new(DataCode::CallInvalid, format!("no random numbers: {error}")))?;
@@ -160,7 +172,12 @@ fn make_key(path: &Path, console: &Console) -> Result<()> {
     write_whole(path, (update::hex(&bytes) + "\n").as_bytes())?;
     keep_private(path);
     console.note("keep this file private and safe: who has it can change the firmware of your controllers");
-    console.result(update::hex(&update::public_of(&key)));
+    let public_key = update::hex(&update::public_of(&key));
+    console.result(if json {
+        text(&FirmwareKey { schema: "pam-firmware-key/1", public_key })?
+    } else {
+        public_key
+    });
     Ok(())
 }
 
@@ -176,12 +193,12 @@ fn keep_private(path: &Path) {
     let _ = path;
 }
 
-fn pack(images: &[PathBuf], key: &Path, output: &Path, console: &Console) -> Result<()> {
+fn pack(images: &[PathBuf], key: &Path, output: &Path, json: bool, console: &Console) -> Result<()> {
     let unreadable = |path: &Path, error: std::io::Error| {
         Error::new(DataCode::FileUnreadable, error.to_string()).file(path)
     };
-    let text = std::fs::read_to_string(key).map_err(|error| unreadable(key, error))?;
-    let key = update::key_from_hex(text.trim()).ok_or_else(|| {
+    let digits = std::fs::read_to_string(key).map_err(|error| unreadable(key, error))?;
+    let key = update::key_from_hex(digits.trim()).ok_or_else(|| {
         Error::new(DataCode::CallInvalid, "this is not a key of `host update key`").file(key)
     })?;
     let number = |text: &str| text.parse::<u16>().unwrap_or(0);
@@ -196,8 +213,16 @@ fn pack(images: &[PathBuf], key: &Path, output: &Path, console: &Console) -> Res
         packed.push(update::signed_elf(&elf, release, &key).map_err(|error| error.file(path))?);
     }
     write_whole(output, &update::to_bytes(&packed))?;
-    for image in &packed {
-        console.note(format!("slot {}: {} bytes", image.header.slot, image.header.length));
+    let images: Vec<FirmwareImage> = packed
+        .iter()
+        .map(|image| FirmwareImage { slot: image.header.slot, bytes: image.header.length })
+        .collect();
+    if json {
+        console.result(text(&FirmwareFile { schema: "pam-firmware-file/1", images })?);
+    } else {
+        for image in &images {
+            console.result(format!("slot {}: {} bytes", image.slot, image.bytes));
+        }
     }
     Ok(())
 }

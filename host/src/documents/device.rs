@@ -143,6 +143,31 @@ pub(crate) struct Firmware {
     pub slots: Vec<Option<FirmwareSlot>>,
 }
 
+/// `host update key --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct FirmwareKey {
+    pub schema: &'static str,
+    /// For `firmware/build --key`.
+    pub public_key: String,
+}
+
+/// `host update pack --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct FirmwareFile {
+    pub schema: &'static str,
+    pub images: Vec<FirmwareImage>,
+}
+
+/// An image in a file of firmware.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct FirmwareImage {
+    pub slot: u8,
+    pub bytes: u32,
+}
+
 /// Firmware in a slot.
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
@@ -179,8 +204,8 @@ pub(crate) struct Sensor {
     /// In its unit.
     pub reading: f64,
     pub unit: &'static str,
-    pub at_zero: f64,
-    pub per_unit: f64,
+    pub at_zero: f32,
+    pub per_unit: f32,
     pub filter_s: f32,
 }
 

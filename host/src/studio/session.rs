@@ -29,7 +29,7 @@ pub enum Order {
     Replace(Box<Connected>),
     /// Answers whether this is the address of the present connection.
     IsConnected(Address),
-    /// Vent and close the connection.
+    /// Vent what the page has started, and close the connection.
     Disconnect,
     /// Arm.
     Arm,
@@ -137,10 +137,10 @@ impl Session<'_> {
         }
     }
 
-    /// The present controller is vented and its recording ended before its connection is given up.
+    /// What the page has started on the present controller is vented and its recording ended before its connection is given up.
     fn replace(&mut self, fresh: Connected) -> Result<Value> {
         if let Some(present) = &mut self.connected {
-            present.vent().map_err(|e| {
+            present.release().map_err(|e| {
                 Error::new(e.code(), format!("the present controller stays connected: {}", e.cause()))
                     .help("vent it, or disconnect it first")
             })?;
@@ -185,17 +185,19 @@ impl Session<'_> {
             && matches!(present.state(), State::Armed | State::Running)
         {
             // No page is open: the next one sees by the state itself whether this failed.
-            let _ = present.vent();
+            let _ = present.release();
         }
     }
 
-    /// Vents, ends the recording and closes the connection, each also when the one before failed.
+    /// Vents what this page has started, ends the recording and closes the connection, each also when the one before failed.
     fn close(&mut self) -> Result<()> {
         let Some(mut present) = self.connected.take() else { return Ok(()) };
-        let vented = present.vent();
+        let vented = present.release();
+        // A controller that is gone has no stream to leave.
+        let quiet = if vented.is_ok() { present.end_telemetry() } else { Ok(()) };
         let ended = present.end_recording();
         self.vent.disconnect();
-        vented.and(ended.map(|_| ()))
+        vented.and(ended.map(|_| ())).and(quiet)
     }
 }
 

@@ -129,7 +129,7 @@ function readings() {
     k.place.hidden = k.mode !== undefined && k.mode !== mode;
     const change = cursor !== null && marked >= 0 ? value - shown.get(k.of, marked) : NaN;
     k.place.textContent = !Number.isFinite(value) ? k.word
-      : `${k.word} ${value.toFixed(digits)}` + (Number.isFinite(change) ? ` (${change < 0 ? "−" : "+"}${Math.abs(change).toFixed(digits)})` : "");
+      : `${k.word} ${value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1")}` + (Number.isFinite(change) ? ` (${change < 0 ? "−" : "+"}${Math.abs(change).toFixed(digits)})` : "");
   }
 }
 readings();
@@ -216,7 +216,7 @@ click("emulate", async () => { unseen(); message("starting …"); const r = awai
 $("mishap").addEventListener("change", () => order("mishap", { code: Number($("mishap").value) }));
 click("arm", () => order("arm"));
 click("follow", async () => {
-  // Each run is recorded unless that is switched off; a recording that was begun by hand goes on.
+  // Each run is recorded unless that is switched off; a recording that was begun by hand continues.
   if ($("record-runs").checked && !handRecording && typeof state.recording !== "number") ownRecording = (await order("record")) !== null;
   const followed = await order("follow", { quantity: $("quantity").value, profile: $("profile").value });
   if (followed) keepProfile($("profile").value); else endOwnRecording();

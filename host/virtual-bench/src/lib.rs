@@ -21,3 +21,4 @@ pub mod rubbing;
 pub mod sensors;
 pub mod surface;
 pub mod tube;
+pub mod wall_creep;

@@ -3,6 +3,7 @@
 
 pub use crate::rubber::{Branches, Heat, Mullins, Relaxation, Temperatures, Wear};
 pub use crate::rubbing::{Activated, Ageing, Relays, RubbingState, Seal, Slow, StrandContact, Viscous};
+pub use crate::wall_creep::{LoadHistory, WallCreep};
 use serde::{Deserialize, Serialize};
 
 /// What is switched on; everything off is the quasi-static muscle with bristle friction.
@@ -33,6 +34,9 @@ pub struct Physics {
     /// Relaxation of the elastic force.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relaxation: Option<Relaxation>,
+    /// Creep of the wall's stress over all that was asked of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wall_creep: Option<WallCreep>,
     /// Creep of the whole force under load.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub creep: Option<Relaxation>,
@@ -154,6 +158,7 @@ pub struct PhysicsState {
     on: Physics,
     relaxation: Branches,
     creep: Branches,
+    wall: LoadHistory,
     rubbing: RubbingState,
     largest: f64,
     last_stretch: Option<f64>,
@@ -172,6 +177,7 @@ impl PhysicsState {
         Self {
             relaxation: Branches::new(on.relaxation),
             creep: Branches::new(on.creep),
+            wall: LoadHistory::default(),
             rubbing: RubbingState::new(on.relays),
             largest: on.mullins.map_or(0.0, |m| m.conditioned),
             last_stretch: None,
@@ -211,6 +217,9 @@ impl PhysicsState {
         }
         if self.on.relaxation.is_some() {
             force += self.relaxation.add(force, m.dt);
+        }
+        if let Some(law) = &self.on.wall_creep {
+            force += self.wall.creep(law, -hyperelastic, m.pressure, m.dt);
         }
         force
     }

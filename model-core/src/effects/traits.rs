@@ -95,6 +95,9 @@ pub struct Traits {
     pub slow: bool,
     /// What else it is mistaken for.
     pub imitates: Option<Imitates>,
+    /// Whether it is looked for in the differences between recordings of one mounting only, where no static model hides it, and not in the
+    /// search through the rows.
+    pub between_recordings: bool,
     /// Whether amplitudes and shapes that were fitted freely can belong to one and the same cause.
     pub consistent: fn(amplitudes: &[f64], shapes: &[f64]) -> bool,
 }
@@ -112,6 +115,7 @@ impl Traits {
             vented: Vented::Nothing,
             slow: false,
             imitates: None,
+            between_recordings: false,
             consistent: always,
         }
     }
@@ -129,6 +133,11 @@ impl Traits {
     #[must_use]
     pub const fn slow(self) -> Self {
         Self { slow: true, ..self }
+    }
+    /// The same that is looked for between recordings only.
+    #[must_use]
+    pub const fn between_recordings(self) -> Self {
+        Self { between_recordings: true, ..self }
     }
     /// The same, mistaken for something that is no effect.
     #[must_use]

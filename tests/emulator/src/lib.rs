@@ -8,6 +8,7 @@ pub mod bandwidth;
 pub mod closed_loop;
 pub mod debugger;
 pub mod diagnosed;
+pub mod faulty_line;
 pub mod figures;
 pub mod fitting;
 pub mod joint;

@@ -3,8 +3,12 @@
 
 use crate::answer::{Answer, run_limited};
 use crate::festo_history;
+use crate::festo_tables;
 use crate::queue::in_order;
 use crate::tool;
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::{Import, Reader};
+use pam_diagnose::history::table_unseen::{UnseenErrors, unseen_by_table};
 use serde_json::Value;
 use std::error::Error;
 use std::fmt::Write as _;
@@ -179,6 +183,7 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
         .collect();
     let diagnosed = in_order(&cases, |c| Ok(diagnose(data, output, host, *c)))?;
     let mut text = HEAD.to_owned();
+    let _ = writeln!(text, "\n{}", tables_section(data)?.trim_end());
     let per_form = cases.len() / FORMS.len();
     for ((_, words), diagnosed) in FORMS.iter().zip(diagnosed.chunks(per_form)) {
         let _ = writeln!(text, "\n## Diagnosis: {words}\n\n{ANSWERS}| --- | --- | --- | --- | --- |");
@@ -216,6 +221,46 @@ fn memory_section(cases: &[Case], diagnosed: &[Diagnosed]) -> String {
     festo_history::section(&answers)
 }
 
+/// Errors of unseen runs of one muscle through the table.
+fn unseen(data: &Path, (year, muscle, file, _): Case) -> Result<[UnseenErrors; 2], String> {
+    let words = |e: pam_data::error::Error| e.to_string();
+    let described = MuscleDescription::read(description(year, muscle)).map_err(words)?;
+    let described_import = Import::read(import(year, "staircase")).map_err(words)?;
+    let recording = data.join(format!("aarl-festo-10mm-{year}")).join(format!("{file}.csv"));
+    let read = |file: PathBuf, import: &Import| {
+        Reader::of(&described).import(Some(import)).campaign([file]).map_err(words)
+    };
+    let recorded = read(recording, &described_import)?;
+    let settled_import = Import::read(import(year, "settled")).map_err(words)?;
+    let points = data.join(format!("aarl-festo-10mm-{year}")).join("settled_points.csv");
+    let settled = read(points, &settled_import)?;
+    unseen_by_table(&settled, &recorded, &described)
+        .map_err(words)?
+        .ok_or_else(|| "no staircases with repeated runs".to_owned())
+}
+
+/// The section on unseen runs through the table.
+fn tables_section(data: &Path) -> Result<String, String> {
+    let cases: Vec<Case> =
+        SETS.iter().flat_map(|s| s.muscles.iter().map(|m| (s.year, m.0, m.1, ""))).collect();
+    let row =
+        |c: &Case| Ok(festo_tables::Row { label: format!("{}, {}", c.0, c.1), errors: unseen(data, *c) });
+    Ok(festo_tables::section(&in_order(&cases, row)?))
+}
+
+/// Writes the section on unseen runs through the table into `page`.
+pub fn run_tables(data: &Path, output: &Path, page: Option<&Path>) -> Result<(), Box<dyn Error>> {
+    std::fs::create_dir_all(output)?;
+    let section = tables_section(data)?;
+    std::fs::write(output.join("festo-tables.md"), &section)?;
+    if let Some(page) = page {
+        let old = std::fs::read_to_string(page)?;
+        std::fs::write(page, festo_history::replaced(&old, festo_tables::HEADING, &section))?;
+    }
+    println!("{section}");
+    Ok(())
+}
+
 /// Diagnoses settled points only, and writes the section on the memory of the bladder into `page`.
 pub fn run_history(
     data: &Path,
@@ -230,7 +275,7 @@ pub fn run_history(
     let section = memory_section(&cases, &diagnosed);
     if let Some(page) = page {
         let old = std::fs::read_to_string(page)?;
-        std::fs::write(page, festo_history::replaced(&old, &section))?;
+        std::fs::write(page, festo_history::replaced(&old, festo_history::HEADING, &section))?;
     }
     println!("{section}");
     Ok(())

@@ -227,10 +227,10 @@ fn end_effect(text: &mut String, answers: &[MuscleAnswer<'_>]) {
     }
 }
 
-/// A page with its section of that heading replaced, or with the section at its end.
-pub fn replaced(page: &str, section: &str) -> String {
-    let Some(from) = page.find(HEADING) else { return format!("{}\n\n{section}", page.trim_end()) };
-    let after = page[from + HEADING.len()..].find("\n## ").map(|k| from + HEADING.len() + k);
+/// A page with its section of a heading replaced, or with the section at its end.
+pub fn replaced(page: &str, heading: &str, section: &str) -> String {
+    let Some(from) = page.find(heading) else { return format!("{}\n\n{section}", page.trim_end()) };
+    let after = page[from + heading.len()..].find("\n## ").map(|k| from + heading.len() + k);
     let rest = after.map_or(String::new(), |k| page[k..].to_owned());
     format!("{}{}\n{rest}", &page[..from], section.trim_end())
 }
@@ -271,9 +271,9 @@ mod tests {
     fn a_section_is_put_in_the_place_of_the_old_one() {
         let page = format!("# T\n\na\n\n{HEADING}\n\nold\n\n## Next\n\nb\n");
         assert_eq!(
-            replaced(&page, &format!("{HEADING}\n\nnew\n")),
+            replaced(&page, HEADING, &format!("{HEADING}\n\nnew\n")),
             format!("# T\n\na\n\n{HEADING}\n\nnew\n\n## Next\n\nb\n")
         );
-        assert!(replaced("# T\n", &format!("{HEADING}\n\nnew\n")).ends_with("new\n"));
+        assert!(replaced("# T\n", HEADING, &format!("{HEADING}\n\nnew\n")).ends_with("new\n"));
     }
 }

@@ -9,6 +9,7 @@ mod campaign;
 mod clopper;
 mod festo;
 mod festo_history;
+mod festo_tables;
 mod figures;
 mod fitted;
 mod generate;
@@ -202,6 +203,8 @@ enum Command {
     Festo(Real),
     /// The same for settled points only: writes the section of the page on the memory of the bladder.
     FestoHistory(Real),
+    /// Unseen runs of these recordings through the table only: writes that section of the page.
+    FestoTables(Real),
     /// Diagnose the real sets of the 10 mm fluidic muscle as stocks, and predict unseen contractions and lengths with them.
     Stock(Real),
     /// Fit static force maps of commercial muscles and predict them between lengths and pressures, beside published models.
@@ -273,6 +276,7 @@ fn main() -> ExitCode {
         Command::FestoHistory(real) => {
             festo::run_history(&real.data, &real.output, &real.host, real.page.as_deref())
         }
+        Command::FestoTables(real) => festo::run_tables(&real.data, &real.output, real.page.as_deref()),
         Command::Campaign(what) => campaign::run(&what),
         Command::Sensitivity(study) => sensitivity::run(&study),
         Command::Sensors(what) => sensors::run(&what),

@@ -167,13 +167,3 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
     println!("{text}");
     Ok(())
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_page_in_the_book_has_these_texts() {
-        crate::book::contains("stock.md", &[HEAD, LAWS, SHARED, UNSEEN]);
-    }
-}

@@ -46,6 +46,15 @@ fn a_filter_smooths_what_is_controlled_and_delays_no_watch() {
     assert!(last.pressure_pa < 450e3, "the reading for control is filtered: {}", last.pressure_pa);
 }
 
+/// A filter that has not yet followed must not hide pressure from arming.
+#[test]
+fn an_empty_muscle_is_judged_before_the_filter() {
+    let mut bench = Bench::new(|settings| settings.scales.pressure.filter_s = 0.1);
+    bench.pass(50);
+    bench.pass_with(1, |now, _| now.pressure_pa = 300e3);
+    assert_eq!(bench.controller.arm(OWNER), Err(Refusal::StillFaulty(Fault::NotVented)));
+}
+
 #[test]
 fn two_pressure_sensors_that_disagree_vent_and_so_does_one_that_is_missing() {
     let compared = |settings: &mut Settings| settings.watch.second_pressure_pa = 20e3;

@@ -1,7 +1,7 @@
 //! Checks that keep people safe: each test fails if the check that it names is removed.
 
 use model_core::effects::{EffectName, FittedEffect};
-use model_core::link::messages::ForgetMemory;
+use model_core::link::messages::{ForgetMemory, UpdateBegin, UpdatePiece, UpdateStatus};
 
 use super::*;
 
@@ -44,6 +44,55 @@ fn nothing_that_writes_flash_is_done_while_a_mode_runs() {
     assert_eq!(info(&mut server), before);
     pass(&shared, 10, &mut pressure);
     assert_eq!(shared.with(|c| c.state()), State::Running);
+}
+
+/// An updater that fails the test if it is used.
+struct Untouched;
+
+impl Update for Untouched {
+    fn status(&mut self, _: &mut UpdateStatus) -> Result<(), Refusal> {
+        Ok(())
+    }
+
+    fn begin(&mut self, _: &[u8]) -> Result<(), Refusal> {
+        panic!("flash is written")
+    }
+
+    fn piece(&mut self, _: &UpdatePiece) -> Result<u32, Refusal> {
+        panic!("flash is written")
+    }
+
+    fn commit(&mut self) -> Result<(), Refusal> {
+        panic!("flash is written")
+    }
+
+    fn confirm(&mut self) -> Result<(), Refusal> {
+        panic!("flash is written")
+    }
+
+    fn revert(&mut self) -> Result<(), Refusal> {
+        panic!("flash is written")
+    }
+
+    fn restarted(&mut self) {}
+}
+
+#[test]
+fn no_firmware_is_taken_while_a_mode_runs() {
+    let shared = Shared::new(Settings::default());
+    let (mut server, _) = running(&shared);
+    let mut status = UpdateStatus::default();
+    let mut answers = Answers { server: &mut server, shared: &shared };
+    assert_eq!(answers.update(&(), &mut status), Err(Refusal::NotSupported), "without a key");
+    server.take_updates(std::boxed::Box::new(Untouched));
+    let no = Err(Refusal::WrongState(State::Running));
+    let mut answers = Answers { server: &mut server, shared: &shared };
+    assert_eq!(answers.update(&(), &mut status), Ok(()), "read");
+    assert_eq!(answers.update_begin(&UpdateBegin::default(), &mut status), no, "begin");
+    assert_eq!(answers.update_piece(&UpdatePiece::default(), &mut 0), no, "piece");
+    assert_eq!(answers.update_commit(&(), &mut status), no, "commit");
+    assert_eq!(answers.update_confirm(&(), &mut status), no, "confirm");
+    assert_eq!(answers.update_revert(&(), &mut status), no, "revert");
 }
 
 #[test]

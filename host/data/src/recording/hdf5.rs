@@ -15,6 +15,8 @@ use crate::error::{Error, Result};
 
 /// A recording is at most this many groups deep.
 const DEEPEST: usize = 4;
+/// Groups and data sets that are looked at. A recording has some dozens; a few links from a group to itself make millions of a small file.
+const MEMBERS: usize = 10_000;
 
 /// The columns of a file.
 pub(super) fn columns(path: &Path) -> Result<ColumnTable> {
@@ -23,8 +25,12 @@ pub(super) fn columns(path: &Path) -> Result<ColumnTable> {
     start.map_err(|e| Error::unreadable(path, &e))?;
     let options = OpenOptions::default().with_max_read_bytes(WHOLE as usize);
     let file = Hdf5File::open_with_options(path, options).map_err(damaged)?;
-    let mut found =
-        Found { table: ColumnTable::new(), matlab: first == *b"MATLAB 7.3", budget: Budget::whole() };
+    let mut found = Found {
+        table: ColumnTable::new(),
+        matlab: first == *b"MATLAB 7.3",
+        budget: Budget::whole(),
+        left: MEMBERS,
+    };
     found.group(&file.root_group().map_err(damaged)?, "", 0)?;
     Ok(without_common_prefix(found.table))
 }
@@ -34,10 +40,19 @@ struct Found {
     /// MATLAB stores column by column, so that its dimensions appear in reverse.
     matlab: bool,
     budget: Budget,
+    /// Groups and data sets that may still be looked at.
+    left: usize,
 }
 
 impl Found {
+    fn count(&mut self) -> Result<()> {
+        let more = || damaged(format!("it has more than {MEMBERS} groups and data sets"));
+        self.left = self.left.checked_sub(1).ok_or_else(more)?;
+        Ok(())
+    }
+
     fn group(&mut self, group: &Group, prefix: &str, depth: usize) -> Result<()> {
+        self.count()?;
         if text_of(group.attribute("pandas_type").ok()).as_deref() == Some("frame") {
             return self.frame(group, prefix);
         }
@@ -64,6 +79,7 @@ impl Found {
     }
 
     fn dataset(&mut self, dataset: &Dataset, name: &str) -> Result<()> {
+        self.count()?;
         let class = text_of(dataset.attribute("MATLAB_class").ok());
         let numeric = |c: &str| {
             let kind = c.trim_start_matches('u');
@@ -108,12 +124,16 @@ impl Found {
     fn field(&mut self, bytes: &[u8], record: usize, field: &CompoundField, table: &str) {
         let name = format!("{table}.{}", field.name);
         let (kind, wide) = match &field.datatype {
-            Datatype::Array { base, dims } => (&**base, dims.iter().product::<u64>() as usize),
+            Datatype::Array { base, dims } => {
+                (&**base, dims.iter().fold(1_u64, |n, side| n.saturating_mul(*side)) as usize)
+            }
             kind => (kind, 1),
         };
         let Some(number) = Number::of(kind) else { return self.other(&name, what(kind).to_owned()) };
         let from = field.byte_offset as usize;
         let size = number.size();
+        // What the type says of itself may be more than a record has room for.
+        let wide = wide.min(record / size);
         let mut values = Vec::new();
         for k in 0..wide {
             let at = from + k * size;
@@ -229,4 +249,32 @@ fn text_of(attribute: Option<hdf5_reader::Attribute>) -> Option<String> {
 /// The last part of a path in the file.
 fn last(name: &str) -> &str {
     name.rsplit('/').next().unwrap_or(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn links_that_lead_back_make_no_endless_file() {
+        // 40 links from the root to itself, made by h5py: `file[f"a{k}"] = file["/"]`.
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/linked_to_itself.h5");
+        let error = columns(&path).expect_err("three million data sets");
+        assert!(error.cause().contains("more than 10000 groups"), "{error}");
+    }
+
+    #[test]
+    fn an_array_wider_than_its_record_is_read_as_far_as_it_goes() {
+        let mut found =
+            Found { table: ColumnTable::new(), matlab: false, budget: Budget::whole(), left: MEMBERS };
+        let double = || {
+            Box::new(Datatype::FloatingPoint { size: 8, byte_order: hdf5_reader::ByteOrder::LittleEndian })
+        };
+        for dims in [vec![2], vec![u64::MAX], vec![1 << 40, 1 << 40]] {
+            let datatype = Datatype::Array { base: double(), dims };
+            let field = CompoundField { name: "x".into(), byte_offset: 0, datatype };
+            found.field(&[0; 64], 16, &field, "t");
+        }
+        assert_eq!(found.table.len(), 6, "two columns of each");
+    }
 }

@@ -3,11 +3,13 @@
 //! A column's physical type says how its values are stored, its logical type what they mean: a time of day is stored as an
 //! integer, and must not be taken for seconds. A column that is not numeric is an error only where it is needed.
 
+mod footer;
+
 use std::fs::File;
 
 use parquet::basic::{ConvertedType, LogicalType};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
-use parquet::data_type::DataType;
+use parquet::data_type::{ByteArray, DataType};
 use parquet::file::metadata::FileMetaData;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
@@ -20,7 +22,8 @@ use crate::error::Result;
 const BATCH: usize = 1 << 16;
 
 /// The columns of a file. A missing value becomes NaN, or an empty text, and is an error only where it is needed.
-pub(super) fn columns(file: File) -> Result<ColumnTable> {
+pub(super) fn columns(mut file: File) -> Result<ColumnTable> {
+    footer::check(&mut file)?;
     let reader = SerializedFileReader::new(file).map_err(damaged)?;
     let about = reader.metadata().file_metadata();
     let durations = durations(about);
@@ -93,28 +96,35 @@ fn values(
         let group = reader.get_row_group(group).map_err(damaged)?;
         match group.get_column_reader(index).map_err(damaged)? {
             ColumnReader::DoubleColumnReader(mut r) => {
-                take(&mut r, nullable, budget, &mut numbers, f64::NAN, |v| *v)?;
+                take(&mut r, nullable, budget, &mut numbers, f64::NAN, |v| *v, |_| 0)?;
             }
             ColumnReader::FloatColumnReader(mut r) => {
-                take(&mut r, nullable, budget, &mut numbers, f64::NAN, |v| f64::from(*v))?;
+                take(&mut r, nullable, budget, &mut numbers, f64::NAN, |v| f64::from(*v), |_| 0)?;
             }
-            ColumnReader::Int32ColumnReader(mut r) => {
-                take(&mut r, nullable, budget, &mut numbers, f64::NAN, |v| {
-                    scale * if unsigned { f64::from(v.cast_unsigned()) } else { f64::from(*v) }
-                })?
-            }
-            ColumnReader::Int64ColumnReader(mut r) => {
-                take(&mut r, nullable, budget, &mut numbers, f64::NAN, |v| {
-                    scale * if unsigned { v.cast_unsigned() as f64 } else { *v as f64 }
-                })?
-            }
+            ColumnReader::Int32ColumnReader(mut r) => take(
+                &mut r,
+                nullable,
+                budget,
+                &mut numbers,
+                f64::NAN,
+                |v| scale * if unsigned { f64::from(v.cast_unsigned()) } else { f64::from(*v) },
+                |_| 0,
+            )?,
+            ColumnReader::Int64ColumnReader(mut r) => take(
+                &mut r,
+                nullable,
+                budget,
+                &mut numbers,
+                f64::NAN,
+                |v| scale * if unsigned { v.cast_unsigned() as f64 } else { *v as f64 },
+                |_| 0,
+            )?,
             ColumnReader::BoolColumnReader(mut r) => {
-                take(&mut r, nullable, budget, &mut numbers, f64::NAN, |v| f64::from(u8::from(*v)))?;
+                take(&mut r, nullable, budget, &mut numbers, f64::NAN, |v| f64::from(u8::from(*v)), |_| 0)?;
             }
             ColumnReader::ByteArrayColumnReader(mut r) if scale == 1.0 => {
-                take(&mut r, nullable, budget, &mut texts, String::new(), |v| {
-                    String::from_utf8_lossy(v.data()).into_owned()
-                })?;
+                let text = |v: &ByteArray| String::from_utf8_lossy(v.data()).into_owned();
+                take(&mut r, nullable, budget, &mut texts, String::new(), text, ByteArray::len)?;
             }
             _ => return Ok(Column::Other("bytes".to_owned())),
         }
@@ -129,6 +139,7 @@ fn take<D: DataType, T: Clone>(
     out: &mut Vec<T>,
     absent: T,
     convert: impl Fn(&D::T) -> T,
+    bytes: impl Fn(&D::T) -> usize,
 ) -> Result<()> {
     let (mut values, mut levels) = (Vec::with_capacity(BATCH), Vec::new());
     loop {
@@ -139,8 +150,9 @@ fn take<D: DataType, T: Clone>(
         if records == 0 {
             return Ok(());
         }
-        // A text takes three words at least; what it says comes on top, and is in the file.
-        budget.take(records * size_of::<T>().div_ceil(size_of::<f64>()))?;
+        // A text takes three words at least, and what it says comes on top: a file holds it once, however many rows it is in.
+        let said: usize = values.iter().map(&bytes).sum();
+        budget.take(records * size_of::<T>().div_ceil(size_of::<f64>()) + said / size_of::<f64>())?;
         if nullable == 0 {
             out.extend(values.iter().map(&convert));
         } else {
@@ -152,5 +164,46 @@ fn take<D: DataType, T: Clone>(
             };
             out.extend(levels.iter().map(value));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use parquet::data_type::ByteArrayType;
+    use parquet::file::properties::WriterProperties;
+    use parquet::file::writer::SerializedFileWriter;
+    use parquet::schema::parser::parse_message_type;
+
+    use super::*;
+
+    /// A file with one column of texts, each row the same: it holds the text once.
+    fn repeated(text: &str, rows: usize) -> File {
+        let file = tempfile::tempfile().expect("a file");
+        let schema =
+            Arc::new(parse_message_type("message m { required binary x (UTF8); }").expect("a schema"));
+        let properties = WriterProperties::builder().set_dictionary_enabled(true);
+        let properties = Arc::new(properties.set_dictionary_page_size_limit(1 << 30).build());
+        let copy = file.try_clone().expect("a second handle");
+        let mut writer = SerializedFileWriter::new(copy, schema, properties).expect("a writer");
+        let mut group = writer.next_row_group().expect("a group");
+        let mut column = group.next_column().expect("written").expect("a column");
+        let values = vec![ByteArray::from(text); rows];
+        column.typed::<ByteArrayType>().write_batch(&values, None, None).expect("written");
+        column.close().expect("closed");
+        group.close().expect("closed");
+        writer.close().expect("closed");
+        file
+    }
+
+    #[test]
+    fn a_text_that_stands_in_every_row_is_counted_in_every_row() {
+        let few = columns(repeated("load", 1_000)).expect("columns");
+        assert!(matches!(&few[0].1, Column::Texts(texts) if texts.len() == 1_000));
+        let file = repeated(&"x".repeat(1 << 20), 1_000);
+        assert!(file.metadata().expect("its size").len() < 4 << 20, "the file is small");
+        let error = columns(file).expect_err("a gigabyte of text");
+        assert!(error.cause().contains("million values"), "{error}");
     }
 }

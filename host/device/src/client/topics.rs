@@ -50,6 +50,20 @@ impl Topics {
         self.queue.pop_front()
     }
 
+    /// Leaves out the samples that nothing has fetched yet.
+    pub fn forget_samples(&mut self) {
+        self.queue.retain(|topic| !matches!(topic, Topic::Telemetry(_)));
+    }
+
+    /// How many pairs of neighbouring samples wait, and the least number of ticks between the two of a pair.
+    pub fn gaps(&self) -> (usize, Option<u64>) {
+        let tick =
+            |topic: &Topic| if let Topic::Telemetry(sample) = topic { Some(sample.tick) } else { None };
+        let ticks: Vec<u64> = self.queue.iter().filter_map(tick).collect();
+        let gaps = ticks.windows(2).filter_map(|pair| pair[1].checked_sub(pair[0]));
+        (ticks.len().saturating_sub(1), gaps.min())
+    }
+
     /// Takes a frame; one that cannot be decoded is dropped, and shows as a gap.
     pub fn take(&mut self, header: Header, body: &[u8]) {
         if header.id == TELEMETRY {

@@ -1,11 +1,11 @@
 //! A file that grows piece by piece and is at every moment a whole number of pieces: `NAME.part` until it is finished.
 
-use std::fs::File;
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::recover::{Recovered, recover};
-use pam_data::error::{Error, Result};
+use pam_data::error::{DataCode, Error, Result};
 
 /// A file on its way to its name.
 #[derive(Debug)]
@@ -23,11 +23,16 @@ impl Part {
     pub fn create(path: &Path) -> Result<(Self, Option<Recovered>)> {
         let part = part_of(path);
         let recovered = if part.exists() { Some(recover(&part)?) } else { None };
-        let file = File::create(&part).map_err(|e| {
-            Error::unwritable(&part, &e).help("check that the folder exists and may be written to")
-        })?;
-        // The lock shows other programs that this file still grows.
-        let _ = file.try_lock();
+        // Never one that is there: it would be that of another program which began in the meantime.
+        let file =
+            OpenOptions::new().write(true).create_new(true).open(&part).map_err(|e| match e.kind() {
+                std::io::ErrorKind::AlreadyExists => in_use(&part),
+                _ => Error::unwritable(&part, &e).help("check that the folder exists and may be written to"),
+            })?;
+        // The lock shows other programs that this file still grows. Before it, another one may have removed the file as an empty one.
+        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) || !is_at(&file, &part) {
+            return Err(in_use(&part));
+        }
         Ok((Self { path: path.to_owned(), part, file, whole: 0, last: 0 }, recovered))
     }
 
@@ -75,6 +80,27 @@ impl Part {
     }
 }
 
+/// The error where another program records to the same file.
+pub(super) fn in_use(part: &Path) -> Error {
+    Error::new(DataCode::FileUnwritable, "another program is recording to this file")
+        .file(part)
+        .help("end that one first, or give this recording another name with -o")
+}
+
+/// Whether an open file is the one that has this name.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |metadata: std::io::Result<std::fs::Metadata>| metadata.ok().map(|m| (m.dev(), m.ino()));
+    identity(file.metadata()).is_some_and(|open| identity(std::fs::symlink_metadata(path)) == Some(open))
+}
+
+/// Elsewhere an open file cannot be removed.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
 /// The name of a file while it grows.
 pub(super) fn part_of(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
@@ -85,6 +111,48 @@ pub(super) fn part_of(path: &Path) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_programs_that_begin_the_same_file_at_the_same_time_one_gets_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        for round in 0..200 {
+            let barrier = std::sync::Barrier::new(4);
+            let got: Vec<String> = std::thread::scope(|scope| {
+                let begin = |program: usize| {
+                    let (barrier, path) = (&barrier, &path);
+                    scope.spawn(move || {
+                        barrier.wait();
+                        let part = Part::create(path);
+                        // All have tried before one ends.
+                        barrier.wait();
+                        let (mut part, _) = part.ok()?;
+                        let text = format!("{round} {program}\n");
+                        part.append(text.as_bytes()).unwrap();
+                        part.finish().unwrap();
+                        Some(text)
+                    })
+                };
+                let programs: Vec<_> = (0..4).map(begin).collect();
+                programs.into_iter().filter_map(|program| program.join().unwrap()).collect()
+            });
+            assert!(got.len() <= 1, "round {round}: {got:?}");
+            // Where all were in each other's way, none got it, and the next round begins anew.
+            if let Some(text) = got.first() {
+                assert_eq!(&std::fs::read_to_string(&path).unwrap(), text);
+            }
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_prepared_link_is_not_written_through() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, other) = (folder.path().join("run.csv"), folder.path().join("other"));
+        std::os::unix::fs::symlink(&other, part_of(&path)).unwrap();
+        assert!(Part::create(&path).is_err());
+        assert!(!other.exists());
+    }
 
     #[test]
     fn what_was_cut_off_is_whole_again_and_replaces_nothing() {

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
+use super::part::in_use;
 use super::side_file;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::mcap_records::MAGIC;
@@ -83,9 +84,7 @@ pub fn recover(path: &Path) -> Result<Recovered> {
         return Err(Error::new(DataCode::CallInvalid, "this is not a file").file(path));
     }
     if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
-        return Err(Error::new(DataCode::FileUnwritable, "another program is recording to this file")
-            .file(path)
-            .help("end that one first, or give this recording another name with -o"));
+        return Err(in_use(path));
     }
     let text = path.to_string_lossy();
     let part = text.strip_suffix(".part").map(PathBuf::from);

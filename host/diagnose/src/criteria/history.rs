@@ -5,8 +5,6 @@
 
 pam_data::criteria! {
     "History of a campaign":
-    /// Largest change of a held length within one mounting.
-    MEMORY_SAME_LENGTH: f64 = 0.5e-3, "ΔL_m", "m", Derived("half of a tape measure's ±1 mm");
     /// Rows at least this far apart are settled points already.
     SETTLED_INTERVAL: f64 = 0.25, "Δt_s", "s", Derived("valve pulses ring for 0.2 to 0.3 s (20 Hz, damping 0.5)");
     /// Least number of settled points of a campaign.
@@ -127,6 +125,16 @@ pam_data::criteria! {
     STAIRCASE_WITHOUT_PULSES: f64 = 0.5, "staircase_without_pulses", "s", Judgement;
     /// The pressure has turned when it has gone back by this share of the run's range: above a regulator's ripple.
     STAIRCASE_TURN: f64 = 0.04, "staircase_turn", "1", Judgement;
+    /// Widths of the contact that are tried in a table.
+    TABLE_WIDTHS: ([f64; 3]) = [6e4, 9e4, 1.2e5], "P_c", "Pa", Derived("from the width of the knee at full length to the pressure at which a bladder carries no stress");
+    /// Least deadband of a table beside the contact: pretension of a mounted muscle pulls before any pressure.
+    TABLE_LEAST_DEADBAND: f64 = -8e4, "P0_min", "Pa", Derived("a table refuses less than −100 kPa");
+    /// Rounds of a table's fit: the amplitudes beside the table, then the table beside the amplitudes.
+    TABLE_ROUNDS: usize = 2, "n_round", "1", Derived("the wall's drive of the second table differs from that of the first by its fit's error only");
+    /// Least number of slack points whose median is the zero of the load cell.
+    TABLE_LEAST_SLACK: usize = 20, "n_slack", "1", Derived("a median that one run does not decide");
+    /// Runs that are predicted from the others by tables: of more, every so many-th is left out together.
+    TABLE_FOLDS: usize = 6, "n_fold", "1", Cost;
     /// Single time constants that the spectrum is tried against.
     MEMORY_SINGLE_TIMES: ([f64; 2]) = [30.0, 300.0], "tau_1", "s", Judgement;
 }

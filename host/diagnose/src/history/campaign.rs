@@ -1,8 +1,8 @@
 //! How a campaign was made: mountings, the runs of each, and the clock that starts with a mounting.
 
-use super::criteria::{LEAST_POINTS, LEAST_RUNS, LEAST_SPAN, MEMORY_SAME_LENGTH};
+use super::criteria::{LEAST_POINTS, LEAST_RUNS, LEAST_SPAN};
 use super::staircase::{self, Point};
-use pam_data::recording::{Campaign, Clock, Recording};
+use pam_data::recording::{Campaign, Clock};
 
 /// One recording at held length.
 #[derive(Clone, Debug)]
@@ -95,29 +95,23 @@ impl Points {
     }
 }
 
-/// The length that a recording held throughout, as a stroke in metres.
-fn held(recording: &Recording) -> Option<f64> {
-    let (low, high) =
-        recording.stroke.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(*s), h.max(*s)));
-    (high - low <= MEMORY_SAME_LENGTH).then_some(0.5 * (low + high))
-}
-
 /// Reads the structure of a campaign; `None` where it is no campaign of isometric staircases with repeated runs.
 ///
-/// A run is one recording. A mounting begins where the held length changes by more than [`MEMORY_SAME_LENGTH`], or where a label other than the last
-/// of an import's `split_by` changes.
+/// A run is one recording; for mountings see [`Campaign::mountings`].
 pub(super) fn points(campaign: &Campaign, rest_length: f64) -> Option<Points> {
     let mut points = Points::default();
-    let mut before: Option<(f64, &[(String, String)])> = None;
+    let mountings = campaign.mountings()?;
     for (index, recording) in campaign.recordings.iter().enumerate() {
-        let stroke = held(recording)?;
         let force = recording.force.as_deref()?;
-        let labels = recording.labels.split_last().map_or(&[][..], |(_, others)| others);
-        let same = before.is_some_and(|(s, l)| (s - stroke).abs() <= MEMORY_SAME_LENGTH && l == labels);
-        before = Some((stroke, labels));
-        if !same {
+        if points.mountings.len() <= mountings[index] {
+            let middle =
+                recording.stroke.first().zip(recording.stroke.last()).map_or(0.0, |(a, b)| 0.5 * (a + b));
             let length = recording.rest_length.unwrap_or(rest_length);
-            points.mountings.push(Mounting { stroke, contraction: stroke / length, runs: Vec::new() });
+            points.mountings.push(Mounting {
+                stroke: middle,
+                contraction: middle / length,
+                runs: Vec::new(),
+            });
         }
         let (settled, averaged) = staircase::settled(recording, force);
         points.averaged |= averaged;

@@ -94,7 +94,7 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
     if !rest_agrees {
         diagnosis.remarks.insert(0, Remark::StaticMisfit(freed_misfit));
     }
-    diagnosis.remarks.push(Remark::MemoryNotInTable);
+    diagnosis.remarks.push(Remark::MemoryInTable);
     let verdict = if well && rest_agrees { Verdict::Explained } else { Verdict::PartlyExplained };
     diagnosis.outcome = Outcome::Judged(verdict);
     diagnosis.unexplained.share = left;

@@ -62,7 +62,7 @@ pub(super) struct Law {
 }
 
 /// Pressures at which a muscle begins to pull, by the tangent to its static curve near the highest pressure.
-fn thresholds(points: &Points) -> Vec<f64> {
+pub(super) fn thresholds(points: &Points) -> Vec<f64> {
     let highest = points.highest();
     let spline = shift_fit::static_spline(highest);
     (0..points.mountings.len())

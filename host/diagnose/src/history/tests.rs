@@ -4,3 +4,4 @@
 
 mod festo;
 mod synthetic;
+mod table;

@@ -109,7 +109,10 @@ impl Fit {
 const SHARE_OF_BRAID: (f64, f64) = (0.2, 2.0);
 
 /// The table's numbers from the solution, checked.
-fn table(solution: &Solution, muscle: &MuscleDescription) -> Result<MuscleTable> {
+///
+/// # Errors
+/// [`FitCode::FitUnderdetermined`] where no usable table comes out.
+pub(super) fn table(solution: &Solution, muscle: &MuscleDescription) -> Result<MuscleTable> {
     let unusable = |what: &str| {
         let share = solution.problem.share_of_braid();
         let units = share.filter(|s| !(SHARE_OF_BRAID.0..SHARE_OF_BRAID.1).contains(s)).map(|s| {

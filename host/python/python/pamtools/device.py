@@ -99,7 +99,7 @@ class Device:
         self._link.arm()
 
     def vent(self):
-        """Vents and disarms immediately, also from another thread while a run goes on."""
+        """Vents and disarms immediately, also from another thread during a run."""
         self._link.vent()
 
     def clear(self):
@@ -142,7 +142,7 @@ class Device:
         return _recording(name, [sample async for sample in self.follow_async(**options)])
 
     def close(self):
-        """Ends what goes on, vents if this connection armed the controller, and closes the port."""
+        """Ends a run or recording in progress, vents if this connection armed the controller, and closes the port."""
         self._link.close()
 
     def __enter__(self):
@@ -220,7 +220,7 @@ class _Samples:
         try:
             self.close()
         except PamError:
-            # How a run ended that nobody follows any more interests nobody.
+            # No caller is left that could take the error.
             pass
 
 

@@ -13,9 +13,9 @@ pub fn remark(remark: &Remark) -> String {
             "without the memory, the static model over all mountings still leaves {rms:.2} N rms: geometry, end effects and mounted lengths (±1 mm \
              by tape measure) are not identifiable from one muscle"
         ),
-        Remark::MemoryNotInTable => {
-            "the memory is not written into a table: it was found at held length only. To measure its recovery, repeat a run at one mounting \
-             after a vented hour"
+        Remark::MemoryInTable => {
+            "the table that -o writes carries the memory as `bladder-creep`, where it predicts the recordings better with it; the length was \
+             held throughout, so under motion it is a prediction. To measure its recovery, repeat a run at one mounting after a vented hour"
                 .to_owned()
         }
         Remark::HeldLength => {

@@ -80,6 +80,11 @@ impl Name {
     }
 }
 
+/// A setting in the unit of its sensor, with as many digits as it has.
+fn shown(value: f32, si: f64) -> f32 {
+    (f64::from(value) / si) as f32
+}
+
 fn point(text: &str) -> Result<(f64, f64), String> {
     let wrong = || format!("write SIGNAL=VALUE, such as 0.333=0, not `{text}`");
     let (signal, value) = text.split_once('=').ok_or_else(wrong)?;
@@ -117,8 +122,8 @@ fn show(arguments: &Arguments, client: &mut Client, settings: &Settings, console
                 signal,
                 reading: f64::from(scale.reading(signal)) / sensor.unit().1,
                 unit: sensor.unit().0,
-                at_zero: f64::from(scale.at_zero) / sensor.unit().1,
-                per_unit: f64::from(scale.per_unit) / sensor.unit().1,
+                at_zero: shown(scale.at_zero, sensor.unit().1),
+                per_unit: shown(scale.per_unit, sensor.unit().1),
                 filter_s: scale.filter_s,
             })
         })
@@ -188,8 +193,8 @@ fn calibrate(
             signal: pairs.last().map_or(0.0, |pair| pair.signal as f32),
             reading: pairs.last().map_or(0.0, |pair| f64::from(scale.reading(pair.signal as f32)) / si),
             unit,
-            at_zero: f64::from(scale.at_zero) / si,
-            per_unit: f64::from(scale.per_unit) / si,
+            at_zero: shown(scale.at_zero, si),
+            per_unit: shown(scale.per_unit, si),
             filter_s: scale.filter_s,
         };
         console.result(text(&Sensors {
@@ -212,8 +217,8 @@ fn calibrate(
         console.result(format!(
             "{when:<7} {} = {} + {} × signal",
             sensor.name(),
-            f64::from(scale.at_zero) / si,
-            f64::from(scale.per_unit) / si
+            shown(scale.at_zero, si),
+            shown(scale.per_unit, si)
         ));
     }
     Ok(())

@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 use model_core::check;
 use model_core::image;
 use model_core::link::endpoints::{
-    ClearFault, GetFaults, GetSettings, GetStatus, SetSettings, SetTelemetry, StartMode, Stop,
+    ClearFault, GetFaults, GetSettings, GetStatus, SetSettings, StartMode, Stop,
 };
 use model_core::link::hello::Board;
-use model_core::link::messages::{Event, Side, Start, State, Status, Telemetry, TelemetryRate};
+use model_core::link::messages::{Event, Side, Start, State, Status, Telemetry};
 use model_core::link::settings::Settings;
 use serde_json::{Value, json};
 use tokio::sync::broadcast;
@@ -26,9 +26,9 @@ use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::error::DeviceCode;
 use pam_device::reachability::Reachability;
 use pam_device::recorder::{Recorder, about_losses, about_start, serial};
-use pam_device::run::{Plan, Steps, arm, vent};
+use pam_device::run::{Plan, Steps, arm, release, vent};
 use pam_device::setpoint_profile::Quantity;
-use pam_device::{Address, Client, Topic, VentLine, messages, table_diff, tables};
+use pam_device::{Address, Client, Subscription, Topic, VentLine, messages, table_diff, tables};
 use pam_diagnose::reference::Mounted;
 use pam_fit::table_file::TableFile;
 
@@ -41,6 +41,8 @@ const REPORT: Duration = Duration::from_millis(400);
 pub struct Connected {
     address: Address,
     client: Client,
+    /// The telemetry, until this controller is left.
+    stream: Option<Subscription>,
     status: Status,
     settings: Settings,
     emulated: Option<(Emulated, Arc<AtomicU8>)>,
@@ -102,17 +104,30 @@ impl Connected {
         Ok(())
     }
 
+    /// The same for a page that is gone, or leaves this controller: what another program has started goes on.
+    pub(super) fn release(&mut self) -> Result<()> {
+        self.running = None;
+        self.status = release(&mut self.client)?;
+        Ok(())
+    }
+
+    /// Leaves the telemetry as it was before.
+    pub(super) fn end_telemetry(&mut self) -> Result<()> {
+        self.stream.take().map_or(Ok(()), |stream| stream.end(&mut self.client))
+    }
+
     pub(crate) fn new(
         address: Address,
         mut client: Client,
         emulated: Option<(Emulated, Arc<AtomicU8>)>,
     ) -> Result<Self> {
-        client.call::<SetTelemetry>(&TelemetryRate { every_ticks: 1 })?;
+        let stream = Some(Subscription::begin(&mut client, 1)?);
         let status = client.call::<GetStatus>(&())?;
         let settings = client.call::<GetSettings>(&())?;
         let mut now = Self {
             address,
             client,
+            stream,
             status,
             settings,
             emulated,
@@ -174,6 +189,9 @@ impl Connected {
             }
             other => other?,
         }
+        if let Some(stream) = &mut self.stream {
+            stream.renew(&mut self.client)?;
+        }
         let until = Instant::now() + Duration::from_millis(8);
         while let Some(topic) = self.client.topic(until.saturating_duration_since(Instant::now()))? {
             match topic {
@@ -205,6 +223,10 @@ impl Connected {
     }
 
     fn take(&mut self, sample: Telemetry, say: &broadcast::Sender<String>) -> Result<()> {
+        if let Some(stream) = &mut self.stream {
+            // At the device's own rate it takes every one.
+            let _ = stream.takes(&sample);
+        }
         if (sample.state, sample.mode) != (self.status.state, self.status.mode) {
             (self.status.state, self.status.mode) = (sample.state, sample.mode);
             self.note_fault()?;

@@ -82,7 +82,7 @@ pub enum UpdateFault {
     Digest,
     /// The flash failed.
     Medium,
-    /// There is no other program to go back to.
+    /// The other slot has no program to go back to.
     NoOther,
 }
 

@@ -228,8 +228,16 @@ impl Cells {
         let recordings = before.recordings.iter().chain(&after.recordings).cloned().collect();
         let both = Campaign { recordings, clock: Clock::Separate, warnings: Vec::new() };
         let (prepared, _) = rows::prepare(&both, braid)?;
-        // On a ramp of pressure at a held length friction turns by a share of its own: no state of the strokes is like it.
-        let joint = prepared.without(|i| prepared.on_ramp[i]);
+        // On a ramp of pressure at a held length friction turns by a share of its own: no state of the strokes is like it, and what the
+        // muscle remembers of it is in the strokes that follow.
+        if prepared.on_ramp.contains(&true) {
+            return Err(Error::new(
+                DataCode::RecordingOutOfRange,
+                "the recordings mix strokes with ramps of pressure at a held length",
+            )
+            .help("give one kind at a time"));
+        }
+        let joint = prepared;
         let first_recording = (joint.names.len() - own.names.len().min(joint.names.len())) as u32;
         let first_after = joint.recording.iter().position(|r| *r >= first_recording).unwrap_or(joint.len());
         let reference_rows = joint.without(|i| i >= first_after);

@@ -50,7 +50,7 @@ pub(super) const UNTESTED: &str = "\n## Not tested\n\n\
     - Lengths between those of the reference are interpolated from three lengths on; tested on synthetic staircases only (`cargo test -p \
     pam-diagnose interpolated`).\n\
     - Length and pressure that move together, and a controller at work: tested on an emulated one only (`cargo test -p host --test change_watch`).\n\
-    - Stroked muscles with a description: tested on [simulated pairs](proof-reference-bench.md), not on real ones.\n\
+    - Stroked muscles with a description: no sealed set was answered yet (`trials reference-bench --set final`), and no real one.\n\
     - All staircases are of one laboratory and one type of muscle, and the constants of the repeatability come from six of the eleven. A second rig is \
     missing.\n\
     - Added drift and slip run through AFTER by run, then mounting. Lags of the 12 Hz recordings are added by the same interpolation that the analysis \

@@ -1,0 +1,194 @@
+//! What is at a limit is not beyond it, each finding states the limit that it crossed, and no watch counts a tick too many.
+
+use super::*;
+
+/// Every finding of a stream of ticks, with the number of its tick from 1 on.
+fn all(ticks: impl IntoIterator<Item = Seen>, settings: &Settings) -> Vec<(u32, Finding)> {
+    let mut watch = SideWatch::default();
+    let mut found = Vec::new();
+    for (tick, seen) in (1..).zip(ticks) {
+        watch.check(&seen, settings, &mut |finding| found.push((tick, finding)));
+    }
+    found
+}
+
+/// Readings that never change, at a pressure that the regulator expects.
+fn still(pressure_pa: f32, stroke_m: f32, force_n: f32) -> Seen {
+    Seen {
+        readings: Some(Readings { pressure_pa, stroke_m, force_n }),
+        speed_m_per_s: 0.0,
+        command: Command { pressure_pa: 200e3, vent: false },
+        expected_pa: pressure_pa,
+        model_n: None,
+        second_pa: None,
+    }
+}
+
+fn repeated(seen: Seen, settings: &Settings, fault: Fault) -> Option<(u32, Finding)> {
+    all([seen; 400], settings).into_iter().find(|(_, finding)| finding.fault == fault)
+}
+
+/// Sensors that read anything, so that only the limits judge.
+fn wide() -> Settings {
+    let mut settings = Settings::default();
+    for sensor in [&mut settings.pressure, &mut settings.stroke, &mut settings.force] {
+        (sensor.low, sensor.high, sensor.jump, sensor.stuck_ticks) = (-1e9, 1e9, 1e9, 0);
+    }
+    settings
+}
+
+#[test]
+fn what_is_at_a_limit_is_not_beyond_it() {
+    let settings = wide();
+    let limits = settings.limits;
+    let speed = |speed_m_per_s| Seen { speed_m_per_s, ..still(200e3, 0.0, 0.0) };
+    type Case<'a> = (Fault, &'a dyn Fn(f32) -> Seen, f32, f32);
+    let cases: [Case<'_>; 6] = [
+        (Fault::OverPressure, &|v| still(v, 0.0, 0.0), limits.pressure_pa, limits.pressure_pa.next_up()),
+        (Fault::OverForce, &|v| still(200e3, 0.0, v), limits.force_n, limits.force_n.next_up()),
+        (Fault::OverStroke, &|v| still(200e3, v, 0.0), limits.stroke_max_m, limits.stroke_max_m.next_up()),
+        (Fault::OverStroke, &|v| still(200e3, v, 0.0), limits.stroke_min_m, limits.stroke_min_m.next_down()),
+        (Fault::OverSpeed, &speed, limits.speed_m_per_s, limits.speed_m_per_s.next_up()),
+        (Fault::OverSpeed, &speed, -limits.speed_m_per_s, -limits.speed_m_per_s.next_up()),
+    ];
+    for (fault, seen, at, beyond) in cases {
+        assert_eq!(all([seen(at); 400], &settings), [], "{fault:?} at {at}");
+        let (tick, finding) = repeated(seen(beyond), &settings, fault).expect("found");
+        assert_eq!((tick, finding.value, finding.limit.abs()), (2, beyond, at.abs()), "{fault:?}");
+        assert!(fault == Fault::OverSpeed || finding.limit == at, "{fault:?} states the other limit");
+    }
+}
+
+#[test]
+fn a_reading_at_the_end_of_its_range_is_within_and_a_finding_states_the_end_that_was_passed() {
+    let mut settings = wide();
+    (settings.limits.pressure_pa, settings.limits.force_n) = (1e9, 1e9);
+    (settings.limits.stroke_min_m, settings.limits.stroke_max_m) = (-1e9, 1e9);
+    for sensor in [Sensor::Pressure, Sensor::Stroke, Sensor::Force] {
+        let mut settings = settings;
+        let (watch, seen): (&mut SensorWatch, fn(f32) -> Seen) = match sensor {
+            Sensor::Pressure => (&mut settings.pressure, |v| still(v, 0.0, 0.0)),
+            Sensor::Stroke => (&mut settings.stroke, |v| still(0.0, v, 0.0)),
+            Sensor::Force => (&mut settings.force, |v| still(0.0, 0.0, v)),
+        };
+        (watch.low, watch.high) = (-3.0, 5.0);
+        for (end, beyond) in [(-3.0, -3.5), (5.0, 5.5)] {
+            assert_eq!(all([seen(end); 400], &settings), [], "{sensor:?} at {end}");
+            let (tick, finding) = repeated(seen(beyond), &settings, Fault::SensorRange).expect("found");
+            assert_eq!((tick, finding.sensor, finding.limit), (2, Some(sensor), end));
+        }
+    }
+}
+
+#[test]
+fn a_change_as_large_as_the_bound_is_no_jump() {
+    let mut settings = wide();
+    settings.force.jump = 100.0;
+    let alternating =
+        |change: f32| (0..40).map(move |tick| still(200e3, 0.0, if tick % 2 == 0 { 0.0 } else { change }));
+    assert_eq!(all(alternating(100.0), &settings), []);
+    let (tick, finding) = all(alternating(100.5), &settings)[0];
+    // The first reading is no jump.
+    assert_eq!(
+        (tick, finding.fault, finding.limit),
+        (u32::from(settings.watch.noisy_jumps) + 1, Fault::SensorNoisy, 100.0)
+    );
+}
+
+/// A reading that stays the same while the command goes from `before` to `after` in tick 51.
+fn stuck(before: f32, after: f32, stuck_ticks: u16) -> Option<u32> {
+    let mut settings = wide();
+    settings.pressure.stuck_ticks = stuck_ticks;
+    let ticks = (1..=400).map(|tick| Seen {
+        command: Command { pressure_pa: if tick <= 50 { before } else { after }, vent: false },
+        ..still(200e3, 0.0, 0.0)
+    });
+    let (tick, finding) = all(ticks, &settings).into_iter().next()?;
+    assert_eq!((finding.fault, finding.sensor), (Fault::SensorStuck, Some(Sensor::Pressure)));
+    Some(tick)
+}
+
+#[test]
+fn a_sensor_is_stuck_where_it_stays_the_same_while_the_command_moves_by_more_than_20_kpa() {
+    assert_eq!(stuck(200e3, 200e3, 100), None, "nothing moves");
+    assert_eq!(stuck(200e3, 220e3, 100), None, "as much as the bound");
+    assert_eq!(stuck(200e3, 220.5e3, 100), Some(150));
+    assert_eq!(stuck(200e3, 179.5e3, 100), Some(150), "downwards, too");
+    assert_eq!(stuck(200e3, 300e3, 1), Some(51));
+    assert_eq!(stuck(200e3, 300e3, 0), None, "a watch that is off");
+}
+
+#[test]
+fn pressure_follows_within_its_band_and_a_finding_states_the_end_of_the_band() {
+    let settings = wide();
+    let (follow, ticks) = (settings.watch.follow_pa, u32::from(settings.watch.follow_ticks));
+    let expected = 200e3;
+    let at = |pressure_pa: f32| Seen { expected_pa: expected, ..still(pressure_pa, 0.0, 0.0) };
+    for (fault, end, beyond) in [
+        (Fault::PressureNotFalling, expected + follow, expected + follow + 1.0),
+        (Fault::PressureNotRising, expected - follow, expected - follow - 1.0),
+    ] {
+        assert_eq!(all([at(end); 400], &settings), [], "{fault:?}");
+        let (tick, finding) = repeated(at(beyond), &settings, fault).expect("found");
+        assert_eq!((tick, finding.value, finding.limit), (ticks, beyond, end));
+    }
+}
+
+#[test]
+fn a_muscle_is_not_vented_from_the_tick_after_its_time_on() {
+    let settings = wide();
+    let (time, vented) = (settings.watch.vent_ticks, settings.watch.vented_pa);
+    let seen = |pressure_pa: f32| Seen { command: Command::VENT, ..still(pressure_pa, 0.0, 0.0) };
+    let ticks = time as usize + 10;
+    assert_eq!(all(vec![seen(vented); ticks], &settings), []);
+    let (tick, finding) = all(vec![seen(vented + 1.0); ticks], &settings)[0];
+    assert_eq!(
+        (tick, finding.fault, finding.limit),
+        (time + 2, Fault::NotVented, vented),
+        "two ticks beyond the time"
+    );
+    // A command in between begins the time anew.
+    let mut interrupted = vec![seen(vented + 1.0); ticks];
+    interrupted[time as usize - 5].command.vent = false;
+    assert_eq!(all(interrupted, &settings), []);
+}
+
+#[test]
+fn a_restart_forgets_what_was_counted_but_not_how_long_the_muscle_has_been_vented() {
+    let settings = wide();
+    let over = still(settings.limits.pressure_pa + 1.0, 0.0, 0.0);
+    let mut watch = SideWatch::default();
+    let mut found = Vec::new();
+    watch.check(&over, &settings, &mut |finding| found.push(finding));
+    watch.restart();
+    watch.check(&over, &settings, &mut |finding| found.push(finding));
+    assert_eq!(found, [], "two ticks in a row, with a restart between them");
+    watch.check(&over, &settings, &mut |finding| found.push(finding));
+    assert_eq!(found.len(), 1);
+
+    let full = Seen { command: Command::VENT, ..still(settings.watch.vented_pa + 1.0, 0.0, 0.0) };
+    let mut watch = SideWatch::default();
+    let mut found = Vec::new();
+    for _ in 0..settings.watch.vent_ticks {
+        watch.check(&full, &settings, &mut |finding| found.push(finding));
+    }
+    watch.restart();
+    for _ in 0..2 {
+        watch.check(&full, &settings, &mut |finding| found.push(finding));
+    }
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(found[0].fault, Fault::NotVented);
+}
+
+#[test]
+fn table_and_load_cell_may_be_apart_by_as_much_as_the_bound() {
+    let mut settings = wide();
+    settings.watch.disagree_n = 10.0;
+    let apart = |by: f32| Seen { model_n: Some(40.0 + by), ..still(200e3, 0.0, 40.0) };
+    assert_eq!(all([apart(10.0); 400], &settings), []);
+    let (tick, finding) = repeated(apart(-10.5), &settings, Fault::SensorsDisagree).expect("found");
+    let ticks = u32::from(settings.watch.disagree_ticks);
+    assert_eq!((tick, finding.value, finding.limit), (ticks, 10.5, 10.0));
+    settings.watch.disagree_n = 0.0;
+    assert_eq!(all([apart(100.0); 400], &settings), [], "a watch that is off");
+}

@@ -1,0 +1,133 @@
+//! Recordings at held lengths: which of them belong to one mounting, and how the muscle rested before each.
+
+use super::{Campaign, Clock, Recording};
+
+/// The largest change of a held length within one mounting, m: half of a tape measure's ±1 mm.
+pub const SAME_LENGTH: f64 = 0.5e-3;
+/// An unknown pause between two recordings of one mounting counts as this long, s: someone saves a file and starts the next. The
+/// memories of a muscle span decades of time, of which the recordings themselves are most.
+const ASSUMED_REST: f64 = 5.0;
+/// The time in which a muscle is vented after the last reading, s.
+pub const VENTING: f64 = 2.0;
+
+/// The rest of a muscle before a recording at a held length, vented.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rest {
+    /// Whether a mounting begins: memories of the load begin anew.
+    pub remounted: bool,
+    /// How long the muscle rested, s.
+    pub seconds: f64,
+    /// Whether the bench's clock says so; otherwise it is assumed.
+    pub known: bool,
+    /// From the end of the rest to the first reading, s.
+    pub lead: f64,
+}
+
+/// The length that a recording held throughout, as a stroke in metres.
+fn held(recording: &Recording) -> Option<f64> {
+    let (low, high) =
+        recording.stroke.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(*s), h.max(*s)));
+    (high - low <= SAME_LENGTH).then_some(0.5 * (low + high))
+}
+
+/// What the recording's labels or its file's name call its mounting. A name says it where it ends in the number of a run, as in
+/// `short7_run2.csv`; `None` where nothing says it.
+fn called(recording: &Recording) -> Option<String> {
+    if !recording.labels.is_empty() {
+        return Some(recording.mounting());
+    }
+    let stem = recording.name.split('.').next().unwrap_or("").to_ascii_lowercase();
+    let bare = stem.trim_end_matches(|c: char| c.is_ascii_digit());
+    let separators: &[char] = &['_', '-', ' '];
+    let runs = ["run", "cycle", "repeat", "trial"];
+    let word = runs.iter().find_map(|word| bare.trim_end_matches(separators).strip_suffix(word));
+    (bare.len() < stem.len()).then(|| word.unwrap_or(bare).trim_end_matches(separators).to_owned())
+}
+
+impl Campaign {
+    /// The number of the mounting of each recording, from zero. A mounting begins where the held length changes by more than
+    /// [`SAME_LENGTH`], or where labels or file names call it otherwise. `None` where a recording did not hold its length.
+    #[must_use]
+    pub fn mountings(&self) -> Option<Vec<usize>> {
+        let mut number = 0;
+        let mut before: Option<(f64, Option<String>)> = None;
+        let mut all = Vec::with_capacity(self.recordings.len());
+        for recording in &self.recordings {
+            let (stroke, name) = (held(recording)?, called(recording));
+            if let Some((last, other)) = &before {
+                let renamed = name.is_some() && other.is_some() && name != *other;
+                number += usize::from((last - stroke).abs() > SAME_LENGTH || renamed);
+            }
+            before = Some((stroke, name));
+            all.push(number);
+        }
+        Some(all)
+    }
+
+    /// The rest before each recording; `None` where a recording did not hold its length: what happened between the others is not known.
+    #[must_use]
+    pub fn rests(&self) -> Option<Vec<Rest>> {
+        let mountings = self.mountings()?;
+        let rest = |index: usize| {
+            let recording = &self.recordings[index];
+            let remounted = index == 0 || mountings[index] != mountings[index - 1];
+            let first = recording.time.first().copied().unwrap_or(0.0);
+            let interval = recording.duration() / recording.len().saturating_sub(1).max(1) as f64;
+            let known = self.pause_before(index);
+            // A clock that starts near zero was started with the recording.
+            let own = self.clock == Clock::Separate && (0.0..=2.0 * interval).contains(&first);
+            let lead = if own { first } else { known.map_or(interval, |pause| interval.min(pause)) };
+            let seconds = known.map_or(ASSUMED_REST, |pause| (pause - lead).max(0.0));
+            Rest { remounted, seconds, known: known.is_some(), lead }
+        };
+        Some((0..self.recordings.len()).map(rest).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(name: &str, stroke: f64, times: [f64; 3], labels: &[(&str, &str)]) -> Recording {
+        let labels = labels.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+        Recording {
+            name: name.into(),
+            stroke: vec![stroke; 3],
+            time: times.to_vec(),
+            labels,
+            ..Recording::default()
+        }
+    }
+
+    #[test]
+    fn a_mounting_begins_with_another_length_label_or_name() {
+        let of = |recordings: Vec<Recording>| Campaign::new(recordings).mountings();
+        let times = [0.0, 1.0, 2.0];
+        let lengths = [0.0, 0.2e-3, 9e-3, 9e-3, 0.0].map(|s| run("r.csv", s, times, &[]));
+        assert_eq!(of(lengths.to_vec()), Some(vec![0, 0, 1, 1, 2]));
+        let labelled = [("a", "1"), ("a", "2"), ("b", "1")]
+            .map(|(m, r)| run("x.csv", 0.0, times, &[("condition", m), ("run", r)]));
+        assert_eq!(of(labelled.to_vec()), Some(vec![0, 0, 1]));
+        let named = ["short7_run1.csv", "short7_run2.csv", "short9-run1.csv", "short9-run2.csv.gz"]
+            .map(|n| run(n, 0.0, times, &[]));
+        assert_eq!(of(named.to_vec()), Some(vec![0, 0, 1, 1]));
+        // Names without a number say nothing.
+        assert_eq!(of(["a.csv", "b.csv"].map(|n| run(n, 0.0, times, &[])).to_vec()), Some(vec![0, 0]));
+        let mut moved = run("r.csv", 0.0, times, &[]);
+        moved.stroke[2] = 2e-3;
+        assert_eq!(of(vec![moved]), None);
+    }
+
+    #[test]
+    fn a_rest_is_known_from_the_bench_s_clock_and_assumed_without_it() {
+        let shared =
+            Campaign::new(vec![run("a", 0.0, [0.0, 1.0, 2.0], &[]), run("b", 0.0, [12.0, 13.0, 14.0], &[])]);
+        let rests = shared.rests().expect("held");
+        assert!(rests[0].remounted && !rests[1].remounted);
+        assert_eq!((rests[1].known, rests[1].lead, rests[1].seconds), (true, 1.0, 9.0));
+        let separate =
+            Campaign::new(vec![run("a", 0.0, [0.4, 0.9, 1.4], &[]), run("b", 0.0, [0.4, 0.9, 1.4], &[])]);
+        let rests = separate.rests().expect("held");
+        assert_eq!((rests[1].known, rests[1].lead, rests[1].seconds), (false, 0.4, ASSUMED_REST));
+    }
+}

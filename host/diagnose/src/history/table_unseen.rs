@@ -1,0 +1,155 @@
+//! Each run predicted from the others by tables with and without memory: through the bytes of a table file, and the prediction that
+//! `host predict` makes.
+
+use pam_data::error::Result;
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::{Campaign, largest_force};
+use pam_fit::predict::predict;
+use pam_fit::table_file::TableFile;
+use rayon::prelude::*;
+
+use super::criteria::{PULLS, TABLE_FOLDS};
+use super::table_fit::{self, Layers, Prepared};
+use crate::valve_pulses;
+
+/// Sizes of errors of unseen runs, % of the largest force.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct UnseenError {
+    /// Root mean square.
+    pub rms_pct: f64,
+    /// Mean absolute.
+    pub mean_pct: f64,
+    /// Readings that count.
+    pub readings: usize,
+}
+
+/// The errors of one form of a campaign's readings.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct UnseenErrors {
+    /// The base model alone, with the zero of the load cell.
+    pub base: UnseenError,
+    /// The static model that the memory stands beside: base model and contact.
+    pub without_memory: UnseenError,
+    /// Contact and memory.
+    pub with_memory: UnseenError,
+    /// Share of the readings set aside because they ring after a valve's pulse, %.
+    pub ringing_pct: f64,
+    /// Share of the others that are slack or at the converter's end, %: a prediction errs there only by what it pulls too much.
+    pub slack_pct: f64,
+}
+
+/// What counts of each recording's readings.
+struct Counted {
+    rings: Vec<Vec<bool>>,
+    /// A reading up to this is slack, N.
+    slack: f64,
+    largest: f64,
+}
+
+/// Sums over the readings of recordings.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    squares: f64,
+    sizes: f64,
+    count: f64,
+    slack: f64,
+}
+
+impl Counted {
+    fn of(campaign: &Campaign, zero: f64) -> Self {
+        let rings = campaign.recordings.par_iter().map(valve_pulses::ringing).collect();
+        let largest = largest_force(campaign).max(f64::MIN_POSITIVE);
+        Self { rings, slack: zero + PULLS * largest, largest }
+    }
+
+    fn add(&self, sums: &mut Sums, campaign: &Campaign, index: usize, predicted: &[f64]) {
+        let Some(force) = &campaign.recordings[index].force else { return };
+        for ((read, model), rings) in force.iter().zip(predicted).zip(&self.rings[index]) {
+            if *rings || !read.is_finite() || !model.is_finite() {
+                continue;
+            }
+            let slack = *read <= self.slack;
+            // A slack reading says that the muscle pulls no more than that.
+            let error = if slack { (model - self.slack).max(0.0) } else { model - read };
+            sums.squares += error * error;
+            sums.sizes += error.abs();
+            sums.count += 1.0;
+            sums.slack += f64::from(u8::from(slack));
+        }
+    }
+
+    /// Over the readings that pull.
+    fn size(&self, sums: Sums) -> UnseenError {
+        let n = (sums.count - sums.slack).max(1.0);
+        UnseenError {
+            rms_pct: 100.0 * (sums.squares / n).sqrt() / self.largest,
+            mean_pct: 100.0 * sums.sizes / n / self.largest,
+            readings: n as usize,
+        }
+    }
+}
+
+/// Through the bytes of a file, as `host predict` reads it.
+fn reread(file: &TableFile) -> Result<TableFile> {
+    TableFile::from_bytes(&file.to_bytes()?)
+}
+
+/// The errors of unseen runs over the readings of two forms of one campaign: the one that the tables are fitted to (at its settled points), and
+/// another of the same runs, as recorded. `None` where the campaign is none of isometric staircases with repeated runs, or the other has
+/// other runs. Of many runs every so many-th is left out together.
+///
+/// # Errors
+/// Recordings that cannot be fitted or predicted.
+pub fn unseen_by_table(
+    campaign: &Campaign,
+    recorded: &Campaign,
+    muscle: &MuscleDescription,
+) -> Result<Option<[UnseenErrors; 2]>> {
+    let settled = table_fit::settled(campaign);
+    let runs = settled.recordings.len();
+    let folds = runs.min(TABLE_FOLDS);
+    if settled.mountings() != recorded.mountings() {
+        return Ok(None);
+    }
+    let Some(whole) = Prepared::of(&settled, muscle, &vec![true; runs])? else { return Ok(None) };
+    let forms =
+        [(&settled, Counted::of(&settled, whole.zero)), (recorded, Counted::of(recorded, whole.zero))];
+    let fold = |fold: usize| -> Result<[[Sums; 3]; 2]> {
+        let used: Vec<bool> = (0..runs).map(|r| r % folds != fold).collect();
+        let mut sums = [[Sums::default(); 3]; 2];
+        let Some(prepared) = Prepared::of(&settled, muscle, &used)? else { return Ok(sums) };
+        let tables = [prepared.base(), prepared.table(Layers::Contact)?, prepared.table(Layers::Memory)?];
+        for (k, table) in tables.iter().enumerate() {
+            let table = reread(table)?;
+            for (f, (form, counted)) in forms.iter().enumerate() {
+                let predicted = predict(&table, form)?;
+                for r in (0..runs).filter(|r| !used[*r]) {
+                    counted.add(&mut sums[f][k], form, r, &predicted.recordings[r].force);
+                }
+            }
+        }
+        Ok(sums)
+    };
+    let parts: Vec<[[Sums; 3]; 2]> = (0..folds).into_par_iter().map(fold).collect::<Result<_>>()?;
+    let form = |f: usize| {
+        let counted = &forms[f].1;
+        let total = |k: usize| {
+            parts.iter().map(|p| p[f][k]).fold(Sums::default(), |a, b| Sums {
+                squares: a.squares + b.squares,
+                sizes: a.sizes + b.sizes,
+                count: a.count + b.count,
+                slack: a.slack + b.slack,
+            })
+        };
+        let rings = counted.rings.iter().flatten().filter(|r| **r).count() as f64;
+        let readings = counted.rings.iter().map(Vec::len).sum::<usize>().max(1) as f64;
+        UnseenErrors {
+            base: counted.size(total(0)),
+            without_memory: counted.size(total(1)),
+            with_memory: counted.size(total(2)),
+            ringing_pct: 100.0 * rings / readings,
+            slack_pct: 100.0 * total(2).slack / total(2).count.max(1.0),
+        }
+    };
+    Ok(Some([form(0), form(1)]))
+}

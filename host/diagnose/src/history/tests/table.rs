@@ -1,0 +1,70 @@
+//! The memory through a table: a muscle whose forces a table with `bladder-creep` makes, by the law as the catalogue has it.
+
+use model_core::effects::{EffectName, FittedEffect};
+use model_core::table;
+use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::{Campaign, Recording};
+use pam_fit::predict::predict;
+use pam_fit::table_file::{About, TableFile};
+
+use super::super::table_fit;
+use super::super::table_unseen::unseen_by_table;
+use crate::linear::Random;
+
+const DESCRIPTION: &str = "name = \"mini\"\nkind = \"contractile\"\nrest_length_mm = 39.16\nbraid_angle_deg = 77.4\n\
+    bladder_outer_diameter_mm = 3.0\nbladder_wall_mm = 0.5\nmax_pressure_kPa = 600\n";
+/// `c`, `b` and `d` in Pa, `P_c` in Pa.
+const TRUTH: [f64; 4] = [0.5, 15e3, 20e3, 9e4];
+
+/// Staircases at four lengths, five runs each, with the forces of a table that carries some effects, and noise.
+fn campaign(effects: &[f64; 4]) -> Campaign {
+    let mut recordings = Vec::new();
+    for mounting in 0..4 {
+        for run in 0..5 {
+            let time: Vec<f64> = (0..100).map(|i| 0.4 + 0.5 * f64::from(i)).collect();
+            let filled = |t: f64| if t < 27.0 { 1.0 - (-t / 6.0).exp() } else { (-(t - 27.0) / 5.0).exp() };
+            recordings.push(Recording {
+                name: format!("mounting{mounting}_run{run}"),
+                stroke: vec![0.6e-3 * f64::from(mounting); time.len()],
+                pressure: time.iter().map(|t| 9e3 + 560e3 * filled(*t)).collect(),
+                direction: Some(time.iter().map(|t| if *t < 27.0 { 1 } else { -1 }).collect()),
+                force: Some(vec![0.0; time.len()]),
+                time,
+                ..Recording::default()
+            });
+        }
+    }
+    let mut campaign = Campaign::new(recordings);
+    let mut table = table::example();
+    table.goes_slack = true;
+    table.friction.iter_mut().for_each(|k| *k = 0.01);
+    table.effects.push(FittedEffect::new(EffectName::BladderCreep, effects)).expect("room");
+    let made = predict(&TableFile { table, about: About::default() }, &campaign).expect("a valid table");
+    let mut random = Random(7);
+    for (recording, made) in campaign.recordings.iter_mut().zip(&made.recordings) {
+        recording.force = Some(made.force.iter().map(|f| f + 0.1 * random.normal()).collect());
+    }
+    campaign
+}
+
+#[test]
+fn a_table_carries_the_memory_and_foretells_unseen_runs() {
+    let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
+    let campaign = campaign(&TRUTH);
+    let file = table_fit::table(&campaign, &muscle).expect("fitted").expect("staircases");
+    let effect = &file.table.effects[0];
+    assert_eq!(effect.effect, EffectName::BladderCreep);
+    assert!((f64::from(effect.parameters[0]) / TRUTH[0] - 1.0).abs() < 0.2, "{effect:?}");
+    let [settled, recorded] =
+        unseen_by_table(&campaign, &campaign, &muscle).expect("fitted").expect("staircases");
+    assert!(settled.with_memory.rms_pct < 0.5 * settled.without_memory.rms_pct, "{settled:?}");
+    assert_eq!(settled.with_memory, recorded.with_memory);
+}
+
+#[test]
+fn without_a_memory_none_is_found() {
+    let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
+    let campaign = campaign(&[0.0, 0.0, TRUTH[2], TRUTH[3]]);
+    let file = table_fit::table(&campaign, &muscle).expect("fitted").expect("staircases");
+    assert!(file.table.effects[0].parameters[0].abs() < 0.05, "{:?}", file.table.effects);
+}

@@ -1,0 +1,88 @@
+//! The section of festo.md on unseen runs through the table: each run predicted from the others by a table file, without and with the
+//! memory of the bladder, at settled points and over the readings as recorded.
+
+use pam_diagnose::history::table_unseen::{UnseenError, UnseenErrors};
+use std::fmt::Write as _;
+
+/// Heading of the section.
+pub const HEADING: &str = "## Unseen runs through the table";
+
+/// First paragraph of the section, and the head of its table.
+pub const INTRODUCTION: &str = "Each run is predicted from the others by a table file (`.pam`) and the prediction of `host predict`, which carries the \
+    memory through all runs in order; of the predicted run only pressure and time are used. Every sixth run is left out together. \
+    \"Base\": the base model of `host fit` with the zero of the load cell. \"Static\": base and contact of the bladder. \"Memory\": the same with `bladder-creep`. Root mean square in percent \
+    of the largest force, over readings that pull; readings that ring after a valve's pulse are set aside, and slack readings or those at \
+    the converter's end count only by the pull that is predicted too much there. \"Change\" compares memory and static.\n\n\
+    | set, muscle | readings | base | static | memory | change | ringing | slack |\n";
+
+/// A muscle and what was found.
+pub struct Row {
+    /// Set and muscle.
+    pub label: String,
+    /// Errors at settled points and over readings as recorded, or why there are none.
+    pub errors: Result<[UnseenErrors; 2], String>,
+}
+
+/// The whole section.
+pub fn section(rows: &[Row]) -> String {
+    let mut text = format!("{HEADING}\n\n{INTRODUCTION}| --- | --- | --- | --- | --- | --- | --- | --- |\n");
+    let mut counts = [[0_usize; 2]; 2];
+    for row in rows {
+        let errors = match &row.errors {
+            Ok(errors) => errors,
+            Err(e) => {
+                let _ = writeln!(text, "| {} | failed: {} | | | | | | |", row.label, e.replace('|', "/"));
+                continue;
+            }
+        };
+        for (k, (name, e)) in ["settled points", "as recorded"].iter().zip(errors).enumerate() {
+            let change = e.with_memory.rms_pct / e.without_memory.rms_pct - 1.0;
+            counts[k][0] += usize::from(change <= -0.35);
+            counts[k][1] += usize::from(e.with_memory.rms_pct <= 0.6);
+            let shown = |u: &UnseenError| format!("{:.2}", u.rms_pct);
+            let _ = writeln!(
+                text,
+                "| {} | {name} | {} | {} | {} | {:.0} % | {:.0} % | {:.0} % |",
+                row.label,
+                shown(&e.base),
+                shown(&e.without_memory),
+                shown(&e.with_memory),
+                100.0 * change,
+                e.ringing_pct,
+                e.slack_pct
+            );
+        }
+    }
+    let n = rows.len();
+    let [settled, recorded] = counts;
+    let _ = writeln!(
+        text,
+        "\nError lower by 35 % or more: {} of {n} at settled points, {} of {n} as recorded. At most 0.6 %: {} of {n} and {} of {n}.",
+        settled[0], recorded[0], settled[1], recorded[1]
+    );
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn muscles_are_counted_by_both_bounds() {
+        let size = |rms_pct: f64| UnseenError { rms_pct, mean_pct: rms_pct, readings: 100 };
+        let errors = |memory: f64| UnseenErrors {
+            base: size(1.2),
+            without_memory: size(1.0),
+            with_memory: size(memory),
+            ringing_pct: 70.0,
+            slack_pct: 40.0,
+        };
+        let row = |a: f64, b: f64| Row { label: "x".into(), errors: Ok([errors(a), errors(b)]) };
+        let text = section(&[row(0.5, 0.7), row(0.62, 0.59)]);
+        assert!(text.contains("| x | settled points | 1.20 | 1.00 | 0.50 | -50 % | 70 % | 40 % |"), "{text}");
+        assert!(
+            text.contains("2 of 2 at settled points, 1 of 2 as recorded. At most 0.6 %: 1 of 2 and 1 of 2."),
+            "{text}"
+        );
+    }
+}
