@@ -1,7 +1,7 @@
 //! The fuzz targets for some seconds: the seeds of `host/fuzz/seeds`, what was found before (`host/fuzz/found`), and damaged copies of both.
 //!
-//! The generator begins with the same number on every machine. `PAM_FUZZ_SEED` gives another one, `PAM_FUZZ_CASES` multiplies the number
-//! of cases, and `PAM_FUZZ_SEEDS=write` writes the seeds that are made here. A case that fails is kept in the folder of test results.
+//! The generator begins with the same number on every machine. `PAM_FUZZ_SEED` gives another one, `PAM_FUZZ_CASES` multiplies the
+//! cases, and `PAM_FUZZ_SEEDS=write` writes the seeds that are made here. A case that fails is kept in the folder of test results.
 #![allow(clippy::unwrap_used)] // what fails here fails the test
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};

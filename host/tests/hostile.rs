@@ -23,7 +23,7 @@ fn said(output: &Output) -> String {
     [&output.stdout[..], &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned()).concat()
 }
 
-/// An error with its cause: no panic, no abort, no signal.
+/// An error with its cause: no panic, no crash, no signal.
 fn is_refused(output: &Output, what: &str) {
     let said = said(output);
     assert_eq!(output.status.code(), Some(1), "{what}: {:?} {said}", output.status);

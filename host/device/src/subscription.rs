@@ -1,7 +1,7 @@
 //! Telemetry on a line that programs share: the device has one rate for all of them.
 //!
-//! A subscription never makes the stream coarser than another program has it, takes the samples of its own rate from a finer stream,
-//! asks again after a silence, and leaves the stream at its end as it was at its beginning.
+//! A subscription never makes the stream of another program coarser, and takes the samples of its own rate from a finer stream. It asks
+//! again after a silence. At its end it leaves the stream as it found it.
 
 use std::time::{Duration, Instant};
 
@@ -85,7 +85,7 @@ impl Subscription {
         Ok(())
     }
 
-    /// Leaves the stream as it was. One that this program began goes on while another session owns the device.
+    /// Leaves the stream as it was. One that this program began continues while another session owns the device.
     ///
     /// # Errors
     /// What the device refuses, or silence.

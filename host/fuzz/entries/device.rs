@@ -128,7 +128,7 @@ fn is_frame(bytes: &[u8]) -> bool {
     bytes.iter().filter(|byte| matches!(accumulator.push(**byte), Some(Ok(_)))).count() == 1
 }
 
-/// A reading of one byte: within 0 to 800 kPa, 0 to 20 mm, 0 to 400 N, and what no sensor should give.
+/// A reading of one byte: within 0 to 800 kPa, 0 to 20 mm, 0 to 400 N, and values outside every range.
 fn reading(byte: u8, full: f32) -> f32 {
     match byte {
         255 => f32::NAN,

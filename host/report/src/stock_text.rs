@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use pam_diagnose::stock::{Interval, StockDiagnosis};
 use pam_fit::stock::Law;
 
-/// A law between muscles in words, with the factor and the unit of its parameter.
+/// The description of a law between muscles, with the factor and the unit of its parameter.
 pub(crate) fn law(of: Option<Law>) -> (&'static str, f64, &'static str) {
     match of {
         None => ("chance differences only", 1.0, ""),

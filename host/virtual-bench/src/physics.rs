@@ -34,7 +34,7 @@ pub struct Physics {
     /// Relaxation of the elastic force.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relaxation: Option<Relaxation>,
-    /// Creep of the wall's stress over all that was asked of it.
+    /// Creep of the wall's stress over its load history.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wall_creep: Option<WallCreep>,
     /// Creep of the whole force under load.

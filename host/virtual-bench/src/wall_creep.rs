@@ -21,7 +21,7 @@ pub struct WallCreep {
     pub contact: f64,
 }
 
-/// What was asked of the wall: when, and by how much its load changed then.
+/// Changes of the wall's load: when, and by how much.
 #[derive(Debug, Clone, Default)]
 pub struct LoadHistory {
     changes: Vec<(f64, f64)>,
@@ -31,7 +31,7 @@ pub struct LoadHistory {
 
 /// Changes within this time count as one, s.
 const TOGETHER: f64 = 0.02;
-/// Beyond so many changes the older ones are put together in pairs.
+/// Beyond this number of changes the older ones are merged in pairs.
 const MOST: usize = 512;
 
 impl LoadHistory {

@@ -9,8 +9,8 @@
 //! | `F_w` | what the wall takes from the pull of the gas ([`Context::bladder`]); no more than there is | N |
 //! | `c` | share of it that relaxes over the whole spectrum, a fifth in each decade | – |
 //! | `e` | contact of bladder and braid, which builds up with pressure | – |
-//! | `d` | pressure that contact takes at once; the base model's deadband is the part that no pressure gives back | Pa |
-//! | `b` | pressure that contact takes in addition in the course of time | Pa |
+//! | `d` | pressure that contact takes immediately; the base model's deadband is the part that no pressure gives back | Pa |
+//! | `b` | pressure that contact takes in addition with time | Pa |
 //! | `P_c` | pressure over which contact builds up | Pa |
 //!
 //! One memory with two signs: where the wall resists much (shortened) the pull grows with the logarithm of time, at full length it

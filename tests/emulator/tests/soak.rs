@@ -65,14 +65,14 @@ const FAULTS: [Fault; 10] = [
 impl Fault {
     fn words(self) -> &'static str {
         match self {
-            Self::Killed => "the program that runs is killed",
+            Self::Killed => "the program of the run is stopped by force",
             Self::Suspended => "the computer sleeps for 3 s: all programs stop, then the clock jumps",
             Self::Cable => "the cable is pulled for 2 s",
             Self::FullDisk => "the disk is full",
             Self::TwoHosts => "a second program tries to run",
             Self::Deaf => "programs that do not read, at the line and at the page",
             Self::Noise => "bits change on the line for 2 s",
-            Self::Starved => "a slow disk: the program stands still for 0.1 s ten times",
+            Self::Starved => "a slow disk: the program pauses for 0.1 s ten times",
             Self::Vent => "another program vents",
             Self::Nothing => "none: Ctrl-C",
         }
@@ -118,7 +118,7 @@ fn happens(fault: Fault, rig: &mut Rig, run: &mut Child) -> (u64, bool) {
             rig.line.cut(false);
             (vented, false)
         }
-        // The run was started with a bound on its files and ends by itself.
+        // The run was started with a bound on its files and ends on its own.
         Fault::FullDisk => {
             until("the run ends", || run.try_wait().is_ok_and(|ended| ended.is_some()));
             (rig.vented_after(rig.plant.ticks()), false)
@@ -129,14 +129,14 @@ fn happens(fault: Fault, rig: &mut Rig, run: &mut Child) -> (u64, bool) {
             let refused = second.wait_with_output().expect("it ends");
             let said = String::from_utf8_lossy(&refused.stderr);
             assert!(said.contains("device::in-use"), "a second run: {said}");
-            assert!(!rig.plant.is_vented(), "the first run goes on");
+            assert!(!rig.plant.is_vented(), "the first run continues");
             (interrupted(rig, run), true)
         }
         Fault::Deaf => {
             let at_line = TcpStream::connect(rig.line.address()).expect("the line");
             let at_page = rig.studio.watched_by_no_one();
             std::thread::sleep(Duration::from_secs(2));
-            assert!(!rig.plant.is_vented(), "the run goes on");
+            assert!(!rig.plant.is_vented(), "the run continues");
             let vented = interrupted(rig, run);
             drop((at_line, at_page));
             (vented, true)
@@ -155,7 +155,7 @@ fn happens(fault: Fault, rig: &mut Rig, run: &mut Child) -> (u64, bool) {
                 signal(run, Signal::CONT);
                 std::thread::sleep(Duration::from_millis(100));
             }
-            assert!(!rig.plant.is_vented(), "the run goes on");
+            assert!(!rig.plant.is_vented(), "the run continues");
             (interrupted(rig, run), true)
         }
         Fault::Vent => {
@@ -195,7 +195,7 @@ fn round(number: u32, fault: Fault, rig: &mut Rig, row: &mut Row) {
     let found = if path.exists() { recorded(&path) } else { rig.recovered(&name) };
     let Recorded { samples, missing, told, .. } = found;
     assert!(samples > 300, "{fault:?}: {samples} samples");
-    assert!(missing <= told, "{fault:?}: {missing} samples are missing, the recording tells of {told}");
+    assert!(missing <= told, "{fault:?}: {missing} samples are missing, the recording reports {told}");
     row.add(ticks, samples, missing);
     // The recorder ends with the cable, and where it stood still for long: the next one begins.
     rig.revive();

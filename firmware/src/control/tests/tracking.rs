@@ -158,7 +158,7 @@ fn the_table_alone_reaches_a_force() {
     assert_eq!(
         rig.bench.controller.saturated_ticks(),
         saturated + 1_000,
-        "each tick of a force out of reach"
+        "each tick of a force in saturation"
     );
 }
 
@@ -285,7 +285,7 @@ fn nothing_winds_up_while_a_limit_holds_the_command() {
         settings.force_loop.trim_limit_pa = 500e3;
         settings.feed_forward = FeedForward::Gaylord;
     };
-    // Out of reach above, with a force that stays too small.
+    // Saturated above, with a force that stays too small.
     let mut high = Rig::new(gaylord);
     high.strength = 0.9;
     let mut high = high.start(Mode::Force);
@@ -296,7 +296,7 @@ fn nothing_winds_up_while_a_limit_holds_the_command() {
     high.pass(2_000);
     // One tick passes before a limit is known.
     assert!((high.trim_pa() - before).abs() < 4e3, "{before} to {}", high.trim_pa());
-    // Out of reach below, with a trim that adds pressure.
+    // Saturated below, with a trim that adds pressure.
     let mut low = Rig::new(gaylord);
     low.strength = 0.8;
     let mut low = low.start(Mode::Force);

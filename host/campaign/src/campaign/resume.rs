@@ -1,4 +1,4 @@
-//! A campaign that goes on: what its log holds, taught to the engine.
+//! The continuation of a campaign: the engine reads what the log holds.
 
 use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;

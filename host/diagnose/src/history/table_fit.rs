@@ -4,7 +4,7 @@
 //! for each mounting; only at full length, where the base model's force is a straight line in pressure, is the curve that line and the
 //! contact's part. The table is then fitted to the forces without the effect, and the wall's drive is computed again from that table.
 //!
-//! What a slack muscle reads is the zero of the load cell, and no force: it is taken off first, and stands in the table as `force-offset`.
+//! What a slack muscle reads is the zero of the load cell, and no force: it is subtracted first, and the table contains it as `force-offset`.
 
 use model_core::effects::{EffectName, FittedEffect};
 use pam_data::error::Result;
@@ -258,6 +258,30 @@ struct Beside {
     deadband: f64,
 }
 
+/// Least squares in which the columns `limited` have no negative coefficient: of those that would, the most negative is left out until
+/// none is left. A wall relaxes and a contact spreads with time; the reverse is no memory.
+fn without_negative(
+    gram: &[Vec<f64>],
+    moment: &[f64],
+    mut open: Vec<usize>,
+    limited: std::ops::Range<usize>,
+) -> Vec<f64> {
+    loop {
+        let solved = solve_symmetric(gram, moment, &open).unwrap_or_default();
+        let mut weights = vec![0.0; moment.len()];
+        open.iter().zip(&solved).for_each(|(a, w)| weights[*a] = *w);
+        let negative = |a: &usize| weights[*a] * gram[*a][*a].sqrt();
+        let worst = limited
+            .clone()
+            .filter(|a| weights[*a] < 0.0 && open.contains(a))
+            .min_by(|a, b| negative(a).total_cmp(&negative(b)));
+        match worst {
+            Some(worst) => open.retain(|a| *a != worst),
+            None => return weights,
+        }
+    }
+}
+
 /// Least squares of the amplitudes beside the curves.
 fn beside_curves(points: &Points, pulls: &[bool], zero: f64, columns: &[Vec<f64>], layers: Layers) -> Beside {
     let spline = static_spline(points.highest());
@@ -299,9 +323,7 @@ fn beside_curves(points: &Points, pulls: &[bool], zero: f64, columns: &[Vec<f64>
     // Columns of forces per unit of an amplitude are of very different size: the solution scales them.
     let open: Vec<usize> = (0..count).filter(|a| gram[*a][*a] > 0.0).collect();
     open.iter().for_each(|a| gram[*a][*a] *= 1.0 + RIDGE);
-    let solved = solve_symmetric(&gram, &moment, &open).unwrap_or_default();
-    let mut weights = vec![0.0; count];
-    open.iter().zip(&solved).for_each(|(a, w)| weights[*a] = *w);
+    let weights = without_negative(&gram, &moment, open, curves..curves + CONTACT);
     let left = |i: usize| points.force[i] - zero - row(i).iter().map(|(a, x)| x * weights[*a]).sum::<f64>();
     let squares = (0..points.len()).filter(|i| pulls[*i]).map(|i| left(i).powi(2)).sum();
     let of = |a: usize| weights[curves + a];

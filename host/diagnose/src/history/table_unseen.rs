@@ -28,7 +28,7 @@ pub struct UnseenError {
 pub struct UnseenErrors {
     /// The base model alone, with the zero of the load cell.
     pub base: UnseenError,
-    /// The static model that the memory stands beside: base model and contact.
+    /// The static model without the memory: base model and contact.
     pub without_memory: UnseenError,
     /// Contact and memory.
     pub with_memory: UnseenError,

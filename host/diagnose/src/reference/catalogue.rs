@@ -4,7 +4,7 @@
 //! BEFORE and AFTER as rows → model fitted to BEFORE alone → its residual by state in BEFORE is subtracted in AFTER
 //!        → cells of AFTER → each effect's trace with its memory → evidence → probabilities → names
 //! ```
-//! What the model cannot describe is in both campaigns and cancels; what remains in AFTER is a change.
+//! What the model cannot describe is in both campaigns and cancels; the residual of AFTER is a change.
 
 mod answer;
 mod cells;

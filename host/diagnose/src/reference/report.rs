@@ -37,7 +37,7 @@ pub struct Options {
     pub muscle: Option<String>,
     /// L0, m, where it is known.
     pub rest_length: Option<f64>,
-    /// The muscle's dimensions, where they are described: then strokes are asked about every effect of the catalogue.
+    /// The muscle's dimensions, where they are described: then strokes are compared with every effect of the catalogue.
     pub geometry: Option<Geometry>,
     /// Whether AFTER was mounted anew.
     pub mounted: Mounted,

@@ -98,7 +98,7 @@ pub enum Change {
     EndSlip,
     SensorDelay,
     PressureSensorLag,
-    /// Another effect of the catalogue, weighed for strokes of a described muscle.
+    /// Another effect of the catalogue, tested for strokes of a described muscle.
     Effect(&'static str),
 }
 
@@ -307,7 +307,7 @@ impl Change {
         self.about().class
     }
 
-    /// Its class among strokes, where a late channel and a force that grows with speed are alike.
+    /// Its class among strokes, where a late channel and a force that grows with speed have the same shape.
     #[must_use]
     pub fn stroke_class(self) -> Class {
         match self {

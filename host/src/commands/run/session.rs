@@ -172,7 +172,7 @@ impl Session {
         Ok(Report { summary: self.summary(kept), about: self.about, changed: changed.map(|c| c.0) })
     }
 
-    /// Warns where the setpoint was out of reach for long, and where the run left the tested range.
+    /// Warns where the setpoint was saturated for long, and where the run left the tested range.
     fn warn_of_limits(&self, saturated: Option<u32>, samples_per_s: f64, console: &Console) {
         let lasted = self.tracking.all.samples as f64 * f64::from(self.every_ticks);
         if let Some(saturated) = saturated.map(f64::from).filter(|s| *s > SATURATION_REPORTED * lasted) {

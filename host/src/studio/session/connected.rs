@@ -104,7 +104,7 @@ impl Connected {
         Ok(())
     }
 
-    /// The same for a page that is gone, or leaves this controller: what another program has started goes on.
+    /// The same for a page that is gone, or leaves this controller: what another program has started continues.
     pub(super) fn release(&mut self) -> Result<()> {
         self.running = None;
         self.status = release(&mut self.client)?;

@@ -1,4 +1,4 @@
-//! A recording and what it tells of what is missing in it.
+//! A recording, and what it reports as missing.
 
 use std::path::Path;
 

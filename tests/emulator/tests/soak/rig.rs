@@ -332,7 +332,7 @@ impl Rig {
             if path.exists() { recorded(&path) } else { return };
         assert!(
             missing - interrupted <= told,
-            "{}: {missing} samples are missing, it tells of {told}",
+            "{}: {missing} samples are missing, it reports {told}",
             path.display()
         );
         self.watched.samples += samples;

@@ -24,7 +24,7 @@ pub(super) fn check(file: &mut File) -> Result<()> {
         file.seek(SeekFrom::End(-8)).map_err(unreadable)?;
         file.read_exact(&mut end).map_err(unreadable)?;
     }
-    // What is no Parquet file is reported by its reader.
+    // A file that is not Parquet is reported by its reader.
     if &end[4..] == MAGIC {
         let size = u64::from(u32::from_le_bytes([end[0], end[1], end[2], end[3]]));
         if size > WRITTEN || size > length - 12 {

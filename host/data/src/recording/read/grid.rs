@@ -1,6 +1,6 @@
 //! Static maps: a grid with a row for each pressure and a column of force for each length, as tables in papers and data sheets are printed.
 //!
-//! The grid is read column by column as the long table that it stands for, one recording for each column, and then like any other file.
+//! The grid is read column by column as a long table, one recording for each column, and then like any other file.
 
 use std::borrow::Cow;
 use std::io::{Cursor, Read};
@@ -14,11 +14,11 @@ use super::super::source;
 use super::Reader;
 use crate::error::{DataCode, Error, Result};
 
-/// A map has at least so many rows.
+/// Rows of a map, at least.
 const MIN_ROWS: usize = 3;
 /// The largest grid, bytes: a printed table has a few thousand cells.
 const LARGEST: u64 = 1 << 24;
-/// A map has no times: its points follow one another by so many seconds.
+/// A map has no times: time between two of its points, s.
 const INTERVAL: f64 = 1.0;
 
 impl Reader<'_> {
@@ -120,11 +120,14 @@ fn long_table(text: &[u8], description: &Import, grid: &Grid) -> Result<(String,
                 if description.missing == Missing::Skip {
                     continue;
                 }
-                return Err(Error::new(DataCode::RecordingNotANumber, "this cell of the grid is no number")
-                    .line(*number)
-                    .column(&header.names[*column])
-                    .value(cell)
-                    .help("leave such cells out with missing = \"skip\""));
+                return Err(Error::new(
+                    DataCode::RecordingNotANumber,
+                    "this cell of the grid is not a number",
+                )
+                .line(*number)
+                .column(&header.names[*column])
+                .value(cell)
+                .help("leave such cells out with missing = \"skip\""));
             }
             let mut line: Vec<&str> = others.iter().map(|i| cells[*i].as_str()).collect();
             line.extend(told.iter().map(String::as_str));

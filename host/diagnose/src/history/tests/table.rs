@@ -60,3 +60,12 @@ fn a_table_carries_the_memory_and_foretells_unseen_runs() {
     assert!(settled.with_memory.rms_pct < 0.5 * settled.without_memory.rms_pct, "{settled:?}");
     assert_eq!(settled.with_memory, recorded.with_memory);
 }
+
+#[test]
+fn without_a_memory_none_is_found() {
+    let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
+    let campaign = campaign(&[0.0, 0.0, TRUTH[2], TRUTH[3]]);
+    let file = table_fit::table(&campaign, &muscle).expect("fitted").expect("staircases");
+    let parameters = &file.table.effects[0].parameters;
+    assert!((0.0..0.05).contains(&parameters[0]) && (0.0..5e3).contains(&parameters[1]), "{parameters:?}");
+}

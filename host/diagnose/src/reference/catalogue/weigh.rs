@@ -250,7 +250,7 @@ impl Round {
         fits.sort_by(|a, b| b.log.total_cmp(&a.log).then(a.change.cmp(&b.change)));
         let free = SIZES.map(|s| Metric::of(cells, &columns, s * cells.largest).density - still.density);
         let unknown = log_mean(&free);
-        // States differ from a law together, not each by itself.
+        // States differ from a law together, not one by one.
         let factor = (cells.groups as f64 / CATALOGUE_INDEPENDENT).max(1.0);
         let share = (1.0 - none - PRIOR_UNKNOWN).max(1e-3) / fits.len().max(1) as f64;
         let logs: Vec<f64> = [none.ln(), PRIOR_UNKNOWN.ln() + unknown / factor]
