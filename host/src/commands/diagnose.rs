@@ -39,7 +39,8 @@ use pam_report::{diagnose_page, document, history_text, wording};
     host diagnose --muscle mini.toml loops/*.csv -o corrected.pam \\\n      \
         --report answer.html --json answer.json\n  \
     host diagnose --muscle mini.toml loops/*.csv --with backlash,force-offset\n  \
-    host diagnose --muscle a.toml a/*.csv --muscle b.toml b/*.csv --muscle c.toml c/*.csv\n  \
+    host diagnose --muscle a.toml a/*.csv --muscle b.toml b/*.csv \\\n      \
+        --muscle c.toml c/*.csv\n  \
     host diagnose today/*.csv --reference march/*.csv --report changed.html\n  \
     host diagnose --muscle mini.toml today/*.csv --reference mini.pam")]
 pub struct Arguments {
