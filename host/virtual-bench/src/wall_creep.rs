@@ -1,10 +1,10 @@
-//! A wall whose stress creeps with the logarithm of time, as a convolution over all that was ever asked of it.
+//! A wall whose stress creeps with the logarithm of time, as a convolution over its whole load history.
 //!
 //! ```text
 //! F(t) = r ∫ log10(1 + (t − t′)/t_0) du(t′)        u = (F_w − F_0) tanh(P/P_w)
 //! ```
-//! `F_w`, N, is what the wall takes from the pull; where it takes `F_0` nothing creeps, below it the creep turns round. No branch, no
-//! state per decade and no end of the creep: the diagnosis has a sum of exponentials, and a contact that is one itself.
+//! `F_w`, N, is the wall's share of the pull. At `F_0` nothing creeps; below it the creep reverses. There is no branch, no state per decade,
+//! and no end of the creep, unlike in the model, which has a sum of exponentials.
 
 use serde::{Deserialize, Serialize};
 
@@ -48,7 +48,11 @@ impl LoadHistory {
         }
         if self.changes.len() > MOST {
             let (old, new) = self.changes.split_at(MOST / 2);
-            let pair = |c: &[(f64, f64)]| c.iter().fold((c[0].0, 0.0), |(w, s), x| (w, s + x.1));
+            let pair = |c: &[(f64, f64)]| {
+                let size = c.iter().map(|(_, u)| u.abs()).sum::<f64>();
+                let when = c.iter().map(|(t, u)| t * u.abs()).sum::<f64>() / size.max(f64::MIN_POSITIVE);
+                (when, c.iter().map(|(_, u)| u).sum())
+            };
             self.changes = old.chunks(2).map(pair).chain(new.iter().copied()).collect();
         }
         let crept =

@@ -10,9 +10,9 @@ pub const HEADING: &str = "## Unseen runs through the table";
 /// First paragraph of the section, and the head of its table.
 pub const INTRODUCTION: &str = "Each run is predicted from the others by a table file (`.pam`) and the prediction of `host predict`, which carries the \
     memory through all runs in order; of the predicted run only pressure and time are used. Every sixth run is left out together. \
-    \"Base\": the base model of `host fit` with the zero of the load cell. \"Static\": base and contact of the bladder. \"Memory\": the same with `bladder-creep`. Root mean square in percent \
+    \"Base\": the base model of `host fit` with the zero of the load cell. \"Static\": the same, with the contact of the bladder where the other runs follow it more closely. \"Memory\": `bladder-creep` in addition. Root mean square in percent \
     of the largest force, over readings that pull; readings that ring after a valve's pulse are set aside, and slack readings or those at \
-    the converter's end count only by the pull that is predicted too much there. \"Change\" compares memory and static.\n\n\
+    the converter's end count only by the pull that is predicted too much there. \"Change\" compares memory and the better one of base and static.\n\n\
     | set, muscle | readings | base | static | memory | change | ringing | slack |\n";
 
 /// A muscle and what was found.
@@ -36,7 +36,7 @@ pub fn section(rows: &[Row]) -> String {
             }
         };
         for (k, (name, e)) in ["settled points", "as recorded"].iter().zip(errors).enumerate() {
-            let change = e.with_memory.rms_pct / e.without_memory.rms_pct - 1.0;
+            let change = e.with_memory.rms_pct / e.without_memory.rms_pct.min(e.base.rms_pct) - 1.0;
             counts[k][0] += usize::from(change <= -0.35);
             counts[k][1] += usize::from(e.with_memory.rms_pct <= 0.6);
             let shown = |u: &UnseenError| format!("{:.2}", u.rms_pct);

@@ -7,7 +7,7 @@ use std::path::Path;
 /// What the trials are, how they were made, and what the figures mean.
 const INTRODUCTION: &str = "# Sealed trials\n\n\
     A sealed trial tests the diagnosis on simulated recordings with hidden effects. The simulated muscles belong to a bench that shares no \
-    equation with the model. Each muscle has one effect of the catalogue, two, three, none, or something that is not in the catalogue. \
+    equation with the model. Each muscle has one effect of the catalogue, several, none, or something that is not in the catalogue. \
     The truths are sealed by their hashes before the tool runs, and the answers are frozen by theirs before a seal is opened. The seed of \
     the final set comes from the operating system. In half of the trials the noise is resampled from residuals of real recordings, where \
     these are available.\n\n\

@@ -12,6 +12,7 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Recording};
 use pam_fit::effect_columns::effect_columns;
 use pam_fit::numerics::median;
+use pam_fit::predict::predict;
 use pam_fit::table_file::{About, Correction, TableFile, stored_mountings};
 use pam_fit::{Options as FitOptions, fit, table_alone};
 
@@ -25,10 +26,18 @@ use super::shift_fit::static_spline;
 use super::staircase;
 use crate::linear::solve_symmetric;
 
-/// Amplitudes of [`EffectName::BladderCreep`], in its order.
-const AMPLITUDES: usize = 3;
-/// Which of them is the contact's part without memory.
-const CONTACT: usize = 2;
+/// The amplitudes of [`EffectName::BladderCreep`], in its order.
+#[derive(Clone, Copy)]
+enum Amplitude {
+    /// `c`: the relaxing share of the wall.
+    Wall,
+    /// `b`: contact that grows with time.
+    Growing,
+    /// `d`: contact without memory.
+    Contact,
+}
+
+const AMPLITUDES: [Amplitude; 3] = [Amplitude::Wall, Amplitude::Growing, Amplitude::Contact];
 
 /// Which amplitudes are fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,11 +134,38 @@ impl<'a> Prepared<'a> {
         file
     }
 
-    /// The table with some layers of the effect.
+    /// The table with some layers of the effect: with the contact's static part where the recordings in use follow it more closely.
     ///
     /// # Errors
     /// Recordings that cannot be fitted.
     pub(super) fn table(&self, layers: Layers) -> Result<TableFile> {
+        let with = self.layered(layers, true)?;
+        let without = match layers {
+            Layers::Contact => self.base(),
+            Layers::Memory => self.layered(layers, false)?,
+        };
+        Ok(if self.squares(&with)? < self.squares(&without)? { with } else { without })
+    }
+
+    /// Squared errors of a table on the recordings in use, N². A slack muscle pulls no more than it reads.
+    fn squares(&self, file: &TableFile) -> Result<f64> {
+        let predicted = predict(file, &self.loaded)?;
+        let least = PULLS * self.points.largest_force();
+        let mut sum = 0.0;
+        let pairs = self.loaded.recordings.iter().zip(&predicted.recordings).zip(&self.used);
+        for ((recording, predicted), _) in pairs.filter(|(_, used)| **used) {
+            let force = recording.force.iter().flatten();
+            for (read, model) in force.zip(&predicted.force) {
+                // The prediction has the zero of the load cell, which the recordings have lost.
+                let model = model - self.zero;
+                let error = if *read > least { model - read } else { (model - least).max(0.0) };
+                sum += error * error;
+            }
+        }
+        Ok(sum)
+    }
+
+    fn layered(&self, layers: Layers, contact: bool) -> Result<TableFile> {
         let Self { muscle, used, .. } = self;
         let everything = used.iter().all(|used| *used);
         // The contact depends on pressure and geometry alone, the wall's drive on the table.
@@ -138,7 +174,7 @@ impl<'a> Prepared<'a> {
         for round in 1..=rounds {
             let mut bare = file.clone();
             bare.table.effects.clear();
-            let effect = self.amplitudes(&bare, layers)?;
+            let effect = self.amplitudes(&bare, (layers, contact))?;
             let freed = chosen(&self.freed(&bare, &effect)?, used);
             let last = round == rounds && everything;
             file = if last { complete(&freed, muscle)? } else { alone(&freed, muscle)? };
@@ -152,7 +188,7 @@ impl<'a> Prepared<'a> {
     /// The readings that pull, without the effect's force. What a slack muscle would pull without it is not known.
     fn freed(&self, bare: &TableFile, effect: &FittedEffect) -> Result<Campaign> {
         let values: Vec<f64> = effect.parameters.iter().map(|p| f64::from(*p)).collect();
-        let columns = effect_columns(bare, &self.loaded, effect.effect, &values[AMPLITUDES..])?;
+        let columns = effect_columns(bare, &self.loaded, effect.effect, &values[AMPLITUDES.len()..])?;
         let least = PULLS * self.points.largest_force();
         let mut freed = self.loaded.clone();
         let mut first = 0;
@@ -173,7 +209,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// The effect beside a free curve for each mounting, at the width of the contact that leaves the least.
-    fn amplitudes(&self, bare: &TableFile, layers: Layers) -> Result<FittedEffect> {
+    fn amplitudes(&self, bare: &TableFile, layers: (Layers, bool)) -> Result<FittedEffect> {
         let (points, zero) = (&self.points, self.zero);
         let least = PULLS * points.largest_force();
         let pulls: Vec<bool> = self
@@ -182,7 +218,7 @@ impl<'a> Prepared<'a> {
             .zip(&points.force)
             .map(|(used, force)| *used && force - zero > least)
             .collect();
-        let mut best: Option<(f64, [f64; AMPLITUDES], f64)> = None;
+        let mut best: Option<(f64, [f64; AMPLITUDES.len()], f64)> = None;
         for width in TABLE_WIDTHS {
             let columns = effect_columns(bare, &self.loaded, EffectName::BladderCreep, &[width])?;
             let found = beside_curves(points, &pulls, zero, &columns, layers);
@@ -191,7 +227,7 @@ impl<'a> Prepared<'a> {
                 best = Some((found.squares, found.amplitudes, width));
             }
         }
-        let (_, found, width) = best.unwrap_or((0.0, [0.0; AMPLITUDES], TABLE_WIDTHS[0]));
+        let (_, found, width) = best.unwrap_or((0.0, [0.0; AMPLITUDES.len()], TABLE_WIDTHS[0]));
         Ok(FittedEffect::new(EffectName::BladderCreep, &[found[0], found[1], found[2], width]))
     }
 }
@@ -251,7 +287,7 @@ fn slack_reading(points: &Points, use_point: &[bool]) -> f64 {
 
 /// Amplitudes beside free curves.
 struct Beside {
-    amplitudes: [f64; AMPLITUDES],
+    amplitudes: [f64; AMPLITUDES.len()],
     /// Sum of squared residuals, N².
     squares: f64,
     /// Deadband of the straight line at full length, Pa.
@@ -283,11 +319,17 @@ fn without_negative(
 }
 
 /// Least squares of the amplitudes beside the curves.
-fn beside_curves(points: &Points, pulls: &[bool], zero: f64, columns: &[Vec<f64>], layers: Layers) -> Beside {
+fn beside_curves(
+    points: &Points,
+    pulls: &[bool],
+    zero: f64,
+    columns: &[Vec<f64>],
+    (layers, contact): (Layers, bool),
+) -> Beside {
     let spline = static_spline(points.highest());
     let (longest, knots) = (points.longest(), spline.len());
     let curves = knots * points.mountings.len();
-    let count = curves + AMPLITUDES;
+    let count = curves + AMPLITUDES.len();
     let row = |i: usize| -> Vec<(usize, f64)> {
         let (m, p) = (points.mounting[i], points.pressure[i]);
         let mut row: Vec<(usize, f64)> = if m == longest {
@@ -298,8 +340,9 @@ fn beside_curves(points: &Points, pulls: &[bool], zero: f64, columns: &[Vec<f64>
         };
         let memory = layers == Layers::Memory;
         // Elsewhere a free curve has the contact's part.
-        let fitted = |a: &usize| if *a == CONTACT { m == longest } else { memory };
-        row.extend((0..AMPLITUDES).filter(fitted).map(|a| (curves + a, columns[a][i])));
+        let fitted =
+            |a: &usize| if *a == (Amplitude::Contact as usize) { contact && m == longest } else { memory };
+        row.extend((0..AMPLITUDES.len()).filter(fitted).map(|a| (curves + a, columns[a][i])));
         row
     };
     let mut gram = vec![vec![0.0; count]; count];
@@ -323,12 +366,20 @@ fn beside_curves(points: &Points, pulls: &[bool], zero: f64, columns: &[Vec<f64>
     // Columns of forces per unit of an amplitude are of very different size: the solution scales them.
     let open: Vec<usize> = (0..count).filter(|a| gram[*a][*a] > 0.0).collect();
     open.iter().for_each(|a| gram[*a][*a] *= 1.0 + RIDGE);
-    let weights = without_negative(&gram, &moment, open, curves..curves + CONTACT);
+    let weights = without_negative(&gram, &moment, open, curves..curves + Amplitude::Contact as usize);
     let left = |i: usize| points.force[i] - zero - row(i).iter().map(|(a, x)| x * weights[*a]).sum::<f64>();
     let squares = (0..points.len()).filter(|i| pulls[*i]).map(|i| left(i).powi(2)).sum();
     let of = |a: usize| weights[curves + a];
     let line = knots * longest;
     let deadband = -1e3 * points.highest() * weights[line] / weights[line + 1];
     // Contact takes pressure and gives none.
-    Beside { amplitudes: [of(0), of(1), of(CONTACT).max(0.0)], squares, deadband }
+    Beside {
+        amplitudes: [
+            of(Amplitude::Wall as usize),
+            of(Amplitude::Growing as usize),
+            of(Amplitude::Contact as usize).max(0.0),
+        ],
+        squares,
+        deadband,
+    }
 }
