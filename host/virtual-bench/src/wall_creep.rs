@@ -32,7 +32,7 @@ pub struct LoadHistory {
 /// Changes within this time count as one, s.
 const TOGETHER: f64 = 0.02;
 /// Beyond this number of changes the older ones are merged in pairs.
-const MOST: usize = 512;
+const MOST: usize = 1024;
 
 impl LoadHistory {
     /// The creep's force, N, after the wall has taken `wall` (N) at a pressure (Pa) for a step `dt` (s).
