@@ -184,7 +184,7 @@ fn parse() -> Result<Cli> {
     apply(program_name::renamed(Cli::command()), &settings)
         .try_get_matches()
         .and_then(|matches| Cli::from_arg_matches(&matches))
-        .or_else(|words| Err(ended(&words)))
+        .map_err(|words| ended(&words))
 }
 
 /// Prints help or the version, or what is wrong with a call, and ends: with status 2 for the last.

@@ -141,7 +141,7 @@ fn a_bladder_creeps_with_two_signs_and_the_next_run_remembers_it() {
         alone.at(vented);
         alone.at(Context { dt: 1e-9, ..filled });
         let first = steps(&mut alone, filled, 40.0, 7);
-        let drive = |t: f64| if t < 40.0 || t >= 60.0 { 1.0 } else { 0.0 };
+        let drive = |t: f64| if !(40.0..60.0).contains(&t) { 1.0 } else { 0.0 };
         let law = |z: f64| 0.2 * (share * wall - creeping_contact * engaged) * z - contact * engaged;
         close(first, law(creeping(drive, 40.0)), 0.01);
         assert_eq!(first > -contact * engaged, grows);

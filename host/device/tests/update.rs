@@ -22,7 +22,7 @@ fn device(key: Option<[u8; 32]>) -> Device {
 }
 
 fn images(release: u16, key: u8) -> Vec<Image> {
-    let program: Vec<u8> = (0..40_001_u32).map(|n| (n * u32::from(release) >> 3) as u8).collect();
+    let program: Vec<u8> = (0..40_001_u32).map(|n| ((n * u32::from(release)) >> 3) as u8).collect();
     let key = key_of(&[key; 32]);
     [0, 1]
         .map(|slot| signed(Board::Native, slot, SLOTS[usize::from(slot)], (release, 0, 0), &program, &key))

@@ -78,10 +78,7 @@ impl Device {
         }
         for command in self.outputs.sides {
             let Command { pressure_pa, .. } = command;
-            assert!(
-                pressure_pa >= 0.0 && pressure_pa <= Hardware::SIMULATED.command_ceiling_pa,
-                "{command:?}"
-            );
+            assert!((0.0..=Hardware::SIMULATED.command_ceiling_pa).contains(&pressure_pa), "{command:?}");
             assert!(command.vent || state != State::Armed, "an armed device is vented");
             assert!(command.vent || state != State::Fault || settings.hold_on != 0, "a fault vents");
         }

@@ -85,7 +85,7 @@ mod tests {
         let report = compare(&lasting, Against::Recordings(&before), &options).expect("comparable");
         assert_eq!(report.missing.first().map(|m| m.effect.as_str()), Some("force-offset"), "{report:?}");
         let turning = sweeps(700.0, |stroke, p, run| {
-            let sign = if (run + (stroke * 250.0) as usize) % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if (run + (stroke * 250.0) as usize).is_multiple_of(2) { 1.0 } else { -1.0 };
             sign * 12.0 * (p / 150e3).sin()
         });
         let report = compare(&turning, Against::Recordings(&before), &options).expect("comparable");

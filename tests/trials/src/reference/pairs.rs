@@ -48,13 +48,11 @@ fn short(v: f64) -> Option<f32> {
     v.is_finite().then_some(v as f32)
 }
 
+/// Name of the muscle, its half, the change, its size, and the runs.
+type About = (String, Option<Half>, Option<&'static str>, f64, (usize, usize, usize));
+
 /// The table of a pair.
-pub fn table(
-    (before, after): (&[Run], &[Run]),
-    slopes: &Slopes,
-    largest: f64,
-    about: (String, Option<Half>, Option<&'static str>, f64, (usize, usize, usize)),
-) -> Pair {
+pub fn table((before, after): (&[Run], &[Run]), slopes: &Slopes, largest: f64, about: About) -> Pair {
     let mountings = before.iter().chain(after).map(|r| r.mounting).max().map_or(0, |m| m + 1);
     let side = |runs: &[Run]| -> Vec<Vec<f64>> {
         let numbers: BTreeSet<usize> = runs.iter().map(|r| r.run).collect();
@@ -83,7 +81,7 @@ pub fn table(
         largest,
         cells: kept
             .iter()
-            .map(|i| (i / (2 * BINS), if (i / BINS) % 2 == 0 { 1 } else { -1 }, i % BINS))
+            .map(|i| (i / (2 * BINS), if (i / BINS).is_multiple_of(2) { 1 } else { -1 }, i % BINS))
             .collect(),
         before: pick(&old),
         after: pick(&new),
