@@ -8,7 +8,7 @@
 //! confirm  the host has talked to it: it stays. Without this, the fourth start is that of the program before
 //! ```
 //! Whenever power fails, one of the two programs is whole and is started. The layout is that of
-//! [`firmware_image`](model_core::firmware_image).
+//! [`model_core::firmware_image`].
 
 use ed25519_dalek::{Signature, VerifyingKey};
 use model_core::firmware_image::{

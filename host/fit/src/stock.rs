@@ -12,10 +12,10 @@
 //!
 //! | step | file |
 //! | --- | --- |
-//! | recordings to mean forces by muscle, mounting, direction, pressure and stroke | [`cells`] |
-//! | the shared force | [`surface`] |
-//! | Gauss–Newton steps, and the variances of the random effects | [`mixed_model`] |
-//! | each muscle predicted from the others; intervals over muscles | [`between`] |
+//! | recordings to mean forces by muscle, mounting, direction, pressure and stroke | `cells` |
+//! | the shared force | `surface` |
+//! | Gauss–Newton steps, and the variances of the random effects | `mixed_model` |
+//! | each muscle predicted from the others; intervals over muscles | `between` |
 //! | constants | [`criteria`] |
 //!
 //! Linear mixed model and its equations: C. R. Henderson, Biometrics 31 (1975) 423, doi 10.2307/2529430; variances by expectation and maximisation:
