@@ -6,11 +6,12 @@
 use model_core::effects::EffectName;
 use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
+use pam_data::pluralise::pluralise;
 use pam_data::recording::{Campaign, Recording};
 use pam_fit::effect_columns::effect_columns;
 use pam_fit::numerics::median;
-use pam_fit::table_file::{About, Correction, TableFile, stored_mountings};
-use pam_fit::{Options as FitOptions, fit, table_alone};
+use pam_fit::table_file::{About, Correction, TableFile};
+use pam_fit::{Options as FitOptions, table_alone};
 
 use super::campaign::{self, Points};
 use super::criteria::{PULLS, RAMP, TABLE_LEAST_DEADBAND, TABLE_LEAST_SLACK, TABLE_ROUNDS, TABLE_WIDTHS};
@@ -186,7 +187,7 @@ impl<'a> Prepared<'a> {
         Ok(last)
     }
 
-    /// What the file tells: the base model's fit, with the errors of this one.
+    /// What the file tells.
     fn about(
         &self,
         problem: &Problem<'_>,
@@ -194,13 +195,21 @@ impl<'a> Prepared<'a> {
         solution: &Solution,
         width: f64,
     ) -> Result<About> {
-        let mut about = complete(&chosen(&self.loaded, &self.used), self.muscle)?.about;
         let with = TableFile { table: solution.table.clone(), ..bare.clone() };
         let columns = self.columns(&with, width)?;
-        about.uncertainty = problem.uncertainty(&columns, solution);
-        about.mountings.clear();
-        about.fit = problem.quality(solution, about.fit.warnings);
-        Ok(about)
+        let mountings = pluralise(self.points.mountings.len(), "mounting");
+        let together = format!(
+            "recorded at held lengths ({mountings}): static part, friction and the bladder's memory were fitted together, with the braid \
+             angle, diameter and wall that these lengths ask for"
+        );
+        let warnings = self.loaded.warnings.iter().cloned().chain([together]).collect();
+        Ok(About {
+            muscle: self.muscle.name.clone(),
+            tool: format!("host {}", env!("CARGO_PKG_VERSION")),
+            fit: problem.quality(solution, warnings),
+            uncertainty: problem.uncertainty(&columns, solution),
+            ..About::default()
+        })
     }
 }
 
@@ -214,23 +223,7 @@ pub fn table(settled: &Campaign, muscle: &MuscleDescription) -> Result<Option<Ta
     prepared.map(|prepared| prepared.table(Layers::Memory)).transpose()
 }
 
-/// The table of recordings with all that its file tells.
-fn complete(campaign: &Campaign, muscle: &MuscleDescription) -> Result<TableFile> {
-    let with =
-        |as_described: bool| fit(campaign, muscle, &FitOptions { as_described, ..FitOptions::default() });
-    let fitted = with(false).or_else(|_| with(true))?;
-    let about = About {
-        muscle: muscle.name.clone(),
-        tool: format!("host {}", env!("CARGO_PKG_VERSION")),
-        fit: fitted.summary.quality(),
-        uncertainty: Some(fitted.stored_uncertainty()),
-        mountings: stored_mountings(&fitted.solution.problem),
-        ..About::default()
-    };
-    Ok(TableFile { table: fitted.table, about })
-}
-
-/// The same for a prediction only. Few recordings may ask for dimensions that no table has: then those of the description stay.
+/// The base model's table. Few recordings may ask for dimensions that no table has: then those of the description stay.
 fn alone(campaign: &Campaign, muscle: &MuscleDescription) -> Result<TableFile> {
     let with = |as_described: bool| {
         table_alone(campaign, muscle, &FitOptions { as_described, ..FitOptions::default() })

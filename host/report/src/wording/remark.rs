@@ -147,6 +147,10 @@ fn refused(effect: &str, why: &Refusal) -> String {
             "{effect} not named: it fits these recordings but does not improve held-out rows by more than chance ({without:.3} N \
              without it, {with:.3} N with it)"
         ),
+        // A number of many thousand percent says no more.
+        Refusal::UncertainSize(half) if half.is_finite() && *half > 10.0 => format!(
+            "{effect} not named: the 95 % interval of its size is more than ten times as wide as the size itself"
+        ),
         Refusal::UncertainSize(half) if half.is_finite() => format!(
             "{effect} not named: the 95 % interval of its size includes zero (± {:.0} % of the size, by parts of the recordings)",
             100.0 * half
