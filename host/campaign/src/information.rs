@@ -22,6 +22,9 @@ use crate::hypothesis::{DECIDED, Hypothesis, entropy};
 use crate::places::Places;
 use crate::step::{CheckKind, Step};
 
+/// Time between two steps that a design assumes, s.
+const PAUSE_S: f64 = 10.0;
+
 /// What is known when a step is chosen.
 #[derive(Debug, Clone)]
 pub struct Knowledge<'a> {
@@ -101,7 +104,7 @@ impl<'a> Design<'a> {
         }
         let mut recordings = self.past.clone();
         let begin = recordings.iter().filter_map(|r| r.time.last()).copied().fold(0.0, f64::max);
-        recordings.push(simulated(&step.course(places), begin + 10.0));
+        recordings.push(simulated(&step.course(places), begin + PAUSE_S));
         let before: usize = self.past.iter().map(Recording::len).sum();
         let Some(seen) = Seen::of(self, recordings, before) else { return Gain::default() };
         self.compare(&seen.before, &seen.after, &seen)
@@ -361,6 +364,11 @@ fn simulated(course: &Course, begin: f64) -> Recording {
     let (time, pressure, stroke) = course.samples(begin, SAMPLE_HZ);
     let stride = time.len().div_ceil(STEP_ROWS).max(1);
     thinned(&Recording { name: "step".into(), time, pressure, stroke, ..Recording::default() }, stride)
+}
+
+/// The recording that is expected of a course after a time, s.
+pub(crate) fn expected(course: &Course, after: f64, name: &str) -> Recording {
+    Recording { name: name.to_owned(), ..simulated(course, after + PAUSE_S) }
 }
 
 /// What each row counts: its share of the time between independent readings.
