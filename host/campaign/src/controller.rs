@@ -214,10 +214,11 @@ impl Actuation for Controller {
         (self.ahead, self.clock) = (ahead.get(), clock.get());
         // The muscle is vented; the free end moves back after failures, too.
         let back = self.axis.rest();
-        outcome?;
+        // An axis that fails is the cause of what the controller then reports, such as a host that was silent meanwhile.
         if let Some(error) = failed.into_inner() {
             return Err(error);
         }
+        outcome?;
         back?;
         Ok(if ended.get() { Ending::Ended } else { Ending::Whole })
     }

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
 
 use model_core::image;
 use model_core::link::endpoints::{ClearFault, GetFaults, GetSettings, GetStatus, SetSettings};
@@ -28,6 +29,11 @@ use crate::demo::tracking::{Law, Task, choose, track};
 
 /// Most ticks without a host that the firmware's settings allow.
 const LONGEST_SILENCE: u32 = 60_000;
+
+/// Time beyond the silence of a host until its fault shows.
+const MARGIN: Duration = Duration::from_secs(2);
+/// Time between two looks at the state of a controller.
+const POLL: Duration = Duration::from_millis(50);
 
 /// Everything that carries out steps.
 pub(crate) struct Rigging {
@@ -79,10 +85,10 @@ pub(crate) fn emulated(
 }
 
 /// Allows an emulated host to be silent as long as a real one: the watch counts device time, which goes so much faster, and twice as fast
-/// again after a pause of a busy machine.
+/// again after a pause of a busy machine, which may last as long.
 pub(crate) fn allow_silence(client: &mut Client, speed: f64) -> Result<()> {
     let mut settings = client.call::<GetSettings>(&())?;
-    let faster = (2.0 * speed).ceil().max(1.0) as u32;
+    let faster = (4.0 * speed).ceil().max(1.0) as u32;
     settings.watch.host_silence_ticks =
         settings.watch.host_silence_ticks.saturating_mul(faster).min(LONGEST_SILENCE);
     client.call_once::<SetSettings>(&settings).map(drop)
@@ -126,17 +132,21 @@ pub(crate) fn real(
     Ok(Rigging { controller: Controller::new(client, axis, none), rig, muscle, words, emulated: None })
 }
 
-/// A campaign that was stopped by force leaves the controller vented by the fault of a silent host. This call is the host that was
-/// missing, so the fault is cleared; any other stays.
+/// A campaign that was stopped by force leaves a controller that runs until its host has been silent for long enough, and is then vented
+/// by that fault. This call is the host that was missing, so it waits, and clears the fault; any other fault stays.
 fn clear_silence(client: &mut Client, console: &Console) -> Result<()> {
+    let ticks = client.call::<GetSettings>(&())?.watch.host_silence_ticks;
+    let deadline = Instant::now() + Duration::from_millis(ticks.into()) + MARGIN;
+    while client.call::<GetStatus>(&())?.state == State::Running && Instant::now() < deadline {
+        std::thread::sleep(POLL);
+    }
     if client.call::<GetStatus>(&())?.state != State::Fault {
         return Ok(());
     }
-    let silent =
-        client.call::<GetFaults>(&())?.latched.is_some_and(|report| report.fault == Fault::HostSilence);
-    if silent {
+    let latched = client.call::<GetFaults>(&())?.latched;
+    if latched.is_some_and(|report| report.fault == Fault::HostSilence) {
         client.call_once::<ClearFault>(&())?;
-        console.note("the controller had vented the muscle because the interrupted campaign fell silent; that fault is cleared");
+        console.note("the controller had vented the muscle because the interrupted campaign fell silent; the fault is cleared");
     }
     Ok(())
 }

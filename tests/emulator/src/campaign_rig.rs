@@ -218,6 +218,7 @@ impl LineMachine {
 /// # Panics
 /// When the folder cannot be written.
 pub fn campaign(folder: &Path, port: &Path, minutes: &str) -> Command {
+    let messages = File::options().create(true).append(true).open(folder.join(MESSAGES)).expect("a file");
     let mut command = Command::new(program::path());
     command
         .args(["campaign", "--muscle", "muscle.toml", "--rig", "rig.toml", "-o", "c", "--for", "fit"])
@@ -228,8 +229,19 @@ pub fn campaign(folder: &Path, port: &Path, minutes: &str) -> Command {
         .env_remove("PAM_SETTINGS")
         .stdin(Stdio::null())
         .stdout(Stdio::null())
-        .stderr(Stdio::null());
+        .stderr(messages);
     command
+}
+
+/// Messages of all calls of a folder.
+const MESSAGES: &str = "messages.txt";
+
+/// The last messages of the campaigns of a folder, for a test that fails.
+#[must_use]
+pub fn messages(folder: &Path) -> String {
+    let text = std::fs::read_to_string(folder.join(MESSAGES)).unwrap_or_default();
+    let lines: Vec<&str> = text.lines().collect();
+    lines[lines.len().saturating_sub(20)..].join("\n")
 }
 
 /// Rows of every recording of a campaign, also of unfinished ones: whole lines below the header.

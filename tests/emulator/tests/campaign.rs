@@ -13,13 +13,17 @@ mod campaign {
 }
 
 use std::collections::HashSet;
+use std::fs::File;
 use std::io::{Read, Write};
+use std::os::fd::AsFd;
 use std::path::Path;
 use std::process::{Child, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use emulator_tests::campaign_rig::{Bench, Cable, LineMachine, VENTED_KPA, campaign, rows, times, until};
+use emulator_tests::campaign_rig::{
+    Bench, Cable, LineMachine, VENTED_KPA, campaign, messages, rows, times, until,
+};
 use emulator_tests::program::interrupt;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -96,7 +100,8 @@ fn a_campaign_with_a_testing_machine_on_serial_lines_is_killed_continues_and_ven
 
 /// What the operator reads and does: moves the free end where the program says, then presses Enter.
 fn operate(child: &mut Child, bench: &Bench, said: &Arc<Mutex<String>>, most: usize) -> Vec<f64> {
-    let mut input = child.stdin.take().expect("its input");
+    let mut input =
+        child.stdin.as_ref().and_then(|i| rustix::io::dup(i).ok()).map(File::from).expect("its input");
     let mut strokes = Vec::new();
     let mut answered = 0;
     until("the campaign ends", || {
@@ -148,7 +153,10 @@ fn an_operator_is_prompted_in_words_and_may_end_the_campaign_there() {
     let (mut child, said) = prompted(folder, &bench);
     assert!(operate(&mut child, &bench, &said, 0).is_empty());
     interrupt(&child);
-    assert!(child.wait().expect("it ends").success(), "an interruption is no failure");
+    // Waiting would close its input, which is an answer, too.
+    until("it ends", || child.try_wait().expect("a process").is_some());
+    let ended = child.wait().expect("it ends");
+    assert!(ended.success(), "an interruption is no failure: {}", said.lock().expect("text"));
     let before = rows(&folder.join("c"));
     assert!(!before.is_empty() && said.lock().expect("text").contains("interrupted"));
 
@@ -191,7 +199,7 @@ fn interruptions_lose_no_row_and_leave_no_muscle_under_pressure() {
         });
         if ended {
             // Complete; the next one begins in a new folder.
-            assert!(child.wait().expect("it ends").success(), "the campaign failed by itself");
+            assert!(child.wait().expect("it ends").success(), "the campaign failed: {}", messages(folder));
             assert_eq!(document(folder)["complete"], true);
             figures.campaigns += 1;
             std::fs::remove_dir_all(folder.join("c")).expect("a folder");
