@@ -90,7 +90,7 @@ fn a_plan_without_recordings_begins_with_the_first_steps_and_continues_with_thei
     let recordings: Vec<&str> = made.iter().map(String::as_str).collect();
     let third = plan(folder, &recordings);
     let after = third["predicted_error_N"].as_f64().unwrap();
-    assert!(after < before, "the recorded plan makes the table surer: {before} to {after} N");
+    assert!(after < before, "the recorded plan makes the table more certain: {before} to {after} N");
 }
 
 #[test]

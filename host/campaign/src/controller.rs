@@ -143,7 +143,7 @@ impl Actuation for Controller {
     }
 
     fn set_clock(&mut self, seconds: f64) {
-        // The next reading comes at this time, whatever the device's own clock shows then.
+        // The next reading comes at this time. The device's own clock may show any other.
         (self.clock, self.ahead) = (seconds, None);
     }
 

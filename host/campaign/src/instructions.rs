@@ -10,7 +10,7 @@ use crate::step::{CheckKind, Step};
 /// Speed at which the free end returns to rest length while nothing is recorded, mm/s.
 const RETURN_MM_S: f64 = 2.0;
 
-/// The protocol file of a step, recorded under a name, and `NAME_2` and so on where it records in pieces; nothing for a check, which has no muscle.
+/// The protocol file of a step, recorded under a name; nothing for a check, which has no muscle.
 #[must_use]
 pub fn protocol(step: &Step, places: &Places, name: &str) -> Option<Protocol> {
     let course = step.course(places);
@@ -20,13 +20,13 @@ pub fn protocol(step: &Step, places: &Places, name: &str) -> Option<Protocol> {
     // As long as the free stroke is unknown, a full stroke is one to wherever the muscle is free.
     let unknown = places.model.is_none() && !(places.free > 0.0);
     let mut steps = Vec::new();
-    let (mut recording, mut stroke, mut files) = (false, 0.0_f64, 0);
-    for (segment, recorded) in &course.segments {
-        if *recorded != recording {
-            recording = *recorded;
-            files += u32::from(recording);
-            let file = if files > 1 { format!("{name}_{files}") } else { name.to_owned() };
-            steps.push(if recording { ProtocolStep::File { name: file } } else { ProtocolStep::EndFile });
+    let (mut recording, mut stroke) = (false, 0.0_f64);
+    let recorded = recorded(&course);
+    for (at, (segment, _)) in course.segments.iter().enumerate() {
+        if recorded.contains(&at) != recording {
+            recording = !recording;
+            let file = ProtocolStep::File { name: name.to_owned() };
+            steps.push(if recording { file } else { ProtocolStep::EndFile });
         }
         match *segment {
             Segment::Travel { to, speed, until_force } => {
@@ -50,7 +50,7 @@ pub fn protocol(step: &Step, places: &Places, name: &str) -> Option<Protocol> {
                     steps.push(ProtocolStep::Move { to: rest, speed_mm_s: RETURN_MM_S });
                     stroke = 0.0;
                 }
-                steps.push(if *recorded {
+                steps.push(if recording {
                     ProtocolStep::Tare { seconds }
                 } else {
                     ProtocolStep::Rest { seconds }
@@ -69,13 +69,14 @@ pub fn instructions(step: &Step, places: &Places) -> Vec<String> {
     }
     let course = step.course(places);
     let mut lines: Vec<String> = Vec::new();
+    let recorded = recorded(&course);
     let mut recording = false;
     let mut at = 0;
     while at < course.segments.len() {
-        let (segment, recorded) = course.segments[at];
-        if recorded != recording {
-            recording = recorded;
-            lines.push(if recorded { "Start the recording." } else { "Stop the recording." }.to_owned());
+        let segment = course.segments[at].0;
+        if recorded.contains(&at) != recording {
+            recording = !recording;
+            lines.push(if recording { "Start the recording." } else { "Stop the recording." }.to_owned());
         }
         let times = repeats(&course, at);
         if times > 1 {
@@ -92,6 +93,13 @@ pub fn instructions(step: &Step, places: &Places) -> Vec<String> {
         lines.push("Stop the recording.".to_owned());
     }
     lines
+}
+
+/// Segments from the first that is recorded to the last: an operator records them into one file.
+fn recorded(course: &Course) -> std::ops::Range<usize> {
+    let first = course.segments.iter().position(|s| s.1);
+    let last = course.segments.iter().rposition(|s| s.1);
+    first.unwrap_or(0)..last.map_or(0, |last| last + 1)
 }
 
 /// How often the pair of segments that begins here follows itself; at least once.

@@ -6,7 +6,7 @@
 //! | what is known of the muscle's range | [`places`] |
 //! | what is a step expected to tell | [`information`] |
 //! | what to do next, and when to stop | [`engine`] |
-//! | what a person does | [`instructions`], [`prompt`] |
+//! | what the operator does | [`instructions`], [`prompt`] |
 //! | is the recording good | [`watch`] |
 //! | who carries it out | [`actuation`]: [`mod@bench`], [`controller`] |
 //! | what was done, also after an interruption | [`journal`], [`campaign`] |

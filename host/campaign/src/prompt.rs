@@ -54,7 +54,7 @@ impl<W: Write> Prompt<W> {
             |e| {
                 Error::new(
                     DeviceCode::DeviceSilent,
-                    format!("the operator cannot be asked for a stroke: {e}"),
+                    format!("the operator cannot be prompted for a stroke: {e}"),
                 )
             },
         )?;

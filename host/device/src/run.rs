@@ -40,7 +40,7 @@ pub enum Ending {
 /// Silence of the telemetry after which the device counts as gone.
 const SILENCE: Duration = Duration::from_secs(5);
 
-/// Another session may arm a device whose owner has sent no keep-alive request for `watch.host_silence_ticks`; so much longer is waited.
+/// Another session may arm a device whose owner has sent no keep-alive request for `watch.host_silence_ticks`; this margin is added.
 const OWNER_MARGIN: Duration = Duration::from_millis(500);
 
 /// How long arming may take: the air of the run before leaves in two seconds, the test of the dump valve takes as long at most.

@@ -70,7 +70,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Starts it with so many device seconds in a second.
+    /// Starts it with a number of device seconds in a second.
     ///
     /// # Panics
     /// When it does not start.

@@ -15,7 +15,6 @@ mod campaign {
 use std::collections::HashSet;
 use std::fs::File;
 use std::io::{Read, Write};
-use std::os::fd::AsFd;
 use std::path::Path;
 use std::process::{Child, Stdio};
 use std::sync::{Arc, Mutex};
@@ -76,7 +75,7 @@ fn a_campaign_with_a_testing_machine_on_serial_lines_is_killed_continues_and_ven
     let before = rows(&folder.join("c"));
     bench.until_vented();
 
-    // The controller is held by the fault of a silent host; the same call goes on.
+    // The controller is held by the fault of a silent host; the same call continues.
     let mut child = campaign(folder, &port, "6").spawn().expect("it starts");
     until_rows(folder, &mut child, before.len() + 60);
     interrupt(&child);

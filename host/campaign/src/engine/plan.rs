@@ -32,7 +32,7 @@ pub struct Planned {
 /// A plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Steps in the order in which they should be recorded: each tells most per second after those before it.
+    /// Steps in the order of recording: each tells most per second after those before it.
     pub steps: Vec<Planned>,
     /// Why it ends there, in one sentence.
     pub ends: String,
@@ -80,7 +80,7 @@ impl Engine {
         Ok(engine)
     }
 
-    /// The steps that are worth recording next, at most so many and within so much bench time.
+    /// The steps that are worth recording next, at most this number and within this bench time.
     #[must_use]
     pub fn plan(&self, most: usize, budget_s: f64) -> Plan {
         let mut left = budget_s - self.seconds(&CLOSING);

@@ -98,7 +98,7 @@ impl Engine {
         Ranking { steps: weighed, settled, error: Some(error) }
     }
 
-    /// Bench time of a step, s; with the handling of a person.
+    /// Bench time of a step, s; with the handling of an operator.
     pub(super) fn seconds(&self, step: &Step) -> f64 {
         step.seconds(&self.places) + self.handling_s
     }
