@@ -177,6 +177,7 @@ fn an_operator_is_prompted_in_words_and_may_end_the_campaign_there() {
 #[test]
 fn interruptions_lose_no_row_and_leave_no_muscle_under_pressure() {
     let count = if std::env::var_os("PAM_LONG").is_some() { 200 } else { 6 };
+    let write = std::env::var("PAM_INTERRUPTIONS_PAGE").is_ok_and(|wish| wish == "write");
     let folder = folder("");
     let folder = folder.path();
     let port = folder.join("tty");
@@ -243,10 +244,11 @@ fn interruptions_lose_no_row_and_leave_no_muscle_under_pressure() {
         figures.add(kind, under_pressure, lost, now.len() - known.len(), vented_s);
         assert_eq!(lost, 0, "rows are gone after {kind:?}");
         known = now;
+        // After each, so that a test that is ended leaves what it has seen.
+        if write {
+            figures.write();
+        }
     }
     eprintln!("{figures:?}");
     assert!(figures.under_pressure() > 0, "the muscle was under pressure at some of the interruptions");
-    if std::env::var("PAM_INTERRUPTIONS_PAGE").is_ok_and(|wish| wish == "write") {
-        figures.write();
-    }
 }
