@@ -68,11 +68,13 @@ fn a_campaign_with_a_testing_machine_on_serial_lines_is_killed_continues_and_ven
     let port = folder.join("tty");
     let _cable = Cable::plug(&port, &bench);
 
+    until("the controller has been on for a minute", || bench.state().time_s > 60.0);
     let mut child = campaign(folder, &port, "6").spawn().expect("it starts");
     until_rows(folder, &mut child, 130);
     child.kill().expect("it runs");
     child.wait().expect("it ends");
     let before = rows(&folder.join("c"));
+    assert!(times(&before)[0] < 60.0, "the clock of a campaign begins with it, not with the controller");
     bench.until_vented();
 
     // The controller is held by the fault of a silent host; the same call continues.
