@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::criteria::baseline::DEPENDENT_COLUMN;
 use super::criteria::candidates::MOST_AMPLITUDES;
-/// Rows from which the threads share one product. The parts are the same whatever the number of threads, and so is the sum.
+/// Rows from which the threads share one product. The parts do not depend on the number of threads, so the sum does not either.
 const PART: usize = 1 << 16;
 
 /// Sum of products.

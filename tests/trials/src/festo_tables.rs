@@ -25,7 +25,7 @@ pub struct Row {
     pub errors: Result<Unseen, String>,
 }
 
-/// Errors of what a table has not seen.
+/// Errors on recordings that were held out.
 pub struct Unseen {
     /// Runs, at settled points and over readings as recorded.
     pub runs: [UnseenErrors; 2],

@@ -140,12 +140,12 @@ fn reread(file: &TableFile) -> Result<TableFile> {
     TableFile::from_bytes(&file.to_bytes()?)
 }
 
-/// What is left out together, and predicted from the rest.
+/// Which runs are held out together and predicted from the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LeftOut {
     /// A run; of many, every so many-th.
     Runs,
-    /// All runs of a mounting between others: a contraction that the table has not seen.
+    /// All runs of a mounting between others: a contraction of which the fit has no recording.
     Mountings,
 }
 
