@@ -59,6 +59,7 @@ mod tests {
         published::<super::bench::Demo<'_>>("pam-demo-1");
         published::<super::bench::Emulate<'_>>("pam-emulate-1");
         published::<super::bench::Plan<'_>>("pam-plan-1");
+        published::<super::bench::PlanOfRecordings<'_>>("pam-plan-protocols-1");
         published::<super::bench::Recover>("pam-recover-1");
         published::<super::bench::SettingsFiles<'_>>("pam-settings-1");
         published::<super::bench::Studio<'_>>("pam-studio-1");

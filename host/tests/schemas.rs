@@ -76,6 +76,7 @@ fn results_of_recordings_and_tables_are_valid() {
         own("predict --quiet --table t.pam --json -", true),
         own("evaluate --quiet --muscle m.toml --leave-out runs --json -", true),
         own("plan --quiet --table t.pam p.toml --json -", false),
+        own("plan --quiet --muscle m.toml --steps 2 --json -", true),
         own("table show t.pam --json", false),
         own("table check t.pam --json", false),
         own("table export t.pam -o t.h --json", false),
@@ -110,7 +111,7 @@ fn results_of_recordings_and_tables_are_valid() {
     seen.push(valid(&all, "compare", &host(folder, &["compare", "--quiet", a, b, "--json"])));
     seen.sort();
     seen.dedup();
-    assert_eq!(seen.len(), 14, "{seen:?}");
+    assert_eq!(seen.len(), 15, "{seen:?}");
 }
 
 #[test]

@@ -3,6 +3,9 @@
 
     python3 tests/benchmarks/fleet.py [MUSCLES] [ROWS] [PROGRAMS]        400 muscles of 20,000 rows unless told otherwise
 
+The page names the number of muscles that were run; 10,000 runs the whole fleet. A Dask job that calls SciPy (fleet_dask.py) fits some of
+the muscles for comparison.
+
 The recordings are those of the virtual bench, one seed each. Only 24 are made; a manifest of more muscles names them in turn, which costs a
 fit the same and does not fill the disk. PROGRAMS is the folder of `host` and `virtual-bench`; without it they are built.
 
@@ -21,6 +24,10 @@ from pathlib import Path
 
 MUSCLES = int(sys.argv[1]) if len(sys.argv) > 1 else 400
 ROWS = int(sys.argv[2]) if len(sys.argv) > 2 else 20_000
+import environment
+
+environment.enter()
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 RECORDED = 24
@@ -62,6 +69,19 @@ def manifest(path, muscles):
     return path
 
 
+def dask(bin_, cores, fit_per, wall_per):
+    """The section on the Dask job, which fits as many muscles as there are different ones."""
+    path = manifest("fleet.csv", 2 * RECORDED).resolve()
+    _, _, _, text = timed([sys.executable, HERE / "fleet_dask.py", path, cores])
+    muscles, wall, processor = (float(word) for word in text.split())
+    lines = ["## Beside a Dask job that calls SciPy", "", "| program | muscles | wall per muscle | processor per muscle |", "| --- | ---: | ---: | ---: |"]
+    lines.append(f"| `host batch --only fit`, {cores} jobs | {MUSCLES:,} | {1e3 * wall_per:.0f} ms | {1e3 * fit_per:.0f} ms |")
+    lines.append(f"| Dask, {cores} workers, SciPy | {muscles:.0f} | {1e3 * wall / muscles:.0f} ms | {1e3 * processor / muscles:.0f} ms |")
+    return [*lines, "", "The Dask job reads the same files with polars and minimises the objective of the thesis (eq. 23) with SLSQP for each pressure, "
+            "over 200 points of the mid-line, for a given deadband. `host batch` also finds the deadband, fits all pressures together with friction, "
+            "computes uncertainties, checks the recordings, hashes them, and writes four tables.", ""]  # fmt: skip
+
+
 def main():
     bin_ = programs()
     cores = os.cpu_count()
@@ -90,6 +110,9 @@ def main():
     wall_per, fit_per = wall / MUSCLES, per
     lines += ["", f"Extrapolated from {MUSCLES:,} muscles: {FLEET:,} muscles need {FLEET * fit_per / cores / 60:.0f} min of both cores by processor time, "
               f"{FLEET * wall_per / 60:.0f} min by the wall time above.", ""]  # fmt: skip
+
+    # The same muscles by a Dask job that calls SciPy.
+    lines += dask(bin_, cores, fit_per, wall_per)
 
     # Strong and weak scaling over shards.
     lines += ["## Shards", "", "| shards | work | processor per muscle | efficiency |", "| ---: | --- | ---: | ---: |"]

@@ -1,6 +1,6 @@
 //! The columns of the design: what the table's coefficients and each effect do to the force, row by row.
 
-use model_core::effects::Context;
+use model_core::effects::{Context, MEMORY};
 use model_core::muscle::Muscle;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use pam_data::recording::{Campaign, Recording};
@@ -233,22 +233,44 @@ impl Where {
     }
 }
 
+/// What each effect of the library remembers, for each of its shapes.
+pub(crate) type Memories = Vec<Vec<[f64; MEMORY]>>;
+
+/// Where the columns of each effect are when its shapes are judged within a span, and memories without a past.
+pub(crate) fn layout(table: &Table, library: &Library, span: &Span) -> (Vec<Where>, Memories) {
+    let mut next = table.len();
+    let places: Vec<Where> = library
+        .laws
+        .iter()
+        .map(|law| {
+            let grid = law.law.grid(law.count, span);
+            let amplitudes = law.law.amplitudes().len();
+            let shapes = grid.iter().map(|_| {
+                next += amplitudes;
+                (next - amplitudes..next).collect()
+            });
+            Where { shapes: shapes.collect(), grid: grid.clone() }
+        })
+        .collect();
+    let memories = places.iter().map(|p| vec![NO_PAST; p.grid.len()]).collect();
+    (places, memories)
+}
+
 /// The rows of a design.
 pub(crate) struct RowsOf {
-    /// One row per moment, one column per coefficient; columns of effects have the largest value 1.
+    /// One row per moment, one column per coefficient of the table (scaled) and per amplitude of an effect (N per unit).
     pub(crate) matrix: DMatrix<f64>,
-    /// Where the columns of each effect of the library are.
-    pub(crate) places: Vec<Where>,
-    /// Largest value of each column, N per unit of its amplitude.
+    /// Largest value of each column; 1 for those of the table.
     pub(crate) peak: Vec<f64>,
 }
 
-/// All columns at all moments.
+/// All columns at moments that follow those that left the memories.
 pub(crate) fn columns_of_rows(
     table: &Table,
     library: &Library,
     contexts: &[Context<f64>],
-    span: &Span,
+    places: &[Where],
+    memories: &mut Memories,
 ) -> RowsOf {
     let m = table.len();
     let mut columns: Vec<Vec<f64>> = vec![Vec::with_capacity(contexts.len()); m];
@@ -258,32 +280,21 @@ pub(crate) fn columns_of_rows(
         }
     }
     let mut peak = vec![1.0; m];
-    let mut places = Vec::with_capacity(library.laws.len());
     let vented = |c: &Context<f64>| c.pressure < VENTED * table.top;
-    for law in &library.laws {
-        let mut place = Where { shapes: Vec::new(), grid: law.law.grid(law.count, span) };
-        for shape in &place.grid {
-            let mut memory = NO_PAST;
-            let mut at = Vec::new();
-            for (a, mut column) in law.law.columns(contexts, shape, &mut memory).into_iter().enumerate() {
+    for ((law, place), memories) in library.laws.iter().zip(places).zip(memories) {
+        for (shape, memory) in place.grid.iter().zip(memories) {
+            for (a, mut column) in law.law.columns(contexts, shape, memory).into_iter().enumerate() {
                 let stays = law.law.acts_on_a_slack_muscle(a);
                 for (v, c) in column.iter_mut().zip(contexts) {
                     if !v.is_finite() || (!stays && vented(c)) {
                         *v = 0.0;
                     }
                 }
-                let largest = column.iter().map(|v| v.abs()).fold(0.0, f64::max);
-                if largest > 0.0 {
-                    column.iter_mut().for_each(|v| *v /= largest);
-                }
-                at.push(columns.len());
-                peak.push(largest);
+                peak.push(column.iter().map(|v| v.abs()).fold(0.0, f64::max));
                 columns.push(column);
             }
-            place.shapes.push(at);
         }
-        places.push(place);
     }
     let matrix = DMatrix::from_fn(contexts.len(), columns.len(), |i, j| columns[j][i]);
-    RowsOf { matrix, places, peak }
+    RowsOf { matrix, peak }
 }

@@ -31,8 +31,10 @@ pub struct Controller {
     client: Client,
     axis: Box<dyn StrokeAxis>,
     checks: MakeCheck,
-    ahead: f64,
-    last: f64,
+    /// Clock of the campaign less the time of the device; unknown until the device has told its time.
+    ahead: Option<f64>,
+    /// Clock of the last reading.
+    clock: f64,
 }
 
 impl std::fmt::Debug for Controller {
@@ -45,7 +47,7 @@ impl Controller {
     /// A connected controller.
     #[must_use]
     pub fn new(client: Client, axis: Box<dyn StrokeAxis>, checks: MakeCheck) -> Self {
-        Self { client, axis, checks, ahead: 0.0, last: 0.0 }
+        Self { client, axis, checks, ahead: None, clock: 0.0 }
     }
 
     /// The conversation with it.
@@ -137,11 +139,12 @@ impl<'a> Player<'a> {
 
 impl Actuation for Controller {
     fn clock(&self) -> f64 {
-        self.last + self.ahead
+        self.clock
     }
 
     fn set_clock(&mut self, seconds: f64) {
-        self.ahead = seconds - self.last;
+        // The next reading comes at this time. The device's own clock may show any other.
+        (self.clock, self.ahead) = (seconds, None);
     }
 
     fn perform(&mut self, course: &Course, each: &mut dyn FnMut(&Reading) -> Result<bool>) -> Result<Ending> {
@@ -149,7 +152,9 @@ impl Actuation for Controller {
             Segment::Travel { to, .. } if *to > 0.0 => Some(*to),
             _ => None,
         });
-        self.axis.prepare(held.unwrap_or(0.0))?;
+        if !self.axis.prepare(held.unwrap_or(0.0))? {
+            return Ok(Ending::Ended);
+        }
         let every = (TICKS_HZ / TELEMETRY_HZ) as u16;
         let plan = Plan {
             quantity: Quantity::Pressure,
@@ -160,7 +165,7 @@ impl Actuation for Controller {
         let player = RefCell::new(Player::new(course));
         let shown = Cell::new(Shown::default());
         let (ended, failed) = (Cell::new(false), RefCell::new(None));
-        let (ahead, last) = (self.ahead, Cell::new(self.last));
+        let (ahead, clock) = (Cell::new(self.ahead), Cell::new(self.clock));
         let mut forces = [0.0; 4];
         let mut count = 0_usize;
         let axis = &mut self.axis;
@@ -174,12 +179,17 @@ impl Actuation for Controller {
                 let known = count.min(forces.len());
                 let force = forces[..known].iter().sum::<f64>() / known as f64;
                 shown.set(Shown { stroke: f64::from(side.stroke_m), force });
-                let now = sample.time_us as f64 * 1e-6;
-                last.set(now);
+                let device = sample.time_us as f64 * 1e-6;
+                let ahead = ahead.get().unwrap_or_else(|| {
+                    let ahead_now = clock.get() - device;
+                    ahead.set(Some(ahead_now));
+                    ahead_now
+                });
+                clock.set(device + ahead);
                 // Every second sample is a row: the recording's rate is half the telemetry's.
                 let recorded = player.borrow().recorded() && count.is_multiple_of(2);
                 let reading = Reading {
-                    time: now + ahead,
+                    time: clock.get(),
                     pressure: f64::from(side.pressure_pa),
                     command: player.borrow().command,
                     stroke: f64::from(side.stroke_m),
@@ -201,13 +211,14 @@ impl Actuation for Controller {
                 }
             },
         );
-        self.last = last.get();
+        (self.ahead, self.clock) = (ahead.get(), clock.get());
         // The muscle is vented; the free end moves back after failures, too.
         let back = self.axis.rest();
-        outcome?;
+        // An axis that fails is the cause of what the controller then reports, such as a host that was silent meanwhile.
         if let Some(error) = failed.into_inner() {
             return Err(error);
         }
+        outcome?;
         back?;
         Ok(if ended.get() { Ending::Ended } else { Ending::Whole })
     }
@@ -216,7 +227,9 @@ impl Actuation for Controller {
         let clock = self.clock();
         let table = (self.checks)(check, force, pressure, clock)?;
         if table.is_some() {
-            self.ahead += check.seconds() + crate::criteria::HANDLING_S;
+            let seconds = check.seconds() + crate::criteria::HANDLING_S;
+            self.clock += seconds;
+            self.ahead = self.ahead.map(|ahead| ahead + seconds);
         }
         Ok(table)
     }

@@ -63,7 +63,7 @@ pub const SURE: f64 = 0.9;
 pub const NAMED: f64 = 0.1;
 /// Times that a spoiled step is repeated before it is left out.
 pub const REPEATS: u32 = 2;
-/// Seconds that the operator needs to set a stroke or mount a check by hand.
+/// Seconds that the operator needs to set a stroke, mount a check or prepare a step by hand.
 pub const HANDLING_S: f64 = 60.0;
 
 /// Largest difference of pressure and command before a reading counts as not settled, share of the highest level.

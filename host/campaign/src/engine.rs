@@ -1,5 +1,8 @@
 //! Chooses the next step from what is known, and learns from what was recorded.
 
+mod plan;
+mod ranking;
+
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -7,14 +10,12 @@ use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Recording;
 use pam_diagnose::Diagnosis;
-use rayon::prelude::*;
 
-use crate::analysis::{Findings, diagnosed, fitted, names, sets};
-use crate::criteria::{
-    DIAGNOSE_EVERY, DIAGNOSE_FROM, FIT_FROM, INDEPENDENT_S, INEXACTNESS, NAMED, SURE, WANTED_ERROR,
-    WORTHWHILE_NATS,
-};
-use crate::information::{Design, Gain, Knowledge};
+pub use self::plan::{Plan, Planned};
+pub use self::ranking::{Ranking, Weighed};
+use crate::analysis::{Findings, diagnosed, fitted, names};
+use crate::criteria::{DIAGNOSE_EVERY, DIAGNOSE_FROM, FIT_FROM};
+use crate::information::Gain;
 use crate::journal::Chosen;
 use crate::menu::{menu, opening};
 use crate::places::Places;
@@ -51,6 +52,8 @@ pub struct Engine {
     diagnosis: Option<Diagnosis>,
     since_diagnosis: usize,
     error: Option<f64>,
+    /// Time that an operator needs for each step besides its own, s; none where the program carries it out.
+    handling_s: f64,
 }
 
 impl Engine {
@@ -74,6 +77,7 @@ impl Engine {
             diagnosis: None,
             since_diagnosis: 0,
             error: None,
+            handling_s: 0.0,
         })
     }
 
@@ -99,6 +103,12 @@ impl Engine {
     #[must_use]
     pub fn recordings(&self) -> &[Recording] {
         &self.recordings
+    }
+
+    /// The steps that were made, in order.
+    #[must_use]
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
     }
 
     /// The fit of it, as soon as there is one.
@@ -156,7 +166,9 @@ impl Engine {
                 return Ok(chosen(step, why.to_owned(), Gain::default(), seconds));
             }
         }
-        let (best, settled) = self.weigh(left);
+        let Ranking { steps, settled, error } = self.rank(left, &[]);
+        self.error = error.or(self.error);
+        let best = steps.into_iter().next();
         let closed = matches!(self.steps.last(), Some(Step::Tare { .. }));
         let close = |reason: String| {
             if closed || left < 0.0 {
@@ -169,13 +181,7 @@ impl Engine {
             return Ok(close(words::settled(self.diagnosis.as_ref(), self.purpose)));
         }
         Ok(match best {
-            Some((step, gain, seconds)) if self.findings.is_none() => {
-                chosen(step, words::NO_TABLE.to_owned(), gain, seconds)
-            }
-            Some((step, gain, seconds)) => {
-                let why = words::why(&gain, self.diagnosis.as_ref(), &step);
-                chosen(step, why, gain, seconds)
-            }
+            Some(Weighed { step, gain, seconds }) => chosen(step, self.reason(&step, &gain), gain, seconds),
             None if left < self.shortest() => close(words::time_is_over(self.budget_s)),
             None => close(words::NOTHING_MORE.to_owned()),
         })
@@ -185,78 +191,6 @@ impl Engine {
     fn shortest(&self) -> f64 {
         let steps = menu(&self.places, &self.rig).into_iter().map(|s| s.seconds(&self.places));
         steps.fold(f64::INFINITY, f64::min)
-    }
-
-    /// The step of the menu with the most information per second within the time left, and whether all targets are met.
-    fn weigh(&mut self, left_s: f64) -> (Option<(Step, Gain, f64)>, bool) {
-        let Some(findings) = &self.findings else {
-            let next = menu(&self.places, &self.rig)
-                .into_iter()
-                .find(|s| !self.steps.contains(s) && self.may_follow(s) && s.seconds(&self.places) <= left_s);
-            return (next.map(|s| (s, Gain::default(), s.seconds(&self.places))), false);
-        };
-        let sets = match (&self.diagnosis, self.purpose) {
-            (_, Purpose::Fit) | (None, _) => Vec::new(),
-            (Some(d), _) => sets(d),
-        };
-        let blocked = self.places.blocked.max(1e-9);
-        let (noise, memory) = self.diagnosis.as_ref().map_or((0.0, 0.0), |d| (d.noise_N, d.noise_memory_s));
-        let noise = noise.max(findings.fit.summary.rms_N.min(0.01 * blocked));
-        let levels = self.places.levels();
-        let checked: Vec<CheckKind> = self.checks.iter().map(|c| c.0).collect();
-        let knowledge = Knowledge {
-            model: &findings.model,
-            past: &self.recordings,
-            levels: &levels,
-            sigma: noise.hypot(INEXACTNESS * blocked),
-            independent_s: INDEPENDENT_S.max(memory),
-            blocked,
-            sets: &sets,
-            checked: &checked,
-        };
-        let design = Design::new(knowledge, &self.places);
-        let (error, doubts) = design.now();
-        self.error = Some(error);
-        let table_known = error <= WANTED_ERROR * blocked;
-        let all_seen = doubts.iter().all(|d| *d < NAMED);
-        let one_name = self.diagnosis.as_ref().is_some_and(|d| {
-            d.judged() && d.missing.iter().all(|m| m.confusable_with.is_empty() && m.probability >= SURE)
-        });
-        let settled = match self.purpose {
-            Purpose::Fit => table_known,
-            Purpose::Diagnosis => one_name && all_seen,
-            Purpose::Both => table_known && one_name && all_seen,
-        };
-        let steps: Vec<Step> = menu(&self.places, &self.rig)
-            .into_iter()
-            .filter(|s| self.may_follow(s) && s.seconds(&self.places) <= left_s)
-            .collect();
-        let weighed: Vec<(Step, Gain, f64)> = steps
-            .par_iter()
-            .map(|s| {
-                let mut gain = design.gain(s, &self.places);
-                match self.purpose {
-                    Purpose::Fit => (gain.set, gain.unseen) = (0.0, 0.0),
-                    Purpose::Diagnosis => gain.table = 0.0,
-                    Purpose::Both => {}
-                }
-                // A repeat averages noise, and leaves the inexactness of the model as it is.
-                let repeats = self.steps.iter().filter(|done| *done == s).count() as f64;
-                if !matches!(s, Step::Tare { .. }) {
-                    gain = gain.divided(1.0 + repeats);
-                }
-                (*s, gain, s.seconds(&self.places))
-            })
-            .collect();
-        let rate = |w: &(Step, Gain, f64)| w.1.total() / w.2.max(1.0);
-        let mut best: Option<&(Step, Gain, f64)> = None;
-        for w in weighed.iter().filter(|w| w.1.total() >= WORTHWHILE_NATS) {
-            // The first of equals: the menu's order is fixed.
-            if best.is_none_or(|b| rate(w) > rate(b)) {
-                best = Some(w);
-            }
-        }
-        (best.copied(), settled)
     }
 
     fn may_follow(&self, step: &Step) -> bool {

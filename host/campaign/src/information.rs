@@ -15,12 +15,15 @@ use pam_data::recording::{Campaign, Recording};
 use pam_diagnose::protocol_simulation::moments;
 use pam_fit::bench::{Candidate, Span};
 
-use crate::columns::{Library, Table, columns_of_rows};
+use crate::columns::{Library, Memories, RowsOf, Table, Where, columns_of_rows, layout};
 use crate::course::Course;
 use crate::criteria::{EFFECT_SIZE, PAST_ROWS, PRIOR_NOTHING, SAMPLE_HZ, STEP_ROWS, WANTED_ERROR};
 use crate::hypothesis::{DECIDED, Hypothesis, entropy};
 use crate::places::Places;
 use crate::step::{CheckKind, Step};
+
+/// Time between two steps that a design assumes, s.
+const PAUSE_S: f64 = 10.0;
 
 /// What is known when a step is chosen.
 #[derive(Debug, Clone)]
@@ -79,6 +82,20 @@ pub struct Design<'a> {
     past: Vec<Recording>,
     table: Table,
     library: Library,
+    /// What the past gives to every candidate; nothing without rows.
+    shared: Option<Past>,
+}
+
+/// The columns of everything recorded so far, as products, and what the effects remember at its end. A candidate adds its own rows to it.
+#[derive(Debug)]
+struct Past {
+    span: Span,
+    places: Vec<Where>,
+    memories: Memories,
+    /// Products of weighted columns.
+    gram: DMatrix<f64>,
+    /// Largest value of each column.
+    peak: Vec<f64>,
 }
 
 impl<'a> Design<'a> {
@@ -90,7 +107,29 @@ impl<'a> Design<'a> {
         let past = known.past.iter().map(|r| thinned(r, stride)).collect();
         let table = Table::new(known.model, known.levels, known.blocked, places);
         let library = Library::new(known.sets);
-        Self { known, past, table, library }
+        let mut design = Self { known, past, table, library, shared: None };
+        design.shared = design.of_past();
+        design
+    }
+
+    fn of_past(&self) -> Option<Past> {
+        let campaign = Campaign::new(self.past.clone());
+        let contexts: Vec<Context<f64>> = moments(self.known.model, &campaign);
+        let span = Span::of(&contexts)?;
+        let (places, mut memories) = layout(&self.table, &self.library, &span);
+        let rows = columns_of_rows(&self.table, &self.library, &contexts, &places, &mut memories);
+        let gram = self.products(&rows, &campaign.recordings);
+        Some(Past { span, places, memories, gram, peak: rows.peak })
+    }
+
+    /// Products of columns over rows of these recordings, each row with its weight.
+    fn products(&self, rows: &RowsOf, recordings: &[Recording]) -> DMatrix<f64> {
+        let mut matrix = rows.matrix.clone();
+        let weights = weights(recordings, self.known.independent_s);
+        for (mut row, w) in matrix.row_iter_mut().zip(weights) {
+            row *= w.sqrt() / self.known.sigma;
+        }
+        matrix.tr_mul(&matrix)
     }
 
     /// What a step is expected to tell.
@@ -99,21 +138,16 @@ impl<'a> Design<'a> {
         if let Step::Check { check } = step {
             return self.of_check(*check);
         }
-        let mut recordings = self.past.clone();
-        let begin = recordings.iter().filter_map(|r| r.time.last()).copied().fold(0.0, f64::max);
-        recordings.push(simulated(&step.course(places), begin + 10.0));
-        let before: usize = self.past.iter().map(Recording::len).sum();
-        let Some(seen) = Seen::of(self, recordings, before) else { return Gain::default() };
+        let begin = self.past.iter().filter_map(|r| r.time.last()).copied().fold(0.0, f64::max);
+        let step = simulated(&step.course(places), begin + PAUSE_S);
+        let Some(seen) = Seen::of(self, Some(step)) else { return Gain::default() };
         self.compare(&seen.before, &seen.after, &seen)
     }
 
     /// What is known now: the predicted error of the table, N, and the expected entropy of the set if each effect in turn were there.
     #[must_use]
     pub fn now(&self) -> (f64, Vec<f64>) {
-        let before: usize = self.past.iter().map(Recording::len).sum();
-        let Some(seen) = Seen::of(self, self.past.clone(), before) else {
-            return (f64::INFINITY, Vec::new());
-        };
+        let Some(seen) = Seen::of(self, None) else { return (f64::INFINITY, Vec::new()) };
         let Some(precision) = self.table.precision(&seen.before) else { return (f64::INFINITY, Vec::new()) };
         (rms(&self.table.errors(&precision)), self.doubts(&seen.before, &precision, &seen, &[]))
     }
@@ -127,8 +161,7 @@ impl<'a> Design<'a> {
             };
             gain.set += entropy(set, |_, _| 0.0) - entropy(set, apart);
         }
-        let before: usize = self.past.iter().map(Recording::len).sum();
-        if let Some(seen) = Seen::of(self, self.past.clone(), before)
+        if let Some(seen) = Seen::of(self, None)
             && let Some(precision) = self.table.precision(&seen.before)
         {
             gain.error_before = rms(&self.table.errors(&precision));
@@ -148,7 +181,7 @@ impl<'a> Design<'a> {
         self.known.sets.iter().flatten().any(|h| h.law == law)
     }
 
-    fn compare(&self, before: &DMatrix<f64>, after: &DMatrix<f64>, seen: &Seen) -> Gain {
+    fn compare(&self, before: &DMatrix<f64>, after: &DMatrix<f64>, seen: &Seen<'_>) -> Gain {
         let (Some(first), Some(second)) = (self.table.precision(before), self.table.precision(after)) else {
             return Gain::default();
         };
@@ -179,7 +212,7 @@ impl<'a> Design<'a> {
         &self,
         gram: &DMatrix<f64>,
         precision: &Cholesky<f64, Dyn>,
-        seen: &Seen,
+        seen: &Seen<'_>,
         more: &[CheckKind],
     ) -> Vec<f64> {
         let m = self.table.len();
@@ -218,7 +251,7 @@ impl<'a> Design<'a> {
     }
 
     /// Squared distance of one effect of a set from another, whose size and shape are free.
-    fn between(&self, gram: &DMatrix<f64>, seen: &Seen, set: usize, of: usize, from: usize) -> f64 {
+    fn between(&self, gram: &DMatrix<f64>, seen: &Seen<'_>, set: usize, of: usize, from: usize) -> f64 {
         let (a, b) = (&self.known.sets[set][of], &self.known.sets[set][from]);
         let checked = |h: &Hypothesis| {
             h.law.traits().check.and_then(CheckKind::of).is_some_and(|c| self.known.checked.contains(&c))
@@ -248,47 +281,59 @@ impl<'a> Design<'a> {
     }
 }
 
-/// The columns of everything recorded and a step, in products of columns.
-struct Seen {
+/// The columns of everything recorded and a step, in products of columns that have the largest value 1.
+struct Seen<'a> {
     /// Products over the past.
     before: DMatrix<f64>,
     /// Products over the past and the step.
     after: DMatrix<f64>,
     /// Where the columns of each effect are.
-    places: Vec<crate::columns::Where>,
+    places: &'a [Where],
     /// Largest value of each column before scaling; zero for a column without any.
     peak: Vec<f64>,
     /// For each set, the force of each hypothesis as coefficients of the columns.
     traces: Vec<Vec<DVector<f64>>>,
 }
 
-impl Seen {
-    fn of(design: &Design<'_>, recordings: Vec<Recording>, before: usize) -> Option<Self> {
-        let known = &design.known;
-        let campaign = Campaign::new(recordings);
-        let contexts: Vec<Context<f64>> = moments(known.model, &campaign);
-        let span = Span::of(&contexts)?;
-        let rows = columns_of_rows(&design.table, &design.library, &contexts, &span);
-        let weights: Vec<f64> = weights(&campaign, known.independent_s)
-            .iter()
-            .map(|w| (w / (known.sigma * known.sigma)).sqrt())
-            .collect();
-        let mut matrix = rows.matrix;
-        for (mut row, w) in matrix.row_iter_mut().zip(&weights) {
-            row *= *w;
+impl<'a> Seen<'a> {
+    /// The past, and a step after it.
+    fn of(design: &'a Design<'_>, step: Option<Recording>) -> Option<Self> {
+        let past = design.shared.as_ref()?;
+        let mut peak = past.peak.clone();
+        let mut added = None;
+        if let Some(step) = step.filter(|s| !s.is_empty()) {
+            let rows_before: usize = design.past.iter().map(Recording::len).sum();
+            let mut recordings = design.past.clone();
+            recordings.push(step);
+            let campaign = Campaign::new(recordings);
+            let contexts: Vec<Context<f64>> = moments(design.known.model, &campaign);
+            let mut memories = past.memories.clone();
+            let rows = columns_of_rows(
+                &design.table,
+                &design.library,
+                contexts.get(rows_before..)?,
+                &past.places,
+                &mut memories,
+            );
+            for (p, of_step) in peak.iter_mut().zip(&rows.peak) {
+                *p = p.max(*of_step);
+            }
+            added = Some(design.products(&rows, campaign.recordings.last().map(std::slice::from_ref)?));
         }
-        let past = matrix.rows(0, before.min(matrix.nrows()));
-        let old = past.tr_mul(&past);
-        let rest = matrix.rows(before.min(matrix.nrows()), matrix.nrows() - before.min(matrix.nrows()));
-        let after = &old + rest.tr_mul(&rest);
-        let mut seen = Self { before: old, after, places: rows.places, peak: rows.peak, traces: Vec::new() };
-        seen.traces = known.sets.iter().map(|set| traces(design, &seen, set, &span)).collect();
+        let scale: Vec<f64> = peak.iter().map(|p| if *p > 0.0 { 1.0 / p } else { 0.0 }).collect();
+        let scaled = |gram: &DMatrix<f64>| {
+            DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| gram[(i, j)] * scale[i] * scale[j])
+        };
+        let before = scaled(&past.gram);
+        let after = added.map_or_else(|| before.clone(), |added| &before + scaled(&added));
+        let mut seen = Self { before, after, places: &past.places, peak, traces: Vec::new() };
+        seen.traces = design.known.sets.iter().map(|set| traces(design, &seen, set, &past.span)).collect();
         Some(seen)
     }
 }
 
 /// The force of each hypothesis of a set: the first as fitted, each other as it imitates the first best.
-fn traces(design: &Design<'_>, seen: &Seen, set: &[Hypothesis], span: &Span) -> Vec<DVector<f64>> {
+fn traces(design: &Design<'_>, seen: &Seen<'_>, set: &[Hypothesis], span: &Span) -> Vec<DVector<f64>> {
     let total = seen.peak.len();
     let m = design.table.len();
     let mut out: Vec<DVector<f64>> = Vec::with_capacity(set.len());
@@ -363,10 +408,14 @@ fn simulated(course: &Course, begin: f64) -> Recording {
     thinned(&Recording { name: "step".into(), time, pressure, stroke, ..Recording::default() }, stride)
 }
 
+/// The recording that is expected of a course after a time, s.
+pub(crate) fn expected(course: &Course, after: f64, name: &str) -> Recording {
+    Recording { name: name.to_owned(), ..simulated(course, after + PAUSE_S) }
+}
+
 /// What each row counts: its share of the time between independent readings.
-fn weights(campaign: &Campaign, independent_s: f64) -> Vec<f64> {
-    campaign
-        .recordings
+fn weights(recordings: &[Recording], independent_s: f64) -> Vec<f64> {
+    recordings
         .iter()
         .flat_map(|r| {
             let step = r.duration() / r.len().saturating_sub(1).max(1) as f64;

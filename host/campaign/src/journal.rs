@@ -263,13 +263,19 @@ impl Journal {
     /// Clock at which the campaign stood when the last row was written, s, and when that was, in seconds since 1970.
     #[must_use]
     pub fn clock(&self) -> Option<f64> {
-        self.events.iter().rev().find_map(|e| match e {
+        let told = self.events.iter().rev().find_map(|e| match e {
             Event::Recorded { end_s, .. } | Event::Spoiled { end_s, .. } | Event::Checked { end_s, .. } => {
                 Some(*end_s)
             }
             Event::Ended { clock_s, .. } | Event::Begin { clock_s, .. } => Some(*clock_s),
             _ => None,
-        })
+        });
+        // The rows of an interrupted step, however few, are later than all that the log tells a time of.
+        let cut = self.events.iter().rev().find_map(|e| match e {
+            Event::Cut { file, .. } if !file.is_empty() => last_time(&self.folder.join(file)),
+            _ => None,
+        });
+        told.into_iter().chain(cut).reduce(f64::max)
     }
 
     /// Recordings that the fit reads, in order.
@@ -362,6 +368,12 @@ pub fn unix_seconds() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs())
 }
 
+/// The time of the last row of a recording of this log, s.
+fn last_time(path: &Path) -> Option<f64> {
+    let text = std::fs::read_to_string(path).ok()?;
+    text.lines().last()?.split(',').next()?.parse().ok()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -392,6 +404,7 @@ mod tests {
         assert_eq!(journal.events(), [Event::Cut { number: 1, file: "01_tare_cut.csv".into(), rows: 5 }]);
         let text = std::fs::read_to_string(folder.path().join("01_tare_cut.csv")).unwrap();
         assert_eq!(text.lines().count(), 6);
+        assert_eq!(journal.clock(), Some(4.0), "what follows comes after the rows of the interrupted step");
         journal.begin(1, "tare").unwrap();
         journal.row(&reading(9.0)).unwrap();
         let (file, rows) = journal.finish("").unwrap();

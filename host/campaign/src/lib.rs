@@ -6,6 +6,7 @@
 //! | what is known of the muscle's range | [`places`] |
 //! | what is a step expected to tell | [`information`] |
 //! | what to do next, and when to stop | [`engine`] |
+//! | what the operator does | [`instructions`], [`prompt`] |
 //! | is the recording good | [`watch`] |
 //! | who carries it out | [`actuation`]: [`mod@bench`], [`controller`] |
 //! | what was done, also after an interruption | [`journal`], [`campaign`] |
@@ -35,9 +36,11 @@ pub mod criteria;
 pub mod engine;
 pub mod hypothesis;
 pub mod information;
+pub mod instructions;
 pub mod journal;
 pub mod menu;
 pub mod places;
+pub mod prompt;
 mod purpose;
 pub mod rig;
 pub mod step;

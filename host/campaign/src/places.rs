@@ -104,6 +104,13 @@ impl Places {
         self.blocked = self.blocked.max(highest);
     }
 
+    /// Takes the free stroke from a model where no stroke at the highest level was recorded.
+    pub fn learn_stroke_of(&mut self, model: &Muscle<f64>) {
+        if !(self.free > 0.0) {
+            self.free = pam_diagnose::protocol_simulation::free_stroke(model, self.top).min(self.stroke_max);
+        }
+    }
+
     /// Takes free stroke and levels from the survey of all levels. The levels stay where the muscle moves at the lowest of them.
     pub fn learn_survey(&mut self, recording: &Recording) {
         let levels = self.levels();

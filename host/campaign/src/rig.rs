@@ -53,9 +53,12 @@ pub struct Rig {
     /// What moves the free end.
     #[serde(default)]
     pub axis: Axis,
-    /// Where a machine listens (`tcp:HOST:PORT`), for the axis `line`.
+    /// Where a machine listens (a serial device, or `tcp:HOST:PORT`), for the axis `line`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis_address: Option<String>,
+    /// Speed of its serial line, baud.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis_baud: Option<u32>,
     /// Largest stroke that the rig allows, mm.
     #[serde(rename = "stroke_max_mm", skip_serializing_if = "Option::is_none")]
     pub stroke_max_mm: Option<f64>,
@@ -113,13 +116,16 @@ impl Rig {
                     .value(value.to_string()));
             }
         }
+        if rig.axis_baud == Some(0) {
+            return Err(Error::new(DataCode::ProtocolInvalid, "axis_baud must be above zero").value("0"));
+        }
         match rig.axis {
             Axis::Weight if rig.weight.is_none() => {
                 Err(Error::new(DataCode::ProtocolInvalid, "a rig with a hanging weight needs weight_N"))
             }
             Axis::Line if rig.axis_address.is_none() => {
                 Err(Error::new(DataCode::ProtocolInvalid, "an axis that takes lines needs axis_address")
-                    .help("write axis_address = \"tcp:HOST:PORT\""))
+                    .help("write axis_address = \"/dev/ttyUSB0\" or \"tcp:HOST:PORT\""))
             }
             _ => Ok(rig),
         }
@@ -135,9 +141,14 @@ mod tests {
         let rig = Rig::parse("axis = 'weight'\nweight_N = 19.6\n").unwrap();
         assert_eq!((rig.axis, rig.weight), (Axis::Weight, Some(19.6)));
         assert_eq!(Rig::parse("").unwrap().axis, Axis::Held);
-        for bad in
-            ["axis = 'weight'", "axis = 'line'", "stroke_max_mm = -1.0", "force_max_N = nan", "speed = 1.0"]
-        {
+        for bad in [
+            "axis = 'weight'",
+            "axis = 'line'",
+            "axis_baud = 0",
+            "stroke_max_mm = -1.0",
+            "force_max_N = nan",
+            "speed = 1.0",
+        ] {
             assert!(Rig::parse(bad).is_err(), "{bad}");
         }
     }

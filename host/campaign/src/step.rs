@@ -104,6 +104,16 @@ impl CheckKind {
         }
     }
 
+    /// The kind of a check that was made.
+    #[must_use]
+    pub const fn of_made(kind: pam_fit::checks::Kind) -> Self {
+        match kind {
+            pam_fit::checks::Kind::DeadWeights => Self::DeadWeights,
+            pam_fit::checks::Kind::RigidBar => Self::RigidBar,
+            pam_fit::checks::Kind::ReferenceGauge => Self::ReferenceGauge,
+        }
+    }
+
     /// Name of its file, without extension.
     #[must_use]
     pub const fn file(self) -> &'static str {
@@ -154,10 +164,10 @@ impl Step {
             Self::Tare { seconds } => format!("vented at rest length for {seconds:.0} s"),
             Self::BlockedRamp => "a pressure ramp up and down at rest length".into(),
             Self::Survey { times } => {
-                format!("a stroke at each pressure level, {times:.3} × the slow speed")
+                format!("a stroke at each pressure level, {times} × the slow speed")
             }
             Self::Loops { level, times, count } => {
-                format!("{count} strokes at {}, {times:.3} × the slow speed", kpa(level))
+                format!("{count} strokes at {}, {times} × the slow speed", kpa(level))
             }
             Self::Speeds { level } => format!("strokes at three speeds at {}", kpa(level)),
             Self::Dwells { level, seconds } => {

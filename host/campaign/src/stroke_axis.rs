@@ -1,11 +1,10 @@
 //! What moves the free end of the muscle: an emulated axis, a machine with a line protocol, the operator, or nothing.
 
-use std::io::{BufRead, BufReader, Write};
-use std::net::TcpStream;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use pam_data::error::{Error, Result};
 use pam_device::error::DeviceCode;
+use pam_device::{Address, Port};
 
 /// Moves the free end.
 pub trait StrokeAxis {
@@ -14,12 +13,12 @@ pub trait StrokeAxis {
         false
     }
 
-    /// Before a course that holds a stroke (m), the muscle being vented.
+    /// Before a course that holds a stroke (m), the muscle being vented; false where the operator ends the campaign instead.
     ///
     /// # Errors
     /// An axis that does not answer.
-    fn prepare(&mut self, _stroke: f64) -> Result<()> {
-        Ok(())
+    fn prepare(&mut self, _stroke: f64) -> Result<bool> {
+        Ok(true)
     }
 
     /// Moves to a stroke (m) at a speed (m/s).
@@ -85,56 +84,7 @@ impl StrokeAxis for pam_device::emulated::Axis {
     }
 }
 
-/// The operator sets the stroke when prompted, and presses Enter.
-pub struct Prompt<R, W> {
-    input: R,
-    output: W,
-    now: f64,
-}
-
-impl<R, W> std::fmt::Debug for Prompt<R, W> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Prompt").field("now", &self.now).finish_non_exhaustive()
-    }
-}
-
-impl<R: BufRead, W: Write> Prompt<R, W> {
-    /// Asks on `output` and reads from `input`; the muscle is at rest length.
-    pub fn new(input: R, output: W) -> Self {
-        Self { input, output, now: 0.0 }
-    }
-
-    fn ask(&mut self, words: &str) -> Result<()> {
-        let lost = |e: std::io::Error| {
-            Error::new(
-                DeviceCode::DeviceSilent,
-                format!("no terminal to request a stroke from the operator: {e}"),
-            )
-        };
-        write!(self.output, "{words}, then press Enter: ")
-            .and_then(|()| self.output.flush())
-            .map_err(lost)?;
-        let mut line = String::new();
-        if self.input.read_line(&mut line).map_err(lost)? == 0 {
-            return Err(Error::new(DeviceCode::DeviceSilent, "no answer to the request to set the stroke")
-                .help("run the command on a terminal; the same call continues the campaign"));
-        }
-        Ok(())
-    }
-}
-
-impl<R: BufRead, W: Write> StrokeAxis for Prompt<R, W> {
-    fn prepare(&mut self, stroke: f64) -> Result<()> {
-        // A hundredth of a millimetre is finer than an operator sets a stroke.
-        if (stroke - self.now).abs() > 1e-5 {
-            self.ask(&format!("The muscle is vented. Move to a stroke of {:.2} mm", stroke * 1e3))?;
-            self.now = stroke;
-        }
-        Ok(())
-    }
-}
-
-/// A machine that takes one command per line over TCP and answers each with `ok`:
+/// A machine that takes one command per line, over TCP or a serial line, and answers each with `ok`:
 ///
 /// ```text
 /// move STROKE_mm SPEED_mm_s
@@ -142,39 +92,66 @@ impl<R: BufRead, W: Write> StrokeAxis for Prompt<R, W> {
 /// ```
 #[derive(Debug)]
 pub struct Line {
-    stream: BufReader<TcpStream>,
+    port: Port,
+    received: Vec<u8>,
 }
 
 /// How long a machine may take to answer.
 const ANSWER: Duration = Duration::from_secs(2);
+/// Longest answer of a machine, bytes; more is not an answer.
+const LONGEST_ANSWER: usize = 1024;
+/// Speed of a serial line where the rig does not say, baud.
+pub const BAUD: u32 = 115_200;
 
 impl Line {
-    /// Connects to `tcp:HOST:PORT`.
+    /// Connects to `tcp:HOST:PORT`, or opens a serial device at a speed, baud.
     ///
     /// # Errors
     /// [`DeviceCode::DevicePort`].
-    pub fn open(address: &str) -> Result<Self> {
-        let place = address.strip_prefix("tcp:").unwrap_or(address);
-        let stream = TcpStream::connect(place)
-            .and_then(|s| s.set_read_timeout(Some(ANSWER)).and_then(|()| s.set_nodelay(true)).map(|()| s))
-            .map_err(|e| {
-                Error::new(DeviceCode::DevicePort, format!("the axis cannot be reached: {e}"))
-                    .value(address)
-                    .help("check axis_address in rig.toml, and that the machine listens there")
-            })?;
-        Ok(Self { stream: BufReader::new(stream) })
+    pub fn open(address: &str, baud: u32) -> Result<Self> {
+        let port = address.parse::<Address>().and_then(|a| Port::open_at(&a, baud)).map_err(|e| {
+            Error::new(DeviceCode::DevicePort, format!("the axis cannot be reached: {}", e.cause()))
+                .value(address)
+                .help("check axis_address in rig.toml, and that the machine listens there")
+        })?;
+        Ok(Self { port, received: Vec::new() })
     }
 
     fn order(&mut self, line: &str) -> Result<()> {
-        let lost = |e: std::io::Error| Error::new(DeviceCode::DeviceSilent, format!("the axis is gone: {e}"));
-        self.stream.get_mut().write_all(format!("{line}\n").as_bytes()).map_err(lost)?;
-        let mut answer = String::new();
-        self.stream.read_line(&mut answer).map_err(lost)?;
-        if answer.trim() == "ok" {
+        // What the machine said without being asked is no answer to this.
+        self.received.clear();
+        self.port.write_all(format!("{line}\n").as_bytes()).map_err(|e| lost(&e))?;
+        let answer = self.answer()?;
+        if answer.split_whitespace().next() == Some("ok") {
             return Ok(());
         }
-        Err(Error::new(DeviceCode::DeviceRefused, format!("the axis refuses `{line}`")).value(answer.trim()))
+        Err(Error::new(DeviceCode::DeviceRefused, format!("the axis refuses `{line}`"))
+            .value(answer.trim())
+            .help("check the limits of the machine, and stroke_max_mm and speed_max_mm_s in rig.toml"))
     }
+
+    fn answer(&mut self) -> Result<String> {
+        let deadline = Instant::now() + ANSWER;
+        loop {
+            if let Some(end) = self.received.iter().position(|b| *b == b'\n') {
+                let line: Vec<u8> = self.received.drain(..=end).collect();
+                return Ok(String::from_utf8_lossy(&line).trim().to_owned());
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() || self.received.len() > LONGEST_ANSWER {
+                return Err(Error::new(DeviceCode::DeviceSilent, "the axis does not answer")
+                    .help("check the machine and its line; the same call continues the campaign"));
+            }
+            let mut bytes = [0; 256];
+            let count = self.port.read(&mut bytes, left).map_err(|e| lost(&e))?;
+            self.received.extend_from_slice(&bytes[..count]);
+        }
+    }
+}
+
+fn lost(e: &std::io::Error) -> Error {
+    Error::new(DeviceCode::DeviceSilent, format!("the connection to the axis is lost: {e}"))
+        .help("check the machine and its line; the same call continues the campaign")
 }
 
 impl StrokeAxis for Line {
@@ -198,19 +175,7 @@ impl StrokeAxis for Line {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_person_is_asked_once_for_each_stroke() {
-        let mut output = Vec::new();
-        let mut prompt = Prompt::new(std::io::Cursor::new("\n\n"), &mut output);
-        for stroke in [0.0, 12.5e-3, 12.5e-3, 0.0] {
-            prompt.prepare(stroke).unwrap();
-        }
-        assert!(prompt.prepare(1e-3).is_err(), "the input has ended");
-        let said = String::from_utf8(output).unwrap();
-        assert_eq!(said.matches("press Enter").count(), 3, "{said}");
-        assert!(said.contains("12.50 mm"), "{said}");
-    }
+    use std::io::{BufRead, BufReader, Write};
 
     #[test]
     fn a_machine_takes_lines_and_may_refuse() {
@@ -220,17 +185,24 @@ mod tests {
             let (stream, _) = listener.accept().unwrap();
             let mut lines = BufReader::new(stream);
             let mut heard = Vec::new();
-            for answer in ["ok\n", "limit\n"] {
+            // The last answer comes in two pieces.
+            for answer in [vec!["ok\n"], vec!["limit\n"], vec!["o", "k\r\n"]] {
                 let mut line = String::new();
                 lines.read_line(&mut line).unwrap();
                 heard.push(line);
-                lines.get_mut().write_all(answer.as_bytes()).unwrap();
+                for piece in answer {
+                    lines.get_mut().write_all(piece.as_bytes()).unwrap();
+                    std::thread::sleep(Duration::from_millis(20));
+                }
             }
             heard
         });
-        let mut axis = Line::open(&address).unwrap();
+        let mut axis = Line::open(&address, BAUD).unwrap();
         axis.go(1.5e-3, 2e-3).unwrap();
-        assert!(axis.stop().is_err());
-        assert_eq!(machine.join().unwrap(), ["move 1.50000 2.00000\n", "stop\n"]);
+        let refused = axis.stop().unwrap_err();
+        assert!(refused.to_string().contains("limit"), "{refused}");
+        axis.stop().unwrap();
+        assert_eq!(machine.join().unwrap(), ["move 1.50000 2.00000\n", "stop\n", "stop\n"]);
+        assert!(axis.go(0.0, 1e-3).is_err(), "the machine is gone");
     }
 }

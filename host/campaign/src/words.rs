@@ -16,6 +16,28 @@ pub const NO_TABLE: &str =
 pub const NOTHING_MORE: &str =
     "No step that this rig can do within the time left is expected to tell anything more.";
 
+/// Why a plan ends before there is a table.
+pub const PLAN_AGAIN: &str =
+    "These steps come first; plan again with their recordings, which decide what follows.";
+
+/// Why a plan ends that has as many steps as requested.
+#[must_use]
+pub fn plan_is_full(steps: usize) -> String {
+    format!("The plan has the requested number of steps, {steps}.")
+}
+
+/// Why a step was chosen, with what it is expected to tell, in one sentence.
+#[must_use]
+pub fn why_with_gain(why: &str, gain: &Gain) -> String {
+    format!(
+        "{} (expected information: {:.2} nats about the table, {:.2} about which effect it is, {:.2} about effects that nothing has shown).",
+        why.trim_end_matches('.'),
+        gain.table,
+        gain.set,
+        gain.unseen
+    )
+}
+
 /// Why a step was chosen.
 #[must_use]
 pub fn why(gain: &Gain, diagnosis: Option<&Diagnosis>, step: &Step) -> String {

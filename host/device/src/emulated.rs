@@ -15,6 +15,7 @@ use crate::error::DeviceCode;
 use pam_data::error::{Error, Result};
 
 mod axis;
+pub mod axis_server;
 mod guard;
 pub mod qemu;
 pub mod relay;
@@ -139,6 +140,9 @@ impl Station for Stand {
         }
         let supply = Mishap::from_code(self.mishap.load(Ordering::Relaxed)) != Mishap::Supply;
         self.plant.step(TICK, if supply { f64::from(pressure_command) } else { 0.0 });
+        if let Some(axis) = &self.axis {
+            axis.notes(self.plant.truth().pressure);
+        }
         self.answer()
     }
 }

@@ -37,10 +37,18 @@ impl Port {
     /// # Errors
     /// [`DeviceCode::DevicePort`] with the system's reason, and what to do about the usual ones.
     pub fn open(address: &Address) -> Result<Self> {
+        Self::open_at(address, BAUD)
+    }
+
+    /// Opens what an address names, a serial line at a speed of its own.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_at(address: &Address, baud: u32) -> Result<Self> {
         let name = address.to_string();
         let line = match address {
             Address::Serial(path) => {
-                let opened = serialport::new(path.to_string_lossy(), BAUD)
+                let opened = serialport::new(path.to_string_lossy(), baud)
                     .timeout(Duration::from_millis(100))
                     .flow_control(serialport::FlowControl::None)
                     .open();

@@ -3,7 +3,9 @@
 use std::time::{Duration, Instant};
 
 use model_core::link::Endpoint;
-use model_core::link::endpoints::{Arm, Disarm, GetFaults, GetStatus, SetReferencePoints, StartMode, Stop};
+use model_core::link::endpoints::{
+    Arm, Disarm, GetFaults, GetSettings, GetStatus, SetReferencePoints, StartMode, Stop,
+};
 use model_core::link::messages::{
     Event, Fault, REFERENCE_PIECE, Reference, ReferencePoints, Refusal, Start, State, Status, Telemetry,
 };
@@ -38,9 +40,8 @@ pub enum Ending {
 /// Silence of the telemetry after which the device counts as gone.
 const SILENCE: Duration = Duration::from_secs(5);
 
-/// After this time without a keep-alive request of the session that armed the device, another may: `watch.host_silence_ticks` by
-/// default, and half a second more.
-const OWNER_SILENCE: Duration = Duration::from_millis(1_500);
+/// Another session may arm a device whose owner has sent no keep-alive request for `watch.host_silence_ticks`; this margin is added.
+const OWNER_MARGIN: Duration = Duration::from_millis(500);
 
 /// How long arming may take: the air of the run before leaves in two seconds, the test of the dump valve takes as long at most.
 const ARMING: Duration = Duration::from_secs(8);
@@ -118,14 +119,18 @@ pub fn run_asking(
 /// # Errors
 /// As the device refuses, or the fault that the test ended in.
 pub fn arm(client: &mut Client) -> Result<()> {
-    let deadline = Instant::now() + ARMING;
-    let silent = Instant::now() + OWNER_SILENCE;
+    let mut deadline = Instant::now() + ARMING;
+    let mut silent = None;
     let empty = Refusal::StillFaulty(Fault::NotVented);
     loop {
         let now = match client.try_call::<Arm>(&client.session())? {
             Ok(status) => status.state,
             Err(refusal) if refusal == empty && Instant::now() < deadline => State::Disarmed,
-            Err(Refusal::OtherSession) if Instant::now() < silent => State::Disarmed,
+            Err(Refusal::OtherSession) if Instant::now() < owner_ends(client, &mut silent)? => {
+                std::thread::sleep(Duration::from_millis(20));
+                deadline = Instant::now() + ARMING;
+                continue;
+            }
             Err(refusal) => return Err(messages::refused(Arm::NAME, refusal)),
         };
         match now {
@@ -138,6 +143,16 @@ pub fn arm(client: &mut Client) -> Result<()> {
             }
         }
     }
+}
+
+/// When an owner that is silent from now on gives up the device, by its settings.
+fn owner_ends(client: &mut Client, known: &mut Option<Instant>) -> Result<Instant> {
+    if let Some(end) = *known {
+        return Ok(end);
+    }
+    let ticks = client.call::<GetSettings>(&())?.watch.host_silence_ticks;
+    // A tick is a millisecond.
+    Ok(*known.insert(Instant::now() + Duration::from_millis(ticks.into()) + OWNER_MARGIN))
 }
 
 /// Makes the device this session's, armed.
@@ -204,7 +219,10 @@ fn follow(
                     client.set_point(plan.quantity.set_point(value))?;
                 }
             }
-            Some(Topic::Event(Event::Fault(report))) => return Err(messages::stopped(&report)),
+            // One from before the start, which was cleared since, may still be in the queue.
+            Some(Topic::Event(Event::Fault(report))) if report.time_us >= status.time_us => {
+                return Err(messages::stopped(&report));
+            }
             Some(Topic::Event(_) | Topic::Log(_)) => {}
             None if heard.elapsed() > silence => {
                 let status = client.call::<GetStatus>(&())?;

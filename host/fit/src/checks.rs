@@ -30,6 +30,37 @@ use pam_data::recording::{Campaign, Quantity};
 
 use table::Table;
 
+/// A kind of check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Known weights on the load cell.
+    DeadWeights,
+    /// A rigid bar in the muscle's place.
+    RigidBar,
+    /// A better gauge beside the bench's own.
+    ReferenceGauge,
+}
+
+impl Kind {
+    /// Which check a file is, by the column of its reference.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or a table without a reference.
+    pub fn of(file: &Path) -> Result<Self> {
+        Self::of_table(&Table::read(file)?)
+    }
+
+    fn of_table(table: &Table) -> Result<Self> {
+        let kinds = [
+            (Quantity::Force, Self::DeadWeights),
+            (Quantity::Displacement, Self::RigidBar),
+            (Quantity::Pressure, Self::ReferenceGauge),
+        ];
+        let found = kinds.into_iter().find(|(quantity, _)| table.has_reference(*quantity));
+        found.map(|f| f.1).ok_or_else(|| table.without_reference())
+    }
+}
+
 /// A fault of the bench as measured by a check.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
@@ -74,14 +105,10 @@ impl Checks {
         for file in files {
             let file = file.as_ref();
             let table = Table::read(file)?;
-            let measured = if table.has_reference(Quantity::Force) {
-                dead_weights::measure(&table)?
-            } else if table.has_reference(Quantity::Displacement) {
-                rigid_bar::measure(&table)?
-            } else if table.has_reference(Quantity::Pressure) {
-                gauge::measure(&table)?
-            } else {
-                return Err(table.without_reference());
+            let measured = match Kind::of_table(&table)? {
+                Kind::DeadWeights => dead_weights::measure(&table)?,
+                Kind::RigidBar => rigid_bar::measure(&table)?,
+                Kind::ReferenceGauge => gauge::measure(&table)?,
             };
             for m in measured {
                 checks.measured.retain(|old| old.fault != m.fault);

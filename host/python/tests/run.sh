@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs the bindings from this checkout into a temporary environment with pip, as a user does, and runs their tests on recordings of the
 # virtual bench and with an emulated controller. The build has no optimisation across crates, which keeps it short.
-#   host/python/tests/run.sh [frames] [regression] [device] [notebook]    # these tests only
+#   host/python/tests/run.sh [frames] [regression] [device] [notebook] [fleet]    # these tests only
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 root=$(cd "$here/../../.." && pwd)
@@ -18,7 +18,7 @@ if ! "$work/env/bin/pip" --quiet download --no-deps --dest "$work/wheels" numpy;
     exit 0
 fi
 tests=("$@")
-[ $# -gt 0 ] || tests=(notebook frames regression device)
+[ $# -gt 0 ] || tests=(notebook frames regression device fleet)
 # The build folder of the workspace, so that crates that are built already are reused.
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$root/target}
 "$work/env/bin/pip" install --quiet --find-links "$work/wheels" --config-settings=build-args='--profile dev' "$root/host/python"
@@ -26,6 +26,9 @@ cargo run --quiet --locked --manifest-path "$root/Cargo.toml" -p virtual-bench -
 cargo build --quiet --locked --manifest-path "$root/Cargo.toml" -p host --bin host
 export PAM_HOST="$CARGO_TARGET_DIR/debug/host"
 "$work/env/bin/pip" install --quiet --find-links "$work/wheels" pandas polars pyarrow scikit-learn matplotlib
+if [[ " ${tests[*]} " == *" fleet "* ]]; then
+    "$work/env/bin/pip" install --quiet "dask[distributed]" ray
+fi
 for test in "${tests[@]}"; do
     "$work/env/bin/python" "$here/test_$test.py" "$work/bench"
 done

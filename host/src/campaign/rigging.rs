@@ -1,14 +1,18 @@
 //! The controller of a campaign and what moves its muscle's free end.
 
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
 
 use model_core::image;
-use model_core::link::endpoints::{GetSettings, SetSettings};
-use model_core::link::messages::Side;
+use model_core::link::endpoints::{ClearFault, GetFaults, GetSettings, GetStatus, SetSettings};
+use model_core::link::messages::{Fault, Side, State};
 use pam_campaign::controller::{Controller, MakeCheck};
+use pam_campaign::prompt::Prompt;
 use pam_campaign::rig::{Axis as RigAxis, Rig};
 use pam_campaign::step::CheckKind;
-use pam_campaign::stroke_axis::{Line, NoAxis, Prompt, StrokeAxis};
+use pam_campaign::stroke_axis::{BAUD, Line, NoAxis, StrokeAxis};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::write_whole;
@@ -25,6 +29,11 @@ use crate::demo::tracking::{Law, Task, choose, track};
 
 /// Most ticks without a host that the firmware's settings allow.
 const LONGEST_SILENCE: u32 = 60_000;
+
+/// Time beyond the silence of a host until its fault shows.
+const MARGIN: Duration = Duration::from_secs(2);
+/// Time between two looks at the state of a controller.
+const POLL: Duration = Duration::from_millis(50);
 
 /// Everything that carries out steps.
 pub(crate) struct Rigging {
@@ -60,12 +69,7 @@ pub(crate) fn emulated(
     let axis = Axis::default();
     let emulated = Emulated::start(Stand::commanded(bench.clone(), axis.clone()), only, speed)?;
     let mut client = Client::open(emulated.address())?;
-    // The watch counts device time, which goes so much faster, and twice as fast again after a pause of a busy machine.
-    let mut settings = client.call::<GetSettings>(&())?;
-    let faster = (2.0 * speed).ceil().max(1.0) as u32;
-    settings.watch.host_silence_ticks =
-        settings.watch.host_silence_ticks.saturating_mul(faster).min(LONGEST_SILENCE);
-    client.call_once::<SetSettings>(&settings)?;
+    allow_silence(&mut client, speed)?;
     limit(&mut rig, &mut client)?;
     let made: MakeCheck = Box::new(move |check, force, pressure, clock| {
         let at = match check {
@@ -80,21 +84,37 @@ pub(crate) fn emulated(
     Ok(Rigging { controller, rig, muscle, words, emulated: Some((emulated, axis)) })
 }
 
+/// Allows an emulated host to be silent as long as a real one: the watch counts device time, which goes so much faster, and twice as fast
+/// again after a pause of a busy machine, which may last as long.
+pub(crate) fn allow_silence(client: &mut Client, speed: f64) -> Result<()> {
+    let mut settings = client.call::<GetSettings>(&())?;
+    let faster = (4.0 * speed).ceil().max(1.0) as u32;
+    settings.watch.host_silence_ticks =
+        settings.watch.host_silence_ticks.saturating_mul(faster).min(LONGEST_SILENCE);
+    client.call_once::<SetSettings>(&settings).map(drop)
+}
+
 /// A controller at a port, on the rig that is described.
 pub(crate) fn real(
     port: &PortOption,
     description: &Path,
     rig: Option<Rig>,
+    continued: bool,
+    interrupted: &Arc<AtomicBool>,
     console: &Console,
 ) -> Result<Rigging> {
     let mut rig = rig.unwrap_or_default();
     let muscle = MuscleDescription::read(description)?;
     let mut client = port.connect(console)?;
+    if continued {
+        clear_silence(&mut client, console)?;
+    }
     limit(&mut rig, &mut client)?;
     let axis: Box<dyn StrokeAxis> = match (rig.axis, &rig.axis_address) {
-        (RigAxis::Line, Some(address)) => Box::new(Line::open(address)?),
+        (RigAxis::Line, Some(address)) => Box::new(Line::open(address, rig.axis_baud.unwrap_or(BAUD))?),
         (RigAxis::Prompt, _) => {
-            Box::new(Prompt::new(std::io::BufReader::new(std::io::stdin()), std::io::stderr()))
+            let input = std::io::BufReader::new(std::io::stdin());
+            Box::new(Prompt::new(input, std::io::stderr(), Arc::clone(interrupted)))
         }
         (RigAxis::Commanded, _) => {
             return Err(Error::new(
@@ -110,6 +130,25 @@ pub(crate) fn real(
     let none: MakeCheck = Box::new(|_, _, _, _| Ok(None));
     let words = format!("the controller at {}", client.port());
     Ok(Rigging { controller: Controller::new(client, axis, none), rig, muscle, words, emulated: None })
+}
+
+/// A campaign that was stopped by force leaves a controller that runs until its host has been silent for long enough, and is then vented
+/// by that fault. This call is the host that was missing, so it waits, and clears the fault; any other fault stays.
+fn clear_silence(client: &mut Client, console: &Console) -> Result<()> {
+    let ticks = client.call::<GetSettings>(&())?.watch.host_silence_ticks;
+    let deadline = Instant::now() + Duration::from_millis(ticks.into()) + MARGIN;
+    while client.call::<GetStatus>(&())?.state == State::Running && Instant::now() < deadline {
+        std::thread::sleep(POLL);
+    }
+    if client.call::<GetStatus>(&())?.state != State::Fault {
+        return Ok(());
+    }
+    let latched = client.call::<GetFaults>(&())?.latched;
+    if latched.is_some_and(|report| report.fault == Fault::HostSilence) {
+        client.call_once::<ClearFault>(&())?;
+        console.note("the controller had vented the muscle because the interrupted campaign fell silent; the fault is cleared");
+    }
+    Ok(())
 }
 
 /// No more pressure and stroke than the controller itself allows.

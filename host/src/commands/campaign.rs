@@ -1,6 +1,8 @@
 //! `host campaign`: the program records, checks, fits and diagnoses automatically.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use clap::{Args, ValueEnum};
 
@@ -73,8 +75,9 @@ pub struct Arguments {
     json: bool,
 }
 
+/// What recordings are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum For {
+pub enum For {
     /// The force table.
     Fit,
     /// What the model leaves out.
@@ -84,7 +87,8 @@ enum For {
 }
 
 impl For {
-    const fn purpose(self) -> (Purpose, &'static str) {
+    /// The purpose, and its name in documents.
+    pub(super) const fn purpose(self) -> (Purpose, &'static str) {
         match self {
             Self::Fit => (Purpose::Fit, "fit"),
             Self::Diagnosis => (Purpose::Diagnosis, "diagnosis"),
@@ -103,7 +107,8 @@ impl Arguments {
         let interrupted = interrupts()?;
         // The log is opened before any device moves: a folder that is in use, or is none, costs nothing then.
         let mut journal = Journal::open(&self.output)?;
-        let mut rigging = self.rigging(console)?;
+        let continued = !journal.events().is_empty();
+        let mut rigging = self.rigging(continued, &interrupted, console)?;
         console.note(format!("{}; Ctrl-C vents the muscle, and the same call continues", rigging.words));
         let (purpose, purpose_name) = self.purpose.purpose();
         let mut engine =
@@ -135,7 +140,7 @@ impl Arguments {
         self.results(&mut engine, &mut rigging, &course, told, console)
     }
 
-    fn rigging(&self, console: &Console) -> Result<Rigging> {
+    fn rigging(&self, continued: bool, interrupted: &Arc<AtomicBool>, console: &Console) -> Result<Rigging> {
         let rig = self.rig.as_deref().map(Rig::read).transpose()?;
         let only = match self.on.as_deref() {
             Some("native") => Some(Kind::Native),
@@ -144,7 +149,7 @@ impl Arguments {
         };
         match (&self.emulate, &self.muscle) {
             (Some(name), muscle) => emulated(name, muscle.as_deref(), rig, (only, self.speed), &self.output),
-            (None, Some(muscle)) => real(&self.port, muscle, rig, console),
+            (None, Some(muscle)) => real(&self.port, muscle, rig, continued, interrupted, console),
             (None, None) => Err(Error::new(DataCode::CallInvalid, "the muscle's description is missing")
                 .help("give --muscle M.toml")),
         }

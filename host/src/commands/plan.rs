@@ -1,29 +1,65 @@
-//! `host plan`: which effects a planned protocol can identify.
+//! `host plan`: which recordings to make next, and what a planned protocol can distinguish.
+
+mod next;
+mod protocol;
 
 use std::path::PathBuf;
 
 use clap::Args;
-use model_core::muscle::Muscle;
 
+use super::campaign::For;
+use super::recording_files::positive;
 use crate::console::Console;
-use crate::documents::{bench, text};
 use pam_data::error::{DataCode, Error, Result};
-use pam_data::output::write_whole;
-use pam_diagnose::isolability::isolability;
-use pam_diagnose::protocol_simulation;
-use pam_fit::table_file::TableFile;
 
 /// Arguments of `host plan`.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  host plan --table mini.pam protocol.toml\n\n\
-    The table is that of the muscle or of a similar one; the protocol is a file for virtual-bench.")]
+#[command(arg_required_else_help = true)]
+#[command(after_help = "Examples:\n  \
+    host plan --muscle mini.toml -o plan\n  \
+    host plan --muscle mini.toml loops/*.csv -o plan --for diagnosis\n  \
+    host plan --table mini.pam protocol.toml\n\n\
+    With --muscle the plan continues the recordings: each step is the one that is expected to tell most per second after those before \
+    it, as in `host campaign`. The folder receives plan.md with instructions for the operator, and one protocol file for each step, \
+    which `virtual-bench record --protocol` runs. The same data give the same plan.\n\n\
+    With --table the command judges a protocol: which effects it shows, and which of them it does not distinguish.")]
 pub struct Arguments {
-    /// A table of the muscle, or of a similar one.
+    /// The muscle's description: plan the next recordings.
+    #[arg(long, value_name = "M.toml", required_unless_present = "table", conflicts_with = "table")]
+    muscle: Option<PathBuf>,
+    /// A table of the muscle, or of a similar one: judge a protocol.
     #[arg(long, value_name = "T.pam")]
-    table: PathBuf,
-    /// The planned protocol.
-    #[arg(value_name = "PROTOCOL.toml")]
-    protocol: PathBuf,
+    table: Option<PathBuf>,
+    /// Recordings that exist, in chronological order; with --table the planned protocol.
+    #[arg(value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Folder for the plan; it must be new or empty, or hold an earlier plan.
+    #[arg(short, long, value_name = "FOLDER", conflicts_with = "table")]
+    output: Option<PathBuf>,
+    /// What the recordings are for.
+    #[arg(long = "for", value_enum, value_name = "PURPOSE", default_value_t = For::Both, conflicts_with = "table")]
+    purpose: For,
+    /// Steps at most, besides the tare at the end.
+    #[arg(long, value_name = "N", default_value_t = 5, conflicts_with = "table")]
+    steps: u16,
+    /// Bench time of all steps at most, min.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 30.0,
+        allow_negative_numbers = true,
+        conflicts_with = "table"
+    )]
+    minutes: f64,
+    /// What the rig can do. By default it moves the muscle at a speed of choice, and checks of the bench can be made.
+    #[arg(long, value_name = "rig.toml", conflicts_with = "table")]
+    rig: Option<PathBuf>,
+    /// A check of the bench that was made already. May be given more than once.
+    #[arg(long, value_name = "CHECK.csv", conflicts_with = "table")]
+    check: Vec<PathBuf>,
+    /// How to read files that are not in the usual form: an import description.
+    #[arg(long, value_name = "IMPORT.toml", conflicts_with = "table")]
+    import: Option<PathBuf>,
     /// Write the result as JSON to a file; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -35,30 +71,14 @@ impl Arguments {
     /// # Errors
     /// Files that cannot be read, or a protocol that cannot be carried out.
     pub fn run(self, console: &Console) -> Result<()> {
-        let file = TableFile::read(&self.table)?;
-        let muscle = Muscle::<f64>::build(&file.table)
-            .map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
-        let protocol = protocol_simulation::read(&self.protocol)?;
-        let rows = isolability(&protocol, &muscle).map_err(|e| e.file(&self.protocol))?;
-        if let Some(path) = &self.json {
-            let effects = rows.iter().map(bench::Planned::of).collect();
-            let json = text(&bench::Plan { schema: "pam-plan/1", effects })?;
-            write_whole(path, (json + "\n").as_bytes())?;
-        }
-        if self.json.as_deref() != Some(std::path::Path::new("-")) {
-            console.result(format!("{:<26}{:>9}   not distinguished from (cosine)", "effect", "visible"));
-            for r in &rows {
-                let others: Vec<String> =
-                    r.not_told_from.iter().map(|(n, c)| format!("{n} ({c:.2})")).collect();
-                let seen =
-                    if r.visible < 1e-5 { "no".to_owned() } else { format!("{:.2} %", 100.0 * r.visible) };
-                console.result(format!("{:<26}{seen:>9}   {}", r.effect, others.join(", ")));
+        positive([("--minutes", Some(self.minutes))])?;
+        match (&self.table, self.files.as_slice()) {
+            (None, _) => next::run(&self, console),
+            (Some(table), [file]) => protocol::run(table, file, self.json.as_deref(), console),
+            (Some(_), _) => {
+                Err(Error::new(DataCode::CallInvalid, "with --table the command judges one protocol")
+                    .help("give one protocol file, or plan recordings with --muscle M.toml"))
             }
-            console.note(
-                "visible: share of the effect's energy that the tables cannot absorb; cosine: similarity of two effects after the tables \
-                 are refitted (1: not identifiable)",
-            );
         }
-        Ok(())
     }
 }

@@ -54,6 +54,46 @@ impl<'a> Planned<'a> {
     }
 }
 
+/// `host plan --muscle --json`: protocols, best first.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct PlanOfRecordings<'a> {
+    pub schema: &'static str,
+    pub muscle: &'a str,
+    /// `fit`, `diagnosis` or `both`.
+    pub purpose: &'static str,
+    /// Recordings that the plan continues.
+    pub recordings: usize,
+    /// Why the plan ends there, in one sentence.
+    pub ended_by: &'a str,
+    /// Predicted standard error of the table on unseen pressures and strokes before the plan.
+    pub predicted_error_N: Option<f64>,
+    /// Effects that the recordings so far leave possible.
+    pub possible: Vec<String>,
+    pub steps: Vec<PlannedStep>,
+}
+
+/// One step of a plan.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct PlannedStep {
+    pub number: usize,
+    pub name: String,
+    pub what: String,
+    /// Why, in one sentence.
+    pub why: String,
+    pub seconds: f64,
+    pub table_nats: f64,
+    pub effect_nats: f64,
+    pub unseen_nats: f64,
+    /// Predicted standard error of the table after the step; absent before there is a table.
+    pub predicted_error_N: Option<f64>,
+    /// The protocol file; absent for a check of the bench.
+    pub protocol: Option<String>,
+    /// For the operator, one sentence each.
+    pub instructions: Vec<String>,
+}
+
 /// `host settings --json`.
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
@@ -109,6 +149,9 @@ pub(crate) struct Emulate<'a> {
     pub schema: &'static str,
     pub port: &'a str,
     pub controller: &'a str,
+    /// Where the axis of `--axis` listens.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis: Option<&'a str>,
 }
 
 /// `host studio --json`.

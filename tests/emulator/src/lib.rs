@@ -5,6 +5,8 @@
 //! that says what to run, unless `PAM_SKIP_EMULATOR=1` is set.
 
 pub mod bandwidth;
+#[cfg(unix)]
+pub mod campaign_rig;
 pub mod closed_loop;
 pub mod debugger;
 pub mod diagnosed;

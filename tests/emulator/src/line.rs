@@ -39,6 +39,22 @@ pub fn noisy(bit_error_rate: f64, seed: u64) -> Passage {
     })
 }
 
+/// A pseudo-terminal without echo or line editing: its near end, and the path of its far end.
+///
+/// # Panics
+/// When the system gives none.
+#[cfg(unix)]
+pub fn open_pty() -> (File, PathBuf) {
+    use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+    let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a pseudo-terminal");
+    grantpt(&master).and_then(|()| unlockpt(&master)).expect("a pseudo-terminal");
+    let path = ptsname(&master, Vec::new()).expect("its name").into_string().expect("its name").into();
+    let mut raw = rustix::termios::tcgetattr(&master).expect("its modes");
+    raw.make_raw();
+    rustix::termios::tcsetattr(&master, rustix::termios::OptionalActions::Now, &raw).expect("raw mode");
+    (File::from(master), path)
+}
+
 /// What joins a program's end: replaced with every connection.
 type Near = Arc<Mutex<Option<Box<dyn Write + Send>>>>;
 
@@ -93,16 +109,8 @@ impl Line {
     /// When the system gives none.
     #[cfg(unix)]
     pub fn serial(machine: &Machine, to_board: Passage, from_board: Passage) -> Self {
-        use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a pseudo-terminal");
-        grantpt(&master).and_then(|()| unlockpt(&master)).expect("a pseudo-terminal");
-        let path: PathBuf =
-            ptsname(&master, Vec::new()).expect("its name").into_string().expect("its name").into();
-        let mut raw = rustix::termios::tcgetattr(&master).expect("its modes");
-        raw.make_raw();
-        rustix::termios::tcsetattr(&master, rustix::termios::OptionalActions::Now, &raw).expect("raw mode");
+        let (master, path) = open_pty();
         let kept = File::options().read(true).write(true).open(&path).expect("its far end");
-        let master = File::from(master);
         let mut line = Self::begin(machine, path.display().to_string(), from_board);
         line.0._kept = Some(kept);
         *line.1.lock().unwrap_or_else(PoisonError::into_inner) =

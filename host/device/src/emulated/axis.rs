@@ -10,6 +10,8 @@ struct Course {
     now_m: f64,
     to_m: f64,
     speed_m_per_s: f64,
+    pressure_pa: f64,
+    time_s: f64,
 }
 
 /// The command of the axis; clones command the same one.
@@ -47,9 +49,22 @@ impl Axis {
         self.course.lock().unwrap_or_else(PoisonError::into_inner).now_m
     }
 
+    /// True pressure of the muscle, Pa, and the time of the bench, s, for who watches from outside.
+    #[must_use]
+    pub fn seen(&self) -> (f64, f64) {
+        let course = self.course.lock().unwrap_or_else(PoisonError::into_inner);
+        (course.pressure_pa, course.time_s)
+    }
+
+    /// Notes the true pressure of the muscle.
+    pub(super) fn notes(&self, pressure_pa: f64) {
+        self.course.lock().unwrap_or_else(PoisonError::into_inner).pressure_pa = pressure_pa;
+    }
+
     /// Where it is after another `dt` seconds, m.
     pub fn advance(&self, dt: f64) -> f64 {
         let mut course = self.course.lock().unwrap_or_else(PoisonError::into_inner);
+        course.time_s += dt;
         let way = course.speed_m_per_s * dt;
         course.now_m += (course.to_m - course.now_m).clamp(-way, way);
         course.now_m

@@ -18,7 +18,7 @@ pub fn page(all: &[Trial], drawn: usize) -> String {
     let mut m = format!(
         "{INTRODUCTION}The muscles of the virtual bench have one hidden effect, two, or none, of 1 to 6 % of the blocked force (seed {SEED}). \
          Each method has {:.0} minutes of bench time, and all recordings get the same diagnosis. The bounds and the seed were committed before \
-         the first scored run. Rates have exact 95 % intervals. {} of {drawn} muscles of the set were tested.\n\n{DIAGNOSIS}",
+         the first scored run. Rates have exact 95 % intervals. The first {} of {drawn} muscles of the set were tested, in its order.\n\n{DIAGNOSIS}",
         BENCH_S / 60.0,
         all.len()
     );
@@ -61,7 +61,7 @@ fn times(all: &[Trial]) -> String {
     let longest = chosen.iter().map(|s| s.choosing_s).fold(0.0, f64::max);
     let bench = chosen.iter().map(|s| s.bench_s / 60.0).sum::<f64>() / chosen.len().max(1) as f64;
     format!(
-        "\nLongest choice of a step: {longest:.1} s (bound {}; two campaigns at a time shared the machine with other work). Bench time \
+        "\nLongest choice of a step: {longest:.1} s (bound {}; campaigns shared the machine with other work). Bench time \
          of a campaign: {bench:.1} min on average.\n",
         BOUNDS[4].1
     )
