@@ -171,6 +171,11 @@ impl RegulatorState {
         self.predict(dt, 0.0, air, regulator);
     }
 
+    /// Whether line and muscle are empty and stay so at no command, without a movement that draws air in.
+    pub fn is_empty(&self, regulator: &Regulator) -> bool {
+        self.supplied_pa == 0.0 && self.model_pa == 0.0 && regulator.offset_pa <= 0.0
+    }
+
     /// A command of someone else's: only the model follows it.
     pub fn expect(&mut self, command_pa: f32, regulator: &Regulator) {
         self.predict(TICK_S, command_pa, &Air::default(), regulator);

@@ -4,7 +4,7 @@ use model_core::link::messages::{Fault, Mode, Side, State};
 use model_core::link::settings::FeedForward;
 use model_core::scalar::Scalar;
 
-use super::Controller;
+use super::{Controller, in_register};
 use crate::board::Command;
 use crate::modes;
 use crate::pair::{self, Posed, Pull};
@@ -48,9 +48,10 @@ impl Controller {
             }
         }
         let mut bad = None;
+        let settings = in_register(&self.settings);
         for side in Side::ALL {
             let used = self.uses(side);
-            let Self { settings, sides, hardware, .. } = self;
+            let Self { sides, hardware, .. } = self;
             let actuator = &mut sides[side.index()];
             let (demand, reached) = demands[side.index()];
             if !used {
@@ -110,7 +111,7 @@ impl Controller {
         [force_n, coming_n]: [f32; 2],
         foreseen_n: f32,
     ) -> (Demand, bool) {
-        let settings = &self.settings;
+        let settings = in_register(&self.settings);
         let actuator = &mut self.sides[at];
         actuator.force_demand_n = force_n;
         let model_n = actuator.model_n;
