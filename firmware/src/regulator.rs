@@ -18,8 +18,10 @@ use model_core::scalar::Scalar;
 
 use crate::tick::TICK_S;
 
-/// Time constant of the observer of what the regulator's model leaves out, s: slower than its lag, quicker than its drift.
-const OBSERVER_S: f32 = 0.15;
+/// Time constant of the observer of what the regulator's model leaves out, s: slower than the waves that a muscle follows, quicker than
+/// the drift of a regulator. A quick one takes an error of the model's line for drift, and adds it to waves a quarter of a period later:
+/// with 0.15 s, force in a wave of 2 Hz against a mass on a spring was off by 1.04 % of blocked force instead of 0.98 %.
+const OBSERVER_S: f32 = 0.6;
 /// The most that the observer adds, as a part of the largest command.
 const BIAS: f32 = 0.02;
 /// Delay of the loop itself: a command holds for a tick.
