@@ -111,7 +111,7 @@ pub struct Health {
     first_n: f32,
     /// A sample that waits for the next tick.
     staged: Option<Sample>,
-    /// What is left to be done before the rows of a whole block are added.
+    /// What must be done before the rows of a whole block are added.
     due: Due,
     /// The last whole block, while it is being added row by row, and the one before.
     now: [f32; COLUMNS],

@@ -213,7 +213,7 @@ fn signal(child: &Child, signal: Signal) {
 }
 
 #[test]
-fn every_tick_that_the_rows_miss_is_reported_whatever_its_cause() {
+fn every_tick_that_the_rows_miss_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let controller = controller();
     let (path, line, _keep) = cable(&controller);
@@ -225,7 +225,7 @@ fn every_tick_that_the_rows_miss_is_reported_whatever_its_cause() {
     grows(&part, 2_000);
     stream(&line, 0);
     grows(&part, 20_000);
-    // The program stands still: the queues of the line and of the controller overflow.
+    // The program does not run: the queues of the line and of the controller overflow.
     signal(&child, Signal::STOP);
     std::thread::sleep(Duration::from_secs(3));
     signal(&child, Signal::CONT);

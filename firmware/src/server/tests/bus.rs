@@ -105,7 +105,7 @@ impl Bus {
             assert_eq!(
                 Route::of(identifier),
                 Some(Route::From(address)),
-                "only the one that is asked answers"
+                "only the one with the address answers"
             );
             let (receiver, accumulator) = &mut self.from[at];
             for byte in receiver.take(&payload) {

@@ -93,7 +93,7 @@ fn named(id: u32) -> String {
     }
 }
 
-/// Whether a program stands still by a signal.
+/// Whether a signal has stopped a program.
 fn is_stopped(id: u32) -> bool {
     let Ok(status) = fs::read_to_string(format!("/proc/{id}/stat")) else { return false };
     // The name before the state may hold any character.

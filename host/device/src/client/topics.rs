@@ -23,7 +23,7 @@ pub enum Topic {
 /// What did not arrive.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Losses {
-    /// Samples that are missing at the rate of the subscription, by the tick counter of the device: whatever the cause. Without a
+    /// Samples that are missing at the rate of the subscription, by the tick counter of the device. Without a
     /// subscription, those that the sequence numbers miss.
     pub samples: u64,
     /// Gaps in which they are missing.
