@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! cargo test -p emulator-tests --test vent                                      some vents, in the ordinary tests
-//! PAM_VENT_PAGE=write cargo test -p emulator-tests --test vent        more; writes docs/figures/vent.md
+//! PAM_VENT_PAGE=write cargo test -p emulator-tests --test vent              more; writes docs/figures/vent.md
 //! ```
 #![cfg(target_os = "linux")]
 
