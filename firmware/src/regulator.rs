@@ -285,6 +285,23 @@ mod tests {
     }
 
     #[test]
+    fn what_is_empty_stays_so_when_it_is_vented() {
+        for (offset_pa, pressure_pa, empty) in
+            [(0.0, 0.0, true), (-4e3, 0.0, true), (4e3, 0.0, false), (0.0, 1.0, false)]
+        {
+            let regulator = Regulator { offset_pa, ..Settings::default().regulator };
+            let mut state = RegulatorState::default();
+            state.begin(pressure_pa);
+            let before = state;
+            assert_eq!(state.is_empty(&regulator), empty, "{offset_pa}, {pressure_pa}");
+            state.vent(1e-3, &Air::default(), &regulator);
+            assert_eq!(state == before, empty, "{offset_pa}, {pressure_pa}");
+        }
+        let failed = Regulator { offset_pa: f32::NAN, ..Settings::default().regulator };
+        assert!(!RegulatorState::default().is_empty(&failed));
+    }
+
+    #[test]
     fn lead_removes_the_lag_of_a_ramp() {
         let settings = Settings::default();
         let follow = |lead| {
