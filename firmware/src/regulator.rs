@@ -123,6 +123,7 @@ impl RegulatorState {
     }
 
     /// One tick of `dt` seconds towards a demanded pressure, which is limited to `high_pa`.
+    #[inline]
     pub fn step(
         &mut self,
         dt: f32,
