@@ -3,12 +3,12 @@
 
 use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::recording::{Campaign, largest_force};
+use pam_data::recording::{Campaign, Recording, largest_force};
 use pam_fit::predict::predict;
 use pam_fit::table_file::TableFile;
 use rayon::prelude::*;
 
-use super::criteria::{PULLS, TABLE_FOLDS};
+use super::criteria::{PULLS, SUPPORT, TABLE_FOLDS};
 use super::table_fit::{self, Layers, Prepared};
 use crate::valve_pulses;
 
@@ -32,6 +32,10 @@ pub struct UnseenErrors {
     pub without_memory: UnseenError,
     /// Contact and memory.
     pub with_memory: UnseenError,
+    /// The errors without memory of the readings whose pressure another run of the mounting reaches.
+    pub supported_without_memory: UnseenError,
+    /// And with memory.
+    pub supported_with_memory: UnseenError,
     /// Share of the readings set aside because they ring after a valve's pulse, %.
     pub ringing_pct: f64,
     /// Share of the others that are slack or at the converter's end, %: a prediction errs there only by what it pulls too much.
@@ -44,6 +48,8 @@ struct Counted {
     /// A reading up to this is slack, N.
     slack: f64,
     largest: f64,
+    /// The pressure up to which the other runs of its mounting reach, Pa, by recording.
+    reached: Vec<f64>,
 }
 
 /// Sums over the readings of recordings.
@@ -55,26 +61,66 @@ struct Sums {
     slack: f64,
 }
 
+/// The sums of all readings, and of those whose pressure another run of the mounting reaches.
+#[derive(Clone, Copy, Default)]
+struct Both {
+    all: Sums,
+    supported: Sums,
+}
+
+impl std::ops::Add for Sums {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            squares: self.squares + other.squares,
+            sizes: self.sizes + other.sizes,
+            count: self.count + other.count,
+            slack: self.slack + other.slack,
+        }
+    }
+}
+
+/// Up to which pressure the other runs of each recording's mounting reach, Pa.
+fn reached(campaign: &Campaign) -> Vec<f64> {
+    let top = |r: &Recording| r.pressure.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let tops: Vec<f64> = campaign.recordings.iter().map(top).collect();
+    let mountings = campaign.mountings().unwrap_or_default();
+    let same = |r: usize, o: usize| o != r && mountings.get(o) == mountings.get(r);
+    let of =
+        |r: usize| (0..tops.len()).filter(|o| same(r, *o)).map(|o| tops[o]).fold(f64::NEG_INFINITY, f64::max);
+    (0..tops.len()).map(of).collect()
+}
+
 impl Counted {
     fn of(campaign: &Campaign, zero: f64) -> Self {
         let rings = campaign.recordings.par_iter().map(valve_pulses::ringing).collect();
         let largest = largest_force(campaign).max(f64::MIN_POSITIVE);
-        Self { rings, slack: zero + PULLS * largest, largest }
+        Self { rings, slack: zero + PULLS * largest, largest, reached: reached(campaign) }
     }
 
-    fn add(&self, sums: &mut Sums, campaign: &Campaign, index: usize, predicted: &[f64]) {
-        let Some(force) = &campaign.recordings[index].force else { return };
-        for ((read, model), rings) in force.iter().zip(predicted).zip(&self.rings[index]) {
+    fn add(&self, both: &mut Both, campaign: &Campaign, index: usize, predicted: &[f64]) {
+        let recording = &campaign.recordings[index];
+        let Some(force) = &recording.force else { return };
+        let limit = self.reached[index] + SUPPORT * 1e3;
+        let readings = force.iter().zip(predicted).zip(&self.rings[index]).zip(&recording.pressure);
+        for (((read, model), rings), pressure) in readings {
             if *rings || !read.is_finite() || !model.is_finite() {
                 continue;
             }
             let slack = *read <= self.slack;
             // A slack reading says that the muscle pulls no more than that.
             let error = if slack { (model - self.slack).max(0.0) } else { model - read };
-            sums.squares += error * error;
-            sums.sizes += error.abs();
-            sums.count += 1.0;
-            sums.slack += f64::from(u8::from(slack));
+            let one = Sums {
+                squares: error * error,
+                sizes: error.abs(),
+                count: 1.0,
+                slack: f64::from(u8::from(slack)),
+            };
+            both.all = both.all + one;
+            if *pressure <= limit {
+                both.supported = both.supported + one;
+            }
         }
     }
 
@@ -114,9 +160,9 @@ pub fn unseen_by_table(
     let Some(whole) = Prepared::of(&settled, muscle, &vec![true; runs])? else { return Ok(None) };
     let forms =
         [(&settled, Counted::of(&settled, whole.zero)), (recorded, Counted::of(recorded, whole.zero))];
-    let fold = |fold: usize| -> Result<[[Sums; 3]; 2]> {
+    let fold = |fold: usize| -> Result<[[Both; 3]; 2]> {
         let used: Vec<bool> = (0..runs).map(|r| r % folds != fold).collect();
-        let mut sums = [[Sums::default(); 3]; 2];
+        let mut sums = [[Both::default(); 3]; 2];
         let Some(prepared) = Prepared::of(&settled, muscle, &used)? else { return Ok(sums) };
         let tables = [prepared.base(), prepared.table(Layers::Contact)?, prepared.table(Layers::Memory)?];
         for (k, table) in tables.iter().enumerate() {
@@ -130,25 +176,24 @@ pub fn unseen_by_table(
         }
         Ok(sums)
     };
-    let parts: Vec<[[Sums; 3]; 2]> = (0..folds).into_par_iter().map(fold).collect::<Result<_>>()?;
+    let parts: Vec<[[Both; 3]; 2]> = (0..folds).into_par_iter().map(fold).collect::<Result<_>>()?;
     let form = |f: usize| {
         let counted = &forms[f].1;
-        let total = |k: usize| {
-            parts.iter().map(|p| p[f][k]).fold(Sums::default(), |a, b| Sums {
-                squares: a.squares + b.squares,
-                sizes: a.sizes + b.sizes,
-                count: a.count + b.count,
-                slack: a.slack + b.slack,
-            })
+        let total = |k: usize, of: fn(&Both) -> Sums| {
+            parts.iter().map(|p| of(&p[f][k])).fold(Sums::default(), std::ops::Add::add)
         };
+        let all = |k: usize| total(k, |both| both.all);
+        let supported = |k: usize| total(k, |both| both.supported);
         let rings = counted.rings.iter().flatten().filter(|r| **r).count() as f64;
         let readings = counted.rings.iter().map(Vec::len).sum::<usize>().max(1) as f64;
         UnseenErrors {
-            base: counted.size(total(0)),
-            without_memory: counted.size(total(1)),
-            with_memory: counted.size(total(2)),
+            base: counted.size(all(0)),
+            without_memory: counted.size(all(1)),
+            with_memory: counted.size(all(2)),
+            supported_without_memory: counted.size(supported(1)),
+            supported_with_memory: counted.size(supported(2)),
             ringing_pct: 100.0 * rings / readings,
-            slack_pct: 100.0 * total(2).slack / total(2).count.max(1.0),
+            slack_pct: 100.0 * all(2).slack / all(2).count.max(1.0),
         }
     };
     Ok(Some([form(0), form(1)]))
