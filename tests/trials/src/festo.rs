@@ -7,8 +7,8 @@ use crate::festo_tables;
 use crate::queue::in_order;
 use crate::tool;
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::recording::{Import, Reader};
-use pam_diagnose::history::table_unseen::{UnseenErrors, unseen_by_table};
+use pam_data::recording::{Campaign, Import, Reader};
+use pam_diagnose::history::table_unseen::{LeftOut, error_of_a_millimetre, unseen_by_table};
 use serde_json::Value;
 use std::error::Error;
 use std::fmt::Write as _;
@@ -236,22 +236,34 @@ fn memory_section(cases: &[Case], diagnosed: &[Diagnosed]) -> String {
     festo_history::section(&answers)
 }
 
-/// Errors of unseen runs of one muscle through the table.
-fn unseen(data: &Path, (year, muscle, file, _): Case) -> Result<[UnseenErrors; 2], String> {
+/// The recordings of one muscle as recorded and settled, with its description.
+fn recordings(
+    data: &Path,
+    (year, muscle, file, _): Case,
+) -> Result<(Campaign, Campaign, MuscleDescription), String> {
     let words = |e: pam_data::error::Error| e.to_string();
     let described = MuscleDescription::read(description(year, muscle)).map_err(words)?;
-    let described_import = Import::read(import(year, "staircase")).map_err(words)?;
-    let recording = data.join(format!("aarl-festo-10mm-{year}")).join(format!("{file}.csv"));
-    let read = |file: PathBuf, import: &Import| {
-        Reader::of(&described).import(Some(import)).campaign([file]).map_err(words)
+    let read = |file: &str, what: &str| {
+        let import = Import::read(import(year, what)).map_err(words)?;
+        let path = data.join(format!("aarl-festo-10mm-{year}")).join(format!("{file}.csv"));
+        Reader::of(&described).import(Some(&import)).campaign([path]).map_err(words)
     };
-    let recorded = read(recording, &described_import)?;
-    let settled_import = Import::read(import(year, "settled")).map_err(words)?;
-    let points = data.join(format!("aarl-festo-10mm-{year}")).join("settled_points.csv");
-    let settled = read(points, &settled_import)?;
-    unseen_by_table(&settled, &recorded, &described)
-        .map_err(words)?
-        .ok_or_else(|| "no staircases with repeated runs".to_owned())
+    let (recorded, settled) = (read(file, "staircase")?, read("settled_points", "settled")?);
+    Ok((recorded, settled, described))
+}
+
+/// Errors of unseen runs and contractions of one muscle through the table.
+fn unseen(data: &Path, case: Case) -> Result<festo_tables::Unseen, String> {
+    let words = |e: pam_data::error::Error| e.to_string();
+    let (recorded, settled, described) = recordings(data, case)?;
+    let by_table = |left_out| {
+        unseen_by_table(&settled, &recorded, &described, left_out)
+            .map_err(words)?
+            .ok_or_else(|| "no staircases with repeated runs".to_owned())
+    };
+    let [contractions, _] = by_table(LeftOut::Mountings)?;
+    let millimetre_pct = error_of_a_millimetre(&settled, &described).map_err(words)?.unwrap_or(f64::NAN);
+    Ok(festo_tables::Unseen { runs: by_table(LeftOut::Runs)?, contractions, millimetre_pct })
 }
 
 /// The section on unseen runs through the table.

@@ -21,8 +21,18 @@ pub const INTRODUCTION: &str = "Each run is predicted from the others by a table
 pub struct Row {
     /// Set and muscle.
     pub label: String,
-    /// Errors at settled points and over readings as recorded, or why there are none.
-    pub errors: Result<[UnseenErrors; 2], String>,
+    /// The errors, or why there are none.
+    pub errors: Result<Unseen, String>,
+}
+
+/// Errors on recordings that were held out.
+pub struct Unseen {
+    /// Runs, at settled points and over readings as recorded.
+    pub runs: [UnseenErrors; 2],
+    /// Whole mountings, at settled points.
+    pub contractions: UnseenErrors,
+    /// Mean change of the force by a millimetre of length, % of the largest force.
+    pub millimetre_pct: f64,
 }
 
 /// The whole section.
@@ -38,7 +48,7 @@ pub fn section(rows: &[Row]) -> String {
                 continue;
             }
         };
-        for (k, (name, e)) in ["settled points", "as recorded"].iter().zip(errors).enumerate() {
+        for (k, (name, e)) in ["settled points", "as recorded"].iter().zip(&errors.runs).enumerate() {
             let change = e.with_memory.rms_pct / e.without_memory.rms_pct.min(e.base.rms_pct) - 1.0;
             counts[k][0] += usize::from(change <= -0.35);
             counts[k][1] += usize::from(e.with_memory.rms_pct <= 0.6);
@@ -70,7 +80,35 @@ pub fn section(rows: &[Row]) -> String {
          {n} and {} of {n}; supported {} and {} of {n}.",
         settled[0], recorded[0], settled[2], recorded[2], settled[1], recorded[1], settled[3], recorded[3]
     );
+    contractions(&mut text, rows);
     text
+}
+
+/// All runs of a mounting predicted from the other mountings.
+fn contractions(text: &mut String, rows: &[Row]) {
+    let _ = writeln!(
+        text,
+        "\n### Unseen contractions through the table\n\nAll runs of a mounting that lies between others are predicted from the other mountings. \
+         Settled points; mean absolute error and root mean square in percent of the largest force. \"A millimetre\": the mean change of \
+         the force when the held length is wrong by a millimetre, which is how exactly the lengths were set.\n\n\
+         | set, muscle | base, mean | static, mean | memory, mean | base, rms | static, rms | memory, rms | a millimetre |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- |"
+    );
+    let mut means = [0.0; 4];
+    let mut count = 0.0_f64;
+    for row in rows {
+        let Ok(unseen) = &row.errors else { continue };
+        let e = &unseen.contractions;
+        let all = [&e.base, &e.without_memory, &e.with_memory];
+        means.iter_mut().zip(all).for_each(|(mean, e)| *mean += e.mean_pct);
+        means[3] += unseen.millimetre_pct;
+        count += 1.0;
+        let cells = all.map(|e| format!("{:.2}", e.mean_pct)).join(" | ");
+        let rms = all.map(|e| format!("{:.2}", e.rms_pct)).join(" | ");
+        let _ = writeln!(text, "| {} | {cells} | {rms} | {:.2} |", row.label, unseen.millimetre_pct);
+    }
+    let [base, without, with, millimetre] = means.map(|m| format!("{:.2}", m / count.max(1.0)));
+    let _ = writeln!(text, "| **mean** | {base} | {without} | {with} | | | | {millimetre} |");
 }
 
 #[cfg(test)]
@@ -89,7 +127,11 @@ mod tests {
             ringing_pct: 70.0,
             slack_pct: 40.0,
         };
-        let row = |a: f64, b: f64| Row { label: "x".into(), errors: Ok([errors(a), errors(b)]) };
+        let row = |a: f64, b: f64| {
+            let unseen =
+                Unseen { runs: [errors(a), errors(b)], contractions: errors(a), millimetre_pct: 2.5 };
+            Row { label: "x".into(), errors: Ok(unseen) }
+        };
         let text = section(&[row(0.5, 0.7), row(0.62, 0.59)]);
         assert!(
             text.contains(

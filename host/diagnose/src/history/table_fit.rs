@@ -15,7 +15,7 @@ use pam_fit::{Options as FitOptions, fit, table_alone};
 use super::campaign::{self, Points};
 use super::criteria::{PULLS, RAMP, TABLE_LEAST_DEADBAND, TABLE_LEAST_SLACK, TABLE_ROUNDS, TABLE_WIDTHS};
 use super::held_table::{Open, Problem, Solution};
-use super::law::thresholds;
+use super::law::thresholds_of;
 use super::staircase;
 
 /// Which amplitudes are fitted.
@@ -252,7 +252,7 @@ fn chosen(campaign: &Campaign, used: &[bool]) -> Campaign {
 /// The zero of the load cell: what it reads of a muscle that almost pulls, N; 0 without enough points. A tube that lies slack pushes or
 /// hangs, and lifts as it is filled: at lower pressures that is in the reading too.
 fn slack_reading(points: &Points, use_point: &[bool]) -> f64 {
-    let thresholds = thresholds(points);
+    let thresholds = thresholds_of(points, use_point);
     let almost = |i: &usize| {
         let below = thresholds[points.mounting[*i]] - points.pressure[*i];
         use_point[*i] && (RAMP..2.0 * RAMP).contains(&below)

@@ -5,7 +5,7 @@ use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Recording, largest_force};
 use pam_fit::predict::predict;
-use pam_fit::table_file::TableFile;
+use pam_fit::table_file::{About, TableFile};
 use rayon::prelude::*;
 
 use super::criteria::{PULLS, SUPPORT, TABLE_FOLDS};
@@ -140,6 +140,41 @@ fn reread(file: &TableFile) -> Result<TableFile> {
     TableFile::from_bytes(&file.to_bytes()?)
 }
 
+/// Which runs are held out together and predicted from the others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LeftOut {
+    /// A run; of many, every so many-th.
+    Runs,
+    /// All runs of a mounting between others: a contraction of which the fit has no recording.
+    Mountings,
+}
+
+impl LeftOut {
+    /// Which recordings each fold uses.
+    fn folds(self, campaign: &Campaign) -> Vec<Vec<bool>> {
+        let runs = campaign.recordings.len();
+        let mountings = campaign.mountings().unwrap_or_default();
+        let every = |count: usize, of: &dyn Fn(usize) -> usize| -> Vec<Vec<bool>> {
+            (0..count).map(|fold| (0..runs).map(|r| of(r) != fold).collect()).collect()
+        };
+        match self {
+            Self::Runs => every(runs.min(TABLE_FOLDS), &|r| r % TABLE_FOLDS.min(runs)),
+            Self::Mountings => {
+                let stroke = |r: usize| campaign.recordings[r].stroke.first().copied().unwrap_or(0.0);
+                let strokes = || (0..runs).map(stroke);
+                let (low, high) =
+                    strokes().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(s), h.max(s)));
+                let between = |fold: &Vec<bool>| {
+                    let own = (0..runs).find(|r| !fold[*r]).map(stroke);
+                    own.is_some_and(|s| s > low && s < high)
+                };
+                let count = mountings.iter().max().map_or(0, |last| last + 1);
+                every(count, &|r| mountings[r]).into_iter().filter(between).collect()
+            }
+        }
+    }
+}
+
 /// The errors of unseen runs over the readings of two forms of one campaign: the one that the tables are fitted to (at its settled points), and
 /// another of the same runs, as recorded. `None` where the campaign is none of isometric staircases with repeated runs, or the other has
 /// other runs. Of many runs every so many-th is left out together.
@@ -150,20 +185,19 @@ pub fn unseen_by_table(
     campaign: &Campaign,
     recorded: &Campaign,
     muscle: &MuscleDescription,
+    left_out: LeftOut,
 ) -> Result<Option<[UnseenErrors; 2]>> {
     let settled = table_fit::settled(campaign);
     let runs = settled.recordings.len();
-    let folds = runs.min(TABLE_FOLDS);
     if settled.mountings() != recorded.mountings() {
         return Ok(None);
     }
     let Some(whole) = Prepared::of(&settled, muscle, &vec![true; runs])? else { return Ok(None) };
     let forms =
         [(&settled, Counted::of(&settled, whole.zero)), (recorded, Counted::of(recorded, whole.zero))];
-    let fold = |fold: usize| -> Result<[[Both; 3]; 2]> {
-        let used: Vec<bool> = (0..runs).map(|r| r % folds != fold).collect();
+    let fold = |used: &Vec<bool>| -> Result<[[Both; 3]; 2]> {
         let mut sums = [[Both::default(); 3]; 2];
-        let Some(prepared) = Prepared::of(&settled, muscle, &used)? else { return Ok(sums) };
+        let Some(prepared) = Prepared::of(&settled, muscle, used)? else { return Ok(sums) };
         let tables = [prepared.base(), prepared.table(Layers::Contact)?, prepared.table(Layers::Memory)?];
         for (k, table) in tables.iter().enumerate() {
             let table = reread(table)?;
@@ -176,7 +210,7 @@ pub fn unseen_by_table(
         }
         Ok(sums)
     };
-    let parts: Vec<[[Both; 3]; 2]> = (0..folds).into_par_iter().map(fold).collect::<Result<_>>()?;
+    let parts: Vec<[[Both; 3]; 2]> = left_out.folds(&settled).par_iter().map(fold).collect::<Result<_>>()?;
     let form = |f: usize| {
         let counted = &forms[f].1;
         let total = |k: usize, of: fn(&Both) -> Sums| {
@@ -197,4 +231,29 @@ pub fn unseen_by_table(
         }
     };
     Ok(Some([form(0), form(1)]))
+}
+
+/// What a held length that is wrong by a millimetre changes of the force at settled points that pull, mean absolute, % of the largest
+/// force: a table of other lengths cannot be better than the lengths were set. `None` as for [`unseen_by_table`].
+///
+/// # Errors
+/// Recordings that cannot be fitted or predicted.
+pub fn error_of_a_millimetre(campaign: &Campaign, muscle: &MuscleDescription) -> Result<Option<f64>> {
+    let settled = table_fit::settled(campaign);
+    let used = vec![true; settled.recordings.len()];
+    let Some(prepared) = Prepared::of(&settled, muscle, &used)? else { return Ok(None) };
+    let table = prepared.base();
+    let mut shifted = settled.clone();
+    for recording in &mut shifted.recordings {
+        recording.stroke.iter_mut().for_each(|s| *s += 1e-3);
+    }
+    // The table's corrections of the mountings belong to the lengths as recorded.
+    let bare = TableFile { table: table.table, about: About::default() };
+    let (at, beside) = (predict(&bare, &settled)?, predict(&bare, &shifted)?);
+    let largest = largest_force(&settled).max(f64::MIN_POSITIVE);
+    let pairs = at.recordings.iter().zip(&beside.recordings).flat_map(|(a, b)| a.force.iter().zip(&b.force));
+    let differences: Vec<f64> =
+        pairs.filter(|(a, _)| **a > PULLS * largest).map(|(a, b)| (a - b).abs()).collect();
+    let count = differences.len().max(1) as f64;
+    Ok(Some(100.0 * differences.iter().sum::<f64>() / count / largest))
 }

@@ -8,7 +8,7 @@ use pam_fit::predict::predict;
 use pam_fit::table_file::{About, TableFile};
 
 use super::super::table_fit;
-use super::super::table_unseen::unseen_by_table;
+use super::super::table_unseen::{LeftOut, unseen_by_table};
 use crate::linear::Random;
 
 const DESCRIPTION: &str = "name = \"mini\"\nkind = \"contractile\"\nrest_length_mm = 39.16\nbraid_angle_deg = 77.4\n\
@@ -61,7 +61,7 @@ fn a_table_carries_the_memory_and_foretells_unseen_runs() {
     assert_eq!(effect.effect, EffectName::BladderCreep);
     assert!((f64::from(effect.parameters[0]) / TRUTH[0] - 1.0).abs() < 0.2, "{effect:?}");
     let [settled, recorded] =
-        unseen_by_table(&campaign, &campaign, &muscle).expect("fitted").expect("staircases");
+        unseen_by_table(&campaign, &campaign, &muscle, LeftOut::Runs).expect("fitted").expect("staircases");
     assert!(settled.with_memory.rms_pct < 0.5 * settled.without_memory.rms_pct, "{settled:?}");
     assert_eq!(settled.with_memory, recorded.with_memory);
 }
