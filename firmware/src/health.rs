@@ -11,7 +11,8 @@
 //! reported before [`ENOUGH`] independent blocks. A residual that no shape explains is correlated, which widens the interval: it does
 //! not raise an alarm.
 //!
-//! The work is divided over ticks: a sample, then one row of the sums in each of the next ticks.
+//! The work is divided over ticks, so that no tick does much of it: a sample and the table's slopes there; its sum; of a whole block the
+//! means, what ages with them, and one row of the sums in each of the next ticks. All of it is done before the next sample.
 
 use model_core::link::messages::{COLUMNS, HealthSums, LAGGED, SHAPES, SUMS, Shape, TableHealth, WATCHED};
 use model_core::scalar::Scalar;
@@ -108,6 +109,10 @@ pub struct Health {
     samples: u16,
     block: [f32; COLUMNS],
     first_n: f32,
+    /// A sample that waits for the next tick.
+    staged: Option<Sample>,
+    /// What must be done before the rows of a whole block are added.
+    due: Due,
     /// The last whole block, while it is being added row by row, and the one before.
     now: [f32; COLUMNS],
     before: [f32; COLUMNS],
@@ -122,6 +127,17 @@ pub struct Health {
     best: (Shape, f32),
     enough: bool,
     suspect: (Shape, f32),
+}
+
+/// Work on a whole block, in the order of the ticks that do it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Due {
+    /// None.
+    Nothing,
+    /// Its means.
+    Means,
+    /// Sums of the residual, and what has become older.
+    Ages,
 }
 
 /// Place of a sum in the upper triangle.
@@ -147,6 +163,8 @@ impl Health {
             samples: 0,
             block: [0.0; COLUMNS],
             first_n: 0.0,
+            staged: None,
+            due: Due::Nothing,
             now: [0.0; COLUMNS],
             before: [0.0; COLUMNS],
             follows: false,
@@ -172,25 +190,39 @@ impl Health {
         self.state
     }
 
-    /// Lets a tick pass: adds the next row of the last block, and says whether a sample is due.
-    #[inline(never)]
+    /// Lets a tick pass: does the next part of the work, and says whether a sample is due.
+    #[inline]
     pub fn tick(&mut self) -> bool {
-        if self.row < IDLE {
-            self.add_row();
+        if self.staged.is_some() || self.due != Due::Nothing || self.row < IDLE {
+            self.work();
         }
         self.countdown = if self.countdown == 0 { SAMPLE_TICKS - 1 } else { self.countdown - 1 };
         self.countdown == 0
     }
 
+    #[inline(never)]
+    fn work(&mut self) {
+        match (self.staged.take(), self.due) {
+            (Some(sample), _) => self.add(&sample),
+            (None, Due::Means) => self.take_means(),
+            (None, Due::Ages) => self.age(),
+            (None, Due::Nothing) => self.add_row(),
+        }
+    }
+
     /// What is not comparable ends a block: its samples are dropped.
     pub fn interrupt(&mut self) {
         self.samples = 0;
+        self.staged = None;
         self.follows = false;
     }
 
-    /// A sample of a muscle that pulls, within the range that the table was tested in.
-    #[inline(never)]
+    /// A sample of a muscle that pulls, within the range that the table was tested in. The next tick adds it.
     pub fn sample(&mut self, sample: &Sample) {
+        self.staged = Some(*sample);
+    }
+
+    fn add(&mut self, sample: &Sample) {
         let Scales { force_n, pressure_pa, stroke_m, .. } = self.scales;
         let per_n = 1.0 / force_n;
         let force = sample.model_n * per_n;
@@ -225,23 +257,32 @@ impl Health {
         self.samples += 1;
         if self.samples == BLOCK_SAMPLES {
             self.samples = 0;
-            let mut means = self.block.map(|sum| sum / f32::from(BLOCK_SAMPLES));
-            const SPAN_S: f32 = (BLOCK_SAMPLES - 1) as f32 * SAMPLE_TICKS as f32 * crate::tick::TICK_S;
-            means[Shape::Lag as usize] = (force - self.first_n) / SPAN_S;
-            self.take(means);
+            const SPAN: f32 = BLOCK_SAMPLES as f32
+                / ((BLOCK_SAMPLES - 1) as f32 * SAMPLE_TICKS as f32 * crate::tick::TICK_S);
+            self.block[Shape::Lag as usize] = (force - self.first_n) * SPAN;
+            self.due = Due::Means;
         }
     }
 
-    /// A whole block; its rows are added in the ticks that follow.
-    fn take(&mut self, means: [f32; COLUMNS]) {
-        self.now = means;
+    /// The means of a whole block.
+    fn take_means(&mut self) {
+        const PART: f32 = 1.0 / BLOCK_SAMPLES as f32;
+        for (mean, sum) in self.now.iter_mut().zip(&self.block) {
+            *mean = sum * PART;
+        }
+        self.due = Due::Ages;
+    }
+
+    /// Sums of the residual, and what a whole block makes older; its rows are added in the ticks that follow.
+    fn age(&mut self) {
+        self.due = Due::Nothing;
         self.weight = DECAY * self.weight + 1.0;
         self.blocks = self.blocks.saturating_add(1);
         self.best = (Shape::ForceOffset, f32::NEG_INFINITY);
         self.enough = false;
         // Time counts back from now: all earlier blocks have become older by one.
         const AGE: f32 = 1.0 / WINDOW as f32;
-        let residual = means[RESIDUAL];
+        let residual = self.now[RESIDUAL];
         let square = &mut self.sums[place(RESIDUAL, RESIDUAL)];
         *square = DECAY * *square + residual * residual;
         let fresh = if self.follows { 1.0 } else { 0.0 };

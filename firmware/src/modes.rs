@@ -196,8 +196,8 @@ impl Model {
     /// `∂F/∂P`, N/Pa, and `∂F/∂x`, N/m, of the base model at this tick's stroke.
     pub fn slopes(&self, pressure_pa: f32) -> (f32, f32) {
         let pressure = Pressure::from_pascals(pressure_pa);
-        let parts = single_precision::parts(&self.muscle, &self.now.at_stroke, pressure);
-        let by_stroke = single_precision::stroke_slope(&self.muscle, &self.now.at_stroke, pressure);
+        let (parts, by_stroke) =
+            single_precision::parts_and_stiffness(&self.muscle, &self.now.at_stroke, pressure);
         (parts.slope(self.now.context.direction), by_stroke)
     }
 

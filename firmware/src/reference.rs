@@ -181,13 +181,21 @@ impl Generator {
 
     /// The value of this tick; `None` when setpoints come from the host. Moves on by one tick.
     fn step(&mut self) -> Option<f32> {
+        // The commonest one first: it counts no ticks.
+        if let Reference::Sine { mean, amplitude, frequency_hz } = self.reference {
+            let value = mean + amplitude * sine(self.phase);
+            self.phase = self.phase.wrapping_add(steps(frequency_hz));
+            self.last = value;
+            return Some(value);
+        }
+        self.step_other()
+    }
+
+    #[inline(never)]
+    fn step_other(&mut self) -> Option<f32> {
         let value = match self.reference {
             Reference::SetPoint => return None,
-            Reference::Sine { mean, amplitude, frequency_hz } => {
-                let value = mean + amplitude * sine(self.phase);
-                self.phase = self.phase.wrapping_add(steps(frequency_hz));
-                value
-            }
+            Reference::Sine { .. } => self.last,
             Reference::Chirp { mean, amplitude, from_hz, to_hz, duration_s } => {
                 let value = mean + amplitude * sine(self.phase);
                 let time_s = self.ticks as f32 * TICK_S;

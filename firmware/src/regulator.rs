@@ -18,8 +18,10 @@ use model_core::scalar::Scalar;
 
 use crate::tick::TICK_S;
 
-/// Time constant of the observer of what the regulator's model leaves out, s: slower than its lag, quicker than its drift.
-const OBSERVER_S: f32 = 0.15;
+/// Time constant of the observer of what the regulator's model leaves out, s: slower than the waves that a muscle follows, quicker than
+/// the drift of a regulator. A quick one takes an error of the model's line for drift, and adds it to waves a quarter of a period later:
+/// with 0.15 s, force in a wave of 2 Hz against a mass on a spring was off by 1.04 % of blocked force instead of 0.98 %.
+const OBSERVER_S: f32 = 0.6;
 /// The most that the observer adds, as a part of the largest command.
 const BIAS: f32 = 0.02;
 /// Delay of the loop itself: a command holds for a tick.
@@ -121,6 +123,7 @@ impl RegulatorState {
     }
 
     /// One tick of `dt` seconds towards a demanded pressure, which is limited to `high_pa`.
+    #[inline]
     pub fn step(
         &mut self,
         dt: f32,
@@ -169,6 +172,11 @@ impl RegulatorState {
     pub fn vent(&mut self, dt: f32, air: &Air, regulator: &Regulator) {
         *self = Self { supplied_pa: self.supplied_pa, model_pa: self.model_pa, ..Self::default() };
         self.predict(dt, 0.0, air, regulator);
+    }
+
+    /// Whether line and muscle are empty and stay so at no command, without a movement that draws air in.
+    pub fn is_empty(&self, regulator: &Regulator) -> bool {
+        self.supplied_pa == 0.0 && self.model_pa == 0.0 && regulator.offset_pa <= 0.0
     }
 
     /// A command of someone else's: only the model follows it.
@@ -275,6 +283,23 @@ mod tests {
         for wanted in [0.0, 5e3, 20e3] {
             assert_eq!(step(&mut vented, wanted), step(&mut new, wanted));
         }
+    }
+
+    #[test]
+    fn what_is_empty_stays_so_when_it_is_vented() {
+        for (offset_pa, pressure_pa, empty) in
+            [(0.0, 0.0, true), (-4e3, 0.0, true), (4e3, 0.0, false), (0.0, 1.0, false)]
+        {
+            let regulator = Regulator { offset_pa, ..Settings::default().regulator };
+            let mut state = RegulatorState::default();
+            state.begin(pressure_pa);
+            let before = state;
+            assert_eq!(state.is_empty(&regulator), empty, "{offset_pa}, {pressure_pa}");
+            state.vent(1e-3, &Air::default(), &regulator);
+            assert_eq!(state == before, empty, "{offset_pa}, {pressure_pa}");
+        }
+        let failed = Regulator { offset_pa: f32::NAN, ..Settings::default().regulator };
+        assert!(!RegulatorState::default().is_empty(&failed));
     }
 
     #[test]

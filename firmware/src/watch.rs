@@ -222,12 +222,21 @@ impl SideWatch {
         report: &mut dyn FnMut(Finding),
     ) {
         let command_pa = if command.vent { 0.0 } else { command.pressure_pa };
-        let found = [
-            self.pressure.check(Sensor::Pressure, &settings.pressure, settings, now.pressure_pa, command_pa),
-            self.stroke.check(Sensor::Stroke, &settings.stroke, settings, now.stroke_m, command_pa),
-            self.force.check(Sensor::Force, &settings.force, settings, now.force_n, command_pa),
-        ];
-        found.into_iter().flatten().for_each(report);
+        if let Some(found) =
+            self.pressure.check(Sensor::Pressure, &settings.pressure, settings, now.pressure_pa, command_pa)
+        {
+            report(found);
+        }
+        if let Some(found) =
+            self.stroke.check(Sensor::Stroke, &settings.stroke, settings, now.stroke_m, command_pa)
+        {
+            report(found);
+        }
+        if let Some(found) =
+            self.force.check(Sensor::Force, &settings.force, settings, now.force_n, command_pa)
+        {
+            report(found);
+        }
     }
 
     fn check_limits(
@@ -252,10 +261,16 @@ impl SideWatch {
         let over_pressure = settings.pressure.fitted && pressure_pa > limits.pressure_pa;
         let over_force = settings.force.fitted && now.force_n > limits.force_n;
         let over_speed = has_stroke && speed_m_per_s.abs() > limits.speed_m_per_s;
+        let over_stroke = has_stroke && out_of_stroke;
+        let counting = self.over_pressure.0 | self.over_force.0 | self.over_stroke.0 | self.over_speed.0;
+        // Most ticks have nothing to count and nothing to begin anew.
+        if !(over_pressure | over_force | over_stroke | over_speed) && counting == 0 {
+            return;
+        }
         let rows = [
             (&mut self.over_pressure, over_pressure, Fault::OverPressure, pressure_pa, limits.pressure_pa),
             (&mut self.over_force, over_force, Fault::OverForce, now.force_n, limits.force_n),
-            (&mut self.over_stroke, has_stroke && out_of_stroke, Fault::OverStroke, stroke, stroke_limit),
+            (&mut self.over_stroke, over_stroke, Fault::OverStroke, stroke, stroke_limit),
             (&mut self.over_speed, over_speed, Fault::OverSpeed, speed_m_per_s, limits.speed_m_per_s),
         ];
         for (row, over, fault, value, limit) in rows {
@@ -298,12 +313,16 @@ impl SideWatch {
         let gap = pressure - expected;
         let late = self.vented_ticks > watch.vent_ticks;
         let stands = fitted && late && pressure > watch.vented_pa;
+        let (over, under) = (fitted && gap > watch.follow_pa, fitted && gap < -watch.follow_pa);
+        if !(stands | over | under) && self.not_vented.0 | self.high.0 | self.low.0 == 0 {
+            return;
+        }
         let (above, below) = (expected + watch.follow_pa, expected - watch.follow_pa);
         let (follow, debounce) = (watch.follow_ticks, watch.debounce_ticks);
         let rows = [
             (&mut self.not_vented, stands, debounce, Fault::NotVented, watch.vented_pa),
-            (&mut self.high, fitted && gap > watch.follow_pa, follow, Fault::PressureNotFalling, above),
-            (&mut self.low, fitted && gap < -watch.follow_pa, follow, Fault::PressureNotRising, below),
+            (&mut self.high, over, follow, Fault::PressureNotFalling, above),
+            (&mut self.low, under, follow, Fault::PressureNotRising, below),
         ];
         for (row, bad, enough, fault, limit) in rows {
             if row.count(bad, enough) {

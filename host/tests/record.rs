@@ -6,15 +6,20 @@
 #[path = "../device/tests/common/line.rs"]
 mod line;
 
+use std::io::Write;
 use std::net::{Shutdown, TcpStream};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use model_core::link::endpoints::{Endpoint, SetTelemetry};
+use model_core::link::frame::{self, Header, MAX_WIRE, encode};
+use model_core::link::messages::TelemetryRate;
 use pam_data::recording::{Reader, Recording};
 use pam_device::Address;
 use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::recorder::side_file;
+use rustix::process::{Pid, Signal, kill_process};
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::plant::Motion;
 use virtual_bench::presets;
@@ -187,6 +192,64 @@ fn a_cable_that_is_pulled_ends_the_recording_at_a_whole_row() {
     let text = std::fs::read_to_string(folder.path().join("run.csv")).unwrap();
     assert!(text.ends_with('\n'), "the last row is whole");
     assert!(!folder.path().join("run.csv.part").exists());
+}
+
+/// Has the controller send one sample in `every_ticks` ticks, as another program on the line may.
+fn stream(mut line: &TcpStream, every_ticks: u16) {
+    let header = Header { kind: frame::Kind::Request, id: SetTelemetry::ID, sequence: 7 };
+    // The zero ends a frame of the recording program.
+    let mut wire = [0; MAX_WIRE];
+    let length = encode(header, &TelemetryRate { every_ticks }, &mut wire[1..]).unwrap();
+    line.write_all(&wire[..=length]).unwrap();
+}
+
+/// Waits until a file has this many bytes more than now.
+fn grows(file: &Path, bytes: u64) {
+    grown(file, std::fs::metadata(file).unwrap().len() + bytes);
+}
+
+fn signal(child: &Child, signal: Signal) {
+    kill_process(Pid::from_child(child), signal).unwrap();
+}
+
+#[test]
+fn every_tick_that_the_rows_miss_is_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    let controller = controller();
+    let (path, line, _keep) = cable(&controller);
+    let child = start(folder.path(), path.to_str().unwrap(), &["--json"]);
+    let part = folder.path().join("run.csv.part");
+    grown(&part, 20_000);
+    // Another program makes the stream coarser, and ends it: the recorder requests it again.
+    stream(&line, 20);
+    grows(&part, 2_000);
+    stream(&line, 0);
+    grows(&part, 20_000);
+    // The program does not run: the queues of the line and of the controller overflow.
+    signal(&child, Signal::STOP);
+    std::thread::sleep(Duration::from_secs(3));
+    signal(&child, Signal::CONT);
+    grows(&part, 20_000);
+    signal(&child, Signal::INT);
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+    let text = std::fs::read_to_string(folder.path().join("run.csv")).unwrap();
+    let mut lines = text.lines();
+    let at = lines.next().unwrap().split(',').position(|name| name == "tick").unwrap();
+    let ticks: Vec<u64> = lines.map(|row| row.split(',').nth(at).unwrap().parse().unwrap()).collect();
+    let missing: u64 = ticks.windows(2).map(|pair| pair[1] - pair[0] - 1).sum();
+    // Half a second without a stream, at least.
+    assert!(missing > 400, "{missing}");
+    let json = |text: &[u8]| serde_json::from_slice::<serde_json::Value>(text).unwrap();
+    let side = json(&std::fs::read(side_file(&folder.path().join("run.csv"))).unwrap());
+    assert_eq!(side["losses"]["samples"], missing, "{}", side["losses"]);
+    assert_eq!(json(&output.stdout)["losses"], side["losses"]);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains(&format!("{missing} samples missing in ")), "{told}");
+    let mcap = String::from_utf8_lossy(&std::fs::read(folder.path().join("run.mcap")).unwrap()).into_owned();
+    assert!(
+        mcap.contains(&format!("\"samples\": {missing}")) || mcap.contains(&format!("\"samples\":{missing}"))
+    );
 }
 
 /// A file system of one megabyte, whose end no limit of the system imitates: then even the side file has no room.

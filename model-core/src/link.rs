@@ -3,6 +3,7 @@
 //! | layer | where | what |
 //! | --- | --- | --- |
 //! | frame | [`frame`] | COBS(header ‖ body ‖ CRC-32) followed by one zero byte |
+//! | CAN FD | [`can`] | the bytes of frames in messages, for several devices on one bus |
 //! | hello | [`hello`] | the first answer, whose layout never changes: every version of the peer |
 //! | messages | [`messages`], [`settings`] | the bodies, as postcard writes them; closed enums, never text |
 //! | endpoints | [`endpoints`] | ONE table: number, name, request, response; and the hash of all of it |
@@ -10,6 +11,7 @@
 //! A conversation begins with `hello`. The host compares [`endpoints::SCHEMA_HASH`] with the peer's and continues only
 //! when they are equal, because from there on nothing in a body says what it is.
 
+pub mod can;
 pub mod endpoints;
 pub mod frame;
 pub mod hello;

@@ -145,7 +145,7 @@ impl<T: Scalar> Muscle<T> {
     /// The curves around a pressure, and the pressure above the one that they count from.
     #[inline(always)]
     fn around(&self, pressure: T) -> (&Piece<T>, T) {
-        let piece = &self.pieces[self.nodes.find(pressure)];
+        let piece = &self.pieces[self.nodes.place(pressure)];
         (piece, pressure - piece.origin)
     }
 
@@ -157,7 +157,7 @@ impl<T: Scalar> Muscle<T> {
 
     /// The same, and `∂F_quasi/∂x`, N/m, from how the coefficients change with stroke.
     #[inline(always)]
-    fn parts_and_stiffness(
+    pub(crate) fn parts_and_stiffness(
         &self,
         at_stroke: &AtStroke<T>,
         slopes: &StrokeSlopes<T>,

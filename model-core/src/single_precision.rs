@@ -53,11 +53,18 @@ pub fn parts(muscle: &Muscle<f32>, at_stroke: &AtStroke<f32>, pressure: Pressure
 }
 
 /// [`Muscle::stroke_slope`].
-#[inline(never)]
 pub fn stroke_slope(muscle: &Muscle<f32>, at_stroke: &AtStroke<f32>, pressure: Pressure<f32>) -> f32 {
-    let mut slopes = StrokeSlopes::default();
-    refresh_slopes(muscle, at_stroke, &mut slopes);
-    muscle.stroke_slope(at_stroke, &slopes, pressure)
+    parts_and_stiffness(muscle, at_stroke, pressure).1
+}
+
+/// [`Muscle::parts`] and [`Muscle::stroke_slope`], of one look at the curves.
+#[inline(never)]
+pub fn parts_and_stiffness(
+    muscle: &Muscle<f32>,
+    at_stroke: &AtStroke<f32>,
+    pressure: Pressure<f32>,
+) -> (Parts<f32>, f32) {
+    muscle.parts_and_stiffness(at_stroke, &muscle.slopes(at_stroke), pressure)
 }
 
 /// [`Muscle::pressure_for`].

@@ -70,6 +70,10 @@ impl Actuator {
 
     /// Lets the air out, and nothing of what was demanded stays.
     pub(super) fn vent(&mut self, regulator: &Regulator) {
+        // A muscle that has been empty since the last tick, as one that is not there.
+        if self.model_n.is_none() && self.command.vent && self.regulator.is_empty(regulator) {
+            return;
+        }
         let air = self.air();
         self.regulator.vent(TICK_S, &air, regulator);
         self.command = Command::VENT;

@@ -4,7 +4,7 @@ use model_core::link::messages::{Fault, Mode, Side, State};
 use model_core::link::settings::FeedForward;
 use model_core::scalar::Scalar;
 
-use super::Controller;
+use super::{Controller, in_register};
 use crate::board::Command;
 use crate::modes;
 use crate::pair::{self, Posed, Pull};
@@ -47,59 +47,58 @@ impl Controller {
                 }
             }
         }
-        let mut bad = None;
-        for side in Side::ALL {
-            let used = self.uses(side);
-            let Self { settings, sides, hardware, .. } = self;
-            let actuator = &mut sides[side.index()];
-            let (demand, reached) = demands[side.index()];
-            if !used {
-                // Its regulator's model is kept up for the watch on what stays in it, where there is a second muscle at all.
-                if pair::SUPPORTED {
-                    actuator.vent(&settings.regulator);
-                }
-                continue;
-            }
-            if !demand.pressure_pa.is_finite() {
-                bad = Some((side, demand.pressure_pa));
-                continue;
-            }
-            let most =
-                actuator.model.as_ref().map_or(f32::MAX, |model| model.muscle.max_pressure().pascals());
-            let high = most.at_most(settings.limits.pressure_pa).at_most(hardware.command_ceiling_pa);
-            // Without lead a command is the setpoint, as anyone who measures the regulator itself wants it.
-            if settings.pressure.fitted && settings.regulator.lead > 0.0 {
-                actuator.regulator.observe(TICK_S, actuator.sample.pressure_pa, &settings.regulator);
-            }
-            let air = actuator.air();
-            let driven =
-                actuator.regulator.step(TICK_S, demand, high, &air, &settings.regulator, &settings.limits);
-            actuator.saturation = if !reached {
-                // The inverse has gone to the highest pressure, or to the lowest.
-                demand.pressure_pa - 0.5 * high
-            } else if driven.saturated {
-                demand.pressure_pa - driven.pressure_demand_pa
-            } else {
-                0.0
-            };
-            if !reached || driven.saturated {
-                self.saturated_ticks = self.saturated_ticks.saturating_add(1);
-            }
-            // What is sent is judged, not only what was demanded for: the regulator's model comes between.
-            let sent = driven.command_pa;
-            if !(sent >= 0.0
-                && sent <= hardware.command_ceiling_pa
-                && actuator.regulator.model_pa().is_finite())
-            {
-                bad = Some((side, sent));
-                continue;
-            }
-            actuator.command = Command { pressure_pa: sent, vent: false };
-            actuator.sample.pressure_demand_pa = driven.pressure_demand_pa;
+        let [first, second] = demands;
+        let mut bad = self.command(Side::Agonist, first).err().map(|value| (Side::Agonist, value));
+        if self.uses(Side::Antagonist) {
+            let other = self.command(Side::Antagonist, second).err();
+            bad = other.map(|value| (Side::Antagonist, value)).or(bad);
+        } else if pair::SUPPORTED {
+            // Its regulator's model is kept up for the watch on what stays in it, where there is a second muscle at all.
+            let Self { sides, settings, .. } = self;
+            sides[Side::Antagonist.index()].vent(&settings.regulator);
         }
         if let Some((side, value)) = bad {
             self.raise(side, &Finding { fault: Fault::NotANumber, sensor: None, value, limit: 0.0 });
         }
+    }
+
+    /// Makes the command of one muscle; fails with a demand or a command that cannot be sent.
+    #[inline(never)]
+    fn command(&mut self, side: Side, (demand, reached): (Demand, bool)) -> Result<(), f32> {
+        if !demand.pressure_pa.is_finite() {
+            return Err(demand.pressure_pa);
+        }
+        let settings = in_register(&self.settings);
+        let actuator = &mut self.sides[side.index()];
+        let ceiling_pa = self.hardware.command_ceiling_pa;
+        let most = actuator.model.as_ref().map_or(f32::MAX, |model| model.muscle.max_pressure().pascals());
+        let high = most.at_most(settings.limits.pressure_pa).at_most(ceiling_pa);
+        // Without lead a command is the setpoint, as anyone who measures the regulator itself wants it.
+        if settings.pressure.fitted && settings.regulator.lead > 0.0 {
+            actuator.regulator.observe(TICK_S, actuator.sample.pressure_pa, &settings.regulator);
+        }
+        let air = actuator.air();
+        let driven =
+            actuator.regulator.step(TICK_S, demand, high, &air, &settings.regulator, &settings.limits);
+        actuator.saturation = if !reached {
+            // The inverse has gone to the highest pressure, or to the lowest.
+            demand.pressure_pa - 0.5 * high
+        } else if driven.saturated {
+            demand.pressure_pa - driven.pressure_demand_pa
+        } else {
+            0.0
+        };
+        if !reached || driven.saturated {
+            self.saturated_ticks = self.saturated_ticks.saturating_add(1);
+        }
+        // What is sent is judged, not only what was demanded for: the regulator's model comes between.
+        let sent = driven.command_pa;
+        if !(sent >= 0.0 && sent <= ceiling_pa && actuator.regulator.model_pa().is_finite()) {
+            return Err(sent);
+        }
+        actuator.command = Command { pressure_pa: sent, vent: false };
+        actuator.sample.pressure_demand_pa = driven.pressure_demand_pa;
+        Ok(())
     }
 
     /// Feed-forward for the force that will be demanded when a command acts, and trim for the one that is demanded now. `foreseen_n` of
@@ -110,7 +109,7 @@ impl Controller {
         [force_n, coming_n]: [f32; 2],
         foreseen_n: f32,
     ) -> (Demand, bool) {
-        let settings = &self.settings;
+        let settings = in_register(&self.settings);
         let actuator = &mut self.sides[at];
         actuator.force_demand_n = force_n;
         let model_n = actuator.model_n;

@@ -3,7 +3,7 @@
 use model_core::link::messages::{Fault, Mode, Side, State};
 use model_core::link::settings::Reaction;
 
-use super::Controller;
+use super::{Controller, in_register};
 use crate::board::Inputs;
 use crate::safety;
 use crate::watch::{Finding, Seen};
@@ -45,7 +45,8 @@ impl Controller {
         };
         for side in Side::ALL {
             let used = self.uses(side);
-            let actuator = &mut self.sides[side.index()];
+            let Self { sides, settings, .. } = self;
+            let (actuator, settings) = (&mut sides[side.index()], in_register(settings));
             let readings = actuator.readings;
             if !used && readings.is_none() {
                 continue;
@@ -59,17 +60,18 @@ impl Controller {
                 model_n: actuator.model_n,
             };
             let state = if used { state } else { State::Disarmed };
-            actuator.watch.check(&seen, &self.settings, &mut |finding| note(side, state, finding));
+            actuator.watch.check(&seen, settings, &mut |finding| note(side, state, finding));
         }
         let mut note = |fault, value, limit| {
             note(Side::Agonist, state, Finding { fault, sensor: None, value, limit });
         };
-        let watch = &self.settings.watch;
+        let settings = in_register(&self.settings);
+        let watch = &settings.watch;
         if inputs.supply_low {
             note(Fault::BrownOut, 0.0, 0.0);
         }
         let least_pa = watch.supply_low_pa;
-        let supply_pa = inputs.supply_air.map_or(0.0, |signal| self.settings.scales.supply.reading(signal));
+        let supply_pa = inputs.supply_air.map_or(0.0, |signal| settings.scales.supply.reading(signal));
         let low = least_pa > 0.0 && !(supply_pa >= least_pa);
         if self.supply_low.count(low, watch.follow_ticks) {
             note(Fault::SupplyPressureLow, supply_pa, least_pa);

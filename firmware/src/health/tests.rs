@@ -68,7 +68,8 @@ impl Bench {
         let fresh = (1.0 - case.correlation * case.correlation).sqrt();
         self.correlated = case.correlation * self.correlated + fresh * self.noise.normal();
         means[RESIDUAL] = case.rms * self.correlated + (case.change)(&means);
-        self.health.take(means);
+        self.health.now = means;
+        self.health.age();
         while self.health.row < IDLE {
             self.health.add_row();
         }

@@ -1,13 +1,16 @@
 //! Files that appear whole or not at all.
 
-use std::collections::BTreeSet;
+mod turn;
+
 use std::ffi::OsString;
 use std::fs;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::error::{DataCode, Error, Result};
 use crate::file_kind::FileKind;
+
+pub use self::turn::Turn;
 
 /// Writes a file that appears at `path` whole: a reader sees the old file or the new one, and a program that is stopped leaves the old
 /// one and nothing else. A new file that takes an old one's place has its permissions. A path of `-` is standard output.
@@ -106,32 +109,6 @@ mod unnamed {
 
     pub(super) fn link(_: &File, _: &Path) -> io::Result<()> {
         Err(io::ErrorKind::Unsupported.into())
-    }
-}
-
-/// While this lives, other runs of this program write no results into the same folders: the table, the report and the JSON that
-/// exist afterwards are those of one run.
-#[derive(Debug)]
-pub struct Turn {
-    _locked: Vec<fs::File>,
-}
-
-impl Turn {
-    /// Waits for the folders of these files. One that cannot be locked, as on some network drives, is not waited for.
-    #[must_use]
-    pub fn of<'a>(paths: impl IntoIterator<Item = Option<&'a Path>>) -> Self {
-        let folder = |path: &Path| {
-            let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            fs::canonicalize(folder).ok()
-        };
-        // In one order for all, so that no two runs wait for each other.
-        let folders: BTreeSet<PathBuf> =
-            paths.into_iter().flatten().filter(|p| *p != Path::new("-")).filter_map(folder).collect();
-        let lock = |folder: PathBuf| {
-            let file = fs::File::open(folder).ok()?;
-            file.lock().ok().map(|()| file)
-        };
-        Self { _locked: folders.into_iter().filter_map(lock).collect() }
     }
 }
 
@@ -236,27 +213,6 @@ mod tests {
         }
         assert_eq!(fs::read(&other).expect("readable"), b"untouched");
         assert_eq!(fs::read_dir(&folder).expect("a folder").count(), 3);
-    }
-
-    #[test]
-    fn the_results_of_one_run_are_written_together() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = |name: &str| folder.path().join(name);
-        std::thread::scope(|scope| {
-            for run in 0..4 {
-                let (table, report) = (path("t"), path("r"));
-                scope.spawn(move || {
-                    for round in 0..20 {
-                        let text = format!("{run} {round}");
-                        let _turn = Turn::of([Some(table.as_path()), None, Some(report.as_path())]);
-                        write_whole(&table, text.as_bytes()).expect("written");
-                        write_whole(&report, text.as_bytes()).expect("written");
-                        let read = |p: &Path| fs::read(p).expect("readable");
-                        assert_eq!(read(&table), read(&report));
-                    }
-                });
-            }
-        });
     }
 
     #[test]

@@ -167,7 +167,12 @@ impl Client {
     /// What did not arrive so far.
     #[must_use]
     pub fn losses(&self) -> Losses {
-        Losses { bad_frames: u64::from(self.accumulator.counts().bad), ..self.topics.losses }
+        Losses { bad_frames: u64::from(self.accumulator.counts().bad), ..self.topics.losses() }
+    }
+
+    /// Counts samples that a subscription misses before one that it takes.
+    pub(super) fn miss(&mut self, samples: u64) {
+        self.topics.miss(samples);
     }
 
     /// Sends a request, again when no answer comes: for requests that may be repeated.
@@ -339,7 +344,7 @@ impl Client {
         let bad = self.accumulator.counts().bad;
         let mut attempt = 0;
         while attempt < self.allowed(tries, bad) {
-            self.topics.losses.repeats += u64::from(attempt > 0);
+            self.topics.numbered.repeats += u64::from(attempt > 0);
             let sequence = self.next_sequence();
             let header = Header { kind: Kind::Request, id: E::ID, sequence };
             let length = encode(header, request, &mut wire).map_err(|e| {

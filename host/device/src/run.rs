@@ -195,10 +195,10 @@ fn follow(
         match client.topic(Duration::from_millis(50))? {
             Some(Topic::Telemetry(s)) => {
                 heard = Instant::now();
-                let takes = stream.takes(&s);
                 // Samples from before the start may still be on the line, those of an earlier run too.
                 let early = s.state != State::Running || s.time_us <= status.time_us;
                 if early && begun.is_none() {
+                    stream.hears();
                     continue;
                 }
                 let start = *begun.get_or_insert(s.time_us);
@@ -206,7 +206,7 @@ fn follow(
                 if plan.seconds.is_some_and(|end| elapsed >= end) {
                     return Ok(Ending::Done);
                 }
-                if takes {
+                if stream.takes(client, &s) {
                     sample(&s)?;
                 }
                 match s.state {

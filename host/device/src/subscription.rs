@@ -50,18 +50,37 @@ impl Subscription {
         Ok(Self { every_ticks, sent_ticks, before, next: None, heard: now, requested: now })
     }
 
-    /// Whether a sample is one of this program's: of a finer stream it takes those of its own rate.
-    pub fn takes(&mut self, sample: &Telemetry) -> bool {
+    /// Whether a sample is one of this program's: of a finer stream it takes those of its own rate. A gap of the tick counter before
+    /// it counts as lost, whatever its cause: the line, the queue of this program or of the device, another program that changed
+    /// the stream.
+    pub fn takes(&mut self, client: &mut Client, sample: &Telemetry) -> bool {
         self.heard = Instant::now();
-        let every = u64::from(self.every_ticks);
-        let next = match self.next {
-            // Before the last one: the device has restarted.
-            Some(next) if sample.tick < next && sample.tick + every >= next => return false,
-            Some(next) if sample.tick >= next && sample.tick - next < every => next + every,
-            _ => sample.tick + every,
+        let missing = self.place(sample.tick);
+        if let Some(missing) = missing {
+            client.miss(missing);
+        }
+        missing.is_some()
+    }
+
+    /// Notes that the stream is alive, for a sample that is of no use.
+    pub fn hears(&mut self) {
+        self.heard = Instant::now();
+    }
+
+    /// Takes the sample of a tick, if it is due; gives how many are missing before it.
+    fn place(&mut self, tick: u64) -> Option<u64> {
+        let every = u64::from(self.every_ticks.max(1));
+        let (missing, next) = match self.next {
+            Some(next) if tick < next && tick + every >= next => return None,
+            Some(next) if tick >= next => {
+                let missing = (tick - next) / every;
+                (missing, if missing == 0 { next } else { tick } + every)
+            }
+            // The first one, or far before the last one: the device has restarted.
+            _ => (0, tick + every),
         };
         self.next = Some(next);
-        true
+        Some(missing)
     }
 
     /// Silence after which something is wrong: longer than `least` for a slow stream.
@@ -110,27 +129,35 @@ fn request(client: &mut Client, every_ticks: u16) -> Result<()> {
 mod tests {
     use super::*;
 
-    fn taken(every_ticks: u16, ticks: impl IntoIterator<Item = u64>) -> Vec<u64> {
+    /// Ticks of the samples that are taken, and how many are missing between them.
+    fn taken(every_ticks: u16, ticks: impl IntoIterator<Item = u64>) -> (Vec<u64>, u64) {
         let now = Instant::now();
         let mut subscription =
             Subscription { every_ticks, sent_ticks: 1, before: None, next: None, heard: now, requested: now };
-        let mut sample = Telemetry::default();
-        ticks
-            .into_iter()
-            .filter(|tick| {
-                sample.tick = *tick;
-                subscription.takes(&sample)
-            })
-            .collect()
+        let mut missing = 0;
+        let due = |tick: &u64| subscription.place(*tick).inspect(|gap| missing += gap).is_some();
+        (ticks.into_iter().filter(due).collect(), missing)
     }
 
     #[test]
     fn a_program_takes_the_samples_of_its_own_rate() {
-        assert_eq!(taken(1, 5..9), [5, 6, 7, 8]);
-        assert_eq!(taken(10, 5..40), [5, 15, 25, 35]);
-        assert_eq!(taken(10, (0..40).step_by(3)), [0, 12, 21, 30], "the mean rate is kept");
-        assert_eq!(taken(10, (5..20).chain(100..115)), [5, 15, 100, 110], "after a gap");
-        assert_eq!(taken(10, (500..512).chain(1..13)), [500, 510, 1, 11], "after a restart of the device");
+        assert_eq!(taken(1, 5..9).0, [5, 6, 7, 8]);
+        assert_eq!(taken(10, 5..40).0, [5, 15, 25, 35]);
+        assert_eq!(taken(10, (0..40).step_by(3)).0, [0, 12, 21, 30], "the mean rate is kept");
+        assert_eq!(taken(10, (5..20).chain(100..115)).0, [5, 15, 100, 110], "after a gap");
+        assert_eq!(taken(10, (500..512).chain(1..13)).0, [500, 510, 1, 11], "after a restart of the device");
+    }
+
+    #[test]
+    fn every_tick_without_a_sample_is_missing() {
+        let missing = |every, ticks: &[u64]| taken(every, ticks.iter().copied()).1;
+        assert_eq!(missing(1, &[5, 6, 7]), 0);
+        assert_eq!(missing(1, &[5, 9, 10, 12]), 3 + 1);
+        assert_eq!(missing(1, &[5, 6, 16, 26]), 9 + 9, "another program made the stream coarser");
+        assert_eq!(missing(10, &[5, 15, 100, 110]), 7, "25 to 85; the next one is late");
+        assert_eq!(taken(10, (0..2_000).step_by(9)).1, 0, "a finer stream that does not divide");
+        assert_eq!(missing(1, &[500, 501, 1, 2]), 0, "a restart shows no number");
+        assert_eq!(missing(1, &[0, u64::MAX - 2]), u64::MAX - 3);
     }
 
     #[test]

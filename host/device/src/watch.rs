@@ -71,7 +71,7 @@ fn follow(
                 if seconds.is_some_and(|end| elapsed as f64 * 1e-6 >= end) {
                     return Ok(Ending::Done);
                 }
-                if stream.takes(&sample) {
+                if stream.takes(client, &sample) {
                     take(Happened::Sample(&sample, elapsed / 1000))?;
                 }
             }

@@ -101,7 +101,7 @@ impl Output {
         let partial = root.join(PARTIAL);
         fs::create_dir_all(&partial).map_err(|e| unwritable(root, e))?;
         // One run at a time looks for leftovers and makes its own place.
-        let _turn = Turn::of([Some(partial.join("lock").as_path())]);
+        let _turn = Turn::of([Some(partial.join("lock").as_path())])?;
         remove_leftovers(&partial);
         let run = tempfile::Builder::new().prefix("run-").tempdir_in(&partial);
         let run = run.map_err(|e| unwritable(&partial, e))?.keep();

@@ -154,7 +154,7 @@ impl Arguments {
             self.next.as_deref(),
             self.reports.file(),
             self.reports.figures.as_deref(),
-        ]);
+        ])?;
         match refitted {
             Some(Ok(refitted)) => self.with_model(console, &campaign, hashes, refitted, &mut answer)?,
             // Without a requested table a failed refit only costs the advice.

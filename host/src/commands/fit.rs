@@ -128,7 +128,7 @@ impl Arguments {
             self.json.as_deref(),
             self.reports.file(),
             self.reports.figures.as_deref(),
-        ]);
+        ])?;
         let faults = &fitted.summary.faults;
         if let Some(path) = self.output.as_ref().filter(|_| faults.is_empty() || self.force) {
             table.write(path)?;

@@ -95,7 +95,7 @@ impl Arguments {
             self.csv.as_deref(),
             self.reports.file(),
             self.reports.figures.as_deref(),
-        ]);
+        ])?;
         if let Some(path) = &self.json {
             let json = text(&document::History::of(&visits, &found, muscle.as_ref()))?;
             write_whole(path, (json + "\n").as_bytes())?;

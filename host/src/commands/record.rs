@@ -87,6 +87,7 @@ impl Arguments {
         console.note(format!("recording to {names}; Ctrl-C ends it"));
         let progress = ProgressLine::new(console, "record");
         progress.total(self.seconds.map_or(0, |s| (s * 1e3) as u64));
+        let before = client.losses();
         let watched = watch(
             &mut client,
             every_ticks,
@@ -105,7 +106,7 @@ impl Arguments {
             || interrupted.load(Ordering::Relaxed),
         );
         drop(progress);
-        let losses = client.losses();
+        let losses = client.losses().since(before);
         about["losses"] = about_losses(losses);
         about["ended_by"] = json!(match &watched {
             Ok(Ending::Done) => "time".to_owned(),
@@ -121,7 +122,11 @@ impl Arguments {
         if let Err(error) = &watched
             && kept.is_ok()
         {
-            console.note(format!("{} until then in {names}", pluralise(rows, "sample")));
+            console.note(format!(
+                "{} until then in {names}, {} missing",
+                pluralise(rows, "sample"),
+                losses.samples
+            ));
             console.detail(error.to_string());
         }
         watched?;
@@ -130,7 +135,7 @@ impl Arguments {
         console.result(if self.json {
             format!("{about:#}")
         } else {
-            format!("{} in {names}, {} lost", pluralise(rows, "sample"), losses.samples)
+            format!("{} in {names}, {} missing", pluralise(rows, "sample"), losses.samples)
         });
         if let Some((words, _)) = changed.filter(|_| !self.json) {
             console.result(words.trim_end());

@@ -64,13 +64,15 @@ pub(super) fn end(recorder: Recorder, about: &Value, console: &Console) -> Resul
     recorder.finish(about)
 }
 
-/// Warns of samples that were lost.
+/// Warns of samples that are missing.
 pub(super) fn warn_of_losses(losses: Losses, console: &Console) {
     if losses.samples > 0 {
         console.warning(format!(
-            "{} lost on the line, in {}",
+            "{} missing in {}; the controller had sent {} of them, the others not: another program changed its telemetry, or it skipped \
+             ticks",
             pluralise(losses.samples, "sample"),
-            pluralise(losses.gaps, "gap")
+            pluralise(losses.gaps, "gap"),
+            losses.unreceived.min(losses.samples),
         ));
     }
 }

@@ -68,7 +68,7 @@ impl Arguments {
                 corrections: Vec::new(),
                 mountings: Vec::new(),
             };
-            let _turn = Turn::of([Some(path.as_path())]);
+            let _turn = Turn::of([Some(path.as_path())])?;
             TableFile { table: found.table.clone(), about }.write(path)?;
         }
         let document = to_document(&muscle, &found);

@@ -1,6 +1,6 @@
 //! Connections of browsers, with bounds on their number, on the time that a request takes to arrive, and on its size.
 
-use std::sync::Arc;
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use axum::Router;
@@ -11,7 +11,7 @@ use axum::response::{IntoResponse, Response};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use tokio::net::TcpListener;
-use tokio::sync::Semaphore;
+use tokio::task::JoinHandle;
 
 /// Time for the head of a request, and for its body.
 pub(super) const ARRIVAL: Duration = Duration::from_secs(10);
@@ -25,35 +25,56 @@ pub(super) struct Limits {
     pub connections: usize,
     /// Time for the head of a request.
     pub head: Duration,
+    /// What happens at the limit.
+    pub beyond: Beyond,
+}
+
+/// What happens to a connection beyond the limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Beyond {
+    /// It is closed immediately.
+    Refused,
+    /// It takes the place of the oldest one: no number of idle connections keeps a new one out.
+    Replaces,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { connections: 64, head: ARRIVAL }
+        Self { connections: 64, head: ARRIVAL, beyond: Beyond::Refused }
     }
 }
 
-/// Serves until the future is dropped. A connection beyond the limit is closed immediately.
+/// Serves until the future is dropped.
 pub(super) async fn serve(listener: TcpListener, app: Router, limits: Limits) {
-    let permits = Arc::new(Semaphore::new(limits.connections));
+    // In the order of their beginning.
+    let mut open: VecDeque<JoinHandle<()>> = VecDeque::new();
     loop {
         let Ok((stream, _)) = listener.accept().await else {
             tokio::time::sleep(REFUSED).await;
             continue;
         };
-        let Ok(permit) = Arc::clone(&permits).try_acquire_owned() else { continue };
+        open.retain(|connection| !connection.is_finished());
+        if open.len() >= limits.connections {
+            match limits.beyond {
+                Beyond::Refused => continue,
+                Beyond::Replaces => {
+                    if let Some(oldest) = open.pop_front() {
+                        oldest.abort();
+                    }
+                }
+            }
+        }
         // Answers are short, and a vent's must not wait for more to send.
         let _ = stream.set_nodelay(true);
         let service = TowerToHyperService::new(app.clone());
-        tokio::spawn(async move {
-            let _permit = permit;
+        open.push_back(tokio::spawn(async move {
             // A connection that breaks concerns its browser only.
             let _ = hyper::server::conn::http1::Builder::new()
                 .timer(TokioTimer::new())
                 .header_read_timeout(limits.head)
                 .serve_connection(TokioIo::new(stream), service)
                 .await;
-        });
+        }));
     }
 }
 
@@ -119,6 +140,22 @@ mod tests {
         ask(&mut first);
         assert_eq!(connect(address).read(&mut [0; 16]).unwrap(), 0);
         ask(&mut first);
+    }
+
+    #[test]
+    fn where_vents_arrive_idle_connections_keep_no_new_one_out() {
+        let limits = Limits { connections: 4, head: Duration::from_secs(3_600), beyond: Beyond::Replaces };
+        let address = start(limits);
+        let mut idle: Vec<TcpStream> = (0..12).map(|_| connect(address)).collect();
+        // Half a head, a body that does not come, and nothing at all.
+        idle[10].write_all(b"GET / HTTP/1.1\r\nHo").unwrap();
+        idle[11].write_all(b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\n").unwrap();
+        let mut fresh = connect(address);
+        fresh.write_all(b"GET / HTTP/1.1\r\nHost: x\r\n\r\n").unwrap();
+        let mut bytes = [0; 1024];
+        let count = fresh.read(&mut bytes).unwrap();
+        assert!(String::from_utf8_lossy(&bytes[..count]).starts_with("HTTP/1.1 200"));
+        assert_eq!(idle[0].read(&mut bytes).unwrap(), 0, "the oldest one is closed");
     }
 
     #[test]

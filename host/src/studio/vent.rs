@@ -18,7 +18,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::post;
 
 use super::access::{Access, guard, same, token};
-use super::connections::{Limits, body, serve};
+use super::connections::{Beyond, Limits, body, serve};
 use super::server::failed;
 use pam_data::error::{DataCode, Error, Result};
 use pam_device::VentLine;
@@ -100,7 +100,7 @@ pub(super) fn start(vent: Arc<Vent>, pages: Arc<[String]>) -> Result<VentPath> {
         .spawn(move || {
             runtime.block_on(async {
                 if let Ok(listener) = tokio::net::TcpListener::from_std(listener) {
-                    serve(listener, app, Limits::default()).await;
+                    serve(listener, app, Limits { beyond: Beyond::Replaces, ..Limits::default() }).await;
                 }
             });
         })

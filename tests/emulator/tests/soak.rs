@@ -192,10 +192,13 @@ fn round(number: u32, fault: Fault, rig: &mut Rig, row: &mut Row) {
     let ended = run.wait().expect("it ends");
     assert_eq!(ended.success(), succeeds, "{fault:?}: {}", said(&mut run));
     let path = rig.folder().join(&name);
-    let found = if path.exists() { recorded(&path) } else { rig.recovered(&name) };
-    let Recorded { samples, missing, told, .. } = found;
+    let whole = path.exists();
+    let Recorded { samples, missing, told } = if whole { recorded(&path) } else { rig.recovered(&name) };
     assert!(samples > 300, "{fault:?}: {samples} samples");
-    assert!(missing <= told, "{fault:?}: {missing} samples are missing, the recording reports {told}");
+    // A recording that was cut off has no report of the line; its ticks show what is missing.
+    // A full disk may end it before a row that was counted.
+    let right = if fault == Fault::FullDisk { missing <= told } else { missing == told };
+    assert!(!whole || right, "{fault:?}: {missing} samples are missing, the recording reports {told}");
     row.add(ticks, samples, missing);
     // The recorder ends with the cable, and where it stood still for long: the next one begins.
     rig.revive();

@@ -192,3 +192,34 @@ fn table_and_load_cell_may_be_apart_by_as_much_as_the_bound() {
     settings.watch.disagree_n = 0.0;
     assert_eq!(all([apart(100.0); 400], &settings), [], "a watch that is off");
 }
+
+#[test]
+fn one_good_tick_begins_every_count_anew() {
+    let mut settings = wide();
+    settings.watch.follow_ticks = 3;
+    settings.watch.debounce_ticks = 3;
+    let limits = settings.limits;
+    let follow = settings.watch.follow_pa;
+    let apart = |miss: f32| Seen { expected_pa: 200e3, ..still(200e3 + miss, 0.0, 0.0) };
+    let full = Seen { command: Command::VENT, ..still(settings.watch.vented_pa + 1.0, 0.0, 0.0) };
+    let empty = Seen { command: Command::VENT, ..still(0.0, 0.0, 0.0) };
+    let good = still(200e3, 0.0, 0.0);
+    let cases = [
+        (Fault::OverPressure, still(limits.pressure_pa + 1.0, 0.0, 0.0), good),
+        (Fault::OverForce, still(200e3, 0.0, limits.force_n + 1.0), good),
+        (Fault::OverStroke, still(200e3, limits.stroke_max_m + 1.0, 0.0), good),
+        (Fault::OverSpeed, Seen { speed_m_per_s: limits.speed_m_per_s + 1.0, ..good }, good),
+        (Fault::PressureNotFalling, apart(follow + 1.0), apart(0.0)),
+        (Fault::PressureNotRising, apart(-follow - 1.0), apart(0.0)),
+        (Fault::NotVented, full, empty),
+    ];
+    for (fault, bad, good) in cases {
+        // As long as a muscle takes to vent.
+        let before = vec![good; settings.watch.vent_ticks as usize + 2];
+        let ticks = |pattern: &[Seen]| [before.clone(), pattern.repeat(20)].concat();
+        assert_eq!(all(ticks(&[bad, bad, good]), &settings), [], "{fault:?}");
+        let found = all(ticks(&[bad, bad, bad, good]), &settings);
+        assert_eq!(found.len(), 20, "{fault:?}: {:?}", found.first());
+        assert!(found.iter().all(|(_, finding)| finding.fault == fault), "{fault:?}");
+    }
+}

@@ -23,10 +23,13 @@ pub enum Topic {
 /// What did not arrive.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Losses {
-    /// Samples of telemetry that the sequence numbers miss.
+    /// Samples that are missing at the rate of the subscription, by the tick counter of the device. Without a
+    /// subscription, those that the sequence numbers miss.
     pub samples: u64,
-    /// Gaps in which they were lost.
+    /// Gaps in which they are missing.
     pub gaps: u64,
+    /// Samples that the device has numbered and that did not arrive: lost on the line, or without room in the device.
+    pub unreceived: u64,
     /// Frames whose check failed, and bytes between frames that were none.
     pub bad_frames: u64,
     /// Requests that were sent again.
@@ -35,13 +38,31 @@ pub struct Losses {
     pub unread: u64,
 }
 
+impl Losses {
+    /// What was lost after `before`.
+    #[must_use]
+    pub fn since(self, before: Self) -> Self {
+        Self {
+            samples: self.samples.saturating_sub(before.samples),
+            gaps: self.gaps.saturating_sub(before.gaps),
+            unreceived: self.unreceived.saturating_sub(before.unreceived),
+            bad_frames: self.bad_frames.saturating_sub(before.bad_frames),
+            repeats: self.repeats.saturating_sub(before.repeats),
+            unread: self.unread.saturating_sub(before.unread),
+        }
+    }
+}
+
 /// Topics in the order of their arrival, until they are fetched.
 #[derive(Debug, Default)]
 pub(super) struct Topics {
     queue: VecDeque<Topic>,
     /// Sequence number of the next sample, once there was one.
     expected: Option<u16>,
-    pub losses: Losses,
+    /// What the sequence numbers miss: samples and gaps are those of [`Topics::losses`] until a subscription counts ticks.
+    pub numbered: Losses,
+    /// What a subscription misses by the tick counter: samples and gaps.
+    by_ticks: Option<(u64, u64)>,
 }
 
 impl Topics {
@@ -53,6 +74,18 @@ impl Topics {
     /// Leaves out the samples that nothing has fetched yet.
     pub fn forget_samples(&mut self) {
         self.queue.retain(|topic| !matches!(topic, Topic::Telemetry(_)));
+    }
+
+    /// What did not arrive so far, without the frames that were damaged.
+    pub fn losses(&self) -> Losses {
+        let (samples, gaps) = self.by_ticks.unwrap_or((self.numbered.samples, self.numbered.gaps));
+        Losses { samples, gaps, unreceived: self.numbered.samples, ..self.numbered }
+    }
+
+    /// Adds what a subscription finds missing before a sample that it takes.
+    pub fn miss(&mut self, missing: u64) {
+        let (samples, gaps) = self.by_ticks.unwrap_or_default();
+        self.by_ticks = Some((samples + missing, gaps + u64::from(missing > 0)));
     }
 
     /// How many pairs of neighbouring samples wait, and the least number of ticks between the two of a pair.
@@ -69,8 +102,8 @@ impl Topics {
         if header.id == TELEMETRY {
             let Ok(sample) = postcard::from_bytes::<Telemetry>(body) else { return };
             let missing = self.expected.map_or(0, |expected| header.sequence.wrapping_sub(expected));
-            self.losses.samples += u64::from(missing);
-            self.losses.gaps += u64::from(missing > 0);
+            self.numbered.samples += u64::from(missing);
+            self.numbered.gaps += u64::from(missing > 0);
             self.expected = Some(header.sequence.wrapping_add(1));
             self.queue.push_back(Topic::Telemetry(sample));
         } else if header.id == EVENT {
@@ -81,7 +114,7 @@ impl Topics {
         }
         while self.queue.len() > BACKLOG {
             self.queue.pop_front();
-            self.losses.unread += 1;
+            self.numbered.unread += 1;
         }
     }
 }

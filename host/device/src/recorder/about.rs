@@ -49,12 +49,13 @@ pub fn about_device(hello: &Hello, info: &DeviceInfo, settings: &Settings) -> Va
     })
 }
 
-/// What a side file says about losses on the way.
+/// What a side file says about losses: samples that are missing by the tick counter, and what is known of the cause.
 #[must_use]
 pub fn about_losses(losses: Losses) -> Value {
     json!({
         "samples": losses.samples,
         "gaps": losses.gaps,
+        "unreceived": losses.unreceived,
         "bad_frames": losses.bad_frames,
         "repeated_requests": losses.repeats,
         "unread": losses.unread,

@@ -11,7 +11,7 @@ use pam_device::reachability::Reachability;
 use pam_device::recorder::{Recorder, about_losses, about_start};
 use pam_device::run::{Ending, Plan, run};
 use pam_device::setpoint_profile::{Quantity, SetpointProfile};
-use pam_device::{Client, messages};
+use pam_device::{Client, Losses, messages};
 use serde_json::{Value, json};
 
 use super::Arguments;
@@ -32,6 +32,8 @@ pub(super) struct Session {
     ticks: f64,
     /// Control ticks between two samples.
     every_ticks: u16,
+    /// What had been lost before the run.
+    lost_before: Losses,
     saturated_before: u32,
     tracking: TrackingError,
     reachability: Option<Reachability>,
@@ -93,6 +95,7 @@ impl Session {
             seconds: arguments.seconds,
             ticks,
             every_ticks,
+            lost_before: client.losses(),
             saturated_before,
             tracking,
             reachability: reachability.filter(|_| quantity != Quantity::Pressure),
@@ -142,7 +145,7 @@ impl Session {
         client: &mut Client,
         console: &Console,
     ) -> Result<Report> {
-        let losses = client.losses();
+        let losses = client.losses().since(self.lost_before);
         let status = outcome.as_ref().ok().and_then(|_| client.call::<GetStatus>(&()).ok());
         let saturated = status.map(|status| status.saturated_ticks.wrapping_sub(self.saturated_before));
         let samples_per_s = self.ticks / f64::from(self.every_ticks);
@@ -169,7 +172,7 @@ impl Session {
         if ending == Ending::Stopped {
             console.note("interrupted; the muscle is vented");
         }
-        Ok(Report { summary: self.summary(kept), about: self.about, changed: changed.map(|c| c.0) })
+        Ok(Report { summary: self.summary(kept, losses), about: self.about, changed: changed.map(|c| c.0) })
     }
 
     /// Warns where the setpoint was saturated for long, and where the run left the tested range.
@@ -190,9 +193,11 @@ impl Session {
         }
     }
 
-    fn summary(&self, recording: Option<PathBuf>) -> String {
+    fn summary(&self, recording: Option<PathBuf>, losses: Losses) -> String {
+        let missing =
+            if losses.samples > 0 { format!(", {} missing", losses.samples) } else { String::new() };
         let name = recording.map(|p| format!(" in {}", p.display())).unwrap_or_default();
         let samples = pluralise(self.tracking.all.samples, "sample");
-        format!("{samples}{name}{}; vented", self.tracking.to_text(self.quantity))
+        format!("{samples}{name}{missing}{}; vented", self.tracking.to_text(self.quantity))
     }
 }

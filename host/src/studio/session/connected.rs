@@ -28,7 +28,7 @@ use pam_device::reachability::Reachability;
 use pam_device::recorder::{Recorder, about_losses, about_start, serial};
 use pam_device::run::{Plan, Steps, arm, release, vent};
 use pam_device::setpoint_profile::Quantity;
-use pam_device::{Address, Client, Subscription, Topic, VentLine, messages, table_diff, tables};
+use pam_device::{Address, Client, Losses, Subscription, Topic, VentLine, messages, table_diff, tables};
 use pam_diagnose::reference::Mounted;
 use pam_fit::table_file::TableFile;
 
@@ -47,7 +47,8 @@ pub struct Connected {
     settings: Settings,
     emulated: Option<(Emulated, Arc<AtomicU8>)>,
     running: Option<(Quantity, Steps, Option<u64>)>,
-    recorder: Option<(Recorder, Value)>,
+    /// A recording, what it says of itself, and what was lost before it began.
+    recorder: Option<(Recorder, Value, Losses)>,
     fault: Option<String>,
     changed: Option<ChangeWatch>,
     batch: Vec<Telemetry>,
@@ -197,7 +198,7 @@ impl Connected {
             match topic {
                 Topic::Telemetry(sample) => self.take(sample, say)?,
                 Topic::Event(event @ (Event::Fault(_) | Event::State(_))) => {
-                    if let Some((recorder, _)) = &mut self.recorder {
+                    if let Some((recorder, ..)) = &mut self.recorder {
                         recorder.event(&event)?;
                     }
                     self.status = self.client.call::<GetStatus>(&())?;
@@ -225,14 +226,14 @@ impl Connected {
     fn take(&mut self, sample: Telemetry, say: &broadcast::Sender<String>) -> Result<()> {
         if let Some(stream) = &mut self.stream {
             // At the device's own rate it takes every one.
-            let _ = stream.takes(&sample);
+            let _ = stream.takes(&mut self.client, &sample);
         }
         if (sample.state, sample.mode) != (self.status.state, self.status.mode) {
             (self.status.state, self.status.mode) = (sample.state, sample.mode);
             self.note_fault()?;
             report(Some(self), say);
         }
-        if let Some((recorder, _)) = &mut self.recorder
+        if let Some((recorder, ..)) = &mut self.recorder
             && let Err(error) = recorder.push(&sample)
         {
             // A full disk must not take the controller out of sight.
@@ -278,6 +279,8 @@ impl Connected {
                 self.status = self.client.call::<GetStatus>(&())?;
             }
             Order::Follow(quantity, profile) => {
+                // Samples from before the last order may still be on their way, and say what was then.
+                self.status = self.client.call::<GetStatus>(&())?;
                 if self.status.state == State::Disarmed {
                     return Err(Error::new(DeviceCode::DeviceRefused, "the controller is disarmed")
                         .help("arm it first"));
@@ -322,7 +325,8 @@ impl Connected {
             Order::Record(path) => {
                 self.end_recording()?;
                 let about = about_start("pam-run/1", &mut self.client)?;
-                self.recorder = Some((Recorder::create(std::slice::from_ref(&path), &about)?, about));
+                let recorder = Recorder::create(std::slice::from_ref(&path), &about)?;
+                self.recorder = Some((recorder, about, self.client.losses()));
             }
             Order::Watch(reference) => {
                 self.changed =
@@ -382,8 +386,8 @@ impl Connected {
 
     /// Ends the recording, if there is one.
     pub(super) fn end_recording(&mut self) -> Result<Option<PathBuf>> {
-        let Some((recorder, mut about)) = self.recorder.take() else { return Ok(None) };
-        about["losses"] = about_losses(self.client.losses());
+        let Some((recorder, mut about, before)) = self.recorder.take() else { return Ok(None) };
+        about["losses"] = about_losses(self.client.losses().since(before));
         about["ended_by"] = json!("the page");
         recorder.finish(&about).map(Some)
     }

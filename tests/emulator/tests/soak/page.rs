@@ -65,11 +65,10 @@ impl Figures {
         let (_, after) = rest.split_once(end).expect("a mark");
         let [first, last] = self.needs;
         let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
-        let Recorded { samples, missing, interrupted, told } = self.recordings;
+        let Recorded { samples, missing, told } = self.recordings;
         let body = format!(
             "{begin}\n\n{} s, {} ticks of the controller, seed {}.\n\n{}\n\
-             - The program that recorded all the time: {samples} samples, {missing} missing, {told} told as lost, {interrupted} while\n\
-               the stream was ended by another program and requested again.\n\
+             - The program that recorded all the time: {samples} samples, {missing} missing, {told} of them reported.\n\
              - Programs that did not read and were dropped by the line: {}.\n\
              - The studio, after five faults and at the end: {:.1} and {:.1} MiB, {} and {} open files, {} and {} threads.\n\n{end}",
             self.seconds,

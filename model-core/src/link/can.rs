@@ -1,0 +1,178 @@
+//! Frames of the link on CAN FD: one to eight devices on one bus, each with an address.
+//!
+//! A message of CAN FD carries up to [`PAYLOAD`] bytes. The bytes of the link, as on any other line, are cut into messages and put
+//! together again. A frame's check sum and its closing zero find what is lost, as on a serial line.
+//!
+//! | byte of a message | contents |
+//! | --- | --- |
+//! | 0 | number of the message, counted by its sender for each route, wrapping |
+//! | 1 | bytes of the link that follow, 1 to [`DATA`] |
+//! | 2… | these bytes, and zeros up to the next length that CAN FD has |
+//!
+//! | identifier (11 bits) | [`Route`] |
+//! | --- | --- |
+//! | `0x010` | from the host to all devices, before all else on the bus: frames of one message, to vent |
+//! | `0x100 + address` | from the host to one device |
+//! | `0x200 + address` | from a device to the host |
+//!
+//! Source of the lengths and of arbitration by the lower identifier: ISO 11898-1:2015. A message whose end is disturbed may arrive twice
+//! (the transmitter repeats it), which its number shows.
+
+/// Longest message.
+pub const PAYLOAD: usize = 64;
+/// Bytes of the link that a message carries at most.
+pub const DATA: usize = PAYLOAD - HEAD;
+/// Number and length.
+const HEAD: usize = 2;
+/// Devices on one bus.
+pub const DEVICES: u8 = 8;
+/// Lengths that a message of CAN FD can have, beyond 8.
+const LENGTHS: [usize; 7] = [12, 16, 20, 24, 32, 48, 64];
+
+const TO_ALL: u16 = 0x010;
+const TO_DEVICE: u16 = 0x100;
+const FROM_DEVICE: u16 = 0x200;
+
+/// Which device: 1 to [`DEVICES`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Address(u8);
+
+impl Address {
+    /// The address of a number, if there is one.
+    pub const fn new(number: u8) -> Option<Self> {
+        if number >= 1 && number <= DEVICES { Some(Self(number)) } else { None }
+    }
+
+    /// Its number.
+    pub const fn number(self) -> u8 {
+        self.0
+    }
+
+    /// All addresses.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (1..=DEVICES).map(Self)
+    }
+}
+
+/// From where to where a message goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Route {
+    /// From the host to all devices.
+    ToAll,
+    /// From the host to a device.
+    To(Address),
+    /// From a device to the host.
+    From(Address),
+}
+
+impl Route {
+    /// The identifier of its messages.
+    pub const fn identifier(self) -> u16 {
+        match self {
+            Self::ToAll => TO_ALL,
+            Self::To(address) => TO_DEVICE + address.0 as u16,
+            Self::From(address) => FROM_DEVICE + address.0 as u16,
+        }
+    }
+
+    /// The route of an identifier; `None` for messages of others on the bus.
+    pub const fn of(identifier: u16) -> Option<Self> {
+        let Some(address) = Address::new((identifier & 0xFF) as u8) else {
+            return if identifier == TO_ALL { Some(Self::ToAll) } else { None };
+        };
+        match identifier & !0xFF {
+            TO_DEVICE => Some(Self::To(address)),
+            FROM_DEVICE => Some(Self::From(address)),
+            _ => None,
+        }
+    }
+}
+
+/// The sender of one route.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sender {
+    number: u8,
+}
+
+impl Sender {
+    /// Cuts bytes of the link, such as a whole frame with its closing zero, into messages.
+    pub fn send(&mut self, bytes: &[u8], mut message: impl FnMut(&[u8])) {
+        for piece in bytes.chunks(DATA) {
+            let mut payload = [0; PAYLOAD];
+            payload[0] = self.number;
+            payload[1] = piece.len() as u8;
+            payload[HEAD..HEAD + piece.len()].copy_from_slice(piece);
+            self.number = self.number.wrapping_add(1);
+            message(&payload[..padded(HEAD + piece.len())]);
+        }
+    }
+}
+
+/// The next length that a message can have.
+fn padded(length: usize) -> usize {
+    if length <= 8 {
+        return length;
+    }
+    LENGTHS.into_iter().find(|fits| *fits >= length).unwrap_or(PAYLOAD)
+}
+
+/// What a receiver has seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Messages that the numbers miss.
+    pub lost: u32,
+    /// Messages that arrived twice.
+    pub repeated: u32,
+    /// Messages that are none of this protocol.
+    pub malformed: u32,
+}
+
+/// The receiver of one route.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Receiver {
+    expected: Option<u8>,
+    counts: Counts,
+}
+
+impl Receiver {
+    /// Takes a message; gives its bytes of the link. Behind a gap a zero comes first, which ends the frame that is not whole.
+    pub fn take<'a>(&mut self, payload: &'a [u8]) -> impl Iterator<Item = u8> + use<'a> {
+        let bytes = self.accept(payload);
+        let (gap, bytes) = bytes.unwrap_or((false, &[]));
+        gap.then_some(0).into_iter().chain(bytes.iter().copied())
+    }
+
+    /// What it has seen since the beginning.
+    pub const fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    fn accept<'a>(&mut self, payload: &'a [u8]) -> Option<(bool, &'a [u8])> {
+        let Some((number, bytes)) = parse(payload) else {
+            self.counts.malformed = self.counts.malformed.wrapping_add(1);
+            return None;
+        };
+        let lost = number.wrapping_sub(self.expected.unwrap_or(number));
+        if lost == u8::MAX {
+            self.counts.repeated = self.counts.repeated.wrapping_add(1);
+            return None;
+        }
+        self.counts.lost = self.counts.lost.wrapping_add(u32::from(lost));
+        self.expected = Some(number.wrapping_add(1));
+        Some((lost > 0, bytes))
+    }
+}
+
+/// Number and bytes of a message.
+fn parse(payload: &[u8]) -> Option<(u8, &[u8])> {
+    let (&number, rest) = payload.split_first()?;
+    let (&length, rest) = rest.split_first()?;
+    let length = usize::from(length);
+    if length == 0 || length > DATA || payload.len() != padded(HEAD + length) {
+        return None;
+    }
+    Some((number, rest.get(..length)?))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,140 @@
+//! Frames over a bus that loses, repeats, swaps and invents messages.
+
+use super::*;
+use crate::link::frame::{Accumulator, Header, Kind, MAX_BODY, MAX_WIRE, encode_bytes};
+use proptest::prelude::*;
+
+type Message = Vec<u8>;
+
+/// The messages of frames with bodies of these lengths, and how many each frame has.
+fn messages(sender: &mut Sender, lengths: &[usize]) -> Vec<Vec<Message>> {
+    let frame = |(at, length): (usize, &usize)| {
+        let header = Header { kind: Kind::Response, id: 3, sequence: at as u16 };
+        let body: Vec<u8> = (0..*length).map(|byte| (byte * 7 + at) as u8).collect();
+        let mut wire = [0; MAX_WIRE];
+        let count = encode_bytes(header, &body, &mut wire).unwrap();
+        let mut cut = Vec::new();
+        sender.send(&wire[..count], |payload| cut.push(payload.to_vec()));
+        cut
+    };
+    lengths.iter().enumerate().map(frame).collect()
+}
+
+/// Sequence numbers and lengths of the frames that arrive.
+fn arrived<'a>(messages: impl IntoIterator<Item = &'a Message>) -> (Vec<(u16, usize)>, Counts) {
+    let (mut receiver, mut accumulator, mut frames) = (Receiver::default(), Accumulator::new(), Vec::new());
+    for message in messages {
+        for byte in receiver.take(message) {
+            if let Some(Ok(frame)) = accumulator.push(byte) {
+                let at = frame.header.sequence as usize;
+                let right =
+                    frame.body.iter().enumerate().all(|(byte, value)| *value == (byte * 7 + at) as u8);
+                assert!(right, "another body than was sent");
+                frames.push((frame.header.sequence, frame.body.len()));
+            }
+        }
+    }
+    (frames, receiver.counts())
+}
+
+const LENGTHS_SENT: [usize; 6] = [0, 300, 5, MAX_BODY, 1, 60];
+
+fn expected(without: Option<usize>) -> Vec<(u16, usize)> {
+    let all = LENGTHS_SENT.iter().enumerate().map(|(at, length)| (at as u16, *length));
+    all.filter(|(at, _)| Some(usize::from(*at)) != without).collect()
+}
+
+#[test]
+fn identifiers_are_those_of_their_routes_and_vents_go_first() {
+    let routes = Address::all().flat_map(|a| [Route::To(a), Route::From(a)]).chain([Route::ToAll]);
+    for route in routes {
+        assert_eq!(Route::of(route.identifier()), Some(route));
+        assert!(route == Route::ToAll || route.identifier() > Route::ToAll.identifier());
+    }
+    let known = (0..0x800).filter(|identifier| Route::of(*identifier).is_some()).count();
+    assert_eq!(known, 2 * usize::from(DEVICES) + 1);
+    assert_eq!((Address::new(0), Address::new(DEVICES + 1)), (None, None));
+}
+
+#[test]
+fn frames_of_every_length_arrive_in_messages_that_can_fd_has() {
+    let lengths: Vec<usize> = (0..=MAX_BODY).collect();
+    let sent = messages(&mut Sender::default(), &lengths);
+    for message in sent.iter().flatten() {
+        assert!(message.len() <= 8 || LENGTHS.contains(&message.len()), "{}", message.len());
+    }
+    let (frames, counts) = arrived(sent.iter().flatten());
+    assert_eq!(frames.len(), lengths.len());
+    assert!(frames.iter().all(|(sequence, length)| usize::from(*sequence) == *length));
+    assert_eq!(counts, Counts::default());
+}
+
+#[test]
+fn a_lost_message_costs_its_frame_and_no_other() {
+    let sent = messages(&mut Sender::default(), &LENGTHS_SENT);
+    let total = sent.iter().flatten().count();
+    for lost in 1..total {
+        let rest =
+            sent.iter().flatten().enumerate().filter(|(at, _)| *at != lost).map(|(_, message)| message);
+        let mut before = 0;
+        let its = sent.iter().position(|frame| {
+            before += frame.len();
+            lost < before
+        });
+        let (frames, counts) = arrived(rest);
+        assert_eq!(frames, expected(its), "message {lost}");
+        // The last one of all is not missed.
+        assert_eq!(counts.lost, u32::from(lost + 1 < total));
+    }
+}
+
+#[test]
+fn a_repeated_message_changes_nothing_and_swapped_ones_deliver_nothing_wrong() {
+    let sent = messages(&mut Sender::default(), &LENGTHS_SENT);
+    let flat: Vec<&Message> = sent.iter().flatten().collect();
+    for at in 0..flat.len() {
+        let mut twice = flat.clone();
+        twice.insert(at, flat[at]);
+        let (frames, counts) = arrived(twice);
+        assert_eq!((frames, counts.repeated, counts.lost), (expected(None), 1, 0));
+        if at > 0 {
+            let mut swapped = flat.clone();
+            swapped.swap(at - 1, at);
+            let (frames, _) = arrived(swapped);
+            assert!(frames.iter().all(|frame| expected(None).contains(frame)));
+        }
+    }
+}
+
+proptest! {
+    /// Whatever is on the bus: no panic, no frame that no one has sent, and the sender's next frames arrive.
+    #[test]
+    fn any_messages_are_survived(
+        noise in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..80), 0..40),
+        places in prop::collection::vec(0_usize..40, 0..40),
+    ) {
+        let mut sender = Sender::default();
+        let sent = messages(&mut sender, &LENGTHS_SENT);
+        let mut bus: Vec<Message> = sent.into_iter().flatten().collect();
+        for (message, place) in noise.into_iter().zip(places) {
+            bus.insert(place.min(bus.len()), message);
+        }
+        let (mut receiver, mut accumulator) = (Receiver::default(), Accumulator::new());
+        let mut take = |message: &Message, frames: &mut Vec<(u16, usize)>| {
+            for byte in receiver.take(message) {
+                if let Some(Ok(frame)) = accumulator.push(byte) {
+                    frames.push((frame.header.sequence, frame.body.len()));
+                }
+            }
+        };
+        let mut frames = Vec::new();
+        bus.iter().for_each(|message| take(message, &mut frames));
+        prop_assert!(frames.iter().all(|frame| expected(None).contains(frame)));
+        // What was invented may have ended with a number just before the next one; then one message is taken for a repeated one.
+        let mut later = Vec::new();
+        for message in messages(&mut sender, &[8, 9, 10]).iter().flatten() {
+            take(message, &mut later);
+        }
+        prop_assert_eq!(later.last().copied(), Some((2, 10)));
+    }
+}
