@@ -158,9 +158,12 @@ fn every_fault_of_the_plant_is_noticed_in_time_and_latched() {
         assert!(faults.counts[usize::from(fault.code())] >= 1);
         let past = client.call::<GetPastFault>(&PastFault { back: 0 }).expect("the log");
         assert_eq!(format!("{past:?}"), format!("{:?}", Some(report)), "it is kept");
-        // The air takes some of the regulator's lags of 30 ms to leave; a hundred ticks, in which nothing else is found.
-        station.pass(100);
-        client.call::<ClearFault>(&()).expect("it clears when the cause is gone");
+        // The air takes some of the regulator's lags of 30 ms to leave, and the filters of the watches as long again.
+        let cleared = (0..10).any(|_| {
+            station.pass(100);
+            client.try_call::<ClearFault>(&()).is_ok_and(|answer| answer.is_ok())
+        });
+        assert!(cleared, "{fault:?} (case {number}) clears within a second when the cause is gone");
         assert_eq!(client.call::<GetStatus>(&()).expect("a status").state, State::Disarmed);
     }
 }

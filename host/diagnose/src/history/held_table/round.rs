@@ -62,7 +62,7 @@ impl<'a> Round<'a> {
         let mut runs: Vec<usize> =
             (0..points.len()).filter(|i| problem.pulls[*i]).map(|i| points.run[i]).collect();
         runs.dedup();
-        let groups = runs.len().min(HELD_FOLDS).max(1);
+        let groups = runs.len().clamp(1, HELD_FOLDS);
         let empty = Fold { matrix: Symmetric::zeros(count), moment: vec![0.0; count], squares: 0.0 };
         let mut folds = vec![empty; groups];
         let of_run = |run: usize| runs.iter().position(|r| *r == run).map_or(0, |r| r % groups);
