@@ -59,6 +59,11 @@ pub enum NotComparable {
         /// Their share.
         share: f64,
     },
+    /// Ramps of pressure at a held length among strokes.
+    Ramps {
+        /// Their share of the rows.
+        share: f64,
+    },
     /// Rows at lengths that the reference does not have.
     Lengths {
         /// Its name.

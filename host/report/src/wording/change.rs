@@ -172,6 +172,10 @@ pub fn not_comparable(n: &NotComparable) -> String {
         NotComparable::Level { pressure } => {
             format!("strokes at {:.0} kPa: on one side only, or fewer than two each way", pressure / 1e3)
         }
+        NotComparable::Ramps { share } => format!(
+            "{:.0} % of the rows are ramps of pressure at a held length: give them alone, on both sides, to compare them",
+            100.0 * share
+        ),
         NotComparable::States { share } => format!(
             "{:.0} % of the strokes' parts are at pressures, places or speeds that the reference does not have",
             100.0 * share

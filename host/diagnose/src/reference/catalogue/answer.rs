@@ -202,6 +202,9 @@ pub(super) fn answer(cells: &Cells, weighed: &Weighed, prior: f64) -> ChangeRepo
     let share = ((1.0 - prior) / weighed.alone.len().max(1) as f64).max(1e-6);
     let z = (2.0 * (prior / share).ln() + 6.0).max(0.0).sqrt() + 1.28;
     let mut not = vec![];
+    if cells.ramps > 0.0 {
+        not.push(NotComparable::Ramps { share: cells.ramps });
+    }
     if cells.unmatched > 0 {
         not.push(NotComparable::States {
             share: cells.unmatched as f64 / (cells.unmatched + cells.cells.len()) as f64,

@@ -58,6 +58,8 @@ pub(super) struct Cells {
     pub levels: Vec<f64>,
     /// Cells of AFTER that BEFORE has nothing of.
     pub unmatched: usize,
+    /// Share of rows on ramps of pressure at a held length, which are not compared.
+    pub ramps: f64,
     pub names: Vec<String>,
     /// s.
     pub duration: f64,
@@ -228,16 +230,9 @@ impl Cells {
         let recordings = before.recordings.iter().chain(&after.recordings).cloned().collect();
         let both = Campaign { recordings, clock: Clock::Separate, warnings: Vec::new() };
         let (prepared, _) = rows::prepare(&both, braid)?;
-        // On a ramp of pressure at a held length friction turns by a share of its own: no state of the strokes is like it, and what the
-        // muscle remembers of it is in the strokes that follow.
-        if prepared.on_ramp.contains(&true) {
-            return Err(Error::new(
-                DataCode::RecordingOutOfRange,
-                "the recordings mix strokes with ramps of pressure at a held length",
-            )
-            .help("give one kind at a time"));
-        }
-        let joint = prepared;
+        // On a ramp of pressure at a held length friction turns by a share of its own: no state of the strokes is like it.
+        let ramps = prepared.on_ramp.iter().filter(|r| **r).count() as f64 / prepared.len().max(1) as f64;
+        let joint = prepared.without(|i| prepared.on_ramp[i]);
         let first_recording = (joint.names.len() - own.names.len().min(joint.names.len())) as u32;
         let first_after = joint.recording.iter().position(|r| *r >= first_recording).unwrap_or(joint.len());
         let reference_rows = joint.without(|i| i >= first_after);
@@ -310,6 +305,7 @@ impl Cells {
             spread: (variance + floor).sqrt(),
             levels: joint.levels.clone(),
             unmatched,
+            ramps,
             names: own.names.clone(),
             duration: (end - begin).max(1e-9),
             cells,
