@@ -209,13 +209,28 @@ impl Gathering<'_> {
         moved: Moved<'_>,
         samples: std::ops::Range<usize>,
     ) -> Average {
-        let count = samples.len() as f64;
-        let mean = |column: &[f64]| column[samples.clone()].iter().sum::<f64>() / count;
+        let Readings { force, spike, read } = *readings;
+        let good = |j: &usize| read[*j] && !spike[*j] && self.ends.iter().all(|end| force[*j] != end.force);
+        let spiked = samples.clone().filter(|j| read[*j] && spike[*j] && !moved.ringing[*j]).count();
+        let mut taken: Vec<usize> = samples.clone().filter(good).collect();
+        let count = taken.len() as f64;
+        // Pressure, stroke and force are those of the same samples: in fast motion a sample more on one side is an error of force.
+        if taken.is_empty() {
+            taken.extend(samples.clone());
+        }
+        self.rows.spiked += spiked;
+        let mean = |column: &[f64]| taken.iter().map(|j| column[*j]).sum::<f64>() / taken.len() as f64;
         let of = |value: fn(&MotionSample<f64>) -> f64| {
-            moved.samples[samples.clone()].iter().map(value).sum::<f64>() / count
+            taken.iter().map(|j| value(&moved.samples[*j])).sum::<f64>() / taken.len() as f64
         };
         let first = moved.samples[samples.start];
-        let mut average = Average {
+        let force = if count > 0.0 || !read[samples.start] {
+            // Without a good reading it has no weight, but effects that follow the force must not see a jump.
+            mean(force)
+        } else {
+            0.0
+        };
+        Average {
             motion: MotionSample {
                 time: of(|m| m.time),
                 stroke: of(|m| m.stroke),
@@ -231,27 +246,9 @@ impl Gathering<'_> {
             local: mean(&recording.time) - recording.time[0],
             pressure: mean(&recording.pressure),
             still: mean(&moved.state.still),
-            ..Average::default()
-        };
-        let Readings { force, spike, read } = *readings;
-        for j in samples.clone() {
-            if !read[j] {
-                continue;
-            }
-            if spike[j] {
-                self.rows.spiked += usize::from(!moved.ringing[j]);
-            } else if self.ends.iter().all(|end| force[j] != end.force) {
-                average.force += force[j];
-                average.good += 1.0;
-            }
+            force,
+            good: count,
         }
-        if average.good > 0.0 {
-            average.force /= average.good;
-        } else if !read[samples.start] {
-            // It has no weight, but effects that follow the force must not see a jump.
-            average.force = mean(force);
-        }
-        average
     }
 
     /// Appends a row that begins at sample `i` of its recording.

@@ -111,6 +111,23 @@ impl States {
     }
 }
 
+/// Rows at rest whose direction the pressure has turned since the muscle moved. The drift of a regulator turns it by chance, in one campaign and
+/// not in the other, while friction does not follow before the pressure has driven the braid through twice its friction.
+fn turned_at_rest(rows: &Rows) -> Vec<bool> {
+    let (mut recording, mut way) = (None, 0.0);
+    let one = |i: usize| {
+        if recording != Some(rows.recording[i]) {
+            (recording, way) = (Some(rows.recording[i]), 0.0);
+        }
+        if rows.contexts()[i].resting > 0.5 {
+            return way * rows.sign[i] < 0.0;
+        }
+        way = rows.sign[i];
+        false
+    };
+    (0..rows.len()).map(one).collect()
+}
+
 /// Rows of each cell by recording, half-stroke and state.
 fn gathered(rows: &Rows, states: &States, range: std::ops::Range<usize>) -> BTreeMap<(u32, Key), Vec<usize>> {
     let mut all: BTreeMap<(u32, Key), Vec<usize>> = BTreeMap::new();
@@ -232,7 +249,8 @@ impl Cells {
         let (prepared, _) = rows::prepare(&both, braid)?;
         // On a ramp of pressure at a held length friction turns by a share of its own: no state of the strokes is like it.
         let ramps = prepared.on_ramp.iter().filter(|r| **r).count() as f64 / prepared.len().max(1) as f64;
-        let joint = prepared.without(|i| prepared.on_ramp[i]);
+        let turned = turned_at_rest(&prepared);
+        let joint = prepared.without(|i| prepared.on_ramp[i] || turned[i]);
         let first_recording = (joint.names.len() - own.names.len().min(joint.names.len())) as u32;
         let first_after = joint.recording.iter().position(|r| *r >= first_recording).unwrap_or(joint.len());
         let reference_rows = joint.without(|i| i >= first_after);
