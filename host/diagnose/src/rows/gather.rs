@@ -306,3 +306,43 @@ impl Gathering<'_> {
         rows.local_time.push(mean.local);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use pam_data::recording::{Campaign, Recording};
+
+    /// N per m.
+    const SLOPE: f64 = 48e3;
+
+    /// Strokes of 17 readings each way, 26 mm, in a campaign so long that a row holds two readings; every 97th force is an outlier.
+    fn fast_strokes() -> Campaign {
+        let n = 30_000;
+        let stroke: Vec<f64> =
+            (0..n).map(|i: i32| f64::from(17 - (i % 34 - 17).abs()) * 26e-3 / 17.0).collect();
+        let ripple = |i: usize| ((i * 7 % 13) as f64 - 6.0) / 6.0;
+        let force = |(i, x): (usize, &f64)| {
+            let outlier = if i % 97 == 50 { 400.0 } else { 0.0 };
+            1300.0 - SLOPE * x + 0.5 * ripple(i) + outlier
+        };
+        Campaign::new(vec![Recording {
+            time: (0..n).map(|i| 0.1 * f64::from(i)).collect(),
+            pressure: (0..stroke.len()).map(|i| 490e3 + 50.0 * ripple(5 * i)).collect(),
+            force: Some(stroke.iter().enumerate().map(force).collect()),
+            stroke,
+            ..Recording::default()
+        }])
+    }
+
+    #[test]
+    fn force_and_stroke_of_a_row_are_of_the_same_readings() {
+        let braid = crate::tests::geometry().build().expect("a braid");
+        let (rows, _) = crate::rows::prepare(&fast_strokes(), &braid).expect("rows");
+        let mut judged = 0;
+        for (i, context) in rows.contexts().iter().enumerate().filter(|(i, _)| rows.root_weight()[*i] > 0.0) {
+            let error = rows.force[i] - (1300.0 - SLOPE * context.stroke);
+            assert!(error.abs() < 3.0, "row {i} at {:.1} mm: {error:.1} N", context.stroke * 1e3);
+            judged += 1;
+        }
+        assert!(judged > 10_000, "{judged}");
+    }
+}

@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use pam_data::date;
 use pam_diagnose::reference::answer::{
-    ChangeReport, Changed, Left, NotComparable, Place, Remark, Repeatability, Since, Size, Split, Verdict,
-    WhyNot,
+    ChangeReport, Changed, Left, Moment, NotComparable, Place, Remark, Repeatability, Since, Size, Split,
+    Verdict, WhyNot,
 };
 use pam_diagnose::reference::shapes::{Change, Class, Owner};
 
@@ -72,6 +72,14 @@ pub fn remark(remark: &Remark) -> String {
             1e3 * stroke
         ),
         Remark::StrokesAssumed => "how far campaigns of strokes repeat is assumed (zero and level to 0.2 % of the largest force, gain to 0.5 %, friction to 5 to 10 %), not measured".into(),
+        Remark::CatalogueAssumed(share) => format!(
+            "noise is measured on the reference; how far zero, gain, gauge and friction repeat beyond it is assumed: {:.2} % of the largest force",
+            100.0 * share
+        ),
+        Remark::SlippedRests(rests) => format!(
+            "{rests} {} at a held length hardly count: friction slipped there in one of the campaigns, as a regulator's drift makes it",
+            if *rests == 1 { "rest" } else { "rests" }
+        ),
         Remark::StrokesMarginal => "probabilities are those that a change is there at all; several changes can be present together".into(),
         Remark::NotAcquitted(none) => {
             format!("no change is named, but that nothing changed has a probability of {none:.2} only")
@@ -204,15 +212,22 @@ pub fn owner(owner: Owner) -> &'static str {
     }
 }
 
+/// A moment with its uncertainty.
+fn began(m: &Moment) -> String {
+    format!(
+        "from `{}` on ({:.0} s after the beginning; 95 %: {:.0} to {:.0} s)",
+        m.recording, m.moment, m.low, m.high
+    )
+}
+
 /// Since when a change is there.
 #[must_use]
 pub fn since(since: &Since) -> String {
     match since {
         Since::Beginning => "from the first recording on".into(),
-        Since::From { recording, moment } => {
-            format!("at once, from `{recording}` on ({moment:.0} s after the beginning)")
-        }
-        Since::Gradual => "gradually".into(),
+        Since::From(m) => format!("at once, {}", began(m)),
+        Since::Gradual(m) if m.high <= 0.0 => "gradually, from the first recording on".into(),
+        Since::Gradual(m) => format!("gradually, {}", began(m)),
         Since::NotDetermined => "not determined".into(),
     }
 }
