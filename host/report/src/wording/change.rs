@@ -161,6 +161,11 @@ pub fn place(p: &Place) -> String {
     format!("{:.0} % of the difference lies in {what} ({:.0} % of the data)", 100.0 * p.share, 100.0 * p.rows)
 }
 
+/// A share that is not zero.
+fn percent(share: f64) -> String {
+    if share < 0.01 { "under 1 %".into() } else { format!("{:.0} %", 100.0 * share) }
+}
+
 /// What could not be compared.
 #[must_use]
 pub fn not_comparable(n: &NotComparable) -> String {
@@ -181,12 +186,12 @@ pub fn not_comparable(n: &NotComparable) -> String {
             format!("strokes at {:.0} kPa: on one side only, or fewer than two each way", pressure / 1e3)
         }
         NotComparable::Ramps { share } => format!(
-            "{:.0} % of the rows are ramps of pressure at a held length: give them alone, on both sides, to compare them",
-            100.0 * share
+            "{} of the rows are ramps of pressure at a held length: give them alone, on both sides, to compare them",
+            percent(*share)
         ),
         NotComparable::States { share } => format!(
-            "{:.0} % of the strokes' parts are at pressures, places or speeds that the reference does not have",
-            100.0 * share
+            "{} of the strokes' parts are at pressures, places or speeds that the reference does not have",
+            percent(*share)
         ),
         NotComparable::Moving => {
             "sensor-delay, pressure-sensor-lag: not asked of recordings in which length and pressure move together".into()
@@ -234,36 +239,57 @@ pub fn since(since: &Since) -> String {
 
 /// A value with as many digits as its standard deviation supports.
 fn rounded(value: f64, std: f64) -> String {
+    if value.abs() >= LARGE || std >= LARGE {
+        return format!("{value:.1e}");
+    }
     let digits =
         if std > 0.0 && std.is_finite() { (1.0 - std.log10().floor()).clamp(0.0, 9.0) as usize } else { 3 };
     format!("{value:.digits$}")
 }
 
-/// Factor and name of the unit that people use instead of an SI unit.
-fn usual_unit(unit: &str) -> (f64, &'static str) {
-    match unit {
-        "Pa" => (1e-3, " kPa"),
-        "m" => (1e3, " mm"),
-        "s" => (1e3, " ms"),
-        "m²" => (1e5, " N per 100 kPa"),
-        "m/N" => (1e6, " µm/N"),
-        "N" => (1.0, " N"),
-        _ => (100.0, " %"),
-    }
+/// From here on a number is written with its power of ten.
+const LARGE: f64 = 1e6;
+
+/// Factor and name of the unit that people use instead of an SI unit. A number without a unit is a share of something.
+fn usual_unit(value: f64, unit: &str) -> (f64, String) {
+    let (factor, name) = match unit {
+        "Pa" => (1e-3, "kPa"),
+        "m" => (1e3, "mm"),
+        "s" if value.abs() < 1.0 => (1e3, "ms"),
+        "m²" => (1e5, "N per 100 kPa"),
+        "m/N" => (1e6, "µm/N"),
+        "" => (100.0, "%"),
+        other => (1.0, other),
+    };
+    (factor, format!(" {name}"))
 }
+
+/// Numbers without a unit that are no shares.
+const COUNTS: [&str; 4] = ["exponent", "order", "onset", "width"];
 
 /// A size with its interval in a unit that people use.
 #[must_use]
 pub fn size(s: &Size) -> String {
-    let (scale, unit) = usual_unit(&s.unit);
+    let (scale, unit) =
+        if COUNTS.contains(&s.name.as_str()) { (1.0, String::new()) } else { usual_unit(s.value, &s.unit) };
     let half = scale * (s.high - s.low) / 2.0;
     format!("{} ± {}{unit}", rounded(scale * s.value, half), rounded(half, half))
+}
+
+/// All sizes of a change, with their names where there are several.
+#[must_use]
+pub fn sizes(all: &[Size]) -> String {
+    let named = |s: &Size| format!("{} {}", s.name.replace('_', " "), size(s));
+    match all {
+        [only] => size(only),
+        several => several.iter().map(named).collect::<Vec<_>>().join(", "),
+    }
 }
 
 /// A size in a unit that people use, without an interval.
 #[must_use]
 pub fn in_usual_unit(value: f64, unit: &str) -> String {
-    let (scale, unit) = usual_unit(unit);
+    let (scale, unit) = usual_unit(value, unit);
     format!("{}{unit}", rounded(scale * value, scale * value.abs()))
 }
 

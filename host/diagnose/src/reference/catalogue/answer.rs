@@ -14,7 +14,7 @@ use super::super::criteria::{
 use super::super::held_out::Unseen;
 use super::super::report::left;
 use super::super::shapes::Change;
-use super::cells::{Cells, VENTED};
+use super::cells::{Cell, Cells, VENTED};
 use super::weigh::{Accepted, Fit, Weighed};
 
 fn rms(values: &DVector<f64>) -> f64 {
@@ -30,9 +30,9 @@ fn weighted(cells: &Cells, values: &DVector<f64>) -> f64 {
 
 /// Which half each recording of AFTER is held out with: every other one in which the muscle worked. A tare between them is on the side of the
 /// recording before it: tares alone determine no size.
-fn folds(cells: &Cells) -> Vec<usize> {
-    let recordings = cells.cells.iter().map(|c| c.recording + 1).max().unwrap_or(0);
-    let works = |r: usize| cells.cells.iter().any(|c| c.recording == r && c.key.3 != VENTED);
+fn folds(cells: &[Cell]) -> Vec<usize> {
+    let recordings = cells.iter().map(|c| c.recording + 1).max().unwrap_or(0);
+    let works = |r: usize| cells.iter().any(|c| c.recording == r && c.key.3 != VENTED);
     let mut count = 0_usize;
     let one = |r: usize| {
         count += usize::from(works(r));
@@ -45,7 +45,7 @@ fn folds(cells: &Cells) -> Vec<usize> {
 fn unseen(cells: &Cells, accepted: &[&Accepted]) -> Unseen {
     let before = weighted(cells, &cells.difference);
     let columns: Vec<DVector<f64>> = accepted.iter().map(|a| a.fit.trace.clone()).collect();
-    let fold = folds(cells);
+    let fold = folds(&cells.cells);
     let held = fold.contains(&1);
     if columns.is_empty() {
         return Unseen { before, after: before, held };
@@ -306,5 +306,27 @@ pub(super) fn answer(cells: &Cells, weighed: &Weighed, prior: f64) -> ChangeRepo
             .collect(),
         curves: curves(cells, &weighed.accepted),
         abscissa: ("displacement", "mm"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tare_after_each_level_does_not_part_tares_from_levels() {
+        let cell = |recording: usize, kind: i32| Cell {
+            key: (0, true, 0, kind),
+            recording,
+            rows: vec![0],
+            rest: 0,
+            time: 0.0,
+            force: 0.0,
+            stroke: 0.0,
+            direction: 1.0,
+        };
+        // Tare, level, tare, level, tare, level, tare.
+        let cells: Vec<Cell> = (0..7).map(|r| cell(r, if r % 2 == 0 { VENTED } else { 0 })).collect();
+        assert_eq!(folds(&cells), [0, 0, 0, 1, 1, 0, 0]);
     }
 }
