@@ -27,6 +27,7 @@ pub mod answer;
 mod campaign;
 mod enter;
 mod findings;
+mod held_table;
 mod judge;
 mod law;
 mod memory;

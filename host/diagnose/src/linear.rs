@@ -3,10 +3,24 @@
 //! Columns are long (one entry per row of a recording) and few. Everything is computed column by column in a fixed
 //! order, so a result does not depend on how many threads share the columns among them.
 
+use rayon::prelude::*;
+
 use super::criteria::baseline::DEPENDENT_COLUMN;
 use super::criteria::candidates::MOST_AMPLITUDES;
+/// Rows from which the threads share one product. The parts are the same whatever the number of threads, and so is the sum.
+const PART: usize = 1 << 16;
+
 /// Sum of products.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    if a.len() <= PART {
+        return dot_of_part(a, b);
+    }
+    let parts: Vec<f64> =
+        a.par_chunks(PART).zip(b.par_chunks(PART)).map(|(a, b)| dot_of_part(a, b)).collect();
+    parts.iter().sum()
+}
+
+fn dot_of_part(a: &[f64], b: &[f64]) -> f64 {
     // Four partial sums: the compiler vectorises, and the order of summation stays fixed.
     let mut sums = [0.0; 4];
     let (ca, cb) = (a.chunks_exact(4), b.chunks_exact(4));
@@ -26,8 +40,11 @@ pub(crate) fn energy(a: &[f64]) -> f64 {
 
 /// `to += factor · from`.
 pub(crate) fn add_scaled(to: &mut [f64], factor: f64, from: &[f64]) {
-    for (t, f) in to.iter_mut().zip(from) {
-        *t += factor * f;
+    let add = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| *t += factor * f);
+    if to.len() <= PART {
+        add(to, from);
+    } else {
+        to.par_chunks_mut(PART).zip(from.par_chunks(PART)).for_each(|(to, from)| add(to, from));
     }
 }
 

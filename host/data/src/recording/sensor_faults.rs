@@ -184,11 +184,12 @@ pub(super) fn sensor_faults(campaign: &Campaign, skipped: &[bool]) -> Vec<Sensor
     }
     let usual = if faults.is_empty() { Some(usual) } else { Usual::of(campaign, &skipped) };
     let Some(usual) = usual else { return faults };
+    let repeats = constant_runs::Repeats::of(campaign);
     for (index, r) in campaign.recordings.iter().enumerate().filter(|(i, _)| !skipped[*i]) {
         if r.force.is_none() {
             continue;
         }
-        let mut found = constant_runs::find(campaign, index, &usual);
+        let mut found = constant_runs::find(campaign, index, &usual, &repeats);
         for fault in jumps::find(campaign, index, &usual) {
             let overlaps = |f: &SensorFault| f.rows.start < fault.rows.end && fault.rows.start < f.rows.end;
             if !found.iter().any(overlaps) {

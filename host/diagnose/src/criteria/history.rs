@@ -130,11 +130,29 @@ pam_data::criteria! {
     /// Least deadband of a table beside the contact: pretension of a mounted muscle pulls before any pressure.
     TABLE_LEAST_DEADBAND: f64 = -8e4, "P0_min", "Pa", Derived("a table refuses less than −100 kPa");
     /// Rounds of a table's fit: the amplitudes beside the table, then the table beside the amplitudes.
-    TABLE_ROUNDS: usize = 2, "n_round", "1", Derived("the wall's drive of the second table differs from that of the first by its fit's error only");
+    TABLE_ROUNDS: usize = 4, "n_round", "1", Derived("friction and the wall's drive come from the last round; the fourth changes the residuals by less than their rounding");
     /// Least number of slack points whose median is the zero of the load cell.
     TABLE_LEAST_SLACK: usize = 20, "n_slack", "1", Derived("a median that one run does not decide");
+    /// Nodes of a table of held lengths over the pressures that pull.
+    HELD_NODES: usize = 10, "n_node", "1", Derived("a knee of 60 kPa among 600 kPa; the penalties decide, not their number");
+    /// Most elastic coefficients of it.
+    HELD_ORDER: usize = 4, "M", "1", Derived("the base model's order");
+    /// Weights of second differences of its curves that are tried, per point.
+    HELD_SMOOTHNESS: ([f64; 5]) = [1e-3, 1e-2, 1e-1, 1.0, 10.0], "lambda_2", "1", Derived("chosen by leaving out runs");
+    /// Weights of first differences, as shares of those: a wall of one material has moduli that do not depend on pressure.
+    HELD_FLATNESS: ([f64; 3]) = [1e-3, 1e-2, 1e-1], "lambda_1", "1", Derived("chosen by leaving out runs");
+    /// Groups of runs that are left out in turn.
+    HELD_FOLDS: usize = 12, "n_fold", "1", Cost;
+    /// Standard deviation of the area's scale: 5 % of the diameter.
+    HELD_GAMMA_ERROR: f64 = 0.1, "s_gamma", "1", Derived("as the prior of the diameter in a fit");
+    /// Standard deviation of the part that each elastic coefficient after the first gives, as a share of that of the one before.
+    HELD_NEXT_COEFFICIENT: f64 = 0.2, "r_E", "1", Derived("a wall whose stress is nearly proportional to strain; decides only where lengths are missing");
+    /// Residual that weighs the priors, as a share of the largest force.
+    HELD_RESIDUAL: f64 = 0.005, "s_r", "1", Derived("what repeats on benches of this kind");
+    /// Rounds in which slack readings join the bounds.
+    HELD_BOUND_ROUNDS: usize = 6, "n_bound", "1", Cost;
     /// Runs that are predicted from the others by tables: of more, every so many-th is left out together.
-    TABLE_FOLDS: usize = 6, "n_fold", "1", Cost;
+    TABLE_FOLDS: usize = 12, "n_fold", "1", Cost;
     /// Single time constants that the spectrum is tried against.
     MEMORY_SINGLE_TIMES: ([f64; 2]) = [30.0, 300.0], "tau_1", "s", Judgement;
 }

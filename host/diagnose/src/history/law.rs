@@ -63,11 +63,16 @@ pub(super) struct Law {
 
 /// Pressures at which a muscle begins to pull, by the tangent to its static curve near the highest pressure.
 pub(super) fn thresholds(points: &Points) -> Vec<f64> {
+    thresholds_of(points, &vec![true; points.len()])
+}
+
+/// The same by the points in use; the highest pressure of a mounting that has none of them.
+pub(super) fn thresholds_of(points: &Points, use_point: &[bool]) -> Vec<f64> {
     let highest = points.highest();
     let spline = shift_fit::static_spline(highest);
     (0..points.mountings.len())
         .map(|m| {
-            let own = || (0..points.len()).filter(|i| points.mounting[*i] == m);
+            let own = || (0..points.len()).filter(|i| points.mounting[*i] == m && use_point[*i]);
             let top = own().map(|i| points.pressure[i]).fold(0.0, f64::max).min(highest);
             let Some(curve) = shift_fit::static_curve(points, &spline, own()) else { return top };
             let tangents = (0..7).map(|k| {

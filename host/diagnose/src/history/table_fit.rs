@@ -1,43 +1,22 @@
 //! The memory in a table: the catalogue's `bladder-creep` beside a base model, fitted to the settled points of a campaign.
 //!
-//! What differs between visits to one pressure at one length needs no static model. So the amplitudes are found first, beside a free curve
-//! for each mounting; only at full length, where the base model's force is a straight line in pressure, is the curve that line and the
-//! contact's part. The table is then fitted to the forces without the effect, and the wall's drive is computed again from that table.
-//!
-//! What a slack muscle reads is the zero of the load cell, and no force: it is subtracted first, and the table contains it as `force-offset`.
+//! The dimensions are those of the base model's fit; table and memory are then one least-squares problem ([`super::held_table`]).
+//! The zero of the load cell is subtracted first, and the table contains it as `force-offset`.
 
-use model_core::effects::{EffectName, FittedEffect};
+use model_core::effects::EffectName;
 use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Recording};
 use pam_fit::effect_columns::effect_columns;
 use pam_fit::numerics::median;
-use pam_fit::predict::predict;
 use pam_fit::table_file::{About, Correction, TableFile, stored_mountings};
 use pam_fit::{Options as FitOptions, fit, table_alone};
 
 use super::campaign::{self, Points};
-use super::criteria::{
-    PULLS, RAMP, RIDGE, SMOOTHNESS_STATIC, TABLE_LEAST_DEADBAND, TABLE_LEAST_SLACK, TABLE_ROUNDS,
-    TABLE_WIDTHS,
-};
-use super::law::thresholds;
-use super::shift_fit::static_spline;
+use super::criteria::{PULLS, RAMP, TABLE_LEAST_DEADBAND, TABLE_LEAST_SLACK, TABLE_ROUNDS, TABLE_WIDTHS};
+use super::held_table::{Open, Problem, Solution};
+use super::law::thresholds_of;
 use super::staircase;
-use crate::linear::solve_symmetric;
-
-/// The amplitudes of [`EffectName::BladderCreep`], in its order.
-#[derive(Clone, Copy)]
-enum Amplitude {
-    /// `c`: the relaxing share of the wall.
-    Wall,
-    /// `b`: contact that grows with time.
-    Growing,
-    /// `d`: contact without memory.
-    Contact,
-}
-
-const AMPLITUDES: [Amplitude; 3] = [Amplitude::Wall, Amplitude::Growing, Amplitude::Contact];
 
 /// Which amplitudes are fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,101 +113,94 @@ impl<'a> Prepared<'a> {
         file
     }
 
-    /// The table with some layers of the effect: with the contact's static part where the recordings in use follow it more closely.
+    /// The table with some layers: the contact, and friction that follows pressure, where runs that are left out ask for them.
     ///
     /// # Errors
     /// Recordings that cannot be fitted.
     pub(super) fn table(&self, layers: Layers) -> Result<TableFile> {
-        let with = self.layered(layers, true)?;
-        let without = match layers {
-            Layers::Contact => self.base(),
-            Layers::Memory => self.layered(layers, false)?,
+        let bare = TableFile { table: self.base.table.clone(), about: About::default() };
+        let least = PULLS * self.points.largest_force();
+        let force: Vec<f64> = self.points.force.iter().map(|f| f - self.zero).collect();
+        let problem = Problem::new(&self.points, &force, &self.use_point, least, &self.base.table);
+        let Some(problem) = problem else { return Ok(self.base()) };
+        let memory = layers == Layers::Memory;
+        let widths = TABLE_WIDTHS.iter().flat_map(|width| [(*width, true), (*width, false)]);
+        let mut best: Option<(Solution, Open, f64)> = None;
+        for (width, contact) in
+            widths.filter(|(width, contact)| memory || *contact || *width == TABLE_WIDTHS[0])
+        {
+            let open = [memory, memory, contact, false, false];
+            let possible = |s: &Solution| f64::from(s.table.deadband.pascals()) > TABLE_LEAST_DEADBAND;
+            let better = |s: &Solution| best.as_ref().is_none_or(|(b, ..)| s.squares < b.squares);
+            if let Some(found) =
+                self.rounds(&problem, &bare, open, width)?.filter(|s| possible(s) && better(s))
+            {
+                best = Some((found, open, width));
+            }
+        }
+        let Some((mut solution, open, width)) = best else { return Ok(self.base()) };
+        let with_gap = [open[0], open[1], open[2], true, true];
+        if let Some(found) = self.rounds(&problem, &bare, with_gap, width)?
+            && found.predicts_better_than(&solution)
+        {
+            solution = found;
+        }
+        let about = if self.used.iter().all(|used| *used) {
+            self.about(&problem, &bare, &solution, width)?
+        } else {
+            About::default()
         };
-        Ok(if self.squares(&with)? < self.squares(&without)? { with } else { without })
+        let mut table = solution.with_layers(width);
+        table.goes_slack = self.base.table.goes_slack;
+        Ok(self.zeroed(TableFile { table, about }))
     }
 
-    /// Squared errors of a table on the recordings in use, N². A slack muscle pulls no more than it reads.
-    fn squares(&self, file: &TableFile) -> Result<f64> {
-        let predicted = predict(file, &self.loaded)?;
-        let least = PULLS * self.points.largest_force();
-        let mut sum = 0.0;
-        let pairs = self.loaded.recordings.iter().zip(&predicted.recordings).zip(&self.used);
-        for ((recording, predicted), _) in pairs.filter(|(_, used)| **used) {
-            let force = recording.force.iter().flatten();
-            for (read, model) in force.zip(&predicted.force) {
-                // The prediction has the zero of the load cell, which the recordings have lost.
-                let model = model - self.zero;
-                let error = if *read > least { model - read } else { (model - least).max(0.0) };
-                sum += error * error;
-            }
+    /// The columns of the layers beside a table.
+    fn columns(&self, file: &TableFile, width: f64) -> Result<Vec<Vec<f64>>> {
+        let mut columns = effect_columns(file, &self.loaded, EffectName::BladderCreep, &[width])?;
+        let mut friction = effect_columns(file, &self.loaded, EffectName::PressureFriction, &[])?.into_iter();
+        if let (Some(now), Some(at_rest)) = (friction.next(), friction.next()) {
+            columns.push(now.iter().zip(&at_rest).map(|(now, at_rest)| now - at_rest).collect());
+            columns.push(at_rest);
         }
-        Ok(sum)
+        Ok(columns)
     }
 
-    fn layered(&self, layers: Layers, contact: bool) -> Result<TableFile> {
-        let Self { muscle, used, .. } = self;
-        let everything = used.iter().all(|used| *used);
-        // The contact depends on pressure and geometry alone, the wall's drive on the table.
-        let rounds = if layers == Layers::Contact { 1 } else { TABLE_ROUNDS };
-        let mut file = self.base.clone();
-        for round in 1..=rounds {
-            let mut bare = file.clone();
-            bare.table.effects.clear();
-            let effect = self.amplitudes(&bare, (layers, contact))?;
-            let freed = chosen(&self.freed(&bare, &effect)?, used);
-            let last = round == rounds && everything;
-            file = if last { complete(&freed, muscle)? } else { alone(&freed, muscle)? };
-            // Slack readings are not in that fit.
+    /// Friction and the wall's drive come from the last solution.
+    fn rounds(
+        &self,
+        problem: &Problem<'_>,
+        bare: &TableFile,
+        open: Open,
+        width: f64,
+    ) -> Result<Option<Solution>> {
+        let mut file = bare.clone();
+        let mut last: Option<Solution> = None;
+        for _ in 0..TABLE_ROUNDS {
+            let columns = self.columns(&file, width)?;
+            let Some(solution) = problem.solve(&columns, open, last.as_ref()) else { return Ok(None) };
+            file.table = solution.table.clone();
             file.table.goes_slack = self.base.table.goes_slack;
-            let _ = file.table.effects.push(effect);
+            last = Some(solution);
         }
-        Ok(self.zeroed(file))
+        Ok(last)
     }
 
-    /// The readings that pull, without the effect's force. What a slack muscle would pull without it is not known.
-    fn freed(&self, bare: &TableFile, effect: &FittedEffect) -> Result<Campaign> {
-        let values: Vec<f64> = effect.parameters.iter().map(|p| f64::from(*p)).collect();
-        let columns = effect_columns(bare, &self.loaded, effect.effect, &values[AMPLITUDES.len()..])?;
-        let least = PULLS * self.points.largest_force();
-        let mut freed = self.loaded.clone();
-        let mut first = 0;
-        for recording in &mut freed.recordings {
-            let force = recording.force.take().unwrap_or_default();
-            let keep: Vec<usize> = (0..force.len()).filter(|i| force[*i] > least).collect();
-            let part = |i: usize| -> f64 { columns.iter().zip(&values).map(|(c, v)| c[first + i] * v).sum() };
-            recording.force = Some(keep.iter().map(|i| force[*i] - part(*i)).collect());
-            for column in [&mut recording.time, &mut recording.stroke, &mut recording.pressure] {
-                *column = keep.iter().map(|i| column[*i]).collect();
-            }
-            recording.direction = recording.direction.take().map(|d| keep.iter().map(|i| d[*i]).collect());
-            (recording.temperature, recording.pressure_command) = (None, None);
-            (recording.cycle, recording.rows) = (None, None);
-            first += force.len();
-        }
-        Ok(freed)
-    }
-
-    /// The effect beside a free curve for each mounting, at the width of the contact that leaves the least.
-    fn amplitudes(&self, bare: &TableFile, layers: (Layers, bool)) -> Result<FittedEffect> {
-        let (points, zero) = (&self.points, self.zero);
-        let least = PULLS * points.largest_force();
-        let pulls: Vec<bool> = self
-            .use_point
-            .iter()
-            .zip(&points.force)
-            .map(|(used, force)| *used && force - zero > least)
-            .collect();
-        let mut best: Option<(f64, [f64; AMPLITUDES.len()], f64)> = None;
-        for width in TABLE_WIDTHS {
-            let columns = effect_columns(bare, &self.loaded, EffectName::BladderCreep, &[width])?;
-            let found = beside_curves(points, &pulls, zero, &columns, layers);
-            let possible = found.deadband > TABLE_LEAST_DEADBAND || width == TABLE_WIDTHS[0];
-            if possible && best.as_ref().is_none_or(|(least, ..)| found.squares < *least) {
-                best = Some((found.squares, found.amplitudes, width));
-            }
-        }
-        let (_, found, width) = best.unwrap_or((0.0, [0.0; AMPLITUDES.len()], TABLE_WIDTHS[0]));
-        Ok(FittedEffect::new(EffectName::BladderCreep, &[found[0], found[1], found[2], width]))
+    /// What the file tells: the base model's fit, with the errors of this one.
+    fn about(
+        &self,
+        problem: &Problem<'_>,
+        bare: &TableFile,
+        solution: &Solution,
+        width: f64,
+    ) -> Result<About> {
+        let mut about = complete(&chosen(&self.loaded, &self.used), self.muscle)?.about;
+        let with = TableFile { table: solution.table.clone(), ..bare.clone() };
+        let columns = self.columns(&with, width)?;
+        about.uncertainty = problem.uncertainty(&columns, solution);
+        about.mountings.clear();
+        about.fit = problem.quality(solution, about.fit.warnings);
+        Ok(about)
     }
 }
 
@@ -277,109 +249,14 @@ fn chosen(campaign: &Campaign, used: &[bool]) -> Campaign {
     Campaign { recordings: recordings.collect(), clock: campaign.clock, warnings: Vec::new() }
 }
 
-/// What the load cell reads of a slack muscle, N; 0 without enough points.
+/// The zero of the load cell: what it reads of a muscle that almost pulls, N; 0 without enough points. A tube that lies slack pushes or
+/// hangs, and lifts as it is filled: at lower pressures that is in the reading too.
 fn slack_reading(points: &Points, use_point: &[bool]) -> f64 {
-    let thresholds = thresholds(points);
-    let slack = |i: &usize| use_point[*i] && points.pressure[*i] < thresholds[points.mounting[*i]] - RAMP;
-    let mut read: Vec<f64> = (0..points.len()).filter(slack).map(|i| points.force[i]).collect();
-    if read.len() < TABLE_LEAST_SLACK { 0.0 } else { median(&mut read) }
-}
-
-/// Amplitudes beside free curves.
-struct Beside {
-    amplitudes: [f64; AMPLITUDES.len()],
-    /// Sum of squared residuals, N².
-    squares: f64,
-    /// Deadband of the straight line at full length, Pa.
-    deadband: f64,
-}
-
-/// Least squares in which the columns `limited` have no negative coefficient: of those that would, the most negative is left out until
-/// none is left. A wall relaxes and a contact spreads with time; the reverse is no memory.
-fn without_negative(
-    gram: &[Vec<f64>],
-    moment: &[f64],
-    mut open: Vec<usize>,
-    limited: std::ops::Range<usize>,
-) -> Vec<f64> {
-    loop {
-        let solved = solve_symmetric(gram, moment, &open).unwrap_or_default();
-        let mut weights = vec![0.0; moment.len()];
-        open.iter().zip(&solved).for_each(|(a, w)| weights[*a] = *w);
-        let negative = |a: &usize| weights[*a] * gram[*a][*a].sqrt();
-        let worst = limited
-            .clone()
-            .filter(|a| weights[*a] < 0.0 && open.contains(a))
-            .min_by(|a, b| negative(a).total_cmp(&negative(b)));
-        match worst {
-            Some(worst) => open.retain(|a| *a != worst),
-            None => return weights,
-        }
-    }
-}
-
-/// Least squares of the amplitudes beside the curves.
-fn beside_curves(
-    points: &Points,
-    pulls: &[bool],
-    zero: f64,
-    columns: &[Vec<f64>],
-    (layers, contact): (Layers, bool),
-) -> Beside {
-    let spline = static_spline(points.highest());
-    let (longest, knots) = (points.longest(), spline.len());
-    let curves = knots * points.mountings.len();
-    let count = curves + AMPLITUDES.len();
-    let row = |i: usize| -> Vec<(usize, f64)> {
-        let (m, p) = (points.mounting[i], points.pressure[i]);
-        let mut row: Vec<(usize, f64)> = if m == longest {
-            vec![(knots * m, 1.0), (knots * m + 1, p / points.highest())]
-        } else {
-            let local = spline.at(p);
-            (0..4).map(|k| (knots * m + local.first + k, local.value[k])).collect()
-        };
-        let memory = layers == Layers::Memory;
-        // Elsewhere a free curve has the contact's part.
-        let fitted =
-            |a: &usize| if *a == (Amplitude::Contact as usize) { contact && m == longest } else { memory };
-        row.extend((0..AMPLITUDES.len()).filter(fitted).map(|a| (curves + a, columns[a][i])));
-        row
+    let thresholds = thresholds_of(points, use_point);
+    let almost = |i: &usize| {
+        let below = thresholds[points.mounting[*i]] - points.pressure[*i];
+        use_point[*i] && (RAMP..2.0 * RAMP).contains(&below)
     };
-    let mut gram = vec![vec![0.0; count]; count];
-    let mut moment = vec![0.0; count];
-    for i in (0..points.len()).filter(|i| pulls[*i]) {
-        let row = row(i);
-        for (a, x) in &row {
-            moment[*a] += x * (points.force[i] - zero);
-            row.iter().for_each(|(b, y)| gram[*a][*b] += x * y);
-        }
-    }
-    for m in (0..points.mountings.len()).filter(|m| *m != longest) {
-        for first in knots * m..knots * (m + 1) - 2 {
-            for (a, x) in [1.0, -2.0, 1.0].iter().enumerate() {
-                for (b, y) in [1.0, -2.0, 1.0].iter().enumerate() {
-                    gram[first + a][first + b] += SMOOTHNESS_STATIC * x * y;
-                }
-            }
-        }
-    }
-    // Columns of forces per unit of an amplitude are of very different size: the solution scales them.
-    let open: Vec<usize> = (0..count).filter(|a| gram[*a][*a] > 0.0).collect();
-    open.iter().for_each(|a| gram[*a][*a] *= 1.0 + RIDGE);
-    let weights = without_negative(&gram, &moment, open, curves..curves + Amplitude::Contact as usize);
-    let left = |i: usize| points.force[i] - zero - row(i).iter().map(|(a, x)| x * weights[*a]).sum::<f64>();
-    let squares = (0..points.len()).filter(|i| pulls[*i]).map(|i| left(i).powi(2)).sum();
-    let of = |a: usize| weights[curves + a];
-    let line = knots * longest;
-    let deadband = -1e3 * points.highest() * weights[line] / weights[line + 1];
-    // Contact takes pressure and gives none.
-    Beside {
-        amplitudes: [
-            of(Amplitude::Wall as usize),
-            of(Amplitude::Growing as usize),
-            of(Amplitude::Contact as usize).max(0.0),
-        ],
-        squares,
-        deadband,
-    }
+    let mut read: Vec<f64> = (0..points.len()).filter(almost).map(|i| points.force[i]).collect();
+    if read.len() < TABLE_LEAST_SLACK { 0.0 } else { median(&mut read) }
 }

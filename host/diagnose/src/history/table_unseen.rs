@@ -3,12 +3,12 @@
 
 use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::recording::{Campaign, largest_force};
+use pam_data::recording::{Campaign, Recording, largest_force};
 use pam_fit::predict::predict;
-use pam_fit::table_file::TableFile;
+use pam_fit::table_file::{About, TableFile};
 use rayon::prelude::*;
 
-use super::criteria::{PULLS, TABLE_FOLDS};
+use super::criteria::{PULLS, SUPPORT, TABLE_FOLDS};
 use super::table_fit::{self, Layers, Prepared};
 use crate::valve_pulses;
 
@@ -32,6 +32,10 @@ pub struct UnseenErrors {
     pub without_memory: UnseenError,
     /// Contact and memory.
     pub with_memory: UnseenError,
+    /// The errors without memory of the readings whose pressure another run of the mounting reaches.
+    pub supported_without_memory: UnseenError,
+    /// And with memory.
+    pub supported_with_memory: UnseenError,
     /// Share of the readings set aside because they ring after a valve's pulse, %.
     pub ringing_pct: f64,
     /// Share of the others that are slack or at the converter's end, %: a prediction errs there only by what it pulls too much.
@@ -44,6 +48,8 @@ struct Counted {
     /// A reading up to this is slack, N.
     slack: f64,
     largest: f64,
+    /// The pressure up to which the other runs of its mounting reach, Pa, by recording.
+    reached: Vec<f64>,
 }
 
 /// Sums over the readings of recordings.
@@ -55,26 +61,66 @@ struct Sums {
     slack: f64,
 }
 
+/// The sums of all readings, and of those whose pressure another run of the mounting reaches.
+#[derive(Clone, Copy, Default)]
+struct Both {
+    all: Sums,
+    supported: Sums,
+}
+
+impl std::ops::Add for Sums {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            squares: self.squares + other.squares,
+            sizes: self.sizes + other.sizes,
+            count: self.count + other.count,
+            slack: self.slack + other.slack,
+        }
+    }
+}
+
+/// Up to which pressure the other runs of each recording's mounting reach, Pa.
+fn reached(campaign: &Campaign) -> Vec<f64> {
+    let top = |r: &Recording| r.pressure.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let tops: Vec<f64> = campaign.recordings.iter().map(top).collect();
+    let mountings = campaign.mountings().unwrap_or_default();
+    let same = |r: usize, o: usize| o != r && mountings.get(o) == mountings.get(r);
+    let of =
+        |r: usize| (0..tops.len()).filter(|o| same(r, *o)).map(|o| tops[o]).fold(f64::NEG_INFINITY, f64::max);
+    (0..tops.len()).map(of).collect()
+}
+
 impl Counted {
     fn of(campaign: &Campaign, zero: f64) -> Self {
         let rings = campaign.recordings.par_iter().map(valve_pulses::ringing).collect();
         let largest = largest_force(campaign).max(f64::MIN_POSITIVE);
-        Self { rings, slack: zero + PULLS * largest, largest }
+        Self { rings, slack: zero + PULLS * largest, largest, reached: reached(campaign) }
     }
 
-    fn add(&self, sums: &mut Sums, campaign: &Campaign, index: usize, predicted: &[f64]) {
-        let Some(force) = &campaign.recordings[index].force else { return };
-        for ((read, model), rings) in force.iter().zip(predicted).zip(&self.rings[index]) {
+    fn add(&self, both: &mut Both, campaign: &Campaign, index: usize, predicted: &[f64]) {
+        let recording = &campaign.recordings[index];
+        let Some(force) = &recording.force else { return };
+        let limit = self.reached[index] + SUPPORT * 1e3;
+        let readings = force.iter().zip(predicted).zip(&self.rings[index]).zip(&recording.pressure);
+        for (((read, model), rings), pressure) in readings {
             if *rings || !read.is_finite() || !model.is_finite() {
                 continue;
             }
             let slack = *read <= self.slack;
             // A slack reading says that the muscle pulls no more than that.
             let error = if slack { (model - self.slack).max(0.0) } else { model - read };
-            sums.squares += error * error;
-            sums.sizes += error.abs();
-            sums.count += 1.0;
-            sums.slack += f64::from(u8::from(slack));
+            let one = Sums {
+                squares: error * error,
+                sizes: error.abs(),
+                count: 1.0,
+                slack: f64::from(u8::from(slack)),
+            };
+            both.all = both.all + one;
+            if *pressure <= limit {
+                both.supported = both.supported + one;
+            }
         }
     }
 
@@ -94,6 +140,41 @@ fn reread(file: &TableFile) -> Result<TableFile> {
     TableFile::from_bytes(&file.to_bytes()?)
 }
 
+/// What is left out together, and predicted from the rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LeftOut {
+    /// A run; of many, every so many-th.
+    Runs,
+    /// All runs of a mounting between others: a contraction that the table has not seen.
+    Mountings,
+}
+
+impl LeftOut {
+    /// Which recordings each fold uses.
+    fn folds(self, campaign: &Campaign) -> Vec<Vec<bool>> {
+        let runs = campaign.recordings.len();
+        let mountings = campaign.mountings().unwrap_or_default();
+        let every = |count: usize, of: &dyn Fn(usize) -> usize| -> Vec<Vec<bool>> {
+            (0..count).map(|fold| (0..runs).map(|r| of(r) != fold).collect()).collect()
+        };
+        match self {
+            Self::Runs => every(runs.min(TABLE_FOLDS), &|r| r % TABLE_FOLDS.min(runs)),
+            Self::Mountings => {
+                let stroke = |r: usize| campaign.recordings[r].stroke.first().copied().unwrap_or(0.0);
+                let strokes = || (0..runs).map(stroke);
+                let (low, high) =
+                    strokes().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(s), h.max(s)));
+                let between = |fold: &Vec<bool>| {
+                    let own = (0..runs).find(|r| !fold[*r]).map(stroke);
+                    own.is_some_and(|s| s > low && s < high)
+                };
+                let count = mountings.iter().max().map_or(0, |last| last + 1);
+                every(count, &|r| mountings[r]).into_iter().filter(between).collect()
+            }
+        }
+    }
+}
+
 /// The errors of unseen runs over the readings of two forms of one campaign: the one that the tables are fitted to (at its settled points), and
 /// another of the same runs, as recorded. `None` where the campaign is none of isometric staircases with repeated runs, or the other has
 /// other runs. Of many runs every so many-th is left out together.
@@ -104,20 +185,19 @@ pub fn unseen_by_table(
     campaign: &Campaign,
     recorded: &Campaign,
     muscle: &MuscleDescription,
+    left_out: LeftOut,
 ) -> Result<Option<[UnseenErrors; 2]>> {
     let settled = table_fit::settled(campaign);
     let runs = settled.recordings.len();
-    let folds = runs.min(TABLE_FOLDS);
     if settled.mountings() != recorded.mountings() {
         return Ok(None);
     }
     let Some(whole) = Prepared::of(&settled, muscle, &vec![true; runs])? else { return Ok(None) };
     let forms =
         [(&settled, Counted::of(&settled, whole.zero)), (recorded, Counted::of(recorded, whole.zero))];
-    let fold = |fold: usize| -> Result<[[Sums; 3]; 2]> {
-        let used: Vec<bool> = (0..runs).map(|r| r % folds != fold).collect();
-        let mut sums = [[Sums::default(); 3]; 2];
-        let Some(prepared) = Prepared::of(&settled, muscle, &used)? else { return Ok(sums) };
+    let fold = |used: &Vec<bool>| -> Result<[[Both; 3]; 2]> {
+        let mut sums = [[Both::default(); 3]; 2];
+        let Some(prepared) = Prepared::of(&settled, muscle, used)? else { return Ok(sums) };
         let tables = [prepared.base(), prepared.table(Layers::Contact)?, prepared.table(Layers::Memory)?];
         for (k, table) in tables.iter().enumerate() {
             let table = reread(table)?;
@@ -130,26 +210,50 @@ pub fn unseen_by_table(
         }
         Ok(sums)
     };
-    let parts: Vec<[[Sums; 3]; 2]> = (0..folds).into_par_iter().map(fold).collect::<Result<_>>()?;
+    let parts: Vec<[[Both; 3]; 2]> = left_out.folds(&settled).par_iter().map(fold).collect::<Result<_>>()?;
     let form = |f: usize| {
         let counted = &forms[f].1;
-        let total = |k: usize| {
-            parts.iter().map(|p| p[f][k]).fold(Sums::default(), |a, b| Sums {
-                squares: a.squares + b.squares,
-                sizes: a.sizes + b.sizes,
-                count: a.count + b.count,
-                slack: a.slack + b.slack,
-            })
+        let total = |k: usize, of: fn(&Both) -> Sums| {
+            parts.iter().map(|p| of(&p[f][k])).fold(Sums::default(), std::ops::Add::add)
         };
+        let all = |k: usize| total(k, |both| both.all);
+        let supported = |k: usize| total(k, |both| both.supported);
         let rings = counted.rings.iter().flatten().filter(|r| **r).count() as f64;
         let readings = counted.rings.iter().map(Vec::len).sum::<usize>().max(1) as f64;
         UnseenErrors {
-            base: counted.size(total(0)),
-            without_memory: counted.size(total(1)),
-            with_memory: counted.size(total(2)),
+            base: counted.size(all(0)),
+            without_memory: counted.size(all(1)),
+            with_memory: counted.size(all(2)),
+            supported_without_memory: counted.size(supported(1)),
+            supported_with_memory: counted.size(supported(2)),
             ringing_pct: 100.0 * rings / readings,
-            slack_pct: 100.0 * total(2).slack / total(2).count.max(1.0),
+            slack_pct: 100.0 * all(2).slack / all(2).count.max(1.0),
         }
     };
     Ok(Some([form(0), form(1)]))
+}
+
+/// What a held length that is wrong by a millimetre changes of the force at settled points that pull, mean absolute, % of the largest
+/// force: a table of other lengths cannot be better than the lengths were set. `None` as for [`unseen_by_table`].
+///
+/// # Errors
+/// Recordings that cannot be fitted or predicted.
+pub fn error_of_a_millimetre(campaign: &Campaign, muscle: &MuscleDescription) -> Result<Option<f64>> {
+    let settled = table_fit::settled(campaign);
+    let used = vec![true; settled.recordings.len()];
+    let Some(prepared) = Prepared::of(&settled, muscle, &used)? else { return Ok(None) };
+    let table = prepared.base();
+    let mut shifted = settled.clone();
+    for recording in &mut shifted.recordings {
+        recording.stroke.iter_mut().for_each(|s| *s += 1e-3);
+    }
+    // The table's corrections of the mountings belong to the lengths as recorded.
+    let bare = TableFile { table: table.table, about: About::default() };
+    let (at, beside) = (predict(&bare, &settled)?, predict(&bare, &shifted)?);
+    let largest = largest_force(&settled).max(f64::MIN_POSITIVE);
+    let pairs = at.recordings.iter().zip(&beside.recordings).flat_map(|(a, b)| a.force.iter().zip(&b.force));
+    let differences: Vec<f64> =
+        pairs.filter(|(a, _)| **a > PULLS * largest).map(|(a, b)| (a - b).abs()).collect();
+    let count = differences.len().max(1) as f64;
+    Ok(Some(100.0 * differences.iter().sum::<f64>() / count / largest))
 }

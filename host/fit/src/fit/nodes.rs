@@ -49,6 +49,11 @@ pub fn pressures(points: &Points, max_pressure: f64) -> Pressures {
 /// of the regulator and the noise of the sensor, which are what makes a level wide.
 const HALF_WIDTHS: [f64; 4] = [0.0075, 0.015, 0.03, 0.06];
 
+/// Levels hold at least this share of the rows: the rest are ramps between them.
+const HELD: f64 = 0.8;
+/// Rows away from the longest level matter from this share on; fewer are its regulator's transients.
+const MOVING: f64 = 0.1;
+
 /// The pressures that were held, if nearly all rows lie at a few of them.
 fn held_levels(points: &Points) -> Option<Vec<f64>> {
     let range = points.pressure;
@@ -106,7 +111,11 @@ fn peaks(rows: &[f64], half: usize) -> Option<Vec<usize>> {
     }
     // Ramps between levels are used as data, but do not hide the levels.
     let held: f64 = peaks.iter().map(|i| near[*i]).sum();
-    (!peaks.is_empty() && peaks.len() <= MAX_NODES - 2 && held >= 0.8 * total).then_some(peaks)
+    // A long stay at one pressure does not make a ramp to it levels: the rows elsewhere must lie at levels too.
+    let longest = peaks.iter().map(|i| near[*i]).fold(0.0, f64::max);
+    let elsewhere = (total - longest, held - longest);
+    let ramp = elsewhere.0 > MOVING * total && elsewhere.1 < HELD * elsewhere.0;
+    (!peaks.is_empty() && peaks.len() <= MAX_NODES - 2 && held >= HELD * total && !ramp).then_some(peaks)
 }
 
 /// Nodes beyond the tested pressures: down to where the muscle begins to pull, up to what may be commanded. The evaluator
@@ -204,6 +213,17 @@ mod tests {
         let found = pressures(&at((0..5000).map(|i| 8e3 + 120.0 * f64::from(i)).collect()), 620e3);
         assert!(!found.held);
         assert_eq!((found.levels.len(), found.nodes.len()), (INTERVALS, INTERVALS + 1));
+    }
+
+    #[test]
+    fn a_long_stay_at_the_top_of_a_ramp_makes_no_levels_of_it() {
+        // Staircases of a muscle that pulls from 60 kPa on, and stays at 620 kPa for most of the time.
+        let ramp = |turn: u32| (0..40).map(move |i| 60e3 + 14e3 * f64::from(i) + 1e3 * f64::from(turn));
+        let stay = (0..60).map(|i| 620e3 + 500.0 * f64::from(i).sin());
+        let staircases: Vec<f64> = (0..12).flat_map(|turn| ramp(turn).chain(stay.clone())).collect();
+        let found = pressures(&at(staircases), 650e3);
+        assert!(!found.held, "{found:?}");
+        assert!(found.nodes.len() > INTERVALS);
     }
 
     #[test]

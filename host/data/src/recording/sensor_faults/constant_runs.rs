@@ -27,12 +27,12 @@ const SLACK: f64 = 0.05;
 const SATURATED: (usize, f64) = (10, 0.03);
 
 /// Frozen and saturated stretches of a recording.
-pub(super) fn find(campaign: &Campaign, index: usize, usual: &Usual) -> Vec<SensorFault> {
+pub(super) fn find(campaign: &Campaign, index: usize, usual: &Usual, repeats: &Repeats) -> Vec<SensorFault> {
     let r = &campaign.recordings[index];
-    let mut found = saturated_force(campaign, index, usual);
+    let mut found = saturated_force(r, index, usual, repeats.largest_force);
     for channel in Channel::ALL {
         let column = channel.of(r);
-        let habit = Habit::of(campaign, index, channel);
+        let habit = repeats.of_others(index, channel);
         let (low, high) = ends(column);
         // A column that is always constant, such as a held length, says nothing by being so.
         if habit.equal > ALWAYS {
@@ -70,6 +70,60 @@ fn runs(column: &[f64]) -> Vec<Range<usize>> {
     runs
 }
 
+/// How one column repeats its readings.
+#[derive(Clone, Copy, Default)]
+struct Column {
+    /// Neighbours that are equal, and neighbours.
+    equal: usize,
+    all: usize,
+    longest: usize,
+}
+
+impl Column {
+    fn of(values: &[f64]) -> Self {
+        let mut column = Self { all: values.len().saturating_sub(1), longest: 1, ..Self::default() };
+        let mut run = 1;
+        for pair in values.windows(2) {
+            run = if pair[0] == pair[1] { run + 1 } else { 1 };
+            column.equal += usize::from(run > 1);
+            column.longest = column.longest.max(run);
+        }
+        column
+    }
+}
+
+/// How the columns of a campaign repeat their readings, and the largest force of all.
+pub(super) struct Repeats {
+    /// By channel, by recording.
+    columns: [Vec<Column>; Channel::ALL.len()],
+    largest_force: f64,
+}
+
+impl Repeats {
+    pub(super) fn of(campaign: &Campaign) -> Self {
+        let column = |channel: Channel| {
+            campaign.recordings.iter().map(|r| Column::of(channel.of(r))).collect::<Vec<Column>>()
+        };
+        let forces = campaign.recordings.iter().filter_map(|r| r.force.as_deref()).flatten();
+        Self {
+            columns: Channel::ALL.map(column),
+            largest_force: forces.copied().fold(f64::NEG_INFINITY, f64::max),
+        }
+    }
+
+    /// The habit of the other recordings, or of this one where there are no others.
+    fn of_others(&self, index: usize, channel: Channel) -> Habit {
+        let columns =
+            Channel::ALL.iter().position(|c| *c == channel).map_or(&[][..], |c| &self.columns[c][..]);
+        let alone = columns.len() < 2;
+        let (mut equal, mut all, mut longest) = (0, 0, 1);
+        for (_, c) in columns.iter().enumerate().filter(|(i, _)| alone || *i != index) {
+            (equal, all, longest) = (equal + c.equal, all + c.all, longest.max(c.longest));
+        }
+        Habit { equal: equal as f64 / all.max(1) as f64, longest: (!alone).then_some(longest) }
+    }
+}
+
 /// How a column repeats its readings in the other recordings, or in this one where there are no others.
 struct Habit {
     /// The share of neighbours that are equal.
@@ -79,25 +133,6 @@ struct Habit {
 }
 
 impl Habit {
-    fn of(campaign: &Campaign, index: usize, channel: Channel) -> Self {
-        let others: Vec<&Recording> =
-            campaign.recordings.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, r)| r).collect();
-        let alone = [&campaign.recordings[index]];
-        let (mut equal, mut all, mut longest) = (0_usize, 0_usize, 1);
-        for r in if others.is_empty() { &alone[..] } else { &others } {
-            let column = channel.of(r);
-            let mut run = 1;
-            for pair in column.windows(2) {
-                run = if pair[0] == pair[1] { run + 1 } else { 1 };
-                equal += usize::from(run > 1);
-                longest = longest.max(run);
-            }
-            all += column.len().saturating_sub(1);
-        }
-        let share = equal as f64 / all.max(1) as f64;
-        Self { equal: share, longest: (!others.is_empty()).then_some(longest) }
-    }
-
     /// How far the force must move during a run of this many rows, N.
     fn bound(&self, rows: usize, usual: &Usual) -> f64 {
         let unknown = self.longest.is_some_and(|longest| rows >= LONGER * longest);
@@ -133,18 +168,13 @@ fn ends(column: &[f64]) -> (f64, f64) {
 
 /// Rows at the largest force of a recording that other recordings exceed: the force sensor, or the range that was set for it, ends
 /// there. A sensor that ends at one value in all recordings is found by the fit.
-fn saturated_force(campaign: &Campaign, index: usize, usual: &Usual) -> Vec<SensorFault> {
-    let r = &campaign.recordings[index];
+fn saturated_force(r: &Recording, index: usize, usual: &Usual, largest: f64) -> Vec<SensorFault> {
     let Some(force) = r.force.as_deref() else { return Vec::new() };
     let (_, high) = ends(force);
     let at: Vec<usize> = (0..force.len()).filter(|i| force[*i] == high).collect();
     let next = force.iter().copied().filter(|f| *f < high).fold(f64::NEG_INFINITY, f64::max);
     let neighbours = force.iter().filter(|f| **f == next).count();
-    let beyond = campaign
-        .recordings
-        .iter()
-        .filter_map(|o| o.force.as_deref())
-        .any(|f| f.iter().any(|f| *f > high + SATURATED.1 * usual.spans[2]));
+    let beyond = largest > high + SATURATED.1 * usual.spans[2];
     // Readings of a free sensor at its largest value are about as frequent as those next to it.
     if at.len() < SATURATED.0 || at.len() <= 3 * neighbours || !beyond {
         return Vec::new();

@@ -8,7 +8,7 @@ use pam_fit::predict::predict;
 use pam_fit::table_file::{About, TableFile};
 
 use super::super::table_fit;
-use super::super::table_unseen::unseen_by_table;
+use super::super::table_unseen::{LeftOut, unseen_by_table};
 use crate::linear::Random;
 
 const DESCRIPTION: &str = "name = \"mini\"\nkind = \"contractile\"\nrest_length_mm = 39.16\nbraid_angle_deg = 77.4\n\
@@ -16,8 +16,13 @@ const DESCRIPTION: &str = "name = \"mini\"\nkind = \"contractile\"\nrest_length_
 /// `c`, `b` and `d` in Pa, `P_c` in Pa.
 const TRUTH: [f64; 4] = [0.5, 15e3, 20e3, 9e4];
 
-/// Staircases at four lengths, five runs each, with the forces of a table that carries some effects, and noise.
+/// Staircases at four lengths, five runs each, with the forces of a table that carries the memory, and noise.
 fn campaign(effects: &[f64; 4]) -> Campaign {
+    campaign_of(&[FittedEffect::new(EffectName::BladderCreep, effects)])
+}
+
+/// The same with any effects.
+fn campaign_of(effects: &[FittedEffect]) -> Campaign {
     let mut recordings = Vec::new();
     for mounting in 0..4 {
         for run in 0..5 {
@@ -38,7 +43,7 @@ fn campaign(effects: &[f64; 4]) -> Campaign {
     let mut table = table::example();
     table.goes_slack = true;
     table.friction.iter_mut().for_each(|k| *k = 0.01);
-    table.effects.push(FittedEffect::new(EffectName::BladderCreep, effects)).expect("room");
+    table.effects.extend(effects.iter().cloned());
     let made = predict(&TableFile { table, about: About::default() }, &campaign).expect("a valid table");
     let mut random = Random(7);
     for (recording, made) in campaign.recordings.iter_mut().zip(&made.recordings) {
@@ -56,7 +61,7 @@ fn a_table_carries_the_memory_and_foretells_unseen_runs() {
     assert_eq!(effect.effect, EffectName::BladderCreep);
     assert!((f64::from(effect.parameters[0]) / TRUTH[0] - 1.0).abs() < 0.2, "{effect:?}");
     let [settled, recorded] =
-        unseen_by_table(&campaign, &campaign, &muscle).expect("fitted").expect("staircases");
+        unseen_by_table(&campaign, &campaign, &muscle, LeftOut::Runs).expect("fitted").expect("staircases");
     assert!(settled.with_memory.rms_pct < 0.5 * settled.without_memory.rms_pct, "{settled:?}");
     assert_eq!(settled.with_memory, recorded.with_memory);
 }
@@ -68,4 +73,30 @@ fn without_a_memory_none_is_found() {
     let file = table_fit::table(&campaign, &muscle).expect("fitted").expect("staircases");
     let parameters = &file.table.effects[0].parameters;
     assert!((0.0..0.05).contains(&parameters[0]) && (0.0..5e3).contains(&parameters[1]), "{parameters:?}");
+}
+
+#[test]
+fn friction_that_grows_with_the_radius_is_in_the_table() {
+    let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
+    let grows = 0.3;
+    let campaign = campaign_of(&[
+        FittedEffect::new(EffectName::BladderCreep, &TRUTH),
+        FittedEffect::new(EffectName::PressureFriction, &[f64::from(grows), -f64::from(grows)]),
+    ]);
+    let file = table_fit::table(&campaign, &muscle).expect("fitted").expect("staircases");
+    let found = file.table.effects.iter().find(|e| e.effect == EffectName::PressureFriction);
+    let found = found.expect("named").parameters[0];
+    assert!((found / grows - 1.0).abs() < 0.2, "{found}");
+}
+
+#[test]
+fn what_the_tables_numbers_scatter_by_is_stored_with_them() {
+    let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
+    let file = table_fit::table(&campaign(&TRUTH), &muscle).expect("fitted").expect("staircases");
+    let uncertainty = file.about.uncertainty.as_ref().expect("a jackknife over runs");
+    let numbers = 1 + (file.table.elastic.len() + 1) * file.table.nodes.len();
+    assert_eq!(uncertainty.rows as usize, numbers);
+    let deadband: f64 = uncertainty.root[..uncertainty.columns as usize].iter().map(|x| x * x).sum();
+    assert!((1.0..2e4).contains(&deadband.sqrt()), "P0 ± {} Pa", deadband.sqrt());
+    assert!((0.05..0.3).contains(&uncertainty.residual_newtons), "{}", uncertainty.residual_newtons);
 }
