@@ -76,7 +76,7 @@ fn two(t: &mut String, trials: &[together::Trial]) {
     let _ = writeln!(
         t,
         "\nA lag is named alone: the rows in motion that show it hold both changes. Of one class only one name is given, because the shape of the \
-         first is never exact and what it leaves looks like the second; the other is in its set.\n\n\
+         first is never exact, and what it leaves looks like the second.\n\n\
          ### Pairs of two classes that were not both named, 3 %\n\n| pair | n | both exact | both in the set |\n| --- | --- | --- | --- |"
     );
     let mut by: BTreeMap<[&str; 2], Vec<&together::Trial>> = BTreeMap::new();
@@ -160,13 +160,17 @@ pub fn run(what: &Further) -> Result<(), Box<dyn Error>> {
     let jobs: Vec<(&Muscle, &Slopes)> = slopes.iter().map(|(m, s)| (*m, s)).collect();
     let pairs = together::run(&jobs)?;
     let courses = course::run(&jobs)?;
+    let half = what.half.as_deref().map_or_else(String::new, |h| format!(" --half {h}"));
     let mut text = format!(
         "# Two changes, and since when\n\n`host diagnose AFTER… --reference BEFORE…` is tested on real recordings of {} fluidic muscles (pressure staircases \
          at held lengths): two changes at once, and changes that begin within the later recordings. Changes are added as in the [trials of \
          changes](proof-reference.md), by slopes that the recordings give. Nothing on this page is typed by hand:\n\n\
-         ```text\ncargo run --release -p trials -- reference-further -o DIR --page docs/src/proof-reference-further.md\n```\n",
+         ```text\ncargo run --release -p trials -- reference-further{half} -o DIR --page docs/src/proof-reference-further.md\n```\n",
         jobs.len()
     );
+    if what.half.as_deref() == Some("development") {
+        text += "\nThese are the muscles on which the constants of the repeatability were chosen; the others are not tried yet.\n";
+    }
     two(&mut text, &pairs);
     when(&mut text, &courses);
     std::fs::write(what.output.join("further.json"), serde_json::to_string_pretty(&(&pairs, &courses))?)?;
