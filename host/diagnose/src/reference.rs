@@ -29,7 +29,8 @@
 //! | `catalogue` | strokes of a described muscle: every effect of the catalogue as a change |
 //! | `strokes`, `stroked` | the same question for strokes at regulated pressures |
 //! | `sweeps` | runs at the reference's lengths, for quantities that are followed over campaigns |
-//! | `localise` | which cells, since which file, abruptly or gradually |
+//! | `localise` | which cells differ |
+//! | `course` | since what moment, at once or gradually |
 //! | `held_out` | how much of the difference is removed on held-out recordings |
 //! | `units` | columns in other units, another actuator |
 //! | `sides` | rows on both sides, sides in the wrong order |
@@ -45,6 +46,7 @@ mod cells;
 mod combined;
 mod contrast;
 pub mod correction;
+mod course;
 mod gate;
 mod held_out;
 mod interpolate;

@@ -10,6 +10,10 @@ use super::wording::change as words;
 /// Panels in one picture, at most.
 const MOST_PANELS: usize = 6;
 
+/// Causes in the picture of probabilities, at most, and the least probability of one that is shown by itself.
+const MOST_BARS: usize = 8;
+const LEAST_BAR: f64 = 0.01;
+
 /// The page of a comparison; `after` gives the recordings' names.
 #[must_use]
 pub fn page(r: &ChangeReport, after: &Campaign) -> Page {
@@ -76,11 +80,10 @@ fn head(page: &mut Page, r: &ChangeReport) {
 fn changes(r: &ChangeReport) -> Section {
     let mut section = Section::new("What changed, and what to do").summarised();
     for m in &r.missing {
-        let sizes: Vec<String> = m.parameters.iter().map(words::size).collect();
         section.text(format!(
             "*{}* ({}): {}. Probability {}, of its class {}. Law: {}. Since when: {}. It is {}.",
             m.effect,
-            sizes.join(", "),
+            words::sizes(&m.parameters),
             words::remedy(m.change),
             fixed(m.probability, 2),
             fixed(m.class_probability, 2),
@@ -101,9 +104,16 @@ fn changes(r: &ChangeReport) -> Section {
 
 fn probabilities(r: &ChangeReport) -> Section {
     let mut section = Section::new("How probable each cause is");
-    let names: Vec<String> = r.probabilities.iter().map(|p| p.cause.clone()).collect();
+    // The labels of all causes of the catalogue cannot be read beside each other.
+    let kept = r.probabilities.iter().take(MOST_BARS).filter(|p| p.probability >= LEAST_BAR).count();
+    let mut names: Vec<String> = r.probabilities[..kept].iter().map(|p| p.cause.clone()).collect();
+    let mut y: Vec<f64> = r.probabilities[..kept].iter().map(|p| p.probability).collect();
+    let others = &r.probabilities[kept..];
+    if !others.is_empty() {
+        names.push(format!("{} others", others.len()));
+        y.push(others.iter().map(|p| p.probability).sum());
+    }
     let x: Vec<f64> = (0..names.len()).map(|i| i as f64).collect();
-    let y: Vec<f64> = r.probabilities.iter().map(|p| p.probability).collect();
     let panel = Panel::new(Axis::names("cause", names), Axis::new("probability", "").range(0.0, 1.0)).bars(
         "",
         Colour::Series(0),
@@ -191,22 +201,11 @@ fn differences(r: &ChangeReport) -> Section {
 }
 
 fn located(r: &ChangeReport) -> Section {
-    let mut section = Section::new("Where it sits");
-    let mut table = Table::new(
-        "Parts of the data that hold more of the difference than their share",
-        &["where", "from", "to", "unit", "share of the difference", "share of the data"],
-    );
-    for p in &r.r#where {
-        table.row([
-            p.coordinate.clone(),
-            figures(p.from, 4),
-            figures(p.to, 4),
-            p.unit.clone(),
-            fixed(p.share, 2),
-            fixed(p.rows, 2),
-        ]);
+    let mut section = Section::new("Where it is");
+    if r.r#where.is_empty() {
+        section.text("No part of the data holds more of the difference than its share.");
     }
-    section.table(table);
+    section.list(r.r#where.iter().map(words::place));
     section
 }
 
@@ -230,6 +229,9 @@ fn unseen_sizes(r: &ChangeReport) -> Section {
 
 fn limits(r: &ChangeReport) -> Section {
     let mut section = Section::new("What could not be compared");
+    if r.reference.not_comparable.is_empty() {
+        section.text("Everything that was recorded after was compared.");
+    }
     section.list(r.reference.not_comparable.iter().map(words::not_comparable));
     section
 }

@@ -217,6 +217,8 @@ enum Command {
     Reference(reference::Reference),
     /// Diagnose changes between two campaigns of the virtual bench, of which the later one has one effect: a sealed set.
     ReferenceBench(reference_bench::Options),
+    /// Two changes at once, and changes that begin within the later runs, added to real recordings.
+    ReferenceFurther(reference::further::Further),
     /// Campaigns that choose their own steps, compared with protocol C for the same time, random steps, and single proposals.
     Campaign(campaign::Campaigns),
     /// Generate, answer and score; each step continues where an earlier run was interrupted.
@@ -281,6 +283,7 @@ fn main() -> ExitCode {
         Command::Sensitivity(study) => sensitivity::run(&study),
         Command::Sensors(what) => sensors::run(&what),
         Command::Reference(what) => reference::run(&what),
+        Command::ReferenceFurther(what) => reference::further::run(&what),
         Command::ReferenceBench(what) => {
             let specs = specs(&what.set.kind, &what.set.what);
             specs.and_then(|(seed, _, specs)| reference_bench::run(&what, seed, specs))

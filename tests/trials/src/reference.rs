@@ -1,13 +1,16 @@
 //! `trials reference`: changes put into later runs of real recordings, untouched pairs, and a cylinder whose seal was swapped; each asked of
 //! the diagnosis against a reference.
 
+mod course;
 mod cylinder;
+pub mod further;
 mod injection;
 mod page;
 mod pairs;
 mod single_effects;
 mod staircases;
 mod tables;
+mod together;
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -228,15 +231,19 @@ fn write_pairs(
     write(&what.output, "training.jsonl", &text)
 }
 
+/// The comparison of two sides that nobody took off the bench.
+fn compared(before: &[staircases::Run], after: &[staircases::Run]) -> Result<ChangeReport, String> {
+    let campaign =
+        |runs: &[staircases::Run]| Campaign::new(runs.iter().map(staircases::Run::recording).collect());
+    let options = Options { mounted: Mounted::Same, ..Options::default() };
+    compare(&campaign(after), Against::Recordings(&campaign(before)), &options).map_err(|e| e.to_string())
+}
+
 fn ask(job: &Job<'_>, slopes: &Slopes) -> Result<Trial, String> {
     let (before, after, size) = sides(job, slopes);
     let simple = single_effects::name(&before, &after, slopes);
-    let campaign =
-        |runs: &[staircases::Run]| Campaign::new(runs.iter().map(staircases::Run::recording).collect());
-    let (before, after) = (campaign(&before), campaign(&after));
-    let options = Options { mounted: Mounted::Same, ..Options::default() };
     let start = Instant::now();
-    let report = compare(&after, Against::Recordings(&before), &options)
+    let report = compared(&before, &after)
         .map_err(|e| format!("{} {:?} {:?}: {e}", job.muscle.name, job.runs, job.put_in))?;
     Ok(Trial {
         muscle: job.muscle.name.clone(),

@@ -119,6 +119,10 @@ pam_data::criteria! {
     TABLE_SLOPE_OVER_LENGTH: f64 = 0.5, "table_slope_over_length", "1", Measured("development half, sizes of changes put in");
     /// Start points of a step that are tried, at most.
     STEP_STARTS: usize = 24, "step_starts", "1", Cost;
+    /// Moments at which a change may have begun that are tried first, at most.
+    COURSE_STARTS: usize = 40, "course_starts", "1", Cost;
+    /// A change that began outside this part of AFTER has too little on one side to tell its course.
+    COURSE_PART: ((f64, f64)) = (0.03, 0.97), "course_part", "1", Judgement;
     /// Log evidence by which one profile over time must lead the other to be reported: e³ = 20.
     COURSE_LEAD: f64 = 3.0, "course_lead", "1", Convention("e^3 = 20");
     /// Names in one answer, at most.
@@ -220,6 +224,11 @@ pam_data::criteria! {
     CATALOGUE_PRIOR: f64 = 10.0, "catalogue_prior", "1", Judgement;
     /// The shortest rest, s; longer ones count by decades.
     CATALOGUE_REST: f64 = 1.0, "catalogue_rest", "s", Judgement;
+    /// In a rest friction has slipped where the force has moved by more than this share of friction that neither the strokes beside it nor the
+    /// other rests have.
+    CATALOGUE_SLIP: f64 = 0.15, "catalogue_slip", "1", Judgement;
+    /// ... and by more than this many robust deviations of all rests.
+    CATALOGUE_SLIP_SPREADS: f64 = 5.0, "catalogue_slip_spreads", "1", Judgement;
     /// Speeds that differ by less than about this factor count as one.
     CATALOGUE_SPEED_STEP: f64 = 4.0, "catalogue_speed_step", "1", Judgement;
     /// What campaigns usually differ by without a change, share of the largest force: a load cell's zero, gain, gauge and friction.

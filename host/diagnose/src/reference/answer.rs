@@ -59,6 +59,11 @@ pub enum NotComparable {
         /// Their share.
         share: f64,
     },
+    /// Ramps of pressure at a held length among strokes.
+    Ramps {
+        /// Their share of the rows.
+        share: f64,
+    },
     /// Rows at lengths that the reference does not have.
     Lengths {
         /// Its name.
@@ -113,6 +118,10 @@ pub enum Remark {
     },
     /// How far campaigns of strokes repeat is assumed.
     StrokesAssumed,
+    /// How far campaigns of strokes of a described muscle repeat beyond their noise is assumed: this share of the largest force.
+    CatalogueAssumed(f64),
+    /// This many rests in which friction slipped in one of the campaigns.
+    SlippedRests(usize),
     /// Probabilities of strokes are marginal.
     StrokesMarginal,
     /// No change is named, but the probability that nothing changed is this only.
@@ -176,21 +185,29 @@ pub struct Place {
     pub unit: String,
 }
 
+/// When a change began.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Moment {
+    /// Name of the recording.
+    pub recording: String,
+    /// s since AFTER began.
+    pub moment: f64,
+    /// Lower end of its 95 % interval, s.
+    pub low: f64,
+    /// Upper end, s.
+    pub high: f64,
+}
+
 /// Since when a change is there.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "course", rename_all = "kebab-case")]
 pub enum Since {
     /// From the first recording of AFTER on.
     Beginning,
-    /// A step, from one recording on.
-    From {
-        /// Its name.
-        recording: String,
-        /// s since AFTER began.
-        moment: f64,
-    },
-    /// Gradually through AFTER.
-    Gradual,
+    /// At once, from a moment on.
+    From(Moment),
+    /// Gradually, from a moment on.
+    Gradual(Moment),
     /// The recordings do not say.
     NotDetermined,
 }

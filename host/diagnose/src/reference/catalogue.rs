@@ -8,6 +8,7 @@
 
 mod answer;
 mod cells;
+mod rests;
 mod weigh;
 
 use super::answer::ChangeReport;

@@ -4,6 +4,7 @@ use nalgebra::DVector;
 
 use super::cells::{Cell, cells};
 use super::contrast::{Contrast, evidence};
+use super::course::{self, Course, Kind};
 use super::criteria::{
     COMBINED_SHAPE_ERROR, DIRECTIONS_PER_RUN, LAG_FLOOR, LAGS, MOST_CHANGES, NAMED, SIZES,
     TABLE_ERROR_FACTORS, TABLE_LAGS,
@@ -41,6 +42,8 @@ pub(super) struct Accepted {
     pub shape: DVector<f64>,
     pub size: f64,
     pub std: f64,
+    /// Since when; unknown for a lag.
+    pub course: Option<Course>,
 }
 
 /// One weighing of all changes.
@@ -165,6 +168,7 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
         let lagged = accepted.iter().any(|a| is_lag(a.change));
         let more = leader.filter(|_| !lagged && none < NAMED && accepted.len() < MOST_CHANGES);
         let next = more.and_then(|(change, p)| accept(&cells, &round, change, p, late));
+        let next = next.map(|n| with_course(&cells, &present, &surface, n));
         let last = round.posterior.clone();
         inexact.first = inexact.first.max(round.best);
         first.get_or_insert(round);
@@ -342,7 +346,30 @@ fn accept(cells: &[Cell], round: &Round, change: Change, probability: f64, late:
         shape,
         size: estimate.size,
         std: estimate.std,
+        course: None,
     })
+}
+
+/// The same change with the course that it takes through AFTER, where it is not there from the beginning.
+fn with_course(cells: &[Cell], present: &Contrast, surface: &Surface, found: Accepted) -> Accepted {
+    let on = |value: &dyn Fn(&Cell) -> f64| {
+        DVector::from_iterator(cells.len(), cells.iter().map(|c| if c.after { value(c) } else { 0.0 }))
+    };
+    let (base, kinds): (DVector<f64>, &[Kind]) = match found.change {
+        change if is_lag(change) => return found,
+        Change::EndSlip => (on(&|c| c.means.step_by_stroke), &[Kind::Step]),
+        Change::ForceDrift => (on(&|_| 1.0), &[Kind::Ramp]),
+        _ => (found.shape.clone(), &[Kind::Whole, Kind::Step, Kind::Ramp]),
+    };
+    let sizes = SIZES.map(|s| s * surface.largest);
+    let Some(course) = course::of(cells, present, &base, kinds, &sizes) else { return found };
+    let (a, b) = present.products(&course.shape);
+    if !course.sure || course.kind == Kind::Whole || !(a > 0.0) {
+        return Accepted { course: Some(course), ..found };
+    }
+    let scale = present.without_shapes(std::slice::from_ref(&course.shape)).scale();
+    let shape = course.shape.clone();
+    Accepted { shape, size: b / a, std: (scale / a).sqrt(), course: Some(course), ..found }
 }
 
 /// Sizes of several changes beside each other.

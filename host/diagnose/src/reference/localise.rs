@@ -1,14 +1,12 @@
-//! Where the difference is concentrated, and since when.
+//! Where the difference is concentrated, and in which recording a change began.
 
 use nalgebra::DVector;
 
-use super::answer::{Place, Since};
+use super::answer::{Moment, Place, Since};
 use super::cells::Cell;
-use super::contrast::{Contrast, evidence};
-use super::criteria::{CELLS, COURSE_LEAD, LOCALISE_STANDS_OUT, SIZES};
+use super::course::Kind;
+use super::criteria::{CELLS, LOCALISE_STANDS_OUT};
 use super::isometric::{Accepted, Analysis};
-use super::shapes::Change;
-use super::slip::rms_after;
 
 /// Shares of the energy by mounting, pressure, direction and recording, those that stand out.
 pub(super) fn places(analysis: &Analysis, difference: &DVector<f64>, rest_length: Option<f64>) -> Vec<Place> {
@@ -66,51 +64,19 @@ fn recording_at(analysis: &Analysis, clock: f64) -> String {
     name
 }
 
-/// Whether an accepted change was there from the first recording of AFTER, began at one, or grew.
+/// Whether an accepted change was there from the first recording of AFTER, began at a moment, or grew.
 pub(super) fn since(analysis: &Analysis, accepted: &Accepted) -> Since {
-    match accepted.change {
-        Change::ForceDrift => return Since::Gradual,
-        Change::EndSlip => {
-            let start = analysis.first.slip.as_ref().map_or(0.0, |s| s.start);
-            return Since::From {
-                recording: recording_at(analysis, start),
-                moment: start * analysis.runs.duration,
-            };
-        }
-        Change::SensorDelay | Change::PressureSensorLag => return Since::NotDetermined,
-        _ => {}
-    }
-    let cells = &analysis.cells;
-    let others: Vec<DVector<f64>> =
-        analysis.accepted.iter().filter(|a| a.change != accepted.change).map(|a| a.shape.clone()).collect();
-    let contrast: Contrast = analysis.contrast.without_shapes(&others);
-    let scale = contrast.without_shapes(std::slice::from_ref(&accepted.shape)).scale();
-    let sizes = SIZES.map(|s| s * analysis.surface.largest);
-    let weigh = |factor: &dyn Fn(&Cell) -> f64| {
-        let shape = DVector::from_iterator(
-            cells.len(),
-            cells.iter().zip(accepted.shape.iter()).map(|(c, s)| s * factor(c)),
-        );
-        let rms = rms_after(cells, &shape);
-        if !(rms > 0.0) {
-            return f64::NEG_INFINITY;
-        }
-        let (a, b) = contrast.products(&(shape / rms));
-        evidence(a, b, scale, &sizes)
+    let Some(course) = accepted.course.as_ref().filter(|c| c.sure) else { return Since::NotDetermined };
+    let seconds = |clock: f64| clock * analysis.runs.duration;
+    let moment = Moment {
+        recording: recording_at(analysis, course.start.at),
+        moment: seconds(course.start.at),
+        low: seconds(course.start.low),
+        high: seconds(course.start.high),
     };
-    let whole = weigh(&|_| 1.0);
-    let ramp = weigh(&|c| c.means.clock);
-    let starts = analysis.runs.side(true).skip(1).map(|r| r.since_after / analysis.runs.duration.max(1e-9));
-    let step = starts
-        .map(|start| (start, weigh(&|c| f64::from(u8::from(c.means.clock >= start)))))
-        .fold((0.0, f64::NEG_INFINITY), |best, one| if one.1 > best.1 { one } else { best });
-    if whole > step.1.max(ramp) + COURSE_LEAD {
-        Since::Beginning
-    } else if step.1 > whole.max(ramp) + COURSE_LEAD {
-        Since::From { recording: recording_at(analysis, step.0), moment: step.0 * analysis.runs.duration }
-    } else if ramp > whole.max(step.1) + COURSE_LEAD {
-        Since::Gradual
-    } else {
-        Since::NotDetermined
+    match course.kind {
+        Kind::Whole => Since::Beginning,
+        Kind::Step => Since::From(moment),
+        Kind::Ramp => Since::Gradual(moment),
     }
 }

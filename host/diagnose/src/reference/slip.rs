@@ -9,8 +9,6 @@ use super::criteria::{SLIP_PART, STEP_STARTS};
 /// The step that fits best.
 #[derive(Debug, Clone)]
 pub(super) struct Slip {
-    /// On AFTER's clock, 0 to 1.
-    pub start: f64,
     /// ∂F/∂x from then on, not normalised.
     pub shape: DVector<f64>,
     /// Log evidence over all starts.
@@ -51,7 +49,7 @@ fn starts(cells: &[Cell]) -> Vec<f64> {
 /// Weighs a step at every start; `None` where no start or no slope over the length is there.
 pub(super) fn search(cells: &[Cell], contrast: &Contrast, scale: f64, sizes: &[f64]) -> Option<Slip> {
     let mut logs = Vec::new();
-    let mut best: Option<(f64, f64, DVector<f64>)> = None;
+    let mut best: Option<(f64, DVector<f64>)> = None;
     for start in starts(cells) {
         let on = |c: &Cell| if c.after && c.means.clock >= start { c.means.step_by_stroke } else { 0.0 };
         let shape = DVector::from_iterator(cells.len(), cells.iter().map(on));
@@ -62,9 +60,9 @@ pub(super) fn search(cells: &[Cell], contrast: &Contrast, scale: f64, sizes: &[f
         let (a, b) = contrast.products(&(&shape / rms));
         let log = evidence(a, b, scale, sizes);
         logs.push(log);
-        if best.as_ref().is_none_or(|(l, ..)| log > *l) {
-            best = Some((log, start, shape));
+        if best.as_ref().is_none_or(|(l, _)| log > *l) {
+            best = Some((log, shape));
         }
     }
-    best.map(|(_, start, shape)| Slip { start, shape, log: log_mean(&logs) })
+    best.map(|(_, shape)| Slip { shape, log: log_mean(&logs) })
 }

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "what fails here fails the test")]
 
-use super::answer::{NotComparable, Remark};
+use super::answer::{NotComparable, Remark, Since};
 use super::{Against, ChangeReport, Mounted, Options, Verdict, compare};
 use pam_data::recording::{Campaign, Recording};
 
@@ -193,4 +193,38 @@ fn a_length_beyond_those_of_the_reference_is_not_compared() {
     let report = at_another_length(4, &untouched);
     assert!(report.reference.not_comparable.iter().any(|n| matches!(n, NotComparable::Stroke { .. })));
     assert!(!report.remarks.iter().any(|r| matches!(r, Remark::Interpolated { .. })));
+}
+
+/// A zero of 13 N that `course` gives its size over the time of AFTER, s.
+fn zero_over_time(course: impl Fn(f64) -> f64) -> ChangeReport {
+    let before = campaign(3, 0..3, &untouched);
+    let mut after = campaign(3, 3..6, &untouched);
+    let mut begin = 0.0;
+    for r in &mut after.recordings {
+        let zeros = r.time.iter().map(|t| 13.0 * course(begin + t)).collect::<Vec<f64>>();
+        r.force.as_mut().unwrap().iter_mut().zip(zeros).for_each(|(f, z)| *f += z);
+        begin += r.duration();
+    }
+    let options = Options { mounted: Mounted::Same, ..Options::default() };
+    compare(&after, Against::Recordings(&before), &options).unwrap()
+}
+
+#[test]
+fn a_step_within_a_recording_is_dated_with_an_interval_that_holds_it() {
+    // Nine recordings of 60 s; the step is in the middle of the fifth.
+    let report = zero_over_time(|t| f64::from(u8::from(t > 270.0)));
+    let change = &report.missing[0];
+    assert_eq!(change.effect, "force-offset", "{:?}", report.probabilities);
+    let Since::From(at) = &change.since else { panic!("{:?}", change.since) };
+    assert!((at.moment - 270.0).abs() < 15.0 && at.low < 270.0 && at.high > 270.0, "{at:?}");
+    assert_eq!(at.recording, "m1 r4");
+    assert!((change.parameters[0].value - 13.0).abs() < 2.0, "{:?}", change.parameters);
+}
+
+#[test]
+fn a_change_that_was_there_or_grew_is_no_step() {
+    assert_eq!(zero_over_time(|_| 1.0).missing[0].since, Since::Beginning);
+    let grown = zero_over_time(|t| ((t - 180.0) / 180.0).max(0.0));
+    let Since::Gradual(from) = &grown.missing[0].since else { panic!("{:?}", grown.missing[0].since) };
+    assert!(from.low < 180.0 && from.high > 180.0, "{from:?}");
 }

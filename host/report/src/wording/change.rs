@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use pam_data::date;
 use pam_diagnose::reference::answer::{
-    ChangeReport, Changed, Left, NotComparable, Place, Remark, Repeatability, Since, Size, Split, Verdict,
-    WhyNot,
+    ChangeReport, Changed, Left, Moment, NotComparable, Place, Remark, Repeatability, Since, Size, Split,
+    Verdict, WhyNot,
 };
 use pam_diagnose::reference::shapes::{Change, Class, Owner};
 
@@ -72,6 +72,14 @@ pub fn remark(remark: &Remark) -> String {
             1e3 * stroke
         ),
         Remark::StrokesAssumed => "how far campaigns of strokes repeat is assumed (zero and level to 0.2 % of the largest force, gain to 0.5 %, friction to 5 to 10 %), not measured".into(),
+        Remark::CatalogueAssumed(share) => format!(
+            "noise is measured on the reference; how far zero, gain, gauge and friction repeat beyond it is assumed: {:.2} % of the largest force",
+            100.0 * share
+        ),
+        Remark::SlippedRests(rests) => format!(
+            "{rests} {} at a held length hardly count: friction slipped there in one of the campaigns, as a regulator's drift makes it",
+            if *rests == 1 { "rest" } else { "rests" }
+        ),
         Remark::StrokesMarginal => "probabilities are those that a change is there at all; several changes can be present together".into(),
         Remark::NotAcquitted(none) => {
             format!("no change is named, but that nothing changed has a probability of {none:.2} only")
@@ -153,6 +161,11 @@ pub fn place(p: &Place) -> String {
     format!("{:.0} % of the difference lies in {what} ({:.0} % of the data)", 100.0 * p.share, 100.0 * p.rows)
 }
 
+/// A share that is not zero.
+fn percent(share: f64) -> String {
+    if share < 0.01 { "under 1 %".into() } else { format!("{:.0} %", 100.0 * share) }
+}
+
 /// What could not be compared.
 #[must_use]
 pub fn not_comparable(n: &NotComparable) -> String {
@@ -172,9 +185,13 @@ pub fn not_comparable(n: &NotComparable) -> String {
         NotComparable::Level { pressure } => {
             format!("strokes at {:.0} kPa: on one side only, or fewer than two each way", pressure / 1e3)
         }
+        NotComparable::Ramps { share } => format!(
+            "{} of the rows are ramps of pressure at a held length: give them alone, on both sides, to compare them",
+            percent(*share)
+        ),
         NotComparable::States { share } => format!(
-            "{:.0} % of the strokes' parts are at pressures, places or speeds that the reference does not have",
-            100.0 * share
+            "{} of the strokes' parts are at pressures, places or speeds that the reference does not have",
+            percent(*share)
         ),
         NotComparable::Moving => {
             "sensor-delay, pressure-sensor-lag: not asked of recordings in which length and pressure move together".into()
@@ -200,51 +217,79 @@ pub fn owner(owner: Owner) -> &'static str {
     }
 }
 
+/// A moment with its uncertainty.
+fn began(m: &Moment) -> String {
+    format!(
+        "from `{}` on ({:.0} s after the beginning; 95 %: {:.0} to {:.0} s)",
+        m.recording, m.moment, m.low, m.high
+    )
+}
+
 /// Since when a change is there.
 #[must_use]
 pub fn since(since: &Since) -> String {
     match since {
         Since::Beginning => "from the first recording on".into(),
-        Since::From { recording, moment } => {
-            format!("at once, from `{recording}` on ({moment:.0} s after the beginning)")
-        }
-        Since::Gradual => "gradually".into(),
+        Since::From(m) => format!("at once, {}", began(m)),
+        Since::Gradual(m) if m.high <= 0.0 => "gradually, from the first recording on".into(),
+        Since::Gradual(m) => format!("gradually, {}", began(m)),
         Since::NotDetermined => "not determined".into(),
     }
 }
 
 /// A value with as many digits as its standard deviation supports.
 fn rounded(value: f64, std: f64) -> String {
+    if value.abs() >= LARGE || std >= LARGE {
+        return format!("{value:.1e}");
+    }
     let digits =
         if std > 0.0 && std.is_finite() { (1.0 - std.log10().floor()).clamp(0.0, 9.0) as usize } else { 3 };
     format!("{value:.digits$}")
 }
 
-/// Factor and name of the unit that people use instead of an SI unit.
-fn usual_unit(unit: &str) -> (f64, &'static str) {
-    match unit {
-        "Pa" => (1e-3, " kPa"),
-        "m" => (1e3, " mm"),
-        "s" => (1e3, " ms"),
-        "m²" => (1e5, " N per 100 kPa"),
-        "m/N" => (1e6, " µm/N"),
-        "N" => (1.0, " N"),
-        _ => (100.0, " %"),
-    }
+/// From here on a number is written with its power of ten.
+const LARGE: f64 = 1e6;
+
+/// Factor and name of the unit that people use instead of an SI unit. A number without a unit is a share of something.
+fn usual_unit(value: f64, unit: &str) -> (f64, String) {
+    let (factor, name) = match unit {
+        "Pa" => (1e-3, "kPa"),
+        "m" => (1e3, "mm"),
+        "s" if value.abs() < 1.0 => (1e3, "ms"),
+        "m²" => (1e5, "N per 100 kPa"),
+        "m/N" => (1e6, "µm/N"),
+        "" => (100.0, "%"),
+        other => (1.0, other),
+    };
+    (factor, format!(" {name}"))
 }
+
+/// Numbers without a unit that are no shares.
+const COUNTS: [&str; 4] = ["exponent", "order", "onset", "width"];
 
 /// A size with its interval in a unit that people use.
 #[must_use]
 pub fn size(s: &Size) -> String {
-    let (scale, unit) = usual_unit(&s.unit);
+    let (scale, unit) =
+        if COUNTS.contains(&s.name.as_str()) { (1.0, String::new()) } else { usual_unit(s.value, &s.unit) };
     let half = scale * (s.high - s.low) / 2.0;
     format!("{} ± {}{unit}", rounded(scale * s.value, half), rounded(half, half))
+}
+
+/// All sizes of a change, with their names where there are several.
+#[must_use]
+pub fn sizes(all: &[Size]) -> String {
+    let named = |s: &Size| format!("{} {}", s.name.replace('_', " "), size(s));
+    match all {
+        [only] => size(only),
+        several => several.iter().map(named).collect::<Vec<_>>().join(", "),
+    }
 }
 
 /// A size in a unit that people use, without an interval.
 #[must_use]
 pub fn in_usual_unit(value: f64, unit: &str) -> String {
-    let (scale, unit) = usual_unit(unit);
+    let (scale, unit) = usual_unit(value, unit);
     format!("{}{unit}", rounded(scale * value, scale * value.abs()))
 }
 

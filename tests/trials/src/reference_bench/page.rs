@@ -26,9 +26,9 @@ pub(super) fn page(all: &[Outcome], drawn: usize, hash: &str) -> String {
     );
     let _ = writeln!(
         t,
-        "{} pairs were answered, each once, of a set of 330 whose secret seed has the SHA-256 `{hash}`; strata are mixed evenly over the \
-         numbers, so that the first {drawn} are a stratified share. Counted are single effects of at least {LEAST} % of the blocked \
-         force (99.5 % quantile); the first name counts.\n",
+        "{} of {drawn} pairs are answered, each once. The set's seed is secret; its SHA-256, `{hash}`, was written before the first pair was made. Strata are \
+         mixed evenly over the numbers, so that a part of them is nearly a stratified share. Counted are single effects of at least {LEAST} % of the \
+         blocked force (99.5 % quantile); the first name counts. A bound that is missed is missed: the set is not drawn again.\n",
         all.len()
     );
     let _ = writeln!(t, "| | n | bound | measured | |\n| --- | --- | --- | --- | --- |");

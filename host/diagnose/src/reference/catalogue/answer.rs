@@ -5,35 +5,55 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::super::answer::{
-    ChangeReport, Changed, Considered, Curve, HeldOut, NotComparable, Place, Probability, Reference, Remark,
-    Repeatability, Since, Split, Verdict, WhyNot, size,
+    ChangeReport, Changed, Considered, Curve, HeldOut, Moment, NotComparable, Place, Probability, Reference,
+    Remark, Repeatability, Since, Split, Verdict, WhyNot, size,
 };
 use super::super::criteria::{
-    CATALOGUE_BINS, CATALOGUE_LAW_ERROR, COURSE_LEAD, LOCALISE_STANDS_OUT, NAMED, SET, SIZES,
+    CATALOGUE_BINS, CATALOGUE_LAW_ERROR, CATALOGUE_USUAL, COURSE_LEAD, LOCALISE_STANDS_OUT, NAMED, SET, SIZES,
 };
 use super::super::held_out::Unseen;
 use super::super::report::left;
 use super::super::shapes::Change;
-use super::cells::Cells;
+use super::cells::{Cell, Cells, VENTED};
 use super::weigh::{Accepted, Fit, Weighed};
 
 fn rms(values: &DVector<f64>) -> f64 {
     (values.norm_squared() / values.len().max(1) as f64).sqrt()
 }
 
+/// Root mean square over the cells, by their certainty: cells of fast motion and of rests that slipped are known less well, N.
+fn weighted(cells: &Cells, values: &DVector<f64>) -> f64 {
+    let weights = cells.variance.iter().map(|v| 1.0 / v).sum::<f64>();
+    let square: f64 = values.iter().zip(cells.variance.iter()).map(|(d, v)| d * d / v).sum();
+    (square / weights.max(f64::MIN_POSITIVE)).sqrt()
+}
+
+/// Which half each recording of AFTER is held out with: every other one in which the muscle worked. A tare between them is on the side of the
+/// recording before it: tares alone determine no size.
+fn folds(cells: &[Cell]) -> Vec<usize> {
+    let recordings = cells.iter().map(|c| c.recording + 1).max().unwrap_or(0);
+    let works = |r: usize| cells.iter().any(|c| c.recording == r && c.key.3 != VENTED);
+    let mut count = 0_usize;
+    let one = |r: usize| {
+        count += usize::from(works(r));
+        count.saturating_sub(1) % 2
+    };
+    (0..recordings).map(one).collect()
+}
+
 /// rms of the difference without and with the changes, their sizes fitted to every other recording and judged on the rest, N.
 fn unseen(cells: &Cells, accepted: &[&Accepted]) -> Unseen {
-    let before = rms(&cells.difference);
+    let before = weighted(cells, &cells.difference);
     let columns: Vec<DVector<f64>> = accepted.iter().map(|a| a.fit.trace.clone()).collect();
-    let recordings = cells.cells.iter().map(|c| c.recording).max().unwrap_or(0) + 1;
-    let held = recordings > 1;
+    let fold = folds(&cells.cells);
+    let held = fold.contains(&1);
     if columns.is_empty() {
         return Unseen { before, after: before, held };
     }
     let x = DMatrix::from_columns(&columns);
     let mut remaining = cells.difference.clone();
     for side in 0..if held { 2 } else { 1 } {
-        let own = |i: usize| !held || cells.cells[i].recording % 2 == side;
+        let own = |i: usize| !held || fold[cells.cells[i].recording] == side;
         let kept: Vec<usize> = (0..cells.cells.len()).filter(|i| !held || !own(*i)).collect();
         let weights = |i: &usize| 1.0 / cells.variance[*i];
         let (mut g, mut b) = (DMatrix::zeros(x.ncols(), x.ncols()), DVector::zeros(x.ncols()));
@@ -47,23 +67,30 @@ fn unseen(cells: &Cells, accepted: &[&Accepted]) -> Unseen {
             remaining[i] -= (x.row(i) * &sizes)[0];
         }
     }
-    Unseen { before, after: rms(&remaining), held }
+    Unseen { before, after: weighted(cells, &remaining), held }
+}
+
+/// A moment of AFTER, s, with its recording.
+fn moment(cells: &Cells, [at, low, high]: [f64; 3]) -> Moment {
+    let from = cells.cells.iter().filter(|c| c.time >= at).map(|c| c.recording).min();
+    let recording = from.and_then(|r| cells.names.get(r)).cloned().unwrap_or_default();
+    Moment { recording, moment: at, low, high }
 }
 
 /// Since when: the change as it is, from one recording on, or growing over AFTER.
 fn since(cells: &Cells, fit: &Fit) -> Since {
     match fit.change {
-        Change::ForceDrift => return Since::Gradual,
+        Change::ForceDrift => return Since::Gradual(moment(cells, [0.0; 3])),
         Change::EndSlip => {
-            // Its law has the moment as a parameter.
+            // Its law has the moment as a parameter, found to about a half-stroke.
             let begin = cells.rows.contexts().first().map_or(0.0, |c| c.time);
             let time = fit.parameters.iter().find(|p| p.1 == "s").map(|p| p.2 - begin);
-            let recording = |moment: f64| {
-                let from = cells.cells.iter().filter(|c| c.time >= moment).map(|c| c.recording).min();
-                from.and_then(|r| cells.names.get(r)).cloned().unwrap_or_default()
+            let near = |at: f64| {
+                let before = cells.cells.iter().map(|c| c.time).filter(|t| *t <= at).fold(0.0, f64::max);
+                let after = cells.cells.iter().map(|c| c.time).filter(|t| *t > at);
+                [at, before, after.fold(cells.duration, f64::min)]
             };
-            return time
-                .map_or(Since::NotDetermined, |moment| Since::From { recording: recording(moment), moment });
+            return time.map_or(Since::NotDetermined, |at| Since::From(moment(cells, near(at))));
         }
         change if change.remembers() => return Since::NotDetermined,
         _ => {}
@@ -86,25 +113,28 @@ fn since(cells: &Cells, fit: &Fit) -> Since {
     if whole > step.1.max(ramp) + COURSE_LEAD {
         Since::Beginning
     } else if step.1 > whole.max(ramp) + COURSE_LEAD {
-        let first = cells.cells.iter().filter(|c| c.recording == step.0);
-        Since::From {
-            recording: cells.names.get(step.0).cloned().unwrap_or_default(),
-            moment: first.map(|c| c.time).fold(f64::INFINITY, f64::min).min(cells.duration),
-        }
+        let times = |of: &dyn Fn(usize) -> bool| {
+            cells.cells.iter().filter(|c| of(c.recording)).map(|c| c.time).collect::<Vec<f64>>()
+        };
+        let first = times(&|r| r == step.0).into_iter().fold(f64::INFINITY, f64::min).min(cells.duration);
+        let last = times(&|r| r < step.0).into_iter().fold(0.0, f64::max);
+        Since::From(moment(cells, [first, last, first]))
     } else if ramp > whole.max(step.1) + COURSE_LEAD {
-        Since::Gradual
+        Since::Gradual(moment(cells, [0.0; 3]))
     } else {
         Since::NotDetermined
     }
 }
 
 fn places(cells: &Cells) -> Vec<Place> {
-    let total = cells.difference.norm_squared();
+    // Energy by certainty, as everywhere.
+    let energy = |i: usize| cells.difference[i].powi(2) / cells.variance[i];
+    let total: f64 = (0..cells.cells.len()).map(energy).sum();
     let count = cells.cells.len() as f64;
     let mut all = Vec::new();
     let mut add = |coordinate: &str, unit: &str, at: f64, own: &dyn Fn(usize) -> bool| {
         let members: Vec<usize> = (0..cells.cells.len()).filter(|i| own(*i)).collect();
-        let share = members.iter().map(|i| cells.difference[*i].powi(2)).sum::<f64>() / total;
+        let share = members.iter().map(|i| energy(*i)).sum::<f64>() / total;
         let rows = members.len() as f64 / count;
         if share > LOCALISE_STANDS_OUT * rows && rows < 1.0 {
             all.push(Place {
@@ -184,6 +214,14 @@ fn curves(cells: &Cells, accepted: &[Accepted]) -> Vec<Curve> {
     all
 }
 
+fn remarks(cells: &Cells) -> Vec<Remark> {
+    let mut all = vec![Remark::CatalogueAssumed(CATALOGUE_USUAL)];
+    if cells.slipped > 0 {
+        all.push(Remark::SlippedRests(cells.slipped));
+    }
+    all
+}
+
 /// Everything that was found, as the answer.
 pub(super) fn answer(cells: &Cells, weighed: &Weighed, prior: f64) -> ChangeReport {
     let accepted: Vec<&Accepted> = weighed.accepted.iter().collect();
@@ -202,6 +240,9 @@ pub(super) fn answer(cells: &Cells, weighed: &Weighed, prior: f64) -> ChangeRepo
     let share = ((1.0 - prior) / weighed.alone.len().max(1) as f64).max(1e-6);
     let z = (2.0 * (prior / share).ln() + 6.0).max(0.0).sqrt() + 1.28;
     let mut not = vec![];
+    if cells.ramps > 0.0 {
+        not.push(NotComparable::Ramps { share: cells.ramps });
+    }
     if cells.unmatched > 0 {
         not.push(NotComparable::States {
             share: cells.unmatched as f64 / (cells.unmatched + cells.cells.len()) as f64,
@@ -245,7 +286,7 @@ pub(super) fn answer(cells: &Cells, weighed: &Weighed, prior: f64) -> ChangeRepo
             .iter()
             .map(|(cause, p)| Probability { cause: cause.clone(), probability: *p })
             .collect(),
-        remarks: vec![Remark::StrokesAssumed],
+        remarks: remarks(cells),
         reference: Reference {
             files: Vec::new(),
             table: None,
@@ -265,5 +306,27 @@ pub(super) fn answer(cells: &Cells, weighed: &Weighed, prior: f64) -> ChangeRepo
             .collect(),
         curves: curves(cells, &weighed.accepted),
         abscissa: ("displacement", "mm"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tare_after_each_level_does_not_part_tares_from_levels() {
+        let cell = |recording: usize, kind: i32| Cell {
+            key: (0, true, 0, kind),
+            recording,
+            rows: vec![0],
+            rest: 0,
+            time: 0.0,
+            force: 0.0,
+            stroke: 0.0,
+            direction: 1.0,
+        };
+        // Tare, level, tare, level, tare, level, tare.
+        let cells: Vec<Cell> = (0..7).map(|r| cell(r, if r % 2 == 0 { VENTED } else { 0 })).collect();
+        assert_eq!(folds(&cells), [0, 0, 0, 1, 1, 0, 0]);
     }
 }

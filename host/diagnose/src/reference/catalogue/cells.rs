@@ -9,6 +9,7 @@ use super::super::criteria::{
     CATALOGUE_BINS, CATALOGUE_FEWEST_CELLS, CATALOGUE_FLOOR, CATALOGUE_PRIOR, CATALOGUE_REST,
     CATALOGUE_SPEED_STEP,
 };
+use super::rests;
 use crate::baselines::{self, Kind};
 use crate::linear::energy;
 use crate::rows::{self, ORDERS, Rows};
@@ -19,8 +20,8 @@ use pam_data::recording::{Campaign, Clock};
 type Key = (u32, bool, usize, i32);
 
 /// Kinds of motion beside speeds: rests by decades from here on, and the vented muscle.
-const REST: i32 = 100;
-const VENTED: i32 = 2000;
+pub(super) const REST: i32 = 100;
+pub(super) const VENTED: i32 = 2000;
 
 /// Rows of one half-stroke in one state.
 #[derive(Debug, Clone)]
@@ -30,6 +31,8 @@ pub(super) struct Cell {
     pub recording: usize,
     /// Rows of `Cells::rows`.
     pub rows: Vec<usize>,
+    /// Number of the rest it belongs to; zero where the muscle moves.
+    pub rest: usize,
     /// s since AFTER began.
     pub time: f64,
     pub force: f64,
@@ -58,6 +61,10 @@ pub(super) struct Cells {
     pub levels: Vec<f64>,
     /// Cells of AFTER that BEFORE has nothing of.
     pub unmatched: usize,
+    /// Rests in which friction slipped in one of the campaigns.
+    pub slipped: usize,
+    /// Share of rows on ramps of pressure at a held length, which are not compared.
+    pub ramps: f64,
     pub names: Vec<String>,
     /// s.
     pub duration: f64,
@@ -228,16 +235,10 @@ impl Cells {
         let recordings = before.recordings.iter().chain(&after.recordings).cloned().collect();
         let both = Campaign { recordings, clock: Clock::Separate, warnings: Vec::new() };
         let (prepared, _) = rows::prepare(&both, braid)?;
-        // On a ramp of pressure at a held length friction turns by a share of its own: no state of the strokes is like it, and what the
-        // muscle remembers of it is in the strokes that follow.
-        if prepared.on_ramp.contains(&true) {
-            return Err(Error::new(
-                DataCode::RecordingOutOfRange,
-                "the recordings mix strokes with ramps of pressure at a held length",
-            )
-            .help("give one kind at a time"));
-        }
-        let joint = prepared;
+        // On a ramp of pressure at a held length friction turns by a share of its own: no state of the strokes is like it.
+        let ramps = prepared.on_ramp.iter().filter(|r| **r).count() as f64 / prepared.len().max(1) as f64;
+        let turned = rests::turned(&prepared);
+        let joint = prepared.without(|i| prepared.on_ramp[i] || turned[i]);
         let first_recording = (joint.names.len() - own.names.len().min(joint.names.len())) as u32;
         let first_after = joint.recording.iter().position(|r| *r >= first_recording).unwrap_or(joint.len());
         let reference_rows = joint.without(|i| i >= first_after);
@@ -264,6 +265,8 @@ impl Cells {
         let begin = rows.contexts().first().map_or(0.0, |c| c.time);
         let end = rows.contexts().last().map_or(1.0, |c| c.time);
         let (mut cells, mut difference, mut spread, mut unmatched) = (Vec::new(), Vec::new(), Vec::new(), 0);
+        let rest = rests::numbers(&joint);
+        let mut half_gap = Vec::new();
         for ((_, key), members) in &new {
             let Some((before, count)) = level.means.get(key) else {
                 unmatched += 1;
@@ -279,7 +282,10 @@ impl Cells {
             // Cells of AFTER share the mean of BEFORE: each counts with its part of that mean's error.
             let own = level.variances.get(&key.3).copied().unwrap_or(variance);
             spread.push((own + floor) * (1.0 + shared.get(key).copied().unwrap_or(1.0) / count));
+            let friction = |j: &usize| joint.contexts()[*j].friction * joint.contexts()[*j].quasi;
+            half_gap.push(members.iter().map(friction).sum::<f64>().abs() / members.len().max(1) as f64);
             cells.push(Cell {
+                rest: rest[first],
                 key: *key,
                 recording: (joint.recording[first] - first_recording) as usize,
                 time: rows.contexts()[own_rows[0]].time - begin,
@@ -296,6 +302,16 @@ impl Cells {
             )
             .help("record the same pressures over the same stroke"));
         }
+        let slipped = rests::slipped(&cells, &difference, &spread, &half_gap);
+        for (variance, gap) in
+            spread.iter_mut().zip(&half_gap).zip(&slipped).filter(|(_, s)| **s).map(|(v, _)| v)
+        {
+            *variance += (2.0 * gap).powi(2);
+        }
+        let mut rests: Vec<usize> =
+            cells.iter().zip(&slipped).filter(|(_, s)| **s).map(|(c, _)| c.rest).collect();
+        rests.sort_unstable();
+        rests.dedup();
         let mut states: Vec<Key> = cells.iter().map(|c| c.key).collect();
         states.sort_unstable();
         states.dedup();
@@ -310,6 +326,8 @@ impl Cells {
             spread: (variance + floor).sqrt(),
             levels: joint.levels.clone(),
             unmatched,
+            slipped: rests.len(),
+            ramps,
             names: own.names.clone(),
             duration: (end - begin).max(1e-9),
             cells,

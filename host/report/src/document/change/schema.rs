@@ -67,8 +67,8 @@ pub(super) enum Repeatability {
 #[allow(dead_code, reason = "only its schema is used")]
 pub(super) enum Since {
     Beginning,
-    From { recording: String, moment: f64 },
-    Gradual,
+    From { recording: String, moment: f64, low: f64, high: f64 },
+    Gradual { recording: String, moment: f64, low: f64, high: f64 },
     NotDetermined,
 }
 

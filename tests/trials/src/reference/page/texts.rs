@@ -42,15 +42,15 @@ pub(super) const CYLINDER: &str = "## Cylinder with another seal\n\nOne rig, ano
 
 /// The last section.
 pub(super) const UNTESTED: &str = "\n## Not tested\n\n\
-    - Two simultaneous changes in staircases, several campaigns in the reference of strokes, and the time of a change: computed, not measured \
-    here.\n\
+    - Several campaigns in the reference of strokes. Two changes at once and the time of a change have a [page of their \
+    own](proof-reference-further.md).\n\
     - A leak of a muscle that its valve supplies is not identifiable from force over measured pressure; strokes of a described muscle name it \
     only within the class of gains. What closed valves lose is not used.\n\
     - A lag together with another change is never named: the rows that show a lag contain the other change, too.\n\
     - Lengths between those of the reference are interpolated from three lengths on; tested on synthetic staircases only (`cargo test -p \
     pam-diagnose interpolated`).\n\
     - Length and pressure that move together, and a controller at work: tested on an emulated one only (`cargo test -p host --test change_watch`).\n\
-    - Stroked muscles with a description: no sealed set was answered yet (`trials reference-bench --set final`), and no real one.\n\
+    - Stroked muscles with a description: tested on [simulated pairs](proof-reference-bench.md), not on real ones.\n\
     - All staircases are of one laboratory and one type of muscle, and the constants of the repeatability come from six of the eleven. A second rig is \
     missing.\n\
     - Added drift and slip run through AFTER by run, then mounting. Lags of the 12 Hz recordings are added by the same interpolation that the analysis \
