@@ -30,7 +30,7 @@
 //! | `strokes`, `stroked` | the same question for strokes at regulated pressures |
 //! | `sweeps` | runs at the reference's lengths, for quantities that are followed over campaigns |
 //! | `localise` | which cells differ |
-//! | `course` | since what moment, at once or gradually |
+//! | `course` | since what moment, suddenly or gradually |
 //! | `held_out` | how much of the difference is removed on held-out recordings |
 //! | `units` | columns in other units, another actuator |
 //! | `sides` | rows on both sides, sides in the wrong order |

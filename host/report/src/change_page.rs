@@ -10,7 +10,7 @@ use super::wording::change as words;
 /// Panels in one picture, at most.
 const MOST_PANELS: usize = 6;
 
-/// Causes in the picture of probabilities, at most, and the least probability of one that is shown by itself.
+/// Causes in the picture of probabilities, at most, and the least probability of one that is shown on its own.
 const MOST_BARS: usize = 8;
 const LEAST_BAR: f64 = 0.01;
 

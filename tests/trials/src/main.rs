@@ -217,7 +217,7 @@ enum Command {
     Reference(reference::Reference),
     /// Diagnose changes between two campaigns of the virtual bench, of which the later one has one effect: a sealed set.
     ReferenceBench(reference_bench::Options),
-    /// Two changes at once, and changes that begin within the later runs, added to real recordings.
+    /// Two simultaneous changes, and changes that begin within the later runs, added to real recordings.
     ReferenceFurther(reference::further::Further),
     /// Campaigns that choose their own steps, compared with protocol C for the same time, random steps, and single proposals.
     Campaign(campaign::Campaigns),

@@ -231,7 +231,7 @@ fn write_pairs(
     write(&what.output, "training.jsonl", &text)
 }
 
-/// The comparison of two sides that nobody took off the bench.
+/// The comparison of two sides of an actuator that stayed on the bench.
 fn compared(before: &[staircases::Run], after: &[staircases::Run]) -> Result<ChangeReport, String> {
     let campaign =
         |runs: &[staircases::Run]| Campaign::new(runs.iter().map(staircases::Run::recording).collect());

@@ -204,7 +204,7 @@ pub struct Moment {
 pub enum Since {
     /// From the first recording of AFTER on.
     Beginning,
-    /// At once, from a moment on.
+    /// Suddenly, from a moment on.
     From(Moment),
     /// Gradually, from a moment on.
     Gradual(Moment),

@@ -1,4 +1,4 @@
-//! The course of a change through AFTER: there from the beginning, at once from a moment on, or growing from a moment on.
+//! How a change develops through AFTER: there from the beginning, suddenly from a moment on, or growing from a moment on.
 
 use nalgebra::DVector;
 
@@ -7,12 +7,12 @@ use super::contrast::{Contrast, evidence, log_mean, log_sum};
 use super::criteria::{COURSE_LEAD, COURSE_PART, COURSE_STARTS};
 use super::slip::rms_after;
 
-/// How a change goes on.
+/// How a change continues.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
     /// As it is, through all of AFTER.
     Whole,
-    /// At once.
+    /// Suddenly.
     Step,
     /// Gradually, to the end.
     Ramp,
@@ -70,7 +70,7 @@ fn thinned(all: &[f64], n: usize) -> Vec<f64> {
     all.iter().step_by(n.max(1)).copied().collect()
 }
 
-/// The course of a change whose shape is known. `kinds`: those that its name leaves open.
+/// How a change whose shape is known develops. `kinds`: those that its name allows.
 pub(super) fn of(
     cells: &[Cell],
     contrast: &Contrast,

@@ -230,7 +230,7 @@ fn began(m: &Moment) -> String {
 pub fn since(since: &Since) -> String {
     match since {
         Since::Beginning => "from the first recording on".into(),
-        Since::From(m) => format!("at once, {}", began(m)),
+        Since::From(m) => format!("suddenly, {}", began(m)),
         Since::Gradual(m) if m.high <= 0.0 => "gradually, from the first recording on".into(),
         Since::Gradual(m) => format!("gradually, {}", began(m)),
         Since::NotDetermined => "not determined".into(),

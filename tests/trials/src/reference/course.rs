@@ -1,4 +1,4 @@
-//! Changes that begin within the later runs, at once or gradually: whether they are found, and how far the time that is found is off.
+//! Changes that begin within the later runs, suddenly or gradually: whether they are found, and how far the time that is found is off.
 
 use pam_diagnose::reference::answer::{Moment, Since};
 use rayon::prelude::*;
@@ -23,13 +23,13 @@ pub const EFFECTS: [&str; 8] = [
 /// % of the largest force rms, once the change is there in full.
 pub const SIZES: [f64; 2] = [3.0, 5.0];
 
-/// How a change goes on.
+/// How a change continues.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Course {
     /// From the first run after on.
     Whole,
-    /// At once.
+    /// Suddenly.
     Step,
     /// Growing to the end.
     Ramp,
@@ -120,7 +120,7 @@ fn ask(
     let (told, moment): (&str, Option<&Moment>) = match named.map(|m| &m.since) {
         None => ("no name", None),
         Some(Since::Beginning) => ("beginning", None),
-        Some(Since::From(m)) => ("at once", Some(m)),
+        Some(Since::From(m)) => ("suddenly", Some(m)),
         Some(Since::Gradual(m)) => ("gradually", Some(m)),
         Some(Since::NotDetermined) => ("not determined", None),
     };

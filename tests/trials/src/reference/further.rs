@@ -1,4 +1,4 @@
-//! `trials reference-further`: two changes at once, and changes that begin within the later runs, on real recordings.
+//! `trials reference-further`: two simultaneous changes, and changes that begin within the later runs, on real recordings.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -46,7 +46,7 @@ fn quantile(values: &mut [f64], share: f64) -> f64 {
 fn two(t: &mut String, trials: &[together::Trial]) {
     let _ = writeln!(
         t,
-        "\n## Two changes at once\n\nIn each muscle, the later half of the runs gets two changes, each of the given size: every pair of the twelve. \
+        "\n## Two simultaneous changes\n\nIn each muscle, the later half of the runs gets two changes, each of the given size: every pair of the twelve. \
          \"In the set\": named, or among the causes that a name may be mistaken for. Rates with exact 95 % intervals.\n\n\
          | pairs | n | both exact | both classes | one class or more | both in the set | a name of a false class |\n\
          | --- | --- | --- | --- | --- | --- | --- |"
@@ -96,7 +96,7 @@ fn when(t: &mut String, trials: &[course::Trial]) {
     let _ = writeln!(
         t,
         "\n## Since when\n\nIn each muscle, one of eight changes begins within the later half of the runs, at a moment drawn by hash from the middle \
-         half of their time: at once, or growing to the end. \"Size\": once the change is there in full. \"Class right\": a zero that grows may be called a \
+         half of their time: suddenly, or growing to the end. \"Size\": once the change is there in full. \"Class right\": a zero that grows may be called a \
          drift, an offset of the stroke that comes an end slip. \"Error\": of the moment found, as a share of the time of AFTER.\n\n\
          | change | n | class right | course right | course wrong | right recording | error, median | error, 90 % | moment in the stated 95 % |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
@@ -107,7 +107,7 @@ fn when(t: &mut String, trials: &[course::Trial]) {
                 trials.iter().filter(|c| c.course == course && c.percent == percent).collect();
             let (name, right) = match course {
                 Course::Whole => ("from the beginning", "beginning"),
-                Course::Step => ("at once", "at once"),
+                Course::Step => ("suddenly", "suddenly"),
                 Course::Ramp => ("gradually", "gradually"),
             };
             let named: Vec<&course::Trial> = own.iter().copied().filter(|c| c.right).collect();
@@ -163,7 +163,7 @@ pub fn run(what: &Further) -> Result<(), Box<dyn Error>> {
     let half = what.half.as_deref().map_or_else(String::new, |h| format!(" --half {h}"));
     let mut text = format!(
         "# Two changes, and since when\n\n`host diagnose AFTER… --reference BEFORE…` is tested on real recordings of {} fluidic muscles (pressure staircases \
-         at held lengths): two changes at once, and changes that begin within the later recordings. Changes are added as in the [trials of \
+         at held lengths): two simultaneous changes, and changes that begin within the later recordings. Changes are added as in the [trials of \
          changes](proof-reference.md), by slopes that the recordings give. Nothing on this page is typed by hand:\n\n\
          ```text\ncargo run --release -p trials -- reference-further{half} -o DIR --page docs/src/proof-reference-further.md\n```\n",
         jobs.len()

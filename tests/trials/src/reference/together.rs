@@ -1,4 +1,4 @@
-//! Two changes at once in the later runs of real recordings.
+//! Two simultaneous changes in the later runs of real recordings.
 
 use rayon::prelude::*;
 use serde::Serialize;

@@ -42,7 +42,7 @@ pub(super) const CYLINDER: &str = "## Cylinder with another seal\n\nOne rig, ano
 
 /// The last section.
 pub(super) const UNTESTED: &str = "\n## Not tested\n\n\
-    - Several campaigns in the reference of strokes. Two changes at once and the time of a change have a [page of their \
+    - Several campaigns in the reference of strokes. Two simultaneous changes and the time of a change have a [page of their \
     own](proof-reference-further.md).\n\
     - A leak of a muscle that its valve supplies is not identifiable from force over measured pressure; strokes of a described muscle name it \
     only within the class of gains. What closed valves lose is not used.\n\
