@@ -312,7 +312,9 @@ mod tests {
     use pam_data::recording::{Campaign, Recording};
 
     /// N per m.
-    const SLOPE: f64 = 48e3;
+    fn slope() -> f64 {
+        48e3
+    }
 
     /// Strokes of 17 readings each way, 26 mm, in a campaign so long that a row holds two readings; every 97th force is an outlier.
     fn fast_strokes() -> Campaign {
@@ -322,7 +324,7 @@ mod tests {
         let ripple = |i: usize| ((i * 7 % 13) as f64 - 6.0) / 6.0;
         let force = |(i, x): (usize, &f64)| {
             let outlier = if i % 97 == 50 { 400.0 } else { 0.0 };
-            1300.0 - SLOPE * x + 0.5 * ripple(i) + outlier
+            1300.0 - slope() * x + 0.5 * ripple(i) + outlier
         };
         Campaign::new(vec![Recording {
             time: (0..n).map(|i| 0.1 * f64::from(i)).collect(),
@@ -339,7 +341,7 @@ mod tests {
         let (rows, _) = crate::rows::prepare(&fast_strokes(), &braid).expect("rows");
         let mut judged = 0;
         for (i, context) in rows.contexts().iter().enumerate().filter(|(i, _)| rows.root_weight()[*i] > 0.0) {
-            let error = rows.force[i] - (1300.0 - SLOPE * context.stroke);
+            let error = rows.force[i] - (1300.0 - slope() * context.stroke);
             assert!(error.abs() < 3.0, "row {i} at {:.1} mm: {error:.1} N", context.stroke * 1e3);
             judged += 1;
         }
