@@ -186,7 +186,7 @@ fn round(number: u32, fault: Fault, rig: &mut Rig, row: &mut Row) -> bool {
     let part = rig.folder().join(format!("{name}.part"));
     let mut ended = false;
     until(&format!("{fault:?}: samples are recorded"), || {
-        // One on a full disk ends by itself, later than that.
+        // One on a full disk ends on its own, but later.
         ended = fault != Fault::FullDisk && run.try_wait().is_ok_and(|ended| ended.is_some());
         ended || std::fs::metadata(&part).is_ok_and(|file| file.len() > 100_000)
     });
