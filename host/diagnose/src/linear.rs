@@ -5,18 +5,16 @@
 
 use rayon::prelude::*;
 
-use super::criteria::baseline::DEPENDENT_COLUMN;
+use super::criteria::baseline::{DEPENDENT_COLUMN, PRODUCT_PART};
 use super::criteria::candidates::MOST_AMPLITUDES;
-/// Rows from which the threads share one product. The parts do not depend on the number of threads, so the sum does not either.
-const PART: usize = 1 << 16;
 
 /// Sum of products.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    if a.len() <= PART {
+    if a.len() <= PRODUCT_PART {
         return dot_of_part(a, b);
     }
     let parts: Vec<f64> =
-        a.par_chunks(PART).zip(b.par_chunks(PART)).map(|(a, b)| dot_of_part(a, b)).collect();
+        a.par_chunks(PRODUCT_PART).zip(b.par_chunks(PRODUCT_PART)).map(|(a, b)| dot_of_part(a, b)).collect();
     parts.iter().sum()
 }
 
@@ -41,10 +39,12 @@ pub(crate) fn energy(a: &[f64]) -> f64 {
 /// `to += factor · from`.
 pub(crate) fn add_scaled(to: &mut [f64], factor: f64, from: &[f64]) {
     let add = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| *t += factor * f);
-    if to.len() <= PART {
+    if to.len() <= PRODUCT_PART {
         add(to, from);
     } else {
-        to.par_chunks_mut(PART).zip(from.par_chunks(PART)).for_each(|(to, from)| add(to, from));
+        to.par_chunks_mut(PRODUCT_PART)
+            .zip(from.par_chunks(PRODUCT_PART))
+            .for_each(|(to, from)| add(to, from));
     }
 }
 

@@ -30,18 +30,26 @@ use super::campaign::Points;
 use super::criteria::{HELD_NODES, HELD_ORDER, KEPT_ERRORS, MEMORY_KEPT_GAIN, SHORTENED};
 use round::{Round, Smoothing, dot};
 
-/// Places of `γ` and `π` among the unknowns; those of the layers' amplitudes follow, then `k_F` at the nodes, then the wall's curves.
-const GAMMA: usize = 0;
-const DEADBAND: usize = 1;
-const LAYERS: usize = 2;
-/// Amplitudes of the memory; `k_F` acts on them.
-pub(super) const MEMORY: usize = 3;
-/// Amplitudes of the friction that follows pressure: `μ` with `μ_0 = −μ`, which is none at rest length, and `μ_0` alone.
-const GAP: usize = 2;
-const FRICTION: usize = LAYERS + MEMORY + GAP;
+/// Where the unknowns stand.
+struct Places {
+    /// `γ`.
+    gamma: usize,
+    /// `π`.
+    deadband: usize,
+    /// The first amplitude: those of the memory, on which `k_F` acts, then those of the friction that follows pressure.
+    layers: usize,
+    /// How many amplitudes the memory has.
+    memory: usize,
+    /// `k_F` at the first node; the wall's curves follow.
+    friction: usize,
+}
 
-/// Which amplitudes are fitted: those of the memory, then those of the friction that follows pressure.
-pub(super) type Open = [bool; MEMORY + GAP];
+const AT: Places = Places { gamma: 0, deadband: 1, layers: 2, memory: 3, friction: 7 };
+
+/// Amplitudes: three of the memory; of the friction that follows pressure `μ` with `μ_0 = −μ`, which is none at rest length, and `μ_0` alone.
+pub(super) type Amplitudes = [f64; 5];
+/// Which amplitudes are fitted.
+pub(super) type Open = [bool; 5];
 
 /// What is fitted, and beside which table.
 pub(super) struct Problem<'a> {
@@ -72,7 +80,7 @@ pub(super) struct Problem<'a> {
 #[derive(Clone)]
 pub(super) struct Solution {
     pub(super) table: MuscleTable,
-    pub(super) amplitudes: [f64; MEMORY + GAP],
+    pub(super) amplitudes: Amplitudes,
     /// Sum of squared residuals, N².
     pub(super) squares: f64,
     /// The same over the runs of each group when it is left out, N².
@@ -141,12 +149,12 @@ impl<'a> Problem<'a> {
     }
 
     fn unknowns(&self) -> usize {
-        FRICTION + self.basis.nodes().len() * (1 + self.directions.ncols())
+        AT.friction + self.basis.nodes().len() * (1 + self.directions.ncols())
     }
 
     /// Place of the first value of a wall's curve.
     fn curve(&self, q: usize) -> usize {
-        FRICTION + self.basis.nodes().len() * (1 + q)
+        AT.friction + self.basis.nodes().len() * (1 + q)
     }
 
     /// The solution with the columns of the memory, after the last solution.
@@ -172,7 +180,7 @@ impl<'a> Problem<'a> {
         let table = self.table(&parameters)?;
         let nodes = self.basis.nodes().len();
         let friction: Vec<f64> =
-            self.phi.iter().map(|phi| dot(phi, &parameters[FRICTION..FRICTION + nodes])).collect();
+            self.phi.iter().map(|phi| dot(phi, &parameters[AT.friction..AT.friction + nodes])).collect();
         let squares = (0..self.points.len())
             .map(|i| match (self.pulls[i], self.slack[i]) {
                 (true, _) => (round.pull(&parameters, i) - self.force[i]).powi(2),
@@ -183,12 +191,12 @@ impl<'a> Problem<'a> {
         let without_friction = (0..self.points.len())
             .map(|i| {
                 let statics: f64 = self.static_row(i).iter().map(|(a, x)| x * parameters[*a]).sum();
-                let memory: f64 = (0..MEMORY).map(|a| columns[a][i] * parameters[LAYERS + a]).sum();
+                let memory: f64 = (0..AT.memory).map(|a| columns[a][i] * parameters[AT.layers + a]).sum();
                 // The columns contain the friction.
                 statics + memory / (1.0 - f64::from(self.points.direction[i]) * friction[i])
             })
             .collect();
-        let amplitudes = std::array::from_fn(|a| parameters[LAYERS + a]);
+        let amplitudes = std::array::from_fn(|a| parameters[AT.layers + a]);
         let left_out = round.left_out(smoothing);
         Some(Solution {
             table,
@@ -206,7 +214,7 @@ impl<'a> Problem<'a> {
     fn static_row(&self, i: usize) -> Vec<(usize, f64)> {
         let m = self.points.mounting[i];
         let area = self.area[m];
-        let mut row = vec![(GAMMA, self.points.pressure[i] * 1e3 * area), (DEADBAND, -area)];
+        let mut row = vec![(AT.gamma, self.points.pressure[i] * 1e3 * area), (AT.deadband, -area)];
         if let Some(l) = self.length[m] {
             for q in 0..self.directions.ncols() {
                 let (first, w) = (self.curve(q), self.directions[(l, q)]);
@@ -218,14 +226,14 @@ impl<'a> Problem<'a> {
 
     /// The table that the unknowns are; `None` where it is none.
     fn table(&self, parameters: &[f64]) -> Option<MuscleTable> {
-        let gamma = parameters[GAMMA];
+        let gamma = parameters[AT.gamma];
         if !(gamma > 0.0) {
             return None;
         }
         let mut table = self.base.clone();
         table.effects.clear();
         table.geometry.outer_diameter = table.geometry.outer_diameter * gamma.sqrt() as f32;
-        table.deadband = Pressure::from_pascals((parameters[DEADBAND] / gamma) as f32);
+        table.deadband = Pressure::from_pascals((parameters[AT.deadband] / gamma) as f32);
         let braid: Braid<f64> = table.geometry.cast().build().ok()?;
         let columns = elastic_columns(&braid, &self.strokes);
         let scale: Vec<f64> = columns.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE)).collect();
@@ -242,7 +250,8 @@ impl<'a> Problem<'a> {
                 table.elastic[k][j] = (moduli[k] / scale) as f32;
             }
         }
-        table.friction = parameters[FRICTION..FRICTION + nodes.len()].iter().map(|k| *k as f32).collect();
+        table.friction =
+            parameters[AT.friction..AT.friction + nodes.len()].iter().map(|k| *k as f32).collect();
         table.check().is_ok().then_some(table)
     }
 
@@ -255,7 +264,7 @@ impl<'a> Problem<'a> {
             let model = (1.0 - s * solution.friction[*i]) * solution.without_friction[*i];
             let pressure = self.points.pressure[*i] * 1e3;
             let blocked =
-                (parameters[GAMMA] * pressure - parameters[DEADBAND]) * posture(&self.braid, 0.0).area;
+                (parameters[AT.gamma] * pressure - parameters[AT.deadband]) * posture(&self.braid, 0.0).area;
             100.0 * (model - self.force[*i]).abs() / blocked.max(self.least)
         };
         let errors: Vec<f64> = pulling.iter().map(of).collect();

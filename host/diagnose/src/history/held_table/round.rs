@@ -6,7 +6,7 @@ use super::super::criteria::{
     HELD_BOUND_ROUNDS, HELD_FLATNESS, HELD_FOLDS, HELD_GAMMA_ERROR, HELD_NEXT_COEFFICIENT, HELD_RESIDUAL,
     HELD_SMOOTHNESS,
 };
-use super::{DEADBAND, FRICTION, GAMMA, LAYERS, Open, Problem, Solution};
+use super::{AT, Open, Problem, Solution};
 
 /// Weights of the penalties on the curves over pressure.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,8 +53,8 @@ impl<'a> Round<'a> {
             let mut row = problem.static_row(i);
             // `F ≈ (1 − s k) T(θ) − s (k' − k) T`: linear in θ and k'.
             row.iter_mut().for_each(|(_, x)| *x *= 1.0 - s * friction);
-            row.extend((0..open.len()).filter(|a| open[*a]).map(|a| (LAYERS + a, columns[a][i])));
-            row.extend(problem.phi[i].iter().enumerate().map(|(j, phi)| (FRICTION + j, -s * phi * bare)));
+            row.extend((0..open.len()).filter(|a| open[*a]).map(|a| (AT.layers + a, columns[a][i])));
+            row.extend(problem.phi[i].iter().enumerate().map(|(j, phi)| (AT.friction + j, -s * phi * bare)));
             rows.push(row);
             right.push(problem.force[i] - s * friction * bare);
         }
@@ -108,7 +108,7 @@ impl<'a> Round<'a> {
                 }
             }
         };
-        smooth(FRICTION, problem.largest);
+        smooth(AT.friction, problem.largest);
         (0..problem.directions.ncols()).for_each(|q| smooth(problem.curve(q), 1.0));
         let variance = (HELD_RESIDUAL * problem.largest).powi(2);
         let mut prior = |unknown: usize, value: f64, error: f64| {
@@ -121,9 +121,9 @@ impl<'a> Round<'a> {
             let error = problem.largest * HELD_NEXT_COEFFICIENT.powi(q as i32);
             (0..nodes.len()).for_each(|j| prior(problem.curve(q) + j, 0.0, error));
         }
-        prior(GAMMA, 1.0, HELD_GAMMA_ERROR);
+        prior(AT.gamma, 1.0, HELD_GAMMA_ERROR);
         let high = problem.points.highest() * 1e3;
-        prior(DEADBAND, 0.1 * high, high);
+        prior(AT.deadband, 0.1 * high, high);
         (matrix, moment)
     }
 
@@ -143,7 +143,7 @@ impl<'a> Round<'a> {
     fn not_negative(&self, matrix: &Symmetric, moment: &[f64]) -> Vec<f64> {
         let nodes = self.problem.basis.nodes().len();
         let mut closed: Vec<usize> =
-            (0..self.open.len()).filter(|a| !self.open[*a]).map(|a| LAYERS + a).collect();
+            (0..self.open.len()).filter(|a| !self.open[*a]).map(|a| AT.layers + a).collect();
         loop {
             let mut held = matrix.clone();
             for a in &closed {
@@ -153,7 +153,7 @@ impl<'a> Round<'a> {
             closed.iter().for_each(|a| solved[*a] = 0.0);
             let negative = |a: &usize| solved[*a] * matrix.at(*a, *a).sqrt();
             // A wall relaxes, a contact spreads with time and takes pressure, friction resists.
-            let worst = (LAYERS..FRICTION + nodes)
+            let worst = (AT.layers..AT.friction + nodes)
                 .filter(|a| solved[*a] < 0.0 && !closed.contains(a))
                 .min_by(|a, b| negative(a).total_cmp(&negative(b)));
             match worst {
