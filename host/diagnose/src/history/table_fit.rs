@@ -1,6 +1,6 @@
 //! The memory in a table: the catalogue's `bladder-creep` beside a base model, fitted to the settled points of a campaign.
 //!
-//! The dimensions are those of the base model's fit; table and memory are then one least-squares problem ([`super::held_table`]).
+//! The dimensions are those of the base model's fit; table and memory are then one least-squares problem (`held_table`).
 //! The zero of the load cell is subtracted first, and the table contains it as `force-offset`.
 
 use model_core::effects::EffectName;
