@@ -7,10 +7,10 @@ use std::net::{Shutdown, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::line::open_pty;
-use crate::program;
+use crate::{patience, program};
 
 /// How long the test waits for what must happen on any machine.
 pub const PATIENCE: Duration = Duration::from_secs(300);
@@ -32,12 +32,8 @@ pub struct State {
 ///
 /// # Panics
 /// When it does not within the patience.
-pub fn until(what: &str, mut holds: impl FnMut() -> bool) {
-    let deadline = Instant::now() + PATIENCE;
-    while !holds() {
-        assert!(Instant::now() < deadline, "never: {what}");
-        thread::sleep(Duration::from_millis(10));
-    }
+pub fn until(what: &str, holds: impl FnMut() -> bool) {
+    patience::until(PATIENCE, what, holds);
 }
 
 fn first_line(child: &mut Child) -> (String, BufReader<std::process::ChildStdout>) {

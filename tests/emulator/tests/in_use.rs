@@ -3,11 +3,12 @@
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use emulator_tests::follower::Follower;
 use emulator_tests::machine::Folder;
-use emulator_tests::{program, shared_line};
-use firmware::board::{Inputs, Outputs, Readings};
+use emulator_tests::{patience, program, shared_line};
+use firmware::board::Outputs;
 use firmware::native::{Device, Options};
 use model_core::link::endpoints::{GetStatus, StartMode};
 use model_core::link::messages::{Mode, Reference, SetPoint, Start, State};
@@ -17,18 +18,8 @@ use pam_device::{Address, Client};
 
 /// A controller whose muscle follows its command within 30 ms.
 fn device() -> Device {
-    let (mut pressure_pa, mut tick) = (0.0_f32, 0_u32);
-    let plant = move |outputs: &Outputs| {
-        let command = outputs.sides[0];
-        let target = if command.vent { 0.0 } else { command.pressure_pa };
-        pressure_pa += (target - pressure_pa) / 31.0;
-        tick += 1;
-        // Live sensors never read the same twice.
-        let wiggle = (tick % 7) as f32 - 3.0;
-        let now =
-            Readings { pressure_pa: pressure_pa + wiggle, stroke_m: 1e-7 * wiggle, force_n: 1e-3 * wiggle };
-        Inputs { sides: [Some(now.into()), None], ..Inputs::default() }
-    };
+    let mut muscle = Follower::default();
+    let plant = move |outputs: &Outputs| muscle.exchange(outputs);
     Device::start("127.0.0.1:0", Options::default(), plant).expect("a controller")
 }
 
@@ -95,12 +86,8 @@ fn running(line: SocketAddr, folder: &Folder, seconds: &str) -> Child {
     first.expect("the program starts")
 }
 
-fn until(what: &str, mut happens: impl FnMut() -> bool) {
-    let deadline = Instant::now() + Duration::from_secs(60);
-    while !happens() {
-        assert!(Instant::now() < deadline, "{what}: it does not happen");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+fn until(what: &str, happens: impl FnMut() -> bool) {
+    patience::until(Duration::from_secs(60), what, happens);
 }
 
 /// Ticks of the samples in a recording.

@@ -17,9 +17,10 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use emulator_tests::follower::Follower;
 use emulator_tests::machine::Folder;
 use emulator_tests::program;
-use firmware::board::{Inputs, Outputs, Readings};
+use firmware::board::Outputs;
 use firmware::native::{Device, Options};
 use serde_json::{Value, json};
 
@@ -40,7 +41,7 @@ struct Valve {
 /// A controller in real time whose muscle follows its command within 30 ms.
 fn controller(valve: &Arc<Valve>) -> Device {
     let valve = Arc::clone(valve);
-    let (mut pressure_pa, mut tick) = (0.0_f32, 0_u64);
+    let mut muscle = Follower::default();
     let exchange = move |outputs: &Outputs| {
         let command = outputs.sides[0];
         if command.vent && valve.open.swap(false, Ordering::SeqCst) {
@@ -48,14 +49,7 @@ fn controller(valve: &Arc<Valve>) -> Device {
         } else if !command.vent {
             valve.open.store(true, Ordering::SeqCst);
         }
-        let target = if command.vent { 0.0 } else { command.pressure_pa };
-        pressure_pa += (target - pressure_pa) / 31.0;
-        tick += 1;
-        // Live sensors never read the same twice.
-        let wiggle = (tick % 7) as f32 - 3.0;
-        let now =
-            Readings { pressure_pa: pressure_pa + wiggle, stroke_m: 1e-7 * wiggle, force_n: 1e-3 * wiggle };
-        Inputs { sides: [Some(now.into()), None], ..Inputs::default() }
+        muscle.exchange(outputs)
     };
     Device::start("127.0.0.1:0", Options::default(), exchange).expect("a controller")
 }

@@ -6,12 +6,13 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use emulator_tests::faulty_line::FaultyLine;
+use emulator_tests::follower::Follower;
 use emulator_tests::machine::Folder;
-use emulator_tests::program;
-use firmware::board::{Inputs, Outputs, Readings};
+use emulator_tests::{patience, program};
+use firmware::board::Outputs;
 use firmware::native::{Device, Options};
 use model_core::link::endpoints::{ClearFault, GetStatus};
 use model_core::link::messages::State;
@@ -23,12 +24,8 @@ use super::recording::{Recorded, recorded};
 /// A machine with many other tasks needs some time; who waits longer waits for nothing.
 const HOPELESS: Duration = Duration::from_secs(120);
 
-pub fn until(what: &str, mut happens: impl FnMut() -> bool) {
-    let deadline = Instant::now() + HOPELESS;
-    while !happens() {
-        assert!(Instant::now() < deadline, "{what}: it does not happen");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+pub fn until(what: &str, happens: impl FnMut() -> bool) {
+    patience::until(HOPELESS, what, happens);
 }
 
 pub fn signal(program: &Child, signal: Signal) {
@@ -78,7 +75,7 @@ impl Plant {
 
     fn device(self: &Arc<Self>) -> Device {
         let plant = Arc::clone(self);
-        let mut pressure_pa = 0.0_f32;
+        let mut muscle = Follower::default();
         let exchange = move |outputs: &Outputs| {
             let tick = plant.ticks.fetch_add(1, Ordering::SeqCst) + 1;
             let command = outputs.sides[0];
@@ -87,18 +84,9 @@ impl Plant {
             } else if !plant.is_vented() {
                 plant.vented.store(tick, Ordering::SeqCst);
             }
-            let target = if command.vent { 0.0 } else { command.pressure_pa };
-            // A muscle that follows its command within 30 ms.
-            pressure_pa += (target - pressure_pa) / 31.0;
-            plant.pascals.store(pressure_pa as u64, Ordering::SeqCst);
-            // Live sensors never read the same twice.
-            let wiggle = (tick % 7) as f32 - 3.0;
-            let now = Readings {
-                pressure_pa: pressure_pa + wiggle,
-                stroke_m: 1e-7 * wiggle,
-                force_n: 1e-3 * wiggle,
-            };
-            Inputs { sides: [Some(now.into()), None], ..Inputs::default() }
+            let inputs = muscle.exchange(outputs);
+            plant.pascals.store(muscle.pressure_pa() as u64, Ordering::SeqCst);
+            inputs
         };
         Device::start("127.0.0.1:0", Options::default(), exchange).expect("a controller")
     }
