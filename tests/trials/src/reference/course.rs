@@ -5,21 +5,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use super::injection::{Slopes, inject};
+use super::injection::{Slopes, immediate, inject};
 use super::staircases::{Muscle, Run};
 use super::{class, compared};
 
-/// What is put in: changes that are there from one reading to the next.
-pub const EFFECTS: [&str; 8] = [
-    "force-offset",
-    "force-gain",
-    "gauge-gain",
-    "gauge-offset",
-    "cross-talk",
-    "displacement-offset",
-    "coulomb-friction",
-    "rig-compliance",
-];
 /// % of the largest force rms, once the change is there in full.
 pub const SIZES: [f64; 2] = [3.0, 5.0];
 
@@ -146,7 +135,7 @@ fn ask(
 pub fn run(muscles: &[(&Muscle, &Slopes)]) -> Result<Vec<Trial>, String> {
     let mut jobs = Vec::new();
     for (muscle, slopes) in muscles {
-        for effect in EFFECTS {
+        for effect in immediate() {
             for percent in SIZES {
                 for course in [Course::Whole, Course::Step, Course::Ramp] {
                     jobs.push((*muscle, *slopes, effect, percent, course));

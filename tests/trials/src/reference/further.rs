@@ -6,6 +6,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
+use pam_data::statistics::quantile;
 
 use super::course::{self, Course};
 use super::injection::Slopes;
@@ -26,21 +27,12 @@ pub struct Further {
     #[arg(long)]
     page: Option<PathBuf>,
     /// Only one half of the muscles: development or final.
-    #[arg(long)]
+    #[arg(long, value_parser = ["development", "final"])]
     half: Option<String>,
 }
 
 fn rate<T>(of: &[&T], right: impl Fn(&T) -> bool) -> Rate {
     Rate::new(of.iter().filter(|o| right(o)).count(), of.len())
-}
-
-/// The value that a share of sorted values lies below.
-fn quantile(values: &mut [f64], share: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values
-        .get(((share * values.len() as f64) as usize).min(values.len().saturating_sub(1)))
-        .copied()
-        .unwrap_or(f64::NAN)
 }
 
 fn two(t: &mut String, trials: &[together::Trial]) {
@@ -120,15 +112,18 @@ fn when(t: &mut String, trials: &[course::Trial]) {
                 Course::Whole => ("–".into(), "–".into()),
                 _ => (rate(&told, |c| c.recording).to_string(), inside.to_string()),
             };
-            let share = |v: f64| if v.is_finite() { format!("{:.1} %", 100.0 * v) } else { "–".into() };
+            let mut error = |share: f64| match errors.as_mut_slice() {
+                [] => "–".to_owned(),
+                errors => format!("{:.1} %", 100.0 * quantile(errors, share)),
+            };
             let _ = writeln!(
                 t,
                 "| {name}, {percent} % | {} | {} | {} | {wrong} | {recording} | {} | {} | {inside} |",
                 own.len(),
                 rate(&own, |c| c.right),
                 rate(&named, |c| c.told == right),
-                share(quantile(&mut errors, 0.5)),
-                share(quantile(&mut errors, 0.9))
+                error(0.5),
+                error(0.9)
             );
         }
     }

@@ -19,12 +19,19 @@ pub const EFFECTS: [&str; 12] = [
     "sensor-delay",
     "pressure-sensor-lag",
 ];
+/// Those of them that grow, come in the middle, or shift a channel in time: the others are there from one reading to the next.
+const OVER_TIME: [&str; 4] = ["force-drift", "end-slip", "sensor-delay", "pressure-sensor-lag"];
 const NODES: usize = 65;
 /// Pa: ends of the curves and width of their kernel.
 const ENDS: (f64, f64) = (5e3, 645e3);
 const WIDTH: f64 = 20e3;
 /// s: longest lag put in.
 const LONGEST: f64 = 2.0;
+
+/// The effects that are there from one reading to the next.
+pub fn immediate() -> impl Iterator<Item = &'static str> {
+    EFFECTS.into_iter().filter(|effect| !OVER_TIME.contains(effect))
+}
 
 /// Mean curves of all runs of a muscle, for the slopes.
 pub struct Slopes {
