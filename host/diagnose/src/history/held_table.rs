@@ -21,14 +21,16 @@ use model_core::effects::{EffectName, FittedEffect};
 use model_core::table::MuscleTable;
 use model_core::units::{Length, Pressure};
 use nalgebra::{DMatrix, DVector};
+use pam_fit::numerics::jackknife::covariance_root;
 use pam_fit::numerics::spline_basis::SplineBasis;
+use pam_fit::numerics::symmetric::dot;
 use pam_fit::table_file::{FitQuality, Uncertainty};
 
 mod round;
 
 use super::campaign::Points;
 use super::criteria::{HELD_NODES, HELD_ORDER, KEPT_ERRORS, MEMORY_KEPT_GAIN, SHORTENED};
-use round::{Round, Smoothing, dot};
+use round::{Round, Smoothing};
 
 /// Where the unknowns stand.
 struct Places {
@@ -83,8 +85,6 @@ pub(super) struct Solution {
     pub(super) amplitudes: Amplitudes,
     /// Sum of squared residuals, N².
     pub(super) squares: f64,
-    /// The same over the runs of each group when it is left out, N².
-    pub(super) left_out: Vec<f64>,
     smoothing: Smoothing,
     parameters: Vec<f64>,
     /// `k_F` and the force without friction at each point.
@@ -170,6 +170,17 @@ impl<'a> Problem<'a> {
         self.solution(&round, smoothing, parameters, columns)
     }
 
+    /// Squared errors of each group of runs when it is left out of the round of `solve` that gave a solution, N².
+    pub(super) fn left_out(
+        &self,
+        columns: &[Vec<f64>],
+        open: Open,
+        last: Option<&Solution>,
+        solution: &Solution,
+    ) -> Vec<f64> {
+        Round::new(self, columns, open, last).left_out(solution.smoothing)
+    }
+
     fn solution(
         &self,
         round: &Round<'_>,
@@ -197,17 +208,7 @@ impl<'a> Problem<'a> {
             })
             .collect();
         let amplitudes = std::array::from_fn(|a| parameters[AT.layers + a]);
-        let left_out = round.left_out(smoothing);
-        Some(Solution {
-            table,
-            amplitudes,
-            squares,
-            left_out,
-            smoothing,
-            parameters,
-            friction,
-            without_friction,
-        })
+        Some(Solution { table, amplitudes, squares, smoothing, parameters, friction, without_friction })
     }
 
     /// The columns of the static part without friction.
@@ -283,20 +284,20 @@ impl<'a> Problem<'a> {
     pub(super) fn uncertainty(&self, columns: &[Vec<f64>], solution: &Solution) -> Option<Uncertainty> {
         let round = Round::new(self, columns, solution.amplitudes.map(|a| a != 0.0), Some(solution));
         let all: Option<Vec<Vec<f64>>> = (0..round.folds.len())
-            .map(|fold| self.table(&round.unconstrained(solution.smoothing, Some(fold))).map(|t| numbers(&t)))
+            .map(|fold| self.table(&round.without(fold, solution.smoothing)).map(|t| numbers(&t)))
             .collect();
         let all = all.filter(|all| all.len() > 1)?;
         let count = all.len() as f64;
         let rows = all[0].len();
         let mean: Vec<f64> = (0..rows).map(|r| all.iter().map(|n| n[r]).sum::<f64>() / count).collect();
-        let factor = ((count - 1.0) / count).sqrt();
-        let root =
-            (0..rows).flat_map(|r| all.iter().map(move |n| (r, n))).map(|(r, n)| factor * (n[r] - mean[r]));
+        let changes: Vec<Vec<f64>> =
+            all.iter().map(|n| n.iter().zip(&mean).map(|(n, mean)| n - mean).collect()).collect();
+        let root = covariance_root(&changes, rows);
         let used = self.pulls.iter().filter(|p| **p).count().max(1) as f64;
         Some(Uncertainty {
-            rows: rows as u32,
-            columns: all.len() as u32,
-            root: root.collect(),
+            rows: root.rows as u32,
+            columns: root.columns as u32,
+            root: root.s,
             residual_newtons: (solution.squares / used).sqrt(),
         })
     }
@@ -332,17 +333,16 @@ fn elastic_columns(braid: &Braid<f64>, strokes: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(strokes.len(), order, |l, k| columns[l][k])
 }
 
-impl Solution {
-    /// Whether left-out runs are predicted better than by another solution: by a share of their squares, and beyond the scatter of the
-    /// groups.
-    pub(super) fn predicts_better_than(&self, other: &Self) -> bool {
-        let gains: Vec<f64> = other.left_out.iter().zip(&self.left_out).map(|(o, s)| o - s).collect();
-        let (count, gain) = (gains.len() as f64, gains.iter().sum::<f64>());
-        let variance = gains.iter().map(|g| (g - gain / count).powi(2)).sum::<f64>() / (count - 1.0);
-        let before: f64 = other.left_out.iter().sum();
-        gain > MEMORY_KEPT_GAIN * before && gain > KEPT_ERRORS * (count * variance).sqrt()
-    }
+/// Whether left-out runs are predicted better: by a share of their squares, and beyond the scatter of the groups.
+pub(super) fn predicts_better(with: &[f64], without: &[f64]) -> bool {
+    let gains: Vec<f64> = without.iter().zip(with).map(|(o, s)| o - s).collect();
+    let (count, gain) = (gains.len() as f64, gains.iter().sum::<f64>());
+    let variance = gains.iter().map(|g| (g - gain / count).powi(2)).sum::<f64>() / (count - 1.0);
+    let before: f64 = without.iter().sum();
+    gain > MEMORY_KEPT_GAIN * before && gain > KEPT_ERRORS * (count * variance).sqrt()
+}
 
+impl Solution {
     /// The table with the layers that have a share.
     pub(super) fn with_layers(&self, width: f64) -> MuscleTable {
         let [c, b, d, growing, constant] = self.amplitudes;

@@ -15,7 +15,7 @@ use pam_fit::{Options as FitOptions, table_alone};
 
 use super::campaign::{self, Points};
 use super::criteria::{PULLS, RAMP, TABLE_LEAST_DEADBAND, TABLE_LEAST_SLACK, TABLE_ROUNDS, TABLE_WIDTHS};
-use super::held_table::{Open, Problem, Solution};
+use super::held_table::{Open, Problem, Solution, predicts_better};
 use super::law::thresholds_of;
 use super::staircase;
 
@@ -57,6 +57,22 @@ pub fn settled(campaign: &Campaign) -> Campaign {
         recordings: campaign.recordings.iter().map(of).collect(),
         clock: campaign.clock,
         warnings: campaign.warnings.clone(),
+    }
+}
+
+/// A solution, and the last round that gave it.
+struct Found {
+    solution: Solution,
+    open: Open,
+    /// `P_c`, Pa.
+    width: f64,
+    columns: Vec<Vec<f64>>,
+    before: Option<Solution>,
+}
+
+impl Found {
+    fn left_out(&self, problem: &Problem<'_>) -> Vec<f64> {
+        problem.left_out(&self.columns, self.open, self.before.as_ref(), &self.solution)
     }
 }
 
@@ -126,26 +142,26 @@ impl<'a> Prepared<'a> {
         let Some(problem) = problem else { return Ok(self.base()) };
         let memory = layers == Layers::Memory;
         let widths = TABLE_WIDTHS.iter().flat_map(|width| [(*width, true), (*width, false)]);
-        let mut best: Option<(Solution, Open, f64)> = None;
+        let mut best: Option<Found> = None;
         for (width, contact) in
             widths.filter(|(width, contact)| memory || *contact || *width == TABLE_WIDTHS[0])
         {
             let open = [memory, memory, contact, false, false];
             let possible = |s: &Solution| f64::from(s.table.deadband.pascals()) > TABLE_LEAST_DEADBAND;
-            let better = |s: &Solution| best.as_ref().is_none_or(|(b, ..)| s.squares < b.squares);
-            if let Some(found) =
-                self.rounds(&problem, &bare, open, width)?.filter(|s| possible(s) && better(s))
-            {
-                best = Some((found, open, width));
+            let better = |s: &Solution| best.as_ref().is_none_or(|b| s.squares < b.solution.squares);
+            let found = self.rounds(&problem, &bare, open, width)?;
+            if let Some(found) = found.filter(|f| possible(&f.solution) && better(&f.solution)) {
+                best = Some(found);
             }
         }
-        let Some((mut solution, open, width)) = best else { return Ok(self.base()) };
-        let with_gap = [open[0], open[1], open[2], true, true];
-        if let Some(found) = self.rounds(&problem, &bare, with_gap, width)?
-            && found.predicts_better_than(&solution)
+        let Some(mut best) = best else { return Ok(self.base()) };
+        let [wall, growing, contact, ..] = best.open;
+        if let Some(found) = self.rounds(&problem, &bare, [wall, growing, contact, true, true], best.width)?
+            && predicts_better(&found.left_out(&problem), &best.left_out(&problem))
         {
-            solution = found;
+            best = found;
         }
+        let Found { solution, width, .. } = best;
         let about = if self.used.iter().all(|used| *used) {
             self.about(&problem, &bare, &solution, width)?
         } else {
@@ -174,17 +190,18 @@ impl<'a> Prepared<'a> {
         bare: &TableFile,
         open: Open,
         width: f64,
-    ) -> Result<Option<Solution>> {
+    ) -> Result<Option<Found>> {
         let mut file = bare.clone();
-        let mut last: Option<Solution> = None;
+        let mut found: Option<Found> = None;
         for _ in 0..TABLE_ROUNDS {
             let columns = self.columns(&file, width)?;
-            let Some(solution) = problem.solve(&columns, open, last.as_ref()) else { return Ok(None) };
+            let before = found.map(|f| f.solution);
+            let Some(solution) = problem.solve(&columns, open, before.as_ref()) else { return Ok(None) };
             file.table = solution.table.clone();
             file.table.goes_slack = self.base.table.goes_slack;
-            last = Some(solution);
+            found = Some(Found { solution, open, width, columns, before });
         }
-        Ok(last)
+        Ok(found)
     }
 
     /// What the file tells.

@@ -1,6 +1,6 @@
 //! One round of the least-squares problem: rows that are linear in the unknowns, penalties, bounds, and the choice of the smoothing.
 
-use pam_fit::numerics::symmetric::Symmetric;
+use pam_fit::numerics::symmetric::{Symmetric, dot};
 
 use super::super::criteria::{
     HELD_BOUND_ROUNDS, HELD_FLATNESS, HELD_FOLDS, HELD_GAMMA_ERROR, HELD_NEXT_COEFFICIENT, HELD_RESIDUAL,
@@ -127,15 +127,19 @@ impl<'a> Round<'a> {
         (matrix, moment)
     }
 
-    /// The solution without one fold; friction and amplitudes are not negative.
-    pub(super) fn unconstrained(&self, smoothing: Smoothing, without: Option<usize>) -> Vec<f64> {
+    /// Normal equations of all folds but one, with the penalties.
+    fn normal(&self, smoothing: Smoothing, without: Option<usize>) -> (Symmetric, Vec<f64>) {
         let (mut matrix, mut moment) = self.penalty(smoothing);
-        for (index, fold) in self.folds.iter().enumerate() {
-            if Some(index) != without {
-                matrix.add_scaled(&fold.matrix, 1.0);
-                moment.iter_mut().zip(&fold.moment).for_each(|(m, r)| *m += r);
-            }
+        for (_, fold) in self.folds.iter().enumerate().filter(|(index, _)| Some(*index) != without) {
+            matrix.add_scaled(&fold.matrix, 1.0);
+            moment.iter_mut().zip(&fold.moment).for_each(|(m, r)| *m += r);
         }
+        (matrix, moment)
+    }
+
+    /// The solution without one fold, and without the bounds of a slack muscle.
+    pub(super) fn without(&self, fold: usize, smoothing: Smoothing) -> Vec<f64> {
+        let (matrix, moment) = self.normal(smoothing, Some(fold));
         self.not_negative(&matrix, &moment)
     }
 
@@ -165,11 +169,7 @@ impl<'a> Round<'a> {
 
     /// The solution that pulls a slack muscle no more than it reads.
     pub(super) fn solve(&self, smoothing: Smoothing) -> Vec<f64> {
-        let (mut matrix, mut moment) = self.penalty(smoothing);
-        for fold in &self.folds {
-            matrix.add_scaled(&fold.matrix, 1.0);
-            moment.iter_mut().zip(&fold.moment).for_each(|(m, r)| *m += r);
-        }
+        let (mut matrix, mut moment) = self.normal(smoothing, None);
         let mut parameters = self.not_negative(&matrix, &moment);
         let mut bound = vec![false; self.rows.len()];
         for _ in 0..HELD_BOUND_ROUNDS {
@@ -200,7 +200,7 @@ impl<'a> Round<'a> {
     /// Squared errors of each group of runs when it is left out, N².
     pub(super) fn left_out(&self, smoothing: Smoothing) -> Vec<f64> {
         let of = |(index, fold): (usize, &Fold)| {
-            let parameters = self.unconstrained(smoothing, Some(index));
+            let parameters = self.without(index, smoothing);
             fold.matrix.quadratic(&parameters) - 2.0 * dot(&fold.moment, &parameters) + fold.squares
         };
         self.folds.iter().enumerate().map(of).collect()
@@ -217,8 +217,4 @@ impl<'a> Round<'a> {
         let best = scored.min_by(|a, b| a.0.total_cmp(&b.0));
         best.map_or(Smoothing { curvature: 1.0, slope: 1.0 }, |(_, s)| s)
     }
-}
-
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -303,10 +303,8 @@ impl Cells {
             .help("record the same pressures over the same stroke"));
         }
         let slipped = rests::slipped(&cells, &difference, &spread, &half_gap);
-        for (variance, gap) in
-            spread.iter_mut().zip(&half_gap).zip(&slipped).filter(|(_, s)| **s).map(|(v, _)| v)
-        {
-            *variance += (2.0 * gap).powi(2);
+        for i in (0..cells.len()).filter(|i| slipped[*i]) {
+            spread[i] += (2.0 * half_gap[i]).powi(2);
         }
         let mut rests: Vec<usize> =
             cells.iter().zip(&slipped).filter(|(_, s)| **s).map(|(c, _)| c.rest).collect();
