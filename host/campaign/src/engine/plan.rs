@@ -116,9 +116,7 @@ impl Engine {
                 seconds: best.seconds,
             });
         }
-        if plan.steps.iter().any(|p| p.step != CLOSING)
-            && plan.steps.last().is_some_and(|p| p.step != CLOSING)
-        {
+        if plan.steps.last().is_some_and(|p| p.step != CLOSING) {
             plan.steps.push(Planned {
                 step: CLOSING,
                 why: words::CLOSING.to_owned(),

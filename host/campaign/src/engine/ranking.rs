@@ -1,5 +1,7 @@
 //! The steps of the menu by what they are expected to tell per second: one ranking for campaigns and for plans.
 
+use std::borrow::Cow;
+
 use pam_data::recording::Recording;
 use rayon::prelude::*;
 
@@ -76,8 +78,11 @@ impl Engine {
             _ => None,
         });
         let checked: Vec<CheckKind> = self.checks.iter().map(|c| c.0).chain(planned_checks).collect();
-        let mut past = self.recordings.clone();
-        past.extend(planned.iter().filter_map(|p| p.1.clone()));
+        let expected: Vec<Recording> = planned.iter().filter_map(|p| p.1.clone()).collect();
+        let past = match expected.as_slice() {
+            [] => Cow::Borrowed(self.recordings.as_slice()),
+            expected => Cow::Owned([&self.recordings, expected].concat()),
+        };
         let knowledge = Knowledge {
             model: &findings.model,
             past: &past,

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use pam_data::date;
+use pam_data::pluralise::pluralise;
 use pam_diagnose::reference::answer::{
     ChangeReport, Changed, Left, Moment, NotComparable, Place, Remark, Repeatability, Since, Size, Split,
     Verdict, WhyNot,
@@ -77,8 +78,8 @@ pub fn remark(remark: &Remark) -> String {
             100.0 * share
         ),
         Remark::SlippedRests(rests) => format!(
-            "{rests} {} at a held length hardly count: friction slipped there in one of the campaigns, as a regulator's drift makes it",
-            if *rests == 1 { "rest" } else { "rests" }
+            "{} at a held length hardly count: friction slipped there in one of the campaigns, as a regulator's drift makes it",
+            pluralise(*rests, "rest")
         ),
         Remark::StrokesMarginal => "probabilities are those that a change is there at all; several changes can be present together".into(),
         Remark::NotAcquitted(none) => {
