@@ -19,8 +19,8 @@
 //! | `repeatability` | how far untouched recordings differ: a Gaussian covariance |
 //! | `contrast` | generalised least squares and Bayes factors |
 //! | `lag` | delays between the channels, by rows in motion |
-//! | `slip` | a step within AFTER |
 //! | `unknown` | a smooth change that no name describes |
+//! | `weighing` | how strongly the cells support each change |
 //! | `gate` | a change must show without any single mounting |
 //! | `withdrawal` | names that are withdrawn: another actuator, held-out recordings that get worse |
 //! | `posterior` | probabilities, set, verdict |
@@ -60,7 +60,6 @@ mod report;
 mod runs;
 pub mod shapes;
 mod sides;
-mod slip;
 mod spline;
 mod stages;
 mod staircase_answer;
@@ -75,6 +74,7 @@ mod table_surface;
 mod tests;
 mod units;
 mod unknown;
+mod weighing;
 mod withdrawal;
 
 pub(crate) use crate::criteria::reference as criteria;

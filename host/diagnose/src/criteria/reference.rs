@@ -117,10 +117,9 @@ pam_data::criteria! {
     TABLE_INTERVAL: f64 = 1.4, "table_interval", "1", Measured("development half, 34 of 43 sizes within without it");
     /// The same over the length, along which a table was fitted at three to five lengths.
     TABLE_SLOPE_OVER_LENGTH: f64 = 0.5, "table_slope_over_length", "1", Measured("development half, sizes of changes put in");
-    /// Start points of a step that are tried, at most.
-    STEP_STARTS: usize = 24, "step_starts", "1", Cost;
-    /// Moments at which a change may have begun that are tried first, at most.
-    COURSE_STARTS: usize = 40, "course_starts", "1", Cost;
+    /// Prior probability that a change was there from the beginning of AFTER: four of five, as for no change at all. A step and a ramp
+    /// within AFTER share the rest.
+    COURSE_WHOLE: f64 = 0.8, "course_whole", "1", Judgement;
     /// A change that began outside this part of AFTER has too little on one side to tell its course.
     COURSE_PART: ((f64, f64)) = (0.03, 0.97), "course_part", "1", Judgement;
     /// Log evidence by which one profile over time must lead the other to be reported: e³ = 20.
@@ -181,8 +180,6 @@ pam_data::criteria! {
     REPEATABILITY_PULLS: f64 = 0.05, "repeatability_pulls", "1", Judgement;
     /// Share of the largest pressure within which a regulated one stays.
     REPORT_REGULATED: f64 = 0.3, "report_regulated", "1", Judgement;
-    /// Moments outside this part of AFTER leave too little on one side.
-    SLIP_PART: ((f64, f64)) = (0.1, 0.95), "slip_part", "1", Judgement;
     /// Coefficients of one curve.
     SPLINE_COEFFICIENTS: (usize) = SPLINE_INTERVALS + 3, "spline_coefficients", "1", Derived("cubic splines");
     /// Numerical floor of the diagonal, share of the largest force.

@@ -174,6 +174,13 @@ pub(super) fn cells(all: &Runs, surface: &Surface, lag: Option<LagTrace<'_>>) ->
     cells
 }
 
+/// Root mean square over the cells of AFTER.
+pub(super) fn rms_after(cells: &[Cell], shape: &nalgebra::DVector<f64>) -> f64 {
+    let own = || cells.iter().zip(shape.iter()).filter(|(c, _)| c.after);
+    let count = own().count().max(1) as f64;
+    (own().map(|(_, s)| s * s).sum::<f64>() / count).sqrt()
+}
+
 /// For every cell of AFTER at a length that the reference does not have, one of BEFORE without a difference: its error is that of the
 /// interpolation.
 fn interpolated(cells: &[Cell], all: &Runs) -> Vec<Cell> {

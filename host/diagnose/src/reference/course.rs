@@ -1,11 +1,14 @@
-//! How a change develops through AFTER: there from the beginning, suddenly from a moment on, or growing from a moment on.
+//! How a change develops through AFTER: there from the beginning, suddenly from a moment on, or growing from a moment on to the end.
+//!
+//! A cell with the shape `s` and the clock `c` counts with `s` (whole), with `s` from `c ≥ t` on (a step at `t`), or with `s·(c − t)/(1 − t)`
+//! from there on (a ramp). In the order of the clocks the products of all steps and ramps follow from sums over the cells so far.
 
 use nalgebra::DVector;
 
-use super::cells::Cell;
+use super::cells::{Cell, rms_after};
 use super::contrast::{Contrast, evidence, log_mean, log_sum};
-use super::criteria::{COURSE_LEAD, COURSE_PART, COURSE_STARTS};
-use super::slip::rms_after;
+use super::criteria::{COURSE_LEAD, COURSE_PART, COURSE_WHOLE};
+use super::shapes::Change;
 
 /// How a change continues.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -16,6 +19,12 @@ pub(super) enum Kind {
     Step,
     /// Gradually, to the end.
     Ramp,
+}
+
+/// What a change does while it is there in full, per unit of size, and the courses that it may take; zero on BEFORE.
+pub(super) struct Candidate {
+    pub shape: DVector<f64>,
+    pub kinds: &'static [Kind],
 }
 
 /// When a change begins, on AFTER's clock, with the 95 % interval.
@@ -35,12 +44,37 @@ pub(super) struct Course {
     pub start: Start,
     /// The shape with this course.
     pub shape: DVector<f64>,
+    /// Log evidence over all courses and their starts.
+    pub log: f64,
 }
 
 /// A course from one start.
 struct Tried {
     start: f64,
     log: f64,
+}
+
+/// A change with the courses that its name allows: an offset of the stroke that comes suddenly is a slip, a zero that grows is a drift.
+/// `None` for a change that settled cells do not show by a shape.
+pub(super) fn candidate(cells: &[Cell], change: Change) -> Option<Candidate> {
+    let on = |value: &dyn Fn(&Cell) -> Option<f64>| {
+        let all: Option<Vec<f64>> =
+            cells.iter().map(|c| if c.after { value(c) } else { Some(0.0) }).collect();
+        all.map(DVector::from_vec)
+    };
+    let kinds: &[Kind] = match change {
+        Change::EndSlip => &[Kind::Step],
+        Change::ForceDrift => &[Kind::Ramp],
+        Change::DisplacementOffset => &[Kind::Whole, Kind::Ramp],
+        Change::ForceOffset => &[Kind::Whole, Kind::Step],
+        _ => &[Kind::Whole, Kind::Step, Kind::Ramp],
+    };
+    let shape = match change {
+        Change::EndSlip => on(&|c| Some(c.means.step_by_stroke)),
+        Change::ForceDrift => on(&|_| Some(1.0)),
+        other => on(&|c| other.shape(&c.means, c.direction)),
+    };
+    Some(Candidate { shape: shape?, kinds })
 }
 
 fn factor(kind: Kind, start: f64, clock: f64) -> f64 {
@@ -56,95 +90,205 @@ fn with_course(cells: &[Cell], shape: &DVector<f64>, kind: Kind, start: f64) -> 
     DVector::from_iterator(cells.len(), cells.iter().zip(shape.iter()).map(of))
 }
 
-/// Moments between the cells of AFTER at which a change may have begun.
-fn starts(cells: &[Cell]) -> Vec<f64> {
-    let mut clocks: Vec<f64> = cells.iter().filter(|c| c.after).map(|c| c.means.clock).collect();
-    clocks.sort_by(f64::total_cmp);
-    clocks.dedup();
-    let between = clocks.windows(2).map(|w| 0.5 * (w[0] + w[1]));
-    between.filter(|t| *t > COURSE_PART.0 && *t < COURSE_PART.1).collect()
+/// `s'Πs`, `s'Πy` and `s's` of a shape with a course.
+type Products = (f64, f64, f64);
+
+/// Sums over the latest cells, by powers of the clock: over pairs of cells, over cells with the difference, and over squares of the shape.
+#[derive(Default)]
+struct Sums {
+    pairs: [f64; 3],
+    moments: [f64; 2],
+    squares: [f64; 3],
 }
 
-/// Every `n`-th.
-fn thinned(all: &[f64], n: usize) -> Vec<f64> {
-    all.iter().step_by(n.max(1)).copied().collect()
+impl Sums {
+    fn step(&self) -> Products {
+        (self.pairs[0], self.moments[0], self.squares[0])
+    }
+
+    /// A ramp from a start that no summed cell precedes.
+    fn ramp(&self, start: f64) -> Products {
+        let rise = 1.0 / (1.0 - start);
+        let square = |m: &[f64; 3]| (m[2] - 2.0 * start * m[1] + start * start * m[0]) * rise * rise;
+        (square(&self.pairs), (self.moments[1] - start * self.moments[0]) * rise, square(&self.squares))
+    }
 }
 
-/// How a change whose shape is known develops. `kinds`: those that its name allows.
+/// The products of a shape from the beginning, of its steps and of its ramps, each by falling start.
+struct AllProducts {
+    whole: Products,
+    steps: Vec<(f64, Products)>,
+    ramps: Vec<(f64, Products)>,
+    /// Cells of AFTER.
+    count: f64,
+}
+
+fn products(cells: &[Cell], contrast: &Contrast, shape: &DVector<f64>) -> AllProducts {
+    let mut order: Vec<usize> = (0..cells.len()).filter(|i| cells[*i].after).collect();
+    order.sort_by(|a, b| cells[*b].means.clock.total_cmp(&cells[*a].means.clock));
+    let mut sums = Sums::default();
+    let (mut steps, mut ramps) = (Vec::new(), Vec::new());
+    for (k, &i) in order.iter().enumerate() {
+        let (s, c) = (shape[i], cells[i].means.clock);
+        let column = contrast.projector.column(i);
+        for &j in &order[..k] {
+            let pair = s * shape[j] * column[j];
+            let other = cells[j].means.clock;
+            sums.pairs[0] += 2.0 * pair;
+            sums.pairs[1] += (c + other) * pair;
+            sums.pairs[2] += 2.0 * c * other * pair;
+        }
+        let own = s * s * column[i];
+        let moment = s * contrast.projected[i];
+        for (power, clock) in [1.0, c, c * c].into_iter().enumerate() {
+            sums.pairs[power] += own * clock;
+            sums.squares[power] += s * s * clock;
+        }
+        sums.moments[0] += moment;
+        sums.moments[1] += c * moment;
+        let Some(next) = order.get(k + 1).map(|n| cells[*n].means.clock) else { continue };
+        let start = 0.5 * (c + next);
+        if next < c && start > COURSE_PART.0 && start < COURSE_PART.1 {
+            steps.push((start, sums.step()));
+            ramps.push((start, sums.ramp(start)));
+        }
+    }
+    ramps.push((0.0, sums.ramp(0.0)));
+    AllProducts { whole: sums.step(), steps, ramps, count: order.len().max(1) as f64 }
+}
+
+/// Log evidence of a kind of course over all its starts. A ramp grows from the beginning in half of the cases.
+fn over_starts(kind: Kind, tried: &[Tried]) -> f64 {
+    let logs: Vec<f64> = tried.iter().map(|t| t.log).collect();
+    match (kind, logs.split_last()) {
+        (Kind::Ramp, Some((first, later))) if !later.is_empty() => log_mean(&[*first, log_mean(later)]),
+        _ => log_mean(&logs),
+    }
+}
+
+/// How a change develops; `None` where the cells do not show it by any of its courses.
 pub(super) fn of(
     cells: &[Cell],
     contrast: &Contrast,
-    shape: &DVector<f64>,
-    kinds: &[Kind],
+    candidate: &Candidate,
+    scale: f64,
     sizes: &[f64],
 ) -> Option<Course> {
-    let scale = contrast.without_shapes(std::slice::from_ref(shape)).scale();
-    let weigh = |kind: Kind, start: f64| {
-        let shape = with_course(cells, shape, kind, start);
-        let rms = rms_after(cells, &shape);
-        if !(rms > 0.0) {
-            return Tried { start, log: f64::NEG_INFINITY };
-        }
-        let (a, b) = contrast.products(&(shape / rms));
-        Tried { start, log: evidence(a, b, scale, sizes) }
-    };
-    let all = starts(cells);
-    let stride = all.len().div_ceil(COURSE_STARTS);
-    let mut courses: Vec<(Kind, f64, Vec<Tried>)> = Vec::new();
-    for kind in kinds {
-        let mut tried: Vec<Tried> = match kind {
-            Kind::Whole => vec![weigh(Kind::Whole, 0.0)],
-            Kind::Step => thinned(&all, stride).into_iter().map(|t| weigh(Kind::Step, t)).collect(),
-            Kind::Ramp => {
-                let later = thinned(&all, 2 * stride).into_iter();
-                std::iter::once(0.0).chain(later).map(|t| weigh(Kind::Ramp, t)).collect()
-            }
+    let Candidate { shape, kinds } = candidate;
+    let all = products(cells, contrast, shape);
+    let tried = |from: &[(f64, Products)]| -> Vec<Tried> {
+        let log = |(a, b, square): Products| {
+            let mean = square / all.count;
+            if mean > 0.0 { evidence(a / mean, b / mean.sqrt(), scale, sizes) } else { f64::NEG_INFINITY }
         };
-        let logs: Vec<f64> = tried.iter().map(|t| t.log).collect();
-        let log = log_mean(&logs);
-        // All moments beside the best one, for the time.
-        if *kind == Kind::Step
-            && stride > 1
-            && let Some(best) = tried.iter().max_by(|a, b| a.log.total_cmp(&b.log)).map(|t| t.start)
-        {
-            let at = all.partition_point(|t| *t < best);
-            let near = all[at.saturating_sub(stride)..(at + stride).min(all.len())].iter();
-            tried = near.map(|t| weigh(Kind::Step, *t)).collect();
-        }
+        from.iter().map(|(start, products)| Tried { start: *start, log: log(*products) }).collect()
+    };
+    let mut courses: Vec<(Kind, f64, Vec<Tried>)> = Vec::new();
+    for kind in *kinds {
+        let tried = match kind {
+            Kind::Whole => tried(&[(0.0, all.whole)]),
+            Kind::Step => tried(&all.steps),
+            Kind::Ramp => tried(&all.ramps),
+        };
+        // Most changes happen between two campaigns, and not within the later one.
+        let prior = match kind {
+            _ if kinds.len() == 1 => 1.0,
+            Kind::Whole => COURSE_WHOLE,
+            _ => (1.0 - COURSE_WHOLE) / (kinds.len() as f64 - 1.0),
+        };
+        let log = prior.ln() + over_starts(*kind, &tried);
         if log.is_finite() {
             courses.push((*kind, log, tried));
         }
     }
+    let log = log_sum(&courses.iter().map(|c| c.1).collect::<Vec<f64>>());
     courses.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     let second = courses.get(1).map_or(f64::NEG_INFINITY, |c| c.1);
-    let (kind, log, tried) = courses.into_iter().next()?;
+    let (kind, best, tried) = courses.into_iter().next()?;
     let start = start(&tried)?;
-    Some(Course {
+    let shape = with_course(cells, shape, kind, start.at);
+    (rms_after(cells, &shape) > 0.0).then_some(Course {
         kind,
-        sure: log > second + COURSE_LEAD,
+        sure: best > second + COURSE_LEAD,
         start,
-        shape: with_course(cells, shape, kind, start.at),
+        shape,
+        log,
     })
 }
 
-/// The likeliest start and the shortest stretch of starts that holds 95 %.
+/// The likeliest start and the stretch of likely starts that holds 95 %; the starts that were tried fall.
 fn start(tried: &[Tried]) -> Option<Start> {
     let logs: Vec<f64> = tried.iter().map(|t| t.log).collect();
     let total = log_sum(&logs);
     let mut order: Vec<usize> = (0..tried.len()).filter(|i| logs[*i].is_finite()).collect();
     order.sort_by(|a, b| logs[*b].total_cmp(&logs[*a]));
     let best = *order.first()?;
-    let (mut sum, mut low, mut high) = (0.0, best, best);
+    let (mut sum, mut late, mut early) = (0.0, best, best);
     for i in order {
         if sum >= 0.95 {
             break;
         }
         sum += (logs[i] - total).exp();
-        (low, high) = (low.min(i), high.max(i));
+        (late, early) = (late.min(i), early.max(i));
     }
     // A change between two moments that were tried can be anywhere between their neighbours.
-    let ends = (low.saturating_sub(1), (high + 1).min(tried.len() - 1));
-    let (at, low, high) = (tried[best].start, tried[ends.0].start, tried[ends.1].start);
+    let high = tried[late.saturating_sub(1)].start;
+    let low = tried[(early + 1).min(tried.len() - 1)].start;
     // What may have grown from the beginning is taken to have done so.
-    Some(Start { at: if low > 0.0 { at } else { 0.0 }, low, high })
+    Some(Start { at: if low > 0.0 { tried[best].start } else { 0.0 }, low, high })
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::super::cells::Means;
+    use super::*;
+
+    /// Two cells of BEFORE and eight of AFTER in no order of time, with correlations.
+    fn example() -> (Vec<Cell>, Contrast, DVector<f64>) {
+        let clocks = [0.55, 0.05, 0.95, 0.25, 0.75, 0.15, 0.45, 0.85];
+        let before = [Cell::default(), Cell::default()];
+        let after = clocks.map(|clock| Cell {
+            after: true,
+            means: Means { clock, ..Means::default() },
+            ..Cell::default()
+        });
+        let cells: Vec<Cell> = before.into_iter().chain(after).collect();
+        let k = DMatrix::from_fn(10, 10, |i, j| {
+            (-0.2 * (i as f64 - j as f64).powi(2)).exp() + if i == j { 0.3 } else { 0.0 }
+        });
+        let y = DVector::from_fn(10, |i, _| (1.7 * i as f64).sin());
+        let shape = DVector::from_fn(10, |i, _| if i < 2 { 0.0 } else { 1.0 + 0.1 * i as f64 });
+        (cells, Contrast::new(k, Some(&[0; 10]), y, 4.0).expect("definite"), shape)
+    }
+
+    #[test]
+    fn products_from_sums_are_those_of_the_shapes() {
+        let (cells, contrast, shape) = example();
+        let all = products(&cells, &contrast, &shape);
+        let mut each = vec![(Kind::Whole, 0.0, all.whole)];
+        each.extend(all.steps.iter().map(|(t, p)| (Kind::Step, *t, *p)));
+        each.extend(all.ramps.iter().map(|(t, p)| (Kind::Ramp, *t, *p)));
+        assert_eq!(each.len(), 1 + 7 + 8);
+        for (kind, start, (a, b, square)) in each {
+            let direct = with_course(&cells, &shape, kind, start);
+            let (direct_a, direct_b) = contrast.products(&direct);
+            assert!((a - direct_a).abs() < 1e-9, "{kind:?} {start}: {a} {direct_a}");
+            assert!((b - direct_b).abs() < 1e-9, "{kind:?} {start}: {b} {direct_b}");
+            assert!((square - direct.norm_squared()).abs() < 1e-9, "{kind:?} {start}");
+        }
+    }
+
+    #[test]
+    fn a_step_is_found_between_the_cells_beside_it() {
+        let (cells, contrast, shape) = example();
+        let stepped = with_course(&cells, &shape, Kind::Step, 0.5) * 30.0;
+        let contrast = contrast.with_residual(&contrast.residual + stepped);
+        let candidate = Candidate { shape, kinds: &[Kind::Whole, Kind::Step, Kind::Ramp] };
+        let course = of(&cells, &contrast, &candidate, 1.0, &[10.0, 30.0]).expect("a course");
+        assert_eq!((course.kind, course.sure), (Kind::Step, true));
+        assert!((course.start.at - 0.5).abs() < 1e-9, "{:?}", course.start);
+        assert!(course.start.low < 0.5 && course.start.high > 0.5, "{:?}", course.start);
+    }
 }

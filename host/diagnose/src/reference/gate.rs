@@ -14,6 +14,8 @@ pub(super) struct Asked<'a> {
     pub shape: &'a DVector<f64>,
     /// Log evidence over no change.
     pub log: f64,
+    /// Whether it begins within AFTER.
+    pub begins: bool,
 }
 
 /// Limits the log evidences. With fewer than three mountings there is no limit.
@@ -42,9 +44,9 @@ pub(super) fn limit(cells: &[Cell], contrast: &Contrast, asked: &mut [Asked<'_>]
     let strong = GATE.ln();
     let best = candidates.iter().map(|i| worst[*i]).fold(f64::NEG_INFINITY, f64::max);
     for &i in &candidates {
-        // The gate tests the presence of a change of this kind: it closes for every name or for none. Only a step may lie at the
-        // end of AFTER, where one mounting shows it.
-        let closed = best < strong || (asked[i].change == Change::EndSlip && worst[i] < strong);
+        // The gate tests the presence of a change of this kind: it closes for every name or for none. Only what begins within AFTER
+        // may lie at its end, where one mounting shows it.
+        let closed = best < strong || (asked[i].begins && worst[i] < strong);
         if closed {
             asked[i].log = asked[i].log.min(worst[i]);
         }

@@ -2,34 +2,22 @@
 
 use nalgebra::DVector;
 
-use super::cells::{Cell, cells};
-use super::contrast::{Contrast, evidence};
-use super::course::{self, Course, Kind};
+use super::cells::{Cell, cells, rms_after};
+use super::contrast::Contrast;
+use super::course::{self, Course};
 use super::criteria::{
     COMBINED_SHAPE_ERROR, DIRECTIONS_PER_RUN, LAG_FLOOR, LAGS, MOST_CHANGES, NAMED, SIZES,
     TABLE_ERROR_FACTORS, TABLE_LAGS,
 };
-use super::gate::{self, Asked};
-use super::lag::{self, Shift};
+use super::lag;
 use super::posterior::{Cause, Posterior};
 use super::repeatability::{Setting, covariance};
 use super::runs::{Run, Runs};
-use super::shapes::{CHANGES, Change};
-use super::slip::{self, Slip, rms_after};
+use super::shapes::Change;
 use super::surface::Surface;
 use super::table_error;
-use super::unknown;
+use super::weighing::{Inexact, Round, Weighing, is_lag, weigh};
 use pam_data::error::{DataCode, Error, Result};
-
-/// The size of a change if it is the only one left, SI.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Estimate {
-    pub change: Change,
-    pub size: f64,
-    pub std: f64,
-    /// rms of the shape over AFTER per unit of size, N.
-    pub rms: f64,
-}
 
 /// A change that is named, with the shape that it has in the cells.
 #[derive(Debug, Clone)]
@@ -44,37 +32,6 @@ pub(super) struct Accepted {
     pub std: f64,
     /// Since when; unknown for a lag.
     pub course: Option<Course>,
-}
-
-/// One weighing of all changes.
-pub(super) struct Round {
-    pub posterior: Posterior,
-    pub estimates: Vec<Estimate>,
-    pub slip: Option<Slip>,
-    pub local: Option<(usize, f64)>,
-    /// Log evidence of the best name.
-    pub best: f64,
-}
-
-/// How inexact shapes are, share of their size, and the evidence of the best name of the first round.
-#[derive(Debug, Clone, Copy, Default)]
-struct Inexact {
-    share: f64,
-    first: f64,
-}
-
-impl Inexact {
-    /// A shape that is wrong by a share of its size leaves that share of what it explains, and another shape may take it: evidence
-    /// counts as with a variance larger by so much.
-    fn temper(self, all: &mut [(Cause, f64)]) -> f64 {
-        let named = all.iter().filter(|(c, _)| matches!(c, Cause::Named(_)));
-        let best = named.map(|(_, log)| *log).fold(0.0, f64::max);
-        let factor = 1.0 + 2.0 * self.share * self.share * best.max(self.first);
-        for (_, log) in all.iter_mut().filter(|(_, log)| log.is_finite()) {
-            *log = best - (best - *log) / factor;
-        }
-        best
-    }
 }
 
 /// Everything that was found.
@@ -101,12 +58,6 @@ fn levels(cells: &[Cell]) -> Vec<usize> {
     all.sort_unstable();
     all.dedup();
     cells.iter().map(|c| all.binary_search(&key(c)).unwrap_or(0)).collect()
-}
-
-fn shape(cells: &[Cell], change: Change) -> Option<DVector<f64>> {
-    let of = |c: &Cell| change.shape(&c.means, c.direction).map(|s| if c.after { s } else { 0.0 });
-    let values: Option<Vec<f64>> = cells.iter().map(of).collect();
-    values.map(DVector::from_vec)
 }
 
 /// The reference and how good it is.
@@ -156,7 +107,8 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
     let mut accepted: Vec<Accepted> = Vec::new();
     // Lag scores are of rows that still hold what was named before: a lag is named first or not at all.
     let mut inexact = Inexact { share: if runs.moving { COMBINED_SHAPE_ERROR } else { 0.0 }, first: 0.0 };
-    let weighed = |c: Contrast| (weigh(&cells, &c, &surface, (shift.as_ref(), inexact), prior_none), c);
+    let by = Weighing { surface: &surface, lag: shift.as_ref(), inexact, moving: runs.moving, prior_none };
+    let weighed = |c: Contrast| (weigh(&cells, &c, by), c);
     let (mut round, contrast, which) = likeliest(contrasts.into_iter().map(weighed).collect())?;
     let reference_error = if recorded { 0.0 } else { error * TABLE_ERROR_FACTORS[which] };
     let mut present = contrast.clone();
@@ -198,7 +150,7 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
             present = present.without_shapes(std::slice::from_ref(&next.shape));
         }
         accepted.push(next);
-        round = weigh(&cells, &present, &surface, (None, inexact), prior_none);
+        round = weigh(&cells, &present, Weighing { lag: None, inexact, ..by });
     }
 }
 
@@ -246,94 +198,12 @@ fn likeliest(mut all: Vec<(Round, Contrast)>) -> Result<(Round, Contrast, usize)
     Ok((round, contrast, best))
 }
 
-fn is_lag(change: Change) -> bool {
-    matches!(change, Change::SensorDelay | Change::PressureSensorLag)
-}
-
-/// Weighs every change that the cells can carry.
-fn weigh(
-    cells: &[Cell],
-    contrast: &Contrast,
-    surface: &Surface,
-    (lag, inexact): (Option<&Shift>, Inexact),
-    prior_none: f64,
-) -> Round {
-    let scale = contrast.scale();
-    let sizes = SIZES.map(|s| s * surface.largest);
-    let still = lag.map_or(0.0, |l| l.unchanged);
-    let mut estimates = Vec::new();
-    let mut shapes: Vec<(Change, DVector<f64>, f64)> = Vec::new();
-    let mut enter = |change: Change, shape: DVector<f64>, log: Option<f64>| {
-        let rms = rms_after(cells, &shape);
-        if !(rms > 0.0 && rms.is_finite()) {
-            return;
-        }
-        let unit = shape / rms;
-        let (a, b) = contrast.products(&unit);
-        let log = log.unwrap_or_else(|| evidence(a, b, scale, &sizes));
-        if log.is_finite() {
-            estimates.push(Estimate { change, size: b / a / rms, std: (scale / a).sqrt() / rms, rms });
-            shapes.push((change, unit, log));
-        }
-    };
-    for about in CHANGES {
-        if let Some(shape) = shape(cells, about.change) {
-            enter(about.change, shape, None);
-        }
-    }
-    let slip = slip::search(cells, contrast, scale, &sizes);
-    if let Some(slip) = &slip {
-        enter(Change::EndSlip, slip.shape.clone(), Some(slip.log));
-    }
-    let mut asked: Vec<Asked<'_>> =
-        shapes.iter().map(|(change, shape, log)| Asked { change: *change, shape, log: *log }).collect();
-    gate::limit(cells, contrast, &mut asked, &sizes);
-    let mut all: Vec<(Cause, f64)> = asked.iter().map(|a| (Cause::Named(a.change), a.log + still)).collect();
-    all.push((Cause::None, still));
-    let range = surface.high - surface.low;
-    let unknown = unknown::weighed(cells, contrast, range, surface.largest);
-    if let Some(unknown) = unknown {
-        all.push((Cause::Unknown, unknown.log + still));
-    }
-    if let Some(lag) = lag {
-        let (change, log) = weigh_lag(cells, contrast, lag);
-        all.push((Cause::Named(change), log));
-        let rms = rms_after(cells, &lag::trace(cells)) / lag.lag.abs().max(1e-9);
-        estimates.push(Estimate { change, size: lag.lag.abs(), std: lag.variance.sqrt(), rms });
-    }
-    let best = if inexact.share > 0.0 { inexact.temper(&mut all) } else { 0.0 };
-    Round {
-        best,
-        posterior: Posterior::of(&all, prior_none),
-        estimates,
-        slip,
-        local: unknown.and_then(|u| u.local),
-    }
-}
-
-/// The lag with its trace in the settled cells, which it must not contradict.
-fn weigh_lag(cells: &[Cell], contrast: &Contrast, lag: &Shift) -> (Change, f64) {
-    let trace = lag::trace(cells);
-    let scale = contrast.scale();
-    let change = if lag.lag > 0.0 { Change::SensorDelay } else { Change::PressureSensorLag };
-    if trace.iter().all(|v| *v == 0.0) {
-        return (change, lag.changed);
-    }
-    let freed = &contrast.residual - &trace;
-    let image = &contrast.projector * &freed;
-    let gain = 0.5 * (contrast.energy - freed.dot(&image)) / scale;
-    let (a, b) = (trace.dot(&(&contrast.projector * &trace)), trace.dot(&image));
-    // The size is known from the rows in motion; the cells may put it right by a third.
-    let own = evidence(a, b, scale, &[0.3]);
-    (change, gain + own.max(-5.0) + lag.changed)
-}
-
 fn accept(cells: &[Cell], round: &Round, change: Change, probability: f64, late: f64) -> Option<Accepted> {
     let estimate = round.estimates.iter().find(|e| e.change == change)?;
-    let shape = match change {
-        Change::EndSlip => round.slip.as_ref()?.shape.clone(),
-        c if is_lag(c) => lag::trace(cells) / late.abs().max(1e-9),
-        c => shape(cells, c)?,
+    let course = round.courses.iter().find(|c| c.0 == change).map(|c| c.1.clone());
+    let shape = match &course {
+        Some(course) => course.shape.clone(),
+        None => lag::trace(cells) / late.abs().max(1e-9),
     };
     let competitors = round.posterior.set().into_iter().filter_map(|c| match c {
         Cause::Named(other) if other != change => Some(other),
@@ -346,26 +216,24 @@ fn accept(cells: &[Cell], round: &Round, change: Change, probability: f64, late:
         shape,
         size: estimate.size,
         std: estimate.std,
-        course: None,
+        course,
     })
 }
 
-/// The same change with the course that it takes through AFTER, where it is not there from the beginning.
+/// The same change with its course and its size where the spread of the runs is judged without it.
 fn with_course(cells: &[Cell], present: &Contrast, surface: &Surface, found: Accepted) -> Accepted {
-    let on = |value: &dyn Fn(&Cell) -> f64| {
-        DVector::from_iterator(cells.len(), cells.iter().map(|c| if c.after { value(c) } else { 0.0 }))
-    };
-    let (base, kinds): (DVector<f64>, &[Kind]) = match found.change {
-        change if is_lag(change) => return found,
-        Change::EndSlip => (on(&|c| c.means.step_by_stroke), &[Kind::Step]),
-        Change::ForceDrift => (on(&|_| 1.0), &[Kind::Ramp]),
-        _ => (found.shape.clone(), &[Kind::Whole, Kind::Step, Kind::Ramp]),
-    };
+    if is_lag(found.change) {
+        return found;
+    }
     let sizes = SIZES.map(|s| s * surface.largest);
-    let Some(course) = course::of(cells, present, &base, kinds, &sizes) else { return found };
+    let scale = present.without_shapes(std::slice::from_ref(&found.shape)).scale();
+    let candidate = course::candidate(cells, found.change);
+    let Some(course) = candidate.and_then(|c| course::of(cells, present, &c, scale, &sizes)) else {
+        return found;
+    };
     let (a, b) = present.products(&course.shape);
-    if !course.sure || course.kind == Kind::Whole || !(a > 0.0) {
-        return Accepted { course: Some(course), ..found };
+    if !(a > 0.0) {
+        return found;
     }
     let scale = present.without_shapes(std::slice::from_ref(&course.shape)).scale();
     let shape = course.shape.clone();

@@ -6,16 +6,17 @@ use super::answer::{
     ChangeReport, Changed, Considered, Curve, HeldOut, NotComparable, Probability, Reference, Remark,
     Repeatability, Size, Split, Verdict, WhyNot, size,
 };
+use super::cells::rms_after;
 use super::criteria::{
     CELLS, COMBINED_SHAPE_ERROR, FEWEST_CELLS, GATE, NAMED, OWN_SLOPE_ERROR, PRIOR_NONE, SCALE_PRIOR, SIZES,
     SLOPE_ERROR, TABLE_INTERVAL, TABLE_SLOPE_ERROR, TABLE_SLOPE_OVER_LENGTH, UNSEEN_EXPLAINED,
 };
 use super::held_out;
-use super::isometric::{Accepted, Analysis, Estimate};
+use super::isometric::{Accepted, Analysis};
 use super::posterior::Cause;
 use super::report::{Options, left, prior, verdict};
 use super::shapes::{CHANGES, Change, Class};
-use super::slip::rms_after;
+use super::weighing::Estimate;
 use super::{cells, localise, repeatability};
 
 /// Everything that was found, as the answer.

@@ -1,0 +1,162 @@
+//! One weighing of all changes: how strongly the cells support each, with the course through AFTER that suits it best.
+
+use nalgebra::DVector;
+
+use super::cells::{Cell, rms_after};
+use super::contrast::{Contrast, evidence};
+use super::course::{self, Candidate, Course, Kind};
+use super::criteria::SIZES;
+use super::gate::{self, Asked};
+use super::lag::{self, Shift};
+use super::posterior::{Cause, Posterior};
+use super::shapes::{CHANGES, Change};
+use super::surface::Surface;
+use super::unknown;
+
+/// The size of a change if it is the only one left, SI.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Estimate {
+    pub change: Change,
+    pub size: f64,
+    pub std: f64,
+    /// rms of the shape over AFTER per unit of size, N.
+    pub rms: f64,
+}
+
+/// One weighing of all changes.
+pub(super) struct Round {
+    pub posterior: Posterior,
+    pub estimates: Vec<Estimate>,
+    /// The best course of every change that settled cells show.
+    pub courses: Vec<(Change, Course)>,
+    pub local: Option<(usize, f64)>,
+    /// Log evidence of the best name.
+    pub best: f64,
+}
+
+/// How inexact shapes are, share of their size, and the evidence of the best name of the first round.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Inexact {
+    pub share: f64,
+    pub first: f64,
+}
+
+impl Inexact {
+    /// A shape that is wrong by a share of its size leaves that share of what it explains, and another shape may take it: evidence
+    /// counts as with a variance larger by so much.
+    fn temper(self, all: &mut [(Cause, f64)]) -> f64 {
+        let named = all.iter().filter(|(c, _)| matches!(c, Cause::Named(_)));
+        let best = named.map(|(_, log)| *log).fold(0.0, f64::max);
+        let factor = 1.0 + 2.0 * self.share * self.share * best.max(self.first);
+        for (_, log) in all.iter_mut().filter(|(_, log)| log.is_finite()) {
+            *log = best - (best - *log) / factor;
+        }
+        best
+    }
+}
+
+pub(super) fn is_lag(change: Change) -> bool {
+    matches!(change, Change::SensorDelay | Change::PressureSensorLag)
+}
+
+/// What a weighing depends on beside the cells.
+#[derive(Clone, Copy)]
+pub(super) struct Weighing<'a> {
+    pub surface: &'a Surface,
+    /// The lag between the channels, where it is weighed.
+    pub lag: Option<&'a Shift>,
+    pub inexact: Inexact,
+    /// Whether the runs are parts of recordings in which length and pressure move together.
+    pub moving: bool,
+    pub prior_none: f64,
+}
+
+/// A change with the courses by which it is weighed. Parts of a motion overlap in time: there only a slip has another course than the whole.
+fn candidate(cells: &[Cell], change: Change, moving: bool) -> Option<Candidate> {
+    if moving && change != Change::EndSlip {
+        return Some(Candidate { shape: whole(cells, change)?, kinds: &[Kind::Whole] });
+    }
+    course::candidate(cells, change)
+}
+
+/// The shape of a change that was there from the beginning of AFTER.
+fn whole(cells: &[Cell], change: Change) -> Option<DVector<f64>> {
+    let of = |c: &Cell| change.shape(&c.means, c.direction).map(|s| if c.after { s } else { 0.0 });
+    let values: Option<Vec<f64>> = cells.iter().map(of).collect();
+    values.map(DVector::from_vec)
+}
+
+/// The size of a change as the only one.
+fn estimate(cells: &[Cell], contrast: &Contrast, change: Change, shape: &DVector<f64>) -> Option<Estimate> {
+    let rms = rms_after(cells, shape);
+    let (a, b) = contrast.products(shape);
+    (rms > 0.0 && a > 0.0).then(|| Estimate { change, size: b / a, std: (contrast.scale() / a).sqrt(), rms })
+}
+
+/// Weighs every change that the cells can carry.
+pub(super) fn weigh(cells: &[Cell], contrast: &Contrast, by: Weighing<'_>) -> Round {
+    let scale = contrast.scale();
+    let sizes = SIZES.map(|s| s * by.surface.largest);
+    let still = by.lag.map_or(0.0, |l| l.unchanged);
+    let mut estimates = Vec::new();
+    let mut courses: Vec<(Change, Course)> = Vec::new();
+    for about in CHANGES {
+        let candidate = candidate(cells, about.change, by.moving);
+        let course = candidate.and_then(|c| course::of(cells, contrast, &c, scale, &sizes));
+        let Some(course) = course.filter(|c| c.log.is_finite()) else { continue };
+        let shape = whole(cells, about.change).unwrap_or_else(|| course.shape.clone());
+        estimates.extend(estimate(cells, contrast, about.change, &shape));
+        courses.push((about.change, course));
+    }
+    let units: Vec<DVector<f64>> =
+        courses.iter().map(|(_, c)| &c.shape / rms_after(cells, &c.shape)).collect();
+    let mut asked: Vec<Asked<'_>> = courses
+        .iter()
+        .zip(&units)
+        .map(|((change, course), shape)| Asked {
+            change: *change,
+            shape,
+            log: course.log,
+            begins: course.start.at > 0.0,
+        })
+        .collect();
+    gate::limit(cells, contrast, &mut asked, &sizes);
+    let mut all: Vec<(Cause, f64)> = asked.iter().map(|a| (Cause::Named(a.change), a.log + still)).collect();
+    all.push((Cause::None, still));
+    let range = by.surface.high - by.surface.low;
+    let unknown = unknown::weighed(cells, contrast, range, by.surface.largest);
+    if let Some(unknown) = unknown {
+        all.push((Cause::Unknown, unknown.log + still));
+    }
+    if let Some(lag) = by.lag {
+        let (change, log) = weigh_lag(cells, contrast, lag);
+        all.push((Cause::Named(change), log));
+        let rms = rms_after(cells, &lag::trace(cells)) / lag.lag.abs().max(1e-9);
+        estimates.push(Estimate { change, size: lag.lag.abs(), std: lag.variance.sqrt(), rms });
+    }
+    let best = if by.inexact.share > 0.0 { by.inexact.temper(&mut all) } else { 0.0 };
+    Round {
+        best,
+        posterior: Posterior::of(&all, by.prior_none),
+        estimates,
+        courses,
+        local: unknown.and_then(|u| u.local),
+    }
+}
+
+/// The lag with its trace in the settled cells, which it must not contradict.
+fn weigh_lag(cells: &[Cell], contrast: &Contrast, lag: &Shift) -> (Change, f64) {
+    let trace = lag::trace(cells);
+    let scale = contrast.scale();
+    let change = if lag.lag > 0.0 { Change::SensorDelay } else { Change::PressureSensorLag };
+    if trace.iter().all(|v| *v == 0.0) {
+        return (change, lag.changed);
+    }
+    let freed = &contrast.residual - &trace;
+    let image = &contrast.projector * &freed;
+    let gain = 0.5 * (contrast.energy - freed.dot(&image)) / scale;
+    let (a, b) = (trace.dot(&(&contrast.projector * &trace)), trace.dot(&image));
+    // The size is known from the rows in motion; the cells may put it right by a third.
+    let own = evidence(a, b, scale, &[0.3]);
+    (change, gain + own.max(-5.0) + lag.changed)
+}
