@@ -6,7 +6,7 @@ use super::cells::{Cell, cells, rms_after};
 use super::contrast::Contrast;
 use super::course::{self, Course};
 use super::criteria::{
-    COMBINED_SHAPE_ERROR, DIRECTIONS_PER_RUN, LAG_FLOOR, LAGS, MOST_CHANGES, NAMED, SIZES,
+    COMBINED_SHAPE_ERROR, DIRECTIONS_PER_RUN, LAG_FLOOR, LAGS, MOST_CHANGES, NAMED, SIZES, SLOPE_ERROR,
     TABLE_ERROR_FACTORS, TABLE_LAGS,
 };
 use super::lag;
@@ -106,6 +106,8 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
     let contrasts = contrasts(&cells, &runs, &setting, (!recorded).then_some(error))?;
     let mut accepted: Vec<Accepted> = Vec::new();
     // Lag scores are of rows that still hold what was named before: a lag is named first or not at all.
+    let inexact_share = if runs.moving { COMBINED_SHAPE_ERROR } else { SLOPE_ERROR };
+    // Beside rests the first name is weighed as it is: no other one is left by it.
     let mut inexact = Inexact { share: if runs.moving { COMBINED_SHAPE_ERROR } else { 0.0 }, first: 0.0 };
     let by = Weighing { surface: &surface, lag: shift.as_ref(), inexact, moving: runs.moving, prior_none };
     let weighed = |c: Contrast| (weigh(&cells, &c, by), c);
@@ -122,7 +124,7 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
         let next = more.and_then(|(change, p)| accept(&cells, &round, change, p, late));
         let next = next.map(|n| with_course(&cells, &present, &surface, n));
         let last = round.posterior.clone();
-        inexact.first = inexact.first.max(round.best);
+        inexact = Inexact { share: inexact_share, first: inexact.first.max(round.best) };
         first.get_or_insert(round);
         // A second change of the same kind is what the first one's shape is inexact by.
         let Some(next) = next.filter(|n| accepted.iter().all(|a| a.change.class() != n.change.class()))
@@ -220,7 +222,7 @@ fn accept(cells: &[Cell], round: &Round, change: Change, probability: f64, late:
     })
 }
 
-/// The same change with its course and its size where the spread of the runs is judged without it.
+/// The same change with its course and its size; the course where the spread of the runs is judged without the change.
 fn with_course(cells: &[Cell], present: &Contrast, surface: &Surface, found: Accepted) -> Accepted {
     if is_lag(found.change) {
         return found;
@@ -235,9 +237,9 @@ fn with_course(cells: &[Cell], present: &Contrast, surface: &Surface, found: Acc
     if !(a > 0.0) {
         return found;
     }
-    let scale = present.without_shapes(std::slice::from_ref(&course.shape)).scale();
-    let shape = course.shape.clone();
-    Accepted { shape, size: b / a, std: (scale / a).sqrt(), course: Some(course), ..found }
+    // The spread of the runs with the change in it: what the shape leaves is a part of it.
+    let std = (present.scale() / a).sqrt();
+    Accepted { shape: course.shape.clone(), size: b / a, std, course: Some(course), ..found }
 }
 
 /// Sizes of several changes beside each other.

@@ -34,7 +34,7 @@ pub(super) struct Round {
     pub best: f64,
 }
 
-/// How inexact shapes are, share of their size, and the evidence of the best name of the first round.
+/// How inexact shapes are, share of their size, and the evidence of the best name so far.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Inexact {
     pub share: f64,
@@ -134,7 +134,7 @@ pub(super) fn weigh(cells: &[Cell], contrast: &Contrast, by: Weighing<'_>) -> Ro
         let rms = rms_after(cells, &lag::trace(cells)) / lag.lag.abs().max(1e-9);
         estimates.push(Estimate { change, size: lag.lag.abs(), std: lag.variance.sqrt(), rms });
     }
-    let best = if by.inexact.share > 0.0 { by.inexact.temper(&mut all) } else { 0.0 };
+    let best = by.inexact.temper(&mut all);
     Round {
         best,
         posterior: Posterior::of(&all, by.prior_none),
