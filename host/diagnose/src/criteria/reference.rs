@@ -138,6 +138,8 @@ pam_data::criteria! {
     SHARED_ROWS: f64 = 0.1, "shared_rows", "1", Judgement;
     /// Rest lengths that differ by more than this share are of two actuators: a tape measure errs by less.
     OTHER_LENGTH: f64 = 0.02, "other_length", "1", Judgement;
+    /// A recording shows a change where its rms is more than this share of that in the recording that shows it most.
+    SHOWS: f64 = 0.1, "shows", "1", Judgement;
     /// Share of the difference's energy on held-out recordings that names must remove; below it they describe something else.
     UNSEEN_LEAST: f64 = 0.1, "unseen_least", "1", Convention("as FURTHER_SHARE of the forward selection");
     /// The same from which on the names explain the difference; below it they explain a part.

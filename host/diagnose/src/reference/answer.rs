@@ -276,6 +276,9 @@ pub struct HeldOut {
     pub rms_before_N: f64,
     /// rms with them, N.
     pub rms_after_N: f64,
+    /// Share of the difference's energy that they remove from the held-out recordings in which they show: a change that begins within
+    /// AFTER says nothing of those before it.
+    pub share_where_shown: f64,
     /// What repeats, N.
     pub noise_N: f64,
 }

@@ -24,7 +24,7 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
     let first = &analysis.first.posterior;
     let difference = held_out::difference(&analysis.cells, &analysis.contrast);
     let shapes: Vec<DVector<f64>> = analysis.accepted.iter().map(|a| a.shape.clone()).collect();
-    let unseen = held_out::unseen(&analysis.cells, &analysis.contrast, &shapes);
+    let (unseen, where_shown) = held_out::unseen(&analysis.cells, &analysis.contrast, &shapes);
     let scale = analysis.contrast.without_shapes(&shapes).scale();
     let noise = repeatability::spread(analysis.surface.largest, scale).hypot(analysis.reference_error);
     let verdict = verdict(
@@ -65,6 +65,7 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
             },
             rms_before_N: unseen.before,
             rms_after_N: unseen.after,
+            share_where_shown: where_shown.share(),
             noise_N: noise,
         },
         considered: considered(analysis, options),
@@ -152,7 +153,8 @@ fn incomparable(analysis: &Analysis) -> Vec<NotComparable> {
 fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
     let about = accepted.change.about();
     let freedom = SCALE_PRIOR + analysis.contrast.taught.min(analysis.contrast.free);
-    let unseen = held_out::unseen(&analysis.cells, &analysis.contrast, std::slice::from_ref(&accepted.shape));
+    let own = std::slice::from_ref(&accepted.shape);
+    let (unseen, _) = held_out::unseen(&analysis.cells, &analysis.contrast, own);
     let class = analysis.first.posterior.classes().get(&about.class).copied().unwrap_or(0.0);
     Changed {
         change: about.change,

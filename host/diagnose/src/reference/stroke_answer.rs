@@ -53,6 +53,7 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
             split: Split::OtherLevels,
             rms_before_N: before,
             rms_after_N: after,
+            share_where_shown: unseen.share(),
             noise_N: noise,
         },
         considered: stroked::ASKED

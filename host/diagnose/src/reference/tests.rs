@@ -224,3 +224,27 @@ fn a_change_that_was_there_or_grew_is_no_step() {
     let Since::Gradual(from) = &grown.missing[0].since else { panic!("{:?}", grown.missing[0].since) };
     assert!(from.low < 180.0 && from.high > 180.0, "{from:?}");
 }
+
+/// A slip of the clamp that only the recordings `slipped` of AFTER have, counted from 0 in the order of their times.
+fn slip(mountings: usize, slipped: &[usize]) -> ChangeReport {
+    let before = campaign(mountings, 0..3, &untouched);
+    let all = (3..6).flat_map(|n| (0..mountings).map(move |m| (m, n))).enumerate();
+    let moved = |_: f64, _: f64, _: f64, slope: f64| (0.0, 4e-3 * slope);
+    let one = |(k, (m, n)): (usize, (usize, usize))| {
+        if slipped.contains(&k) { run(m, n, &moved) } else { run(m, n, &untouched) }
+    };
+    let after = Campaign::new(all.map(one).collect());
+    let options = Options { mounted: Mounted::Same, ..Options::default() };
+    compare(&after, Against::Recordings(&before), &options).unwrap()
+}
+
+#[test]
+fn a_slip_is_not_judged_on_recordings_before_it() {
+    // The last recording alone has it: there is none to hold out.
+    let last = slip(2, &[5]);
+    assert_eq!(last.missing.first().map(|m| m.effect.as_str()), Some("end-slip"), "{last:?}");
+    // The last two have it, and each is judged by the other.
+    let two = slip(3, &[7, 8]);
+    assert_eq!(two.missing.first().map(|m| m.effect.as_str()), Some("end-slip"), "{:?}", two.probabilities);
+    assert!(two.held_out.share_where_shown > 0.5, "{:?}", two.held_out);
+}

@@ -16,9 +16,9 @@ pub(super) fn withdraw(report: &mut ChangeReport) {
     // A lag shows in rows in motion; the held-out cells are of rows at rest.
     let lag = |c: Change| matches!(c, Change::SensorDelay | Change::PressureSensorLag);
     let judged = !report.missing.iter().any(|m| lag(m.change));
-    // A change that happened describes the recordings that did not determine its size, too.
-    let kept = (1.0 - UNSEEN_LEAST).sqrt() * report.held_out.rms_before_N;
-    if judged && report.held_out.split != Split::None && report.held_out.rms_after_N > kept {
+    // A change that happened describes the recordings that did not determine its size, too, where it shows.
+    let held = report.held_out.split != Split::None;
+    if judged && held && report.held_out.share_where_shown < UNSEEN_LEAST {
         without_names(report);
     }
 }
@@ -38,6 +38,7 @@ fn without_names(report: &mut ChangeReport) {
     }
     report.verdict = Verdict::Unexplained;
     report.held_out.rms_after_N = report.held_out.rms_before_N;
+    report.held_out.share_where_shown = 0.0;
     report.unexplained = Left { share: 1.0, place: report.r#where.first().cloned() };
 }
 

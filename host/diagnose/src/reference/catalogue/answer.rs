@@ -11,7 +11,7 @@ use super::super::answer::{
 use super::super::criteria::{
     CATALOGUE_BINS, CATALOGUE_LAW_ERROR, CATALOGUE_USUAL, COURSE_LEAD, LOCALISE_STANDS_OUT, NAMED, SET, SIZES,
 };
-use super::super::held_out::Unseen;
+use super::super::held_out::{Unseen, parts, shown};
 use super::super::report::left;
 use super::super::shapes::Change;
 use super::cells::{Cell, Cells, VENTED};
@@ -21,53 +21,75 @@ fn rms(values: &DVector<f64>) -> f64 {
     (values.norm_squared() / values.len().max(1) as f64).sqrt()
 }
 
-/// Root mean square over the cells, by their certainty: cells of fast motion and of rests that slipped are known less well, N.
-fn weighted(cells: &Cells, values: &DVector<f64>) -> f64 {
-    let weights = cells.variance.iter().map(|v| 1.0 / v).sum::<f64>();
-    let square: f64 = values.iter().zip(cells.variance.iter()).map(|(d, v)| d * d / v).sum();
-    (square / weights.max(f64::MIN_POSITIVE)).sqrt()
+/// Root mean square over some cells, by their certainty: cells of fast motion and of rests that slipped are known less well, N.
+fn weighted(cells: &Cells, values: &DVector<f64>, of: &[usize]) -> f64 {
+    let sum = |value: &dyn Fn(usize) -> f64| of.iter().map(|i| value(*i) / cells.variance[*i]).sum::<f64>();
+    (sum(&|i| values[i] * values[i]) / sum(&|_| 1.0).max(f64::MIN_POSITIVE)).sqrt()
 }
 
-/// Which half each recording of AFTER is held out with: every other one in which the muscle worked. A tare between them is on the side of the
-/// recording before it: tares alone determine no size.
-fn folds(cells: &[Cell]) -> Vec<usize> {
+/// Which recordings of AFTER are held out together: each in which the muscle worked, with the tares after it. Tares alone determine no size.
+fn together(cells: &[Cell]) -> Vec<usize> {
     let recordings = cells.iter().map(|c| c.recording + 1).max().unwrap_or(0);
     let works = |r: usize| cells.iter().any(|c| c.recording == r && c.key.3 != VENTED);
     let mut count = 0_usize;
     let one = |r: usize| {
         count += usize::from(works(r));
-        count.saturating_sub(1) % 2
+        count.saturating_sub(1)
     };
     (0..recordings).map(one).collect()
 }
 
-/// rms of the difference without and with the changes, their sizes fitted to every other recording and judged on the rest, N.
-fn unseen(cells: &Cells, accepted: &[&Accepted]) -> Unseen {
-    let before = weighted(cells, &cells.difference);
+/// rms of the difference without and with the changes, their sizes fitted to one part of the recordings and judged on the other, N: over
+/// all of AFTER, and over the held-out recordings in which the changes show.
+fn unseen(cells: &Cells, accepted: &[&Accepted]) -> (Unseen, Unseen) {
+    let n = cells.cells.len();
+    let all: Vec<usize> = (0..n).collect();
+    let before = weighted(cells, &cells.difference, &all);
     let columns: Vec<DVector<f64>> = accepted.iter().map(|a| a.fit.trace.clone()).collect();
-    let fold = folds(&cells.cells);
-    let held = fold.contains(&1);
+    let groups = together(&cells.cells);
+    let group = |i: usize| groups[cells.cells[i].recording];
+    let count = groups.last().map_or(0, |g| g + 1);
     if columns.is_empty() {
-        return Unseen { before, after: before, held };
+        let none = Unseen { before, after: before, held: count > 1 };
+        return (none, none);
     }
+    let of_group = |g: usize| -> Vec<f64> {
+        let own: Vec<usize> = all.iter().copied().filter(|i| group(*i) == g).collect();
+        columns.iter().map(|c| weighted(cells, c, &own)).collect()
+    };
+    let shown = shown(&(0..count).map(of_group).collect::<Vec<_>>());
+    let parts = parts(&shown);
+    let judged: Vec<usize> = all
+        .iter()
+        .copied()
+        .filter(|i| parts[group(*i)].is_some() && shown[group(*i)].contains(&true))
+        .collect();
+    let held = !judged.is_empty();
+    let part = |i: usize| if held { parts[group(i)] } else { None };
     let x = DMatrix::from_columns(&columns);
     let mut remaining = cells.difference.clone();
-    for side in 0..if held { 2 } else { 1 } {
-        let own = |i: usize| !held || fold[cells.cells[i].recording] == side;
-        let kept: Vec<usize> = (0..cells.cells.len()).filter(|i| !held || !own(*i)).collect();
-        let weights = |i: &usize| 1.0 / cells.variance[*i];
+    for side in [Some(0), Some(1), None] {
+        // What cannot be held out is in every fit.
+        let own: Vec<usize> = all.iter().copied().filter(|i| part(*i) == side).collect();
+        if own.is_empty() {
+            continue;
+        }
         let (mut g, mut b) = (DMatrix::zeros(x.ncols(), x.ncols()), DVector::zeros(x.ncols()));
-        for i in &kept {
-            let row = x.row(*i).transpose();
-            g += &row * row.transpose() * weights(i);
-            b += &row * (cells.difference[*i] * weights(i));
+        for i in all.iter().copied().filter(|i| side.is_none() || part(*i) != side) {
+            let row = x.row(i).transpose();
+            let weight = 1.0 / cells.variance[i];
+            g += &row * row.transpose() * weight;
+            b += &row * (cells.difference[i] * weight);
         }
         let Some(sizes) = g.cholesky().map(|f| f.solve(&b)) else { continue };
-        for i in (0..cells.cells.len()).filter(|i| own(*i)) {
+        for i in own {
             remaining[i] -= (x.row(i) * &sizes)[0];
         }
     }
-    Unseen { before, after: weighted(cells, &remaining), held }
+    let over = |values: &DVector<f64>| weighted(cells, values, &judged);
+    let whole = Unseen { before, after: weighted(cells, &remaining, &all), held };
+    let where_shown = Unseen { before: over(&cells.difference), after: over(&remaining), held };
+    (whole, if held { where_shown } else { whole })
 }
 
 /// A moment of AFTER, s, with its recording.
@@ -163,7 +185,7 @@ fn places(cells: &Cells) -> Vec<Place> {
 
 fn changed(cells: &Cells, accepted: &Accepted) -> Changed {
     let about = accepted.fit.change.about();
-    let alone = unseen(cells, &[accepted]);
+    let (alone, _) = unseen(cells, &[accepted]);
     // The catalogue counts the pressure that the reading lacks, a change what the gauge reads too much.
     let sign = if accepted.fit.change == Change::GaugeGain { -1.0 } else { 1.0 };
     let parameters = accepted.fit.parameters.iter();
@@ -225,7 +247,7 @@ fn remarks(cells: &Cells) -> Vec<Remark> {
 /// Everything that was found, as the answer.
 pub(super) fn answer(cells: &Cells, weighed: &Weighed, prior: f64) -> ChangeReport {
     let accepted: Vec<&Accepted> = weighed.accepted.iter().collect();
-    let unseen = unseen(cells, &accepted);
+    let (unseen, where_shown) = unseen(cells, &accepted);
     let verdict = super::super::report::verdict(weighed.none, accepted.len(), weighed.last_none < NAMED);
     let places = if verdict == Verdict::Consistent { Vec::new() } else { places(cells) };
     let noise = cells.spread;
@@ -262,6 +284,7 @@ pub(super) fn answer(cells: &Cells, weighed: &Weighed, prior: f64) -> ChangeRepo
             split: if unseen.held { Split::OtherRecordings } else { Split::None },
             rms_before_N: unseen.before,
             rms_after_N: unseen.after,
+            share_where_shown: where_shown.share(),
             noise_N: noise,
         },
         considered: weighed
@@ -327,6 +350,6 @@ mod tests {
         };
         // Tare, level, tare, level, tare, level, tare.
         let cells: Vec<Cell> = (0..7).map(|r| cell(r, if r % 2 == 0 { VENTED } else { 0 })).collect();
-        assert_eq!(folds(&cells), [0, 0, 0, 1, 1, 0, 0]);
+        assert_eq!(together(&cells), [0, 0, 0, 1, 1, 2, 2]);
     }
 }
