@@ -22,6 +22,7 @@
 //! | `unknown` | a smooth change that no name describes |
 //! | `weighing` | how strongly the cells support each change |
 //! | `gate` | a change must show without any single mounting |
+//! | `naming` | one name after the other |
 //! | `withdrawal` | names that are withdrawn: another actuator, held-out recordings that get worse |
 //! | `posterior` | probabilities, set, verdict |
 //! | `isometric` | all of this for pressure staircases at held lengths |
@@ -54,6 +55,7 @@ mod isometric;
 mod lag;
 mod localise;
 mod motion;
+mod naming;
 mod posterior;
 pub(crate) mod repeatability;
 mod report;

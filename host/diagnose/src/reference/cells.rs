@@ -78,7 +78,7 @@ impl Means {
 }
 
 /// What a row contributes.
-fn row(run: &Run, i: usize, surface: &Surface, duration: f64) -> Means {
+pub(super) fn row(run: &Run, i: usize, surface: &Surface, duration: f64) -> Means {
     let (p, d) = (run.pressure[i], run.direction[i]);
     let c = &surface.curves[run.mounting];
     let at = |curve: &[f64]| surface.at(curve, p);

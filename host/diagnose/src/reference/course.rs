@@ -5,7 +5,7 @@
 
 use nalgebra::DVector;
 
-use super::cells::{Cell, rms_after};
+use super::cells::{Cell, Means, rms_after};
 use super::contrast::{Contrast, evidence, log_mean, log_sum};
 use super::criteria::{COURSE_LEAD, COURSE_PART, COURSE_WHOLE};
 use super::shapes::Change;
@@ -48,6 +48,13 @@ pub(super) struct Course {
     pub log: f64,
 }
 
+impl Course {
+    /// The part of the change that is there at a moment.
+    pub fn at(&self, clock: f64) -> f64 {
+        factor(self.kind, self.start.at, clock)
+    }
+}
+
 /// A course from one start.
 struct Tried {
     start: f64,
@@ -69,12 +76,16 @@ pub(super) fn candidate(cells: &[Cell], change: Change) -> Option<Candidate> {
         Change::ForceOffset => &[Kind::Whole, Kind::Step],
         _ => &[Kind::Whole, Kind::Step, Kind::Ramp],
     };
-    let shape = match change {
-        Change::EndSlip => on(&|c| Some(c.means.step_by_stroke)),
-        Change::ForceDrift => on(&|_| Some(1.0)),
-        other => on(&|c| other.shape(&c.means, c.direction)),
-    };
-    Some(Candidate { shape: shape?, kinds })
+    Some(Candidate { shape: on(&|c| in_full(change, &c.means, c.direction))?, kinds })
+}
+
+/// What a change adds to the force per unit of size once it is there in full.
+pub(super) fn in_full(change: Change, means: &Means, direction: f64) -> Option<f64> {
+    match change {
+        Change::EndSlip => Some(means.step_by_stroke),
+        Change::ForceDrift => Some(1.0),
+        other => other.shape(means, direction),
+    }
 }
 
 fn factor(kind: Kind, start: f64, clock: f64) -> f64 {
@@ -242,7 +253,6 @@ fn start(tried: &[Tried]) -> Option<Start> {
 mod tests {
     use nalgebra::DMatrix;
 
-    use super::super::cells::Means;
     use super::*;
 
     /// Two cells of BEFORE and eight of AFTER in no order of time, with correlations.

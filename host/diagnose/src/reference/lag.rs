@@ -8,7 +8,7 @@ use super::surface::{Surface, bin};
 
 /// The lag of a run that explains its force best, s: positive where the force is late, negative where the pressure reading is.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Score {
+struct Score {
     pub lag: f64,
     /// How much a lag would show: a slack mounting says nothing.
     pub weight: f64,
@@ -143,7 +143,7 @@ fn lowest(x: [f64; 3], y: [f64; 3]) -> f64 {
 }
 
 /// The lag score of a run, by the lags that are tried, ascending.
-pub(super) fn score(run: &Run, surface: &Surface, lags: &[f64]) -> Score {
+fn score(run: &Run, surface: &Surface, lags: &[f64]) -> Score {
     let scorer = Scorer::new(run, surface);
     let expected = scorer.forces(&run.pressure);
     let later = |lag: f64| scorer.forces(&delayed(&run.time, &run.pressure, lag));
@@ -182,7 +182,7 @@ fn weighted_median(values: &[(f64, f64)]) -> f64 {
 }
 
 /// AFTER's lags against BEFORE's: a robust contrast per mounting, joined by a weighted median.
-pub(super) fn shift(runs: &Runs, scores: &[Score]) -> Shift {
+fn shift(runs: &Runs, scores: &[Score]) -> Shift {
     let (mut contrasts, mut deviations) = (Vec::new(), Vec::new());
     let alone = runs.side(false).next().is_none();
     for mounting in 0..runs.strokes.len() {
@@ -230,6 +230,13 @@ pub(super) fn shift(runs: &Runs, scores: &[Score]) -> Shift {
     let each: Vec<f64> = LAG_SIZES.iter().map(|s| density(variance + s * s)).collect();
     // The sign is known, hence twice the density.
     Shift { lag, variance, unchanged: density(variance), changed: log_mean(&each) + std::f64::consts::LN_2 }
+}
+
+/// AFTER's lags against BEFORE's, by the lags that are tried.
+pub(super) fn between(runs: &Runs, surface: &Surface, lags: &[f64]) -> Shift {
+    use rayon::prelude::*;
+    let scores: Vec<Score> = runs.runs.par_iter().map(|r| score(r, surface, lags)).collect();
+    shift(runs, &scores)
 }
 
 /// What this lag does to the rows of a run, N.

@@ -6,7 +6,8 @@ use super::answer::{Moment, Place, Since};
 use super::cells::Cell;
 use super::course::Kind;
 use super::criteria::{CELLS, LOCALISE_STANDS_OUT};
-use super::isometric::{Accepted, Analysis};
+use super::isometric::Analysis;
+use super::naming::Accepted;
 
 /// Shares of the energy by mounting, pressure, direction and recording, those that stand out.
 pub(super) fn places(analysis: &Analysis, difference: &DVector<f64>, rest_length: Option<f64>) -> Vec<Place> {

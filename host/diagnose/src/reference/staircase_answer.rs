@@ -12,7 +12,8 @@ use super::criteria::{
     SLOPE_ERROR, TABLE_INTERVAL, TABLE_SLOPE_ERROR, TABLE_SLOPE_OVER_LENGTH, UNSEEN_EXPLAINED,
 };
 use super::held_out;
-use super::isometric::{Accepted, Analysis};
+use super::isometric::Analysis;
+use super::naming::Accepted;
 use super::posterior::Cause;
 use super::report::{Options, left, prior, verdict};
 use super::shapes::{CHANGES, Change, Class};

@@ -1,0 +1,192 @@
+//! One name after the other: what is named is taken out, and the rest is weighed again.
+
+use nalgebra::DVector;
+
+use super::cells::{Cell, cells, rms_after, row};
+use super::contrast::Contrast;
+use super::course::{self, Course};
+use super::criteria::{COMBINED_SHAPE_ERROR, LAG_FLOOR, MOST_CHANGES, NAMED, SIZES, SLOPE_ERROR};
+use super::lag;
+use super::posterior::{Cause, Posterior};
+use super::runs::{Run, Runs};
+use super::shapes::Change;
+use super::surface::Surface;
+use super::weighing::{Inexact, Round, Weighing, is_lag, weigh};
+
+/// A change that is named, with the shape that it has in the cells.
+#[derive(Debug, Clone)]
+pub(super) struct Accepted {
+    pub change: Change,
+    pub probability: f64,
+    /// Other names that the set of this round holds.
+    pub competitors: Vec<Change>,
+    /// Per unit of size, N; zero on BEFORE.
+    pub shape: DVector<f64>,
+    pub size: f64,
+    pub std: f64,
+    /// Since when; unknown for a lag.
+    pub course: Option<Course>,
+}
+
+/// What names depend on beside the cells.
+pub(super) struct About<'a> {
+    pub runs: &'a Runs,
+    /// Lags that are tried.
+    pub lags: &'a [f64],
+    /// The first weighing.
+    pub by: Weighing<'a>,
+}
+
+/// What was named.
+pub(super) struct Named {
+    /// With the trace of the lag that was weighed last.
+    pub cells: Vec<Cell>,
+    pub accepted: Vec<Accepted>,
+    /// The weighing after the last name.
+    pub last: Posterior,
+}
+
+/// The cells with the trace of a lag.
+pub(super) fn traced(runs: &Runs, surface: &Surface, late: f64) -> Vec<Cell> {
+    let of = |run: &Run| lag::effect(run, surface, late);
+    cells(runs, surface, (late.abs() > LAG_FLOOR).then_some(&of as &dyn Fn(&Run) -> Vec<f64>))
+}
+
+/// The runs without what was named, in their rows.
+fn without(runs: &Runs, surface: &Surface, accepted: &[Accepted]) -> Runs {
+    let mut freed = runs.clone();
+    for run in freed.runs.iter_mut().filter(|r| r.after) {
+        let added = |i: usize| -> f64 {
+            let means = row(run, i, surface, runs.duration);
+            accepted
+                .iter()
+                .filter_map(|a| {
+                    let course = a.course.as_ref()?;
+                    Some(
+                        a.size
+                            * course.at(means.clock)
+                            * course::in_full(a.change, &means, run.direction[i])?,
+                    )
+                })
+                .sum()
+        };
+        let force: Vec<f64> = (0..run.time.len()).map(|i| run.force[i] - added(i)).collect();
+        run.force = force;
+    }
+    freed
+}
+
+/// Names changes until none is more probable than not.
+pub(super) fn name(about: &About<'_>, contrast: &Contrast, (given, first): (&[Cell], &Round)) -> Named {
+    let by = about.by;
+    let mut cells = given.to_vec();
+    let mut shift = by.lag.copied();
+    let mut present = contrast.clone();
+    let mut accepted: Vec<Accepted> = Vec::new();
+    let share = if by.moving { COMBINED_SHAPE_ERROR } else { SLOPE_ERROR };
+    let mut inexact = Inexact { share, first: first.best };
+    let mut weighed: Option<Round> = None;
+    loop {
+        let round = weighed.as_ref().unwrap_or(first);
+        let none = round.posterior.probability(Cause::None);
+        let more = round.posterior.leader().filter(|_| none < NAMED && accepted.len() < MOST_CHANGES);
+        let late = shift.map_or(0.0, |s| s.lag);
+        let next = more.and_then(|(change, p)| accept(&cells, round, change, p, late));
+        // A second change of the same kind is what the first one's shape is inexact by.
+        let other = |n: &Accepted| accepted.iter().all(|a| a.change.class() != n.change.class());
+        let Some(next) = next.map(|n| with_course(&cells, &present, by.surface, n)).filter(other) else {
+            let last = round.posterior.clone();
+            refit(contrast, &mut accepted, &cells);
+            return Named { cells, accepted, last };
+        };
+        if is_lag(next.change) {
+            let trace = lag::trace(&cells);
+            let before = present.energy;
+            present = present.with_residual(&present.residual - &trace).without_shapes(&[trace]);
+            inexact.first = inexact.first.max(0.5 * (before - present.energy) / present.scale());
+            shift = None;
+        } else {
+            present = present.without_shapes(std::slice::from_ref(&next.shape));
+        }
+        accepted.push(next);
+        if shift.is_some() {
+            // Rows in motion are scored without what was named.
+            let freed = without(about.runs, by.surface, &accepted);
+            let found = lag::between(&freed, by.surface, about.lags);
+            let with = traced(&freed, by.surface, found.lag);
+            cells.iter_mut().zip(with).for_each(|(c, w)| c.means.lag = w.means.lag);
+            shift = Some(found);
+        }
+        let round = weigh(&cells, &present, Weighing { lag: shift.as_ref(), inexact, ..by });
+        inexact.first = inexact.first.max(round.best);
+        weighed = Some(round);
+    }
+}
+
+fn accept(cells: &[Cell], round: &Round, change: Change, probability: f64, late: f64) -> Option<Accepted> {
+    let estimate = round.estimates.iter().find(|e| e.change == change)?;
+    let course = round.courses.iter().find(|c| c.0 == change).map(|c| c.1.clone());
+    let shape = match &course {
+        Some(course) => course.shape.clone(),
+        None => lag::trace(cells) / late.abs().max(1e-9),
+    };
+    let competitors = round.posterior.set().into_iter().filter_map(|c| match c {
+        Cause::Named(other) if other != change => Some(other),
+        _ => None,
+    });
+    Some(Accepted {
+        change,
+        probability,
+        competitors: competitors.collect(),
+        shape,
+        size: estimate.size,
+        std: estimate.std,
+        course,
+    })
+}
+
+/// The same change with its course and its size; the course where the spread of the runs is judged without the change.
+fn with_course(cells: &[Cell], present: &Contrast, surface: &Surface, found: Accepted) -> Accepted {
+    if is_lag(found.change) {
+        return found;
+    }
+    let sizes = SIZES.map(|s| s * surface.largest);
+    let scale = present.without_shapes(std::slice::from_ref(&found.shape)).scale();
+    let candidate = course::candidate(cells, found.change);
+    let Some(course) = candidate.and_then(|c| course::of(cells, present, &c, scale, &sizes)) else {
+        return found;
+    };
+    let (a, b) = present.products(&course.shape);
+    if !(a > 0.0) {
+        return found;
+    }
+    // The spread of the runs with the change in it: what the shape leaves is a part of it.
+    let std = (present.scale() / a).sqrt();
+    Accepted { shape: course.shape.clone(), size: b / a, std, course: Some(course), ..found }
+}
+
+/// Sizes of several changes beside each other.
+fn refit(contrast: &Contrast, accepted: &mut [Accepted], cells: &[Cell]) {
+    let lagged = accepted.iter().any(|a| is_lag(a.change));
+    let freed = if lagged {
+        contrast.with_residual(&contrast.residual - lag::trace(cells))
+    } else {
+        contrast.clone()
+    };
+    let places: Vec<usize> = (0..accepted.len()).filter(|i| !is_lag(accepted[*i].change)).collect();
+    if places.is_empty() || accepted.len() < 2 {
+        return;
+    }
+    let shapes: Vec<DVector<f64>> = places.iter().map(|i| accepted[*i].shape.clone()).collect();
+    let rms: Vec<f64> = shapes.iter().map(|s| rms_after(cells, s).max(f64::MIN_POSITIVE)).collect();
+    let x =
+        nalgebra::DMatrix::from_columns(&shapes.iter().zip(&rms).map(|(s, r)| s / *r).collect::<Vec<_>>());
+    let inner = x.tr_mul(&(&freed.projector * &x));
+    let Some(factor) = inner.cholesky() else { return };
+    let sizes = factor.solve(&x.tr_mul(&freed.projected));
+    let covariance = factor.inverse() * freed.without_shapes(&shapes).scale();
+    for (k, i) in places.into_iter().enumerate() {
+        accepted[i].size = sizes[k] / rms[k];
+        accepted[i].std = covariance[(k, k)].max(0.0).sqrt() / rms[k];
+    }
+}
