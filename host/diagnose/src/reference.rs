@@ -23,6 +23,7 @@
 //! | `weighing` | how strongly the cells support each change |
 //! | `gate` | a change must show without any single mounting |
 //! | `naming` | one name after the other |
+//! | `pairs` | two changes of which neither leads alone |
 //! | `withdrawal` | names that are withdrawn: another actuator, held-out recordings that get worse |
 //! | `posterior` | probabilities, set, verdict |
 //! | `isometric` | all of this for pressure staircases at held lengths |
@@ -56,6 +57,7 @@ mod lag;
 mod localise;
 mod motion;
 mod naming;
+mod pairs;
 mod posterior;
 pub(crate) mod repeatability;
 mod report;

@@ -124,6 +124,8 @@ pam_data::criteria! {
     COURSE_PART: ((f64, f64)) = (0.03, 0.97), "course_part", "1", Judgement;
     /// Log evidence by which one profile over time must lead the other to be reported: e³ = 20.
     COURSE_LEAD: f64 = 3.0, "course_lead", "1", Convention("e^3 = 20");
+    /// Pairs of changes that are weighed in full where one name leaves something, the likeliest first.
+    PAIRS_TRIED: usize = 3, "pairs_tried", "1", Cost;
     /// Names in one answer, at most.
     MOST_CHANGES: usize = 3, "most_changes", "1", Cost;
     /// Residual rms as a share of the largest force from which on another actuator is suspected.

@@ -7,6 +7,7 @@ use super::contrast::Contrast;
 use super::course::{self, Course};
 use super::criteria::{COMBINED_SHAPE_ERROR, LAG_FLOOR, MOST_CHANGES, NAMED, SIZES, SLOPE_ERROR};
 use super::lag;
+use super::pairs::{self, Pair};
 use super::posterior::{Cause, Posterior};
 use super::runs::{Run, Runs};
 use super::shapes::Change;
@@ -95,7 +96,17 @@ pub(super) fn name(about: &About<'_>, contrast: &Contrast, (given, first): (&[Ce
         // A second change of the same kind is what the first one's shape is inexact by.
         let other = |n: &Accepted| accepted.iter().all(|a| a.change.class() != n.change.class());
         let Some(next) = next.map(|n| with_course(&cells, &present, by.surface, n)).filter(other) else {
-            let last = round.posterior.clone();
+            let left = none < NAMED && !by.moving && !accepted.iter().any(|a| is_lag(a.change));
+            let without_lag = Weighing { lag: None, inexact, ..by };
+            let mut last = round.posterior.clone();
+            if left
+                && accepted.len() < 2
+                && let Some(pair) = pairs::search(&cells, contrast, without_lag, first)
+            {
+                accepted = both(&cells, by.surface, &pair);
+                let shapes: Vec<DVector<f64>> = accepted.iter().map(|a| a.shape.clone()).collect();
+                last = weigh(&cells, &contrast.without_shapes(&shapes), without_lag).posterior;
+            }
             refit(contrast, &mut accepted, &cells);
             return Named { cells, accepted, last };
         };
@@ -121,6 +132,16 @@ pub(super) fn name(about: &About<'_>, contrast: &Contrast, (given, first): (&[Ce
         inexact.first = inexact.first.max(round.best);
         weighed = Some(round);
     }
+}
+
+/// Both changes of a pair, each where the other one is taken out.
+fn both(cells: &[Cell], surface: &Surface, pair: &Pair) -> Vec<Accepted> {
+    let one = |k: usize| {
+        let (change, round, rest) = (pair.changes[k], &pair.rounds[k], &pair.rests[k]);
+        let found = accept(cells, round, change, round.posterior.probability(Cause::Named(change)), 0.0)?;
+        Some(with_course(cells, rest, surface, found))
+    };
+    (0..2).filter_map(one).collect()
 }
 
 fn accept(cells: &[Cell], round: &Round, change: Change, probability: f64, late: f64) -> Option<Accepted> {
@@ -169,7 +190,8 @@ fn with_course(cells: &[Cell], present: &Contrast, surface: &Surface, found: Acc
 fn refit(contrast: &Contrast, accepted: &mut [Accepted], cells: &[Cell]) {
     let lagged = accepted.iter().any(|a| is_lag(a.change));
     let freed = if lagged {
-        contrast.with_residual(&contrast.residual - lag::trace(cells))
+        let trace = lag::trace(cells);
+        contrast.with_residual(&contrast.residual - &trace).without_shapes(&[trace])
     } else {
         contrast.clone()
     };

@@ -1,0 +1,59 @@
+//! Two changes that explain the difference together, where one after the other does not: the first name that is found may be one that
+//! imitates both.
+
+use super::cells::Cell;
+use super::contrast::Contrast;
+use super::course;
+use super::criteria::{PAIRS_TRIED, SIZES};
+use super::shapes::Change;
+use super::weighing::{Round, Weighing, is_lag, weigh};
+
+/// Two changes, and the weighing of each where the other one is taken out.
+pub(super) struct Pair {
+    pub changes: [Change; 2],
+    pub rounds: [Round; 2],
+    /// Without the other one.
+    pub rests: [Contrast; 2],
+}
+
+/// Pairs of two classes by falling log evidence: of one change alone and of the other beside it.
+fn ranked(cells: &[Cell], contrast: &Contrast, by: Weighing<'_>, first: &Round) -> Vec<(f64, usize, Change)> {
+    let scale = contrast.scale();
+    let sizes = SIZES.map(|s| s * by.surface.largest);
+    let mut all = Vec::new();
+    for (i, (one, course)) in first.courses.iter().enumerate() {
+        let rest = contrast.without_shapes(std::slice::from_ref(&course.shape));
+        for (other, _) in first.courses.iter().filter(|o| o.0.class() != one.class()) {
+            let candidate = course::candidate(cells, *other);
+            let beside = candidate.and_then(|c| course::of(cells, &rest, &c, scale, &sizes));
+            all.extend(beside.map(|b| (course.log + b.log, i, *other)));
+        }
+    }
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    all
+}
+
+/// The best pair of which each change leads where the other one is taken out.
+pub(super) fn search(cells: &[Cell], contrast: &Contrast, by: Weighing<'_>, first: &Round) -> Option<Pair> {
+    let without = |round: &Round, change: Change| {
+        let course = round.courses.iter().find(|c| c.0 == change)?;
+        Some(contrast.without_shapes(std::slice::from_ref(&course.1.shape)))
+    };
+    let leads = |round: &Round, like: Change| -> Option<Change> {
+        let leader = round.posterior.leader()?.0;
+        (!is_lag(leader) && leader.class() == like.class()).then_some(leader)
+    };
+    let mutual = |(_, i, other): &(f64, usize, Change)| -> Option<Pair> {
+        let one = first.courses[*i].0;
+        let second = weigh(cells, &without(first, one)?, by);
+        let other = leads(&second, *other)?;
+        let without_other = without(&second, other)?;
+        let again = weigh(cells, &without_other, by);
+        let one = leads(&again, one)?;
+        let without_one = without(&again, one)?;
+        let second = weigh(cells, &without_one, by);
+        let other = leads(&second, other)?;
+        Some(Pair { changes: [one, other], rounds: [again, second], rests: [without_other, without_one] })
+    };
+    ranked(cells, contrast, by, first).iter().take(PAIRS_TRIED).find_map(mutual)
+}
