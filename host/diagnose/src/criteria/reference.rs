@@ -109,6 +109,8 @@ pam_data::criteria! {
     SET: f64 = 0.95, "set", "1", Convention("95 %");
     /// Error of the slopes ∂F/∂P and ∂F/∂x, share of the size: by principle, they are estimated from the same recordings.
     SLOPE_ERROR: f64 = 0.05, "slope_error", "1", Judgement;
+    /// Error of the whole shape of a change that is named already, share of its size: what it leaves is no evidence of another one.
+    NAMED_SHAPE_ERROR: f64 = 0.1, "named_shape_error", "1", Judgement;
     /// The same for a step within AFTER beside a table, by the slope that AFTER shows, which the step itself has altered.
     OWN_SLOPE_ERROR: f64 = 0.15, "own_slope_error", "1", Judgement;
     /// The same where the slopes are a table's.

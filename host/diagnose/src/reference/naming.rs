@@ -5,7 +5,7 @@ use nalgebra::DVector;
 use super::cells::{Cell, cells, rms_after, row};
 use super::contrast::Contrast;
 use super::course::{self, Course};
-use super::criteria::{COMBINED_SHAPE_ERROR, LAG_FLOOR, MOST_CHANGES, NAMED, SIZES, SLOPE_ERROR};
+use super::criteria::{COMBINED_SHAPE_ERROR, LAG_FLOOR, MOST_CHANGES, NAMED, NAMED_SHAPE_ERROR, SIZES};
 use super::lag;
 use super::pairs::{self, Pair};
 use super::posterior::{Cause, Posterior};
@@ -84,7 +84,7 @@ pub(super) fn name(about: &About<'_>, contrast: &Contrast, (given, first): (&[Ce
     let mut shift = by.lag.copied();
     let mut present = contrast.clone();
     let mut accepted: Vec<Accepted> = Vec::new();
-    let share = if by.moving { COMBINED_SHAPE_ERROR } else { SLOPE_ERROR };
+    let share = if by.moving { COMBINED_SHAPE_ERROR } else { NAMED_SHAPE_ERROR };
     let mut inexact = Inexact { share, first: first.best };
     let mut weighed: Option<Round> = None;
     loop {
