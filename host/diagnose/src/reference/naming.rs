@@ -107,7 +107,12 @@ pub(super) fn name(about: &About<'_>, contrast: &Contrast, (given, first): (&[Ce
                 let shapes: Vec<DVector<f64>> = accepted.iter().map(|a| a.shape.clone()).collect();
                 last = weigh(&cells, &contrast.without_shapes(&shapes), without_lag).posterior;
             }
-            refit(contrast, &mut accepted, &cells);
+            let base = without_lags(contrast, &accepted, &cells);
+            if !by.moving && revisit(&cells, &base, without_lag, &mut accepted) {
+                let shapes: Vec<DVector<f64>> = accepted.iter().map(|a| a.shape.clone()).collect();
+                last = weigh(&cells, &base.without_shapes(&shapes), without_lag).posterior;
+            }
+            refit(&base, &mut accepted, &cells);
             return Named { cells, accepted, last };
         };
         if is_lag(next.change) {
@@ -186,15 +191,40 @@ fn with_course(cells: &[Cell], present: &Contrast, surface: &Surface, found: Acc
     Accepted { shape: course.shape.clone(), size: b / a, std, course: Some(course), ..found }
 }
 
-/// Sizes of several changes beside each other.
-fn refit(contrast: &Contrast, accepted: &mut [Accepted], cells: &[Cell]) {
-    let lagged = accepted.iter().any(|a| is_lag(a.change));
-    let freed = if lagged {
-        let trace = lag::trace(cells);
-        contrast.with_residual(&contrast.residual - &trace).without_shapes(&[trace])
-    } else {
-        contrast.clone()
-    };
+/// Without what a named lag does, at any size.
+fn without_lags(contrast: &Contrast, accepted: &[Accepted], cells: &[Cell]) -> Contrast {
+    if !accepted.iter().any(|a| is_lag(a.change)) {
+        return contrast.clone();
+    }
+    let trace = lag::trace(cells);
+    contrast.with_residual(&contrast.residual - &trace).without_shapes(&[trace])
+}
+
+/// Weighs each name once more beside the others: the first one was found while the others were in the difference. Whether any changed.
+fn revisit(cells: &[Cell], base: &Contrast, by: Weighing<'_>, accepted: &mut [Accepted]) -> bool {
+    let places: Vec<usize> = (0..accepted.len()).filter(|i| !is_lag(accepted[*i].change)).collect();
+    let mut changed = false;
+    if accepted.len() < 2 {
+        return changed;
+    }
+    for &i in &places {
+        let others: Vec<usize> = places.iter().copied().filter(|o| *o != i).collect();
+        let shapes: Vec<DVector<f64>> = others.iter().map(|o| accepted[*o].shape.clone()).collect();
+        let rest = base.without_shapes(&shapes);
+        let round = weigh(cells, &rest, by);
+        let Some((change, probability)) = round.posterior.leader().filter(|l| !is_lag(l.0)) else { continue };
+        if others.iter().any(|o| accepted[*o].change.class() == change.class()) {
+            continue;
+        }
+        let Some(found) = accept(cells, &round, change, probability, 0.0) else { continue };
+        accepted[i] = with_course(cells, &rest, by.surface, found);
+        changed = true;
+    }
+    changed
+}
+
+/// Sizes of several changes beside each other. `base`: without what a named lag does.
+fn refit(base: &Contrast, accepted: &mut [Accepted], cells: &[Cell]) {
     let places: Vec<usize> = (0..accepted.len()).filter(|i| !is_lag(accepted[*i].change)).collect();
     if places.is_empty() || accepted.len() < 2 {
         return;
@@ -203,10 +233,10 @@ fn refit(contrast: &Contrast, accepted: &mut [Accepted], cells: &[Cell]) {
     let rms: Vec<f64> = shapes.iter().map(|s| rms_after(cells, s).max(f64::MIN_POSITIVE)).collect();
     let x =
         nalgebra::DMatrix::from_columns(&shapes.iter().zip(&rms).map(|(s, r)| s / *r).collect::<Vec<_>>());
-    let inner = x.tr_mul(&(&freed.projector * &x));
+    let inner = x.tr_mul(&(&base.projector * &x));
     let Some(factor) = inner.cholesky() else { return };
-    let sizes = factor.solve(&x.tr_mul(&freed.projected));
-    let covariance = factor.inverse() * freed.without_shapes(&shapes).scale();
+    let sizes = factor.solve(&x.tr_mul(&base.projected));
+    let covariance = factor.inverse() * base.without_shapes(&shapes).scale();
     for (k, i) in places.into_iter().enumerate() {
         accepted[i].size = sizes[k] / rms[k];
         accepted[i].std = covariance[(k, k)].max(0.0).sqrt() / rms[k];

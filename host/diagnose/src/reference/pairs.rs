@@ -16,14 +16,14 @@ pub(super) struct Pair {
     pub rests: [Contrast; 2],
 }
 
-/// Pairs of two classes by falling log evidence: of one change alone and of the other beside it.
+/// Pairs by falling log evidence: of one change alone and of the other beside it.
 fn ranked(cells: &[Cell], contrast: &Contrast, by: Weighing<'_>, first: &Round) -> Vec<(f64, usize, Change)> {
     let scale = contrast.scale();
     let sizes = SIZES.map(|s| s * by.surface.largest);
     let mut all = Vec::new();
     for (i, (one, course)) in first.courses.iter().enumerate() {
         let rest = contrast.without_shapes(std::slice::from_ref(&course.shape));
-        for (other, _) in first.courses.iter().filter(|o| o.0.class() != one.class()) {
+        for (other, _) in first.courses.iter().filter(|o| o.0 != *one) {
             let candidate = course::candidate(cells, *other);
             let beside = candidate.and_then(|c| course::of(cells, &rest, &c, scale, &sizes));
             all.extend(beside.map(|b| (course.log + b.log, i, *other)));
@@ -46,13 +46,13 @@ pub(super) fn search(cells: &[Cell], contrast: &Contrast, by: Weighing<'_>, firs
     let mutual = |(_, i, other): &(f64, usize, Change)| -> Option<Pair> {
         let one = first.courses[*i].0;
         let second = weigh(cells, &without(first, one)?, by);
-        let other = leads(&second, *other)?;
+        let other = leads(&second, *other).filter(|other| *other != one)?;
         let without_other = without(&second, other)?;
         let again = weigh(cells, &without_other, by);
-        let one = leads(&again, one)?;
+        let one = leads(&again, one).filter(|one| *one != other)?;
         let without_one = without(&again, one)?;
         let second = weigh(cells, &without_one, by);
-        let other = leads(&second, other)?;
+        let other = leads(&second, other).filter(|other| *other != one)?;
         Some(Pair { changes: [one, other], rounds: [again, second], rests: [without_other, without_one] })
     };
     ranked(cells, contrast, by, first).iter().take(PAIRS_TRIED).find_map(mutual)
