@@ -56,6 +56,8 @@ pam_data::criteria! {
     LAGS: ([f64; 13]) = [0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.17, 0.23, 0.3, 0.4, 0.55, 0.75], "lags", "s", Judgement;
     /// A row further than this many median intervals from the one before says nothing about lags.
     LAG_GAP: f64 = 3.0, "lag_gap", "1", Judgement;
+    /// Beside a change of friction, rows within so many of the longest lag after a turn say nothing about lags: e⁻³ of a jump is left.
+    LAG_AFTER_TURN: f64 = 3.0, "lag_after_turn", "1", Derived("e^-3 = 5 %");
     /// Residuals of the lag score are clipped at this share of the largest force.
     LAG_CLIP: f64 = 0.1, "lag_clip", "1", Judgement;
     /// Spread of the lag score between runs that is always allowed: what valve timing does.

@@ -58,7 +58,7 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
     let Reference { surface, error, recorded } = reference;
     // Rows of one part of a motion do not follow one another: they say nothing about lags.
     let tried: &[f64] = if recorded { &LAGS } else { &TABLE_LAGS };
-    let shift = (!runs.moving).then(|| lag::between(&runs, &surface, tried));
+    let shift = (!runs.moving).then(|| lag::between(&runs, &surface, tried, false));
     let late = shift.as_ref().map_or(0.0, |s| s.lag);
     let cells = naming::traced(&runs, &surface, late);
     if !cells.iter().any(|c| c.after) {

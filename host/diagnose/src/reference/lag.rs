@@ -2,7 +2,9 @@
 
 use super::cells::Cell;
 use super::contrast::log_mean;
-use super::criteria::{CELLS, LAG_CLIP, LAG_FLOOR, LAG_GAP, LAG_RUNS, LAG_SIZES, MEDIAN_VARIANCE};
+use super::criteria::{
+    CELLS, LAG_AFTER_TURN, LAG_CLIP, LAG_FLOOR, LAG_GAP, LAG_RUNS, LAG_SIZES, MEDIAN_VARIANCE,
+};
 use super::runs::{Run, Runs};
 use super::surface::{Surface, bin};
 
@@ -67,14 +69,23 @@ struct Scorer<'a> {
     rows: Vec<(usize, usize)>,
 }
 
+/// Which rows say something about lags beside a change of friction: at a turn its force jumps, and a jump at another row than the one that
+/// is taken for the turn looks like a lag. `longest`: of the lags that are tried, s.
+fn clear_of_turns(run: &Run, longest: f64) -> Vec<bool> {
+    let turned = (1..run.time.len()).filter(|i| run.direction[*i] != run.direction[i - 1]);
+    let turns: Vec<f64> = turned.map(|i| run.time[i]).collect();
+    let clear = |t: &f64| turns.iter().all(|turn| t - turn < -longest || t - turn > LAG_AFTER_TURN * longest);
+    run.time.iter().map(clear).collect()
+}
+
 impl<'a> Scorer<'a> {
-    fn new(run: &'a Run, surface: &'a Surface) -> Self {
+    fn new(run: &'a Run, surface: &'a Surface, clear: &[bool]) -> Self {
         let mut steps: Vec<f64> = run.time.windows(2).map(|w| w[1] - w[0]).collect();
         let middle = steps.len() / 2;
         let usual =
             if steps.is_empty() { 0.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 };
         let rows = (1..run.time.len())
-            .filter(|i| run.time[*i] - run.time[i - 1] < LAG_GAP * usual)
+            .filter(|i| run.time[*i] - run.time[i - 1] < LAG_GAP * usual && clear[*i])
             .map(|i| {
                 let place = bin(run.pressure[i], surface.low, surface.high, CELLS);
                 (i, place + if run.direction[i] > 0.0 { CELLS } else { 0 })
@@ -143,8 +154,10 @@ fn lowest(x: [f64; 3], y: [f64; 3]) -> f64 {
 }
 
 /// The lag score of a run, by the lags that are tried, ascending.
-fn score(run: &Run, surface: &Surface, lags: &[f64]) -> Score {
-    let scorer = Scorer::new(run, surface);
+fn score(run: &Run, surface: &Surface, lags: &[f64], rubs: bool) -> Score {
+    let longest = lags.iter().copied().fold(0.0, f64::max);
+    let clear = if rubs { clear_of_turns(run, longest) } else { vec![true; run.time.len()] };
+    let scorer = Scorer::new(run, surface, &clear);
     let expected = scorer.forces(&run.pressure);
     let later = |lag: f64| scorer.forces(&delayed(&run.time, &run.pressure, lag));
     let mut tried: Vec<(f64, f64)> = lags
@@ -232,10 +245,10 @@ fn shift(runs: &Runs, scores: &[Score]) -> Shift {
     Shift { lag, variance, unchanged: density(variance), changed: log_mean(&each) + std::f64::consts::LN_2 }
 }
 
-/// AFTER's lags against BEFORE's, by the lags that are tried.
-pub(super) fn between(runs: &Runs, surface: &Surface, lags: &[f64]) -> Shift {
+/// AFTER's lags against BEFORE's, by the lags that are tried. `rubs`: whether friction changed, which leaves the rows at turns out.
+pub(super) fn between(runs: &Runs, surface: &Surface, lags: &[f64], rubs: bool) -> Shift {
     use rayon::prelude::*;
-    let scores: Vec<Score> = runs.runs.par_iter().map(|r| score(r, surface, lags)).collect();
+    let scores: Vec<Score> = runs.runs.par_iter().map(|r| score(r, surface, lags, rubs)).collect();
     shift(runs, &scores)
 }
 

@@ -10,7 +10,7 @@ use super::lag;
 use super::pairs::{self, Pair};
 use super::posterior::{Cause, Posterior};
 use super::runs::{Run, Runs};
-use super::shapes::Change;
+use super::shapes::{Change, Class};
 use super::surface::Surface;
 use super::weighing::{Inexact, Round, Weighing, is_lag, weigh};
 
@@ -127,8 +127,9 @@ pub(super) fn name(about: &About<'_>, contrast: &Contrast, (given, first): (&[Ce
         accepted.push(next);
         if shift.is_some() {
             // Rows in motion are scored without what was named.
+            let rubs = accepted.iter().any(|a| a.change.class() == Class::Friction);
             let freed = without(about.runs, by.surface, &accepted);
-            let found = lag::between(&freed, by.surface, about.lags);
+            let found = lag::between(&freed, by.surface, about.lags, rubs);
             let with = traced(&freed, by.surface, found.lag);
             cells.iter_mut().zip(with).for_each(|(c, w)| c.means.lag = w.means.lag);
             shift = Some(found);
