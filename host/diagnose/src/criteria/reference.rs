@@ -53,7 +53,7 @@ pam_data::criteria! {
     /// A longer pause on a shared clock, and the actuator counts as mounted anew.
     NEW_VISIT: f64 = 3600.0, "new_visit", "s", Judgement;
     /// First-order lags and delays that are tried on the rows of a run.
-    LAGS: ([f64; 13]) = [0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.17, 0.23, 0.3, 0.4, 0.55, 0.75], "lags", "s", Judgement;
+    LAGS: ([f64; 16]) = [0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.17, 0.23, 0.3, 0.4, 0.55, 0.75, 1.0, 1.4, 2.0], "lags", "s", Judgement;
     /// A row further than this many median intervals from the one before says nothing about lags.
     LAG_GAP: f64 = 3.0, "lag_gap", "1", Judgement;
     /// Beside a change of friction, rows within so many of the longest lag after a turn say nothing about lags: e⁻³ of a jump is left.
@@ -115,6 +115,8 @@ pam_data::criteria! {
     NAMED_SHAPE_ERROR: f64 = 0.1, "named_shape_error", "1", Judgement;
     /// The same for a step within AFTER beside a table, by the slope that AFTER shows, which the step itself has altered.
     OWN_SLOPE_ERROR: f64 = 0.15, "own_slope_error", "1", Judgement;
+    /// How often that slope is taken again with the step out of it.
+    OWN_SLOPE_ROUNDS: usize = 3, "own_slope_rounds", "1", Cost;
     /// The same where the slopes are a table's.
     TABLE_SLOPE_ERROR: f64 = 0.2, "table_slope_error", "1", Measured("development half, sizes of changes put in");
     /// Widens intervals beside a table: its error is larger in some muscles than its four sizes allow.

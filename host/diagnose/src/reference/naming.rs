@@ -5,13 +5,16 @@ use nalgebra::DVector;
 use super::cells::{Cell, cells, rms_after, row};
 use super::contrast::Contrast;
 use super::course::{self, Course};
-use super::criteria::{COMBINED_SHAPE_ERROR, LAG_FLOOR, MOST_CHANGES, NAMED, NAMED_SHAPE_ERROR, SIZES};
+use super::criteria::{
+    COMBINED_SHAPE_ERROR, LAG_FLOOR, MOST_CHANGES, NAMED, NAMED_SHAPE_ERROR, OWN_SLOPE_ROUNDS, SIZES,
+};
 use super::lag;
 use super::pairs::{self, Pair};
 use super::posterior::{Cause, Posterior};
 use super::runs::{Run, Runs};
 use super::shapes::{Change, Class};
 use super::surface::Surface;
+use super::table_surface;
 use super::weighing::{Inexact, Round, Weighing, is_lag, weigh};
 
 /// A change that is named, with the shape that it has in the cells.
@@ -95,7 +98,9 @@ pub(super) fn name(about: &About<'_>, contrast: &Contrast, (given, first): (&[Ce
         let next = more.and_then(|(change, p)| accept(&cells, round, change, p, late));
         // A second change of the same kind is what the first one's shape is inexact by.
         let other = |n: &Accepted| accepted.iter().all(|a| a.change.class() != n.change.class());
-        let Some(next) = next.map(|n| with_course(&cells, &present, by.surface, n)).filter(other) else {
+        let next = next.map(|n| with_course(&cells, &present, by.surface, n));
+        let next = next.map(|n| with_own_slopes(about.runs, &mut cells, &present, by.surface, n));
+        let Some(next) = next.filter(other) else {
             let left = none < NAMED && !by.moving && !accepted.iter().any(|a| is_lag(a.change));
             let without_lag = Weighing { lag: None, inexact, ..by };
             let mut last = round.posterior.clone();
@@ -190,6 +195,30 @@ fn with_course(cells: &[Cell], present: &Contrast, surface: &Surface, found: Acc
     // The spread of the runs with the change in it: what the shape leaves is a part of it.
     let std = (present.scale() / a).sqrt();
     Accepted { shape: course.shape.clone(), size: b / a, std, course: Some(course), ..found }
+}
+
+/// A slip beside a table with the slopes that AFTER shows once the slip is taken out of it: with the slip in them they are too small or
+/// too large by a share of the slip.
+fn with_own_slopes(
+    runs: &Runs,
+    cells: &mut [Cell],
+    present: &Contrast,
+    surface: &Surface,
+    found: Accepted,
+) -> Accepted {
+    if found.change != Change::EndSlip || surface.curves.iter().all(|c| c.own_by_stroke.is_empty()) {
+        return found;
+    }
+    let mut found = found;
+    let mut own = surface.clone();
+    for _ in 0..OWN_SLOPE_ROUNDS {
+        let freed = without(runs, &own, std::slice::from_ref(&found));
+        table_surface::fill_own_slopes(&mut own, &freed);
+        let with = traced(runs, &own, 0.0);
+        cells.iter_mut().zip(with).for_each(|(c, w)| c.means.step_by_stroke = w.means.step_by_stroke);
+        found = with_course(cells, present, surface, found);
+    }
+    found
 }
 
 /// Without what a named lag does, at any size.
