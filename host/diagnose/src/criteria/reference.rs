@@ -54,6 +54,8 @@ pam_data::criteria! {
     NEW_VISIT: f64 = 3600.0, "new_visit", "s", Judgement;
     /// First-order lags and delays that are tried on the rows of a run.
     LAGS: ([f64; 16]) = [0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.17, 0.23, 0.3, 0.4, 0.55, 0.75, 1.0, 1.4, 2.0], "lags", "s", Judgement;
+    /// How many of them are tried first beside recordings: the others where the longest of these is the best.
+    LAGS_FIRST: usize = 13, "lags_first", "1", Cost;
     /// A row further than this many median intervals from the one before says nothing about lags.
     LAG_GAP: f64 = 3.0, "lag_gap", "1", Judgement;
     /// Beside a change of friction, rows within so many of the longest lag after a turn say nothing about lags: e⁻³ of a jump is left.
@@ -64,8 +66,6 @@ pam_data::criteria! {
     LAG_FLOOR: f64 = 0.010, "lag_floor", "s", Judgement;
     /// Runs that `LAG_FLOOR` is worth.
     LAG_RUNS: f64 = 4.0, "lag_runs", "1", Judgement;
-    /// The same beside a table, which is often older: a filter of some seconds may have been added since.
-    TABLE_LAGS: ([f64; 16]) = [0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.17, 0.23, 0.3, 0.4, 0.55, 0.75, 1.0, 1.4, 2.0], "table_lags", "s", Judgement;
     /// The sizes of lags that are equally likely beforehand.
     LAG_SIZES: ([f64; 5]) = [0.02, 0.05, 0.1, 0.2, 0.4], "lag_sizes", "s", Judgement;
     /// Variance of a median over that of a mean.

@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::cells::Cell;
 use super::contrast::Contrast;
-use super::criteria::{COMBINED_SHAPE_ERROR, DIRECTIONS_PER_RUN, LAGS, TABLE_ERROR_FACTORS, TABLE_LAGS};
+use super::criteria::{COMBINED_SHAPE_ERROR, DIRECTIONS_PER_RUN, LAGS, LAGS_FIRST, TABLE_ERROR_FACTORS};
 use super::lag;
 use super::naming::{self, Accepted};
 use super::posterior::Posterior;
@@ -57,7 +57,8 @@ pub(super) struct Reference {
 pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Result<Analysis> {
     let Reference { surface, error, recorded } = reference;
     // Rows of one part of a motion do not follow one another: they say nothing about lags.
-    let tried: &[f64] = if recorded { &LAGS } else { &TABLE_LAGS };
+    // A table is often older: a filter of some seconds may have been added since.
+    let tried = if recorded { LAGS_FIRST } else { LAGS.len() };
     let shift = (!runs.moving).then(|| lag::between(&runs, &surface, tried, false));
     let late = shift.as_ref().map_or(0.0, |s| s.lag);
     let cells = naming::traced(&runs, &surface, late);
@@ -85,7 +86,7 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
     let weighed = |c: Contrast| (weigh(&cells, &c, by), c);
     let (first, contrast, which) = likeliest(contrasts.into_iter().map(weighed).collect())?;
     let reference_error = if recorded { 0.0 } else { error * TABLE_ERROR_FACTORS[which] };
-    let about = naming::About { runs: &runs, lags: tried, by };
+    let about = naming::About { runs: &runs, lags_first: tried, by };
     let named = naming::name(&about, &contrast, (&cells, &first));
     let naming::Named { cells, accepted, last } = named;
     Ok(Analysis { runs, surface, cells, contrast, first, accepted, last, recorded, reference_error })

@@ -3,7 +3,7 @@
 use super::cells::Cell;
 use super::contrast::log_mean;
 use super::criteria::{
-    CELLS, LAG_AFTER_TURN, LAG_CLIP, LAG_FLOOR, LAG_GAP, LAG_RUNS, LAG_SIZES, MEDIAN_VARIANCE,
+    CELLS, LAG_AFTER_TURN, LAG_CLIP, LAG_FLOOR, LAG_GAP, LAG_RUNS, LAG_SIZES, LAGS, MEDIAN_VARIANCE,
 };
 use super::runs::{Run, Runs};
 use super::surface::{Surface, bin};
@@ -153,21 +153,36 @@ fn lowest(x: [f64; 3], y: [f64; 3]) -> f64 {
     ((x[0] + x[1]) / 2.0 - a / (2.0 * curvature)).clamp(x[0], x[2])
 }
 
-/// The lag score of a run, by the lags that are tried, ascending.
-fn score(run: &Run, surface: &Surface, lags: &[f64], rubs: bool) -> Score {
-    let longest = lags.iter().copied().fold(0.0, f64::max);
+/// The lag score of a run. The `first` of the lags are tried, and all of them where the longest of these is the best.
+fn score(run: &Run, surface: &Surface, first: usize, rubs: bool) -> Score {
+    let usual = &LAGS[..first.clamp(1, LAGS.len())];
+    let longest = usual[usual.len() - 1];
     let clear = if rubs { clear_of_turns(run, longest) } else { vec![true; run.time.len()] };
     let scorer = Scorer::new(run, surface, &clear);
     let expected = scorer.forces(&run.pressure);
     let later = |lag: f64| scorer.forces(&delayed(&run.time, &run.pressure, lag));
-    let mut tried: Vec<(f64, f64)> = lags
-        .iter()
-        .rev()
-        .map(|lag| (-lag, scorer.cost(&low_pass(&run.time, &run.force, *lag), &expected)))
-        .collect();
-    tried.push((0.0, scorer.cost(&run.force, &expected)));
-    tried.extend(lags.iter().map(|lag| (*lag, scorer.cost(&run.force, &later(*lag)))));
-    let best = (0..tried.len()).min_by(|a, b| tried[*a].1.total_cmp(&tried[*b].1)).unwrap_or(0);
+    let cost = |lag: f64| {
+        let cost = if lag < 0.0 {
+            scorer.cost(&low_pass(&run.time, &run.force, -lag), &expected)
+        } else if lag > 0.0 {
+            scorer.cost(&run.force, &later(lag))
+        } else {
+            scorer.cost(&run.force, &expected)
+        };
+        (lag, cost)
+    };
+    let both = |lags: &[f64]| -> Vec<(f64, f64)> {
+        lags.iter().rev().map(|l| -l).chain([0.0]).chain(lags.iter().copied()).map(cost).collect()
+    };
+    let least = |tried: &[(f64, f64)]| {
+        (0..tried.len()).min_by(|a, b| tried[*a].1.total_cmp(&tried[*b].1)).unwrap_or(0)
+    };
+    let mut tried = both(usual);
+    let mut best = least(&tried);
+    if (best == 0 || best + 1 == tried.len()) && usual.len() < LAGS.len() {
+        tried = both(&LAGS);
+        best = least(&tried);
+    }
     let lag = if best > 0 && best + 1 < tried.len() {
         let near = &tried[best - 1..=best + 1];
         lowest([near[0].0, near[1].0, near[2].0], [near[0].1, near[1].1, near[2].1])
@@ -245,10 +260,10 @@ fn shift(runs: &Runs, scores: &[Score]) -> Shift {
     Shift { lag, variance, unchanged: density(variance), changed: log_mean(&each) + std::f64::consts::LN_2 }
 }
 
-/// AFTER's lags against BEFORE's, by the lags that are tried. `rubs`: whether friction changed, which leaves the rows at turns out.
-pub(super) fn between(runs: &Runs, surface: &Surface, lags: &[f64], rubs: bool) -> Shift {
+/// AFTER's lags against BEFORE's. `first`: how many lags are tried first. `rubs`: whether friction changed, which leaves the rows at turns out.
+pub(super) fn between(runs: &Runs, surface: &Surface, first: usize, rubs: bool) -> Shift {
     use rayon::prelude::*;
-    let scores: Vec<Score> = runs.runs.par_iter().map(|r| score(r, surface, lags, rubs)).collect();
+    let scores: Vec<Score> = runs.runs.par_iter().map(|r| score(r, surface, first, rubs)).collect();
     shift(runs, &scores)
 }
 

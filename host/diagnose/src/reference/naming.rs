@@ -35,8 +35,8 @@ pub(super) struct Accepted {
 /// What names depend on beside the cells.
 pub(super) struct About<'a> {
     pub runs: &'a Runs,
-    /// Lags that are tried.
-    pub lags: &'a [f64],
+    /// How many lags are tried first.
+    pub lags_first: usize,
     /// The first weighing.
     pub by: Weighing<'a>,
 }
@@ -134,7 +134,7 @@ pub(super) fn name(about: &About<'_>, contrast: &Contrast, (given, first): (&[Ce
             // Rows in motion are scored without what was named.
             let rubs = accepted.iter().any(|a| a.change.class() == Class::Friction);
             let freed = without(about.runs, by.surface, &accepted);
-            let found = lag::between(&freed, by.surface, about.lags, rubs);
+            let found = lag::between(&freed, by.surface, about.lags_first, rubs);
             let with = traced(&freed, by.surface, found.lag);
             cells.iter_mut().zip(with).for_each(|(c, w)| c.means.lag = w.means.lag);
             shift = Some(found);
