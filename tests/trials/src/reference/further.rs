@@ -31,6 +31,10 @@ pub struct Further {
     half: Option<String>,
 }
 
+/// How far these trials are a test.
+const DEVELOPED: &str = "\nThese are no independent test: the courses, the pairs and the lags beside other changes were developed on six of the muscles, and one constant \
+         (`named_shape_error`, 0.1 instead of 0.05) was chosen by false second names in all of them.\n";
+
 fn rate<T>(of: &[&T], right: impl Fn(&T) -> bool) -> Rate {
     Rate::new(of.iter().filter(|o| right(o)).count(), of.len())
 }
@@ -156,8 +160,6 @@ pub fn run(what: &Further) -> Result<(), Box<dyn Error>> {
     let pairs = together::run(&jobs)?;
     let courses = course::run(&jobs)?;
     let half = what.half.as_deref().map_or_else(String::new, |h| format!(" --half {h}"));
-    let text_of_use = "\nThese are no independent test: the courses, the pairs and the lags beside other changes were developed on six of the muscles, and one constant \
-         (`named_shape_error`, 0.1 instead of 0.05) was chosen by false second names in all of them.\n";
     let mut text = format!(
         "# Two changes, and since when\n\n`host diagnose AFTER… --reference BEFORE…` is tested on real recordings of {} fluidic muscles (pressure staircases \
          at held lengths): two simultaneous changes, and changes that begin within the later recordings. Changes are added as in the [trials of \
@@ -165,7 +167,7 @@ pub fn run(what: &Further) -> Result<(), Box<dyn Error>> {
          ```text\ncargo run --release -p trials -- reference-further{half} -o DIR --page docs/src/proof-reference-further.md\n```\n",
         jobs.len()
     );
-    text += text_of_use;
+    text += DEVELOPED;
     two(&mut text, &pairs);
     when(&mut text, &courses);
     std::fs::write(what.output.join("further.json"), serde_json::to_string_pretty(&(&pairs, &courses))?)?;
