@@ -58,7 +58,8 @@ pam_data::criteria! {
     LAGS_FIRST: usize = 13, "lags_first", "1", Cost;
     /// A row further than this many median intervals from the one before says nothing about lags.
     LAG_GAP: f64 = 3.0, "lag_gap", "1", Judgement;
-    /// Beside a change of friction, rows within so many of the longest lag after a turn say nothing about lags: e⁻³ of a jump is left.
+    /// Multiple of the longest lag tried first. Beside a change of friction, rows within that time after a reversal say nothing about lags:
+    /// e⁻³ of a jump is left.
     LAG_AFTER_TURN: f64 = 3.0, "lag_after_turn", "1", Derived("e^-3 = 5 %");
     /// Residuals of the lag score are clipped at this share of the largest force.
     LAG_CLIP: f64 = 0.1, "lag_clip", "1", Judgement;

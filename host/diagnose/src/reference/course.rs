@@ -168,7 +168,7 @@ fn products(cells: &[Cell], contrast: &Contrast, shape: &DVector<f64>) -> AllPro
     AllProducts { whole: sums.step(), steps, ramps, count: order.len().max(1) as f64 }
 }
 
-/// Log evidence of a kind of course over all its starts. A ramp grows from the beginning in half of the cases.
+/// Log evidence of one kind over all its starts. A ramp grows from the beginning in half of the cases.
 fn over_starts(kind: Kind, tried: &[Tried]) -> f64 {
     let logs: Vec<f64> = tried.iter().map(|t| t.log).collect();
     match (kind, logs.split_last()) {

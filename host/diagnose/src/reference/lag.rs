@@ -69,8 +69,8 @@ struct Scorer<'a> {
     rows: Vec<(usize, usize)>,
 }
 
-/// Which rows say something about lags beside a change of friction: at a turn its force jumps, and a jump at another row than the one that
-/// is taken for the turn looks like a lag. `longest`: of the lags that are tried, s.
+/// Which rows say something about lags beside a change of friction: at a reversal its force jumps, and a jump at another row than the one
+/// that is taken for the reversal looks like a lag. `longest`: of the lags that are tried, s.
 fn clear_of_turns(run: &Run, longest: f64) -> Vec<bool> {
     let turned = (1..run.time.len()).filter(|i| run.direction[*i] != run.direction[i - 1]);
     let turns: Vec<f64> = turned.map(|i| run.time[i]).collect();

@@ -47,7 +47,7 @@ pub(super) const UNTESTED: &str = "\n## Not tested\n\n\
     - A leak of a muscle that its valve supplies is not identifiable from force over measured pressure; strokes of a described muscle name it \
     only within the class of gains. What closed valves lose is not used.\n\
     - These pairs were seen while changes within AFTER, pairs of changes, and lags beside other changes were developed: no figure here is of \
-    muscles that nobody had seen.\n\
+    new muscles.\n\
     - A change that begins within AFTER and shows in one of its recordings alone is not judged on a held-out one.\n\
     - Lengths between those of the reference are interpolated from three lengths on; tested on synthetic staircases only (`cargo test -p \
     pam-diagnose interpolated`).\n\
