@@ -36,8 +36,9 @@ pub fn pose(
     pressure: Pressure<f32>,
     direction: f32,
 ) -> Force<f32> {
-    hold(muscle, at_stroke, stroke);
-    muscle.pull(muscle.force_posed(&at_stroke.posture, pressure, direction))
+    let held = muscle.at_stroke(stroke);
+    *at_stroke = held;
+    muscle.pull(muscle.force_held(&held, pressure, direction))
 }
 
 /// [`Muscle::slopes`], into their place.
