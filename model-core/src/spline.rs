@@ -268,4 +268,20 @@ mod tests {
             assert!((v - value(&c, u)).abs() < 1e-12 && (d - slope(&c, u)).abs() < 1e-12);
         }
     }
+
+    #[test]
+    fn the_piece_of_a_pressure_is_the_number_of_nodes_at_or_below_it() {
+        for count in 1..=MAX_NODES {
+            let values: [f64; MAX_NODES] = core::array::from_fn(|n| 10.0 * n as f64);
+            let nodes = Nodes::new(&values[..count]);
+            let numbers: [usize; MAX_PIECES] = core::array::from_fn(|n| n);
+            for step in -3..400_i32 {
+                let p = 0.5 * f64::from(step);
+                let below = values[..count].iter().filter(|node| **node <= p).count();
+                assert_eq!((nodes.place(p), *nodes.choose(p, &numbers)), (below, below), "{p} of {count}");
+            }
+            assert_eq!(nodes.place(f64::NAN), 0);
+            assert_eq!(nodes.place(f64::INFINITY), MAX_NODES, "behind the last node all pieces are alike");
+        }
+    }
 }
