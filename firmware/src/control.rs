@@ -10,6 +10,7 @@
 use model_core::link::messages::{Fault, FaultReport, MeanSignals, Mode, Session, Side, State};
 use model_core::link::settings::{Reaction, Settings};
 use model_core::motion::{MotionSettings, MotionTracker};
+use model_core::scalar::Scalar;
 use model_core::single_precision;
 use model_core::table::{MuscleTable, TableError};
 
@@ -18,7 +19,7 @@ use crate::health::{Health, Scales};
 use crate::modes::{Model, Seat};
 use crate::pair::PairState;
 use crate::reference::Generator;
-use crate::regulator;
+use crate::regulator::Law;
 use crate::safety::{self, Machine};
 use crate::signals::{self, Filters};
 use crate::tick::{TICK_S, TICK_US};
@@ -65,6 +66,8 @@ enum Notice {
 #[derive(Debug)]
 pub struct Controller {
     settings: Settings,
+    /// What follows from the settings of the regulator.
+    law: Law,
     hardware: &'static Hardware,
     machine: Machine,
     arming: Arming,
@@ -112,7 +115,11 @@ impl Controller {
     /// The same with places for the tables of the muscles that a board drives.
     #[inline(always)]
     pub fn seated(settings: &Settings, hardware: &'static Hardware, [first, second]: [Seat; 2]) -> Self {
+        let law = Law::of(&settings.regulator, &settings.limits);
+        // Without a table.
+        let bounds = law.bounds(settings.limits.pressure_pa.at_most(hardware.command_ceiling_pa));
         Self {
+            law,
             hardware,
             arming: Arming::Idle,
             unconfirmed: false,
@@ -127,7 +134,7 @@ impl Controller {
             setpoint_age: 0,
             owner: Session::default(),
             owner_age: 0,
-            sides: [Actuator::new(settings, first), Actuator::new(settings, second)],
+            sides: [Actuator::new(settings, first, bounds), Actuator::new(settings, second, bounds)],
             settings: *settings,
             pair: PairState::default(),
             tick: 0,
@@ -209,7 +216,9 @@ impl Controller {
     /// Uses other settings, which must have passed [`check_settings`].
     pub fn use_settings(&mut self, settings: &Settings) {
         self.settings = *settings;
+        self.law = Law::of(&settings.regulator, &settings.limits);
         for side in &mut self.sides {
+            side.bound(settings, self.hardware, &self.law);
             side.motion = MotionTracker::new(motion_settings(settings));
             side.filters = Filters::new(&settings.scales);
             side.watch.restart();
@@ -252,7 +261,9 @@ impl Controller {
     pub fn use_table(&mut self, side: Side, table: &MuscleTable) -> Result<(), TableError> {
         let actuator = &mut self.sides[side.index()];
         actuator.health = Health::new(Scales::of(table));
-        actuator.model.fill(table)
+        let filled = actuator.model.fill(table);
+        actuator.bound(&self.settings, self.hardware, &self.law);
+        filled
     }
 
     /// Means of a muscle's signals since they were last taken.
@@ -271,6 +282,7 @@ impl Controller {
         let actuator = &mut self.sides[side.index()];
         actuator.health = Health::default();
         actuator.model.clear();
+        actuator.bound(&self.settings, self.hardware, &self.law);
     }
 
     /// One telemetry sample every n ticks, 0 for none.
@@ -372,7 +384,7 @@ impl Controller {
 
     /// Brings the setpoint to this tick. A wave of the device's own is known ahead of its time, a host's setpoints are not.
     fn ask(&mut self) {
-        match self.generator.step_ahead(regulator::ahead(&self.settings.regulator)) {
+        match self.generator.step_ahead(self.law.ahead()) {
             Some((now, coming)) => {
                 self.setpoint = now;
                 self.lookahead_step = coming - self.lookahead;

@@ -27,6 +27,8 @@ pub struct Generator {
     /// Ticks since it began.
     ticks: u32,
     phase: u32,
+    /// Phase steps of a tick of a sine.
+    sine_steps: u32,
     points: Placed<Vec<CompactFloat, CAPACITY>>,
     last: f32,
     /// The last values made, at their number; how many were made, and how many of these have had their time.
@@ -41,6 +43,7 @@ impl Default for Generator {
             reference: Reference::SetPoint,
             ticks: 0,
             phase: 0,
+            sine_steps: 0,
             points: placed!(Vec<CompactFloat, CAPACITY>, Vec::new()),
             last: 0.0,
             lookahead: [0.0; AHEAD],
@@ -108,6 +111,10 @@ impl Generator {
             return Err(Refusal::Value(Field::Reference));
         }
         self.reference = reference;
+        self.sine_steps = match reference {
+            Reference::Sine { frequency_hz, .. } => steps(frequency_hz),
+            _ => 0,
+        };
         self.given = self.made;
         self.ticks = 0;
         self.phase = 0;
@@ -159,10 +166,17 @@ impl Generator {
     pub fn look_ahead(&mut self, ticks: usize) -> Option<()> {
         let ticks = ticks.min(AHEAD - 1) as u32;
         while self.made.wrapping_sub(self.given) <= ticks {
-            let value = self.step()?;
-            self.lookahead[self.made as usize % AHEAD] = value;
-            self.made = self.made.wrapping_add(1);
+            self.make()?;
         }
+        Some(())
+    }
+
+    /// One more value. Not inlined: nearly always just one is missing.
+    #[inline(never)]
+    fn make(&mut self) -> Option<()> {
+        let value = self.step()?;
+        self.lookahead[self.made as usize % AHEAD] = value;
+        self.made = self.made.wrapping_add(1);
         Some(())
     }
 
@@ -182,9 +196,9 @@ impl Generator {
     /// The value of this tick; `None` when setpoints come from the host. Moves on by one tick.
     fn step(&mut self) -> Option<f32> {
         // The commonest one first: it counts no ticks.
-        if let Reference::Sine { mean, amplitude, frequency_hz } = self.reference {
+        if let Reference::Sine { mean, amplitude, .. } = self.reference {
             let value = mean + amplitude * sine(self.phase);
-            self.phase = self.phase.wrapping_add(steps(frequency_hz));
+            self.phase = self.phase.wrapping_add(self.sine_steps);
             self.last = value;
             return Some(value);
         }

@@ -56,9 +56,83 @@ pub struct Demand {
     pub lookahead_pa: f32,
 }
 
-/// Ticks by which a setpoint that is known ahead is demanded early.
-pub fn ahead(regulator: &Regulator) -> usize {
-    if regulator.lead > 0.0 { ((LOOP_S + SMOOTHING * regulator.lag_s) / TICK_S) as usize } else { 0 }
+/// Ticks in a second, as a number that rates are multiplied by.
+const PER_S: f32 = 1.0 / TICK_S;
+
+/// What follows from the settings of a regulator: worked out when they change, and not in every tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Law {
+    lead: f32,
+    line_s: f32,
+    gain: f32,
+    inv_gain: f32,
+    offset_pa: f32,
+    command_max_pa: f32,
+    deadband_pa: f32,
+    /// Ticks by which a setpoint that is known ahead is demanded early, and the same in seconds.
+    ahead: usize,
+    ahead_s: f32,
+    /// Lag, delay of the loop and smoothing: what the lead compensates.
+    late_s: f32,
+    /// `Δt/(Δt + smoothing)`, and `1/(Δt + smoothing)`.
+    share: f32,
+    smoothed_per_s: f32,
+    /// Part of its gap that the regulator closes in a tick, and the most that it moves.
+    closes: f32,
+    most_pa: f32,
+    /// The most that a demand changes in a tick.
+    slew_pa: f32,
+    /// The most that the observer adds.
+    bias_pa: f32,
+}
+
+impl Law {
+    /// That of these settings.
+    pub fn of(regulator: &Regulator, limits: &Limits) -> Self {
+        let smoothing_s = SMOOTHING * regulator.lag_s;
+        let ahead = if regulator.lead > 0.0 { ((LOOP_S + smoothing_s) / TICK_S) as usize } else { 0 };
+        Self {
+            lead: regulator.lead,
+            line_s: regulator.line_s,
+            gain: regulator.gain,
+            inv_gain: 1.0 / regulator.gain,
+            offset_pa: regulator.offset_pa,
+            command_max_pa: regulator.command_max_pa,
+            deadband_pa: regulator.deadband_pa,
+            ahead,
+            ahead_s: ahead as f32 * TICK_S,
+            late_s: regulator.lag_s + LOOP_S + smoothing_s,
+            share: TICK_S / (TICK_S + smoothing_s),
+            smoothed_per_s: 1.0 / (TICK_S + smoothing_s),
+            // The exact step of the lag is 1 − e^(−dt/lag); this form is late by a thousandth of it and never overshoots.
+            closes: TICK_S / (0.5 * TICK_S + regulator.lag_s).at_least(TICK_S),
+            most_pa: regulator.rate_pa_per_s * TICK_S,
+            slew_pa: limits.slew_pa_per_s * TICK_S,
+            bias_pa: BIAS * regulator.command_max_pa,
+        }
+    }
+
+    /// Ticks by which a setpoint that is known ahead is demanded early.
+    #[inline(always)]
+    pub fn ahead(&self) -> usize {
+        self.ahead
+    }
+
+    /// Limits for a muscle that may have this pressure.
+    pub fn bounds(&self, high_pa: f32) -> Bounds {
+        let high_pa = high_pa.at_least(0.0);
+        let command_pa = self.command_max_pa.at_most(high_pa / self.gain - self.offset_pa);
+        Bounds { high_pa, command_pa }
+    }
+}
+
+/// What may be demanded of a regulator, and commanded.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bounds {
+    /// Highest pressure in the muscle, Pa.
+    pub high_pa: f32,
+    /// Highest command, Pa.
+    pub command_pa: f32,
 }
 
 /// Keeps the regulator's model and the last demanded pressure.
@@ -104,11 +178,12 @@ impl RegulatorState {
 
     /// Takes a tick's measured pressure: its difference from the model is added slowly to the command. This corrects drift of the
     /// regulator's zero and gain, and its ripple; lag and line are in the model and cause no correction.
-    pub fn observe(&mut self, dt: f32, measured_pa: f32, regulator: &Regulator) {
+    #[inline]
+    pub fn observe(&mut self, measured_pa: f32, law: &Law) {
         let lack = self.model_pa - measured_pa;
         if lack.is_finite() {
-            let most = BIAS * regulator.command_max_pa;
-            self.bias_pa = (self.bias_pa + lack * dt / OBSERVER_S).within(-most, most);
+            let most = law.bias_pa;
+            self.bias_pa = (self.bias_pa + lack * (TICK_S / OBSERVER_S)).within(-most, most);
         }
     }
 
@@ -122,44 +197,28 @@ impl RegulatorState {
         self.command_pa
     }
 
-    /// One tick of `dt` seconds towards a demanded pressure, which is limited to `high_pa`.
+    /// One tick towards a demanded pressure, within its bounds.
     #[inline]
-    pub fn step(
-        &mut self,
-        dt: f32,
-        demand: Demand,
-        high_pa: f32,
-        air: &Air,
-        regulator: &Regulator,
-        limits: &Limits,
-    ) -> Driven {
-        let slew = limits.slew_pa_per_s * dt;
-        let high = high_pa.at_least(0.0);
-        let wanted = demand
-            .pressure_pa
-            .within(0.0, high)
-            .within(self.pressure_demand_pa - slew, self.pressure_demand_pa + slew);
-        let smoothing = SMOOTHING * regulator.lag_s;
-        let share = dt / (dt + smoothing);
-        self.rate_pa_per_s += ((wanted - self.pressure_demand_pa) / dt - self.rate_pa_per_s) * share;
-        let foreseen = demand.lookahead_pa.within(-slew, slew) / dt;
-        self.foreseen_pa_per_s += (foreseen - self.foreseen_pa_per_s) * share;
+    pub fn step(&mut self, demand: Demand, bounds: &Bounds, air: &Air, law: &Law) -> Driven {
+        let (slew, high) = (law.slew_pa, bounds.high_pa);
+        let before = self.pressure_demand_pa;
+        let wanted = demand.pressure_pa.within(0.0, high).within(before - slew, before + slew);
+        self.rate_pa_per_s += ((wanted - before) * PER_S - self.rate_pa_per_s) * law.share;
+        let foreseen = demand.lookahead_pa.within(-slew, slew) * PER_S;
+        self.foreseen_pa_per_s += (foreseen - self.foreseen_pa_per_s) * law.share;
         self.pressure_demand_pa = wanted;
-        let line = regulator.line_s * air.fill;
+        let line = law.line_s * air.fill;
         let draught = (wanted + ATMOSPHERE_PA) * air.widening_per_s;
         let outlet_rate =
-            (wanted + line * (self.rate_pa_per_s + draught) - self.outlet_pa) / (dt + smoothing);
-        self.outlet_pa += outlet_rate * dt;
-        let late = LOOP_S + smoothing;
-        let led = self.outlet_pa + (regulator.lag_s + late) * outlet_rate
-            - ahead(regulator) as f32 * TICK_S * self.foreseen_pa_per_s;
+            (wanted + line * (self.rate_pa_per_s + draught) - self.outlet_pa) * law.smoothed_per_s;
+        self.outlet_pa += outlet_rate * TICK_S;
+        let led = self.outlet_pa + law.late_s * outlet_rate - law.ahead_s * self.foreseen_pa_per_s;
         // Lead never commands more than the muscle may bear, not even for a moment: a regulator may be faster than its model.
-        let target = (wanted + regulator.lead * (led - wanted)).within(0.0, high);
-        let modelled = (target / regulator.gain - regulator.offset_pa).within(0.0, regulator.command_max_pa);
-        let free = (target + self.bias_pa) / regulator.gain - regulator.offset_pa;
-        let command =
-            free.within(0.0, regulator.command_max_pa.at_most(high / regulator.gain - regulator.offset_pa));
-        self.predict(dt, modelled, air, regulator);
+        let target = (wanted + law.lead * (led - wanted)).within(0.0, high);
+        let modelled = (target * law.inv_gain - law.offset_pa).within(0.0, law.command_max_pa);
+        let free = (target + self.bias_pa) * law.inv_gain - law.offset_pa;
+        let command = free.within(0.0, bounds.command_pa);
+        self.predict(modelled, line, air.widening_per_s, law);
         self.command_pa = command;
         Driven {
             pressure_demand_pa: wanted,
@@ -169,38 +228,43 @@ impl RegulatorState {
     }
 
     /// Zero pressure immediately. Nothing of what was demanded is left, only what is still in line and muscle.
-    pub fn vent(&mut self, dt: f32, air: &Air, regulator: &Regulator) {
+    pub fn vent(&mut self, air: &Air, law: &Law) {
         *self = Self { supplied_pa: self.supplied_pa, model_pa: self.model_pa, ..Self::default() };
-        self.predict(dt, 0.0, air, regulator);
+        self.follow(0.0, air, law);
     }
 
     /// Whether line and muscle are empty and stay so at no command, without a movement that draws air in.
-    pub fn is_empty(&self, regulator: &Regulator) -> bool {
-        self.supplied_pa == 0.0 && self.model_pa == 0.0 && regulator.offset_pa <= 0.0
+    #[inline]
+    pub fn is_empty(&self, law: &Law) -> bool {
+        self.supplied_pa == 0.0 && self.model_pa == 0.0 && law.offset_pa <= 0.0
     }
 
     /// A command of someone else's: only the model follows it.
-    pub fn expect(&mut self, command_pa: f32, regulator: &Regulator) {
-        self.predict(TICK_S, command_pa, &Air::default(), regulator);
+    pub fn expect(&mut self, command_pa: f32, law: &Law) {
+        self.follow(command_pa, &Air::default(), law);
     }
 
     /// The last command again.
-    pub fn hold(&mut self, dt: f32, air: &Air, regulator: &Regulator) {
-        self.predict(dt, self.command_pa, air, regulator);
+    pub fn hold(&mut self, air: &Air, law: &Law) {
+        self.follow(self.command_pa, air, law);
     }
 
-    fn predict(&mut self, dt: f32, command_pa: f32, air: &Air, regulator: &Regulator) {
+    #[inline(never)]
+    fn follow(&mut self, command_pa: f32, air: &Air, law: &Law) {
         self.command_pa = command_pa;
-        let target = (regulator.gain * (command_pa + regulator.offset_pa)).at_least(0.0);
+        self.predict(command_pa, law.line_s * air.fill, air.widening_per_s, law);
+    }
+
+    /// What a command makes of line and muscle; `line` in seconds at this tick's volume.
+    #[inline(always)]
+    fn predict(&mut self, command_pa: f32, line_s: f32, widening_per_s: f32, law: &Law) {
+        let target = (law.gain * (command_pa + law.offset_pa)).at_least(0.0);
         let gap = target - self.supplied_pa;
-        if gap.abs() >= regulator.deadband_pa {
-            // The exact step of the lag is 1 − e^(−dt/lag); this form is late by a thousandth of it and never overshoots.
-            let step = gap * dt / (0.5 * dt + regulator.lag_s).at_least(dt);
-            let most = regulator.rate_pa_per_s * dt;
-            self.supplied_pa += step.within(-most, most);
+        if gap.abs() >= law.deadband_pa {
+            self.supplied_pa += (gap * law.closes).within(-law.most_pa, law.most_pa);
         }
-        let flow = dt / (regulator.line_s * air.fill).at_least(1.0e-6);
-        let widening = (air.widening_per_s * dt).within(-0.5, 0.5);
+        let flow = TICK_S / line_s.at_least(1.0e-6);
+        let widening = (widening_per_s * TICK_S).within(-0.5, 0.5);
         let filled = self.model_pa + flow * self.supplied_pa - ATMOSPHERE_PA * widening;
         self.model_pa = (filled / (1.0 + flow + widening)).at_least(0.0);
     }
@@ -211,6 +275,12 @@ mod tests {
     use super::*;
     use model_core::link::settings::Settings;
 
+    const HIGH_PA: f32 = 600e3;
+
+    fn law(regulator: &Regulator) -> Law {
+        Law::of(regulator, &Settings::default().limits)
+    }
+
     fn plain(pressure_pa: f32) -> Demand {
         Demand { pressure_pa, lookahead_pa: 0.0 }
     }
@@ -219,10 +289,11 @@ mod tests {
     fn gain_and_offset_are_inverted_exactly() {
         let settings = Settings::default();
         let regulator = Regulator { gain: 1.25, offset_pa: -4_000.0, ..settings.regulator };
+        let law = law(&regulator);
         let mut state = RegulatorState::default();
         let mut driven = Driven::default();
         for _ in 0..1000 {
-            driven = state.step(1e-3, plain(300e3), 600e3, &Air::default(), &regulator, &settings.limits);
+            driven = state.step(plain(300e3), &law.bounds(HIGH_PA), &Air::default(), &law);
         }
         assert!((driven.command_pa - (300e3 / 1.25 + 4_000.0)).abs() < 1.0);
         assert!((state.model_pa() - 300e3).abs() < 10.0, "{}", state.model_pa());
@@ -233,28 +304,22 @@ mod tests {
     fn a_wish_beyond_the_limit_is_cut_and_said() {
         let settings = Settings::default();
         let mut state = RegulatorState::default();
-        let driven =
-            state.step(1e-3, plain(900e3), 500e3, &Air::default(), &settings.regulator, &settings.limits);
+        let law = law(&settings.regulator);
+        let driven = state.step(plain(900e3), &law.bounds(500e3), &Air::default(), &law);
         assert!(driven.saturated && driven.command_pa <= 500e3);
     }
 
     #[test]
     fn a_drift_of_the_regulator_is_taken_away_and_a_broken_one_is_not_chased() {
         let settings = Settings::default();
+        let law = law(&settings.regulator);
         let run = |drift: f32| {
             let mut state = RegulatorState::default();
             let mut pressure = 0.0_f32;
             for _ in 0..3000 {
-                let driven = state.step(
-                    1e-3,
-                    plain(300e3),
-                    600e3,
-                    &Air::default(),
-                    &settings.regulator,
-                    &settings.limits,
-                );
+                let driven = state.step(plain(300e3), &law.bounds(HIGH_PA), &Air::default(), &law);
                 pressure += (driven.command_pa + drift - pressure) / 31.0;
-                state.observe(1e-3, pressure, &settings.regulator);
+                state.observe(pressure, &law);
             }
             (pressure - 300e3, state.command_pa())
         };
@@ -266,17 +331,17 @@ mod tests {
     #[test]
     fn after_a_vent_nothing_of_what_was_wanted_comes_back() {
         let settings = Settings::default();
-        let regulator = Regulator { line_s: 5e-3, ..settings.regulator };
+        let law = law(&Regulator { line_s: 5e-3, ..settings.regulator });
         let step = |state: &mut RegulatorState, wanted: f32| {
             let foreseen = Demand { pressure_pa: wanted, lookahead_pa: 100.0 };
-            state.step(1e-3, foreseen, 600e3, &Air::default(), &regulator, &settings.limits)
+            state.step(foreseen, &law.bounds(HIGH_PA), &Air::default(), &law)
         };
         let mut vented = RegulatorState::default();
         for tick in 0..500 {
             step(&mut vented, 600.0 * tick as f32);
-            vented.observe(1e-3, 0.0, &regulator);
+            vented.observe(0.0, &law);
         }
-        vented.vent(1e-3, &Air::default(), &regulator);
+        vented.vent(&Air::default(), &law);
         assert!(vented.model_pa() > 100e3, "the muscle is not empty immediately");
         // What is commanded next is what a new one would command.
         let mut new = RegulatorState::default();
@@ -290,15 +355,15 @@ mod tests {
         for (offset_pa, pressure_pa, empty) in
             [(0.0, 0.0, true), (-4e3, 0.0, true), (4e3, 0.0, false), (0.0, 1.0, false)]
         {
-            let regulator = Regulator { offset_pa, ..Settings::default().regulator };
+            let law = law(&Regulator { offset_pa, ..Settings::default().regulator });
             let mut state = RegulatorState::default();
             state.begin(pressure_pa);
             let before = state;
-            assert_eq!(state.is_empty(&regulator), empty, "{offset_pa}, {pressure_pa}");
-            state.vent(1e-3, &Air::default(), &regulator);
+            assert_eq!(state.is_empty(&law), empty, "{offset_pa}, {pressure_pa}");
+            state.vent(&Air::default(), &law);
             assert_eq!(state == before, empty, "{offset_pa}, {pressure_pa}");
         }
-        let failed = Regulator { offset_pa: f32::NAN, ..Settings::default().regulator };
+        let failed = law(&Regulator { offset_pa: f32::NAN, ..Settings::default().regulator });
         assert!(!RegulatorState::default().is_empty(&failed));
     }
 
@@ -306,12 +371,12 @@ mod tests {
     fn lead_removes_the_lag_of_a_ramp() {
         let settings = Settings::default();
         let follow = |lead| {
-            let regulator = Regulator { lead, lag_s: 0.05, ..settings.regulator };
+            let law = law(&Regulator { lead, lag_s: 0.05, ..settings.regulator });
             let mut state = RegulatorState::default();
             let mut miss = 0.0_f32;
             for tick in 0..1000 {
                 let wanted = 300.0 * tick as f32;
-                state.step(1e-3, plain(wanted), 600e3, &Air::default(), &regulator, &settings.limits);
+                state.step(plain(wanted), &law.bounds(HIGH_PA), &Air::default(), &law);
                 if tick > 500 {
                     miss = miss.max((state.model_pa() - wanted).abs());
                 }

@@ -27,6 +27,8 @@ use model_core::link::settings::{SensorWatch, Settings};
 
 use crate::board::{Command, Readings};
 
+mod calm;
+
 /// What a watch found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Finding {
@@ -154,6 +156,8 @@ pub struct SideWatch {
     vented_ticks: u32,
     /// Ticks of the slice in which jumps are being counted, none before the first readings.
     slice: u8,
+    /// Whether every fitted sensor has been read, and no row is being counted.
+    quiet: bool,
 }
 
 /// What one muscle's watches look at.
@@ -181,6 +185,11 @@ impl SideWatch {
 
     /// Looks at one tick and reports every finding, the gravest first.
     pub fn check(&mut self, seen: &Seen, settings: &Settings, report: &mut dyn FnMut(Finding)) {
+        self.check_all(seen, settings, report);
+        self.quiet = seen.readings.is_some() && !self.counts();
+    }
+
+    fn check_all(&mut self, seen: &Seen, settings: &Settings, report: &mut dyn FnMut(Finding)) {
         let watch = &settings.watch;
         self.vented_ticks = if seen.command.vent { self.vented_ticks.saturating_add(1) } else { 0 };
         let silent = self.silent.count(seen.readings.is_none(), watch.debounce_ticks);

@@ -35,6 +35,8 @@ pub struct Braid<T> {
     bladder_volume: T,
     bladder_volume_over_pi: T,
     tip: T,
+    /// `L0 + 2 (π/2 − 1) R0`, or `L0` without the tip correction.
+    tip_length: T,
     fibre: T,
     turns: T,
 }
@@ -92,6 +94,7 @@ impl<T: Scalar> Braid<T> {
         bladder_volume: T::ZERO,
         bladder_volume_over_pi: T::ZERO,
         tip: T::ZERO,
+        tip_length: T::ZERO,
         fibre: T::ZERO,
         turns: T::ZERO,
     };
@@ -111,7 +114,7 @@ impl<T: Scalar> Braid<T> {
         let radius = radius_squared.sqrt();
         let bore = (radius_squared - self.bladder_volume_over_pi / length).at_least(T::ZERO).sqrt();
         let wall = radius - bore;
-        let load_length = length - self.tip * (radius - self.rest_radius);
+        let load_length = self.tip_length - stroke.si() - self.tip * radius;
         let squared = load_length * load_length;
         Posture {
             length,
@@ -142,6 +145,7 @@ impl<T: Scalar> Braid<T> {
             bladder_volume: to(self.bladder_volume),
             bladder_volume_over_pi: to(self.bladder_volume_over_pi),
             tip: to(self.tip),
+            tip_length: to(self.tip_length),
             fibre: to(self.fibre),
             turns: to(self.turns),
         }

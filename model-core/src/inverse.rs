@@ -48,6 +48,8 @@ pub struct Search<T> {
 }
 
 const MAX_STEPS: u8 = 40;
+/// Steps on one piece after which the bracket takes over: from an estimate as far away as a piece is long, three end the search.
+const MAX_STEPS_ON_PIECE: u8 = 4;
 
 /// Force as a function of pressure alone, piece by piece smooth.
 trait Curve<T> {
@@ -181,7 +183,7 @@ impl<T: Scalar> Curve<T> for Base<'_, T> {
     #[inline(always)]
     fn enter(&mut self, p: T) {
         let muscle = self.muscle;
-        let index = muscle.nodes.find(p);
+        let index = muscle.nodes.place(p);
         (self.from, self.to) = muscle.nodes.bounds(index);
         let Piece { origin, elastic: e, friction } = &muscle.pieces[index];
         let (c, area, s) = (&self.at_stroke.columns, self.at_stroke.posture.area, -self.direction);
@@ -270,7 +272,71 @@ impl<T: Scalar> Muscle<T> {
         guess: Pressure<T>,
         search: &Search<T>,
     ) -> Solution<T> {
-        solve(&mut Base::new(self, at_stroke, direction), force.si(), guess, search)
+        match self.pressure_on_piece(force, at_stroke, direction, guess, search) {
+            Ok(found) => found,
+            Err(next) => self.pressure_over_pieces(force, at_stroke, direction, [guess, next], search),
+        }
+    }
+
+    /// The search from piece to piece. It goes on where the search on the first piece left it, and if that is not enough, it begins anew
+    /// within a bracket.
+    #[cold]
+    #[inline(never)]
+    fn pressure_over_pieces(
+        &self,
+        force: Force<T>,
+        at_stroke: &AtStroke<T>,
+        direction: T,
+        [guess, next]: [Pressure<T>; 2],
+        search: &Search<T>,
+    ) -> Solution<T> {
+        match self.pressure_on_piece(force, at_stroke, direction, next, search) {
+            Ok(found) => Solution { steps: found.steps + 1, ..found },
+            Err(_) => solve(&mut Base::new(self, at_stroke, direction), force.si(), guess, search),
+        }
+    }
+
+    /// The same search as long as it needs no bracket: on the piece of the estimate, where the force rises, by steps that each become
+    /// smaller, so that none leaves the bracket that those before it make. Within a few steps; otherwise the pressure where it ended.
+    #[inline(always)]
+    fn pressure_on_piece(
+        &self,
+        force: Force<T>,
+        at_stroke: &AtStroke<T>,
+        direction: T,
+        guess: Pressure<T>,
+        search: &Search<T>,
+    ) -> Result<Solution<T>, Pressure<T>> {
+        let (lowest, highest, tolerance) = (search.low.si(), search.high.si(), search.tolerance.si());
+        let wanted = force.si();
+        let mut p = guess.si().at_least(lowest).at_most(highest);
+        let mut base = Base::new(self, at_stroke, direction);
+        base.enter(p);
+        let mut before = T::ZERO;
+        for steps in 1..=MAX_STEPS_ON_PIECE {
+            let (force, slope) = base.force_and_slope(p);
+            let next = p - (force - wanted) / slope;
+            let size = (next - p).abs();
+            // With `!(…)`, a number that is not one ends it.
+            if !(slope > T::ZERO && next > lowest && next < highest) {
+                break;
+            }
+            let ends = size <= tolerance;
+            let holds = base.holds(next);
+            if ends || (holds && size * size <= tolerance * before) {
+                let (pressure, reach) = (Pressure::from_pascals(next), Reach::Reached);
+                return Ok(Solution { pressure, slope, reach, steps });
+            }
+            if !holds {
+                return Err(Pressure::from_pascals(next));
+            }
+            if !(steps == 1 || size < before) {
+                break;
+            }
+            before = size;
+            p = next;
+        }
+        Err(guess)
     }
 
     /// The pressure for a demanded force with effects, at a moment to which `chain` has been stepped.

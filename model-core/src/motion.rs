@@ -210,7 +210,11 @@ impl<T: Scalar> MotionTracker<T> {
 /// 0.13 of the usual law, the exponential `−1 + 2 e^(−ξ/d)`. Unlike that exponential they respond to signed travel, and noise of the
 /// readings cancels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Slide<T>([T; 3]);
+pub struct Slide<T> {
+    sliders: [T; 3],
+    /// The direction in which all of them are at their end, otherwise zero.
+    full: T,
+}
 
 impl<T: Scalar> Slide<T> {
     /// `d/d_i`.
@@ -219,12 +223,18 @@ impl<T: Scalar> Slide<T> {
     /// Takes a travel, in distances `d`, positive while shortening; gives the direction.
     #[inline(always)]
     pub fn step(&mut self, travel: T) -> T {
+        // Nearly always the muscle continues in its direction, long after the last slider has come to its end.
+        if self.full * travel > T::ZERO {
+            return self.full;
+        }
         let mut sum = T::ZERO;
-        for (s, stiffness) in self.0.iter_mut().zip(Self::STIFFNESS) {
+        for (s, stiffness) in self.sliders.iter_mut().zip(Self::STIFFNESS) {
             *s = (*s + travel * T::from_f32(stiffness)).at_least(-T::ONE).at_most(T::ONE);
             sum += *s;
         }
-        sum * T::from_f32(1.0 / 3.0)
+        let direction = sum * T::from_f32(1.0 / 3.0);
+        self.full = if direction.abs() >= T::ONE { direction } else { T::ZERO };
+        direction
     }
 }
 
@@ -295,6 +305,10 @@ mod tests {
         for _ in 0..100 {
             slide.step(0.1);
         }
+        // All sliders at their end: more of the same changes nothing, not even by rounding.
+        let at_end = slide;
+        let direction = slide.step(0.0);
+        assert_eq!((slide.step(0.1), slide), (direction, at_end));
         for n in 0..1000 {
             assert!(slide.step(if n % 2 == 0 { -0.05 } else { 0.05 }) > 0.9);
         }

@@ -19,21 +19,23 @@ mod at_stroke;
 
 pub use at_stroke::{AtStroke, Moment, Parts, StrokeSlopes};
 
-/// A muscle ready to be evaluated, built once from its [`MuscleTable`].
+/// A muscle ready to be evaluated, built once from its [`MuscleTable`]. The long curves come last, so that an instruction reaches all
+/// the rest.
 #[derive(Clone, Debug, PartialEq)]
+#[repr(C)]
 pub struct Muscle<T> {
     pub(crate) braid: Braid<T>,
     pub(crate) nodes: Nodes<T>,
     pub(crate) order: usize,
     order_scalar: T,
-    /// The curves, piece by piece of the line of pressures.
-    pub(crate) pieces: [Piece<T>; MAX_PIECES],
     pub(crate) deadband: T,
     pub(crate) max_pressure: T,
     /// The least force that is exerted: zero for a muscle that goes slack.
     least_force: T,
     goes_slack: bool,
     kind: Kind,
+    /// The curves, piece by piece of the line of pressures.
+    pub(crate) pieces: [Piece<T>; MAX_PIECES],
 }
 
 /// All curves on one piece of the line of pressures.
@@ -145,7 +147,7 @@ impl<T: Scalar> Muscle<T> {
     /// The curves around a pressure, and the pressure above the one that they count from.
     #[inline(always)]
     fn around(&self, pressure: T) -> (&Piece<T>, T) {
-        let piece = &self.pieces[self.nodes.place(pressure)];
+        let piece = self.nodes.choose(pressure, &self.pieces);
         (piece, pressure - piece.origin)
     }
 
@@ -211,29 +213,58 @@ impl<T: Scalar> Muscle<T> {
     /// ```
     #[inline(always)]
     pub fn force(&self, pressure: Pressure<T>, stroke: Length<T>, direction: T) -> Force<T> {
-        self.pull(self.force_posed(&self.braid.posture(stroke), pressure, direction))
+        if self.order > COMMON_ORDER {
+            return self.force_of_high_order(pressure, stroke, direction);
+        }
+        self.pull(self.force_posed::<false>(&self.braid.posture(stroke), pressure, direction))
+    }
+
+    /// The same for a table of an order above [`COMMON_ORDER`].
+    #[inline(never)]
+    fn force_of_high_order(&self, pressure: Pressure<T>, stroke: Length<T>, direction: T) -> Force<T> {
+        self.pull(self.force_posed::<true>(&self.braid.posture(stroke), pressure, direction))
     }
 
     /// The same at a posture, N, and below zero where the muscle would have to push.
     ///
     /// `Σ E_k c_k = (V_B/L) ε_z Σ E_k ε_z^(k−1) − (t L²/2πN²R) ε_x Σ E_k ε_x^(k−1)`: the curves once, and two polynomials.
     #[inline(always)]
-    pub fn force_posed(&self, posture: &Posture<T>, pressure: Pressure<T>, direction: T) -> T {
+    fn force_posed<const HIGH: bool>(&self, posture: &Posture<T>, pressure: Pressure<T>, direction: T) -> T {
         let p = pressure.si();
-        let piece = &self.pieces[self.nodes.place(p)];
-        let u = p - piece.origin;
         let (z, x) = (posture.axial_strain, posture.radial_strain);
+        // Before the curves, so that fewer numbers wait in registers while they are evaluated.
+        let gaylord = (p - self.deadband) * posture.area;
+        let (axial_part, hoop_part) = (posture.axial_area * z, posture.hoop_area * x);
+        let piece = self.nodes.choose(p, &self.pieces);
+        let u = p - piece.origin;
         let e = |k: usize| spline::value(&piece.elastic[k], u);
         let (mut axial, mut hoop) = (e(3), e(3));
-        if self.order > COMMON_ORDER {
+        if HIGH {
             axial += z * (e(4) + z * e(5));
             hoop += x * (e(4) + x * e(5));
         }
         let (e1, e2, e3) = (e(0), e(1), e(2));
         axial = e1 + z * (e2 + z * (e3 + z * axial));
         hoop = e1 + x * (e2 + x * (e3 + x * hoop));
-        let quasi = (p - self.deadband) * posture.area + posture.axial_area * z * axial
-            - posture.hoop_area * x * hoop;
+        let quasi = gaylord + axial_part * axial - hoop_part * hoop;
+        quasi * (T::ONE - spline::value(&piece.friction, u) * direction)
+    }
+
+    /// The same at a held stroke, whose coefficients are there already: `Σ E_k c_k` as it is written.
+    #[inline(always)]
+    pub(crate) fn force_held(&self, at_stroke: &AtStroke<T>, pressure: Pressure<T>, direction: T) -> T {
+        let p = pressure.si();
+        let (piece, u) = self.around(p);
+        let c = &at_stroke.columns;
+        let e = |k: usize| spline::value(&piece.elastic[k], u);
+        let mut quasi = (p - self.deadband) * at_stroke.posture.area
+            + c[0] * e(0)
+            + c[1] * e(1)
+            + c[2] * e(2)
+            + c[3] * e(3);
+        if self.order > COMMON_ORDER {
+            quasi += c[4] * e(4) + c[5] * e(5);
+        }
         quasi * (T::ONE - spline::value(&piece.friction, u) * direction)
     }
 

@@ -36,8 +36,9 @@ pub fn pose(
     pressure: Pressure<f32>,
     direction: f32,
 ) -> Force<f32> {
-    hold(muscle, at_stroke, stroke);
-    muscle.pull(muscle.force_posed(&at_stroke.posture, pressure, direction))
+    let held = muscle.at_stroke(stroke);
+    *at_stroke = held;
+    muscle.pull(muscle.force_held(&held, pressure, direction))
 }
 
 /// [`Muscle::slopes`], into their place.
@@ -134,4 +135,40 @@ pub fn effects(chain: &Chain<f32>, context: &Context<f32>) -> f32 {
 #[inline(never)]
 pub fn follow(tracker: &mut MotionTracker<f32>, dt: f32, stroke: f32, pressure: f32) -> &Motion<f32> {
     tracker.step(dt, stroke, pressure)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table;
+
+    #[test]
+    fn the_force_of_a_tick_is_that_of_the_model() {
+        let mut long = table::example();
+        for _ in long.elastic.len()..table::MAX_ORDER {
+            let last = long.elastic.last().cloned().expect("a curve");
+            long.elastic.push(last).expect("room for another order");
+        }
+        for table in [table::example(), long] {
+            let single = Muscle::<f32>::build(&table).expect("a valid table");
+            let double = Muscle::<f64>::build(&table).expect("a valid table");
+            let mut held = AtStroke::NONE;
+            for n in 0..3_000_i32 {
+                let (p, x) = (200.0 * n as f32, 1e-5 * (n % 300) as f32);
+                let s = (n % 3 - 1) as f32;
+                let (pressure, stroke) = (Pressure::from_pascals(p), Length::from_metres(x));
+                let exact = double.force(pressure.cast(), stroke.cast(), f64::from(s)).newtons();
+                // A thousandth of a percent of the blocked force of about 130 N.
+                for near in
+                    [pose(&single, &mut held, stroke, pressure, s), force(&single, pressure, stroke, s)]
+                {
+                    assert!(
+                        (f64::from(near.newtons()) - exact).abs() < 1.3e-3,
+                        "{near:?} for {exact} at {p}, {x}"
+                    );
+                }
+                assert_eq!(held, single.at_stroke(stroke));
+            }
+        }
+    }
 }

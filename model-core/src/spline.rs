@@ -79,6 +79,37 @@ pub fn value_and_slope<T: Scalar>(c: &Cubic<T>, u: T) -> (T, T) {
 /// The pieces that `n` nodes cut the line of pressures into: below the first, between each two, above the last.
 pub const MAX_PIECES: usize = MAX_NODES + 1;
 
+/// Search among the edges, with `$found!(piece)` for the result: three comparisons for a table of up to seven nodes, as most are, and up
+/// to four more for a longer one. Written out, so that every index is a constant and needs no check.
+macro_rules! search {
+    ($edges:expr, $p:expr, $found:ident) => {{
+        const { assert!(MAX_NODES == 16) };
+        let below = |edge: T| !($p >= edge);
+        macro_rules! half {
+            ($edge:literal, $low:expr, $high:expr) => {
+                if below($edges[$edge]) { $low } else { $high }
+            };
+        }
+        macro_rules! last {
+            ($edge:literal: $low:literal $high:literal) => {
+                half!($edge, $found!($low), $found!($high))
+            };
+        }
+        let long = || {
+            half!(
+                12,
+                half!(10, half!(9, last!(8: 7 8), $found!(9)), last!(11: 10 11)),
+                half!(14, last!(13: 12 13), half!(15, $found!(14), last!(16: 15 16)))
+            )
+        };
+        half!(
+            4,
+            half!(2, last!(1: 0 1), last!(3: 2 3)),
+            half!(6, last!(5: 4 5), half!(7, $found!(6), long()))
+        )
+    }};
+}
+
 /// Increasing nodes, and the search for the piece that a pressure lies in.
 ///
 /// Outside the nodes lie two pieces more, in which curves stay what they are at the outer nodes: so evaluation is the same
@@ -122,32 +153,25 @@ impl<T: Scalar> Nodes<T> {
     }
 
     /// The piece that `p` lies in: how many nodes lie at or below it. A pressure that is not a number lies below the first.
-    ///
-    /// Written out by fours, so that every index is a constant and needs no check.
     #[inline(always)]
     pub fn place(&self, p: T) -> usize {
-        macro_rules! first_above {
-            ($($next:literal)+; $last:literal) => {{
-                $(if !(p >= self.edges[$next]) {
-                    return $next - 1;
-                })+
-                $last
-            }};
+        macro_rules! number {
+            ($piece:literal) => {
+                $piece
+            };
         }
-        const { assert!(MAX_NODES == 16) };
-        if !(p >= self.edges[8]) {
-            if !(p >= self.edges[4]) { first_above!(1 2 3; 3) } else { first_above!(5 6 7; 7) }
-        } else if !(p >= self.edges[12]) {
-            first_above!(9 10 11; 11)
-        } else {
-            first_above!(13 14 15 16; 16)
-        }
+        search!(self.edges, p, number)
     }
 
-    /// The same without inlining, to keep the code small.
-    #[inline(never)]
-    pub fn find(&self, p: T) -> usize {
-        self.place(p)
+    /// What belongs to the piece that `p` lies in, of all pieces.
+    #[inline(always)]
+    pub fn choose<'a, P>(&self, p: T, pieces: &'a [P; MAX_PIECES]) -> &'a P {
+        macro_rules! piece {
+            ($piece:literal) => {
+                &pieces[$piece]
+            };
+        }
+        search!(self.edges, p, piece)
     }
 
     /// The cubics of all pieces of a curve that [`natural_cubic`] runs through `values` at these nodes.
@@ -242,6 +266,22 @@ mod tests {
         for u in [-1.3, 0.0, 0.4, 2.0] {
             let (v, d) = value_and_slope(&c, u);
             assert!((v - value(&c, u)).abs() < 1e-12 && (d - slope(&c, u)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_piece_of_a_pressure_is_the_number_of_nodes_at_or_below_it() {
+        for count in 1..=MAX_NODES {
+            let values: [f64; MAX_NODES] = core::array::from_fn(|n| 10.0 * n as f64);
+            let nodes = Nodes::new(&values[..count]);
+            let numbers: [usize; MAX_PIECES] = core::array::from_fn(|n| n);
+            for step in -3..400_i32 {
+                let p = 0.5 * f64::from(step);
+                let below = values[..count].iter().filter(|node| **node <= p).count();
+                assert_eq!((nodes.place(p), *nodes.choose(p, &numbers)), (below, below), "{p} of {count}");
+            }
+            assert_eq!(nodes.place(f64::NAN), 0);
+            assert_eq!(nodes.place(f64::INFINITY), MAX_NODES, "behind the last node all pieces are alike");
         }
     }
 }

@@ -1,17 +1,17 @@
 //! One muscle at work: its table, its readings, its loops and its regulator.
 
 use model_core::link::messages::SideSample;
-use model_core::link::settings::{Regulator, Settings};
+use model_core::link::settings::Settings;
 use model_core::motion::MotionTracker;
+use model_core::scalar::Scalar;
 
 use super::motion_settings;
-use crate::board::{Command, Readings};
+use crate::board::{Command, Hardware, Readings};
 use crate::health::{Health, Sample};
 use crate::modes::{Integral, Model, Seat};
-use crate::regulator::{Air, RegulatorState};
+use crate::regulator::{Air, Bounds, Law, RegulatorState};
 use crate::signals::{Filters, Sums};
-use crate::tick::TICK_S;
-use crate::watch::SideWatch;
+use crate::watch::{Seen, SideWatch};
 
 /// One muscle at work.
 #[derive(Debug)]
@@ -20,6 +20,8 @@ pub(super) struct Actuator {
     pub(super) motion: MotionTracker<f32>,
     pub(super) watch: SideWatch,
     pub(super) regulator: RegulatorState,
+    /// What may be demanded of the regulator and commanded, by settings, board and table.
+    pub(super) bounds: Bounds,
     pub(super) trim: Integral,
     pub(super) stroke_loop: Integral,
     pub(super) guess_pa: f32,
@@ -44,12 +46,13 @@ pub(super) struct Actuator {
 
 impl Actuator {
     #[inline(always)]
-    pub(super) fn new(settings: &Settings, model: Seat) -> Self {
+    pub(super) fn new(settings: &Settings, model: Seat, bounds: Bounds) -> Self {
         Self {
             model,
             motion: MotionTracker::new(motion_settings(settings)),
             watch: SideWatch::default(),
             regulator: RegulatorState::default(),
+            bounds,
             trim: Integral::default(),
             stroke_loop: Integral::default(),
             guess_pa: 0.0,
@@ -68,16 +71,42 @@ impl Actuator {
         }
     }
 
+    /// What the watches look at.
+    #[inline(always)]
+    pub(super) fn seen(&self) -> Seen {
+        Seen {
+            readings: self.readings,
+            second_pa: self.second_pa,
+            speed_m_per_s: self.motion.motion().speed,
+            command: self.command,
+            expected_pa: self.regulator.model_pa(),
+            model_n: self.model_n,
+        }
+    }
+
     /// Lets the air out, and nothing of what was demanded stays.
-    pub(super) fn vent(&mut self, regulator: &Regulator) {
+    #[inline]
+    pub(super) fn vent(&mut self, law: &Law) {
         // A muscle that has been empty since the last tick, as one that is not there.
-        if self.model_n.is_none() && self.command.vent && self.regulator.is_empty(regulator) {
+        if self.model_n.is_none() && self.command.vent && self.regulator.is_empty(law) {
             return;
         }
+        self.empty(law);
+    }
+
+    #[inline(never)]
+    fn empty(&mut self, law: &Law) {
         let air = self.air();
-        self.regulator.vent(TICK_S, &air, regulator);
+        self.regulator.vent(&air, law);
         self.command = Command::VENT;
         self.sample.pressure_demand_pa = 0.0;
+    }
+
+    /// Limits by settings, board and table, of which one has changed.
+    pub(super) fn bound(&mut self, settings: &Settings, hardware: &Hardware, law: &Law) {
+        let most = self.model.as_ref().map_or(f32::MAX, |model| model.muscle.max_pressure().pascals());
+        let high_pa = most.at_most(settings.limits.pressure_pa).at_most(hardware.command_ceiling_pa);
+        self.bounds = law.bounds(high_pa);
     }
 
     /// One tick of the comparison of load cell and table, which counts while the muscle is controlled and has a load cell.

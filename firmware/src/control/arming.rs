@@ -121,7 +121,7 @@ impl Controller {
             let most = regulator.command_max_pa.at_most(self.hardware.command_ceiling_pa);
             let command = (pressure_pa / regulator.gain - regulator.offset_pa).within(0.0, most);
             let actuator = &mut self.sides[side.index()];
-            actuator.regulator.expect(if filling { command } else { 0.0 }, &regulator);
+            actuator.regulator.expect(if filling { command } else { 0.0 }, &self.law);
             actuator.command = Command { pressure_pa: command, vent: !filling };
         }
         self.arming = match (self.arming, waits_for) {

@@ -2,14 +2,12 @@
 
 use model_core::link::messages::{Fault, Mode, Side, State};
 use model_core::link::settings::FeedForward;
-use model_core::scalar::Scalar;
 
 use super::{Controller, in_register};
 use crate::board::Command;
 use crate::modes;
 use crate::pair::{self, Posed, Pull};
 use crate::regulator::Demand;
-use crate::tick::TICK_S;
 use crate::watch::Finding;
 
 impl Controller {
@@ -54,8 +52,8 @@ impl Controller {
             bad = other.map(|value| (Side::Antagonist, value)).or(bad);
         } else if pair::SUPPORTED {
             // Its regulator's model is kept up for the watch on what stays in it, where there is a second muscle at all.
-            let Self { sides, settings, .. } = self;
-            sides[Side::Antagonist.index()].vent(&settings.regulator);
+            let Self { sides, law, .. } = self;
+            sides[Side::Antagonist.index()].vent(law);
         }
         if let Some((side, value)) = bad {
             self.raise(side, &Finding { fault: Fault::NotANumber, sensor: None, value, limit: 0.0 });
@@ -71,15 +69,13 @@ impl Controller {
         let settings = in_register(&self.settings);
         let actuator = &mut self.sides[side.index()];
         let ceiling_pa = self.hardware.command_ceiling_pa;
-        let most = actuator.model.as_ref().map_or(f32::MAX, |model| model.muscle.max_pressure().pascals());
-        let high = most.at_most(settings.limits.pressure_pa).at_most(ceiling_pa);
+        let high = actuator.bounds.high_pa;
         // Without lead a command is the setpoint, as anyone who measures the regulator itself wants it.
         if settings.pressure.fitted && settings.regulator.lead > 0.0 {
-            actuator.regulator.observe(TICK_S, actuator.sample.pressure_pa, &settings.regulator);
+            actuator.regulator.observe(actuator.sample.pressure_pa, &self.law);
         }
         let air = actuator.air();
-        let driven =
-            actuator.regulator.step(TICK_S, demand, high, &air, &settings.regulator, &settings.limits);
+        let driven = actuator.regulator.step(demand, &actuator.bounds, &air, &self.law);
         actuator.saturation = if !reached {
             // The inverse has gone to the highest pressure, or to the lowest.
             demand.pressure_pa - 0.5 * high
@@ -163,13 +159,13 @@ impl Controller {
 
     /// Keeps the commands of a state or mode that does not control: vented, or held by a fault.
     pub(super) fn rest(&mut self) {
-        let Self { sides, settings, machine, .. } = self;
+        let Self { sides, law, machine, .. } = self;
         for side in sides {
             if machine.state() == State::Fault && !side.command.vent {
                 let air = side.air();
-                side.regulator.hold(TICK_S, &air, &settings.regulator);
+                side.regulator.hold(&air, law);
             } else {
-                side.vent(&settings.regulator);
+                side.vent(law);
             }
         }
     }

@@ -1,12 +1,13 @@
 //! Faults of one tick, from what all watches see.
 
 use model_core::link::messages::{Fault, Mode, Side, State};
-use model_core::link::settings::Reaction;
+use model_core::link::settings::{Reaction, Settings};
 
+use super::actuator::Actuator;
 use super::{Controller, in_register};
 use crate::board::Inputs;
 use crate::safety;
-use crate::watch::{Finding, Seen};
+use crate::watch::Finding;
 
 /// Faults that were found in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -27,6 +28,14 @@ impl Found {
     pub(super) fn venting(&self) -> Option<(Side, Finding)> {
         self.venting
     }
+}
+
+/// All watches of a muscle. Apart from a calm tick, which needs nothing of it.
+#[cold]
+#[inline(never)]
+fn check(actuator: &mut Actuator, settings: &Settings, report: &mut dyn FnMut(Finding)) {
+    let seen = actuator.seen();
+    actuator.watch.check(&seen, settings, report);
 }
 
 impl Controller {
@@ -51,16 +60,12 @@ impl Controller {
             if !used && readings.is_none() {
                 continue;
             }
-            let seen = Seen {
-                readings,
-                second_pa: actuator.second_pa,
-                speed_m_per_s: actuator.motion.motion().speed,
-                command: actuator.command,
-                expected_pa: actuator.regulator.model_pa(),
-                model_n: actuator.model_n,
-            };
+            let seen = actuator.seen();
+            if actuator.watch.pass(&seen, settings) {
+                continue;
+            }
             let state = if used { state } else { State::Disarmed };
-            actuator.watch.check(&seen, settings, &mut |finding| note(side, state, finding));
+            check(actuator, settings, &mut |finding| note(side, state, finding));
         }
         let mut note = |fault, value, limit| {
             note(Side::Agonist, state, Finding { fault, sensor: None, value, limit });
@@ -79,28 +84,32 @@ impl Controller {
         if self.enable_open.count(inputs.enable_open, watch.debounce_ticks) && watch.enable_input {
             note(Fault::EnableOpen, 0.0, 0.0);
         }
-        self.overruns = self.overruns.saturating_add(u32::from(inputs.missed_ticks));
-        self.missed_in_a_row = if inputs.missed_ticks > 0 {
-            self.missed_in_a_row.saturating_add(inputs.missed_ticks)
+        if inputs.missed_ticks == 0 {
+            self.missed_in_a_row = 0;
         } else {
-            0
-        };
-        if self.missed_in_a_row >= watch.overrun_ticks.max(1) {
-            note(Fault::LoopOverrun, f32::from(self.missed_in_a_row), f32::from(watch.overrun_ticks));
+            self.overruns = self.overruns.saturating_add(u32::from(inputs.missed_ticks));
+            self.missed_in_a_row = self.missed_in_a_row.saturating_add(inputs.missed_ticks);
+            if self.missed_in_a_row >= watch.overrun_ticks {
+                note(Fault::LoopOverrun, f32::from(self.missed_in_a_row), f32::from(watch.overrun_ticks));
+            }
         }
         self.owner_age = self.owner_age.saturating_add(1);
         self.setpoint_age = self.setpoint_age.saturating_add(1);
-        let holds = self.sides.iter().any(|side| !side.command.vent);
         let runs = state == State::Running && self.mode != Mode::Vent;
-        let (silence, held) = (watch.host_silence_ticks, state == State::Fault && holds);
-        if (runs || held) && !watch.autonomous && self.owner_age > silence {
+        let held = state == State::Fault && self.sides.iter().any(|side| !side.command.vent);
+        let silence = watch.host_silence_ticks;
+        if self.owner_age > silence && (runs || held) && !watch.autonomous {
             note(Fault::HostSilence, self.owner_age as f32, silence as f32);
         }
         let silence = watch.silence_ticks;
-        if runs && silence > 0 && self.generator.is_set_point() && self.setpoint_age > silence {
+        if self.setpoint_age > silence && runs && silence > 0 && self.generator.is_set_point() {
             note(Fault::SetPointSilence, self.setpoint_age as f32, silence as f32);
         }
-        self.held_ticks = if held { self.held_ticks.saturating_add(1) } else { 0 };
+        if !held {
+            self.held_ticks = 0;
+            return found;
+        }
+        self.held_ticks = self.held_ticks.saturating_add(1);
         if self.held_ticks > watch.hold_ticks {
             note(Fault::HoldEnded, self.held_ticks as f32, watch.hold_ticks as f32);
         }

@@ -11,7 +11,6 @@ use super::arming::Arming;
 use super::{Controller, Notice};
 use crate::board::Command;
 use crate::pair::{self, Arm};
-use crate::regulator;
 use crate::safety::Cause;
 use crate::watch::Finding;
 
@@ -242,7 +241,7 @@ impl Controller {
         }
         self.generator.begin(reference)?;
         // Here, so that no tick has all of it to do.
-        self.generator.look_ahead(regulator::ahead(&self.settings.regulator));
+        self.generator.look_ahead(self.law.ahead());
         self.setpoint_age = 0;
         self.trace.on_start();
         Ok(())

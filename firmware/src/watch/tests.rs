@@ -3,6 +3,7 @@
 use super::*;
 
 mod boundaries;
+mod calm;
 
 fn good() -> Seen {
     Seen {

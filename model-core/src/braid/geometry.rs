@@ -118,6 +118,7 @@ impl<T: Scalar> Geometry<T> {
         let volume_over_pi = l0 * t0 * (d0 - t0);
         let pi_n2 = pi * turns * turns;
         let four_pi_n2 = (two + two) * pi_n2;
+        let tip = if self.tip_correction { T::from_f64(2.0 * (PI / 2.0 - 1.0)) } else { T::ZERO };
         Ok(Braid {
             rest_length: l0,
             inv_rest_length: T::ONE / l0,
@@ -130,7 +131,8 @@ impl<T: Scalar> Geometry<T> {
             inv_two_pi_turns_squared: two / four_pi_n2,
             bladder_volume: pi * volume_over_pi,
             bladder_volume_over_pi: volume_over_pi,
-            tip: if self.tip_correction { T::from_f64(2.0 * (PI / 2.0 - 1.0)) } else { T::ZERO },
+            tip,
+            tip_length: l0 + tip * (d0 / two),
             fibre,
             turns,
         })
