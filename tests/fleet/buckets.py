@@ -58,7 +58,8 @@ def account(endpoint: str) -> tuple[str, str]:
     policy = {"Version": "2012-10-17", "Statement": [{"Effect": "Allow", "Action": "s3:*", "Resource": "*"}]}
     iam.put_user_policy(UserName="bench", PolicyName="bucket", PolicyDocument=json.dumps(policy))
     made = iam.create_access_key(UserName="bench")["AccessKey"]
-    urllib.request.urlopen(urllib.request.Request(f"{endpoint}/moto-api/reset-auth", data=b"0", method="POST")).close()
+    plain = {"Content-Type": "text/plain"}
+    urllib.request.urlopen(urllib.request.Request(f"{endpoint}/moto-api/reset-auth", data=b"0", headers=plain)).close()
     return made["AccessKeyId"], made["SecretAccessKey"]
 
 
@@ -89,6 +90,14 @@ def files(folder: str) -> dict[str, bytes]:
     found = {p.relative_to(root).as_posix(): p.read_bytes() for p in root.rglob("*") if p.is_file()}
     # The place of unfinished results, which only a folder has.
     return {name: data for name, data in found.items() if not name.startswith(".partial")}
+
+
+def same(found: dict[str, bytes], wanted: dict[str, bytes]) -> None:
+    """Equal names with equal bytes."""
+    apart = sorted(name for name in found.keys() | wanted.keys() if found.get(name) != wanted.get(name))
+    # Its failure says whether a file or an object is missing.
+    apart = [name for name in apart if not name.startswith("muscle=lost/") or {name} - found.keys()]
+    assert not apart, f"{len(apart)} of {len(wanted)} files differ or are missing: {apart[:12]}"
 
 
 def refused(done: subprocess.CompletedProcess, *words: str) -> None:
@@ -122,7 +131,7 @@ def killed_and_continued(environment: dict, s3) -> None:
             kills += 1
             continue
         # Complete: the next one begins with an empty place.
-        assert objects(s3, "results") == files("whole")
+        same(objects(s3, "results"), files("whole"))
         for key in objects(s3, "results"):
             s3.delete_object(Bucket=BUCKET, Key=f"results/{key}")
     assert kills == KILLS, kills
@@ -131,16 +140,20 @@ def killed_and_continued(environment: dict, s3) -> None:
     assert done.returncode == 0, done.stderr
     said = json.loads(done.stdout)
     assert (said["reused"], said["computed"], said["failed"]) == (before, MUSCLES + 1 - before, 1), (before, said)
-    assert objects(s3, "results") == files("whole"), "results in the bucket differ from those in the folder"
+    same(objects(s3, "results"), files("whole"))
     again = json.loads(batch(environment, source, target).stdout)
     assert (again["reused"], again["computed"]) == (MUSCLES + 1, 0), again
     # The other two ways: a folder by its address, and a manifest of this machine that names objects.
     here = Path.cwd()
     assert batch(environment, f"file://{here}/fleet.csv", f"file://{here}/by-address").returncode == 0
-    assert files("by-address") == files("whole")
-    Path("mixed.csv").write_text(f"muscle,description,files\nmixed,s3://{BUCKET}/m1/muscle.toml,s3://{BUCKET}/m1/*Pa.csv\n")
+    same(files("by-address"), files("whole"))
+    rows = (f"{name},s3://{BUCKET}/m1/muscle.toml,s3://{BUCKET}/m1/{files}" for name, files in [("mixed", "*Pa.csv"), ("lost", "none.csv")])
+    Path("mixed.csv").write_text("\n".join(["muscle,description,files", *rows]) + "\n")
     mixed = json.loads(batch(environment, "mixed.csv", "mixed").stdout)
-    assert (mixed["computed"], mixed["failed"]) == (1, 0), mixed
+    assert (mixed["computed"], mixed["failed"]) == (2, 1), mixed
+    (lost,) = mixed["failures"]
+    assert (lost["muscle"], lost["code"]) == ("lost", "file::unreadable") and "no such object" in lost["cause"], lost
+    assert "none.csv" in lost["place"] and "s3://BUCKET/KEY" in lost["remedy"], lost
 
 
 def errors(environment: dict, endpoint: str) -> None:

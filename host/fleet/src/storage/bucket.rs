@@ -125,21 +125,20 @@ fn explained(address: &str, code: DataCode, error: &object_store::Error) -> Erro
     let bucket = Url::parse(address).map_or(address.to_owned(), |url| bucket_of(&url));
     let whole = error.to_string();
     let (cause, help) = match error {
-        object_store::Error::NotFound { .. } => (
+        _ if no_bucket(error) => (
             format!("there is no bucket {bucket}"),
             "create it, or correct the address; a server of your own is named by AWS_ENDPOINT".to_owned(),
         ),
-        object_store::Error::Unauthenticated { .. } | object_store::Error::PermissionDenied { .. } => (
+        _ if refuses(error) => (
             format!("{bucket} refuses the credentials"),
             format!("set {variables} to those of an account that may list, read and write this bucket"),
         ),
-        _ if whole.contains("HTTP URLs are not supported") || whole.contains("URL scheme is not allowed") => {
-            (
-                "the endpoint is not encrypted".to_owned(),
-                "give an https:// endpoint, or set AWS_ALLOW_HTTP=true for a server in your own network"
-                    .to_owned(),
-            )
-        }
+        // The client builds no request to such an address.
+        _ if whole.contains("http://") && whole.contains("builder error") => (
+            "the endpoint is not encrypted".to_owned(),
+            "give an https:// endpoint, or set AWS_ALLOW_HTTP=true for a server in your own network"
+                .to_owned(),
+        ),
         _ => (
             format!("{bucket} cannot be used: {}", first_line(&whole)),
             format!(
@@ -150,9 +149,26 @@ fn explained(address: &str, code: DataCode, error: &object_store::Error) -> Erro
     Error::new(code, cause).file(Path::new(address)).help(help)
 }
 
-/// Answers of servers span lines; the first says what is wrong.
+/// Whether listing a bucket failed because there is none: a list that is not found is one of a bucket. Not every request keeps the kind of its error, but
+/// the answer of the server names it: `NoSuchBucket` of S3 and Google, `ContainerNotFound` of Azure.
+fn no_bucket(error: &object_store::Error) -> bool {
+    let answer = error.to_string();
+    matches!(error, object_store::Error::NotFound { .. })
+        || ["NoSuchBucket", "ContainerNotFound", "404 Not Found"].iter().any(|code| answer.contains(code))
+}
+
+/// Whether the credentials are at fault; as in [`no_bucket`], the kind of the error is lost when a bucket is listed.
+fn refuses(error: &object_store::Error) -> bool {
+    use object_store::Error::{PermissionDenied, Unauthenticated};
+    let answer = error.to_string();
+    matches!(error, Unauthenticated { .. } | PermissionDenied { .. })
+        || ["401 Unauthorized", "403 Forbidden"].iter().any(|status| answer.contains(status))
+}
+
+/// Answers of servers span lines, and may be XML; what stands before says what is wrong.
 fn first_line(text: &str) -> &str {
-    text.lines().next().unwrap_or(text)
+    let line = text.lines().next().unwrap_or(text);
+    line.split_once(": <?xml").map_or(line, |(before, _)| before)
 }
 
 /// Lists at most one object, which tells a missing bucket and wrong credentials before anything is computed.
@@ -179,7 +195,7 @@ pub(crate) fn read(address: &str) -> Result<Option<Vec<u8>>> {
                 std::future::poll_fn(|c| objects.as_mut().poll_next(c)).await.transpose().map(drop)
             })?;
             match listed {
-                Err(e @ object_store::Error::NotFound { .. }) => Err(explained(address, code, &e)),
+                Err(e) if no_bucket(&e) => Err(explained(address, code, &e)),
                 // Who may read objects need not be allowed to list them.
                 _ => Ok(None),
             }
